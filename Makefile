@@ -1,0 +1,101 @@
+# stridor: `make demo` and `make test` are all a new user needs; `make` alone lists the rest.
+# Needs make and Python 3.11 or newer; everything else goes into .venv, in the versions of requirements/dev.lock.
+
+PYTHON ?= python3.13 python3.12 python3.11 python3 python
+JOBS ?= 2
+PYTEST_ARGS ?=
+
+LOCK := requirements/dev.lock
+BIN := .venv/bin
+STAMP := .venv/.stridor-ready
+
+.DEFAULT_GOAL := help
+.PHONY: help env demo test weekly bench lint types layers docs lock clean FORCE
+
+help:  ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+
+env: $(STAMP)  ## the environment in .venv, from the lock file
+
+demo: $(STAMP)  ## the two-beam bench, from case file to report, in demo/
+	@mkdir -p demo
+	@test -e demo/two-beams.toml || (cd demo && ../$(BIN)/stridor new two-beams)
+	cd demo && ../$(BIN)/stridor run two-beams.toml
+	@test -s demo/two-beams.out/report.html || { echo "make demo: no report was written" >&2; exit 1; }
+	@echo; echo "The report: $(CURDIR)/demo/two-beams.out/report.html"
+
+# One BLAS thread each: the workers already use the cores.
+test: $(STAMP)  ## all tests but the slow ones
+	OPENBLAS_NUM_THREADS=$${OPENBLAS_NUM_THREADS:-1} $(BIN)/python -m pytest -n $(JOBS) $(PYTEST_ARGS)
+
+weekly: $(STAMP)  ## the slow tests and the full benchmarks
+	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
+	@$(call each_benchmark,)
+
+bench: $(STAMP)  ## the benchmarks in short mode
+	@$(call each_benchmark,--short)
+
+lint: $(STAMP)  ## ruff
+	$(BIN)/python -m ruff check .
+
+types: $(STAMP)  ## pyright, strict, on src
+	$(BIN)/python -m basedpyright --pythonpath $(BIN)/python
+
+layers: $(STAMP)  ## which part may import which
+	$(BIN)/lint-imports
+
+docs: $(STAMP)  ## the documentation, in docs/_build/html; warnings are errors
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
+lock: $(STAMP)  ## requirements/dev.lock again from pyproject.toml (newest versions: UPGRADE=--upgrade)
+	$(BIN)/python -m uv pip compile pyproject.toml --group dev --universal --python-version 3.11 \
+	  --fork-strategy fewest --generate-hashes --custom-compile-command "make lock" --no-emit-index-url --no-emit-find-links \
+	  --quiet $(UPGRADE) --output-file $(LOCK)
+	@! grep -n '://' $(LOCK) || { echo "make lock: $(LOCK) must not name an address" >&2; exit 1; }
+
+clean:  ## removes what the other targets made, except .venv and demo/
+	rm -rf build dist docs/_build .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find src tests benchmarks examples docs -type d -name __pycache__ -prune -exec rm -rf {} + 2>/dev/null || true
+
+# -- how it is done ----------------------------------------------------------------------------------------------------
+
+define each_benchmark
+set -e; n=0; for script in benchmarks/[!_]*.py; do \
+  test -f "$$script" || continue; \
+  n=$$((n + 1)); echo "== $$script $(1)"; $(BIN)/python "$$script" $(1); \
+done; test $$n -gt 0 || { echo "no benchmarks found" >&2; exit 1; }
+endef
+
+# The first Python that really runs (shims may exist that only complain), is new enough, and can make environments.
+define find_python
+chosen=; old=; bare=; \
+for candidate in $(PYTHON); do \
+  version=$$("$$candidate" -c 'import sys; print("%d.%d.%d" % sys.version_info[:3])' 2>/dev/null </dev/null) || continue; \
+  "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { old="$$old $$candidate ($$version)"; continue; }; \
+  "$$candidate" -c 'import ensurepip, venv' 2>/dev/null || { bare="$$bare $$candidate ($$version)"; continue; }; \
+  chosen=$$candidate; break; \
+done; \
+if test -n "$$chosen"; then :; \
+elif test -n "$$bare"; then \
+  echo "stridor: no module venv in$$bare. On Debian or Ubuntu: apt install python3-venv" >&2; exit 1; \
+else \
+  echo "stridor needs Python 3.11 or newer; found:$${old:- none}. Install one, or name it: make demo PYTHON=/path/to/python3" >&2; exit 1; \
+fi
+endef
+
+# The stamp holds the folder's path: an environment that was moved or copied along is set up again.
+$(STAMP): $(LOCK) pyproject.toml $(if $(subst x$(CURDIR),,x$(shell cat $(STAMP) 2>/dev/null)),FORCE)
+	@if test "$$(cat $@ 2>/dev/null || echo "$(CURDIR)")" = "$(CURDIR)" && \
+	  $(BIN)/python -c 'import pip, sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then :; else \
+	  $(find_python); \
+	  echo "making .venv with $$chosen ($$version)"; \
+	  "$$chosen" -m venv --clear .venv || { echo "stridor: $$chosen -m venv failed, see above" >&2; exit 1; }; \
+	fi
+	@echo "installing $(LOCK) into .venv (about a minute the first time)"
+	@$(BIN)/python -m pip install -qq --no-input --disable-pip-version-check --require-hashes -r $(LOCK) || { \
+	  echo "stridor: the locked packages cannot be installed with $$($(BIN)/python -V) on $$(uname -sm), see above." >&2; \
+	  echo "The lock covers Python 3.11 to 3.13 on Linux and macOS; without a network, nothing can be fetched." >&2; exit 1; }
+	@$(BIN)/python -m pip install -qq --no-input --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@printf '%s\n' "$(CURDIR)" > $@
+
+FORCE:

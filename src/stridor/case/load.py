@@ -1,0 +1,76 @@
+"""Case files read from disk or from text, and the templates they may start from."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+
+from ..errors import CaseError
+from .model import Case
+from .overrides import override
+from .points import no_such
+
+_POSITION = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\s*$")
+
+
+def load(path: str | Path, overrides: Sequence[str] = ()) -> Case:
+    """The case in a TOML file, with overrides such as "phases.1.duration=0.01" applied. Raises CaseError."""
+    source = str(path)
+    try:
+        text = Path(path).read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise CaseError(source, None, "no such file") from None
+    except IsADirectoryError:
+        raise CaseError(source, None, "is a directory; give the path of a case file") from None
+    except UnicodeDecodeError as error:
+        raise CaseError(
+            source, None, f"not UTF-8 text (byte {error.start}); save the file as UTF-8"
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise CaseError(source, None, f"cannot be read: {reason}") from None
+    return loads(text, overrides, source)
+
+
+def loads(text: str, overrides: Sequence[str] = (), source: str = "<text>") -> Case:
+    """The case in a TOML text, with overrides applied; `source` is its name in messages. Raises CaseError."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax(error, source) from None
+    except RecursionError:
+        raise CaseError(source, None, "not valid TOML: nested too deeply") from None
+    if not data and not overrides:
+        raise CaseError(source, None, "empty; a case needs at least one table [bodies.NAME]")
+    problems = override(data, overrides)
+    if problems:
+        raise CaseError.many(problems)
+    return Case.checked(data)
+
+
+def templates() -> list[str]:
+    """Names of the case files to start from."""
+    folder = resources.files("stridor.case") / "templates"
+    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+
+
+def template_text(name: str) -> str:
+    """The commented text of a template. Raises CaseError for a name that is not one of `templates()`."""
+    if name not in templates():
+        raise CaseError(
+            "template", name, no_such("template", name, templates()).replace("the case has", "there are")
+        )
+    return (resources.files("stridor.case") / "templates" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def _syntax(error: tomllib.TOMLDecodeError, source: str) -> CaseError:
+    message = str(error)
+    found = _POSITION.search(message)
+    reason = _POSITION.sub("", message)
+    if found is None:
+        return CaseError(source, None, f"not valid TOML: {reason}")
+    where = f"{source}, line {found[1]}, column {found[2]}" if found[1] else f"{source}, at the end"
+    return CaseError(where, None, f"not valid TOML: {reason[:1].lower()}{reason[1:]}")

@@ -1,0 +1,200 @@
+"""Pydantic's findings in plain English: one Problem each, at the path a user would write.
+
+The schema is walked along with each finding, so that a path never shows how a union was tried, and the
+description of the field that was reached says what it must be.
+"""
+
+from __future__ import annotations
+
+import re
+import types
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Union, cast, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from ..errors import Problem
+from .points import did_you_mean, nearest
+from .schema import NAME_RULE
+
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+@dataclass
+class _Place:
+    """Where the walk has come to: the path, the type wanted and the value written there, and what it must be.
+
+    table: the table that the last key belongs to, with its alternatives where a tag chose it among several;
+    keys: the only keys accepted here, where they are words of a list rather than names.
+    """
+
+    path: tuple[str | int, ...]
+    annotation: Any
+    value: object
+    description: str = ""
+    table: type[BaseModel] | None = None
+    alternatives: tuple[type[BaseModel], ...] = ()
+    keys: tuple[str, ...] = ()
+
+
+def dotted(path: Sequence[str | int]) -> str:
+    """A path as in an override, keys quoted where they need it."""
+    return ".".join(key if _BARE_KEY.fullmatch(key) else f'"{key}"' for key in map(str, path))
+
+
+def problems_of(error: ValidationError, data: object, root: type[BaseModel]) -> list[Problem]:
+    """One Problem for each place that `error` found wrong in `data`, validated as `root`."""
+    found: dict[str, Problem] = {}
+    misspelt: set[str] = set()
+    missing: list[str] = []
+    for item in error.errors(include_url=False, include_input=False, include_context=False):
+        kind, location = item["type"], item["loc"]
+        place = _reach(location, data, root)
+        if kind == "extra_forbidden":
+            problem, meant = _unknown_key(place)
+            if meant:
+                misspelt.add(dotted((*place.path[:-1], meant)))
+        elif kind == "missing" and not isinstance(location[-1], int):
+            problem = Problem(dotted(place.path), None, f"missing – must be {place.description}")
+            missing.append(problem.where)
+        elif location and location[-1] == "[key]":
+            problem = _bad_key(place)
+        elif kind in ("union_tag_not_found", "union_tag_invalid"):
+            problem = _bad_tag(place)
+        else:
+            problem = _bad_value(place)
+        found.setdefault(problem.where, problem)
+    return [problem for where, problem in found.items() if not (where in missing and where in misspelt)]
+
+
+def _reach(location: Sequence[str | int], data: object, root: type[BaseModel]) -> _Place:
+    """Follow a location of pydantic's as far as it names something that a user wrote or should write."""
+    place = _Place((), root, data)
+    for step in location:
+        tables = _tables(place.annotation)
+        if len(tables) > 1:  # the step is the tag of the alternative that was tried
+            chosen = next(table for table in tables if step in _tags(table))
+            place = replace(place, annotation=chosen, alternatives=tables)
+            continue
+        here = replace(place, path=(*place.path, step), value=_item(place.value, step))
+        if tables:
+            field = tables[0].model_fields.get(str(step))
+            description = (field.description or "") if field else ""
+            alternatives = place.alternatives if tables[0] in place.alternatives else tables
+            annotation = field.annotation if field else None
+            place = replace(
+                here,
+                annotation=annotation,
+                description=description,
+                table=tables[0],
+                alternatives=alternatives,
+            )
+        elif (entries := _entries(place.annotation, step)) is not None:
+            keys, annotation = entries
+            place = replace(here, annotation=annotation, keys=keys)
+        else:
+            break
+    return place
+
+
+def _unknown_key(place: _Place) -> tuple[Problem, str]:
+    """The problem, and the key that was probably meant ("" if unclear)."""
+    assert place.table is not None, "only tables have unknown keys"
+    key, where, accepted = str(place.path[-1]), dotted(place.path), ", ".join(place.table.model_fields)
+    if any(key in table.model_fields for table in place.alternatives):
+        tag = _tags(place.table)[0]
+        return Problem(where, place.value, f"not used by {tag!r}; accepted: {accepted}"), ""
+    meant = nearest(key, place.table.model_fields)
+    return Problem(where, None, f"unknown key{did_you_mean(meant)}; accepted: {accepted}"), meant
+
+
+def _bad_key(place: _Place) -> Problem:
+    where, key = dotted(place.path), str(place.path[-1])
+    if place.keys:
+        suggestion = did_you_mean(nearest(key, place.keys))
+        return Problem(where, None, f"unknown key{suggestion}; accepted: {', '.join(place.keys)}")
+    return Problem(where, None, f"not a name; a name is {NAME_RULE}")
+
+
+def _bad_tag(place: _Place) -> Problem:
+    tables = _tables(place.annotation)
+    tag = next(name for name, field in tables[0].model_fields.items() if _words(field.annotation))
+    where, given = dotted((*place.path, tag)), _item(place.value, tag)
+    accepted = f"must be {tables[0].model_fields[tag].description}"
+    if given is None:
+        return Problem(where, None, f"missing – {accepted}")
+    suggestion = nearest(str(given), [word for table in tables for word in _tags(table)])
+    return Problem(where, given, accepted + did_you_mean(suggestion))
+
+
+def _bad_value(place: _Place) -> Problem:
+    where, given = dotted(place.path), place.value
+    tables = _tables(place.annotation)
+    if len(tables) == 1 and not isinstance(given, Mapping):
+        return Problem(where, given, f"must be a table with the keys {', '.join(tables[0].model_fields)}")
+    accepted = f"must be {place.description}"
+    if isinstance(given, str):
+        if _NUMBER.fullmatch(given.strip()) and "number" in place.description:
+            accepted += "; write it without quotes"
+        accepted += did_you_mean(nearest(given, _words(place.annotation)))
+    return Problem(where, given, accepted)
+
+
+# -- the schema, as far as paths need it ---------------------------------------------------------------------
+
+
+def _plain(annotation: Any) -> Any:
+    while get_origin(annotation) is Annotated:
+        annotation = get_args(annotation)[0]
+    return annotation
+
+
+def _alternatives(annotation: Any) -> tuple[Any, ...]:
+    annotation = _plain(annotation)
+    if get_origin(annotation) in (Union, types.UnionType):
+        return tuple(_plain(option) for option in get_args(annotation) if option is not type(None))
+    return (annotation,)
+
+
+def _tables(annotation: Any) -> tuple[type[BaseModel], ...]:
+    """The tables that the annotation accepts; more than one where a key says which."""
+    options = _alternatives(annotation)
+    return tuple(option for option in options if isinstance(option, type) and issubclass(option, BaseModel))
+
+
+def _words(annotation: Any) -> list[str]:
+    """The words that the annotation accepts."""
+    return [
+        value for option in _alternatives(annotation) for value in get_args(option) if isinstance(value, str)
+    ]
+
+
+def _tags(table: type[BaseModel]) -> list[str]:
+    """The word that tells the table from its alternatives."""
+    words = (_words(field.annotation) for field in table.model_fields.values())
+    return next((tag for tag in words if len(tag) == 1), [])
+
+
+def _entries(annotation: Any, step: str | int) -> tuple[tuple[str, ...], Any] | None:
+    """Words accepted as keys (none: any name) and type of the entries of a table or a list of tables.
+
+    None for anything that is better shown as a whole, such as a list of numbers.
+    """
+    for option in _alternatives(annotation):
+        arguments, origin = get_args(option), get_origin(option)
+        if isinstance(origin, type) and issubclass(origin, Mapping):
+            return tuple(_words(arguments[0])), arguments[1]
+        if origin is tuple and isinstance(step, int) and _tables(arguments[0]):
+            return (), arguments[0]
+    return None
+
+
+def _item(value: object, step: str | int) -> object:
+    if isinstance(value, Mapping):
+        return cast("Mapping[str | int, object]", value).get(step)
+    if isinstance(value, list | tuple) and isinstance(step, int):
+        items = cast("Sequence[object]", value)
+        return items[step] if step < len(items) else None
+    return None

@@ -1,0 +1,197 @@
+"""The case: what a user wrote, checked as a whole and frozen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, Any, cast
+
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError, model_validator
+
+from ..errors import CaseError, Problem
+from .checks import Parts, problems_between, slave_side
+from .messages import problems_of
+from .oddities import oddities
+from .overrides import apply, split_path
+from .points import PointRef, parse_point
+from .schema import (
+    DEFAULT_PHASES,
+    ENTRIES,
+    Body,
+    Comparison,
+    Contact,
+    Load,
+    MaterialTable,
+    Modal,
+    Name,
+    Phase,
+    Phases,
+    Reference,
+    Support,
+    Table,
+    Temporal,
+)
+
+
+class Case(Table):
+    """Bodies, what holds and loads them, where they slide, and the settings of the analyses. SI units.
+
+    Frozen; varied by copy with `with_`. Made by `load`, `loads` or `Case.checked`, which raise CaseError with
+    every problem found; calling the class itself raises pydantic's ValidationError for values of the wrong kind.
+    """
+
+    title: str = Field(default="", description="a text")
+    materials: Mapping[Name, MaterialTable] = Field(
+        default_factory=dict[str, MaterialTable], description="tables [materials.NAME]"
+    )
+    bodies: Annotated[Mapping[Name, Body], Field(min_length=1)] = Field(
+        description="tables [bodies.NAME], at least one"
+    )
+    supports: Mapping[Name, Support] = Field(
+        default_factory=dict[str, Support], description="tables [supports.NAME]"
+    )
+    loads: Mapping[Name, Load] = Field(default_factory=dict[str, Load], description="tables [loads.NAME]")
+    contacts: Mapping[Name, Contact] = Field(
+        default_factory=dict[str, Contact], description="tables [contacts.NAME]"
+    )
+    phases: Phases = Field(default=DEFAULT_PHASES, description="a list of tables [[phases]]")
+    modal: Modal = Field(default=Modal(), description="a table [modal]")
+    temporal: Temporal = Field(default=Temporal(), description="a table [temporal]")
+    comparison: Comparison = Field(default=Comparison(), description="a table [comparison]")
+    reference: Reference | None = Field(default=None, description="a table [reference]")
+
+    @classmethod
+    def checked(cls, data: Mapping[str, Any]) -> Case:
+        """The case that plain data, as read from TOML, describe. Raises CaseError with every problem found."""
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            found = problems_of(error, data, cls)
+            told = {problem.where for problem in found}
+            between = [
+                problem for problem in problems_between(_sound(data, error)) if problem.where not in told
+            ]
+            raise CaseError.many(_in_file_order([*found, *between])) from None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Case:
+        # A CaseError is no ValueError: it passes through pydantic as it is.
+        tables = {name: getattr(self, name) for name in type(self).model_fields if name != "title"}
+        if problems := problems_between(Parts(**tables)):
+            raise CaseError.many(problems)
+        return self
+
+    @property
+    def warnings(self) -> list[str]:
+        """One line for each value that is allowed but probably not meant (units, digits)."""
+        return list(oddities(self.materials, self.bodies, self.contacts))
+
+    @property
+    def text(self) -> str:
+        """The case as TOML: only what was given, without comments; `loads` makes an equal case of it."""
+        return self.to_toml()
+
+    def to_toml(self, *, defaults: bool = False) -> str:
+        """The case as TOML, defaults written out if so chosen; `loads` makes an equal case of it."""
+        import tomlkit
+
+        return tomlkit.dumps(self._data(defaults=defaults))  # pyright: ignore[reportUnknownMemberType]
+
+    def with_(self, changes: Mapping[str, object] | None = None, /, **more: object) -> Case:
+        """A copy with other values at dotted paths, checked again; None removes a key.
+
+        case.with_({"contacts.A.friction.coefficient": 0.3}), case.with_(title="lower friction"). An item of a
+        list is reached by its number from 0 or its name ("phases.slide.duration"). Raises CaseError.
+        """
+        data = self._data()
+        problems: list[Problem] = []
+        for path, value in {**(changes or {}), **more}.items():
+            problems.extend(apply(data, split_path(path), _plain(value)))
+        if problems:
+            raise CaseError.many(problems)
+        return Case.checked(data)
+
+    def point(self, reference: str, *, where: str = "point") -> PointRef:
+        """The point that "body.point" or "body@distance" names. Raises CaseError at `where` if none."""
+        return parse_point(reference, self.bodies, where)
+
+    def side(self, contact: str) -> int:
+        """+1 where the slave of a contact lies left of its master's direction, start to end, -1 right."""
+        table = self.contacts[contact]
+        if table.side is not None:
+            return 1 if table.side == "left" else -1
+        return slave_side(self.bodies[self.point(table.slave).body], self.bodies[table.master])
+
+    def load_factors(self) -> tuple[dict[str, float], ...]:
+        """For each phase, the factor of every load at its end."""
+        return tuple(_carried(self.phases, self.loads, lambda phase: phase.loads))
+
+    def velocity_factors(self) -> tuple[dict[str, float], ...]:
+        """For each phase, the factor of every moving support's velocity at its end."""
+        moving = [name for name, support in self.supports.items() if support.velocity]
+        return tuple(_carried(self.phases, moving, lambda phase: phase.velocities))
+
+    def _data(self, *, defaults: bool = False) -> dict[str, Any]:
+        return self.model_dump(mode="json", exclude_unset=not defaults, exclude_none=True)
+
+
+def _carried(
+    phases: tuple[Phase, ...],
+    names: Mapping[str, Any] | list[str],
+    factors: Callable[[Phase], Mapping[str, float]],
+) -> Iterator[dict[str, float]]:
+    present = dict.fromkeys(names, 1.0)
+    for phase in phases:
+        present = {**present, **factors(phase)}
+        yield present
+
+
+def _sound(data: Mapping[str, Any], error: ValidationError) -> Parts:
+    """What of the data is sound although the whole is not."""
+    parts = Parts()
+    faults = {item["loc"][:2] for item in error.errors(include_url=False, include_input=False)}
+    for table, kind in ENTRIES.items():
+        entries = data.get(table, {})
+        if not isinstance(entries, dict):
+            parts.broken.add((table, "*"))
+            continue
+        sound: dict[str, Any] = {}
+        for name, entry in cast("dict[str, Any]", entries).items():
+            if (table, name) in faults:
+                parts.broken.add((table, name))
+            else:
+                sound[name] = TypeAdapter(kind).validate_python(entry)
+        setattr(parts, table, sound)
+    sections: dict[str, Any] = {
+        "phases": Phases,
+        "modal": Modal,
+        "temporal": Temporal,
+        "comparison": Comparison,
+        "reference": Reference,
+    }
+    for section, kind in sections.items():
+        if section in data and not any(fault[:1] == (section,) for fault in faults):
+            setattr(parts, section, TypeAdapter(kind).validate_python(data[section]))
+    return parts
+
+
+def _in_file_order(problems: list[Problem]) -> list[Problem]:
+    order = list(Case.model_fields)
+
+    def place(problem: Problem) -> int:
+        head = problem.where.split(".")[0]
+        return order.index(head) if head in order else -1
+
+    return sorted(problems, key=place)
+
+
+def _plain(value: object) -> object:
+    """NumPy scalars and arrays, tuples and tables as TOML would give them."""
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+    if hasattr(value, "tolist"):
+        return cast("Any", value).tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in cast("Mapping[str, object]", value).items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in cast("list[object]", value)]
+    return value

@@ -1,0 +1,83 @@
+"""What can go wrong, said in one line each: where, what was given, what is accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+_LONGEST_SHOWN = 60
+
+
+class StridorError(Exception):
+    """Anything stridor refuses to do or cannot do, with a message meant for its user."""
+
+
+class AnalysisError(StridorError):
+    """The case is valid, but the analysis has no answer (a contact that would pull, a singular system)."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with what was given.
+
+    where: dotted path of the value, as in an override; given: the value as written, None where nothing was;
+    accepted: what is wrong with it and what would be accepted.
+    """
+
+    where: str
+    given: object
+    accepted: str
+
+    def __str__(self) -> str:
+        if self.given is None:
+            return f"{self.where}: {self.accepted}"
+        return f"{self.where}: {shown(self.given)} – {self.accepted}"
+
+
+class CaseError(StridorError):
+    """Bad input. `problems` holds everything found wrong, and str() is one line for each.
+
+    CaseError("contacts.A.slave", "beam1.tipp", "no such point; beam1 has: start, tip, end")
+    """
+
+    problems: tuple[Problem, ...]
+
+    def __init__(self, where: str, given: object, accepted: str) -> None:
+        super().__init__(where, given, accepted)
+        self.problems = (Problem(where, given, accepted),)
+
+    @classmethod
+    def many(cls, problems: Iterable[Problem]) -> CaseError:
+        """One error for several problems, in the order given. Raises ValueError if there are none."""
+        held = tuple(problems)
+        if not held:
+            raise ValueError("a CaseError needs at least one problem")
+        error = cls(held[0].where, held[0].given, held[0].accepted)
+        error.problems = held
+        return error
+
+    def __str__(self) -> str:
+        return "\n".join(str(problem) for problem in self.problems)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Between processes exceptions are rebuilt from their arguments; that would keep one problem only.
+        return CaseError.many, (self.problems,)
+
+
+def shown(value: object) -> str:
+    """The value as it reads in a case file, on one line, shortened to about 60 characters."""
+    text = _written(value)
+    return text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 1] + "…"
+
+
+def _written(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        table = cast("Mapping[object, object]", value)
+        inner = ", ".join(f"{key} = {_written(item)}" for key, item in table.items())
+        return f"{{ {inner} }}" if inner else "{}"
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        return "[" + ", ".join(_written(item) for item in cast("Sequence[object]", value)) + "]"
+    return repr(value) if isinstance(value, str) else str(value)

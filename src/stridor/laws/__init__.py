@@ -1,0 +1,15 @@
+"""Laws of materials and contacts: frozen numbers and pure functions of numbers; no mesh, no state."""
+
+from stridor.laws.damping import Rayleigh
+from stridor.laws.elasticity import Material, RectangularSection
+from stridor.laws.friction import Coulomb, FrictionLaw, StaticKinetic, Weakening
+
+__all__ = [
+    "Coulomb",
+    "FrictionLaw",
+    "Material",
+    "Rayleigh",
+    "RectangularSection",
+    "StaticKinetic",
+    "Weakening",
+]

@@ -1,0 +1,133 @@
+"""The small contact problem T(λ, μ) δ = 0 that carries the whole friction coupling.
+
+Unknowns per touching contact: the perturbation of the normal force, and where the friction law has
+a slope also that of the slip speed. With receptances H of the uncoupled structure (normal n,
+tangential t), sense s and compliance 1/K_c,
+
+    gap:       −δN/K_c = H_nn δN + H_nt F_t
+    slip:       δw     = H_tn δN + H_tt F_t          (only with a slope)
+    friction:   F_t    = s μ δN − d λ δw,   d = N μ'(v)
+
+(paper eqs 2–4, linearised about steady sliding; docs/theory-modal.md). Constant μ leaves
+T = 1/K_c + H_nn + H_nt s μ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..sliding import full_motion, slip_speeds, steady_sliding
+from ..system import System
+from ..typing import Array, ComplexArray
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """What friction adds to a system whose contacts all touch. m contacts.
+
+    compliance (m,) 1/K_c [m/N]; sense (m,) ±1; slip_speed (m,) [m/s], signed. Whether the laws have
+    a slope at their slip speeds is ``sloped``.
+    """
+
+    system: System
+    compliance: Array
+    sense: Array
+    slip_speed: Array
+    sloped: bool
+
+    @property
+    def contacts(self) -> int:
+        """Number of touching contacts m."""
+        return len(self.compliance)
+
+    def friction_damping(self, mu: float) -> Array:
+        """d = N dμ/d|v| (m,) [N s/m] at steady sliding with coefficient ``mu``."""
+        if not self.sloped or mu == 0.0:
+            return np.zeros(self.contacts)
+        speeds = np.abs(self.slip_speed)
+        steady = steady_sliding(self.system, mu=mu)
+        slopes = [
+            c.law.scaled(mu, float(v)).slope(float(v))
+            for c, v in zip(self.system.contacts, speeds, strict=True)
+        ]
+        return steady.normal_force * np.array(slopes)
+
+    def friction_damping_slope(self, mu: float) -> tuple[Array, Array]:
+        """d and its derivative in μ (m,), the derivative by a central difference."""
+        if not self.sloped:
+            zero = np.zeros(self.contacts)
+            return zero, zero
+        step = 1e-5 * max(mu, 1e-2)
+        low = max(mu - step, 0.0)
+        high = mu + step
+        slope = (self.friction_damping(high) - self.friction_damping(low)) / (high - low)
+        return self.friction_damping(mu), slope
+
+    def matrices(
+        self, lam: ComplexArray, mu: float | complex, receptance: ComplexArray, slope: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """T, ∂T/∂λ, ∂T/∂μ (k, q, q) at λ (k,), q = m or 2m, from H and dH/dλ (k, 2m, 2m)."""
+        nn, nt = receptance[:, 0::2, 0::2], receptance[:, 0::2, 1::2]
+        dnn, dnt = slope[:, 0::2, 0::2], slope[:, 0::2, 1::2]
+        friction = self.sense * mu
+        value = np.diag(self.compliance) + nn + nt * friction
+        by_lambda = dnn + dnt * friction
+        by_mu = nt * self.sense
+        if not self.sloped:
+            return value, by_lambda, by_mu
+        d, d_slope = self.friction_damping_slope(float(np.real(mu)))
+        tn, tt = receptance[:, 1::2, 0::2], receptance[:, 1::2, 1::2]
+        dtn, dtt = slope[:, 1::2, 0::2], slope[:, 1::2, 1::2]
+        at = lam[:, None, None]
+        identity = np.eye(self.contacts)
+        return (
+            _blocks(value, -nt * (d * at), -(tn + tt * friction), identity + tt * (d * at)),
+            _blocks(
+                by_lambda,
+                -dnt * (d * at) - nt * d,
+                -(dtn + dtt * friction),
+                dtt * (d * at) + tt * d,
+            ),
+            _blocks(by_mu, -nt * (d_slope * at), -tt * self.sense, tt * (d_slope * at)),
+        )
+
+    def push(self, mu: float, lam: ComplexArray, null: ComplexArray) -> ComplexArray:
+        """Contact forces on [normal, tangential] rows (k, 2m) belonging to null vectors (k, q) of T."""
+        m = self.contacts
+        normal = null[:, :m]
+        tangential = self.sense * mu * normal
+        if self.sloped:
+            tangential = tangential - self.friction_damping(mu) * lam[:, None] * null[:, m:]
+        return np.stack([normal, tangential], axis=2).reshape(len(null), 2 * m)
+
+
+def _blocks(a: ComplexArray, b: ComplexArray, c: ComplexArray, d: ComplexArray) -> ComplexArray:
+    return np.concatenate([np.concatenate([a, b], axis=2), np.concatenate([c, d], axis=2)], axis=1)
+
+
+def couple(system: System, *, mu: float | None = None) -> tuple[Coupling, tuple[str, ...]]:
+    """Coupling of the contacts that touch in steady sliding at ``mu`` (default: the laws' own), and
+    the names of those that do not. Without loads every contact counts as touching."""
+    open_names: tuple[str, ...] = ()
+    if system.contacts and system.loads:
+        steady = steady_sliding(system, mu=mu)
+        open_names = tuple(c.name for c, a in zip(system.contacts, steady.active, strict=True) if not a)
+        touching = tuple(c for c, a in zip(system.contacts, steady.active, strict=True) if a)
+        system = replace(system, contacts=touching)
+    speeds = slip_speeds(system, full_motion(system))
+    sloped = any(c.law.slope(abs(float(v))) != 0.0 for c, v in zip(system.contacts, speeds, strict=True))
+    if sloped and not system.loads:
+        raise AnalysisError(
+            "a friction law with a slope needs the normal force: give the case a load that presses the bodies"
+        )
+    still = [c.name for c, v in zip(system.contacts, speeds, strict=True) if v == 0.0]
+    if still:
+        raise AnalysisError(
+            f"contact {', '.join(still)} does not slide: no support moves one of its bodies along the "
+            "tangent; give a support a velocity"
+        )
+    compliance = np.array([c.compliance for c in system.contacts])
+    return Coupling(system, compliance, -np.sign(speeds), speeds, sloped), open_names

@@ -1,0 +1,109 @@
+"""Receptance of the uncoupled structure at the contacts, and the small problem T(λ, μ) δ = 0.
+
+With g = G u (normal and tangential relative displacement of each contact) and H(λ) = G D(λ)⁻¹ Gᵀ,
+the friction-coupled system has the eigenvalue λ exactly where T(λ, μ) is singular. For one contact
+with constant μ this is 1/K_c + H_nn + μ s H_nt = 0, so that μ(λ) is explicit (docs/theory-modal.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+from numba import njit
+
+from ..system import System
+from ..typing import Array, ComplexArray
+from .uncoupled import UncoupledModes
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _real_mode_sums(
+    lam_re: Array, lam_im: Array, damping: Array, stiffness: Array, products: Array, out: Array
+) -> None:  # pragma: no cover - compiled
+    """out (k, p, 4): Re and Im of Σ φφ/d with d = λ² + cλ + ω², and of its derivative in λ."""
+    for k in range(lam_re.shape[0]):
+        a, b = lam_re[k], lam_im[k]
+        for p in range(products.shape[0]):
+            s0 = s1 = s2 = s3 = 0.0
+            for i in range(stiffness.shape[0]):
+                dr = a * a - b * b + damping[i] * a + stiffness[i]
+                di = 2 * a * b + damping[i] * b
+                scale = 1.0 / (dr * dr + di * di)
+                fr, fi = dr * scale, -di * scale
+                er, ei = 2 * a + damping[i], 2 * b
+                qr, qi = fr * fr - fi * fi, 2 * fr * fi
+                w = products[p, i]
+                s0 += w * fr
+                s1 += w * fi
+                s2 -= w * (er * qr - ei * qi)
+                s3 -= w * (er * qi + ei * qr)
+            out[k, p, 0] = s0
+            out[k, p, 1] = s1
+            out[k, p, 2] = s2
+            out[k, p, 3] = s3
+
+
+@dataclass(frozen=True)
+class Receptance:
+    """H(λ) = G D(λ)⁻¹ Gᵀ and its derivative from a complete modal basis.
+
+    real (r, n_real), general (r, n_poles): rows of G on the modes.
+    """
+
+    modes: UncoupledModes
+    real: Array
+    general: ComplexArray
+
+    @staticmethod
+    def of(system: System, modes: UncoupledModes) -> Receptance:
+        """Receptance at the contacts of ``system``."""
+        return Receptance(modes, *modes.project(system.contact_rows()))
+
+    def __call__(self, lam: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """H and dH/dλ (k, r, r) at λ (k,)."""
+        rows = self.real.shape[0]
+        first, second = np.triu_indices(rows)
+        sums = np.zeros((len(lam), len(first), 4))
+        products = np.ascontiguousarray(self.real[first] * self.real[second])
+        _real_mode_sums(
+            np.ascontiguousarray(lam.real),
+            np.ascontiguousarray(lam.imag),
+            self.modes.damping,
+            self.modes.stiffness,
+            products,
+            sums,
+        )
+        value = sums[..., 0] + 1j * sums[..., 1]
+        slope = sums[..., 2] + 1j * sums[..., 3]
+        if self.general.shape[1]:
+            gain = (self.general[first] * self.general[second]).T
+            inverse = 1.0 / (lam[:, None] - self.modes.poles)
+            value = value + inverse @ gain
+            slope = slope - inverse**2 @ gain
+        full = np.zeros((2, len(lam), rows, rows), dtype=complex)
+        full[:, :, first, second] = value, slope
+        full[:, :, second, first] = value, slope
+        return full[0], full[1]
+
+
+def direct_receptance(system: System, lam: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """H, dH/dλ, d²H/dλ² (r, r) at one λ from a factorisation of D(λ) itself.
+
+    Costs a sparse solve where the modal sum costs none, but carries the full accuracy of the
+    matrices and needs no basis: it polishes and certifies what the sum has found.
+    """
+    rows = system.contact_rows()
+    dynamic = sp.csc_array(lam**2 * system.mass + lam * system.damping + system.stiffness)
+    slope = sp.csc_array(2 * lam * system.mass + system.damping)
+    solver = spl.splu(dynamic)
+
+    def solve(right: ComplexArray) -> ComplexArray:
+        answer = solver.solve(right)
+        return answer + solver.solve(right - dynamic @ answer)
+
+    x = solve(rows.T.astype(complex))
+    sx = slope @ x
+    return rows @ x, -x.T @ sx, 2 * sx.T @ solve(sx) - 2 * x.T @ (system.mass @ x)

@@ -1,0 +1,210 @@
+"""Branches λ(μ) followed from the frictionless system, through crossings and coalescences.
+
+A branch is never a position in a sorted list. Each step predicts every root by its tangent and
+corrects all of them together; a step is taken only where each root stayed far closer to its own
+prediction than to its neighbours. Two roots that coalesce are followed as a pair through their mean
+a and squared half difference b, which stay analytic in μ where the roots themselves do not: there
+λ = a ± √b, and the continuous square root says which is which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..typing import ComplexArray
+from .roots import Spectrum, frictionless_roots, polish
+
+CLOSE = 0.25  # a correction may be this fraction of the distance to the next root
+CONTINUATION_STEPS = 12
+
+
+@dataclass
+class State:
+    """Roots at one μ: roots (k,) of the branches, their mirror roots (conjugates until a
+    divergence splits the pair on the real axis), tangents dλ/dμ (k,)."""
+
+    mu: float
+    roots: ComplexArray
+    mirror: ComplexArray
+    tangents: ComplexArray
+
+
+@dataclass
+class Tracker:
+    """Follows all branches with |λ| ≤ limit [1/s] at μ = 0 towards larger μ.
+
+    watch, where given, is called with each accepted pair of states (onset detection).
+    """
+
+    spectrum: Spectrum
+    limit: float
+    watch: Callable[[State, State], None] | None = None
+    state: State = field(init=False)
+    smallest_step: float = 1e-9
+
+    def __post_init__(self) -> None:
+        roots = frictionless_roots(self.spectrum, self.limit)
+        self.state = State(0.0, roots, np.conj(roots), self._tangents(roots, 0.0))
+        self._step = 0.01
+
+    def _tangents(self, roots: ComplexArray, mu: float) -> ComplexArray:
+        if not len(roots):
+            return roots.copy()
+        return self.spectrum.tangents(roots, mu)
+
+    def advance(self, mu: float) -> State:
+        """Follow the branches to ``mu`` ≥ the present one; raises AnalysisError where they are lost."""
+        if not len(self.state.roots):
+            self.state = State(mu, self.state.roots, self.state.mirror, self.state.tangents)
+            return self.state
+        while self.state.mu < mu:
+            step = min(self._step, mu - self.state.mu)
+            taken = self._try(self.state.mu + step if step < mu - self.state.mu else mu)
+            if taken is None:
+                self._step = step / 4
+                if self._step < self.smallest_step:
+                    raise AnalysisError(
+                        f"branches cannot be told apart near μ = {self.state.mu:.9g}: three or more modes "
+                        "merge there; split the range or change a parameter slightly"
+                    )
+                continue
+            if self.watch is not None:
+                self.watch(self.state, taken)
+            self.state = taken
+            if step >= 0.999 * self._step:
+                self._step = min(self._step * 2, 0.02)
+        return self.state
+
+    def _try(self, mu: float) -> State | None:
+        old = self.state
+        step = mu - old.mu
+        predicted = old.roots + step * old.tangents
+        mirror = np.where(old.mirror == np.conj(old.roots), np.conj(predicted), old.mirror)
+        pairs = self._pairs(old, predicted)
+        splits: dict[int, tuple[complex, complex, complex]] = {}
+        for i, j in pairs:
+            a, b = _pair(old.roots[i], old.roots[j] if j >= 0 else old.mirror[i])
+            da, db = _pair_slope(old, i, j)
+            splits[i] = (a + step * da, b + step * db, b)
+            half = _continued_root(splits[i][1], b, _half(old, i, j))
+            predicted[i] = splits[i][0] + half
+            if j >= 0:
+                predicted[j] = splits[i][0] - half
+                mirror[[i, j]] = np.conj(predicted[[i, j]])
+            else:
+                mirror[i] = splits[i][0] - half
+                if splits[i][1].real < 0:
+                    mirror[i] = np.conj(predicted[i])
+        roots, converged = polish(self.spectrum, predicted, mirror, mu, steps=CONTINUATION_STEPS)
+        if not converged:
+            return None
+        mirror = np.where(np.abs(roots.imag) > 1e-9 * np.abs(roots), np.conj(roots), mirror)
+        if not self._accept(old, roots, mirror, predicted, pairs, splits):
+            return None
+        return State(mu, roots, mirror, self._tangents(roots, mu))
+
+    def _pairs(self, old: State, predicted: ComplexArray) -> list[tuple[int, int]]:
+        """Pairs (i, j) whose distance is not large against the step; j = −1 is i's own mirror."""
+        moved = np.abs(predicted - old.roots)
+        found: list[tuple[int, int]] = []
+        used: set[int] = set()
+        distance = np.abs(old.roots[:, None] - old.roots)
+        np.fill_diagonal(distance, np.inf)
+        own = np.abs(old.roots - old.mirror)
+        nearest = np.argmin(distance, axis=1)
+        for i in np.argsort(distance.min(axis=1) if len(old.roots) > 1 else own):
+            i = int(i)
+            j = int(nearest[i])
+            if i in used:
+                continue
+            if own[i] < distance[i, j] and own[i] < moved[i] / CLOSE:
+                found.append((i, -1))
+                used.add(i)
+            elif (
+                len(old.roots) > 1
+                and j not in used
+                and nearest[j] == i
+                and distance[i, j] < max(moved[i], moved[j]) / CLOSE
+            ):
+                found.append((min(i, j), max(i, j)))
+                used.update((i, j))
+        return found
+
+    def _accept(
+        self,
+        old: State,
+        roots: ComplexArray,
+        mirror: ComplexArray,
+        predicted: ComplexArray,
+        pairs: list[tuple[int, int]],
+        splits: dict[int, tuple[complex, complex, complex]],
+    ) -> bool:
+        count = len(roots)
+        everything = np.concatenate([roots, mirror])
+        gap = np.abs(roots[:, None] - everything)
+        gap[np.arange(count), np.arange(count)] = np.inf
+        same = np.abs(mirror - roots) < 1e-12 * np.abs(roots)
+        gap[np.arange(count)[same], count + np.arange(count)[same]] = np.inf
+        paired = np.zeros(count, dtype=bool)
+        for i, j in pairs:
+            paired[i] = True
+            if j >= 0:
+                paired[j] = True
+                gap[i, j] = gap[j, i] = np.inf
+                partner = roots[j]
+            else:
+                gap[i, count + i] = np.inf
+                partner = mirror[i]
+            a_guess, b_guess, b_old = splits[i]
+            a, b = _pair(roots[i], partner)
+            # The pair's own quantities must follow their prediction; a sign of √b that flips against
+            # the continuous one would show here as a wrong b or be caught by the next check.
+            if abs(b - b_guess) > 0.3 * max(abs(b_guess - b_old), 1e-3 * abs(b_old)):
+                return False
+            third = min(float(gap[i].min()), float(gap[j].min()) if j >= 0 else np.inf)
+            if abs(a - a_guess) > CLOSE * third:
+                return False
+        alone = ~paired
+        return bool(np.all(np.abs(roots - predicted)[alone] <= CLOSE * gap.min(axis=1)[alone]))
+
+
+def _pair(first: complex, second: complex) -> tuple[complex, complex]:
+    """Mean a and squared half difference b."""
+    return (first + second) / 2, ((first - second) / 2) ** 2
+
+
+def _half(old: State, i: int, j: int) -> complex:
+    return complex(old.roots[i] - (old.roots[j] if j >= 0 else old.mirror[i])) / 2
+
+
+def _pair_slope(old: State, i: int, j: int) -> tuple[complex, complex]:
+    first, second = old.roots[i], old.roots[j] if j >= 0 else old.mirror[i]
+    slope = old.tangents[i]
+    if j >= 0:
+        other = old.tangents[j]
+    elif old.mirror[i] == np.conj(old.roots[i]):
+        other = np.conj(slope)
+    else:
+        # Two real roots: the sum's slope is not known from one of them; the mean moves little.
+        other = -slope
+    return (slope + other) / 2, (first - second) * (slope - other) / 2
+
+
+def _continued_root(b: complex, b_old: complex, half_old: complex) -> complex:
+    """√b continuous with half_old = √b_old along the straight way from b_old to b.
+
+    Where that way meets zero (an exact coalescence, undamped) the sense is free: the first branch
+    of the pair is then the one that becomes unstable.
+    """
+    if b_old == 0:
+        ratio: complex = -1.0
+    else:
+        ratio = b / b_old
+    if ratio.real < 0 and abs(ratio.imag) < 1e-9 * abs(ratio):
+        half = np.sqrt(complex(b))
+        return half if half.real > 0 or (half.real == 0 and half.imag > 0) else -half
+    return half_old * np.sqrt(complex(ratio))

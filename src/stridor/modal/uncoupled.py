@@ -1,0 +1,133 @@
+"""Modes of the structure without contacts: the complete basis in which the heart of stridor works.
+
+Each component that the structure leaves uncoupled is solved by itself. Where its damping is
+proportional its real modes serve (pole pairs); where it is not, its complex modes do (single poles).
+Both give the same sum, the receptance D(λ)⁻¹ with D = λ²M + λC + K.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+
+from ..errors import AnalysisError
+from ..system import System
+from ..typing import Array, ComplexArray, IntArray
+
+PROPORTIONAL_TOLERANCE = 1e-9
+DENSE_LIMIT = 6000
+
+
+@dataclass(frozen=True)
+class RealBlock:
+    """Proportionally damped component: freedoms (k,), vectors (k, k) with ΦᵀMΦ = 1,
+    stiffness ω² (k,) [rad²/s²] and damping c = φᵀCφ (k,) [1/s]."""
+
+    freedoms: IntArray
+    vectors: Array
+    stiffness: Array
+    damping: Array
+
+
+@dataclass(frozen=True)
+class ComplexBlock:
+    """Generally damped component: freedoms (k,), vectors X (k, 2k) scaled so that
+    D⁻¹ = Σ x xᵀ/(λ − λ_j), poles (2k,) [1/s]."""
+
+    freedoms: IntArray
+    vectors: ComplexArray
+    poles: ComplexArray
+
+
+@dataclass(frozen=True)
+class UncoupledModes:
+    """Complete set of modes of the structure without contacts, block by block.
+
+    frequencies_hz (n_real,) are the undamped ones of all real blocks, sorted by block.
+    """
+
+    size: int
+    real: tuple[RealBlock, ...]
+    general: tuple[ComplexBlock, ...]
+
+    @property
+    def proportional(self) -> bool:
+        """Whether every component has proportional damping, so that real modes are complete."""
+        return not self.general
+
+    @property
+    def stiffness(self) -> Array:
+        """ω² of all real blocks in turn [rad²/s²]."""
+        return np.concatenate([b.stiffness for b in self.real] or [np.zeros(0)])
+
+    @property
+    def damping(self) -> Array:
+        """Modal damping c of all real blocks in turn [1/s]."""
+        return np.concatenate([b.damping for b in self.real] or [np.zeros(0)])
+
+    def project(self, rows: Array) -> tuple[Array, ComplexArray]:
+        """Rows (r, n) on the modes: (r, n_real) and (r, n_poles)."""
+        real = [rows[:, b.freedoms] @ b.vectors for b in self.real]
+        general = [rows[:, b.freedoms] @ b.vectors for b in self.general]
+        empty = np.zeros((len(rows), 0))
+        return np.hstack([empty, *real]), np.hstack([empty.astype(complex), *general])
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles of the general blocks in turn [1/s]."""
+        return np.concatenate([b.poles for b in self.general] or [np.zeros(0, dtype=complex)])
+
+
+def uncoupled_modes(system: System) -> UncoupledModes:
+    """Solve each uncoupled component densely. Raises AnalysisError where mass is not positive."""
+    mass, damping, stiffness = (m.tocsr() for m in (system.mass, system.damping, system.stiffness))
+    real: list[RealBlock] = []
+    general: list[ComplexBlock] = []
+    for part in system.components:
+        if len(part) > DENSE_LIMIT:
+            raise AnalysisError(
+                f"a component of {len(part)} freedoms is too large for a complete modal basis "
+                f"(limit {DENSE_LIMIT})"
+            )
+        m, c, k = (a[part][:, part].toarray() for a in (mass, damping, stiffness))
+        block = _solve_block(part, m, c, k)
+        if isinstance(block, RealBlock):
+            real.append(block)
+        else:
+            general.append(block)
+    return UncoupledModes(system.size, tuple(real), tuple(general))
+
+
+def _solve_block(part: IntArray, m: Array, c: Array, k: Array) -> RealBlock | ComplexBlock:
+    try:
+        _, vectors = sl.eigh(k, m)
+    except sl.LinAlgError as error:
+        raise AnalysisError(
+            "the mass matrix is not positive definite: a freedom has stiffness but no mass"
+        ) from error
+    # Rayleigh quotients carry the small eigenvalues to more digits than the dense solver does:
+    # its error is relative to the largest one (docs/theory-modal.md).
+    masses = np.einsum("ij,ij->j", vectors, m @ vectors)
+    quotients = np.einsum("ij,ij->j", vectors, k @ vectors) / masses
+    rounding = np.einsum("ij,ij->j", np.abs(vectors), np.abs(k) @ np.abs(vectors)) / masses
+    stiffness = np.where(np.abs(quotients) < 100 * np.finfo(float).eps * rounding, 0.0, quotients)
+    product = vectors.T @ (c @ vectors)
+    diagonal = np.diag(product).copy()
+    coupling = np.abs(product - np.diag(diagonal)).max()
+    if coupling <= PROPORTIONAL_TOLERANCE * max(np.abs(product).max(), 1e-300):
+        return RealBlock(part, vectors, stiffness, diagonal)
+    return _complex_block(part, m, c, k)
+
+
+def _complex_block(part: IntArray, m: Array, c: Array, k: Array) -> ComplexBlock:
+    size = len(part)
+    zero = np.zeros((size, size))
+    a = np.block([[c, m], [m, zero]])
+    b = np.block([[k, zero], [zero, -m]])
+    poles, right = sl.eig(-b, a)
+    x = right[:size]
+    # Symmetric pencil: the left vector is the right one; xᵀ(2λM + C)x = 1 makes residues of D⁻¹.
+    norms = np.einsum("ij,ij->j", x, m @ x) * 2 * poles + np.einsum("ij,ij->j", x, c @ x)
+    return ComplexBlock(part, x / np.sqrt(norms), poles)

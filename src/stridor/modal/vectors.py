@@ -1,0 +1,61 @@
+"""Right and left complex vectors of given eigenvalues."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..typing import Array, ComplexArray
+from .roots import Spectrum
+
+
+def modal_coordinates(spectrum: Spectrum, lam: ComplexArray, mu: float) -> tuple[ComplexArray, ComplexArray]:
+    """Contact forces (k, 2m) on the right vectors u = D⁻¹ Gᵀ p and on the left ones, at the roots λ (k,)."""
+    left, right = spectrum.null_vectors(lam, mu)
+    coupling = spectrum.coupling
+    push = coupling.push(mu, lam, right)
+    pull = np.zeros_like(push)
+    # The left problem is the transposed coupling: friction reads where the right one pushes.
+    m = coupling.contacts
+    pull[:, 0::2] = left[:, :m]
+    if coupling.sloped:
+        pull[:, 1::2] = -left[:, m:]
+    return push, pull
+
+
+def expand(spectrum: Spectrum, lam: ComplexArray, forces: ComplexArray) -> ComplexArray:
+    """u (n, k) = D(λ)⁻¹ Gᵀ p for each λ (k,) and contact forces p (k, 2m), scaled to unit norm."""
+    modes = spectrum.modes
+    receptance = spectrum.receptance
+    u = np.zeros((modes.size, len(lam)), dtype=complex)
+    start = 0
+    for block in modes.real:
+        stop = start + len(block.freedoms)
+        drive = _real_times_complex(receptance.real[:, start:stop].T, forces.T)
+        drive /= lam * lam + np.multiply.outer(block.damping, lam) + block.stiffness[:, None]
+        u[block.freedoms] = _real_times_complex(block.vectors, drive)
+        start = stop
+    start = 0
+    for general in modes.general:
+        stop = start + len(general.poles)
+        drive = receptance.general[:, start:stop].T @ forces.T
+        u[general.freedoms] = general.vectors @ (drive / (lam - general.poles[:, None]))
+        start = stop
+    return u / np.linalg.norm(u, axis=0)
+
+
+def _real_times_complex(real: Array, values: ComplexArray) -> ComplexArray:
+    """real @ values without turning the real matrix into a complex one."""
+    values = np.ascontiguousarray(values)
+    return (real @ values.view(float)).view(complex)
+
+
+def fixed_vectors(spectrum: Spectrum) -> Array:
+    """Vectors (n, k) of the modes that no contact sees."""
+    modes = spectrum.modes
+    u = np.zeros((modes.size, len(spectrum.fixed)))
+    start = 0
+    for block in modes.real:
+        stop = start + len(block.freedoms)
+        u[block.freedoms] = block.vectors @ spectrum.fixed_modes[:, start:stop].T
+        start = stop
+    return u / np.linalg.norm(u, axis=0) if u.shape[1] else u

@@ -1,0 +1,166 @@
+"""Steady sliding: the equilibrium that both approaches start from.
+
+K u − Σ (n + μ s t) N = f − C_L v,   g₀ + nᵀu + N/K_c = 0,   N ≥ 0   (paper 1.3, eqs 2–4)
+
+with s = −sign(slip of the slave relative to the master), so that friction opposes the slip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from .errors import AnalysisError
+from .system import System
+from .typing import Array
+
+
+@dataclass(frozen=True)
+class SteadySliding:
+    """Equilibrium under friction. m contacts.
+
+    displacement (n,) [m] relative to the moving supports; normal_force (m,) [N] in compression,
+    slip_speed (m,) [m/s] signed along the tangent, sense s (m,) = −sign(slip_speed), active (m,)
+    whether the contact carries load; residual is ‖K u − …‖∞ over the largest term.
+    """
+
+    displacement: Array
+    normal_force: Array
+    slip_speed: Array
+    sense: Array
+    active: Array
+    friction_coefficient: Array
+    residual: float
+
+
+def slip_speeds(system: System, motion_factors: Array) -> Array:
+    """Slip (m,) [m/s] of slave relative to master at rest in the moving frame."""
+    return np.array([float(c.tangent_lift @ motion_factors) for c in system.contacts])
+
+
+def full_motion(system: System) -> Array:
+    """Factor one for every moving support (p,)."""
+    return np.ones(len(system.motion.names))
+
+
+def steady_sliding(
+    system: System,
+    *,
+    mu: float | None = None,
+    load_factors: Mapping[str, float] | None = None,
+    motion_factors: Array | None = None,
+) -> SteadySliding:
+    """Solve the steady sliding equilibrium with an active set on the contacts.
+
+    mu replaces the friction coefficient of every contact (its law scaled at its slip speed);
+    load_factors default to one for every load, motion_factors (p,) to one for every support.
+    Raises AnalysisError where no contact slides, a contact is pulled apart as a whole, or the
+    structure is not held.
+    """
+    factors = full_motion(system) if motion_factors is None else motion_factors
+    speeds = slip_speeds(system, factors)
+    for contact, speed in zip(system.contacts, speeds, strict=True):
+        normal_speed = float(contact.normal_lift @ factors)
+        if abs(normal_speed) > 1e-9 * max(abs(float(speed)), 1e-30) and abs(normal_speed) > 1e-15:
+            raise AnalysisError(
+                f"contact {contact.name}: the prescribed velocities change its gap at {normal_speed:g} m/s, "
+                "so there is no steady sliding; let the supports move along the master line"
+            )
+    coefficients = (
+        system.friction_coefficients(np.abs(speeds))
+        if mu is None
+        else np.full(len(system.contacts), float(mu))
+    )
+    for contact, speed, coefficient in zip(system.contacts, speeds, coefficients, strict=True):
+        if speed == 0.0 and coefficient > 0.0:
+            raise AnalysisError(
+                f"contact {contact.name} does not slide: no support moves one of its bodies along the "
+                "tangent; give a support a velocity"
+            )
+    sense = -np.sign(speeds)
+    force = _external_force(system, load_factors) - system.motion.damping @ factors
+    return _active_set(system, force, coefficients, sense, speeds)
+
+
+def _external_force(system: System, load_factors: Mapping[str, float] | None) -> Array:
+    force = np.zeros(system.size)
+    for name, vector in system.loads.items():
+        force += vector * (1.0 if load_factors is None else load_factors.get(name, 1.0))
+    return force
+
+
+def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: Array) -> SteadySliding:
+    count = len(system.contacts)
+    active = np.ones(count, dtype=bool)
+    displacement, normal = np.zeros(system.size), np.zeros(count)
+    residual = 0.0
+    for _ in range(2 * count + 2):
+        displacement, normal, residual = _solve(system, force, mu, sense, active)
+        gaps = np.array([c.gap + c.normal_row @ displacement for c in system.contacts])
+        pulled = active & (normal < 0)
+        closing = ~active & (gaps < 0)
+        if not pulled.any() and not closing.any():
+            break
+        active = (active & ~pulled) | closing
+    else:
+        raise AnalysisError("steady sliding: the set of touching contacts does not settle")
+    if count and not active.any():
+        names = ", ".join(c.name for c in system.contacts)
+        raise AnalysisError(
+            f"no contact carries load in steady sliding (contacts: {names}): the loads pull the bodies "
+            "apart, or friction lifts them off at this coefficient; check the direction of the loads"
+        )
+    return SteadySliding(displacement, normal, speeds, sense, active, mu, residual)
+
+
+def _solve(
+    system: System, force: Array, mu: Array, sense: Array, active: Array
+) -> tuple[Array, Array, float]:
+    touching = [k for k in range(len(system.contacts)) if active[k]]
+    contacts = [system.contacts[k] for k in touching]
+    normals = np.array([c.normal_row for c in contacts]).reshape(len(contacts), system.size)
+    tangents = np.array([c.tangent_row for c in contacts]).reshape(len(contacts), system.size)
+    push = normals + (mu * sense)[touching][:, None] * tangents
+    # Multipliers are scaled to the stiffness so that the bordered matrix is well balanced.
+    scale = float(np.abs(system.stiffness).max())
+    compliance = np.diag([c.compliance for c in contacts]) if contacts else np.zeros((0, 0))
+    bordered = sp.block_array(
+        [
+            [system.stiffness, sp.csr_array(-push.T * scale)],
+            [sp.csr_array(normals * scale), sp.csr_array(compliance * scale * scale)],
+        ],
+        format="csc",
+    )
+    right = np.concatenate([force, [-c.gap * scale for c in contacts]])
+    with np.errstate(all="ignore"):
+        try:
+            solver = spl.splu(bordered, permc_spec="COLAMD")
+            answer = solver.solve(right)
+            answer += solver.solve(right - bordered @ answer)
+        except RuntimeError:
+            answer = np.full(len(right), np.nan)
+    size = system.size
+    terms = np.abs(bordered) @ np.abs(answer) + np.abs(right)
+    residual = float(np.abs(bordered @ answer - right).max() / max(terms.max(), 1e-300))
+    if not np.isfinite(residual) or residual > 1e-8 or _loose(answer[:size], system):
+        open_names = [c.name for k, c in enumerate(system.contacts) if not active[k]]
+        reason = f"; contacts that would pull: {', '.join(open_names)}" if open_names else ""
+        raise AnalysisError(
+            "steady sliding has no equilibrium: the structure can move freely under its loads"
+            f"{reason}; fix a freedom of the loose body, or turn the load so that it presses the bodies together"
+        )
+    normal = np.zeros(len(system.contacts))
+    normal[touching] = answer[size:] * scale
+    return answer[:size], normal, residual
+
+
+def _loose(displacement: Array, system: System) -> bool:
+    """A free mechanism shows as displacements larger than any structure: beyond 1e6 times its extent."""
+    if not system.lines:
+        return bool(np.abs(displacement).max(initial=0.0) > 1e12)
+    extent = max(float(np.ptp(line.coordinates, axis=0).max()) for line in system.lines)
+    return bool(np.abs(displacement).max(initial=0.0) > 1e6 * extent)

@@ -1,0 +1,6 @@
+"""The one object between modelling and analysis, and how a case becomes one."""
+
+from .build import build_system
+from .model import Line, PrescribedMotion, System
+
+__all__ = ["Line", "PrescribedMotion", "System", "build_system"]

@@ -1,0 +1,187 @@
+"""System: matrices, loads, prescribed motions and contacts. The one object between modelling and analysis.
+
+Nothing after it asks whether the freedoms came from beams, solids or another program's matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+
+from ..contact.interface import Contact, Rows
+from ..errors import AnalysisError
+from ..fe.assembly import connected_components
+from ..typing import Array, IntArray, Sparse
+
+
+@dataclass(frozen=True)
+class Line:
+    """A body as a drawing needs it: coordinates (k, 2) [m] and the rows of its nodes' displacements.
+
+    freedoms (n_body,) are the indices of its free freedoms in the system.
+    """
+
+    name: str
+    coordinates: Array
+    rows: Rows
+    freedoms: IntArray
+
+
+@dataclass(frozen=True)
+class PrescribedMotion:
+    """Supports that move with a given velocity, condensed on one scalar each.
+
+    With u = w + L x_p, where L (n, p) is the static answer to the support's motion, the equations in
+    w are those of the structure at rest loaded by −M_L ẍ_p − C_L ẋ_p. names (p,); lift L (n, p);
+    mass M_L = M L + M_fp (n, p), damping C_L likewise; mass_own, damping_own, stiffness_own (p, p)
+    are the energies' own parts. Unit factor means the velocity written in the case [m/s, rad/s].
+    """
+
+    names: tuple[str, ...]
+    lift: Array
+    mass: Array
+    damping: Array
+    mass_own: Array
+    damping_own: Array
+    stiffness_own: Array
+
+    @staticmethod
+    def none(size: int) -> PrescribedMotion:
+        """No moving support, for a system of ``size`` freedoms."""
+        empty, own = np.zeros((size, 0)), np.zeros((0, 0))
+        return PrescribedMotion((), empty, empty, empty, own, own, own)
+
+
+@dataclass(frozen=True)
+class System:
+    """Free freedoms only: mass, damping, stiffness (n, n) csr, symmetric, contacts not included.
+
+    contacts: the sliding pairs. loads: name → force vector (n,) at factor one. motion: moving
+    supports. points: name → rows (2 or 3, n) of the named points that can be watched. lines: bodies
+    as drawn. dof_names (n,) say in words what a freedom is.
+    """
+
+    mass: Sparse
+    damping: Sparse
+    stiffness: Sparse
+    contacts: tuple[Contact, ...] = ()
+    loads: Mapping[str, Array] = field(default_factory=dict)
+    motion: PrescribedMotion = None  # type: ignore[assignment]  # filled in __post_init__
+    points: Mapping[str, Rows] = field(default_factory=dict)
+    lines: tuple[Line, ...] = ()
+    dof_names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("mass", "damping", "stiffness"):
+            object.__setattr__(self, name, sp.csr_array(getattr(self, name)))
+        if self.motion is None:  # pyright: ignore[reportUnnecessaryComparison]
+            object.__setattr__(self, "motion", PrescribedMotion.none(self.size))
+
+    @property
+    def size(self) -> int:
+        """Number of free freedoms n."""
+        return int(self.mass.shape[0])
+
+    @property
+    def components(self) -> list[Array]:
+        """Freedoms that the structure (contacts aside) leaves uncoupled from the others."""
+        return connected_components(self.mass, self.damping, self.stiffness)
+
+    def contact_rows(self) -> Array:
+        """G (2m, n): normal and tangential relative displacement of contact 0, of contact 1, …"""
+        rows = [row for c in self.contacts for row in (c.normal_row, c.tangent_row)]
+        return np.array(rows).reshape(2 * len(self.contacts), self.size)
+
+    def friction_coefficients(self, speeds: Array) -> Array:
+        """μ (m,) of the contacts at slip speeds (m,) [m/s]."""
+        return np.array([c.law.sliding(float(v)) for c, v in zip(self.contacts, speeds, strict=True)])
+
+    def with_friction(self, mu: float, speeds: Array) -> System:
+        """The same system with every contact's law scaled so that it gives ``mu`` at ``speeds`` (m,)."""
+        contacts = tuple(
+            replace(c, law=c.law.scaled(mu, float(v))) for c, v in zip(self.contacts, speeds, strict=True)
+        )
+        return replace(self, contacts=contacts)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """All freedoms before supports are applied: what bodies give. Matrices (N, N) csr."""
+
+    mass: Sparse
+    damping: Sparse
+    stiffness: Sparse
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A support: freedoms held (indices in the structure) and their velocity at factor one."""
+
+    name: str
+    freedoms: tuple[int, ...]
+    velocity: tuple[float, ...]
+
+    @property
+    def moves(self) -> bool:
+        """Whether a velocity is prescribed."""
+        return any(v != 0.0 for v in self.velocity)
+
+
+def constrain(structure: Structure, constraints: list[Constraint]) -> tuple[IntArray, PrescribedMotion]:
+    """Free freedoms (n,) and the prescribed motions of a structure held by ``constraints``."""
+    total = structure.mass.shape[0]
+    held = np.zeros(total, dtype=bool)
+    for c in constraints:
+        held[list(c.freedoms)] = True
+    free = np.flatnonzero(~held)
+    moving = [c for c in constraints if c.moves]
+    if not moving:
+        return free, PrescribedMotion.none(len(free))
+    selection = np.zeros((total, len(moving)))
+    for column, c in enumerate(moving):
+        selection[list(c.freedoms), column] = c.velocity
+    lift = _static_lift(structure, free, selection)
+    whole = selection.copy()
+    whole[free] = lift
+
+    def coupled(matrix: Sparse) -> tuple[Array, Array]:
+        product = matrix @ whole
+        return product[free], whole.T @ product
+
+    mass, mass_own = coupled(structure.mass)
+    damping, damping_own = coupled(structure.damping)
+    stiffness_own = whole.T @ (structure.stiffness @ whole)
+    # A rigid motion strains nothing; what is left is rounding of entries as large as EA/h.
+    scale = np.abs(structure.stiffness).max() * np.abs(whole).max() ** 2
+    stiffness_own[np.abs(stiffness_own) < 1e-13 * scale] = 0.0
+    names = tuple(c.name for c in moving)
+    return free, PrescribedMotion(names, lift, mass, damping, mass_own, damping_own, stiffness_own)
+
+
+def _static_lift(structure: Structure, free: IntArray, selection: Array) -> Array:
+    """L with K_ff L = −K_fp: the static answer, of least norm where the structure is free to move."""
+    stiffness = sp.csr_array(structure.stiffness)
+    load = -(stiffness @ selection)[free]
+    inner = sp.csr_array(stiffness[free][:, free])
+    lift = np.zeros_like(load)
+    for part in connected_components(inner):
+        if not np.any(load[part]):
+            continue
+        block = inner[part][:, part].toarray()
+        try:
+            factor = sl.cho_factor(block)
+            answer = sl.cho_solve(factor, load[part])
+            answer += sl.cho_solve(factor, load[part] - block @ answer)
+        except sl.LinAlgError:
+            answer = np.linalg.lstsq(block, load[part], rcond=1e-12)[0]
+        if np.linalg.norm(block @ answer - load[part]) > 1e-6 * np.linalg.norm(load[part]):
+            raise AnalysisError(
+                "a moving support cannot be followed statically: its motion loads a mechanism that "
+                "nothing holds; fix more freedoms of that body"
+            )
+        lift[part] = answer
+    return lift
