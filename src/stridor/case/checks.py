@@ -104,9 +104,13 @@ def _shape_problems(parts: Parts) -> Iterator[Problem]:
             if math.dist(body.start, body.end) == 0.0:
                 yield Problem(f"{where}.end", body.end, "must not be the start")
             continue
+        if body.angle_deg is None and body.length is None:
+            accepted = "has no direction – give angle_deg [degrees] and length [m], or end = [x, y] [m]"
+            yield Problem(where, None, accepted)
+            continue
         for key, unit in (("angle_deg", "degrees"), ("length", "m")):
             if getattr(body, key) is None:
-                accepted = f"missing – give angle_deg and length, or end = [x, y]; {key} is a number [{unit}]"
+                accepted = f"missing – give a number [{unit}], or only end = [x, y] [m]"
                 yield Problem(f"{where}.{key}", None, accepted)
 
 
@@ -125,9 +129,8 @@ def _body_problems(parts: Parts) -> Iterator[Problem]:
                     f"{where}.points.{point}", distance, "start and end always exist; choose another name"
                 )
             elif distance > body.length_m:
-                yield Problem(
-                    f"{where}.points.{point}", distance, f"{name} reaches from 0 to {body.length_m:.9g} m"
-                )
+                accepted = f"beyond the body; {name} reaches from 0 to {body.length_m:.9g} m"
+                yield Problem(f"{where}.points.{point}", distance, accepted)
 
 
 def _support_problems(parts: Parts) -> Iterator[Problem]:
@@ -139,7 +142,7 @@ def _support_problems(parts: Parts) -> Iterator[Problem]:
                 accepted = f"a velocity needs {direction!r} in fixed, which has: {', '.join(support.fixed)}"
                 yield Problem(f"{where}.velocity.{direction}", support.velocity[direction], accepted)
         if len(set(support.fixed)) < len(support.fixed):
-            yield Problem(f"{where}.fixed", support.fixed, "names a direction twice")
+            yield Problem(f"{where}.fixed", support.fixed, "must name each direction once")
         point = yield from _point(parts, support.at, f"{where}.at")
         if point is None:
             continue

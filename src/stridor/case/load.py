@@ -14,6 +14,7 @@ from .overrides import override
 from .points import no_such
 
 _POSITION = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\s*$")
+_KEYS = re.compile(r"\('[^)]*',?\)")  # how tomllib names a table
 
 
 def load(path: str | Path, overrides: Sequence[str] = ()) -> Case:
@@ -67,10 +68,14 @@ def template_text(name: str) -> str:
 
 
 def _syntax(error: tomllib.TOMLDecodeError, source: str) -> CaseError:
-    message = str(error)
+    message = _KEYS.sub(_bracketed, str(error))
     found = _POSITION.search(message)
     reason = _POSITION.sub("", message)
     if found is None:
         return CaseError(source, None, f"not valid TOML: {reason}")
     where = f"{source}, line {found[1]}, column {found[2]}" if found[1] else f"{source}, at the end"
     return CaseError(where, None, f"not valid TOML: {reason[:1].lower()}{reason[1:]}")
+
+
+def _bracketed(keys: re.Match[str]) -> str:
+    return "[" + ".".join(re.findall(r"'([^']*)'", keys[0])) + "]"

@@ -6,6 +6,7 @@ description of the field that was reached says what it must be.
 
 from __future__ import annotations
 
+import math
 import re
 import types
 from collections.abc import Mapping, Sequence
@@ -15,7 +16,7 @@ from typing import Annotated, Any, Union, cast, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from ..errors import Problem
-from .points import did_you_mean, nearest
+from .points import choice, did_you_mean, nearest
 from .schema import NAME_RULE
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -57,7 +58,7 @@ def problems_of(error: ValidationError, data: object, root: type[BaseModel]) -> 
             if meant:
                 misspelt.add(dotted((*place.path[:-1], meant)))
         elif kind == "missing" and not isinstance(location[-1], int):
-            problem = Problem(dotted(place.path), None, f"missing – must be {place.description}")
+            problem = Problem(dotted(place.path), None, f"missing – give {place.description}")
             missing.append(problem.where)
         elif location and location[-1] == "[key]":
             problem = _bad_key(place)
@@ -73,6 +74,8 @@ def _reach(location: Sequence[str | int], data: object, root: type[BaseModel]) -
     """Follow a location of pydantic's as far as it names something that a user wrote or should write."""
     place = _Place((), root, data)
     for step in location:
+        if step == "[key]":  # the key itself is wrong
+            break
         tables = _tables(place.annotation)
         if len(tables) > 1:  # the step is the tag of the alternative that was tried
             chosen = next(table for table in tables if step in _tags(table))
@@ -106,15 +109,14 @@ def _unknown_key(place: _Place) -> tuple[Problem, str]:
     if any(key in table.model_fields for table in place.alternatives):
         tag = _tags(place.table)[0]
         return Problem(where, place.value, f"not used by {tag!r}; accepted: {accepted}"), ""
-    meant = nearest(key, place.table.model_fields)
-    return Problem(where, None, f"unknown key{did_you_mean(meant)}; accepted: {accepted}"), meant
+    unknown = f"unknown key{choice(key, place.table.model_fields, 'accepted')}"
+    return Problem(where, None, unknown), nearest(key, place.table.model_fields)
 
 
 def _bad_key(place: _Place) -> Problem:
     where, key = dotted(place.path), str(place.path[-1])
     if place.keys:
-        suggestion = did_you_mean(nearest(key, place.keys))
-        return Problem(where, None, f"unknown key{suggestion}; accepted: {', '.join(place.keys)}")
+        return Problem(where, None, f"unknown key{choice(key, place.keys, 'accepted')}")
     return Problem(where, None, f"not a name; a name is {NAME_RULE}")
 
 
@@ -122,11 +124,11 @@ def _bad_tag(place: _Place) -> Problem:
     tables = _tables(place.annotation)
     tag = next(name for name, field in tables[0].model_fields.items() if _words(field.annotation))
     where, given = dotted((*place.path, tag)), _item(place.value, tag)
-    accepted = f"must be {tables[0].model_fields[tag].description}"
+    accepted = tables[0].model_fields[tag].description
     if given is None:
-        return Problem(where, None, f"missing – {accepted}")
+        return Problem(where, None, f"missing – give {accepted}")
     suggestion = nearest(str(given), [word for table in tables for word in _tags(table)])
-    return Problem(where, given, accepted + did_you_mean(suggestion))
+    return Problem(where, given, f"must be {accepted}{did_you_mean(suggestion)}")
 
 
 def _bad_value(place: _Place) -> Problem:
@@ -134,12 +136,21 @@ def _bad_value(place: _Place) -> Problem:
     tables = _tables(place.annotation)
     if len(tables) == 1 and not isinstance(given, Mapping):
         return Problem(where, given, f"must be a table with the keys {', '.join(tables[0].model_fields)}")
-    accepted = f"must be {place.description}"
+    return Problem(where, given, f"must be {place.description}{_hint(place)}")
+
+
+def _hint(place: _Place) -> str:
+    """What probably went wrong with a value of the wrong kind, "" if unclear."""
+    given, number = place.value, "number" in place.description
     if isinstance(given, str):
-        if _NUMBER.fullmatch(given.strip()) and "number" in place.description:
-            accepted += "; write it without quotes"
-        accepted += did_you_mean(nearest(given, _words(place.annotation)))
-    return Problem(where, given, accepted)
+        if number and _NUMBER.fullmatch(given.strip()):
+            return "; write it without quotes"
+        return did_you_mean(nearest(given, _words(place.annotation)))
+    if number and isinstance(given, float) and not math.isfinite(given):
+        return "; it must be finite"
+    if "whole number" in place.description and isinstance(given, float) and given.is_integer():
+        return "; write it without a decimal point"
+    return ""
 
 
 # -- the schema, as far as paths need it ---------------------------------------------------------------------

@@ -12,7 +12,7 @@ from .checks import Parts, problems_between, slave_side
 from .messages import problems_of
 from .oddities import oddities
 from .overrides import apply, split_path
-from .points import PointRef, parse_point
+from .points import PointRef, nearest, parse_point
 from .schema import (
     DEFAULT_PHASES,
     ENTRIES,
@@ -36,7 +36,7 @@ class Case(Table):
     """Bodies, what holds and loads them, where they slide, and the settings of the analyses. SI units.
 
     Frozen; varied by copy with `with_`. Made by `load`, `loads` or `Case.checked`, which raise CaseError with
-    every problem found; calling the class itself raises pydantic's ValidationError for values of the wrong kind.
+    every problem found; the class itself raises pydantic's ValidationError for values of the wrong kind.
     """
 
     title: str = Field(default="", description="a text")
@@ -61,7 +61,7 @@ class Case(Table):
 
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> Case:
-        """The case that plain data, as read from TOML, describe. Raises CaseError with every problem found."""
+        """The case that data, as read from TOML, describe. Raises CaseError with every problem found."""
         try:
             return cls.model_validate(data)
         except ValidationError as error:
@@ -148,10 +148,15 @@ def _carried(
 def _sound(data: Mapping[str, Any], error: ValidationError) -> Parts:
     """What of the data is sound although the whole is not."""
     parts = Parts()
-    faults = {item["loc"][:2] for item in error.errors(include_url=False, include_input=False)}
+    errors = error.errors(include_url=False, include_input=False)
+    faults = {item["loc"][:2] for item in errors}
+    unknown = [
+        str(item["loc"][0]) for item in errors if item["type"] == "extra_forbidden" and len(item["loc"]) == 1
+    ]
+    misspelt = {nearest(key, Case.model_fields) for key in unknown}
     for table, kind in ENTRIES.items():
         entries = data.get(table, {})
-        if not isinstance(entries, dict):
+        if not isinstance(entries, dict) or (table not in data and (table in misspelt or table == "bodies")):
             parts.broken.add((table, "*"))
             continue
         sound: dict[str, Any] = {}

@@ -17,6 +17,9 @@ from .points import no_such
 from .schema import DEFAULT_PHASES, SINGULAR
 
 _HOW = "write an override as path=value, such as contacts.A.friction.coefficient=0.3"
+_VALUES = (
+    'not a value; accepted: a number such as 0.3, true, false, a word, "a text", [a, list], { a = table }'
+)
 _WORD = re.compile(r"[A-Za-z_]")
 
 
@@ -35,9 +38,7 @@ def parse_override(text: str) -> tuple[str, object]:
     except (tomllib.TOMLDecodeError, RecursionError):
         if _WORD.match(written) and written.isprintable():
             return path, written
-    raise CaseError(
-        path, written, "must be a number, true, false, a word, a text in quotes, [a, list] or { a = table }"
-    )
+    raise CaseError(path, written, _VALUES)
 
 
 def split_path(path: str) -> tuple[str, ...]:

@@ -37,15 +37,20 @@ def parse_point(reference: str, bodies: Mapping[str, Body], where: str = "point"
     if at:
         return PointRef(head, _distance(reference, distance, head, body, where))
     if point not in body.point_names:
-        close = did_you_mean(nearest(point, body.point_names))
-        raise CaseError(where, reference, f"no such point{close}; {head} has: {', '.join(body.point_names)}")
+        raise CaseError(where, reference, f"no such point{choice(point, body.point_names, f'{head} has')}")
     return PointRef(head, body.point_distance(point))
 
 
 def no_such(kind: str, name: str, known: Iterable[str]) -> str:
     """Say "no such body; did you mean 'beam1'? the case has: beam1, beam2"."""
+    return f"no such {kind}{choice(name, known, 'the case has')}"
+
+
+def choice(word: str, known: Iterable[str], introduction: str) -> str:
+    """Say "; did you mean 'tip'? beam1 has: start, tip, end"; no question where no word comes close."""
     names = list(known)
-    return f"no such {kind}{did_you_mean(nearest(name, names))}; the case has: {', '.join(names) or 'none'}"
+    question = did_you_mean(nearest(word, names))
+    return f"{question or ';'} {introduction}: {', '.join(names) or 'none'}"
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -67,5 +72,5 @@ def _distance(reference: str, text: str, name: str, body: Body, where: str) -> f
         ) from None
     length = body.length_m
     if not 0.0 <= distance <= length * (1.0 + _ROUNDING):
-        raise CaseError(where, reference, f"{name} reaches from 0 to {length:.9g} m")
+        raise CaseError(where, reference, f"beyond the body; {name} reaches from 0 to {length:.9g} m")
     return min(distance, length)

@@ -235,7 +235,7 @@ class Phase(Table):
     A factor not given stays as in the phase before, in the first phase it is 1.
     """
 
-    name: Label = Field(description="a text, the name of the phase")
+    name: Label = Field(description="a text that is not empty, the name of the phase")
     duration: Positive = Field(description="a number > 0 [s], how long the phase lasts")
     loads: Mapping[str, Number] = Field(
         default_factory=dict[str, float],
@@ -338,7 +338,7 @@ class ReferenceOnset(Table):
 class ReferenceValue(Table):
     """Any other published or measured number, under a name of the user's choice."""
 
-    name: Label = Field(description="a text, the name of the value")
+    name: Label = Field(description="a text that is not empty, the name of the value")
     value: Number = Field(description="a number")
     unit: str = Field(default="", description="a text, the unit")
     note: str = Field(default="", description="a text")

@@ -10,7 +10,7 @@ from numba import njit
 from ..typing import Array, ComplexArray, IntArray, Sparse
 from .coupling import Coupling
 
-_CHUNK = 64
+_CHUNK = 256
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
@@ -73,8 +73,10 @@ class BackwardError:
         self.coupling = coupling
         self._pattern = _common_pattern(system.stiffness, system.damping, system.mass)
         rows = system.contact_rows()
-        self._normal = sp.csr_array(rows[0::2])
-        self._tangent = sp.csr_array(rows[1::2])
+        # Contacts touch few freedoms: dense rows on those alone.
+        self._touched = np.flatnonzero(np.abs(rows).max(axis=0, initial=0.0))
+        self._normal = rows[0::2][:, self._touched]
+        self._tangent = rows[1::2][:, self._touched]
 
     def __call__(self, lam: ComplexArray, u: ComplexArray, mu: float | Array, *, left: bool = False) -> Array:
         """Errors (k,) of the pairs λ (k,), u (n, k) at μ, one number or (k,).
@@ -104,19 +106,21 @@ class BackwardError:
         if not self.coupling.contacts:
             return np.abs(error).max(axis=0) / scale.max(axis=0)
         coupling, friction = self.coupling, self.coupling.sense[:, None] * mu
-        normal_motion, slip = self._normal @ u, self._tangent @ u
+        touched = self._touched
+        near, near_size = u[touched], size[touched]
+        normal_motion, slip = self._normal @ near, self._tangent @ near
         gap = normal_motion + friction * slip if left else normal_motion
         force = self._forces(gap, error, friction, left)
         tangential = np.zeros_like(force) if left else friction * force
         if coupling.sloped:
             weakening = np.array([coupling.friction_damping(float(m)) for m in mu]).T * lam
             tangential = tangential - weakening * slip
-        error = error - self._normal.T @ force - self._tangent.T @ tangential
-        scale = scale + abs(self._normal.T) @ np.abs(force) + abs(self._tangent.T) @ np.abs(tangential)
+        error[touched] -= self._normal.T @ force + self._tangent.T @ tangential
+        scale[touched] += np.abs(self._normal.T) @ np.abs(force) + np.abs(self._tangent.T) @ np.abs(tangential)
         closure = np.abs(gap + coupling.compliance[:, None] * force)
-        reach = abs(self._normal) @ size + coupling.compliance[:, None] * np.abs(force)
+        reach = np.abs(self._normal) @ near_size + coupling.compliance[:, None] * np.abs(force)
         if left:
-            reach = reach + np.abs(friction) * (abs(self._tangent) @ size)
+            reach = reach + np.abs(friction) * (np.abs(self._tangent) @ near_size)
         contact = (closure / np.maximum(reach, 1e-300)).max(axis=0)
         return np.maximum(np.abs(error).max(axis=0) / scale.max(axis=0), contact)
 
@@ -128,10 +132,10 @@ class BackwardError:
         force[soft] = -gap[soft] / compliance[soft][:, None]
         if soft.all():
             return force
-        normal, tangent = self._normal.toarray(), self._tangent.toarray()
+        normal, tangent = self._normal, self._tangent
         for k in range(gap.shape[1]):
             push = normal if left else normal + friction[:, k : k + 1] * tangent
-            rest = error[:, k] - push[soft].T @ force[soft, k]
+            rest = error[self._touched, k] - push[soft].T @ force[soft, k]
             force[~soft, k] = np.linalg.lstsq(push[~soft].T, rest, rcond=None)[0]
         return force
 

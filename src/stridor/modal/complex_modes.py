@@ -19,6 +19,7 @@ from .tracking import Tracker
 from .uncoupled import uncoupled_modes
 from .vectors import expand, fixed_vectors, modal_coordinates
 
+CHUNK = 256
 UNSTABLE_RELATIVE = 1e-9  # of |λ|: below it a real part is rounding
 
 
@@ -162,16 +163,22 @@ def complex_modes(
         if right is not None and left is not None:
             right[:, k] = shape[:, 0]
             left[:, k] = shape[:, 0]
-    for row, m in enumerate(values):
-        lam = followed[row, moving]
-        if not len(lam):
-            continue
-        push, pull = modal_coordinates(spectrum, lam, float(m))
-        u = expand(spectrum, lam, push)
-        residual[row, at_moving] = judge(lam, u, float(m))
+    # All pairs of the sweep in one list, worked through in pieces that stay in the cache.
+    lam = followed[:, moving].ravel()
+    each = np.repeat(values, len(moving))
+    forces = [modal_coordinates(spectrum, followed[row, moving], float(m)) for row, m in enumerate(values)]
+    push, pull = (np.concatenate([f[side] for f in forces]) for side in (0, 1))
+    flat = np.zeros(len(lam))
+    for start_at in range(0, len(lam), CHUNK):
+        part = slice(start_at, start_at + CHUNK)
+        u = expand(spectrum, lam[part], push[part])
+        flat[part] = judge(lam[part], u, each[part])
         if right is not None and left is not None:
-            right[row, at_moving] = u.T
-            left[row, at_moving] = expand(spectrum, lam, pull).T
+            where = np.arange(len(lam))[part]
+            rows, columns_at = where // len(moving), np.array(at_moving)[where % len(moving)]
+            right[rows, columns_at] = u.T
+            left[rows, columns_at] = expand(spectrum, lam[part], pull[part]).T
+    residual[:, at_moving] = flat.reshape(len(values), len(moving))
     return ComplexModes(
         mu=values,
         eigenvalues=everything[:, columns],

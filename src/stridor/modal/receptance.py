@@ -15,7 +15,7 @@ import scipy.sparse.linalg as spl
 from numba import njit
 
 from ..system import System
-from ..typing import Array, ComplexArray
+from ..typing import Array, ComplexArray, IntArray
 from .uncoupled import UncoupledModes
 
 
@@ -50,43 +50,55 @@ def _real_mode_sums(
 class Receptance:
     """H(λ) = G D(λ)⁻¹ Gᵀ and its derivative from a complete modal basis.
 
-    real (r, n_real), general (r, n_poles): rows of G on the modes.
+    real (r, n_real), general (r, n_poles): rows of G on the modes. pairs (2, p): which entries of
+    the upper triangle are wanted; the others stay zero.
     """
 
     modes: UncoupledModes
     real: Array
     general: ComplexArray
+    pairs: IntArray
 
-    @staticmethod
-    def of(system: System, modes: UncoupledModes) -> Receptance:
-        """Receptance at the contacts of ``system``."""
-        return Receptance(modes, *modes.project(system.contact_rows()))
+    def __post_init__(self) -> None:
+        first, second = self.pairs
+        # What every evaluation needs, multiplied out once.
+        object.__setattr__(self, "_products", np.ascontiguousarray(self.real[first] * self.real[second]))
+        object.__setattr__(self, "_gains", (self.general[first] * self.general[second]).T)
+        object.__setattr__(self, "_damping", self.modes.damping)
+        object.__setattr__(self, "_stiffness", self.modes.stiffness)
+        object.__setattr__(self, "_poles", self.modes.poles)
 
     def __call__(self, lam: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """H and dH/dλ (k, r, r) at λ (k,)."""
         rows = self.real.shape[0]
-        first, second = np.triu_indices(rows)
-        sums = np.zeros((len(lam), len(first), 4))
-        products = np.ascontiguousarray(self.real[first] * self.real[second])
+        first, second = self.pairs
+        sums = np.empty((len(lam), len(first), 4))
         _real_mode_sums(
             np.ascontiguousarray(lam.real),
             np.ascontiguousarray(lam.imag),
-            self.modes.damping,
-            self.modes.stiffness,
-            products,
+            self._damping,  # type: ignore[attr-defined]
+            self._stiffness,  # type: ignore[attr-defined]
+            self._products,  # type: ignore[attr-defined]
             sums,
         )
-        value = sums[..., 0] + 1j * sums[..., 1]
-        slope = sums[..., 2] + 1j * sums[..., 3]
+        both = sums.view(complex)
+        value, slope = both[..., 0], both[..., 1]
         if self.general.shape[1]:
-            gain = (self.general[first] * self.general[second]).T
-            inverse = 1.0 / (lam[:, None] - self.modes.poles)
+            gain = self._gains  # type: ignore[attr-defined]
+            inverse = 1.0 / (lam[:, None] - self._poles)  # type: ignore[attr-defined]
             value = value + inverse @ gain
             slope = slope - inverse**2 @ gain
         full = np.zeros((2, len(lam), rows, rows), dtype=complex)
-        full[:, :, first, second] = value, slope
-        full[:, :, second, first] = value, slope
+        full[0][:, first, second] = full[0][:, second, first] = value
+        full[1][:, first, second] = full[1][:, second, first] = slope
         return full[0], full[1]
+
+
+def wanted_pairs(contacts: int, *, slip: bool) -> IntArray:
+    """Entries (2, p) of H's upper triangle that T needs: without ``slip`` none of tangent with tangent."""
+    first, second = np.triu_indices(2 * contacts)
+    keep = np.ones(len(first), dtype=bool) if slip else ~((first % 2 == 1) & (second % 2 == 1))
+    return np.array([first[keep], second[keep]])
 
 
 def direct_receptance(system: System, lam: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

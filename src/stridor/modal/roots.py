@@ -15,10 +15,10 @@ import scipy.linalg as sl
 from ..errors import AnalysisError
 from ..typing import Array, ComplexArray
 from .coupling import Coupling
-from .receptance import Receptance
+from .receptance import Receptance, wanted_pairs
 from .uncoupled import UncoupledModes
 
-CONVERGED = 2e-14
+CONVERGED = 1e-9  # of the step before last: convergence is at least quadratic
 MAX_STEPS = 40
 UNCOUPLED_TOLERANCE = 1e-12
 
@@ -58,10 +58,10 @@ class Spectrum:
 
     def null_vectors(self, lam: ComplexArray, mu: float) -> tuple[ComplexArray, ComplexArray]:
         """Left and right null vectors (k, q) of T at the roots λ (k,)."""
-        value, _, _ = self.evaluate(lam, mu)
-        if value.shape[1] == 1:
+        if self.coupling.contacts == 1 and not self.coupling.sloped:
             ones = np.ones((len(lam), 1), dtype=complex)
             return ones, ones
+        value, _, _ = self.evaluate(lam, mu)
         return _null_vectors(value)
 
 
@@ -75,7 +75,8 @@ def spectrum_of(coupling: Coupling, modes: UncoupledModes) -> Spectrum:
     rows = coupling.system.contact_rows()
     real, general = modes.project(rows)
     fixed, combinations, real, coupled = _split_unseen(modes, real, sloped=coupling.sloped)
-    receptance = Receptance(modes, real, general)
+    pairs = wanted_pairs(coupling.contacts, slip=coupling.sloped)
+    receptance = Receptance(modes, real, general, pairs)
     return Spectrum(
         coupling=coupling,
         receptance=receptance,
@@ -268,8 +269,8 @@ def polish(
         step = _step(spectrum, roots, mirror, index, nearby, mu)
         relative = np.abs(step) / np.maximum(np.abs(roots[index]), 1e-300)
         roots[index] = roots[index] - step
-        # Converged: at rounding, or stagnating just above it beside a coalescence.
-        done = (relative < CONVERGED) | ((relative < 1e-9) & (relative >= 0.5 * smallest[index]))
+        # Beside a coalescence the last digits stagnate above that; no step helps further then.
+        done = (relative < CONVERGED) | ((relative < 1e-7) & (relative >= 0.5 * smallest[index]))
         smallest[index] = np.minimum(smallest[index], relative)
         active[index[done]] = False
         if not active.any():
