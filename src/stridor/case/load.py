@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import CaseError
 from .model import Case
 from .overrides import override
-from .points import no_such
+from .points import choice
 
 _POSITION = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\s*$")
 _KEYS = re.compile(r"\('[^)]*',?\)")  # how tomllib names a table
@@ -61,9 +61,7 @@ def templates() -> list[str]:
 def template_text(name: str) -> str:
     """The commented text of a template. Raises CaseError for a name that is not one of `templates()`."""
     if name not in templates():
-        raise CaseError(
-            "template", name, no_such("template", name, templates()).replace("the case has", "there are")
-        )
+        raise CaseError("template", name, f"no such template{choice(name, templates(), 'there are')}")
     return (resources.files("stridor.case") / "templates" / f"{name}.toml").read_text(encoding="utf-8")
 
 

@@ -96,7 +96,8 @@ def _reach(location: Sequence[str | int], data: object, root: type[BaseModel]) -
             )
         elif (entries := _entries(place.annotation, step)) is not None:
             keys, annotation = entries
-            place = replace(here, annotation=annotation, keys=keys)
+            description = place.description.partition(", each ")[2] or place.description
+            place = replace(here, annotation=annotation, description=description, keys=keys)
         else:
             break
     return place

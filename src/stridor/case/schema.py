@@ -1,7 +1,8 @@
 """The tables of a case file. SI units; a name with another unit says it (`angle_deg`, `frequency_hz`).
 
-Each description completes the sentence "must be …" and is what a user reads when a value is refused. Rules
-that take more than one value (a ramp longer than its phase, a point that does not exist) are in `checks`.
+Each description completes the sentence "must be …" and is what a user reads when a value is refused; that
+of a table of values says after ", each " what one of them must be. Rules that take more than one value (a
+ramp longer than its phase, a point that does not exist) are in `checks`.
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ class BeamBody(Table):
     )
     points: Mapping[Name, NotNegative] = Field(
         default_factory=dict[str, float],
-        description="a table of named points, each a distance >= 0 [m] from the start along the axis",
+        description="a table of named points, each a number >= 0 [m], the distance along the axis",
     )
 
     @property
@@ -152,7 +153,7 @@ class Support(Table):
     )
     velocity: Mapping[Direction, Number] = Field(
         default_factory=dict[Direction, float],
-        description="a table of numbers { x [m/s], y [m/s], rotation [rad/s] }, prescribed velocities",
+        description="a table of prescribed velocities, each a number, x and y [m/s], rotation [rad/s]",
     )
 
 
@@ -239,11 +240,11 @@ class Phase(Table):
     duration: Positive = Field(description="a number > 0 [s], how long the phase lasts")
     loads: Mapping[str, Number] = Field(
         default_factory=dict[str, float],
-        description="a table { NAME = number }, the factors of loads in this phase",
+        description="a table of loads, each a number, the factor of the load in this phase",
     )
     velocities: Mapping[str, Number] = Field(
         default_factory=dict[str, float],
-        description="a table { NAME = number }, the factors of supports' velocities in this phase",
+        description="a table of supports, each a number, the factor of the support's velocity in this phase",
     )
     ramp: NotNegative = Field(
         default=0.0, description="a number >= 0 [s], the time in which the factors change (0: suddenly)"

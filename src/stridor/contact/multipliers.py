@@ -1,0 +1,69 @@
+"""Forward-increment Lagrange multipliers of one contact: unregularised Coulomb, solved exactly.
+
+Plain arithmetic that the time loop compiles. The multipliers at t_n are those that make the
+configuration at t_{n+1} admissible (paper eqs 9 and 12 and the conditions below them); several
+contacts are iterated by Gauss–Seidel around this local solution.
+"""
+
+from __future__ import annotations
+
+import math
+
+OPEN, STICK, SLIP = 0, 1, 2
+
+
+def sliding_coefficient(kinetic: float, static: float, decay_speed: float, speed: float) -> float:
+    """μ while sliding at ``speed`` [m/s]; decay_speed 0 means no dependence on it."""
+    if decay_speed <= 0.0:
+        return kinetic
+    return kinetic + (static - kinetic) * math.exp(-speed / decay_speed)
+
+
+def solve_contact(
+    gap: float,
+    slip: float,
+    w_nn: float,
+    w_nt: float,
+    w_tt: float,
+    kinetic: float,
+    static: float,
+    decay_speed: float,
+    was_sticking: bool,
+    step: float,
+) -> tuple[float, float, int]:
+    """Normal force N ≥ 0, tangential force T and status from the free motion of one contact.
+
+    gap [m] and slip [m] are the gap at t_{n+1} and the slip over the step that would follow without
+    this contact's forces; w_** [m/N] the compliances over one step, so that gap + w_nn N + w_nt T and
+    slip + w_nt N + w_tt T follow with them. step Δt [s] turns slip into speed.
+    Signorini: gap ≥ 0, N ≥ 0, N·gap = 0. Coulomb: |T| ≤ μN, and T = −μN sign(slip) where it slips.
+    """
+    if gap >= 0.0:
+        return 0.0, 0.0, OPEN
+    determinant = w_nn * w_tt - w_nt * w_nt
+    normal = (slip * w_nt - gap * w_tt) / determinant
+    tangential = (gap * w_nt - slip * w_nn) / determinant
+    speed = abs(slip) / step
+    limit = static if was_sticking else sliding_coefficient(kinetic, static, decay_speed, 0.0)
+    if normal >= 0.0 and abs(tangential) <= limit * normal:
+        return normal, tangential, STICK
+    # Sliding: friction acts as sticking would have to, only not enough.
+    sense = 1.0 if tangential > 0.0 else -1.0
+    for attempt in range(2):
+        for _ in range(8 if decay_speed > 0.0 else 1):
+            mu = sliding_coefficient(kinetic, static, decay_speed, speed)
+            stiff = w_nn + sense * mu * w_nt
+            normal = -gap / stiff
+            tangential = sense * mu * normal
+            moved = slip + w_nt * normal + w_tt * tangential
+            change = abs(abs(moved) / step - speed)
+            speed = abs(moved) / step
+            if change <= 1e-14 * speed:
+                break
+        if (stiff > 0.0 and moved * sense <= 0.0) or attempt == 1:
+            break
+        sense = -sense
+    if normal < 0.0:
+        # No sliding solution pushes (μ beyond the jamming limit of the pair): nothing to transmit.
+        return 0.0, 0.0, OPEN
+    return normal, tangential, SLIP

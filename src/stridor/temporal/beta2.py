@@ -1,0 +1,71 @@
+"""The β2 scheme of the paper (eq. 10) in the form the time loop uses.
+
+With q_n = v_{n−1} + Δt (1−β2) a_{n−1} and d_n = u_{n+1} − u_n, eqs 9 and 10 become
+
+    (M + β2 Δt C) d_n = Δt² s/2 (f_n − K u_n − Gᵀλ_n) + (Δt M − Δt²/2 C) q_n,      s = 1 + 2 β2
+    q_{n+1} = (2β2 − 1)/s q_n + 2/(s Δt) d_n
+    v_n = (q_n + 2β2 d_n/Δt)/s,        a_n = 2 (d_n/Δt − q_n)/(Δt s)
+
+so two vectors u, q are the whole state. β2 = 1/2 is the central difference scheme. The scheme is
+stable for Δt² ω² ≤ (2/β2)(1 + (β2 − 1/2) Δt c) (docs/theory-temporal.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg as sl
+
+from ..errors import AnalysisError
+from ..system import System
+
+
+class Scheme(NamedTuple):
+    """Scalars of the scheme: step Δt [s], beta2, s = 1 + 2 β2, memory κ of q, gain 2/(sΔt) of d in q."""
+
+    step: float
+    beta2: float
+    s: float
+    memory: float
+    gain: float
+
+
+def scheme(step: float, beta2: float) -> Scheme:
+    """Scalars for a step [s] and β2 in [0.5, 1]."""
+    s = 1.0 + 2.0 * beta2
+    return Scheme(step, beta2, s, (2.0 * beta2 - 1.0) / s, 2.0 / (s * step))
+
+
+@dataclass(frozen=True)
+class StepLimit:
+    """Largest stable step [s], the circular frequency that sets it [rad/s] and the body it lives in."""
+
+    step: float
+    omega_max: float
+    body: str
+
+
+def step_limit(system: System, beta2: float) -> StepLimit:
+    """Courant limit √(2/β2)/ω_max of the assembled structure; contacts by multipliers do not lower it.
+
+    Damping can only raise it (equal for β2 = 1/2), so the undamped frequency is used.
+    """
+    worst, body = 0.0, "the system"
+    for part in system.components:
+        mass = system.mass[part][:, part].toarray()
+        stiffness = system.stiffness[part][:, part].toarray()
+        last = len(part) - 1
+        try:
+            value = float(sl.eigh(stiffness, mass, eigvals_only=True, subset_by_index=[last, last])[0])
+        except sl.LinAlgError as error:
+            raise AnalysisError(
+                "the mass matrix is not positive definite: a freedom has stiffness but no mass"
+            ) from error
+        if value > worst:
+            worst = value
+            owners = [line.name for line in system.lines if np.isin(part[0], line.freedoms)]
+            body = owners[0] if owners else "the system"
+    omega = float(np.sqrt(worst))
+    return StepLimit(float(np.sqrt(2.0 / beta2) / omega) if omega > 0 else np.inf, omega, body)
