@@ -10,4 +10,5 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 Sparse = Any  # scipy.sparse.csr_array; SciPy ships no types

@@ -296,7 +296,7 @@ class Temporal(Table):
     )
     perturbation: NotNegative = Field(
         default=0.0,
-        description="a number >= 0 [m/s], a velocity along the normal given to the slave points at the start",
+        description="a number >= 0 [m/s], an extra slip speed of the slave points at the start",
     )
     path: Literal["auto", "modal", "nodal"] = Field(
         default="auto", description='"auto", "modal" or "nodal", the unknowns of the time loop'

@@ -12,13 +12,6 @@ import math
 OPEN, STICK, SLIP = 0, 1, 2
 
 
-def sliding_coefficient(kinetic: float, static: float, decay_speed: float, speed: float) -> float:
-    """μ while sliding at ``speed`` [m/s]; decay_speed 0 means no dependence on it."""
-    if decay_speed <= 0.0:
-        return kinetic
-    return kinetic + (static - kinetic) * math.exp(-speed / decay_speed)
-
-
 def solve_contact(
     gap: float,
     slip: float,
@@ -35,7 +28,9 @@ def solve_contact(
 
     gap [m] and slip [m] are the gap at t_{n+1} and the slip over the step that would follow without
     this contact's forces; w_** [m/N] the compliances over one step, so that gap + w_nn N + w_nt T and
-    slip + w_nt N + w_tt T follow with them. step Δt [s] turns slip into speed.
+    slip + w_nt N + w_tt T follow with them. step Δt [s] turns slip into speed. kinetic, static and
+    decay_speed [m/s] make μ(v) = kinetic + (static − kinetic) exp(−v/decay_speed), 0 meaning kinetic
+    alone while sliding and static while sticking.
     Signorini: gap ≥ 0, N ≥ 0, N·gap = 0. Coulomb: |T| ≤ μN, and T = −μN sign(slip) where it slips.
     """
     if gap >= 0.0:
@@ -44,14 +39,16 @@ def solve_contact(
     normal = (slip * w_nt - gap * w_tt) / determinant
     tangential = (gap * w_nt - slip * w_nn) / determinant
     speed = abs(slip) / step
-    limit = static if was_sticking else sliding_coefficient(kinetic, static, decay_speed, 0.0)
+    limit = static if was_sticking or decay_speed > 0.0 else kinetic
     if normal >= 0.0 and abs(tangential) <= limit * normal:
         return normal, tangential, STICK
     # Sliding: friction acts as sticking would have to, only not enough.
     sense = 1.0 if tangential > 0.0 else -1.0
     for attempt in range(2):
         for _ in range(8 if decay_speed > 0.0 else 1):
-            mu = sliding_coefficient(kinetic, static, decay_speed, speed)
+            mu = kinetic
+            if decay_speed > 0.0:
+                mu += (static - kinetic) * math.exp(-speed / decay_speed)
             stiff = w_nn + sense * mu * w_nt
             normal = -gap / stiff
             tangential = sense * mu * normal

@@ -14,12 +14,14 @@ from ..system import System
 from ..typing import Array, ComplexArray, IntArray
 from .backward_error import BackwardError
 from .coupling import Coupling, couple
+from .refinement import refine
 from .roots import Spectrum, spectrum_of
 from .tracking import Tracker
 from .uncoupled import uncoupled_modes
 from .vectors import expand, fixed_vectors, modal_coordinates
 
 CHUNK = 256
+DOUBTFUL = 1e-11  # backward errors above it are refined on the assembled matrices
 UNSTABLE_RELATIVE = 1e-9  # of |λ|: below it a real part is rounding
 
 
@@ -135,60 +137,85 @@ def complex_modes(
     spectrum, coupling, open_contacts = prepare(system, mu=float(values.max()) if len(values) == 1 else None)
     tracker = Tracker(spectrum, _limit(spectrum, count, max_frequency_hz))
     order = np.argsort(values, kind="stable")
-    followed = np.zeros((len(values), len(tracker.state.roots)), dtype=complex)
     start = tracker.state.roots
+    followed = np.zeros((len(values), len(start)), dtype=complex)
     for k in order:
-        followed[k] = tracker.advance(float(values[k])).roots
+        followed[k] = tracker.advance(float(values[k])).roots[: len(start)]
     fixed = spectrum.fixed
     columns = np.argsort(np.abs(np.concatenate([start, fixed]).imag), kind="stable")
     if max_frequency_hz is None:
         columns = columns[:count]
     else:
         columns = columns[np.concatenate([start, fixed])[columns].imag <= 2 * np.pi * max_frequency_hz]
-    everything = np.hstack([followed, np.broadcast_to(fixed, (len(values), len(fixed)))])
+    moving = np.flatnonzero(columns < len(start))
+    still = np.flatnonzero(columns >= len(start))
+    eigenvalues = np.empty((len(values), len(columns)), dtype=complex)
+    eigenvalues[:, moving] = followed[:, columns[moving]]
+    eigenvalues[:, still] = fixed[columns[still] - len(start)]
     judge = BackwardError(coupling)
     residual = np.zeros((len(values), len(columns)))
-    right = left = None
-    if vectors:
-        right = np.zeros((len(values), len(columns), system.size), dtype=complex)
-        left = np.zeros_like(right)
-    constant = fixed_vectors(spectrum)
-    moving = columns[columns < len(start)]
-    place = {int(c): k for k, c in enumerate(columns)}
-    at_moving = [place[int(c)] for c in moving]
-    for column in columns[columns >= len(start)]:
-        k = place[int(column)]
-        shape = constant[:, [column - len(start)]].astype(complex)
-        residual[:, k] = judge(fixed[[column - len(start)]], shape, 0.0)
-        if right is not None and left is not None:
-            right[:, k] = shape[:, 0]
-            left[:, k] = shape[:, 0]
-    # All pairs of the sweep in one list, worked through in pieces that stay in the cache.
-    lam = followed[:, moving].ravel()
-    each = np.repeat(values, len(moving))
-    forces = [modal_coordinates(spectrum, followed[row, moving], float(m)) for row, m in enumerate(values)]
-    push, pull = (np.concatenate([f[side] for f in forces]) for side in (0, 1))
-    flat = np.zeros(len(lam))
-    for start_at in range(0, len(lam), CHUNK):
-        part = slice(start_at, start_at + CHUNK)
-        u = expand(spectrum, lam[part], push[part])
-        flat[part] = judge(lam[part], u, each[part])
-        if right is not None and left is not None:
-            where = np.arange(len(lam))[part]
-            rows, columns_at = where // len(moving), np.array(at_moving)[where % len(moving)]
-            right[rows, columns_at] = u.T
-            left[rows, columns_at] = expand(spectrum, lam[part], pull[part]).T
-    residual[:, at_moving] = flat.reshape(len(values), len(moving))
+    shapes = np.zeros((2, len(values), len(columns), system.size if vectors else 0), dtype=complex)
+    constant = fixed_vectors(spectrum)[:, columns[still] - len(start)].astype(complex)
+    residual[:, still] = _judge_fixed(judge, spectrum, eigenvalues[0, still], constant, values)
+    shapes[:, :, still] = constant.T if vectors else 0.0
+    part = _pairs(spectrum, judge, eigenvalues[:, moving], values, shapes if vectors else None, moving)
+    eigenvalues[:, moving], residual[:, moving] = part
     return ComplexModes(
         mu=values,
-        eigenvalues=everything[:, columns],
+        eigenvalues=eigenvalues,
         branch=np.arange(1, len(columns) + 1),
         residual=residual,
         damped=damped,
-        right=right,
-        left=left,
+        right=shapes[0] if vectors else None,
+        left=shapes[1] if vectors else None,
         open_contacts=open_contacts,
     )
+
+
+def _judge_fixed(
+    judge: BackwardError, spectrum: Spectrum, lam: ComplexArray, vectors: ComplexArray, mu: Array
+) -> Array:
+    """Backward errors (k, b) of the modes that no contact sees: the same at every μ."""
+    if not len(lam):
+        return np.zeros((len(mu), 0))
+    return np.broadcast_to(judge(lam, vectors, 0.0), (len(mu), len(lam)))
+
+
+def _pairs(
+    spectrum: Spectrum,
+    judge: BackwardError,
+    eigenvalues: ComplexArray,
+    mu: Array,
+    shapes: ComplexArray | None,
+    columns: IntArray,
+) -> tuple[ComplexArray, Array]:
+    """Eigenvalues and backward errors (k, b); right and left vectors go to ``columns`` of ``shapes``.
+
+    All pairs of the sweep are one list, worked through in pieces that stay in the cache.
+    """
+    count = eigenvalues.shape[1]
+    lam, each = eigenvalues.ravel(), np.repeat(mu, count)
+    forces = [modal_coordinates(spectrum, row, float(m)) for row, m in zip(eigenvalues, mu, strict=True)]
+    push, pull = (np.concatenate([f[side] for f in forces]) for side in (0, 1))
+    errors = np.zeros(len(lam))
+    for start in range(0, len(lam), CHUNK):
+        part = np.arange(start, min(start + CHUNK, len(lam)))
+        right = expand(spectrum, lam[part], push[part])
+        errors[part] = judge(lam[part], right, each[part])
+        doubtful = np.flatnonzero(~(errors[part] < DOUBTFUL))
+        chosen = np.arange(len(part)) if shapes is not None else doubtful
+        left = np.zeros_like(right)
+        left[:, chosen] = expand(spectrum, lam[part[chosen]], pull[part[chosen]])
+        for k in doubtful:
+            at = part[k]
+            value, x, y = refine(spectrum.coupling, complex(lam[at]), right[:, k], left[:, k], float(each[at]))
+            error = float(judge(np.array([value]), x[:, None], each[at])[0])
+            if error < errors[at] or not np.isfinite(errors[at]):
+                errors[at], lam[at], right[:, k], left[:, k] = error, value, x, y
+        if shapes is not None:
+            shapes[0, part // count, columns[part % count]] = right.T
+            shapes[1, part // count, columns[part % count]] = left.T
+    return lam.reshape(eigenvalues.shape), errors.reshape(eigenvalues.shape)
 
 
 def _limit(spectrum: Spectrum, count: int, max_frequency_hz: float | None) -> float:

@@ -176,26 +176,38 @@ def _passages(spectrum: Spectrum, old: State, new: State, has_damping: bool) -> 
                                                          new.tangents[i].real * step):
                 mu = old.mu + fraction * step
                 events.append(
-                    _Event(mu, a + fraction * (b - a), i, _nearest(new.roots, i, b), stabilising, False)
+                    _Event(
+                        mu,
+                        a + fraction * (b - a),
+                        int(new.branch[i]),
+                        _named(new, _nearest(new.roots, i, b)),
+                        stabilising,
+                        False,
+                    )
                 )
             continue
         was, now = _grows(a), _grows(b)
         if was == now:
             continue
         j = _partner(old, new, i)
-        first = ((a - (old.roots[j] if j >= 0 else old.mirror[i])) / 2) ** 2
-        second = ((b - (new.roots[j] if j >= 0 else new.mirror[i])) / 2) ** 2
+        first = ((a - old.roots[j]) / 2) ** 2 if j >= 0 else a**2
+        second = ((b - new.roots[j]) / 2) ** 2 if j >= 0 else b**2
         fraction = float(np.clip((first / (first - second)).real, 0.0, 1.0)) if first != second else 0.5
         if j >= 0:
             middle = (1 - fraction) * (a + old.roots[j]) / 2 + fraction * (b + new.roots[j]) / 2
         else:
             middle = 0.0
-        events.append(_Event(old.mu + fraction * step, complex(middle), i, j, was, True))
+        at = old.mu + fraction * step
+        events.append(_Event(at, complex(middle), int(new.branch[i]), _named(new, j), was, True))
     return events
 
 
 def _grows(root: complex) -> bool:
     return bool(abs(root.real) > UNSTABLE_RELATIVE * max(abs(root), 1.0))
+
+
+def _named(state: State, i: int) -> int:
+    return int(state.branch[i]) if i >= 0 else -1
 
 
 def _nearest(roots: ComplexArray, i: int, root: complex) -> int:
@@ -213,6 +225,7 @@ def _partner(old: State, new: State, i: int) -> int:
         return -1
     distance = np.abs(split.roots + np.conj(split.roots[i]))
     distance[i] = np.inf
+    distance[len(old.roots) :] = np.inf
     return int(np.argmin(distance))
 
 

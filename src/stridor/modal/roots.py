@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg as sl
 
 from ..errors import AnalysisError
-from ..typing import Array, ComplexArray
+from ..typing import Array, BoolArray, ComplexArray
 from .coupling import Coupling
 from .receptance import Receptance, wanted_pairs
 from .uncoupled import UncoupledModes
@@ -28,13 +28,15 @@ class Spectrum:
     """Contact problem on a complete modal basis, ready for root finding.
 
     coupled (n_real,) tells which real modes feel the contacts; fixed_modes (k, n_real) are the
-    combinations that no contact sees, with their poles fixed (k,): eigenvalues at any μ.
+    combinations that no contact sees, with their poles fixed (k,): eigenvalues at any μ. projections
+    (2m, n_real): the contact rows on the modes as they are; the receptance has those of equal poles turned.
     """
 
     coupling: Coupling
     receptance: Receptance
     fixed: ComplexArray
     fixed_modes: Array
+    projections: Array
     pole_stiffness: Array
     pole_damping: Array
 
@@ -73,8 +75,8 @@ def _null_vectors(value: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
 def spectrum_of(coupling: Coupling, modes: UncoupledModes) -> Spectrum:
     """Prepare root finding: separate what the contacts do not see from what they do."""
     rows = coupling.system.contact_rows()
-    real, general = modes.project(rows)
-    fixed, combinations, real, coupled = _split_unseen(modes, real, sloped=coupling.sloped)
+    projections, general = modes.project(rows)
+    fixed, combinations, real, coupled = _split_unseen(modes, projections, sloped=coupling.sloped)
     pairs = wanted_pairs(coupling.contacts, slip=coupling.sloped)
     receptance = Receptance(modes, real, general, pairs)
     return Spectrum(
@@ -82,6 +84,7 @@ def spectrum_of(coupling: Coupling, modes: UncoupledModes) -> Spectrum:
         receptance=receptance,
         fixed=fixed,
         fixed_modes=combinations,
+        projections=projections,
         pole_stiffness=modes.stiffness[coupled],
         pole_damping=modes.damping[coupled],
     )
@@ -120,11 +123,11 @@ def _split_unseen(
         rotated[:, group] = real[:, group] @ basis.T
         coupled[group[:rank]] = True
         for k in range(rank, len(group)):
-            pole_root = _pole(stiffness[group[k]], damping[group[k]])
             combination = np.zeros(len(stiffness))
             combination[group] = basis[k]
-            fixed.append(pole_root)
-            combinations.append(combination)
+            for pole_root in _poles(float(stiffness[group[k]]), float(damping[group[k]])):
+                fixed.append(pole_root)
+                combinations.append(combination)
             if not sloped:
                 rotated[0::2, group[k]] = 0.0
             else:
@@ -145,11 +148,14 @@ def _same(stiffness: Array, damping: Array, i: int, j: int) -> bool:
     )
 
 
-def _pole(stiffness: float, damping: float) -> complex:
-    """Root of λ² + cλ + ω² in the upper half plane (the slower one where both are real)."""
+def _poles(stiffness: float, damping: float) -> list[complex]:
+    """Roots of λ² + cλ + ω² in the closed upper half plane: one, or both where they are real."""
     half = damping / 2
     inside = half * half - stiffness
-    return complex(-half + np.sqrt(inside)) if inside > 0 else complex(-half, np.sqrt(-inside))
+    if inside <= 0:
+        return [complex(-half, np.sqrt(-inside))]
+    fast = -half - np.sqrt(inside)
+    return [complex(stiffness / fast), complex(fast)]
 
 
 def frictionless_roots(spectrum: Spectrum, limit: float) -> ComplexArray:
@@ -157,18 +163,19 @@ def frictionless_roots(spectrum: Spectrum, limit: float) -> ComplexArray:
 
     At μ = 0 the coupled stiffness is symmetric and the dense solver finds every root, so the count
     is right from the start; damping is then put in by the simultaneous iteration, or, where it is
-    strong or not proportional, by a dense solve of the damped problem. Upper half plane; of roots on
-    the real axis both are listed. The margin keeps guards beside the outermost root asked for.
+    strong or not proportional, by a dense solve of the damped problem. Upper half plane; roots on the
+    real axis are all listed. The margin keeps guards beside the outermost root asked for.
     """
     starts: ComplexArray | None = None
     if spectrum.modes.proportional:
         starts = _dense_undamped(spectrum, limit)
     if starts is None:
-        starts = _dense_damped(spectrum, limit)
+        starts = dense_roots(spectrum, 0.0, 1.3 * limit)
+        starts = starts[starts.imag >= 0]
     starts = starts[np.argsort(np.abs(starts), kind="stable")]
     if not len(starts):
         return starts
-    roots, converged = polish(spectrum, starts, np.conj(starts), 0.0)
+    roots, converged = polish(spectrum, starts, starts.imag != 0.0, 0.0)
     if not converged:
         raise AnalysisError(
             "the eigenvalues without friction do not settle: two modes coincide at the contact; change a "
@@ -209,28 +216,36 @@ def _elastic(normal: Array, compliance: Array, stiffness: Array) -> tuple[Array,
     return basis, basis.T @ stiffness @ basis
 
 
-def _dense_damped(spectrum: Spectrum, limit: float) -> ComplexArray:
-    """Eigenvalues of the dense damped problem at μ = 0 in physical freedoms, upper half plane."""
-    system = spectrum.coupling.system
-    normal = system.contact_rows()[0::2]
-    basis, stiffness = _elastic(normal, spectrum.coupling.compliance, system.stiffness.toarray())
-    mass, damping = (basis.T @ (a @ basis) for a in (system.mass, system.damping))
-    shift = limit / 10
-    shifted = shift**2 * mass + shift * damping + stiffness
+def dense_roots(spectrum: Spectrum, mu: float, limit: float) -> ComplexArray:
+    """Every eigenvalue with |λ| ≤ ``limit`` [1/s] but the fixed ones, by a dense solve in physical freedoms."""
+    coupling, system = spectrum.coupling, spectrum.coupling.system
+    rows = system.contact_rows()
+    normal, tangent = rows[0::2], rows[1::2]
+    push = normal + mu * coupling.sense[:, None] * tangent
+    rigid = coupling.compliance == 0.0
+    soft = push[~rigid].T @ (normal[~rigid] / coupling.compliance[~rigid][:, None])
+    mass, damping, stiffness = (a.toarray() for a in (system.mass, system.damping, system.stiffness))
+    stiffness = stiffness + soft
+    damping = damping + (tangent.T * coupling.friction_damping(mu)) @ tangent
+    if rigid.any():
+        right, left = sl.null_space(normal[rigid]), sl.null_space(push[rigid])
+        mass, damping, stiffness = (left.T @ a @ right for a in (mass, damping, stiffness))
+    shift = limit / 13
     n = len(mass)
-    factor = sl.cho_factor(shifted)
+    factor = sl.lu_factor(shift**2 * mass + shift * damping + stiffness)
     companion = np.block(
         [
-            [-sl.cho_solve(factor, 2 * shift * mass + damping), -sl.cho_solve(factor, mass) / shift],
-            [shift * np.eye(n), np.zeros((n, n))],
+            [-sl.lu_solve(factor, 2 * shift * mass + damping), -sl.lu_solve(factor, mass) * shift],
+            [np.eye(n) / shift, np.zeros((n, n))],
         ]
     )
     inverse = sl.eigvals(companion)
     inverse = inverse[np.abs(inverse) > 1.0 / (3 * limit)]
     values = shift + 1.0 / inverse
-    values = np.where(np.abs(values.imag) < 1e-9 * limit, values.real + 0j, values)
-    values = values[(np.abs(values) <= 1.3 * limit) & (values.imag >= 0)]
-    return _without(values, spectrum.fixed)
+    values = np.where(np.abs(values.imag) < 1e-9 * np.abs(values), values.real + 0j, values)
+    values = values[np.abs(values) <= limit]
+    fixed = spectrum.fixed
+    return _without(values, np.concatenate([fixed, np.conj(fixed[fixed.imag != 0])]))
 
 
 def _without(values: ComplexArray, fixed: ComplexArray) -> ComplexArray:
@@ -250,23 +265,25 @@ def _coupled_columns(spectrum: Spectrum) -> Array:
     return np.flatnonzero(np.abs(seen).max(axis=0, initial=0.0) > UNCOUPLED_TOLERANCE * scale)
 
 
+def mirrored(roots: ComplexArray, implied: BoolArray) -> ComplexArray:
+    """Conjugates (k,) of the roots where they are implied, not-a-number elsewhere."""
+    return np.where(implied, np.conj(roots), np.nan)
+
+
 def polish(
-    spectrum: Spectrum, starts: ComplexArray, mirrors: ComplexArray, mu: float, *, steps: int = MAX_STEPS
+    spectrum: Spectrum, starts: ComplexArray, implied: BoolArray, mu: float, *, steps: int = MAX_STEPS
 ) -> tuple[ComplexArray, bool]:
-    """Simultaneous iteration from ``starts`` (k,) with mirror roots ``mirrors`` (k,) held apart.
+    """Simultaneous iteration from ``starts`` (k,), the ``implied`` conjugate roots (k,) held apart too.
 
     Returns the roots (k,) and whether all of them converged to rounding.
     """
     roots = np.array(starts, dtype=complex)
-    mirrored = mirrors == np.conj(starts)
-    mirror = np.array(mirrors, dtype=complex)
     nearby = _poles_near(spectrum, roots)
     smallest = np.full(len(roots), np.inf)
     active = np.ones(len(roots), dtype=bool)
     for _ in range(steps):
-        mirror[mirrored] = np.conj(roots[mirrored])
         index = np.flatnonzero(active)
-        step = _step(spectrum, roots, mirror, index, nearby, mu)
+        step = _step(spectrum, roots, mirrored(roots, implied), index, nearby, mu)
         relative = np.abs(step) / np.maximum(np.abs(roots[index]), 1e-300)
         roots[index] = roots[index] - step
         # Beside a coalescence the last digits stagnate above that; no step helps further then.
@@ -279,8 +296,11 @@ def polish(
 
 
 def _poles_near(spectrum: Spectrum, roots: ComplexArray) -> tuple[Array, Array]:
-    limit = (1.5 * np.abs(roots).max()) ** 2
-    near = spectrum.pole_stiffness <= limit
+    # An overdamped pole pair has its slow one far below its ω.
+    half = spectrum.pole_damping / 2
+    slow = half - np.sqrt(np.maximum(half**2 - spectrum.pole_stiffness, 0.0))
+    reach = 1.5 * np.abs(roots).max()
+    near = (spectrum.pole_stiffness <= reach**2) | ((half**2 > spectrum.pole_stiffness) & (slow <= reach))
     return spectrum.pole_stiffness[near], spectrum.pole_damping[near]
 
 
@@ -298,7 +318,7 @@ def _step(
         if value.shape[1] == 1:
             slope = by_lambda[:, 0, 0] / value[:, 0, 0]
         else:
-            slope = np.trace(np.linalg.solve(value + 1e-300, by_lambda), axis1=1, axis2=2)
+            slope = _trace_of_quotient(value, by_lambda)
         stiffness, damping = poles
         column = lam[:, None]
         slope = slope + ((2 * column + damping) / (column * (column + damping) + stiffness)).sum(axis=1)
@@ -308,8 +328,25 @@ def _step(
         others[np.arange(len(index)), index] = np.inf
         slope = slope - (1.0 / others).sum(axis=1)
         pairs = column - mirror
-        # A root on the real axis is its own mirror: one root, not two.
-        pairs[np.abs(pairs) < 1e-12 * np.maximum(np.abs(column), 1e-300)] = np.inf
-        slope = slope - (1.0 / pairs).sum(axis=1)
+        slope = slope - np.where(np.isnan(mirror), 0.0, 1.0 / pairs).sum(axis=1)
         step = 1.0 / slope
     return np.where(np.isfinite(step), step, 0.0)
+
+
+def _trace_of_quotient(value: ComplexArray, slope: ComplexArray) -> ComplexArray:
+    """tr(T⁻¹ T') (k,), infinite where T is singular to the last bit: a root hit exactly."""
+    # Rows are of very different size where soft and rigid contacts meet.
+    size = np.abs(value).max(axis=2, keepdims=True)
+    size = np.where((size > 0) & np.isfinite(size), size, 1.0)
+    value, slope = value / size, slope / size
+    try:
+        return np.trace(np.linalg.solve(value, slope), axis1=1, axis2=2)
+    except np.linalg.LinAlgError:
+        pass
+    result = np.full(len(value), np.inf, dtype=complex)
+    for k in range(len(value)):
+        try:
+            result[k] = np.trace(np.linalg.solve(value[k], slope[k]))
+        except np.linalg.LinAlgError:
+            continue
+    return result

@@ -10,13 +10,14 @@ a and squared half difference b, which stay analytic in μ where the roots thems
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from ..errors import AnalysisError
-from ..typing import ComplexArray
-from .roots import Spectrum, frictionless_roots, polish
+from ..typing import BoolArray, ComplexArray, IntArray
+from .roots import Spectrum, dense_roots, frictionless_roots, polish
 
 CLOSE = 0.25  # a correction may be this fraction of the distance to the next root
 CONTINUATION_STEPS = 12
@@ -24,13 +25,16 @@ CONTINUATION_STEPS = 12
 
 @dataclass
 class State:
-    """Roots at one μ: roots (k,) of the branches, their mirror roots (conjugates until a
-    divergence splits the pair on the real axis), tangents dλ/dμ (k,)."""
+    """Roots at one μ: roots (k,) of the branches, tangents dλ/dμ (k,), and implied (k,): whether the
+    conjugate root is left unsaid. Real roots stand for themselves, and so does each of a pair that was
+    on the real axis once; a root that reaches the axis gets its twin appended. branch (k,): the
+    followed root each came from, itself but for twins."""
 
     mu: float
     roots: ComplexArray
-    mirror: ComplexArray
+    implied: BoolArray
     tangents: ComplexArray
+    branch: IntArray
 
 
 @dataclass
@@ -48,7 +52,9 @@ class Tracker:
 
     def __post_init__(self) -> None:
         roots = frictionless_roots(self.spectrum, self.limit)
-        self.state = State(0.0, roots, np.conj(roots), self._tangents(roots, 0.0))
+        self.state = State(
+            0.0, roots, roots.imag != 0.0, self._tangents(roots, 0.0), np.arange(len(roots))
+        )
         self._step = 0.01
 
     def _tangents(self, roots: ComplexArray, mu: float) -> ComplexArray:
@@ -59,19 +65,16 @@ class Tracker:
     def advance(self, mu: float) -> State:
         """Follow the branches to ``mu`` ≥ the present one; raises AnalysisError where they are lost."""
         if not len(self.state.roots):
-            self.state = State(mu, self.state.roots, self.state.mirror, self.state.tangents)
+            self.state = replace(self.state, mu=mu)
             return self.state
         while self.state.mu < mu:
             step = min(self._step, mu - self.state.mu)
             taken = self._try(self.state.mu + step if step < mu - self.state.mu else mu)
             if taken is None:
                 self._step = step / 4
-                if self._step < self.smallest_step:
-                    raise AnalysisError(
-                        f"branches cannot be told apart near μ = {self.state.mu:.9g}: three or more modes "
-                        "merge there; split the range or change a parameter slightly"
-                    )
-                continue
+                if self._step >= self.smallest_step:
+                    continue
+                taken, self._step = self._leap(mu), 1e-4
             if self.watch is not None:
                 self.watch(self.state, taken)
             self.state = taken
@@ -79,42 +82,79 @@ class Tracker:
                 self._step = min(self._step * 2, 0.02)
         return self.state
 
+    def _leap(self, end: float) -> State:
+        """Over a place where three or more roots merge: every root anew, each branch to the nearest.
+
+        Which of the merging branches is which beyond that place is a convention; that none is lost is not.
+        """
+        old = self.state
+        reach = 1.5 * float(np.abs(old.roots).max())
+        for leap in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
+            mu = min(old.mu + leap, end)
+            found = dense_roots(self.spectrum, mu, reach)
+            found = found[found.imag >= 0]
+            keep = np.flatnonzero(old.roots.imag >= 0)
+            if len(keep) != len(old.roots) or len(found) < len(keep):
+                continue
+            predicted = old.roots + (mu - old.mu) * np.where(np.isfinite(old.tangents), old.tangents, 0.0)
+            bounded = np.where(np.abs(predicted - old.roots) < 1e-3 * np.abs(old.roots), predicted, old.roots)
+            rows, columns = linear_sum_assignment(np.abs(bounded[:, None] - found))
+            roots = np.array(old.roots)
+            roots[rows] = found[columns]
+            implied = roots.imag != 0.0
+            if np.any(implied != old.implied) or np.any(np.abs(roots - old.roots) > 0.02 * np.abs(roots)):
+                continue
+            roots, converged = polish(self.spectrum, roots, implied, mu)
+            if converged:
+                return State(mu, roots, implied, self._tangents(roots, mu), old.branch)
+        raise AnalysisError(
+            f"branches cannot be told apart near μ = {old.mu:.9g}: three or more modes "
+            "merge there; split the range or change a parameter slightly"
+        )
+
     def _try(self, mu: float) -> State | None:
         old = self.state
         step = mu - old.mu
         predicted = old.roots + step * old.tangents
-        mirror = np.where(old.mirror == np.conj(old.roots), np.conj(predicted), old.mirror)
+        if not np.all(np.isfinite(predicted)):
+            return None
+        implied = old.implied.copy()
+        twins: list[complex] = []
+        origins: list[int] = []
         pairs = self._pairs(old, predicted)
         splits: dict[int, tuple[complex, complex, complex]] = {}
         for i, j in pairs:
-            a, b = _pair(old.roots[i], old.roots[j] if j >= 0 else old.mirror[i])
+            a, b = _pair(old.roots[i], old.roots[j] if j >= 0 else np.conj(old.roots[i]))
             da, db = _pair_slope(old, i, j)
             splits[i] = (a + step * da, b + step * db, b)
             half = _continued_root(splits[i][1], b, _half(old, i, j))
             predicted[i] = splits[i][0] + half
             if j >= 0:
                 predicted[j] = splits[i][0] - half
-                mirror[[i, j]] = np.conj(predicted[[i, j]])
-            else:
-                mirror[i] = splits[i][0] - half
-                if splits[i][1].real < 0:
-                    mirror[i] = np.conj(predicted[i])
-        roots, converged = polish(self.spectrum, predicted, mirror, mu, steps=CONTINUATION_STEPS)
+            elif half.imag == 0.0:
+                implied[i] = False
+                twins.append(splits[i][0] - half)
+                origins.append(int(old.branch[i]))
+        both = np.concatenate([predicted, twins])
+        implied = np.concatenate([implied, np.zeros(len(twins), dtype=bool)])
+        roots, converged = polish(self.spectrum, both, implied, mu, steps=CONTINUATION_STEPS)
         if not converged:
             return None
-        mirror = np.where(np.abs(roots.imag) > 1e-9 * np.abs(roots), np.conj(roots), mirror)
-        if not self._accept(old, roots, mirror, predicted, pairs, splits):
+        axis = ~implied & (np.abs(roots.imag) < 1e-9 * np.abs(roots))
+        roots = np.where(axis, roots.real + 0j, roots)
+        if not self._accept(old, roots, implied, predicted, pairs, splits):
             return None
-        return State(mu, roots, mirror, self._tangents(roots, mu))
+        branch = np.concatenate([old.branch, np.array(origins, dtype=np.int64)])
+        return State(mu, roots, implied, self._tangents(roots, mu), branch)
 
     def _pairs(self, old: State, predicted: ComplexArray) -> list[tuple[int, int]]:
-        """Pairs (i, j) whose distance is not large against the step; j = −1 is i's own mirror."""
+        """Pairs (i, j) whose distance is not large against the step; j = −1 is i's own conjugate."""
         moved = np.abs(predicted - old.roots)
         found: list[tuple[int, int]] = []
         used: set[int] = set()
         distance = np.abs(old.roots[:, None] - old.roots)
         np.fill_diagonal(distance, np.inf)
-        own = np.abs(old.roots - old.mirror)
+        own = np.where(old.implied, 2 * np.abs(old.roots.imag), np.inf)
         nearest = np.argmin(distance, axis=1)
         for i in np.argsort(distance.min(axis=1) if len(old.roots) > 1 else own):
             i = int(i)
@@ -138,27 +178,34 @@ class Tracker:
         self,
         old: State,
         roots: ComplexArray,
-        mirror: ComplexArray,
+        implied: BoolArray,
         predicted: ComplexArray,
         pairs: list[tuple[int, int]],
         splits: dict[int, tuple[complex, complex, complex]],
     ) -> bool:
-        count = len(roots)
-        everything = np.concatenate([roots, mirror])
-        gap = np.abs(roots[:, None] - everything)
+        if np.any(roots.imag[implied] <= 0):
+            return False
+        count = len(predicted)
+        everything = np.concatenate([roots, np.conj(roots[implied])])
+        own = np.full(len(roots), -1)
+        own[implied] = len(roots) + np.arange(int(implied.sum()))
+        gap = np.abs(roots[:count, None] - everything)
         gap[np.arange(count), np.arange(count)] = np.inf
-        same = np.abs(mirror - roots) < 1e-12 * np.abs(roots)
-        gap[np.arange(count)[same], count + np.arange(count)[same]] = np.inf
         paired = np.zeros(count, dtype=bool)
+        twin = count
         for i, j in pairs:
             paired[i] = True
             if j >= 0:
                 paired[j] = True
                 gap[i, j] = gap[j, i] = np.inf
                 partner = roots[j]
+            elif implied[i]:
+                gap[i, own[i]] = np.inf
+                partner = np.conj(roots[i])
             else:
-                gap[i, count + i] = np.inf
-                partner = mirror[i]
+                gap[i, twin] = np.inf
+                partner = roots[twin]
+                twin += 1
             a_guess, b_guess, b_old = splits[i]
             a, b = _pair(roots[i], partner)
             # The pair's own quantities must follow their prediction; a sign of √b that flips against
@@ -169,7 +216,7 @@ class Tracker:
             if abs(a - a_guess) > CLOSE * third:
                 return False
         alone = ~paired
-        return bool(np.all(np.abs(roots - predicted)[alone] <= CLOSE * gap.min(axis=1)[alone]))
+        return bool(np.all(np.abs(roots[:count] - predicted)[alone] <= CLOSE * gap.min(axis=1)[alone]))
 
 
 def _pair(first: complex, second: complex) -> tuple[complex, complex]:
@@ -178,19 +225,13 @@ def _pair(first: complex, second: complex) -> tuple[complex, complex]:
 
 
 def _half(old: State, i: int, j: int) -> complex:
-    return complex(old.roots[i] - (old.roots[j] if j >= 0 else old.mirror[i])) / 2
+    return complex(old.roots[i] - (old.roots[j] if j >= 0 else np.conj(old.roots[i]))) / 2
 
 
 def _pair_slope(old: State, i: int, j: int) -> tuple[complex, complex]:
-    first, second = old.roots[i], old.roots[j] if j >= 0 else old.mirror[i]
+    first, second = old.roots[i], old.roots[j] if j >= 0 else np.conj(old.roots[i])
     slope = old.tangents[i]
-    if j >= 0:
-        other = old.tangents[j]
-    elif old.mirror[i] == np.conj(old.roots[i]):
-        other = np.conj(slope)
-    else:
-        # Two real roots: the sum's slope is not known from one of them; the mean moves little.
-        other = -slope
+    other = old.tangents[j] if j >= 0 else np.conj(slope)
     return (slope + other) / 2, (first - second) * (slope - other) / 2
 
 

@@ -25,19 +25,19 @@ def modal_coordinates(spectrum: Spectrum, lam: ComplexArray, mu: float) -> tuple
 def expand(spectrum: Spectrum, lam: ComplexArray, forces: ComplexArray) -> ComplexArray:
     """u (n, k) = D(λ)⁻¹ Gᵀ p for each λ (k,) and contact forces p (k, 2m), scaled to unit norm."""
     modes = spectrum.modes
-    receptance = spectrum.receptance
+    projections, general_rows = spectrum.projections, spectrum.receptance.general
     u = np.zeros((modes.size, len(lam)), dtype=complex)
     start = 0
     for block in modes.real:
         stop = start + len(block.freedoms)
-        drive = _real_times_complex(receptance.real[:, start:stop].T, forces.T)
+        drive = _real_times_complex(projections[:, start:stop].T, forces.T)
         drive /= lam * lam + np.multiply.outer(block.damping, lam) + block.stiffness[:, None]
         u[block.freedoms] = _real_times_complex(block.vectors, drive)
         start = stop
     start = 0
     for general in modes.general:
         stop = start + len(general.poles)
-        drive = receptance.general[:, start:stop].T @ forces.T
+        drive = general_rows[:, start:stop].T @ forces.T
         u[general.freedoms] = general.vectors @ (drive / (lam - general.poles[:, None]))
         start = stop
     return u / np.linalg.norm(u, axis=0)

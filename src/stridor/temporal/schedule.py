@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,45 +54,52 @@ class Schedule:
                 return stretch
         return self.stretches[-1]
 
-    def load_factors(self, steps: Array) -> Array:
-        """Factors (k, l) at t = steps·Δt; steps (k,) within one phase."""
-        stretch = self.stretch_at(int(steps[0]))
-        blend = self._blend(stretch, steps)[:, None]
-        return stretch.loads_before * (1 - blend) + stretch.loads_after * blend
-
-    def motion_increments(self, steps: Array) -> Array:
-        """Displacements (k, p) of the moving supports from t to t + Δt, t = steps·Δt, in units of their
-        velocity at factor one; exact integrals of the velocity factor."""
-        out = np.empty((len(steps), len(self.stretches[0].velocities_after)))
-        for k, number in enumerate(steps):
-            stretch = self.stretch_at(int(number))
-            if number - stretch.first >= stretch.ramp_steps:
-                # A constant factor gives the same increment to the last digit in every step, so that
-                # no acceleration is made from rounding.
-                out[k] = stretch.velocities_after * self.step
+    def load_factors(self, first: int, count: int) -> Array:
+        """Factors (count, l) at t = first·Δt, …"""
+        out = np.empty((count, len(self.stretches[0].loads_after)))
+        for rows, stretch, steps in self._pieces(first, count):
+            if stretch.ramp_steps > 0:
+                x = np.clip((steps - stretch.first) / stretch.ramp_steps, 0.0, 1.0)
+                blend = (x**3 * (10 - 15 * x + 6 * x**2))[:, None]
+                out[rows] = stretch.loads_before * (1 - blend) + stretch.loads_after * blend
             else:
-                start, end = (self._integral(stretch, number + e) for e in (0.0, 1.0))
-                change = stretch.velocities_after - stretch.velocities_before
-                out[k] = stretch.velocities_before * self.step + change * (end - start) * self.step
+                out[rows] = stretch.loads_after
         return out
 
-    def constant_motion(self, first: int, last: int) -> bool:
-        """Whether no ramp is under way in steps first … last − 1 of one phase."""
-        stretch = self.stretch_at(first)
-        return first - stretch.first >= stretch.ramp_steps and last <= stretch.last
+    def motion_increments(self, first: int, count: int) -> Array:
+        """Displacements (count, p) of the moving supports from t to t + Δt, t = first·Δt, …, in units of
+        their velocity at factor one; exact integrals of the velocity factor."""
+        out = np.empty((count, len(self.stretches[0].velocities_after)))
+        for rows, stretch, steps in self._pieces(first, count):
+            # A constant factor gives the same increment to the last digit in every step, so that no
+            # acceleration is made from rounding.
+            out[rows] = stretch.velocities_after * self.step
+            ramping = steps - stretch.first < stretch.ramp_steps
+            if ramping.any():
+                number = steps[ramping] - stretch.first
+                blend = self._integral(stretch, number + 1.0) - self._integral(stretch, number)
+                change = stretch.velocities_after - stretch.velocities_before
+                values = (stretch.velocities_before + change * blend[:, None]) * self.step
+                out[np.arange(rows.start, rows.stop)[ramping]] = values
+        return out
 
-    def _blend(self, stretch: Stretch, steps: Array) -> Array:
-        if stretch.ramp_steps <= 0:
-            return np.ones(len(steps))
-        x = np.clip((np.asarray(steps, dtype=float) - stretch.first) / stretch.ramp_steps, 0.0, 1.0)
-        return x**3 * (10 - 15 * x + 6 * x**2)
+    def _pieces(self, first: int, count: int) -> Iterator[tuple[slice, Stretch, Array]]:
+        """Rows, phase and step numbers of each phase met in steps first … first + count − 1."""
+        done = 0
+        while done < count:
+            stretch = self.stretch_at(first + done)
+            last = stretch is self.stretches[-1]
+            size = count - done if last else min(count - done, stretch.last - first - done)
+            steps = np.arange(first + done, first + done + size, dtype=float)
+            yield slice(done, done + size), stretch, steps
+            done += size
 
     @staticmethod
-    def _integral(stretch: Stretch, number: float) -> float:
+    def _integral(stretch: Stretch, number: Array) -> Array:
         """∫ blend from the start of the phase [steps]; the blend is the C2 quintic 10x³ − 15x⁴ + 6x⁵."""
         r = stretch.ramp_steps
-        x = min((number - stretch.first) / r, 1.0)
-        return r * (2.5 * x**4 - 3 * x**5 + x**6) + max(number - stretch.first - r, 0.0)
+        x = np.minimum(number / r, 1.0)
+        return r * (2.5 * x**4 - 3 * x**5 + x**6) + np.maximum(number - r, 0.0)
 
 
 def lay_out(

@@ -1,0 +1,252 @@
+"""Assembled operators, packed for the compiled loop, and the state that it moves on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from ..modal.uncoupled import UncoupledModes
+from ..system import System
+from ..typing import Array, IntArray
+from .beta2 import Scheme
+from .kernel import Fields, ModalRows, NodalRows, Record, run_modal, run_nodal
+from .operators import FINITE, POINTS_PER_FINITE_CONTACT, ModalArrays, RowTable, nodal_arrays, row_table
+from .schedule import Schedule
+from .stage import FIRST_OPEN, FIRST_STICK, STATISTICS, WORKS, Forcing, LoopState, Scratch
+
+MODAL_LIMIT = 3000
+
+
+@dataclass
+class Machine:
+    """A system made ready to march: rows, path arrays, state. Built by ``modal_machine`` or
+    ``nodal_machine``; ``repack`` is called when a finite-sliding contact enters another segment."""
+
+    system: System
+    scheme: Scheme
+    table: RowTable
+    modal: ModalArrays | None
+    nodal: tuple[object, IntArray] | None
+    table_values: Array  # rows of the table in the path's coordinates, a zero row at the end
+    state: LoopState
+    fields: Fields
+    scratch: Scratch
+    rows: ModalRows | NodalRows | None = None
+    compliance: Array | None = None
+    lift: Array | None = None
+
+    @property
+    def path(self) -> str:
+        """"modal" or "nodal"."""
+        return "modal" if self.modal is not None else "nodal"
+
+    @property
+    def contacts(self) -> int:
+        """Number of contacts."""
+        return len(self.system.contacts)
+
+    def coordinates(self, vector: Array, modes: UncoupledModes | None) -> Array:
+        """A vector of freedoms (n,) in the path's coordinates."""
+        if self.nodal is not None:
+            return vector[self.nodal[1]]
+        assert modes is not None
+        weighted = self.system.mass @ vector
+        return np.concatenate([b.vectors.T @ weighted[b.freedoms] for b in modes.real])
+
+    def repack(self) -> None:
+        """Choose the active rows from the contacts' segments and pack them for the loop."""
+        contacts, table = self.table.contacts, self.table
+        active: list[int] = []
+        zero = self.table_values.shape[0] - 1
+        for c in range(self.contacts):
+            first = int(contacts.table[c])
+            active += [first, first + 1]
+            if contacts.kind[c] == FINITE:
+                count = int(contacts.nodes_at[c + 1] - contacts.nodes_at[c])
+                for k in range(POINTS_PER_FINITE_CONTACT - 1):
+                    node = int(self.state.segment[c]) - 1 + k
+                    inside = 0 <= node < count
+                    active += [first + 2 + 2 * node + d if inside else zero for d in range(2)]
+        auxiliary = zero - table.auxiliary
+        active += list(range(auxiliary, zero))
+        chosen = np.array(active, dtype=np.int64)
+        self.state.active[:] = chosen
+        self.lift = np.vstack([self.table.lift, np.zeros((1, table.motions))])[np.append(chosen, zero)]
+        values = np.ascontiguousarray(self.table_values[np.append(chosen, zero)])
+        force_rows = values[: table.force_rows]
+        if self.modal is not None:
+            self.rows = _modal_rows(values, self.modal)
+            self.compliance = np.ascontiguousarray(values[:-1] @ (self.modal.drive[:, None] * force_rows.T))
+        else:
+            assert self.nodal is not None
+            arrays, order = self.nodal
+            gain = arrays.load_gain  # type: ignore[attr-defined]
+            answers = np.zeros((values.shape[1], table.force_rows))
+            if table.force_rows:
+                answers[:] = gain * self._effective().solve(np.ascontiguousarray(force_rows.T))
+            sparse = sp.csr_array(values[:-1])
+            self.rows = NodalRows(
+                sparse.indptr.astype(np.int64),
+                sparse.indices.astype(np.int64),
+                sparse.data,
+                answers,
+                values[table.force_rows : -1],
+            )
+            self.compliance = np.ascontiguousarray(values[:-1] @ answers)
+            del order
+
+    def _effective(self) -> spl.SuperLU:
+        assert self.nodal is not None
+        order = self.nodal[1]
+        system, scheme = self.system, self.scheme
+        effective = sp.csr_array(system.mass + scheme.beta2 * scheme.step * system.damping)
+        return spl.splu(sp.csc_array(effective[order][:, order]))
+
+    def predict(self) -> None:
+        """Rows, their rates and their prediction from u, q and d as they are (start, or new rows)."""
+        values = self.table_values[np.append(self.state.active, self.table_values.shape[0] - 1)]
+        fields, state = self.fields, self.state
+        assert self.lift is not None
+        state.predicted[:] = values @ (fields.u + fields.d)
+        state.value[:] = values @ fields.u + self.lift @ state.motion[0]
+        state.rate[:] = values @ fields.q + self.lift @ state.motion[1]
+
+    def free_increment(self, coefficients: Array) -> None:
+        """d and its constant part at the start of a run, for forcing coefficients (aux,)."""
+        fields = self.fields
+        fields.coefficients[:] = coefficients
+        auxiliary = self.table_values[-1 - self.table.auxiliary : -1]
+        push = auxiliary.T @ coefficients
+        if self.modal is not None:
+            fields.constant[:] = self.modal.drive * push
+            fields.d[:] = self.modal.forward * fields.q - self.modal.restore * fields.u + fields.constant
+            return
+        assert self.nodal is not None
+        arrays, order = self.nodal
+        gain = arrays.load_gain  # type: ignore[attr-defined]
+        system, scheme = self.system, self.scheme
+        fields.constant[:] = gain * push
+        inverse = np.argsort(order)
+        u, q = fields.u[inverse], fields.q[inverse]
+        dt = scheme.step
+        right = dt * (system.mass @ q) - dt**2 / 2 * (system.damping @ q) - gain * (system.stiffness @ u)
+        fields.d[:] = self._effective().solve(right[order] + fields.constant)
+
+    def run(self, steps: int, schedule: Schedule, record: Record) -> tuple[int, int]:
+        """March up to ``steps`` steps; what was done and why it ended (kernel codes)."""
+        first = int(self.state.counters[0])
+        motion = self.system.motion
+        assert self.lift is not None and self.compliance is not None
+        forcing = Forcing(
+            schedule.load_factors(first, steps + 1),
+            schedule.motion_increments(first, steps + 1),
+            motion.mass_own,
+            motion.damping_own,
+            motion.stiffness_own,
+            self.lift,
+        )
+        arrays = self.modal if self.modal is not None else self.nodal[0]  # type: ignore[index]
+        loop = run_modal if self.modal is not None else run_nodal
+        return loop(
+            steps,
+            arrays,
+            self.rows,
+            self.table.contacts,
+            self.scheme,
+            forcing,
+            self.compliance,
+            self.fields,
+            self.state,
+            self.scratch,
+            record,
+            self.table.force_rows,
+        )
+
+
+def _modal_rows(values: Array, modal: ModalArrays) -> ModalRows:
+    """Rows grouped by fours for each block of modes that they meet."""
+    zero = values.shape[0] - 1
+    groups: list[list[int]] = []
+    offsets = [0]
+    for lo, hi in zip(modal.blocks[:-1], modal.blocks[1:], strict=True):
+        met = [r for r in range(zero) if np.any(values[r, lo:hi])]
+        met += [zero] * (-len(met) % 4 if met else 4)
+        groups += [met[i : i + 4] for i in range(0, len(met), 4)]
+        offsets.append(len(groups))
+    return ModalRows(
+        values, np.array(groups, dtype=np.int64).reshape(-1, 4), np.array(offsets, dtype=np.int64)
+    )
+
+
+def modal_machine(system: System, scheme: Scheme, modes: UncoupledModes) -> Machine:
+    """The scheme in the complete basis of real modes; exact for proportional damping of each component."""
+    table = row_table(system)
+    real, _ = modes.project(table.free.toarray())
+    c, w2 = modes.damping, modes.stiffness
+    dt, s = scheme.step, scheme.s
+    effective = 1.0 + scheme.beta2 * dt * c
+    sizes = [len(b.freedoms) for b in modes.real]
+    arrays = ModalArrays(
+        forward=(dt - dt**2 / 2 * c) / effective,
+        restore=dt**2 * s / 2 * w2 / effective,
+        drive=dt**2 * s / 2 / effective,
+        damping=c,
+        stiffness=w2,
+        blocks=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+    )
+    return _machine(system, scheme, table, real, modal=arrays)
+
+
+def nodal_machine(system: System, scheme: Scheme) -> Machine:
+    """The scheme on the freedoms themselves, for any damping and any mass."""
+    table = row_table(system)
+    arrays, order = nodal_arrays(system, scheme)
+    return _machine(system, scheme, table, table.free.toarray()[:, order], nodal=(arrays, order))
+
+
+def _machine(
+    system: System,
+    scheme: Scheme,
+    table: RowTable,
+    values: Array,
+    *,
+    modal: ModalArrays | None = None,
+    nodal: tuple[object, IntArray] | None = None,
+) -> Machine:
+    m, size = len(system.contacts), values.shape[1]
+    active = table.force_rows + table.auxiliary
+    statistics = np.zeros((m, STATISTICS))
+    statistics[:, [FIRST_STICK, FIRST_OPEN]] = -1.0
+    state = LoopState(
+        predicted=np.zeros(active + 1),
+        value=np.zeros(active + 1),
+        rate=np.zeros(active + 1),
+        force=np.zeros(active + 1),
+        normal=np.zeros(m),
+        tangential=np.zeros(m),
+        status=np.zeros(m, dtype=np.int64),
+        segment=np.array([c.segment for c in system.contacts], dtype=np.int64),
+        xi=np.array([c.xi for c in system.contacts], dtype=float),
+        works=np.zeros(WORKS),
+        statistics=statistics,
+        counters=np.zeros(4, dtype=np.int64),
+        active=np.zeros(active, dtype=np.int64),
+        motion=np.zeros((2, table.motions)),
+    )
+    fields = Fields(*(np.zeros(size) for _ in range(4)), np.zeros(table.auxiliary), np.zeros(size))
+    scratch = Scratch(
+        place=np.zeros(active + 1),
+        moved=np.zeros(active + 1),
+        shape=np.zeros((m, 2 * POINTS_PER_FINITE_CONTACT)),
+        slide=np.zeros((m, 2 * POINTS_PER_FINITE_CONTACT)),
+        weights=np.zeros(4),
+        slopes=np.zeros(4),
+        nodes=np.zeros((4, 2)),
+        delta=np.zeros(m),
+        buffer=np.zeros(1),
+    )
+    padded = np.ascontiguousarray(np.vstack([values, np.zeros((1, size))]))
+    return Machine(system, scheme, table, modal, nodal, padded, state, fields, scratch)

@@ -1,0 +1,388 @@
+"""What happens at the contacts in one step of the time loop, compiled.
+
+Order within step n: the free prediction of every row at t_{n+1} is at hand; the contacts are solved
+for the forces at t_n; works and extrema are accumulated with velocities at t_n; a record is kept
+when due; then one pass adds the forces, completes u_{n+1} and predicts t_{n+2}.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from numba import njit
+
+from ..contact import multipliers, surface
+from ..typing import Array, IntArray
+from .beta2 import Scheme
+from .operators import FINITE, ContactArrays
+
+_STICK, _SLIP = multipliers.STICK, multipliers.SLIP
+_FINITE = FINITE
+
+_solve_contact = njit(cache=True)(multipliers.solve_contact)
+_spline_weights = njit(cache=True)(surface.spline_weights)
+
+SWEEP_LIMIT = 500
+SWEEP_TOLERANCE = 1e-12
+
+# Columns of the statistics kept per contact at every step.
+STICK_STEPS, SLIP_STEPS, OPEN_STEPS, MAX_NORMAL, MAX_SPEED, MAX_TANGENTIAL, FIRST_STICK, FIRST_OPEN = range(8)
+STATISTICS = 8
+# Works accumulated at every step [J].
+DAMPING, FRICTION, NORMAL, EXTERNAL, SUPPORT = range(5)
+WORKS = 5
+# Columns of a contact record.
+REC_NORMAL, REC_TANGENTIAL, REC_SLIP, REC_GAP, REC_STATUS, REC_PLACE = range(6)
+CONTACT_RECORD = 6
+
+
+class LoopState(NamedTuple):
+    """Everything that moves on from step to step, besides u, q and the prediction of the path.
+
+    predicted, value, rate (a + 1,): rows at t_{n+1} without contact, rows at t_n, their q; force (a + 1,)
+    at t_n; normal, tangential, status, segment, xi per contact; works (5,), statistics (m, 8).
+    counters: step number, most sweeps, steps whose sweeps did not converge. active (a,) rows in use.
+    """
+
+    predicted: Array
+    value: Array
+    rate: Array
+    force: Array
+    normal: Array
+    tangential: Array
+    status: IntArray
+    segment: IntArray
+    xi: Array
+    works: Array
+    statistics: Array
+    counters: IntArray
+    active: IntArray
+    motion: Array  # (2, p): displacement and q of the moving supports
+
+
+class Scratch(NamedTuple):
+    """Work space of the loop."""
+
+    place: Array  # rows with the supports' motion added
+    moved: Array  # d/Δt of rows
+    shape: Array  # (m, 10) row weights of the normal
+    slide: Array  # (m, 10) row weights of the tangent
+    weights: Array
+    slopes: Array
+    nodes: Array
+    delta: Array
+    buffer: Array
+
+
+class Forcing(NamedTuple):
+    """Coefficients per step: loads (k, l), acceleration and velocity of supports come from increments
+    (k, p); own matrices of the supports (p, p); lift (a + 1, p) of active rows."""
+
+    loads: Array
+    increments: Array
+    mass_own: Array
+    damping_own: Array
+    stiffness_own: Array
+    lift: Array
+
+
+@njit(cache=True)
+def _local_weights(
+    c: int, contacts: ContactArrays, state: LoopState, scratch: Scratch
+) -> tuple[int, bool]:  # pragma: no cover - compiled
+    """Fill the weights of normal and tangent over the contact's active rows; number of rows, on line."""
+    base = contacts.base[c]
+    if contacts.kind[c] != _FINITE:
+        scratch.shape[c, 0], scratch.shape[c, 1] = 1.0, 0.0
+        scratch.slide[c, 0], scratch.slide[c, 1] = 0.0, 1.0
+        return 2, True
+    start, stop = contacts.nodes_at[c], contacts.nodes_at[c + 1]
+    count = stop - start
+    segment = state.segment[c]
+    nodes = scratch.nodes
+    # Current positions of the four nodes that the loop carries, around the last segment; the others
+    # stay at their reference and are not reached before the active rows follow.
+    for k in range(4):
+        node = segment - 1 + k
+        if 0 <= node < count:
+            for d in range(2):
+                nodes[k, d] = contacts.nodes[start + node, d] + scratch.place[base + 2 + 2 * k + d]
+    x = contacts.slave[c, 0] + scratch.place[base]
+    y = contacts.slave[c, 1] + scratch.place[base + 1]
+    xi, on_line = _project_in(segment, count, x, y, state.xi[c], contacts, start, scratch)
+    state.xi[c] = xi
+    sx = sy = 0.0
+    for k in range(4):
+        if scratch.slopes[k] != 0.0:
+            sx += scratch.slopes[k] * nodes[k, 0]
+            sy += scratch.slopes[k] * nodes[k, 1]
+    length = math.sqrt(sx * sx + sy * sy) * contacts.side[c]
+    tx, ty = sx / length, sy / length
+    scratch.slide[c, 0], scratch.slide[c, 1] = tx, ty
+    scratch.shape[c, 0], scratch.shape[c, 1] = -ty, tx
+    for k in range(4):
+        w = scratch.weights[k]
+        scratch.slide[c, 2 + 2 * k], scratch.slide[c, 3 + 2 * k] = -w * tx, -w * ty
+        scratch.shape[c, 2 + 2 * k], scratch.shape[c, 3 + 2 * k] = w * ty, -w * tx
+    return 10, on_line
+
+
+@njit(cache=True)
+def _project_in(
+    segment: int,
+    count: int,
+    x: float,
+    y: float,
+    xi: float,
+    contacts: ContactArrays,
+    start: int,
+    scratch: Scratch,
+) -> tuple[float, bool]:  # pragma: no cover - compiled
+    """Nearest point within one segment; xi may pass 0 or 1, the rows follow at the next step."""
+    chords = contacts.chords[start : start + count - 1]
+    nodes, weights, slopes = scratch.nodes, scratch.weights, scratch.slopes
+    for _ in range(surface.MAX_PROJECTION_STEPS):
+        _spline_weights(segment, xi, chords, weights, slopes)
+        px = py = sx = sy = 0.0
+        for k in range(4):
+            if weights[k] != 0.0 or slopes[k] != 0.0:
+                px += weights[k] * nodes[k, 0]
+                py += weights[k] * nodes[k, 1]
+                sx += slopes[k] * nodes[k, 0]
+                sy += slopes[k] * nodes[k, 1]
+        step = ((x - px) * sx + (y - py) * sy) / (sx * sx + sy * sy)
+        xi = min(max(xi + step, -0.5), 1.5)
+        if abs(step) < 1e-13:
+            break
+    on_line = not ((segment == 0 and xi < -1e-9) or (segment == count - 2 and xi > 1.0 + 1e-9))
+    _spline_weights(segment, xi, chords, weights, slopes)
+    return xi, on_line
+
+
+@njit(cache=True)
+def _solve_all(
+    contacts: ContactArrays, scheme: Scheme, compliance: Array, state: LoopState, scratch: Scratch
+) -> int:  # pragma: no cover - compiled
+    """Gauss–Seidel over the contacts: forces at t_n into state. Returns −1, or a contact off its line."""
+    count = contacts.kind.shape[0]
+    rows = state.force.shape[0] - 1
+    state.force[:] = 0.0
+    for c in range(count):
+        _, on_line = _local_weights(c, contacts, state, scratch)
+        if not on_line:
+            return c
+    largest = 0.0
+    sweeps = 0
+    for c in range(count):
+        state.normal[c] = 0.0
+        state.tangential[c] = 0.0
+    while sweeps < SWEEP_LIMIT:
+        sweeps += 1
+        change = 0.0
+        for c in range(count):
+            base = contacts.base[c]
+            width = 10 if contacts.kind[c] == _FINITE else 2
+            gap, slip, w_nn, w_nt, w_tt = _local_problem(
+                c, base, width, contacts, compliance, state, scratch
+            )
+            # Free of this contact's own present forces.
+            old_n, old_t = state.normal[c], state.tangential[c]
+            gap -= w_nn * old_n + w_nt * old_t
+            slip -= w_nt * old_n + w_tt * old_t
+            kinetic, static, decay = contacts.friction[c, 0], contacts.friction[c, 1], contacts.friction[c, 2]
+            normal, tangential, status = _solve_contact(
+                gap, slip, w_nn, w_nt, w_tt, kinetic, static, decay, state.status[c] == _STICK, scheme.step
+            )
+            scratch.delta[c] = status
+            dn, dt = normal - old_n, tangential - old_t
+            state.normal[c], state.tangential[c] = normal, tangential
+            change = max(change, abs(dn) + abs(dt))
+            largest = max(largest, normal)
+            if dn != 0.0 or dt != 0.0:
+                for a in range(width):
+                    p = scratch.shape[c, a] * dn + scratch.slide[c, a] * dt
+                    if p != 0.0:
+                        state.force[base + a] += p
+                        for r in range(rows):
+                            scratch.place[r] += compliance[r, base + a] * p
+        if count == 1 or change <= SWEEP_TOLERANCE * max(largest, 1e-300):
+            break
+    for c in range(count):
+        state.status[c] = int(scratch.delta[c])
+    state.counters[1] = max(state.counters[1], sweeps)
+    if sweeps >= SWEEP_LIMIT:
+        state.counters[2] += 1
+    return -1
+
+
+@njit(cache=True)
+def _local_problem(
+    c: int,
+    base: int,
+    width: int,
+    contacts: ContactArrays,
+    compliance: Array,
+    state: LoopState,
+    scratch: Scratch,
+) -> tuple[float, float, float, float, float]:  # pragma: no cover - compiled
+    """Gap and slip at t_{n+1} with all present forces, and the local compliances."""
+    if width == 2:
+        gap = contacts.gap[c] + scratch.place[base]
+        slip = scratch.place[base + 1] - state.value[base + 1]
+        return gap, slip, compliance[base, base], compliance[base, base + 1], compliance[base + 1, base + 1]
+    gap = slip = 0.0
+    start = contacts.nodes_at[c]
+    count = contacts.nodes_at[c + 1] - start
+    for a in range(width):
+        reference = 0.0
+        if a < 2:
+            reference = contacts.slave[c, a]
+        else:
+            node = state.segment[c] - 1 + (a - 2) // 2
+            if 0 <= node < count:
+                reference = contacts.nodes[start + node, a % 2]
+        gap += scratch.shape[c, a] * (reference + scratch.place[base + a])
+        slip += scratch.slide[c, a] * (scratch.place[base + a] - state.value[base + a])
+    w_nn = w_nt = w_tt = 0.0
+    for a in range(width):
+        for b in range(width):
+            w = compliance[base + a, base + b]
+            w_nn += scratch.shape[c, a] * w * scratch.shape[c, b]
+            w_nt += scratch.shape[c, a] * w * scratch.slide[c, b]
+            w_tt += scratch.slide[c, a] * w * scratch.slide[c, b]
+    return gap, slip, w_nn, w_nt, w_tt
+
+
+@njit(cache=True)
+def contact_stage(
+    k: int, contacts: ContactArrays, scheme: Scheme, forcing: Forcing, compliance: Array,
+    state: LoopState, scratch: Scratch,
+) -> int:  # pragma: no cover - compiled
+    """Solve the contacts of step n and bring every row to t_{n+1}; scratch.moved holds d/Δt."""
+    rows = state.force.shape[0] - 1
+    motions = forcing.increments.shape[1]
+    for r in range(rows):
+        place = state.predicted[r]
+        for p in range(motions):
+            place += forcing.lift[r, p] * (state.motion[0, p] + forcing.increments[k, p])
+        scratch.place[r] = place
+    off = _solve_all(contacts, scheme, compliance, state, scratch)
+    for r in range(rows):
+        scratch.moved[r] = (scratch.place[r] - state.value[r]) / scheme.step
+    return off
+
+
+@njit(cache=True)
+def accumulate(
+    k: int, contacts: ContactArrays, scheme: Scheme, forcing: Forcing, state: LoopState, scratch: Scratch,
+    loads_at: int,
+) -> None:  # pragma: no cover - compiled
+    """Works [J] over the step with velocities at t_n, and the statistics of the contacts."""
+    dt, s, two_b = scheme.step, scheme.s, 2.0 * scheme.beta2
+    works = state.works
+    motions = forcing.increments.shape[1]
+    loads = forcing.loads.shape[1]
+    count = contacts.kind.shape[0]
+    total = 0.0
+    for r in range(loads_at):
+        if state.force[r] != 0.0:
+            total += state.force[r] * (state.rate[r] + two_b * scratch.moved[r]) / s
+    friction = 0.0
+    for c in range(count):
+        base = contacts.base[c]
+        width = 10 if contacts.kind[c] == _FINITE else 2
+        now = later = 0.0
+        for a in range(width):
+            w = scratch.slide[c, a]
+            now += w * (state.rate[base + a] + two_b * scratch.moved[base + a]) / s
+            later += w * scratch.moved[base + a]
+        friction += state.tangential[c] * now
+        row = state.statistics[c]
+        status = state.status[c]
+        if status == _STICK:
+            row[STICK_STEPS] += 1.0
+            if row[FIRST_STICK] < 0.0:
+                row[FIRST_STICK] = state.counters[0]
+        elif status == _SLIP:
+            row[SLIP_STEPS] += 1.0
+            row[MAX_SPEED] = max(row[MAX_SPEED], abs(later))
+        else:
+            row[OPEN_STEPS] += 1.0
+            if row[FIRST_OPEN] < 0.0:
+                row[FIRST_OPEN] = state.counters[0]
+        row[MAX_NORMAL] = max(row[MAX_NORMAL], state.normal[c])
+        row[MAX_TANGENTIAL] = max(row[MAX_TANGENTIAL], abs(state.tangential[c]))
+    works[FRICTION] -= friction * dt
+    works[NORMAL] -= (total - friction) * dt
+    for j in range(loads):
+        r = loads_at + j
+        works[EXTERNAL] += forcing.loads[k, j] * (state.rate[r] + two_b * scratch.moved[r]) / s * dt
+    for p in range(motions):
+        step_rate = forcing.increments[k, p] / dt
+        velocity = (state.motion[1, p] + two_b * step_rate) / s
+        if velocity == 0.0 and step_rate == 0.0:
+            continue
+        m_row, c_row = loads_at + loads + p, loads_at + loads + motions + p
+        reaction = 2.0 * (scratch.moved[m_row] - state.rate[m_row]) / (dt * s)
+        drag = (state.rate[c_row] + two_b * scratch.moved[c_row]) / s
+        reaction += drag
+        damped = 2.0 * drag
+        for other in range(motions):
+            other_rate = forcing.increments[k, other] / dt
+            other_velocity = (state.motion[1, other] + two_b * other_rate) / s
+            other_acceleration = 2.0 * (other_rate - state.motion[1, other]) / (dt * s)
+            reaction += forcing.mass_own[p, other] * other_acceleration
+            reaction += forcing.damping_own[p, other] * other_velocity
+            reaction += forcing.stiffness_own[p, other] * state.motion[0, other]
+            damped += forcing.damping_own[p, other] * other_velocity
+        for r in range(loads_at):
+            reaction -= forcing.lift[r, p] * state.force[r]
+        for j in range(loads):
+            reaction -= forcing.lift[loads_at + j, p] * forcing.loads[k, j]
+        works[SUPPORT] += reaction * velocity * dt
+        works[DAMPING] += damped * velocity * dt
+
+
+@njit(cache=True)
+def forces_of(
+    k: int, scheme: Scheme, forcing: Forcing, state: LoopState, out: Array
+) -> bool:  # pragma: no cover - compiled
+    """Coefficients (aux,) of loads, −a of supports, −v of supports at step k; whether they changed."""
+    loads, motions = forcing.loads.shape[1], forcing.increments.shape[1]
+    changed = False
+    for j in range(loads):
+        if out[j] != forcing.loads[k, j]:
+            out[j] = forcing.loads[k, j]
+            changed = True
+    for p in range(motions):
+        rate = forcing.increments[k, p] / scheme.step
+        before = state.motion[1, p]
+        if abs(rate - before) <= 1e-13 * abs(before):
+            rate = before
+        acceleration = -2.0 * (rate - before) / (scheme.step * scheme.s)
+        velocity = -(before + 2.0 * scheme.beta2 * rate) / scheme.s
+        if out[loads + p] != acceleration or out[loads + motions + p] != velocity:
+            out[loads + p] = acceleration
+            out[loads + motions + p] = velocity
+            changed = True
+    return changed
+
+
+@njit(cache=True)
+def advance_rows(
+    k: int, scheme: Scheme, forcing: Forcing, state: LoopState, scratch: Scratch
+) -> None:  # pragma: no cover - compiled
+    """Rows and supports become those of t_{n+1}."""
+    rows = state.force.shape[0] - 1
+    for r in range(rows):
+        state.value[r] = scratch.place[r]
+        state.rate[r] = scheme.memory * state.rate[r] + scheme.gain * scheme.step * scratch.moved[r]
+    for p in range(forcing.increments.shape[1]):
+        increment = forcing.increments[k, p]
+        before = state.motion[1, p]
+        after = scheme.memory * before + scheme.gain * increment
+        if abs(after - before) <= 1e-13 * abs(before):
+            after = before
+        state.motion[1, p] = after
+        state.motion[0, p] += increment

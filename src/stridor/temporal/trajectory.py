@@ -1,0 +1,97 @@
+"""What a temporal run leaves: decimated histories, statistics of every step, energies, the last state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..typing import Array, IntArray
+
+STATUS = ("separation", "stick", "slip")
+
+
+@dataclass(frozen=True)
+class ContactStatistics:
+    """Of one contact over one phase, from every step: fractions of its duration, extrema, first events.
+
+    max_normal_force, max_tangential_force [N]; max_slip_speed [m/s] over a step; first_stick,
+    first_separation [s], None where it did not happen.
+    """
+
+    stick_fraction: float
+    slip_fraction: float
+    separation_fraction: float
+    max_normal_force: float
+    max_tangential_force: float
+    max_slip_speed: float
+    first_stick: float | None
+    first_separation: float | None
+
+
+@dataclass(frozen=True)
+class PhaseResult:
+    """One phase as it was run: name, start and end [s], statistics by contact."""
+
+    name: str
+    start: float
+    end: float
+    contacts: Mapping[str, ContactStatistics]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A temporal run. r records, m contacts, w watched points.
+
+    time (r,) [s]; normal_force, tangential_force (r, m) [N], slip_speed (r, m) [m/s], gap (r, m) [m],
+    status (r, m) 0 separation, 1 stick, 2 slip; displacement, velocity, acceleration (r, w, 2), absolute,
+    x and y. kinetic, elastic (r,) [J] half a step before each record; works by name (r,) [J] up to there:
+    damping, friction and contact count what is taken out, external and support what is put in.
+    sampling [s] between records; step Δt [s]; path modal or nodal. final holds u, q of all freedoms,
+    state everything a restart needs.
+    """
+
+    time: Array
+    contact_names: tuple[str, ...]
+    normal_force: Array
+    tangential_force: Array
+    slip_speed: Array
+    gap: Array
+    status: IntArray
+    watch_names: tuple[str, ...]
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+    kinetic: Array
+    elastic: Array
+    works: Mapping[str, Array]
+    phases: tuple[PhaseResult, ...]
+    step: float
+    beta2: float
+    record_every: int
+    steps: int
+    planned_steps: int
+    path: str
+    path_reason: str
+    step_limit: float
+    limiting_body: str
+    most_sweeps: int
+    unconverged_steps: int
+    interrupted: bool
+    wall_seconds: float
+    body_velocity: Mapping[str, Array] = field(default_factory=dict)
+    state: Mapping[str, Array] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def sampling(self) -> float:
+        """Time between records [s]."""
+        return self.step * self.record_every
+
+    def phase_slice(self, number: int = -1) -> slice:
+        """Records of one phase, the last by default."""
+        phase = self.phases[number]
+        first, last = np.searchsorted(self.time, [phase.start - 1e-12, phase.end - 1e-12])
+        return slice(int(first), max(int(last), int(first) + 1))
