@@ -116,7 +116,9 @@ class BackwardError:
             weakening = np.array([coupling.friction_damping(float(m)) for m in mu]).T * lam
             tangential = tangential - weakening * slip
         error[touched] -= self._normal.T @ force + self._tangent.T @ tangential
-        scale[touched] += np.abs(self._normal.T) @ np.abs(force) + np.abs(self._tangent.T) @ np.abs(tangential)
+        scale[touched] += np.abs(self._normal.T) @ np.abs(force) + np.abs(self._tangent.T) @ np.abs(
+            tangential
+        )
         closure = np.abs(gap + coupling.compliance[:, None] * force)
         reach = np.abs(self._normal) @ near_size + coupling.compliance[:, None] * np.abs(force)
         if left:

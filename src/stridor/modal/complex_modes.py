@@ -208,7 +208,9 @@ def _pairs(
         left[:, chosen] = expand(spectrum, lam[part[chosen]], pull[part[chosen]])
         for k in doubtful:
             at = part[k]
-            value, x, y = refine(spectrum.coupling, complex(lam[at]), right[:, k], left[:, k], float(each[at]))
+            value, x, y = refine(
+                spectrum.coupling, complex(lam[at]), right[:, k], left[:, k], float(each[at])
+            )
             error = float(judge(np.array([value]), x[:, None], each[at])[0])
             if error < errors[at] or not np.isfinite(errors[at]):
                 errors[at], lam[at], right[:, k], left[:, k] = error, value, x, y

@@ -11,19 +11,19 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-import scipy.linalg as sl
 
 from ..errors import AnalysisError, CaseError
 from ..system import System
 from ..typing import ComplexArray
 from .backward_error import BackwardError
+from .bordered import Bordered
 from .complex_modes import UNSTABLE_RELATIVE, prepare, undamped
 from .coupling import Coupling
-from .receptance import direct_receptance
 from .roots import Spectrum
 from .tracking import State, Tracker
 
-NEWTON_STEPS = 30
+NARROWINGS = 8
+BELIEVED = 1e-8  # backward error above which a solved onset is no onset
 
 
 @dataclass(frozen=True)
@@ -104,6 +104,9 @@ class _Event:
     partner: int
     stabilising: bool
     double: bool
+    index: int
+    old: State
+    new: State
 
 
 def onsets(
@@ -134,14 +137,16 @@ def onsets(
     tracker.advance(high)
     order = _numbering(spectrum, first.roots)
     judge = BackwardError(coupling)
-    found = [_solve(coupling, judge, event, order, has_damping) for event in events]
+    found = [_located(spectrum, judge, event, order, has_damping) for event in events]
     inside = [
-        o
-        for o in found
-        if o is not None and low <= o.mu <= high and o.frequency_hz <= max_frequency_hz
+        o for o in found if o is not None and low <= o.mu <= high and o.frequency_hz <= max_frequency_hz
     ]
     return Onsets(
-        tuple(sorted(_distinct(inside), key=lambda o: o.mu)), (low, high), max_frequency_hz, damped, open_contacts
+        tuple(sorted(_distinct(inside), key=lambda o: o.mu)),
+        (low, high),
+        max_frequency_hz,
+        damped,
+        open_contacts,
     )
 
 
@@ -172,8 +177,9 @@ def _passages(spectrum: Spectrum, old: State, new: State, has_damping: bool) -> 
     for i in range(len(old.roots)):
         a, b = old.roots[i], new.roots[i]
         if has_damping:
-            for fraction, stabilising in _axis_crossings(a.real, b.real, old.tangents[i].real * step,
-                                                         new.tangents[i].real * step):
+            for fraction, stabilising in _axis_crossings(
+                a.real, b.real, old.tangents[i].real * step, new.tangents[i].real * step
+            ):
                 mu = old.mu + fraction * step
                 events.append(
                     _Event(
@@ -183,6 +189,9 @@ def _passages(spectrum: Spectrum, old: State, new: State, has_damping: bool) -> 
                         _named(new, _nearest(new.roots, i, b)),
                         stabilising,
                         False,
+                        i,
+                        old,
+                        new,
                     )
                 )
             continue
@@ -198,7 +207,7 @@ def _passages(spectrum: Spectrum, old: State, new: State, has_damping: bool) -> 
         else:
             middle = 0.0
         at = old.mu + fraction * step
-        events.append(_Event(at, complex(middle), int(new.branch[i]), _named(new, j), was, True))
+        events.append(_Event(at, complex(middle), int(new.branch[i]), _named(new, j), was, True, i, old, new))
     return events
 
 
@@ -249,11 +258,53 @@ def _axis_crossings(start: float, end: float, slope0: float, slope1: float) -> l
     return sorted(found)
 
 
+def _located(
+    spectrum: Spectrum, judge: BackwardError, event: _Event, order: dict[int, int], has_damping: bool
+) -> Onset | None:
+    """The onset inside an enclosed passage; where Newton strays, the passage is enclosed more closely."""
+    for _ in range(NARROWINGS):
+        onset = _solve(spectrum.coupling, judge, event, order, has_damping)
+        if onset is not None:
+            reach = 0.5 * (event.new.mu - event.old.mu) + 1e-9
+            near = event.old.mu - reach <= onset.mu <= event.new.mu + reach
+            here = event.double or abs(2 * np.pi * onset.frequency_hz - abs(event.root.imag)) <= _distance(
+                event
+            )
+            if near and here and onset.residual <= BELIEVED:
+                return onset
+        closer = _narrowed(spectrum, event, has_damping)
+        if closer is None:
+            return None
+        event = closer
+    return None
+
+
+def _distance(event: _Event) -> float:
+    """How far an onset's ω may lie from the guess: what the root moves over the passage, and some more."""
+    moved = abs(event.new.roots[event.index] - event.old.roots[event.index])
+    return 2.0 * moved + 1e-6 * abs(event.root) + 1e-3
+
+
+def _narrowed(spectrum: Spectrum, event: _Event, has_damping: bool) -> _Event | None:
+    """The same passage between states a quarter as far apart or closer, None where it is gone."""
+    inner: list[_Event] = []
+    tracker = Tracker.resumed(spectrum, event.old)
+    tracker.watch = lambda old, new: inner.extend(_passages(spectrum, old, new, has_damping))
+    width = event.new.mu - event.old.mu
+    try:
+        for part in (0.25, 0.5, 0.75, 1.0):
+            tracker.advance(event.old.mu + part * width)
+    except AnalysisError:
+        return None
+    same = [e for e in inner if e.index == event.index and e.stabilising == event.stabilising]
+    return min(same, key=lambda e: abs(e.mu - event.mu), default=None)
+
+
 def _solve(
     coupling: Coupling, judge: BackwardError, event: _Event, order: dict[int, int], has_damping: bool
 ) -> Onset | None:
     """Newton on the assembled matrices from an enclosed passage; None where it was no passage."""
-    bordered = _Bordered(coupling)
+    bordered = Bordered(coupling, event.root if abs(event.root) > 0 else 0j, event.mu)
     partner = order[event.partner] if event.partner >= 0 else order[event.branch]
     branches = (min(order[event.branch], partner), max(order[event.branch], partner))
     root: float | None = None
@@ -298,159 +349,3 @@ def _solve(
         growth_slope=slope,
         exceptional_mu=exceptional,
     )
-
-
-class _Bordered:
-    """T(λ, μ) from factorised matrices, bordered so that one scalar f vanishes where T is singular.
-
-    [T b; cᵀ 0][x; f] = [0; 1]. Derivatives of f come from the same bordered matrix with right sides
-    built from derivatives of T (Govaerts, Numerical Methods for Bifurcations, 2000, ch. 3).
-    """
-
-    def __init__(self, coupling: Coupling) -> None:
-        self.coupling = coupling
-
-    def _matrices(self, lam: complex, mu: complex) -> tuple[ComplexArray, ...]:
-        h, dh, ddh = direct_receptance(self.coupling.system, lam)
-        at = np.array([lam])
-        t, t_lam, t_mu = self.coupling.matrices(at, mu, h[None], dh[None])
-        zero = np.zeros_like(h)[None]
-        # T is linear in (H, H'), so feeding derivatives of H gives derivatives of T; the constant part
-        # (compliance, identity) is taken off again.
-        constant = self.coupling.matrices(at, mu, zero, zero)[0]
-        second, _, mixed = self.coupling.matrices(at, mu, ddh[None], zero)[0] - constant, None, None
-        if self.coupling.sloped:
-            # d λ H terms: ∂²(λH) = λH'' + 2H'
-            second = second + self._slope_part(mu, dh) * 2
-            mixed = self._mixed_difference(lam, mu)
-        else:
-            mixed = self.coupling.matrices(at, mu, dh[None], zero)[2]
-        return t[0], t_lam[0], t_mu[0], second[0], mixed[0]
-
-    def _slope_part(self, mu: complex, dh: ComplexArray) -> ComplexArray:
-        one = np.array([1.0 + 0j])
-        zero = np.zeros_like(dh)[None]
-        with_unit = self.coupling.matrices(one, mu, dh[None], zero)[0]
-        without = self.coupling.matrices(0 * one, mu, dh[None], zero)[0]
-        return with_unit - without
-
-    def _mixed_difference(self, lam: complex, mu: complex) -> ComplexArray:
-        step = 1e-5 * max(abs(mu), 1e-2)
-        h, dh, _ = direct_receptance(self.coupling.system, lam)
-        at = np.array([lam])
-        high = self.coupling.matrices(at, mu + step, h[None], dh[None])[1]
-        low = self.coupling.matrices(at, mu - step, h[None], dh[None])[1]
-        return (high - low) / (2 * step)
-
-    def derivatives(self, lam: complex, mu: complex) -> tuple[complex, complex, complex, complex, complex]:
-        """f, f_λ, f_μ, f_λλ, f_λμ."""
-        t, t_lam, t_mu, t_ll, t_lm = self._matrices(lam, mu)
-        q = len(t)
-        u, _, vh = sl.svd(t)
-        matrix = np.zeros((q + 1, q + 1), dtype=complex)
-        matrix[:q, :q] = t
-        scale = max(float(np.abs(t).max()), 1e-300)
-        # At a double root the next singular value stays away from zero: bordering by the smallest
-        # singular vectors keeps the matrix regular.
-        matrix[:q, q] = u[:, -1] * scale if q > 1 else scale
-        matrix[q, :q] = vh[-1] if q > 1 else 1.0
-        factor = sl.lu_factor(matrix)
-
-        def solve(top: ComplexArray, last: complex = 0.0) -> tuple[ComplexArray, complex]:
-            answer = sl.lu_solve(factor, np.concatenate([top, [last]]))
-            return answer[:q], complex(answer[q])
-
-        x, f = solve(np.zeros(q, dtype=complex), 1.0)
-        x_l, f_l = solve(-t_lam @ x)
-        x_m, f_m = solve(-t_mu @ x)
-        _, f_ll = solve(-t_ll @ x - 2 * t_lam @ x_l)
-        _, f_lm = solve(-t_lm @ x - t_lam @ x_m - t_mu @ x_l)
-        return f, f_l, f_m, f_ll, f_lm
-
-    def crossing(self, root: complex, mu: float) -> tuple[float, float, float] | None:
-        """ω, μ and d Re λ/dμ with λ = jω an eigenvalue, from a guess; None if Newton fails."""
-        omega, start = root.imag, mu
-        last = np.inf
-        for _ in range(NEWTON_STEPS):
-            f, f_l, f_m, _, _ = self.derivatives(1j * omega, mu)
-            jacobian = np.array([[(1j * f_l).real, f_m.real], [(1j * f_l).imag, f_m.imag]])
-            try:
-                change = np.linalg.solve(jacobian, [-f.real, -f.imag])
-            except np.linalg.LinAlgError:
-                return None
-            size = max(abs(change[0]) / max(abs(omega), 1.0), abs(change[1]) / max(abs(mu), 1e-6))
-            # Damp the first steps: the guess is a straight line through two followed states.
-            factor = min(1.0, 0.1 / size) if size > 0.1 else 1.0
-            omega += factor * change[0]
-            mu += factor * change[1]
-            if size < 1e-13 or (size < 1e-10 and size >= last):
-                if abs(mu - start) > 0.05 + 0.2 * start:
-                    return None
-                _, f_l, f_m, _, _ = self.derivatives(1j * omega, mu)
-                return omega, mu, float((-f_m / f_l).real)
-            last = size
-        return None
-
-    def double_root(self, lam: complex, mu: complex, *, real: bool) -> tuple[complex, complex, float] | None:
-        """λ, μ with a double eigenvalue and κ = Re √(−2 f_μ/f_λλ); ``real`` keeps λ on the axis, μ real."""
-        lam, mu = complex(lam), complex(mu)
-        start = lam
-        last = np.inf
-        for _ in range(NEWTON_STEPS):
-            f, f_l, f_m, f_ll, f_lm = self.derivatives(lam, mu)
-            try:
-                change = np.linalg.solve(np.array([[f_l, f_m], [f_ll, f_lm]]), [-f, -f_l])
-            except np.linalg.LinAlgError:
-                return None
-            lam, mu = lam + change[0], mu + change[1]
-            if real:
-                lam, mu = 1j * lam.imag, complex(mu.real)
-            if not np.isfinite(lam) or abs(lam - start) > 0.2 * abs(start):
-                return None
-            size = max(abs(change[0]) / abs(lam), abs(change[1]) / max(abs(mu), 1e-6))
-            if size < 1e-13 or (size < 1e-8 and size >= last):
-                _, _, f_m, f_ll, _ = self.derivatives(lam, mu)
-                return lam, mu, float(abs(np.sqrt(-2 * f_m / f_ll + 0j).real))
-            last = size
-        return None
-
-    def static(self, mu: float) -> float | None:
-        """μ at which λ = 0 is an eigenvalue (the tangent stiffness is singular)."""
-        for _ in range(NEWTON_STEPS):
-            f, _, f_m, _, _ = self.derivatives(0j, mu)
-            change = float((-f / f_m).real)
-            mu += change
-            if abs(change) < 1e-13 * max(abs(mu), 1e-6):
-                return mu
-        return None
-
-    def divergence_coefficient(self, mu: float) -> float:
-        """κ of λ = ± κ √(μ − μ_c) at a divergence, where f depends on λ² alone."""
-        _, _, f_m, f_ll, _ = self.derivatives(0j, mu)
-        return float(np.sqrt(abs(2 * f_m / f_ll)))
-
-    def vector(self, lam: complex, mu: float) -> ComplexArray:
-        """Right eigenvector (n,) of unit norm."""
-        coupling = self.coupling
-        h, dh, _ = direct_receptance(coupling.system, lam)
-        t = coupling.matrices(np.array([lam]), mu, h[None], dh[None])[0][0]
-        null = np.ones((1, 1), dtype=complex) if len(t) == 1 else sl.svd(t)[2][-1:].conj()
-        push = coupling.push(mu, np.array([lam]), null)
-        u = direct_solution(coupling, lam, push[0])
-        return u / np.linalg.norm(u)
-
-
-def direct_solution(coupling: Coupling, lam: complex, push: ComplexArray) -> ComplexArray:
-    """u (n,) = D(λ)⁻¹ Gᵀ p from a factorisation, refined once."""
-    import scipy.sparse as sp
-    import scipy.sparse.linalg as spl
-
-    system = coupling.system
-    dynamic = sp.csc_array(lam**2 * system.mass + lam * system.damping + system.stiffness).astype(complex)
-    right = system.contact_rows().T @ push
-    solver = spl.splu(dynamic)
-    answer = solver.solve(right)
-    return answer + solver.solve(right - dynamic @ answer)
-
-
-__all__ = ["AnalysisError", "Onset", "Onsets", "onsets"]

@@ -10,11 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.linalg as spl
 from numba import njit
 
-from ..system import System
 from ..typing import Array, ComplexArray, IntArray
 from .uncoupled import UncoupledModes
 
@@ -99,23 +96,3 @@ def wanted_pairs(contacts: int, *, slip: bool) -> IntArray:
     first, second = np.triu_indices(2 * contacts)
     keep = np.ones(len(first), dtype=bool) if slip else ~((first % 2 == 1) & (second % 2 == 1))
     return np.array([first[keep], second[keep]])
-
-
-def direct_receptance(system: System, lam: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """H, dH/dλ, d²H/dλ² (r, r) at one λ from a factorisation of D(λ) itself.
-
-    Costs a sparse solve where the modal sum costs none, but carries the full accuracy of the
-    matrices and needs no basis: it polishes and certifies what the sum has found.
-    """
-    rows = system.contact_rows()
-    dynamic = sp.csc_array(lam**2 * system.mass + lam * system.damping + system.stiffness)
-    slope = sp.csc_array(2 * lam * system.mass + system.damping)
-    solver = spl.splu(dynamic)
-
-    def solve(right: ComplexArray) -> ComplexArray:
-        answer = solver.solve(right)
-        return answer + solver.solve(right - dynamic @ answer)
-
-    x = solve(rows.T.astype(complex))
-    sx = slope @ x
-    return rows @ x, -x.T @ sx, 2 * sx.T @ solve(sx) - 2 * x.T @ (system.mass @ x)

@@ -40,7 +40,9 @@ def refine(
         )
 
     def slope(at: complex) -> sp.csc_array:
-        return sp.csc_array(sp.block_array([[2 * at * system.mass + damping, edge], [edge.T, empty]]), dtype=complex)
+        return sp.csc_array(
+            sp.block_array([[2 * at * system.mass + damping, edge], [edge.T, empty]]), dtype=complex
+        )
 
     def forced(vector: ComplexArray) -> ComplexArray:
         return np.concatenate([vector, np.zeros(count, dtype=complex)])
@@ -51,10 +53,11 @@ def refine(
     except RuntimeError:
         return lam, right, left
     x, y = forced(right), forced(left)
-    for _ in range(STEPS):
-        x = solver.solve(by_lambda @ x)
-        y = solver.solve(by_lambda.T @ y, trans="T")
-        x, y = x / np.linalg.norm(x[:size]), y / np.linalg.norm(y[:size])
+    with np.errstate(all="ignore"):
+        for _ in range(STEPS):
+            x = solver.solve(by_lambda @ x)
+            y = solver.solve(by_lambda.T @ y, trans="T")
+            x, y = x / np.linalg.norm(x[:size]), y / np.linalg.norm(y[:size])
     product = y @ (by_lambda @ x)
     if product == 0 or not (np.all(np.isfinite(x)) and np.all(np.isfinite(y))):
         return lam, right, left

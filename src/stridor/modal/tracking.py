@@ -52,10 +52,16 @@ class Tracker:
 
     def __post_init__(self) -> None:
         roots = frictionless_roots(self.spectrum, self.limit)
-        self.state = State(
-            0.0, roots, roots.imag != 0.0, self._tangents(roots, 0.0), np.arange(len(roots))
-        )
+        self.state = State(0.0, roots, roots.imag != 0.0, self._tangents(roots, 0.0), np.arange(len(roots)))
         self._step = 0.01
+
+    @classmethod
+    def resumed(cls, spectrum: Spectrum, state: State) -> Tracker:
+        """A tracker that goes on from a state followed before."""
+        tracker = cls.__new__(cls)
+        tracker.spectrum, tracker.limit, tracker.watch = spectrum, float(np.abs(state.roots).max()), None
+        tracker.state, tracker.smallest_step, tracker._step = state, 1e-9, 0.01
+        return tracker
 
     def _tangents(self, roots: ComplexArray, mu: float) -> ComplexArray:
         if not len(roots):

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from ..typing import Array, IntArray
+from .borrow import borrow
 from .beta2 import Scheme
 from .operators import ContactArrays, ModalArrays, NodalArrays
 from .stage import (
@@ -55,12 +56,14 @@ class Fields(NamedTuple):
 
 
 class ModalRows(NamedTuple):
-    """Active rows on modes: values (a + 1, n) with a zero row at the end, groups (g, 4) by block with
-    offsets group_at (b + 1,)."""
+    """Active rows on modes: values (a + 1, n), a zero row at the end. For each block of modes the rows that
+    push on it (contact forces) and those that read it, with offsets (b + 1,) into both lists."""
 
     values: Array
-    groups: IntArray
-    group_at: IntArray
+    pushing: IntArray
+    push_at: IntArray
+    pulling: IntArray
+    pull_at: IntArray
 
 
 class NodalRows(NamedTuple):
@@ -170,75 +173,96 @@ def _record(
 
 
 @njit(cache=True, fastmath=_FAST)
-def _modal_pass(
-    modal: ModalArrays, scheme: Scheme, rows: Array, groups: IntArray, group_at: IntArray, force: Array,
-    constant: Array, u: Array, q: Array, d: Array, predicted: Array, buffer: Array,
-) -> float:  # pragma: no cover - compiled
-    """Add contact forces, complete t_{n+1}, predict t_{n+2}; returns Σ c v² at t_n.
-
-    rows (a + 1, n) packed, the last one zero; groups (g, 4) rows by fours for each block of modes,
-    group_at (b + 1,) offsets. predicted (a + 1,) is overwritten.
-    """
-    rate_gain, two_b, s = scheme.gain, 2.0 * scheme.beta2 / scheme.step, scheme.s
-    memory = scheme.memory
-    dissipated = 0.0
-    predicted[:] = 0.0
-    for b in range(modal.blocks.shape[0] - 1):
-        lo, hi = modal.blocks[b], modal.blocks[b + 1]
-        first, last = group_at[b], group_at[b + 1]
-        for g in range(first + 1, last):
-            r0, r1, r2, r3 = groups[g, 0], groups[g, 1], groups[g, 2], groups[g, 3]
-            p0, p1, p2, p3 = force[r0], force[r1], force[r2], force[r3]
-            if g == first + 1:
-                for i in range(lo, hi):
-                    buffer[i] = p0 * rows[r0, i] + p1 * rows[r1, i] + p2 * rows[r2, i] + p3 * rows[r3, i]
-            else:
-                for i in range(lo, hi):
-                    buffer[i] += p0 * rows[r0, i] + p1 * rows[r1, i] + p2 * rows[r2, i] + p3 * rows[r3, i]
-        if last - first > 1:
+def _push(
+    d: Array, drive: Array, rows: Array, chosen: IntArray, at: int, end: int, force: Array, lo: int, hi: int
+) -> None:  # pragma: no cover - compiled
+    """d += drive Σ p·row over rows chosen[at:end] and modes lo … hi − 1, up to three rows at a time."""
+    while at < end:
+        left = end - at
+        r0 = chosen[at]
+        p0 = force[r0]
+        if left >= 3:
+            r1, r2 = chosen[at + 1], chosen[at + 2]
+            p1, p2 = force[r1], force[r2]
             for i in range(lo, hi):
-                d[i] += modal.drive[i] * buffer[i]
-        r0, r1, r2, r3 = groups[first, 0], groups[first, 1], groups[first, 2], groups[first, 3]
-        p0, p1, p2, p3 = force[r0], force[r1], force[r2], force[r3]
-        y0 = y1 = y2 = y3 = 0.0
-        lost = 0.0
-        for i in range(lo, hi):
-            a0, a1, a2, a3 = rows[r0, i], rows[r1, i], rows[r2, i], rows[r3, i]
-            moved = d[i] + modal.drive[i] * (p0 * a0 + p1 * a1 + p2 * a2 + p3 * a3)
-            now = u[i] + moved
-            old = q[i]
-            velocity = (old + two_b * moved) / s
-            lost += modal.damping[i] * velocity * velocity
-            new = memory * old + rate_gain * moved
-            u[i] = now
-            q[i] = new
-            ahead = modal.forward[i] * new - modal.restore[i] * now + constant[i]
-            d[i] = ahead
-            place = now + ahead
-            y0 += a0 * place
-            y1 += a1 * place
-            y2 += a2 * place
-            y3 += a3 * place
-        dissipated += lost
-        predicted[r0] += y0
-        predicted[r1] += y1
-        predicted[r2] += y2
-        predicted[r3] += y3
-        for g in range(first + 1, last):
-            r0, r1, r2, r3 = groups[g, 0], groups[g, 1], groups[g, 2], groups[g, 3]
-            y0 = y1 = y2 = y3 = 0.0
+                d[i] += drive[i] * (p0 * rows[r0, i] + p1 * rows[r1, i] + p2 * rows[r2, i])
+            at += 3
+        elif left == 2:
+            r1 = chosen[at + 1]
+            p1 = force[r1]
+            for i in range(lo, hi):
+                d[i] += drive[i] * (p0 * rows[r0, i] + p1 * rows[r1, i])
+            at += 2
+        else:
+            for i in range(lo, hi):
+                d[i] += drive[i] * (p0 * rows[r0, i])
+            at += 1
+
+
+@njit(cache=True, fastmath=_FAST)
+def _pull(
+    u: Array, d: Array, rows: Array, chosen: IntArray, at: int, end: int, lo: int, hi: int, predicted: Array
+) -> None:  # pragma: no cover - compiled
+    """predicted[r] += row·(u + d) over rows chosen[at:end] and modes lo … hi − 1."""
+    while at < end:
+        left = end - at
+        r0 = chosen[at]
+        y0 = y1 = y2 = 0.0
+        if left >= 3:
+            r1, r2 = chosen[at + 1], chosen[at + 2]
             for i in range(lo, hi):
                 place = u[i] + d[i]
                 y0 += rows[r0, i] * place
                 y1 += rows[r1, i] * place
                 y2 += rows[r2, i] * place
-                y3 += rows[r3, i] * place
-            predicted[r0] += y0
             predicted[r1] += y1
             predicted[r2] += y2
-            predicted[r3] += y3
-    predicted[predicted.shape[0] - 1] = 0.0
-    return dissipated
+            at += 3
+        elif left == 2:
+            r1 = chosen[at + 1]
+            for i in range(lo, hi):
+                place = u[i] + d[i]
+                y0 += rows[r0, i] * place
+                y1 += rows[r1, i] * place
+            predicted[r1] += y1
+            at += 2
+        else:
+            for i in range(lo, hi):
+                y0 += rows[r0, i] * (u[i] + d[i])
+            at += 1
+        predicted[r0] += y0
+
+
+@njit(cache=True, fastmath=_FAST)
+def _modal_pass(
+    modal: ModalArrays, scheme: Scheme, rows: ModalRows, force: Array, fields: Fields, predicted: Array
+) -> float:  # pragma: no cover - compiled
+    """Add contact forces, complete t_{n+1}, predict t_{n+2}; returns Σ c v² at t_n.
+
+    Short loops over few arrays each: one loop over all of them is not turned into vector instructions,
+    because the compiler would have to prove too many pairs of arrays distinct. Unsigned bounds spare it
+    the test for negative indices.
+    """
+    u, q, d, constant = fields.u, fields.q, fields.d, fields.constant
+    forward, restore, drive, damping = modal.forward, modal.restore, modal.drive, modal.damping
+    gain, two_b, memory = scheme.gain, 2.0 * scheme.beta2 / scheme.step, scheme.memory
+    dissipated = 0.0
+    predicted[:] = 0.0
+    for b in range(modal.blocks.shape[0] - 1):
+        lo, hi = np.uint64(modal.blocks[b]), np.uint64(modal.blocks[b + 1])
+        _push(d, drive, rows.values, rows.pushing, rows.push_at[b], rows.push_at[b + 1], force, lo, hi)
+        for i in range(lo, hi):
+            velocity = q[i] + two_b * d[i]
+            dissipated += damping[i] * velocity * velocity
+        for i in range(lo, hi):
+            u[i] += d[i]
+        for i in range(lo, hi):
+            q[i] = memory * q[i] + gain * d[i]
+        for i in range(lo, hi):
+            d[i] = forward[i] * q[i] - restore[i] * u[i] + constant[i]
+        _pull(u, d, rows.values, rows.pulling, rows.pull_at[b], rows.pull_at[b + 1], lo, hi, predicted)
+    return dissipated / (scheme.s * scheme.s)
+
 
 @njit(cache=True, fastmath=_FAST)
 def _nodal_pass(
@@ -316,6 +340,56 @@ def _all_finite(state: LoopState) -> bool:  # pragma: no cover - compiled
     return True
 
 
+@njit(cache=True, inline="always")
+def _lent_modal(x: ModalArrays) -> ModalArrays:  # pragma: no cover - compiled
+    return ModalArrays(borrow(x.forward), borrow(x.restore), borrow(x.drive), borrow(x.damping), borrow(x.stiffness), borrow(x.blocks))
+
+
+@njit(cache=True, inline="always")
+def _lent_nodal(x: NodalArrays) -> NodalArrays:  # pragma: no cover - compiled
+    return NodalArrays(borrow(x.k_ptr), borrow(x.k_col), borrow(x.k_val), borrow(x.m_ptr), borrow(x.m_col), borrow(x.m_val), borrow(x.c_ptr), borrow(x.c_col), borrow(x.c_val), borrow(x.factor), x.load_gain)
+
+
+@njit(cache=True, inline="always")
+def _lent_modal_rows(x: ModalRows) -> ModalRows:  # pragma: no cover - compiled
+    return ModalRows(borrow(x.values), borrow(x.pushing), borrow(x.push_at), borrow(x.pulling), borrow(x.pull_at))
+
+
+@njit(cache=True, inline="always")
+def _lent_nodal_rows(x: NodalRows) -> NodalRows:  # pragma: no cover - compiled
+    return NodalRows(borrow(x.ptr), borrow(x.col), borrow(x.val), borrow(x.answers), borrow(x.auxiliary))
+
+
+@njit(cache=True, inline="always")
+def _lent_contacts(x: ContactArrays) -> ContactArrays:  # pragma: no cover - compiled
+    return ContactArrays(borrow(x.kind), borrow(x.base), borrow(x.friction), borrow(x.gap), borrow(x.table), borrow(x.nodes_at), borrow(x.nodes), borrow(x.chords), borrow(x.slave), borrow(x.side))
+
+
+@njit(cache=True, inline="always")
+def _lent_forcing(x: Forcing) -> Forcing:  # pragma: no cover - compiled
+    return Forcing(borrow(x.loads), borrow(x.increments), borrow(x.mass_own), borrow(x.damping_own), borrow(x.stiffness_own), borrow(x.lift))
+
+
+@njit(cache=True, inline="always")
+def _lent_fields(x: Fields) -> Fields:  # pragma: no cover - compiled
+    return Fields(borrow(x.u), borrow(x.q), borrow(x.d), borrow(x.constant), borrow(x.coefficients), borrow(x.buffer))
+
+
+@njit(cache=True, inline="always")
+def _lent_state(x: LoopState) -> LoopState:  # pragma: no cover - compiled
+    return LoopState(borrow(x.predicted), borrow(x.value), borrow(x.rate), borrow(x.force), borrow(x.normal), borrow(x.tangential), borrow(x.status), borrow(x.segment), borrow(x.xi), borrow(x.works), borrow(x.statistics), borrow(x.counters), borrow(x.active), borrow(x.motion))
+
+
+@njit(cache=True, inline="always")
+def _lent_scratch(x: Scratch) -> Scratch:  # pragma: no cover - compiled
+    return Scratch(borrow(x.place), borrow(x.moved), borrow(x.shape), borrow(x.slide), borrow(x.weights), borrow(x.slopes), borrow(x.nodes), borrow(x.delta), borrow(x.buffer))
+
+
+@njit(cache=True, inline="always")
+def _lent_record(x: Record) -> Record:  # pragma: no cover - compiled
+    return Record(x.every, borrow(x.contacts), borrow(x.watch), borrow(x.energies), borrow(x.count), borrow(x.watch_rows), borrow(x.watch_lift))
+
+
 @njit(cache=True)
 def run_modal(
     steps: int, modal: ModalArrays, rows: ModalRows, contacts: ContactArrays, scheme: Scheme,
@@ -326,6 +400,10 @@ def run_modal(
 
     loads_at: first row that carries no contact force.
     """
+    # The caller keeps every array alive; borrowed ones cost no counting in the functions below.
+    modal, rows, contacts = _lent_modal(modal), _lent_modal_rows(rows), _lent_contacts(contacts)
+    forcing, fields, state = _lent_forcing(forcing), _lent_fields(fields), _lent_state(state)
+    scratch, record, compliance = _lent_scratch(scratch), _lent_record(record), borrow(compliance)
     for k in range(steps):
         off = contact_stage(k, contacts, scheme, forcing, compliance, state, scratch)
         if off >= 0:
@@ -344,10 +422,7 @@ def run_modal(
         advance_rows(k, scheme, forcing, state, scratch)
         if forces_of(k + 1, scheme, forcing, state, fields.coefficients):
             _modal_constant(modal, rows, fields, loads_at)
-        lost = _modal_pass(
-            modal, scheme, rows.values, rows.groups, rows.group_at, state.force, fields.constant, fields.u,
-            fields.q, fields.d, state.predicted, fields.buffer,
-        )
+        lost = _modal_pass(modal, scheme, rows, state.force, fields, state.predicted)
         state.works[DAMPING] += lost * scheme.step
         state.counters[0] += 1
         if _leaves_segment(contacts, state):
@@ -362,6 +437,10 @@ def run_nodal(
     loads_at: int,
 ) -> tuple[int, int]:  # pragma: no cover - compiled
     """The same on freedoms, for any damping and any mass."""
+    # The caller keeps every array alive; borrowed ones cost no counting in the functions below.
+    nodal, rows, contacts = _lent_nodal(nodal), _lent_nodal_rows(rows), _lent_contacts(contacts)
+    forcing, fields, state = _lent_forcing(forcing), _lent_fields(fields), _lent_state(state)
+    scratch, record, compliance = _lent_scratch(scratch), _lent_record(record), borrow(compliance)
     for k in range(steps):
         off = contact_stage(k, contacts, scheme, forcing, compliance, state, scratch)
         if off >= 0:

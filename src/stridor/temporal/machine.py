@@ -13,11 +13,20 @@ from ..system import System
 from ..typing import Array, IntArray
 from .beta2 import Scheme
 from .kernel import Fields, ModalRows, NodalRows, Record, run_modal, run_nodal
-from .operators import FINITE, POINTS_PER_FINITE_CONTACT, ModalArrays, RowTable, nodal_arrays, row_table
+from .operators import (
+    FINITE,
+    POINTS_PER_FINITE_CONTACT,
+    ModalArrays,
+    NodalArrays,
+    RowTable,
+    nodal_arrays,
+    row_table,
+)
 from .schedule import Schedule
 from .stage import FIRST_OPEN, FIRST_STICK, STATISTICS, WORKS, Forcing, LoopState, Scratch
 
 MODAL_LIMIT = 3000
+LANES = 16
 
 
 @dataclass
@@ -29,7 +38,8 @@ class Machine:
     scheme: Scheme
     table: RowTable
     modal: ModalArrays | None
-    nodal: tuple[object, IntArray] | None
+    nodal: NodalArrays | None
+    order: IntArray  # where in the path's arrays each mode lies, or which freedom each entry is
     table_values: Array  # rows of the table in the path's coordinates, a zero row at the end
     state: LoopState
     fields: Fields
@@ -50,11 +60,18 @@ class Machine:
 
     def coordinates(self, vector: Array, modes: UncoupledModes | None) -> Array:
         """A vector of freedoms (n,) in the path's coordinates."""
-        if self.nodal is not None:
-            return vector[self.nodal[1]]
-        assert modes is not None
+        if modes is None:
+            return vector[self.order]
         weighted = self.system.mass @ vector
-        return np.concatenate([b.vectors.T @ weighted[b.freedoms] for b in modes.real])
+        return self.laid_out(np.concatenate([b.vectors.T @ weighted[b.freedoms] for b in modes.real]))
+
+    def laid_out(self, values: Array) -> Array:
+        """Rows or vectors (…, n) on freedoms or modes, in the order and padding of the loop."""
+        if self.nodal is not None:
+            return values[..., self.order]
+        out = np.zeros((*values.shape[:-1], self.table_values.shape[1]))
+        out[..., self.order] = values
+        return out
 
     def repack(self) -> None:
         """Choose the active rows from the contacts' segments and pack them for the loop."""
@@ -78,12 +95,11 @@ class Machine:
         values = np.ascontiguousarray(self.table_values[np.append(chosen, zero)])
         force_rows = values[: table.force_rows]
         if self.modal is not None:
-            self.rows = _modal_rows(values, self.modal)
+            self.rows = _modal_rows(values, self.modal, table.force_rows)
             self.compliance = np.ascontiguousarray(values[:-1] @ (self.modal.drive[:, None] * force_rows.T))
         else:
             assert self.nodal is not None
-            arrays, order = self.nodal
-            gain = arrays.load_gain  # type: ignore[attr-defined]
+            gain = self.nodal.load_gain
             answers = np.zeros((values.shape[1], table.force_rows))
             if table.force_rows:
                 answers[:] = gain * self._effective().solve(np.ascontiguousarray(force_rows.T))
@@ -96,11 +112,9 @@ class Machine:
                 values[table.force_rows : -1],
             )
             self.compliance = np.ascontiguousarray(values[:-1] @ answers)
-            del order
 
     def _effective(self) -> spl.SuperLU:
-        assert self.nodal is not None
-        order = self.nodal[1]
+        order = self.order
         system, scheme = self.system, self.scheme
         effective = sp.csr_array(system.mass + scheme.beta2 * scheme.step * system.damping)
         return spl.splu(sp.csc_array(effective[order][:, order]))
@@ -125,8 +139,7 @@ class Machine:
             fields.d[:] = self.modal.forward * fields.q - self.modal.restore * fields.u + fields.constant
             return
         assert self.nodal is not None
-        arrays, order = self.nodal
-        gain = arrays.load_gain  # type: ignore[attr-defined]
+        order, gain = self.order, self.nodal.load_gain
         system, scheme = self.system, self.scheme
         fields.constant[:] = gain * push
         inverse = np.argsort(order)
@@ -148,7 +161,7 @@ class Machine:
             motion.stiffness_own,
             self.lift,
         )
-        arrays = self.modal if self.modal is not None else self.nodal[0]  # type: ignore[index]
+        arrays = self.modal if self.modal is not None else self.nodal
         loop = run_modal if self.modal is not None else run_nodal
         return loop(
             steps,
@@ -166,19 +179,31 @@ class Machine:
         )
 
 
-def _modal_rows(values: Array, modal: ModalArrays) -> ModalRows:
-    """Rows grouped by fours for each block of modes that they meet."""
-    zero = values.shape[0] - 1
-    groups: list[list[int]] = []
-    offsets = [0]
+def _modal_rows(values: Array, modal: ModalArrays, force_rows: int) -> ModalRows:
+    """For each block of modes the rows that push on it and those that read it."""
+    pushing: list[int] = []
+    pulling: list[int] = []
+    push_at, pull_at = [0], [0]
     for lo, hi in zip(modal.blocks[:-1], modal.blocks[1:], strict=True):
-        met = [r for r in range(zero) if np.any(values[r, lo:hi])]
-        met += [zero] * (-len(met) % 4 if met else 4)
-        groups += [met[i : i + 4] for i in range(0, len(met), 4)]
-        offsets.append(len(groups))
-    return ModalRows(
-        values, np.array(groups, dtype=np.int64).reshape(-1, 4), np.array(offsets, dtype=np.int64)
-    )
+        met = [r for r in range(values.shape[0] - 1) if np.any(values[r, lo:hi])]
+        pulling += met
+        pushing += [r for r in met if r < force_rows]
+        push_at.append(len(pushing))
+        pull_at.append(len(pulling))
+    return ModalRows(values, *(np.array(x, dtype=np.int64) for x in (pushing, push_at, pulling, pull_at)))
+
+
+def _padded(sizes: list[int]) -> tuple[IntArray, IntArray]:
+    """Place of each mode and ranges of blocks, every block filled up to whole vector registers.
+
+    The modes filled in have no stiffness, no drive and no rows: they stay at zero.
+    """
+    places: list[int] = []
+    blocks = [0]
+    for size in sizes:
+        places += range(blocks[-1], blocks[-1] + size)
+        blocks.append(blocks[-1] + -(-size // LANES) * LANES)
+    return np.array(places, dtype=np.int64), np.array(blocks, dtype=np.int64)
 
 
 def modal_machine(system: System, scheme: Scheme, modes: UncoupledModes) -> Machine:
@@ -188,16 +213,22 @@ def modal_machine(system: System, scheme: Scheme, modes: UncoupledModes) -> Mach
     c, w2 = modes.damping, modes.stiffness
     dt, s = scheme.step, scheme.s
     effective = 1.0 + scheme.beta2 * dt * c
-    sizes = [len(b.freedoms) for b in modes.real]
+    places, blocks = _padded([len(b.freedoms) for b in modes.real])
+
+    def padded(values: Array) -> Array:
+        out = np.zeros((*values.shape[:-1], int(blocks[-1])))
+        out[..., places] = values
+        return out
+
     arrays = ModalArrays(
-        forward=(dt - dt**2 / 2 * c) / effective,
-        restore=dt**2 * s / 2 * w2 / effective,
-        drive=dt**2 * s / 2 / effective,
-        damping=c,
-        stiffness=w2,
-        blocks=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+        forward=padded((dt - dt**2 / 2 * c) / effective),
+        restore=padded(dt**2 * s / 2 * w2 / effective),
+        drive=padded(dt**2 * s / 2 / effective),
+        damping=padded(c),
+        stiffness=padded(w2),
+        blocks=blocks,
     )
-    return _machine(system, scheme, table, real, modal=arrays)
+    return _machine(system, scheme, table, padded(real), modal=(arrays, places))
 
 
 def nodal_machine(system: System, scheme: Scheme) -> Machine:
@@ -213,8 +244,8 @@ def _machine(
     table: RowTable,
     values: Array,
     *,
-    modal: ModalArrays | None = None,
-    nodal: tuple[object, IntArray] | None = None,
+    modal: tuple[ModalArrays, IntArray] | None = None,
+    nodal: tuple[NodalArrays, IntArray] | None = None,
 ) -> Machine:
     m, size = len(system.contacts), values.shape[1]
     active = table.force_rows + table.auxiliary
@@ -249,4 +280,17 @@ def _machine(
         buffer=np.zeros(1),
     )
     padded = np.ascontiguousarray(np.vstack([values, np.zeros((1, size))]))
-    return Machine(system, scheme, table, modal, nodal, padded, state, fields, scratch)
+    chosen = modal or nodal
+    assert chosen is not None
+    return Machine(
+        system,
+        scheme,
+        table,
+        modal[0] if modal else None,
+        nodal[0] if nodal else None,
+        chosen[1],
+        padded,
+        state,
+        fields,
+        scratch,
+    )

@@ -299,8 +299,8 @@ def watch_rows(
     rows = [system.points[name].free[:2].toarray() for name in names]
     lift = [system.points[name].lift[:2] for name in names]
     free = np.vstack([np.zeros((0, system.size)), *rows])
-    inner = free[:, machine.nodal[1]] if machine.nodal is not None else modes.project(free)[0]  # type: ignore[union-attr]
-    return np.ascontiguousarray(inner), np.vstack([np.zeros((0, machine.table.motions)), *lift])
+    inner = free if modes is None else modes.project(free)[0]
+    return np.ascontiguousarray(machine.laid_out(inner)), np.vstack([np.zeros((0, machine.table.motions)), *lift])
 
 
 def _initial_state(

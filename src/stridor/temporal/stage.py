@@ -87,7 +87,7 @@ class Forcing(NamedTuple):
     lift: Array
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _local_weights(
     c: int, contacts: ContactArrays, state: LoopState, scratch: Scratch
 ) -> tuple[int, bool]:  # pragma: no cover - compiled
@@ -128,7 +128,7 @@ def _local_weights(
     return 10, on_line
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _project_in(
     segment: int,
     count: int,
@@ -160,7 +160,7 @@ def _project_in(
     return xi, on_line
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _solve_all(
     contacts: ContactArrays, scheme: Scheme, compliance: Array, state: LoopState, scratch: Scratch
 ) -> int:  # pragma: no cover - compiled
@@ -216,7 +216,7 @@ def _solve_all(
     return -1
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _local_problem(
     c: int,
     base: int,
@@ -254,7 +254,7 @@ def _local_problem(
     return gap, slip, w_nn, w_nt, w_tt
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def contact_stage(
     k: int, contacts: ContactArrays, scheme: Scheme, forcing: Forcing, compliance: Array,
     state: LoopState, scratch: Scratch,
@@ -273,7 +273,7 @@ def contact_stage(
     return off
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def accumulate(
     k: int, contacts: ContactArrays, scheme: Scheme, forcing: Forcing, state: LoopState, scratch: Scratch,
     loads_at: int,
@@ -344,7 +344,7 @@ def accumulate(
         works[DAMPING] += damped * velocity * dt
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def forces_of(
     k: int, scheme: Scheme, forcing: Forcing, state: LoopState, out: Array
 ) -> bool:  # pragma: no cover - compiled
@@ -369,7 +369,7 @@ def forces_of(
     return changed
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def advance_rows(
     k: int, scheme: Scheme, forcing: Forcing, state: LoopState, scratch: Scratch
 ) -> None:  # pragma: no cover - compiled
