@@ -72,7 +72,9 @@ def bench(
     )
 
 
-def bench_case(*slaves, angle_deg, velocity, length, thickness, elements, damping, mass, modulus_factor) -> Case:
+def bench_case(
+    *slaves, angle_deg, velocity, length, thickness, elements, damping, mass, modulus_factor
+) -> Case:
     along = np.array([math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))])
     master = {
         "type": "beam", "material": "base", "start": [0.0, 0.0], "angle_deg": angle_deg, "length": length,
@@ -122,7 +124,9 @@ def bench_case(*slaves, angle_deg, velocity, length, thickness, elements, dampin
     return Case.checked(data)
 
 
-def by_hand(mass, damping, stiffness, normal, tangent, contact_stiffness, *, slip=1.0, law=None, loads=None) -> System:
+def by_hand(
+    mass, damping, stiffness, normal, tangent, contact_stiffness, *, slip=1.0, law=None, loads=None
+) -> System:
     """A System from matrices, with one contact per row of normal and tangent. slip: signed slip speed [m/s]."""
     mass, damping, stiffness = (np.asarray(a, dtype=float) for a in (mass, damping, stiffness))
     size = len(mass)

@@ -38,7 +38,11 @@ def only(mesh: BeamMesh, freedoms: tuple[int, ...]) -> list[int]:
 def roots(function, count: int) -> list[float]:
     grid = np.linspace(0.5, math.pi * (count + 1.5), 4000)
     signs = [function(x) for x in grid]
-    found = [brentq(function, a, b, xtol=1e-14) for a, b, p, q in zip(grid, grid[1:], signs, signs[1:], strict=False) if p * q < 0]
+    found = [
+        brentq(function, a, b, xtol=1e-14)
+        for a, b, p, q in zip(grid, grid[1:], signs, signs[1:], strict=False)
+        if p * q < 0
+    ]
     return found[:count]
 
 

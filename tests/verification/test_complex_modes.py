@@ -22,7 +22,9 @@ BENCHES = {
     "paper": lambda: bench(Slave(elements=8), elements=18),
     "leaning the other way": lambda: bench(Slave(lean_deg=-12)),
     "between two nodes": lambda: bench(Slave(place=0.63)),
-    "two contacts": lambda: bench(Slave(place=0.4), Slave(place=0.9, lean_deg=-8, length=0.04, stiffness=1e6)),
+    "two contacts": lambda: bench(
+        Slave(place=0.4), Slave(place=0.9, lean_deg=-8, length=0.04, stiffness=1e6)
+    ),
     "three contacts on both sides": lambda: bench(
         Slave(place=0.35), Slave(place=0.6, side=-1, length=0.03), Slave(place=0.85, lean_deg=20)
     ),
@@ -44,7 +46,8 @@ BENCHES = {
 
 @pytest.fixture(scope="module", params=BENCHES)
 def system(request) -> System:
-    return BENCHES[request.param]()
+    """Without loads every contact counts as touching: the eigenproblem alone."""
+    return replace(BENCHES[request.param](), loads={})
 
 
 @pytest.mark.parametrize("damped", [False, True])
@@ -73,7 +76,9 @@ def test_every_growing_mode_is_among_the_branches(system):
     modes = complex_modes(system, [0.3, 0.8], max_frequency_hz=40e3)
     for row, m in enumerate(modes.mu):
         dense = full_eigenvalues(system, m)
-        growing = dense[(dense.imag > 0) & (dense.imag < 2 * np.pi * 28e3) & (dense.real > 1e-5 * np.abs(dense))]
+        growing = dense[
+            (dense.imag > 0) & (dense.imag < 2 * np.pi * 28e3) & (dense.real > 1e-5 * np.abs(dense))
+        ]
         for value in growing:
             assert np.abs(modes.eigenvalues[row] - value).min() < 1e-4 * abs(value)
 
@@ -89,7 +94,7 @@ def assembled(system: System, lam: complex, mu: float) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["paper", "two contacts", "two dampings", "identical slaves", "any angle"])
 def test_right_and_left_vectors(name):
-    system = BENCHES[name]()
+    system = replace(BENCHES[name](), loads={})
     mu = 0.3
     modes = complex_modes(system, mu, count=12, vectors=True)
     lam, right, left = modes.eigenvalues[0], modes.right[0], modes.left[0]
@@ -119,7 +124,7 @@ def test_quantities_follow_their_definitions():
     np.testing.assert_allclose(modes.damping_ratio, -lam.real / np.abs(lam))
     # Proportional damping, no friction: the ratio of eq. 13 of the paper.
     omega = np.abs(lam[0])
-    np.testing.assert_allclose(modes.damping_ratio[0], 0.5 * (50.0 / omega + 1e-8 * omega), rtol=1e-6)
+    np.testing.assert_allclose(modes.damping_ratio[0], 0.5 * (50.0 / omega + 1e-8 * omega), rtol=1e-4)
     assert np.all(np.diff(modes.frequency_hz[0]) >= 0)
     document = modes.to_json()
     assert [r["frequency_hz"] for r in document["modes"][1]] == sorted(modes.frequency_hz[1])
@@ -202,23 +207,37 @@ def test_results_do_not_depend_on_the_sweep():
     system = bench(Slave(end="clamped", lean_deg=30))
     fine = complex_modes(system, np.linspace(0, 1, 101), count=10)
     shuffled = complex_modes(system, [1.0, 0.0, 0.37], count=10)
-    np.testing.assert_allclose(shuffled.eigenvalues[0], fine.eigenvalues[100], rtol=1e-9)
-    np.testing.assert_allclose(shuffled.eigenvalues[2], fine.eigenvalues[37], rtol=1e-9)
+    for row, same in ((0, 100), (1, 0), (2, 37)):
+        # Which of two modes that have met is which beyond the meeting is a convention: compare as sets.
+        got, expected = (np.sort_complex(m) for m in (shuffled.eigenvalues[row], fine.eigenvalues[same]))
+        np.testing.assert_allclose(got, expected, rtol=1e-8)
 
 
 def test_friction_that_weakens_damps_negatively():
     law = {"law": "weakening", "coefficient": 0.1, "static_coefficient": 0.4, "decay_speed": 0.02}
     system = bench(Slave(friction=law, end="clamped", lean_deg=20))
     for mu in (0.15, 0.4):
-        modes = complex_modes(system, mu, count=10)
+        modes = complex_modes(system, [mu], max_frequency_hz=30e3)
         steady = steady_sliding(system, mu=mu)
         slope = Weakening(0.1, 0.4, 0.02).scaled(mu, 0.02).slope(0.02) * steady.normal_force
         assert slope[0] < 0
         dense = full_eigenvalues(system, mu, slopes=slope)
         assert distance_to(modes.eigenvalues[0], dense).max() < 1e-7
         assert modes.residual.max() < 1e-10
+        # The traction modes of the master feel the slip only through that slope: they are there, too.
+        band = dense[(dense.imag > 0) & (dense.imag < 2 * np.pi * 25e3)]
+        assert distance_to(band, modes.eigenvalues[0]).max() < 1e-6
         without = full_eigenvalues(system, mu)
         assert distance_to(modes.eigenvalues[0], without).max() > 1e-5
+
+
+def test_a_slope_counts_for_nothing_without_friction():
+    law = {"law": "weakening", "coefficient": 0.1, "static_coefficient": 0.4, "decay_speed": 0.02}
+    sloped, plain = (
+        complex_modes(bench(Slave(friction=f)), [0.0, 1e-9], count=12) for f in (law, Slave().friction)
+    )
+    np.testing.assert_allclose(sloped.eigenvalues, plain.eigenvalues, rtol=1e-7)
+    assert sloped.residual[0].max() < 1e-11
 
 
 def test_an_open_contact_takes_no_part():

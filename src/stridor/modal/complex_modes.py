@@ -137,7 +137,7 @@ def complex_modes(
     spectrum, coupling, open_contacts = prepare(system, mu=float(values.max()) if len(values) == 1 else None)
     tracker = Tracker(spectrum, _limit(spectrum, count, max_frequency_hz))
     order = np.argsort(values, kind="stable")
-    start = tracker.state.roots
+    start = tracker.origin
     followed = np.zeros((len(values), len(start)), dtype=complex)
     for k in order:
         followed[k] = tracker.advance(float(values[k])).roots[: len(start)]
@@ -157,7 +157,10 @@ def complex_modes(
     shapes = np.zeros((2, len(values), len(columns), system.size if vectors else 0), dtype=complex)
     constant = fixed_vectors(spectrum)[:, columns[still] - len(start)].astype(complex)
     residual[:, still] = _judge_fixed(judge, spectrum, eigenvalues[0, still], constant, values)
-    shapes[:, :, still] = constant.T if vectors else 0.0
+    if vectors:
+        shapes[0][:, still] = constant.T
+        for row, m in enumerate(values):
+            shapes[1][row, still] = _left_of_fixed(coupling, eigenvalues[0, still], constant, float(m)).T
     part = _pairs(spectrum, judge, eigenvalues[:, moving], values, shapes if vectors else None, moving)
     eigenvalues[:, moving], residual[:, moving] = part
     return ComplexModes(
@@ -181,6 +184,17 @@ def _judge_fixed(
     return np.broadcast_to(judge(lam, vectors, 0.0), (len(mu), len(lam)))
 
 
+def _left_of_fixed(coupling: Coupling, lam: ComplexArray, right: ComplexArray, mu: float) -> ComplexArray:
+    """Left vectors (n, b) of modes that no contact sees.
+
+    Friction works on the modes' tangential motion, so the left vectors do meet the contacts.
+    """
+    left = np.array(right)
+    for k in range(len(lam)):
+        left[:, k] = refine(coupling, complex(lam[k]), right[:, k], right[:, k], mu)[2]
+    return left
+
+
 def _pairs(
     spectrum: Spectrum,
     judge: BackwardError,
@@ -194,6 +208,8 @@ def _pairs(
     All pairs of the sweep are one list, worked through in pieces that stay in the cache.
     """
     count = eigenvalues.shape[1]
+    if not count:
+        return eigenvalues, np.zeros(eigenvalues.shape)
     lam, each = eigenvalues.ravel(), np.repeat(mu, count)
     forces = [modal_coordinates(spectrum, row, float(m)) for row, m in zip(eigenvalues, mu, strict=True)]
     push, pull = (np.concatenate([f[side] for f in forces]) for side in (0, 1))
@@ -228,5 +244,11 @@ def _limit(spectrum: Spectrum, count: int, max_frequency_hz: float | None) -> fl
     poles = np.sort(np.sqrt(spectrum.modes.stiffness))
     if spectrum.modes.general:
         poles = np.sort(np.concatenate([poles, np.abs(spectrum.modes.poles[spectrum.modes.poles.imag >= 0])]))
-    place = min(count + spectrum.coupling.contacts, len(poles) - 1)
-    return float(poles[place]) * (1 + 1e-9)
+    place = count + spectrum.coupling.contacts
+    if place < len(poles):
+        return float(poles[place]) * (1 + 1e-9)
+    # All of them: contact springs raise the highest frequency by no more than they are stiff.
+    soft = spectrum.coupling.compliance > 0
+    normal = spectrum.receptance.real[0::2][soft]
+    added = np.sum((normal**2).sum(axis=1) / spectrum.coupling.compliance[soft])
+    return float(np.sqrt(poles[-1] ** 2 + added)) * (1 + 1e-9)

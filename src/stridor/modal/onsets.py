@@ -133,9 +133,8 @@ def onsets(
     # Roots that start above the band may meet inside it; follow some beyond.
     tracker = Tracker(spectrum, 2 * np.pi * max_frequency_hz * 1.1)
     tracker.watch = lambda old, new: events.extend(_passages(spectrum, old, new, has_damping))
-    first = tracker.state
     tracker.advance(high)
-    order = _numbering(spectrum, first.roots)
+    order = _numbering(spectrum, tracker.origin)
     judge = BackwardError(coupling)
     found = [_located(spectrum, judge, event, order, has_damping) for event in events]
     inside = [

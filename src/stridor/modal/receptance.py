@@ -16,7 +16,7 @@ from ..typing import Array, ComplexArray, IntArray
 from .uncoupled import UncoupledModes
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def _real_mode_sums(
     lam_re: Array, lam_im: Array, damping: Array, stiffness: Array, products: Array, out: Array
 ) -> None:  # pragma: no cover - compiled
@@ -59,10 +59,13 @@ class Receptance:
     def __post_init__(self) -> None:
         first, second = self.pairs
         # What every evaluation needs, multiplied out once.
-        object.__setattr__(self, "_products", np.ascontiguousarray(self.real[first] * self.real[second]))
+        products = self.real[first] * self.real[second]
+        # Modes that no wanted entry sees would only divide by zero where a root crosses them.
+        seen = np.flatnonzero(np.any(products != 0.0, axis=0))
+        object.__setattr__(self, "_products", np.ascontiguousarray(products[:, seen]))
         object.__setattr__(self, "_gains", (self.general[first] * self.general[second]).T)
-        object.__setattr__(self, "_damping", self.modes.damping)
-        object.__setattr__(self, "_stiffness", self.modes.stiffness)
+        object.__setattr__(self, "_damping", self.modes.damping[seen])
+        object.__setattr__(self, "_stiffness", self.modes.stiffness[seen])
         object.__setattr__(self, "_poles", self.modes.poles)
 
     def __call__(self, lam: ComplexArray) -> tuple[ComplexArray, ComplexArray]:

@@ -49,10 +49,14 @@ def refine(
 
     matrix, by_lambda = problem(lam), slope(lam)
     try:
-        solver = spl.splu(matrix)
+        # A hair off, so that an exact eigenvalue can be factorised too.
+        solver = spl.splu(problem(lam * (1 + 1e-13)))
     except RuntimeError:
         return lam, right, left
-    x, y = forced(right), forced(left)
+    # Some of every direction: on a pole the modal sum may lack the very one that is sought.
+    rng = np.random.default_rng(0)
+    spread = rng.standard_normal(size) / np.sqrt(size)
+    x, y = (forced(spread if not np.all(np.isfinite(v)) else v + 1e-3 * spread) for v in (right, left))
     with np.errstate(all="ignore"):
         for _ in range(STEPS):
             x = solver.solve(by_lambda @ x)

@@ -7,7 +7,7 @@ the simultaneous iteration of Ehrlich and Aberth with the known poles multiplied
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as sl
@@ -166,22 +166,50 @@ def frictionless_roots(spectrum: Spectrum, limit: float) -> ComplexArray:
     strong or not proportional, by a dense solve of the damped problem. Upper half plane; roots on the
     real axis are all listed. The margin keeps guards beside the outermost root asked for.
     """
+    spectrum, own = _without_tangential(spectrum)
     starts: ComplexArray | None = None
     if spectrum.modes.proportional:
         starts = _dense_undamped(spectrum, limit)
     if starts is None:
         starts = dense_roots(spectrum, 0.0, 1.3 * limit)
         starts = starts[starts.imag >= 0]
+    own = own[np.abs(own) <= 1.3 * limit]
     starts = starts[np.argsort(np.abs(starts), kind="stable")]
     if not len(starts):
-        return starts
+        return own
     roots, converged = polish(spectrum, starts, starts.imag != 0.0, 0.0)
     if not converged:
         raise AnalysisError(
             "the eigenvalues without friction do not settle: two modes coincide at the contact; change a "
             "length or a frequency limit slightly"
         )
-    return roots
+    roots = np.concatenate([roots, own])
+    return roots[np.argsort(np.abs(roots), kind="stable")]
+
+
+def _without_tangential(spectrum: Spectrum) -> tuple[Spectrum, ComplexArray]:
+    """The problem at μ = 0, where modes with tangential motion alone keep their poles, and those poles.
+
+    They come into it where friction has a slope, and then only with μ.
+    """
+    if not spectrum.coupling.sloped:
+        return spectrum, np.zeros(0, dtype=complex)
+    modes, rows = spectrum.modes, spectrum.receptance.real.copy()
+    moved = np.abs(rows).max(axis=0, initial=0.0) > 0
+    seen = np.zeros(rows.shape[1], dtype=bool)
+    seen[_coupled_columns(spectrum)] = True
+    alone = np.flatnonzero(moved & ~seen)
+    rows[:, alone] = 0.0
+    own = [p for k in alone for p in _poles(float(modes.stiffness[k]), float(modes.damping[k]))]
+    receptance = replace(spectrum.receptance, real=rows)
+    still = replace(
+        spectrum,
+        receptance=receptance,
+        fixed=np.concatenate([spectrum.fixed, own]),
+        pole_stiffness=modes.stiffness[seen],
+        pole_damping=modes.damping[seen],
+    )
+    return still, np.array(own, dtype=complex)
 
 
 def _dense_undamped(spectrum: Spectrum, limit: float) -> ComplexArray | None:
@@ -217,7 +245,7 @@ def _elastic(normal: Array, compliance: Array, stiffness: Array) -> tuple[Array,
 
 
 def dense_roots(spectrum: Spectrum, mu: float, limit: float) -> ComplexArray:
-    """Every eigenvalue with |λ| ≤ ``limit`` [1/s] but the fixed ones, by a dense solve in physical freedoms."""
+    """Every eigenvalue with |λ| ≤ ``limit`` [1/s] but the fixed ones, densely in physical freedoms."""
     coupling, system = spectrum.coupling, spectrum.coupling.system
     rows = system.contact_rows()
     normal, tangent = rows[0::2], rows[1::2]
@@ -330,7 +358,8 @@ def _step(
         pairs = column - mirror
         slope = slope - np.where(np.isnan(mirror), 0.0, 1.0 / pairs).sum(axis=1)
         step = 1.0 / slope
-    return np.where(np.isfinite(step), step, 0.0)
+    # On a pole to the last bit there is no step: a nudge leads off it.
+    return np.where(np.isfinite(step), step, 1e-9 * lam)
 
 
 def _trace_of_quotient(value: ComplexArray, slope: ComplexArray) -> ComplexArray:

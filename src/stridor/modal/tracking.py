@@ -21,6 +21,7 @@ from .roots import Spectrum, dense_roots, frictionless_roots, polish
 
 CLOSE = 0.25  # a correction may be this fraction of the distance to the next root
 CONTINUATION_STEPS = 12
+START_OF_SLOPES = 1e-6  # μ at which tracking starts where friction has a slope
 
 
 @dataclass
@@ -48,11 +49,20 @@ class Tracker:
     limit: float
     watch: Callable[[State, State], None] | None = None
     state: State = field(init=False)
+    origin: ComplexArray = field(init=False)
     smallest_step: float = 1e-9
 
     def __post_init__(self) -> None:
         roots = frictionless_roots(self.spectrum, self.limit)
-        self.state = State(0.0, roots, roots.imag != 0.0, self._tangents(roots, 0.0), np.arange(len(roots)))
+        mu = START_OF_SLOPES if self.spectrum.coupling.sloped else 0.0
+        implied = roots.imag != 0.0
+        self.origin = roots
+        if mu:
+            # Modes with tangential motion alone sit on poles at μ = 0: a hair of friction takes them off.
+            roots, converged = polish(self.spectrum, roots * (1 + mu * 1e-3), implied, mu)
+            if not converged:
+                raise AnalysisError("the eigenvalues at vanishing friction do not settle")
+        self.state = State(mu, roots, implied, self._tangents(roots, mu), np.arange(len(roots)))
         self._step = 0.01
 
     @classmethod
@@ -60,7 +70,7 @@ class Tracker:
         """A tracker that goes on from a state followed before."""
         tracker = cls.__new__(cls)
         tracker.spectrum, tracker.limit, tracker.watch = spectrum, float(np.abs(state.roots).max()), None
-        tracker.state, tracker.smallest_step, tracker._step = state, 1e-9, 0.01
+        tracker.state, tracker.origin, tracker.smallest_step, tracker._step = state, state.roots, 1e-9, 0.01
         return tracker
 
     def _tangents(self, roots: ComplexArray, mu: float) -> ComplexArray:
@@ -70,6 +80,11 @@ class Tracker:
 
     def advance(self, mu: float) -> State:
         """Follow the branches to ``mu`` ≥ the present one; raises AnalysisError where they are lost."""
+        if mu == 0.0:
+            return replace(self.state, mu=0.0, roots=self.origin)
+        if mu < self.state.mu <= START_OF_SLOPES:
+            nearby = self.origin + mu / self.state.mu * (self.state.roots - self.origin)
+            return replace(self.state, mu=mu, roots=polish(self.spectrum, nearby, self.state.implied, mu)[0])
         if not len(self.state.roots):
             self.state = replace(self.state, mu=mu)
             return self.state
@@ -95,24 +110,40 @@ class Tracker:
         """
         old = self.state
         reach = 1.5 * float(np.abs(old.roots).max())
+        upper, lower = np.flatnonzero(old.roots.imag >= 0), np.flatnonzero(old.roots.imag < 0)
+        # Roots of the lower half plane are explicit twins of upper ones.
+        twin_of = np.array(
+            [upper[np.argmin(np.abs(old.roots[upper] - np.conj(old.roots[j])))] for j in lower],
+            dtype=np.int64,
+        )
         for leap in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
             mu = min(old.mu + leap, end)
             found = dense_roots(self.spectrum, mu, reach)
             found = found[found.imag >= 0]
-            keep = np.flatnonzero(old.roots.imag >= 0)
-            if len(keep) != len(old.roots) or len(found) < len(keep):
+            if len(found) < len(upper):
                 continue
-            predicted = old.roots + (mu - old.mu) * np.where(np.isfinite(old.tangents), old.tangents, 0.0)
-            bounded = np.where(np.abs(predicted - old.roots) < 1e-3 * np.abs(old.roots), predicted, old.roots)
-            rows, columns = linear_sum_assignment(np.abs(bounded[:, None] - found))
+            moved = (mu - old.mu) * np.where(np.isfinite(old.tangents), old.tangents, 0.0)
+            predicted = old.roots + np.where(np.abs(moved) < 1e-3 * np.abs(old.roots), moved, 0.0)
+            rows, columns = linear_sum_assignment(np.abs(predicted[upper, None] - found))
             roots = np.array(old.roots)
-            roots[rows] = found[columns]
-            implied = roots.imag != 0.0
-            if np.any(implied != old.implied) or np.any(np.abs(roots - old.roots) > 0.02 * np.abs(roots)):
+            roots[upper[rows]] = found[columns]
+            roots[lower] = np.conj(roots[twin_of])
+            # A real root may have met one that was not followed: its new conjugate is implied then.
+            implied = roots.imag > 0
+            implied[twin_of] = False
+            if np.any(roots[twin_of].imag == 0) or np.any(old.implied & ~implied):
+                continue
+            if np.any(np.abs(roots - old.roots) > 0.02 * np.abs(roots)):
                 continue
             roots, converged = polish(self.spectrum, roots, implied, mu)
             if converged:
                 return State(mu, roots, implied, self._tangents(roots, mu), old.branch)
+        if reach > 1e3 * self.limit and np.any(self.spectrum.coupling.compliance == 0.0):
+            raise AnalysisError(
+                f"an eigenvalue grows beyond all bounds at μ = {old.mu:.9g}: from there on rigid contact with "
+                "friction no longer determines the motion (Painlevé's paradox); stay below, or give the "
+                "contact a stiffness"
+            )
         raise AnalysisError(
             f"branches cannot be told apart near μ = {old.mu:.9g}: three or more modes "
             "merge there; split the range or change a parameter slightly"

@@ -15,6 +15,7 @@ from ..sliding import slip_speeds, steady_sliding
 from ..system import System
 from ..typing import Array
 from .beta2 import Scheme, StepLimit, scheme, step_limit
+from .inputs import check_inputs
 from .kernel import ENERGY_RECORD, NEW_ROWS, NOT_FINITE, OFF_LINE, Record
 from .machine import MODAL_LIMIT, Machine, modal_machine, nodal_machine
 from .schedule import PhaseSpec, Schedule, lay_out
@@ -63,12 +64,16 @@ class Settings:
 
 
 Progress = Callable[[int, int], None]
+# Displacement, velocity and acceleration (n,) added to the initial state.
+Disturbance = tuple[Array, Array, Array]
 Checkpoint = Callable[[Trajectory], None]
 
 
 def choose_step(limit: StepLimit, settings: Settings) -> float:
     """Δt [s] within the limit; raises CaseError for a step beyond it."""
     if settings.step is None:
+        if not np.isfinite(limit.step):
+            raise CaseError("temporal.step", None, "nothing in the system oscillates, so no step follows; give one")
         return SAFE_FRACTION * limit.step
     if settings.step > limit.step:
         raise CaseError(
@@ -109,16 +114,27 @@ def simulate(
     checkpoint: Checkpoint | None = None,
     checkpoint_seconds: float = 20.0,
     restart: Trajectory | None = None,
+    join: bool = True,
+    disturbance: Disturbance | None = None,
 ) -> Trajectory:
     """March through the phases.
 
     mu scales every contact's friction law. progress(done, planned) is called between chunks, checkpoint
     with the trajectory so far at most every checkpoint_seconds. restart goes on from a trajectory of the
-    same system and settings. KeyboardInterrupt ends the run early and keeps what was computed
+    same system and settings (``join`` False returns the new part alone). disturbance is added to the initial
+    state. KeyboardInterrupt ends the run early and keeps what was computed
     (``interrupted``). Raises CaseError for a step beyond the limit, AnalysisError where motion blows up
     or a slave leaves its master line; what was computed is then in the error's ``trajectory``.
     """
     settings = settings or Settings()
+    check_inputs(
+        system,
+        phases,
+        step=settings.step,
+        beta2=settings.beta2,
+        record_every=settings.record_every,
+        watch=settings.watch,
+    )
     if mu is not None:
         system = system.with_friction(mu, np.abs(slip_speeds(system, np.ones(len(system.motion.names)))))
     limit = step_limit(system, settings.beta2)
@@ -126,7 +142,7 @@ def simulate(
     schedule = lay_out(phases, coefficients.step, list(system.loads), list(system.motion.names))
     modes, reason = choose_path(system, settings)
     machine = modal_machine(system, coefficients, modes) if modes else nodal_machine(system, coefficients)
-    run = _Run(machine, modes, schedule, settings, limit, reason, restart)
+    run = _Run(machine, modes, schedule, settings, limit, reason, restart, join, disturbance)
     return run.march(progress, checkpoint, checkpoint_seconds)
 
 
@@ -142,12 +158,14 @@ class _Run:
         limit: StepLimit,
         reason: str,
         restart: Trajectory | None,
+        join: bool,
+        disturbance: Disturbance | None = None,
     ) -> None:
         self.machine, self.modes, self.schedule, self.settings = machine, modes, schedule, settings
-        self.limit, self.reason, self.restart = limit, reason, restart
+        self.limit, self.reason, self.restart, self.join = limit, reason, restart, join
         self.phases: list[PhaseResult] = []
         if restart is None:
-            _initial_state(machine, modes, schedule, settings)
+            _initial_state(machine, modes, schedule, settings, disturbance)
         else:
             _restore(machine, restart)
         self.record = self._buffers()
@@ -187,6 +205,9 @@ class _Run:
                     _follow_segments(machine)
                 elif code in (NOT_FINITE, OFF_LINE):
                     self._stop(code, stretch.name)
+                if not (np.isfinite(machine.fields.u).all() and np.isfinite(machine.fields.q).all()):
+                    # Between records, or where no row sees it.
+                    self._stop(NOT_FINITE, stretch.name)
                 if done >= stretch.last:
                     self._close_phase(stretch.name, stretch.first, done)
                 if progress is not None:
@@ -284,7 +305,7 @@ class _Run:
             wall_seconds=self.wall,
             state=_saved(machine, settings),
         )
-        return new if self.restart is None else _joined(self.restart, new)
+        return new if self.restart is None or not self.join else _joined(self.restart, new)
 
 
 def _first_step(restart: Trajectory | None) -> int:
@@ -304,13 +325,20 @@ def watch_rows(
 
 
 def _initial_state(
-    machine: Machine, modes: UncoupledModes | None, schedule: Schedule, settings: Settings
+    machine: Machine,
+    modes: UncoupledModes | None,
+    schedule: Schedule,
+    settings: Settings,
+    disturbance: Disturbance | None = None,
 ) -> None:
     system, fields, state = machine.system, machine.fields, machine.state
     if settings.initial == "steady-sliding":
         stretch = schedule.stretches[0]
+        # The loop's contacts are rigid whatever K_c the modal approach uses: an equilibrium that rests on
+        # the spring would start with a penetration, and undoing it in one step is a blow.
+        rigid = replace(system, contacts=tuple(replace(c, stiffness=np.inf) for c in system.contacts))
         steady = steady_sliding(
-            system,
+            rigid,
             load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
             motion_factors=stretch.velocities_after,
         )
@@ -323,6 +351,12 @@ def _initial_state(
         state.status[:] = np.where(steady.active, 2, 0)
         if stretch.ramp_steps:
             raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
+    if disturbance is not None:
+        displacement, velocity, acceleration = disturbance
+        # q_0 = v_0 − β2 Δt a_0 starts the scheme without a jump (docs/theory-temporal.md).
+        rate = velocity - machine.scheme.beta2 * machine.scheme.step * acceleration
+        fields.u[:] += machine.coordinates(displacement, modes)
+        fields.q[:] += machine.coordinates(rate, modes)
     machine.repack()
     coefficients = _start_coefficients(machine, schedule)
     machine.free_increment(coefficients)

@@ -1,0 +1,412 @@
+"""Modal against temporal: do both approaches tell the same story?
+
+Small perturbations about steady sliding obey the equations that the complex modes solve, so frequency
+and growth must be equal to the accuracy of the time scheme. The full run, with stick, slip and
+separation, shows which of the unstable modes responds and how it settles (paper 2.4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from .errors import AnalysisError
+from .modal.complex_modes import ComplexModes, complex_modes
+from .modal.onsets import Onsets, onsets
+from .sliding import full_motion, slip_speeds
+from .system import System
+from .temporal.schedule import PhaseSpec
+from .temporal.shapes import operating_shape
+from .temporal.signals import Components, Growth, components, growth, low_passed, spectrum
+from .temporal.simulate import Settings, simulate
+from .temporal.trajectory import Trajectory
+from .typing import Array, ComplexArray
+
+PERTURBATION = 1e-5  # of the slip speed, at the start
+LINEAR = 0.02  # of the slip speed: beyond it the perturbation is no longer small
+PERTURBATION_DURATION = 0.03  # s, or this many periods of the lowest frequency of interest
+GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """Free vibration about steady sliding at one μ: λ of what grows fastest within the frequency range,
+    the signal (slip speed minus its steady value) [m/s] where it is linear, its sampling [s], and every
+    component found in it."""
+
+    mu: float
+    eigenvalue: complex
+    signal: Array
+    sampling: float
+    components: Components
+
+    @property
+    def growth_rate(self) -> float:
+        """Re λ [1/s]."""
+        return self.eigenvalue.real
+
+    @property
+    def frequency_hz(self) -> float:
+        """Im λ / 2π."""
+        return self.eigenvalue.imag / (2 * np.pi)
+
+    @property
+    def grows(self) -> bool:
+        """Whether it is unstable."""
+        return self.eigenvalue.real > 0
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Both approaches at one μ.
+
+    modal_eigenvalue: the mode that belongs to what the temporal side shows growing fastest (or decaying
+    slowest); frequency_error, growth_rate_error relative; mac between the operating shape of the full run
+    at its dominant frequency and that mode (None without a run); unstable_hz: all unstable modes in range;
+    responding: position in that list of the mode that the full run answers with, None if none.
+    """
+
+    mu: float
+    modal_eigenvalue: complex
+    unstable_hz: tuple[float, ...]
+    unstable_growth: tuple[float, ...]
+    perturbation: Perturbation
+    dominant_frequency_hz: float | None
+    run_growth: Growth | None
+    frequency_error: float
+    growth_rate_error: float
+    mac: float | None
+    responding: int | None
+    agrees: bool
+    verdict: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values of one comparison."""
+        modal, temporal = self.modal_eigenvalue, self.perturbation.eigenvalue
+        return {
+            "mu": self.mu,
+            "modal": {
+                "frequency_hz": modal.imag / (2 * np.pi),
+                "growth_rate": modal.real,
+                "unstable_frequencies_hz": list(self.unstable_hz),
+                "unstable_growth_rates": list(self.unstable_growth),
+            },
+            "temporal": {
+                "frequency_hz": temporal.imag / (2 * np.pi),
+                "growth_rate": temporal.real,
+                "dominant_frequency_hz": self.dominant_frequency_hz,
+                "saturated": None if self.run_growth is None else self.run_growth.saturated,
+                "responding_mode_hz": None if self.responding is None else self.unstable_hz[self.responding],
+            },
+            "frequency_error": self.frequency_error,
+            "growth_rate_error": self.growth_rate_error,
+            "mac": self.mac,
+            "agrees": self.agrees,
+            "verdict": self.verdict,
+        }
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Comparisons at several μ and the critical friction coefficients of both approaches.
+
+    critical_mu_temporal is the middle of the last bracket of the bisection, bracket its ends and
+    tolerance its width; None where it was not asked for or not found, with the reason in notes.
+    """
+
+    comparisons: tuple[Comparison, ...]
+    critical_mu_modal: float | None
+    critical_mu_temporal: float | None
+    bracket: tuple[float, float] | None
+    verdict: str
+    notes: tuple[str, ...] = ()
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """The document that `stridor compare --json` prints: the first μ at the top, all in comparisons."""
+        first = self.comparisons[0].to_json()
+        return {
+            **first,
+            "critical_mu_modal": self.critical_mu_modal,
+            "critical_mu_temporal": self.critical_mu_temporal,
+            "critical_bracket": None if self.bracket is None else list(self.bracket),
+            "verdict": self.verdict,
+            "comparisons": [c.to_json() for c in self.comparisons],
+            "notes": list(self.notes),
+        }
+
+
+def perturb(
+    system: System, mu: float, *, settings: Settings, max_frequency_hz: float = 40e3, duration: float | None = None
+) -> Perturbation:
+    """March a small perturbation of steady sliding and take its fastest component.
+
+    It starts with every mode of rigid contact up to ``max_frequency_hz`` in equal measure, 1e-5 of the
+    slip speed in all, so that frequencies out of range, which may grow faster, start from nothing; the
+    time scheme alone decides what becomes of them. It is used as long as it stays below 2 % of the slip
+    speed, where friction is still linear. Raises AnalysisError without steady sliding.
+    """
+    steady = slip_speeds(system, full_motion(system))
+    if not len(steady) or np.abs(steady).min() == 0:
+        raise AnalysisError("a perturbation of steady sliding needs contacts that slide")
+    speed = float(np.abs(steady).min())
+    rigid = replace(system, contacts=tuple(replace(c, stiffness=np.inf) for c in system.contacts))
+    start = replace(
+        settings, initial="steady-sliding", perturbation=0.0, watch=(), record_every=_every(settings, max_frequency_hz)
+    )
+    run = simulate(
+        rigid,
+        [PhaseSpec("perturbed", duration or PERTURBATION_DURATION, {}, {})],
+        start,
+        mu=mu,
+        disturbance=_band_limited(rigid, mu, PERTURBATION * speed, max_frequency_hz),
+    )
+    signals = run.slip_speed - steady
+    over = np.flatnonzero(np.abs(signals).max(axis=1) > LINEAR * speed)
+    last = int(over[0]) if len(over) else len(signals)
+    contact = int(np.argmax(np.abs(signals[:last]).max(axis=0, initial=0.0)))
+    signal = signals[:last, contact]
+    found = components(signal, run.sampling, max_frequency_hz=max_frequency_hz)
+    return Perturbation(mu, found.fastest, signal, run.sampling, found)
+
+
+def _band_limited(
+    system: System, mu: float, slip_speed: float, max_frequency_hz: float
+) -> tuple[Array, Array, Array]:
+    """Displacement, velocity, acceleration (n,) of all modes up to a frequency, equal in slip speed."""
+    modes = complex_modes(system, mu, max_frequency_hz=max_frequency_hz, vectors=True)
+    assert modes.right is not None
+    tangents = system.contact_rows()[1::2]
+    total = np.zeros((3, system.size))
+    for number, (lam, vector) in enumerate(zip(modes.eigenvalues[0], modes.right[0], strict=True)):
+        slip = lam * (tangents @ vector)
+        largest = float(np.abs(slip).max())
+        # Modes that do not slip would need a huge amplitude to show in the slip speed; leave them out.
+        if largest < 1e-6 * abs(lam) * float(np.abs(vector).max()) or lam.imag == 0:
+            continue
+        # Phases spread by the golden angle, so that nothing adds up at the start.
+        scaled = vector / largest * np.exp(2.399963j * number)
+        total += np.real([scaled, lam * scaled, lam**2 * scaled])
+    count = max(len(modes.branch), 1)
+    return tuple(total * (slip_speed / count))  # type: ignore[return-value]
+
+
+def _every(settings: Settings, max_frequency_hz: float) -> int:
+    """Steps between records that keep six samples per period of the highest frequency."""
+    if settings.step is None:
+        return settings.record_every
+    return max(1, int(1.0 / (12 * max_frequency_hz * settings.step)))
+
+
+def critical_friction(
+    system: System,
+    bracket: tuple[float, float],
+    *,
+    settings: Settings,
+    tolerance: float = 5e-4,
+    max_frequency_hz: float = 40e3,
+    progress: Callable[[str], None] | None = None,
+) -> tuple[float, tuple[float, float]]:
+    """Bisect the μ at which small perturbations begin to grow in time; the middle and the last bracket.
+
+    Raises AnalysisError where the ends of the bracket do not differ.
+    """
+    low, high = bracket
+    state = {m: perturb(system, m, settings=settings, max_frequency_hz=max_frequency_hz).grows for m in (low, high)}
+    if state[low] or not state[high]:
+        both = "grow" if state[low] else "decay"
+        raise AnalysisError(
+            f"perturbations {both} at both ends of the bracket {low:g} … {high:g}; widen comparison.bracket"
+        )
+    while high - low > tolerance:
+        middle = (low + high) / 2
+        grows = perturb(system, middle, settings=settings, max_frequency_hz=max_frequency_hz).grows
+        low, high = (low, middle) if grows else (middle, high)
+        if progress is not None:
+            progress(f"critical μ between {low:.5f} and {high:.5f}")
+    return (low + high) / 2, (low, high)
+
+
+def modal_assurance(first: ComplexArray, second: ComplexArray) -> float:
+    """MAC |aᴴb|²/(aᴴa bᴴb) of two complex shapes, 1 for equal up to a factor."""
+    a, b = np.ravel(first), np.ravel(second)
+    size = float(np.vdot(a, a).real * np.vdot(b, b).real)
+    return float(abs(np.vdot(a, b)) ** 2 / size) if size > 0 else 0.0
+
+
+def mode_shape(system: System, vector: ComplexArray) -> dict[str, ComplexArray]:
+    """Displacements (k, 2) of the nodes of each line in an eigenvector (n,)."""
+    return {
+        line.name: np.asarray(line.rows.free @ vector).reshape(-1, 2) for line in system.lines
+    }
+
+
+def compare(
+    system: System,
+    phases: Sequence[PhaseSpec],
+    settings: Settings,
+    mus: Sequence[float],
+    *,
+    friction_range: tuple[float, float] = (0.0, 1.0),
+    max_frequency_hz: float = 40e3,
+    critical: bool = True,
+    bracket: tuple[float, float] | None = None,
+    tolerance: float = 5e-4,
+    runs: dict[float, Trajectory] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Agreement:
+    """Compare both approaches at each μ and, if asked, by their critical friction coefficients.
+
+    runs may hand in full trajectories already computed at some of the μ. Raises what the analyses raise.
+    """
+    say = progress or (lambda _text: None)
+    comparisons: list[Comparison] = []
+    for mu in mus:
+        say(f"both approaches at μ = {mu:g}")
+        run = (runs or {}).get(mu)
+        if run is None:
+            run = simulate(system, phases, settings, mu=mu)
+        comparisons.append(_compare_at(system, phases, settings, mu, run, max_frequency_hz))
+    say("critical friction, modal")
+    found = onsets(system, friction_range, max_frequency_hz=max_frequency_hz)
+    modal = found.first.mu if found.first else None
+    temporal: float | None = None
+    last: tuple[float, float] | None = None
+    notes: list[str] = []
+    if critical:
+        ends = bracket or _bracket(found)
+        if ends is None:
+            notes.append("no modal onset in range, so no bracket for the temporal critical friction")
+        else:
+            say("critical friction, temporal")
+            try:
+                temporal, last = critical_friction(
+                    system, ends, settings=settings, tolerance=tolerance,
+                    max_frequency_hz=max_frequency_hz, progress=progress,
+                )
+            except AnalysisError as error:
+                notes.append(str(error))
+    return Agreement(
+        tuple(comparisons), modal, temporal, last, _overall(comparisons, modal, temporal, tolerance), tuple(notes)
+    )
+
+
+def _bracket(found: Onsets) -> tuple[float, float] | None:
+    first = found.first
+    return None if first is None else (0.6 * first.mu, 1.5 * first.mu)
+
+
+def _compare_at(
+    system: System,
+    phases: Sequence[PhaseSpec],
+    settings: Settings,
+    mu: float,
+    run: Trajectory,
+    max_frequency_hz: float,
+) -> Comparison:
+    modes = complex_modes(system, mu, max_frequency_hz=1.02 * max_frequency_hz, vectors=True)
+    perturbation = perturb(system, mu, settings=settings, max_frequency_hz=max_frequency_hz)
+    lam = modes.eigenvalues[0]
+    inside = modes.unstable[0] & (modes.frequency_hz[0] <= max_frequency_hz)
+    unstable = np.flatnonzero(inside)
+    unstable = unstable[np.argsort(lam[unstable].real)[::-1]]
+    partner = int(unstable[0]) if len(unstable) else int(np.argmin(np.abs(lam - perturbation.eigenvalue)))
+    here = complex(lam[partner])
+    frequency_error = abs(perturbation.eigenvalue.imag - here.imag) / max(abs(here.imag), 1e-300)
+    growth_error = abs(perturbation.eigenvalue.real - here.real) / max(abs(here.real), 1e-300)
+    dominant, fitted = dominant_response(run, max_frequency_hz)
+    mac, responding = None, None
+    if dominant:
+        shape = operating_shape(system, phases, settings, run, dominant, mu=mu)
+        responding = _responding(modes, unstable, dominant)
+        mode = partner if responding is None else int(unstable[responding])
+        assert modes.right is not None
+        expected = mode_shape(system, modes.right[0, mode])
+        mac = modal_assurance(
+            np.concatenate([shape[n].ravel() for n in shape]), np.concatenate([expected[n].ravel() for n in shape])
+        )
+    agrees, verdict = _judge(mu, len(unstable) > 0, here, perturbation, frequency_error, growth_error)
+    if responding is not None:
+        verdict += f"; the full run answers at {dominant:.0f} Hz"
+    return Comparison(
+        mu=mu,
+        modal_eigenvalue=here,
+        unstable_hz=tuple(float(f) for f in modes.frequency_hz[0][unstable]),
+        unstable_growth=tuple(float(g) for g in modes.growth_rate[0][unstable]),
+        perturbation=perturbation,
+        dominant_frequency_hz=dominant,
+        run_growth=fitted,
+        frequency_error=float(frequency_error),
+        growth_rate_error=float(growth_error),
+        mac=mac,
+        responding=responding,
+        agrees=agrees,
+        verdict=verdict,
+    )
+
+
+def _judge(
+    mu: float, unstable: bool, here: complex, perturbation: Perturbation, frequency: float, rate: float
+) -> tuple[bool, str]:
+    said = "unstable" if unstable else "stable"
+    if unstable != perturbation.grows:
+        other = "grows" if perturbation.grows else "decays"
+        return False, f"μ = {mu:g}: they disagree; modal says {said}, the temporal perturbation {other}"
+    if not unstable:
+        return True, f"μ = {mu:g}: both stable (slowest decay in time {perturbation.growth_rate:.4g} 1/s)"
+    if frequency > GOOD_FREQUENCY or rate > GOOD_GROWTH:
+        return False, (
+            f"μ = {mu:g}: both unstable, but frequency differs by {100 * frequency:.2g} % and growth by "
+            f"{100 * rate:.2g} %"
+        )
+    return True, (
+        f"μ = {mu:g}: both unstable at {here.imag / (2 * np.pi):.1f} Hz, growth {here.real:.1f} against "
+        f"{perturbation.growth_rate:.1f} 1/s ({100 * rate:.2g} %)"
+    )
+
+
+def _responding(modes: ComplexModes, unstable: Array, dominant: float) -> int | None:
+    """Unstable mode whose frequency is nearest to the run's dominant one, within 5 %."""
+    if not len(unstable):
+        return None
+    distance = np.abs(modes.frequency_hz[0][unstable] - dominant) / dominant
+    nearest = int(np.argmin(distance))
+    return nearest if distance[nearest] < 0.05 else None
+
+
+def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float | None, Growth | None]:
+    """Dominant frequency [Hz] of the last phase and the growth of that line.
+
+    Taken from the velocity of the first watched point (what a body radiates follows velocity); without a
+    watched point from the slip speed of the first contact. The spectrum is that of the second half.
+    """
+    part = run.phase_slice()
+    if run.watch_names:
+        signal = run.velocity[part, 0, int(np.argmax(np.ptp(run.velocity[part, 0], axis=0)))]
+    elif run.contact_names:
+        signal = run.slip_speed[part, 0]
+    else:
+        return None, None
+    if len(signal) < 64:
+        return None, None
+    filtered = low_passed(signal, run.sampling, max_frequency_hz)
+    spec = spectrum(filtered[len(filtered) // 2 :], run.sampling)
+    frequency, amplitude = spec.peak(above_hz=2 * spec.bandwidth_hz)
+    if amplitude == 0.0:
+        return None, None
+    return frequency, growth(filtered, run.sampling, frequency)
+
+
+def _overall(
+    comparisons: Sequence[Comparison], modal: float | None, temporal: float | None, tolerance: float
+) -> str:
+    parts = [c.verdict for c in comparisons]
+    agree = all(c.agrees for c in comparisons)
+    if modal is not None and temporal is not None:
+        near = abs(modal - temporal) <= max(tolerance, GOOD_CRITICAL * modal)
+        agree = agree and near
+        parts.append(f"critical μ {modal:.5f} modal, {temporal:.5f} temporal")
+    return ("agree: " if agree else "disagree: ") + "; ".join(parts)

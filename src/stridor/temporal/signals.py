@@ -1,0 +1,226 @@
+"""Signals of a temporal run: spectra with window and resolution stated, growth rates, saturation.
+
+Two ways to a growth rate. In a run that starts suddenly, the envelope at the dominant frequency is
+fitted where it grows exponentially. In a run of small perturbations about steady sliding the signal
+is a sum of damped exponentials, and the matrix pencil (Hua and Sarkar 1990) takes it apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.signal as ss
+
+from ..typing import Array, ComplexArray
+
+PENCIL_TOLERANCE = 1e-9
+# A line outside the band may have grown millions of times larger than what is sought in it; this window
+# keeps 170 dB away.
+STOP_BAND = ("kaiser", 18.0)
+STOP_DECIBELS = 170.0
+LONGEST, WIDEST = 3000, 400  # samples and subspace rows of the matrix pencil
+SHARE = 1e-3  # components below this share of the strongest are not trusted
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """One-sided amplitude spectrum: frequency_hz (k,), amplitude (k,) in the signal's unit (a sine of
+    amplitude one peaks at one), window name, resolution_hz (bin spacing) and bandwidth_hz (−6 dB width of
+    a line)."""
+
+    frequency_hz: Array
+    amplitude: Array
+    window: str
+    resolution_hz: float
+    bandwidth_hz: float
+
+    def peak(self, above_hz: float = 0.0) -> tuple[float, float]:
+        """Frequency [Hz], interpolated between bins, and amplitude of the largest line above ``above_hz``."""
+        inside = self.frequency_hz > above_hz
+        if not inside.any() or not np.any(self.amplitude[inside] > 0):
+            return 0.0, 0.0
+        k = int(np.argmax(np.where(inside, self.amplitude, -1.0)))
+        return _interpolated(self.frequency_hz, self.amplitude, k), float(self.amplitude[k])
+
+
+def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:
+    """Vertex of the parabola through the logarithms of three bins."""
+    if not 0 < k < len(frequency) - 1 or np.min(amplitude[k - 1 : k + 2]) <= 0:
+        return float(frequency[k])
+    a, b, c = np.log(amplitude[k - 1 : k + 2])
+    bend = a - 2 * b + c
+    shift = 0.5 * (a - c) / bend if bend < 0 else 0.0
+    return float(frequency[k] + shift * (frequency[1] - frequency[0]))
+
+
+_WIDTH = {"hann": 2.0, "boxcar": 1.21, "blackmanharris": 2.72, "flattop": 4.59}  # −6 dB width in bins
+
+
+def spectrum(signal: Array, sampling: float, *, window: str = "hann") -> Spectrum:
+    """Amplitude spectrum of a real signal (k,) sampled every ``sampling`` [s], its mean taken off."""
+    count = len(signal)
+    weights = ss.get_window(window, count)
+    values = np.abs(np.fft.rfft((signal - np.mean(signal)) * weights)) * 2 / weights.sum()
+    spacing = 1.0 / (count * sampling)
+    return Spectrum(
+        np.fft.rfftfreq(count, sampling), values, window, spacing, _WIDTH.get(window, 2.0) * spacing
+    )
+
+
+@dataclass(frozen=True)
+class Spectrogram:
+    """time (t,) [s], frequency_hz (k,), amplitude (k, t) in the signal's unit; resolution_hz."""
+
+    time: Array
+    frequency_hz: Array
+    amplitude: Array
+    resolution_hz: float
+
+
+def spectrogram(signal: Array, sampling: float, *, resolution_hz: float, window: str = "hann") -> Spectrogram:
+    """Short-time spectra with three quarters of overlap; resolution_hz sets the length of a piece."""
+    size = int(min(len(signal), max(16, round(1.0 / (resolution_hz * sampling)))))
+    hop = max(1, size // 4)
+    weights = ss.get_window(window, size)
+    pieces = np.lib.stride_tricks.sliding_window_view(signal, size)[::hop]
+    values = np.abs(np.fft.rfft((pieces - pieces.mean(axis=1, keepdims=True)) * weights, axis=1))
+    return Spectrogram(
+        (np.arange(len(pieces)) * hop + size / 2) * sampling,
+        np.fft.rfftfreq(size, sampling),
+        (values * 2 / weights.sum()).T,
+        1.0 / (size * sampling),
+    )
+
+
+def dominant_frequencies(spec: Spectrum, *, count: int = 5, floor: float = 1e-2) -> Array:
+    """Frequencies [Hz] of the largest separate lines, strongest first, down to ``floor`` of the strongest."""
+    apart = max(1, round(2 * spec.bandwidth_hz / spec.resolution_hz))
+    peaks, _ = ss.find_peaks(spec.amplitude, distance=apart, height=floor * float(spec.amplitude.max(initial=0.0)))
+    strongest = peaks[np.argsort(spec.amplitude[peaks])[::-1]][:count]
+    return np.array([_interpolated(spec.frequency_hz, spec.amplitude, int(k)) for k in strongest])
+
+
+def envelope(signal: Array, sampling: float, frequency_hz: float, *, periods: float = 20.0) -> tuple[Array, Array]:
+    """Time [s] and amplitude of the line at ``frequency_hz``, by demodulation over ``periods`` of it."""
+    size = int(max(8, round(periods / (frequency_hz * sampling))))
+    size = min(size, max(len(signal) // 3, 8))
+    weights = ss.get_window("hann", size)
+    weights = weights / weights.sum() * 2
+    time = np.arange(len(signal)) * sampling
+    turned = (signal - np.mean(signal)) * np.exp(-2j * np.pi * frequency_hz * time)
+    values = np.abs(ss.fftconvolve(turned, weights, mode="valid"))
+    hop = max(1, size // 10)
+    return (np.arange(len(values)) * sampling + size * sampling / 2)[::hop], values[::hop]
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Exponential phase of a run: rate [1/s] (negative: decay), fitted from start to end [s] of the signal,
+    spread: rms of ln amplitude about the line; saturated: the amplitude has stopped growing after it;
+    amplitude at the end of the signal."""
+
+    rate: float
+    start: float
+    end: float
+    spread: float
+    saturated: bool
+    amplitude: float
+
+
+def growth(signal: Array, sampling: float, frequency_hz: float) -> Growth:
+    """Fit the growth of the line at ``frequency_hz`` where it is exponential.
+
+    The plateau is the median amplitude of the last quarter. A signal that rises to it is fitted from its
+    lowest point to half the plateau; one that falls is fitted over the fall.
+    """
+    if frequency_hz <= 0 or len(signal) < 32:
+        return Growth(0.0, 0.0, len(signal) * sampling, 0.0, False, 0.0)
+    time, size = envelope(signal, sampling, frequency_hz)
+    size = np.maximum(size, 1e-300)
+    quarter = max(2, len(size) // 4)
+    plateau = float(np.median(size[-quarter:]))
+    before = float(np.median(size[-2 * quarter : -quarter])) if len(size) >= 2 * quarter else size[0]
+    lowest = int(np.argmin(size[: max(3, 3 * len(size) // 4)]))
+    rises = plateau > 1.5 * size[lowest]
+    saturated = bool(rises and plateau < 1.25 * before and plateau > 0.0)
+    if rises:
+        above = np.flatnonzero(size[lowest:] >= (0.5 if saturated else 0.95) * plateau)
+        stop = lowest + int(above[0]) + 1 if len(above) else len(size)
+        part = slice(lowest, max(stop, min(lowest + 4, len(size))))
+    else:
+        part = slice(int(np.argmax(size[: max(3, len(size) // 2)])), len(size))
+    t, y = time[part], np.log(size[part])
+    if len(t) < 3:
+        t, y = time, np.log(size)
+    rate, offset = np.polyfit(t, y, 1)
+    spread = float(np.sqrt(np.mean((y - rate * t - offset) ** 2)))
+    return Growth(float(rate), float(t[0]), float(t[-1]), spread, saturated, plateau)
+
+
+@dataclass(frozen=True)
+class Components:
+    """Damped exponentials that make up a signal: λ (k,) [1/s] and amplitudes (k,) at
+    the middle of the signal, strongest first."""
+
+    eigenvalues: ComplexArray
+    amplitudes: Array
+
+    @property
+    def fastest(self) -> complex:
+        """λ of the component that grows fastest; 0 without any."""
+        if not len(self.eigenvalues):
+            return 0j
+        return complex(self.eigenvalues[np.argmax(self.eigenvalues.real)])
+
+
+def low_passed(signal: Array, sampling: float, max_frequency_hz: float) -> Array:
+    """Signal without what lies above 1.25 ``max_frequency_hz``; the filter's transients are cut off."""
+    if max_frequency_hz * 1.4 * sampling >= 0.5 or len(signal) < 64:
+        return signal
+    # Kaiser's rule: (A − 8)/(2.285 Δω) taps for A dB over a transition of Δω.
+    taps = int((STOP_DECIBELS - 8) / (2.285 * 2 * np.pi * 0.25 * max_frequency_hz * sampling)) | 1
+    taps = min(taps, (len(signal) // 3) | 1)
+    low_pass = ss.firwin(taps, 1.125 * max_frequency_hz, window=STOP_BAND, fs=1.0 / sampling)
+    return np.asarray(ss.fftconvolve(signal - np.mean(signal), low_pass, mode="valid"))
+
+
+def components(signal: Array, sampling: float, *, max_frequency_hz: float, order: int = 80) -> Components:
+    """Take a noise-free free vibration apart into damped exponentials up to ``max_frequency_hz``.
+
+    The signal is low-passed (exponentials pass a filter unchanged but for their amplitude), decimated,
+    and its shift-invariant subspace solved for the poles (ESPRIT form of the matrix pencil). ``order``
+    bounds how many are sought. Parts weaker than 1e-3 of the strongest are not trusted and left out, as is
+    what turns less than twice in the whole signal.
+    """
+    nothing = Components(np.zeros(0, dtype=complex), np.zeros(0))
+    if len(signal) < 64:
+        return nothing
+    band = low_passed(signal, sampling, max_frequency_hz)
+    keep = max(1, int(1.0 / (2.6 * max_frequency_hz * sampling)))
+    reduced = band[::keep][-LONGEST:]
+    rate, count = keep * sampling, len(reduced)
+    if count < 16 or not np.any(reduced):
+        return nothing
+    rows = min(count // 2, WIDEST)
+    hankel = np.lib.stride_tricks.sliding_window_view(reduced, count - rows + 1)
+    left, values, _ = sl.svd(hankel, full_matrices=False)
+    rank = int(min(order, rows - 1, max(2, np.sum(values > PENCIL_TOLERANCE * values[0]))))
+    space = left[:, :rank]
+    poles = sl.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]).astype(complex)
+    # What would change by more than e^60 over half the signal is no vibration.
+    poles = poles[np.abs(np.log(np.maximum(np.abs(poles), 1e-300))) * (count // 2) < 60]
+    if not len(poles):
+        return nothing
+    # Amplitudes at the middle: columns scaled there, so that growth and decay weigh alike.
+    exponent = np.arange(count)[:, None] - count // 2
+    basis = np.exp(exponent * np.log(poles))
+    size = np.linalg.norm(basis, axis=0)
+    amplitude = np.abs(np.linalg.lstsq(basis / size, reduced.astype(complex), rcond=None)[0] / size)
+    lam = np.log(poles) / rate
+    frequency = lam.imag / (2 * np.pi)
+    inside = (frequency > 2.0 / (count * rate)) & (frequency <= max_frequency_hz)
+    inside &= amplitude > SHARE * amplitude[inside].max(initial=0.0)
+    ranked = np.argsort(amplitude[inside])[::-1]
+    return Components(lam[inside][ranked], amplitude[inside][ranked])
