@@ -1,4 +1,4 @@
-"""Benches to test on, and an oracle that shares nothing with the modal side: dense pencils and their eigenvalues."""
+"""Benches to test on, and an oracle that shares nothing with the modal side: dense eigenvalues."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def paper_case(**changes) -> Case:
 class Slave:
     """A beam whose tip rests on the master at `place` of its length, leaning `lean_deg` off the normal.
 
-    end "clamped": top held, tip pressed; "guided": top free along the normal (axis-aligned masters only), pressed there.
+    end "clamped": top held, tip pressed; "guided": top free along the normal (masters along an axis only)
+    and pressed there.
     """
 
     place: float = 2 / 3
@@ -127,7 +128,7 @@ def bench_case(
 def by_hand(
     mass, damping, stiffness, normal, tangent, contact_stiffness, *, slip=1.0, law=None, loads=None
 ) -> System:
-    """A System from matrices, with one contact per row of normal and tangent. slip: signed slip speed [m/s]."""
+    """A System from matrices, one contact per row of normal and tangent. slip: signed slip speed [m/s]."""
     mass, damping, stiffness = (np.asarray(a, dtype=float) for a in (mass, damping, stiffness))
     size = len(mass)
     column = np.zeros((size, 1))
@@ -139,7 +140,8 @@ def by_hand(
         contacts.append(
             Contact(
                 name=f"C{number}", slave=nothing, slave_position=np.zeros(2), master=nothing,
-                master_positions=np.array([[0.0, 0.0], [1.0, 0.0]]), chords=np.ones(1), segment=0, xi=0.0, side=1,
+                master_positions=np.array([[0.0, 0.0], [1.0, 0.0]]), chords=np.ones(1),
+                segment=0, xi=0.0, side=1,
                 gap=0.0, normal=np.array([0.0, 1.0]), tangent=np.array([1.0, 0.0]),
                 normal_row=np.asarray(n, dtype=float), tangent_row=np.asarray(t, dtype=float),
                 normal_lift=np.zeros(1), tangent_lift=np.array([float(slip)]),

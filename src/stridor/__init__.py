@@ -1,0 +1,97 @@
+"""stridor: will these sliding bodies squeal, at which frequency, from which friction on, and what then?
+
+    import stridor as st
+
+    case = st.load("two-beams.toml")
+    st.onsets(case)              # every critical friction coefficient, solved
+    st.modes(case, mu=0.1)       # complex modes, branches followed from μ = 0
+    st.simulate(case)            # explicit dynamics with unregularised Coulomb friction
+    st.compare(case)             # do both approaches agree?
+    st.run(case, "out")          # all of it, and a report
+
+Names are imported when first used, so that ``import stridor`` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .errors import AnalysisError, CaseError, StridorError
+
+if TYPE_CHECKING:
+    from . import view as plot
+    from .app.pipeline import run
+    from .case import Case, load, loads
+    from .io.datasets import load_trajectory, open_dataset, save, to_dataset
+    from .study.analyses import (
+        body_modes,
+        compare,
+        describe,
+        friction_curve,
+        modes,
+        onsets,
+        simulate,
+        summarise,
+    )
+    from .system import System, build_system
+
+_HOMES = {
+    "Case": ".case",
+    "System": ".system",
+    "body_modes": ".study.analyses",
+    "build_system": ".system",
+    "compare": ".study.analyses",
+    "describe": ".study.analyses",
+    "friction_curve": ".study.analyses",
+    "load": ".case",
+    "load_trajectory": ".io.datasets",
+    "loads": ".case",
+    "modes": ".study.analyses",
+    "onsets": ".study.analyses",
+    "open_dataset": ".io.datasets",
+    "plot": ".view",
+    "run": ".app.pipeline",
+    "save": ".io.datasets",
+    "simulate": ".study.analyses",
+    "summarise": ".study.analyses",
+    "to_dataset": ".io.datasets",
+}
+
+__version__ = "0.1.0"
+__all__ = [
+    "AnalysisError",
+    "Case",
+    "CaseError",
+    "StridorError",
+    "System",
+    "body_modes",
+    "build_system",
+    "compare",
+    "describe",
+    "friction_curve",
+    "load",
+    "load_trajectory",
+    "loads",
+    "modes",
+    "onsets",
+    "open_dataset",
+    "plot",
+    "run",
+    "save",
+    "simulate",
+    "summarise",
+    "to_dataset",
+]
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module 'stridor' has no attribute {name!r}")
+    module = import_module(home, __name__)
+    return module if name == "plot" else getattr(module, name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -62,7 +62,8 @@ def test_the_mirrored_bench_has_the_same_spectrum(drawn, mu):
     if any(s.stiffness == "rigid" for s in slaves):
         mu = min(mu, 0.2)
     one = free(slaves, **rest, velocity=0.02)
-    # Mirror in the y axis: the master points the other way, slaves change sides and lean, so does the velocity.
+    # Mirrored in the y axis the master points the other way and the slaves change sides; the velocity,
+    # given along the master, is mirrored with it.
     other = [replace(s, side=-s.side) for s in slaves]
     two = free(other, **(rest | {"angle_deg": 180.0 - rest["angle_deg"]}), velocity=0.02)
     first, second = (complex_modes(s, mu, max_frequency_hz=20e3).eigenvalues[0] for s in (one, two))

@@ -1,4 +1,7 @@
-"""Beam elements and their assembly against closed forms (Blevins, Formulas for Natural Frequency and Mode Shape, 1979)."""
+"""Beam elements and their assembly against closed forms.
+
+Blevins, Formulas for Natural Frequency and Mode Shape, 1979, tables 8-1 and 8-16.
+"""
 
 from __future__ import annotations
 

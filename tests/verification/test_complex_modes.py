@@ -1,4 +1,4 @@
-"""Complex modes against dense eigenvalues of the full unsymmetric pencil, and what vectors and residuals promise."""
+"""Complex modes against dense eigenvalues of the full unsymmetric pencil; vectors, residuals, branches."""
 
 from __future__ import annotations
 
@@ -188,7 +188,7 @@ def test_branches_do_not_swap():
 
 
 def test_a_true_crossing_is_crossed():
-    """A spring mode in the contact's tangent only and one that friction moves: sorted order would swap them."""
+    """One mode that friction moves and one that it does not: sorted order would swap them."""
     mass, stiffness = np.eye(3), np.diag([1.0, 4.0, 0.0])
     stiffness[2, 2] = 1.2**2
     # Contact along freedom 0; friction through the pair (0, 1); freedom 2 stands apart at ω = 1.2.

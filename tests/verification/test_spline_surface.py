@@ -19,7 +19,7 @@ RNG = np.random.default_rng(3)
 def nodes_of(kind: str) -> np.ndarray:
     if kind == "straight, uneven":
         s = np.cumsum([0, 0.1, 0.25, 0.05, 0.2, 0.13])
-        return np.outer(s, [0.6, -0.8]) + [1.0, 2.0]
+        return np.array([1.0, 2.0]) + np.outer(s, [0.6, -0.8])
     x = np.linspace(0, 1, 9)
     return np.column_stack([x, 0.08 * np.sin(5 * x)])
 

@@ -41,10 +41,10 @@ def test_guided_beam_carries_its_load_whatever_it_leans(mu, lean, velocity):
 @pytest.mark.parametrize("lean", [0.0, 10.0, -25.0])
 @pytest.mark.parametrize("velocity", [0.02, -0.02])
 def test_clamped_leaning_slave_digs_in_or_lifts_off(mu, lean, velocity):
-    """A clamped straight slave under its own tip load P, friction μN at the tip, compliance 1/K_c and the master's own:
+    """A clamped straight slave pressed at its tip by P on a cantilever master of compliance c_m.
 
-    tip compliance of a beam at angle θ off the normal, in the frame (tangent, normal):
-    c_nn = cos²θ L/EA + sin²θ L³/3EI,  c_nt = sinθ cosθ (L/EA − L³/3EI)·sign,  gap closed: −(P−N) c_nn + s μ N c_nt ... = −N/K.
+    Tip compliances of the slave, leaning by θ off the normal: c_nn = cos²θ L/EA + sin²θ L³/3EI and
+    c_nt = sinθ cosθ (L/EA − L³/3EI). The gap (N − P) c_nn + s μ N c_nt + N c_m is −N/K_c.
     """
     slave = Slave(lean_deg=lean, end="clamped", stiffness=2e6, force=5.0, damping=(0.0, 0.0))
     system = bench(slave, velocity=velocity, damping=(0.0, 0.0), length=0.15)

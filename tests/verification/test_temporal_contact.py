@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benches import Slave, bench
-from marching import block_on_belt, points_of, rod, run, touch
+from marching import belt_motion, block_on_belt, points_of, rod, run, touch
 from stridor.laws import Coulomb, StaticKinetic, Weakening
 from stridor.sliding import steady_sliding
 from stridor.system import System
@@ -224,7 +224,6 @@ def test_growth_under_weakening_friction():
 @pytest.mark.parametrize("path", ["modal", "nodal"])
 def test_redundant_contacts_are_solved_together(path):
     """A body pressed on three feet, two of them at the same place: forces are not unique, motion is. Sweeps are reported."""
-    # Freedoms: x, y of a rigid block. All feet move as the block does.
     feet = tuple(touch([0.0, 1.0], [1.0, 0.0], law=Coulomb(0.3), name=f"F{i}") for i in range(3))
     one = block_on_belt(stiffness=4.0, law=Coulomb(0.3))
     many = replace(one, contacts=feet)
@@ -243,8 +242,6 @@ def test_coupled_contacts_satisfy_all_laws():
     system = bench(
         Slave(place=0.5), Slave(place=0.52, lean_deg=-20.0), Slave(place=0.95, side=-1), angle_deg=30.0, velocity=0.5,
     )  # fmt: skip
-    if any(c.name == "" for c in system.contacts):
-        pytest.fail("contacts need names")
     result = run(system, 1e-3, record_every=1)
     assert 2 < result.most_sweeps < 500
     assert result.unconverged_steps == 0
@@ -265,7 +262,7 @@ def test_coupled_contacts_satisfy_all_laws():
 @pytest.mark.parametrize("velocity", [0.0, 0.02])
 def test_settles_at_the_static_solution(path, velocity):
     """Damped well, without friction: displacements of the static contact problem, force of the load."""
-    damping = (2e4, 0.0)
+    damping = (1.2e3, 0.0)
     system = bench(Slave(damping=damping, elements=3), elements=6, damping=damping, velocity=velocity)
     system = system.with_friction(0.0, np.array([abs(velocity)]))
     rigid = replace(system, contacts=tuple(replace(c, stiffness=np.inf) for c in system.contacts))
@@ -276,9 +273,9 @@ def test_settles_at_the_static_solution(path, velocity):
     for w, name in enumerate(("s0.start", "s0.end", "base.end")):
         rows = system.points[name]
         expected = rows.free[:2] @ static.displacement
-        moved = rows.lift[:2] @ np.full(len(system.motion.names), 1.0) * 1.0
-        travel = moved * (result.time[-1] - 1e-3) if velocity else 0.0
-        assert np.allclose(result.displacement[-1, w], expected + travel, atol=1e-6 * np.abs(static.displacement).max())
+        # The ramp costs the support half its length.
+        travel = rows.lift[:2] @ np.ones(len(system.motion.names)) * (result.time[-1] - 1e-3)
+        assert np.allclose(result.displacement[-1, w], expected + travel, rtol=0, atol=1e-9)
     assert result.normal_force[-1, 0] == pytest.approx(20.0, rel=1e-6)
 
 
@@ -290,7 +287,8 @@ def test_open_contact_falls_and_lands():
     pressed = np.flatnonzero(result.normal_force[:, 0] > 0)
     assert result.time[pressed[0]] == pytest.approx(math.sqrt(2 * 0.5 * 1.0 / 2.0), abs=2e-3)
     # A single mass does not rebound: the multiplier takes all its momentum, then holds the force.
-    assert result.normal_force[pressed[0], 0] * 1e-3 == pytest.approx(math.sqrt(2 * 2.0 * 0.5), rel=5e-3)
+    blow = result.normal_force[pressed[:2], 0].sum() * 1e-3
+    assert blow == pytest.approx(math.sqrt(2 * 2.0 * 0.5), rel=5e-3)
     assert np.allclose(result.normal_force[pressed[2] :, 0], 2.0)
     assert result.phases[0].contacts["A"].separation_fraction == pytest.approx(math.sqrt(0.5) / 2, abs=2e-3)
 
@@ -310,8 +308,6 @@ def test_contact_between_points_that_cannot_move_tangentially(path):
     held = run(one, 5.0, step=0.1, path=path)
     assert np.allclose(held.normal_force, 1.0)
     assert np.allclose(held.tangential_force, 0.0)
-    from marching import belt_motion
-
     dragged = replace(
         one, motion=belt_motion(1), contacts=(touch([1.0], [0.0], law=Coulomb(0.5), slip=-0.2, motions=1),)
     )

@@ -1,1 +1,1 @@
-
+"""The program: parse, call the API, show."""

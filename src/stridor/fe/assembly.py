@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from ..typing import Array, Sparse
+from ..typing import Array, IntArray, Sparse
 from .beam import DOF_PER_NODE, BeamMesh
 
 
@@ -24,14 +24,14 @@ def assemble_beam(mesh: BeamMesh, *, lumped: bool = False) -> tuple[Sparse, Spar
     )
 
 
-def _scatter(element: Array, rows: Array, columns: Array, elements: int, size: int) -> Sparse:
+def _scatter(element: Array, rows: IntArray, columns: IntArray, elements: int, size: int) -> Sparse:
     values = np.tile(element.ravel(), elements)
     matrix = sp.coo_array((values, (rows, columns)), shape=(size, size)).tocsr()
     matrix.eliminate_zeros()
     return matrix
 
 
-def connected_components(*matrices: Sparse) -> list[Array]:
+def connected_components(*matrices: Sparse) -> list[IntArray]:
     """Index sets of freedoms that the matrices together leave uncoupled, each sorted."""
     pattern = sum(abs(m) for m in matrices)
     count, label = sp.csgraph.connected_components(pattern, directed=False)

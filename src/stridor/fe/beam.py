@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..typing import Array
+from ..typing import Array, IntArray
 
 DOF_PER_NODE = 3
 
@@ -29,7 +29,7 @@ class BeamElement:
         """Matrix (6, 6) from global to local freedoms (u axial, v lateral, θ) of both nodes."""
         c, s = self.direction
         node = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        return np.kron(np.eye(2), node)
+        return np.asarray(np.kron(np.eye(2), node), dtype=float)
 
     def stiffness(self) -> Array:
         """Stiffness (6, 6) in global freedoms: linear traction, cubic (Hermite) bending."""
@@ -124,7 +124,8 @@ class BeamMesh:
     def coordinates(self) -> Array:
         """Node positions (elements + 1, 2) [m]."""
         distance = np.arange(self.elements + 1) * self.element.length
-        return np.asarray(self.start) + distance[:, None] * np.asarray(self.element.direction)
+        coordinates = np.asarray(self.start) + distance[:, None] * np.asarray(self.element.direction)
+        return np.asarray(coordinates, dtype=float)
 
     def node_at(self, distance: float) -> int | None:
         """Node whose distance from the start is ``distance`` [m], or None between nodes."""
@@ -132,7 +133,7 @@ class BeamMesh:
         nearest = round(number)
         return nearest if abs(number - nearest) < 1e-6 and 0 <= nearest <= self.elements else None
 
-    def interpolation(self, distance: float) -> tuple[Array, Array]:
+    def interpolation(self, distance: float) -> tuple[IntArray, Array]:
         """Freedoms (6,) of the body and rows (3, 6) that give x, y, rotation at ``distance`` [m]."""
         number = min(max(distance / self.element.length, 0.0), float(self.elements))
         nearest = round(number)

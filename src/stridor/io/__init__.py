@@ -1,1 +1,1 @@
-
+"""Results to and from files."""

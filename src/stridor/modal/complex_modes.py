@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from ..errors import CaseError
 from ..system import System
-from ..typing import Array, ComplexArray, IntArray
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .backward_error import BackwardError
 from .coupling import Coupling, couple
 from .refinement import refine
@@ -62,7 +62,7 @@ class ComplexModes:
         return -np.divide(self.eigenvalues.real, size, out=np.zeros_like(size), where=size > 0)
 
     @property
-    def unstable(self) -> Array:
+    def unstable(self) -> BoolArray:
         """Whether Re λ > 0 beyond rounding (k, b)."""
         return self.eigenvalues.real > UNSTABLE_RELATIVE * np.maximum(np.abs(self.eigenvalues), 1.0)
 

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from ..typing import ComplexArray
+from ..typing import ComplexArray, Sparse
 from .coupling import Coupling
 
 STEPS = 3
@@ -33,13 +33,13 @@ def refine(
     edge = sp.csr_array((size, count))
     compliance = sp.diags_array(coupling.compliance)
 
-    def problem(at: complex) -> sp.csc_array:
+    def problem(at: complex) -> Sparse:
         dynamic = at**2 * system.mass + at * damping + system.stiffness
         return sp.csc_array(
             sp.block_array([[dynamic, -push * scale], [normal * scale, compliance * scale**2]]), dtype=complex
         )
 
-    def slope(at: complex) -> sp.csc_array:
+    def slope(at: complex) -> Sparse:
         return sp.csc_array(
             sp.block_array([[2 * at * system.mass + damping, edge], [edge.T, empty]]), dtype=complex
         )

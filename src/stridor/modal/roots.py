@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg as sl
 
 from ..errors import AnalysisError
-from ..typing import Array, BoolArray, ComplexArray
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .coupling import Coupling
 from .receptance import Receptance, wanted_pairs
 from .uncoupled import UncoupledModes
@@ -92,7 +92,7 @@ def spectrum_of(coupling: Coupling, modes: UncoupledModes) -> Spectrum:
 
 def _split_unseen(
     modes: UncoupledModes, real: Array, *, sloped: bool
-) -> tuple[ComplexArray, Array, Array, Array]:
+) -> tuple[ComplexArray, Array, Array, BoolArray]:
     """Group equal poles and turn each group so that the fewest of its modes meet the contacts.
 
     A mode without normal motion at any contact keeps its eigenvalue at every μ (its friction force
@@ -287,7 +287,7 @@ def _without(values: ComplexArray, fixed: ComplexArray) -> ComplexArray:
     return np.array(left, dtype=complex)
 
 
-def _coupled_columns(spectrum: Spectrum) -> Array:
+def _coupled_columns(spectrum: Spectrum) -> IntArray:
     seen = spectrum.receptance.real[0::2]
     scale = max(float(np.abs(spectrum.receptance.real).max(initial=0.0)), 1e-300)
     return np.flatnonzero(np.abs(seen).max(axis=0, initial=0.0) > UNCOUPLED_TOLERANCE * scale)
@@ -336,7 +336,7 @@ def _step(
     spectrum: Spectrum,
     roots: ComplexArray,
     mirror: ComplexArray,
-    index: Array,
+    index: IntArray,
     poles: tuple[Array, Array],
     mu: float,
 ) -> ComplexArray:

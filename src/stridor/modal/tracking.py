@@ -21,6 +21,7 @@ from .roots import Spectrum, dense_roots, frictionless_roots, polish
 
 CLOSE = 0.25  # a correction may be this fraction of the distance to the next root
 CONTINUATION_STEPS = 12
+MOST_LEAPS = 40
 START_OF_SLOPES = 1e-6  # μ at which tracking starts where friction has a slope
 
 
@@ -63,14 +64,15 @@ class Tracker:
             if not converged:
                 raise AnalysisError("the eigenvalues at vanishing friction do not settle")
         self.state = State(mu, roots, implied, self._tangents(roots, mu), np.arange(len(roots)))
-        self._step = 0.01
+        self._step, self._leaps = 0.01, 0
 
     @classmethod
     def resumed(cls, spectrum: Spectrum, state: State) -> Tracker:
         """A tracker that goes on from a state followed before."""
         tracker = cls.__new__(cls)
         tracker.spectrum, tracker.limit, tracker.watch = spectrum, float(np.abs(state.roots).max()), None
-        tracker.state, tracker.origin, tracker.smallest_step, tracker._step = state, state.roots, 1e-9, 0.01
+        tracker.state, tracker.origin, tracker.smallest_step = state, state.roots, 1e-9
+        tracker._step, tracker._leaps = 0.01, 0
         return tracker
 
     def _tangents(self, roots: ComplexArray, mu: float) -> ComplexArray:
@@ -95,6 +97,7 @@ class Tracker:
                 self._step = step / 4
                 if self._step >= self.smallest_step:
                     continue
+                self._leaps += 1
                 taken, self._step = self._leap(mu), 1e-4
             if self.watch is not None:
                 self.watch(self.state, taken)
@@ -116,7 +119,7 @@ class Tracker:
             [upper[np.argmin(np.abs(old.roots[upper] - np.conj(old.roots[j])))] for j in lower],
             dtype=np.int64,
         )
-        for leap in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
+        for leap in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4) if self._leaps <= MOST_LEAPS else ():
             mu = min(old.mu + leap, end)
             found = dense_roots(self.spectrum, mu, reach)
             found = found[found.imag >= 0]
@@ -140,8 +143,8 @@ class Tracker:
                 return State(mu, roots, implied, self._tangents(roots, mu), old.branch)
         if reach > 1e3 * self.limit and np.any(self.spectrum.coupling.compliance == 0.0):
             raise AnalysisError(
-                f"an eigenvalue grows beyond all bounds at μ = {old.mu:.9g}: from there on rigid contact with "
-                "friction no longer determines the motion (Painlevé's paradox); stay below, or give the "
+                f"an eigenvalue grows beyond all bounds at μ = {old.mu:.9g}: from there on rigid contact "
+                "with friction no longer determines the motion (Painlevé's paradox); stay below, or give the "
                 "contact a stiffness"
             )
         raise AnalysisError(

@@ -1,1 +1,1 @@
-
+"""Analyses of a case, one call each, with provenance; later many of them as one dataset."""

@@ -87,7 +87,7 @@ class System:
         return int(self.mass.shape[0])
 
     @property
-    def components(self) -> list[Array]:
+    def components(self) -> list[IntArray]:
         """Freedoms that the structure (contacts aside) leaves uncoupled from the others."""
         return connected_components(self.mass, self.damping, self.stiffness)
 

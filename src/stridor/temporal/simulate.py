@@ -167,7 +167,7 @@ class _Run:
         if restart is None:
             _initial_state(machine, modes, schedule, settings, disturbance)
         else:
-            _restore(machine, restart)
+            _restore(machine, restart, settings, join=join)
         self.record = self._buffers()
         self.wall = 0.0
 
@@ -408,16 +408,33 @@ def _saved(machine: Machine, settings: Settings) -> dict[str, Array]:
     for name in machine.state._fields:
         saved[f"state_{name}"] = np.array(getattr(machine.state, name))
     saved["settings"] = np.array([machine.scheme.step, machine.scheme.beta2, float(settings.record_every)])
+    saved["model"] = _model_numbers(machine.system)
     return saved
 
 
-def _restore(machine: Machine, restart: Trajectory) -> None:
+def _model_numbers(system: System) -> Array:
+    """A few numbers by which two models differ: freedoms, contacts, traces of M, C and K."""
+    traces = [float(matrix.trace()) for matrix in (system.mass, system.damping, system.stiffness)]
+    return np.array([float(system.size), float(len(system.contacts)), *traces])
+
+
+def _restore(machine: Machine, restart: Trajectory, settings: Settings, *, join: bool) -> None:
     given, own = restart.state.get("settings"), np.array([machine.scheme.step, machine.scheme.beta2])
     if given is None or restart.path != machine.path or not np.array_equal(given[:2], own):
         raise CaseError(
             "restart",
             f"step {restart.step:g} s, beta2 {restart.beta2:g}, path {restart.path}",
             f"a state of the same scheme: step {own[0]:g} s, beta2 {own[1]:g}, path {machine.path}",
+        )
+    # Padded modes can have the same shape in different models.
+    if not np.allclose(restart.state.get("model", np.zeros(5)), _model_numbers(machine.system), rtol=1e-9, atol=0):
+        raise CaseError("restart", "model", "a state of the same model: this one has other freedoms or contacts")
+    if join and (restart.record_every != settings.record_every or restart.watch_names != settings.watch):
+        raise CaseError(
+            "restart",
+            f"a record every {restart.record_every} steps of {', '.join(restart.watch_names) or 'no points'}",
+            f"the same records as before (here every {settings.record_every} steps of "
+            f"{', '.join(settings.watch) or 'no points'}), or join=False",
         )
     pairs: list[tuple[Mapping[str, Array] | object, str, str]] = [
         (machine.fields, name, f"field_{name}") for name in STATE_FIELDS

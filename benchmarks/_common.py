@@ -1,0 +1,40 @@
+"""What the benchmarks share: the bench itself, and how a ratio is printed."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import stridor as st
+from stridor.case import Case, template_text
+
+
+def bench() -> Case:
+    """The two-beam bench as shipped."""
+    return st.loads(template_text("two-beams"))
+
+
+def options(text: str) -> argparse.Namespace:
+    """--short: seconds instead of minutes, for CI."""
+    parser = argparse.ArgumentParser(description=text)
+    parser.add_argument("--short", action="store_true", help="a few repetitions of the slow side only")
+    return parser.parse_args()
+
+
+def best(call: Callable[[], Any], repeats: int = 3) -> tuple[float, Any]:
+    """Shortest of some runs [s] and the last answer; the first call compiles and is not counted."""
+    answer = call()
+    times: list[float] = []
+    for _ in range(repeats):
+        started = time.perf_counter()
+        answer = call()
+        times.append(time.perf_counter() - started)
+    return min(times), answer
+
+
+def machine() -> str:
+    """Cores, as far as Python tells."""
+    return f"{os.cpu_count()} cores"

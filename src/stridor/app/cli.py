@@ -1,0 +1,407 @@
+"""The `stridor` command. Thin: parse, call the API, show. Heavy imports wait until a verb needs them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import CaseError, StridorError
+
+if TYPE_CHECKING:
+    from ..case import Case
+    from ..io.datasets import Result
+
+app = typer.Typer(
+    name="stridor",
+    help="Will these sliding bodies squeal? Complex modes, solved onsets and explicit dynamics of one model, compared.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+CaseFile = Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML).", show_default=False)]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a value of the case, e.g. contacts.A.friction.coefficient=0.3. Repeatable."),
+]
+Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results [default: CASE.out].")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else there.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="No log and no progress on stderr.")]
+Undamped = Annotated[bool, typer.Option("--undamped", help="Leave structural damping out.")]
+
+
+def _load(path: Path, overrides: list[str] | None, *, quiet: bool) -> Case:
+    from ..case import load
+
+    case = load(path, overrides or ())
+    from .output import say
+
+    for warning in case.warnings:
+        say(f"warning: {warning}", quiet=quiet)
+    return case
+
+
+def _folder(path: Path, out: Path | None) -> Path:
+    return out if out is not None else path.with_suffix(".out")
+
+
+def _keep(result: Result, path: Path, *, quiet: bool) -> None:
+    from ..io.datasets import save
+    from .output import say
+
+    save(result, path)
+    say(f"written: {path}", quiet=quiet)
+
+
+def numbers(text: str, name: str) -> list[float]:
+    """Numbers from "0.1", "0.1,0.2" or "start:stop:count". Raises CaseError."""
+    accepted = "a number, numbers with commas, or start:stop:count, each number ≥ 0"
+    try:
+        if ":" in text:
+            start, stop, count = text.split(":")
+            amount = int(count)
+            if amount < 1 or amount > 1_000_000:
+                raise ValueError
+            low, high = float(start), float(stop)
+            step = (high - low) / max(amount - 1, 1)
+            values = [low + k * step for k in range(amount)]
+        else:
+            values = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise CaseError(name, text, accepted) from None
+    if not all(0 <= v < float("inf") for v in values):
+        raise CaseError(name, text, accepted)
+    return values
+
+
+def _pair(text: str, name: str) -> tuple[float, float]:
+    parts = text.split(":")
+    try:
+        low, high = (float(p) for p in parts)
+    except ValueError:
+        raise CaseError(name, text, "two numbers, low:high") from None
+    return low, high
+
+
+@app.command()
+def new(
+    template: Annotated[str, typer.Argument(metavar="TEMPLATE", help="Name of a template, e.g. two-beams.")],
+    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write into [default: here].")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a commented case file, ready to edit."""
+    from ..case import template_text
+    from ..io.atomic import write_text
+    from .output import print_json, say
+
+    text = template_text(template)
+    path = (out or Path()) / f"{template}.toml"
+    if path.exists() and not force:
+        raise CaseError("TEMPLATE", str(path), "a file that does not exist yet; remove it or add --force")
+    write_text(path, text)
+    if json:
+        print_json({"case": str(path)})
+    say(f"written: {path}\nnext: stridor check {path}, then stridor run {path}", quiet=quiet)
+
+
+@app.command()
+def check(
+    case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False
+) -> None:
+    """Validate a case and print the model in words: bodies, contacts, time step against its limit."""
+    from ..study.analyses import describe
+    from .output import print_json, stdout
+
+    loaded = _load(case, set_, quiet=quiet)
+    description = describe(loaded)
+    if out is not None:
+        from ..io.atomic import write_text
+
+        write_text(out / "check.txt", "\n".join(description.lines) + "\n")
+    if json:
+        print_json(description.to_json())
+        return
+    for line in description.lines:
+        stdout.print(line, markup=False)
+
+
+@app.command()
+def modes(
+    case: CaseFile,
+    mu: Annotated[str | None, typer.Option("--mu", metavar="μ|a,b|start:stop:count", help="Friction coefficients [default: the case's].")] = None,
+    count: Annotated[int | None, typer.Option("--count", min=1, help="How many branches [default: modal.modes].")] = None,
+    undamped: Undamped = False,
+    set_: Set = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Complex modes at one or many friction coefficients, branches followed from μ = 0."""
+    from ..study import analyses
+    from .output import print_json, table
+
+    loaded = _load(case, set_, quiet=quiet)
+    values = None if mu is None else numbers(mu, "--mu")
+    result = analyses.modes(loaded, values, count=count, damped=False if undamped else None)
+    _keep(result, _folder(case, out) / "modes.nc", quiet=quiet)
+    if json:
+        print_json(result.to_json())
+        return
+    for row, m in enumerate(result.to_json()["modes"]):
+        rows = [
+            [
+                str(x["branch"]),
+                f"{x['frequency_hz']:.2f}",
+                f"{x['growth_rate']:.3f}",
+                f"{100 * x['damping_ratio']:.4f}",
+                "unstable" if x["unstable"] else "",
+                f"{x['residual']:.1e}",
+            ]
+            for x in m
+        ]
+        if len(result.mu) <= 5 or row in (0, len(result.mu) - 1):
+            table(
+                f"μ = {result.mu[row]:g}",
+                ["branch", "frequency [Hz]", "growth [1/s]", "damping [%]", "", "residual"],
+                rows,
+            )
+    if len(result.mu) > 5:
+        from .output import say
+
+        say(f"{len(result.mu)} friction coefficients; first and last shown, all in the file", quiet=quiet)
+
+
+@app.command()
+def onsets(
+    case: CaseFile,
+    friction_range: Annotated[str | None, typer.Option("--range", metavar="low:high", help="Range of μ [default: modal.friction_range].")] = None,
+    max_frequency: Annotated[float | None, typer.Option("--max-frequency", metavar="HZ", min=0.0, help="Highest frequency [default: modal.max_frequency_hz].")] = None,
+    undamped: Undamped = False,
+    set_: Set = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Every critical friction coefficient in range: solved, not bracketed."""
+    from ..study import analyses
+    from .output import print_json, stdout, table
+
+    loaded = _load(case, set_, quiet=quiet)
+    chosen = None if friction_range is None else _pair(friction_range, "--range")
+    result = analyses.onsets(loaded, chosen, max_frequency_hz=max_frequency, damped=False if undamped else None)
+    _keep(result, _folder(case, out) / "onsets.nc", quiet=quiet)
+    if json:
+        print_json(result.to_json())
+        return
+    if not result.onsets:
+        low, high = result.friction_range
+        stdout.print(f"no onset for μ in {low:g} … {high:g} up to {result.max_frequency_hz:g} Hz")
+        return
+    rows = [
+        [
+            f"{o.mu:.10f}",
+            f"{o.frequency_hz:.3f}",
+            o.kind,
+            f"{o.branches[0]} + {o.branches[1]}" if o.kind == "flutter" else str(o.branches[0]),
+            "ends" if o.stabilising else "begins",
+            "" if o.square_root_coefficient is None else f"{o.square_root_coefficient:.1f}",
+            "" if o.growth_slope is None else f"{o.growth_slope:.4g}",
+            f"{o.residual:.1e}",
+        ]
+        for o in result.onsets
+    ]
+    columns = ["critical μ", "frequency [Hz]", "kind", "modes", "growth", "κ [1/s]", "slope [1/s]", "residual"]
+    table("onsets, " + ("damped" if result.damped else "undamped"), columns, rows)
+    stdout.print("κ: growth opens as κ √(μ − μ_c) without damping; slope: d growth/dμ at a damped onset")
+
+
+@app.command()
+def simulate(
+    case: CaseFile,
+    mu: Annotated[float | None, typer.Option("--mu", min=0.0, help="Friction coefficient of every contact [default: the case's].")] = None,
+    restart: Annotated[Path | None, typer.Option("--restart", metavar="FILE", help="Go on from the file of an earlier, unfinished run.")] = None,
+    set_: Set = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """The temporal approach: explicit dynamics with stick, slip and separation. Ctrl-C keeps what was computed."""
+    from ..errors import AnalysisError
+    from ..io.datasets import load_trajectory, save
+    from ..study import analyses
+    from .output import print_json, progress_bar, say
+
+    loaded = _load(case, set_, quiet=quiet)
+    path = _folder(case, out) / "simulate.nc"
+    before = None if restart is None else load_trajectory(restart)
+    try:
+        with progress_bar("simulate", quiet=quiet) as progress:
+            run = analyses.simulate(
+                loaded, mu, progress=progress, checkpoint=lambda part: save(part, path) and None, restart=before
+            )
+    except AnalysisError as error:
+        part = getattr(error, "trajectory", None)
+        if part is not None:
+            save(part, path)
+            say(f"written up to there: {path}", quiet=quiet)
+        raise
+    _keep(run, path, quiet=quiet)
+    summary = analyses.summarise(loaded, run)
+    if run.interrupted:
+        say(
+            f"interrupted after {run.steps} of {run.planned_steps} steps; go on with --restart {path}", quiet=quiet
+        )
+    if json:
+        print_json(summary.to_json())
+    else:
+        _show_run(summary.to_json())
+    if run.interrupted:
+        raise typer.Exit(130)
+
+
+def _show_run(summary: dict[str, Any]) -> None:
+    from .output import stdout, table
+
+    rows = [
+        [
+            phase["name"],
+            name,
+            f"{c['max_normal_force']:.2f}",
+            f"{c['max_slip_speed']:.4f}",
+            f"{100 * c['stick_fraction']:.1f}",
+            f"{100 * c['slip_fraction']:.1f}",
+            f"{100 * c['separation_fraction']:.1f}",
+        ]
+        for phase in summary["phases"]
+        for name, c in phase["contacts"].items()
+    ]
+    columns = ["phase", "contact", "max N [N]", "max slip [m/s]", "stick [%]", "slip [%]", "open [%]"]
+    table("contacts", columns, rows)
+    if summary["dominant_frequency_hz"] is not None:
+        state = "saturated" if summary["saturated"] else "not saturated"
+        stdout.print(
+            f"last phase: {summary['dominant_frequency_hz']:.1f} Hz dominates, growth "
+            f"{summary['growth_rate']:.1f} 1/s where exponential, {state}"
+        )
+    stdout.print(f"energy balance closes to {summary['energy']['error']:.1e} of the energy turned over")
+    stdout.print(
+        f"{summary['steps']} steps of {summary['dt']:.4g} s in {summary['wall_seconds']:.1f} s, {summary['path']} path"
+    )
+
+
+@app.command()
+def compare(
+    case: CaseFile,
+    mu: Annotated[str | None, typer.Option("--mu", metavar="μ|a,b|start:stop:count", help="Friction coefficients [default: comparison.mu].")] = None,
+    critical: Annotated[bool | None, typer.Option("--critical/--no-critical", help="Bisect the temporal critical friction [default: comparison.critical].", show_default=False)] = None,
+    set_: Set = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Agreement of both approaches, as a table and a verdict."""
+    from ..study import analyses
+    from .output import print_json, say
+
+    loaded = _load(case, set_, quiet=quiet)
+    values = None if mu is None else numbers(mu, "--mu")
+    result = analyses.compare(loaded, values, critical=critical, progress=lambda text: say(text, quiet=quiet))
+    _keep(result, _folder(case, out) / "compare.nc", quiet=quiet)
+    if json:
+        print_json(result.to_json())
+        return
+    _show_agreement(result.to_json())
+
+
+def _show_agreement(document: dict[str, Any]) -> None:
+    from .output import stdout, table
+
+    def number(value: float | None, form: str) -> str:
+        return "–" if value is None else format(value, form)
+
+    rows = [
+        [
+            f"{c['mu']:g}",
+            number(c["modal"]["frequency_hz"], ".2f"),
+            number(c["temporal"]["frequency_hz"], ".2f"),
+            number(c["modal"]["growth_rate"], ".2f"),
+            number(c["temporal"]["growth_rate"], ".2f"),
+            f"{100 * c['growth_rate_error']:.2f}",
+            number(c["temporal"]["dominant_frequency_hz"], ".1f"),
+            number(c["mac"], ".3f"),
+        ]
+        for c in document["comparisons"]
+    ]
+    columns = ["μ", "modal [Hz]", "temporal [Hz]", "growth modal", "temporal", "error [%]", "run answers [Hz]", "MAC"]
+    table("modal against temporal", columns, rows)
+    if document["critical_mu_modal"] is not None:
+        stdout.print(
+            f"critical μ: {document['critical_mu_modal']:.6f} modal, "
+            f"{number(document['critical_mu_temporal'], '.6f')} temporal"
+        )
+    for note in document["notes"]:
+        stdout.print(f"note: {note}", markup=False)
+    stdout.print(document["verdict"], markup=False)
+
+
+@app.command()
+def run(
+    case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False
+) -> None:
+    """Everything: modes, onsets, simulate, compare, and the report."""
+    from .output import print_json, progress_bar, say, stdout
+    from .pipeline import run as run_all
+
+    loaded = _load(case, set_, quiet=quiet)
+    with progress_bar("simulate", quiet=quiet) as progress:
+        outcome = run_all(
+            loaded, _folder(case, out), progress=progress, log=lambda text: say(text, quiet=quiet)
+        )
+    if json:
+        print_json(outcome.to_json())
+    else:
+        stdout.print(outcome.verdict, markup=False)
+        stdout.print(f"report: {outcome.report}", markup=False)
+    if outcome.interrupted:
+        raise typer.Exit(130)
+
+
+@app.callback(invoke_without_command=True)
+def _top(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and leave.")] = False,
+) -> None:
+    if version:
+        from .. import __version__
+
+        print(f"stridor {__version__}")
+        raise typer.Exit
+
+
+def main() -> None:
+    """Entry point: errors as plain lines, no traceback. Exit code 2: bad input, 1: no answer, 130: Ctrl-C."""
+    sys.exit(_guarded(lambda: app(standalone_mode=True)))
+
+
+def _guarded(call: Callable[[], Any]) -> int:
+    try:
+        call()
+    except StridorError as error:
+        print(f"stridor: {error}" if "\n" not in str(error) else f"stridor:\n{error}", file=sys.stderr)
+        return 2 if isinstance(error, CaseError) else 1
+    except KeyboardInterrupt:
+        print("stridor: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        return 0
+    return 0
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,228 @@
+"""Results as xarray datasets with named dimensions and units, one netCDF-4/HDF5 file per analysis."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..agreement import Agreement
+from ..errors import CaseError
+from ..modal.complex_modes import ComplexModes
+from ..modal.onsets import Onset, Onsets
+from ..temporal.trajectory import STATUS, ContactStatistics, PhaseResult, Trajectory
+from .atomic import replacing
+
+Result = ComplexModes | Onsets | Trajectory | Agreement
+FORMAT = "stridor results 1"
+
+
+def to_dataset(result: Result) -> Any:
+    """xarray.Dataset of a result; units in attributes, case and provenance embedded as text."""
+    if isinstance(result, ComplexModes):
+        return _modes(result)
+    if isinstance(result, Onsets):
+        return _onsets(result)
+    if isinstance(result, Trajectory):
+        return _trajectory(result)
+    return _agreement(result)
+
+
+def save(result: Result, path: str | Path) -> Path:
+    """Write a result to ``path`` (.nc) by way of a temporary file. Raises AnalysisError on a full disk."""
+    dataset = to_dataset(result)
+    target = Path(path)
+    with replacing(target) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf")
+    return target
+
+
+def open_dataset(path: str | Path) -> Any:
+    """xarray.Dataset of a file written by ``save``. Raises CaseError where it is none."""
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(Path(path), engine="h5netcdf", decode_times=False) as dataset:
+            loaded = dataset.load()
+    except (OSError, ValueError, KeyError) as error:
+        raise CaseError("file", str(path), "a results file written by stridor (netCDF-4/HDF5)") from error
+    if loaded.attrs.get("format") != FORMAT:
+        raise CaseError("file", str(path), "a results file written by stridor (netCDF-4/HDF5)")
+    return loaded
+
+
+def load_trajectory(path: str | Path) -> Trajectory:
+    """Trajectory from a file written by ``save``, with the state that a restart needs."""
+    data = open_dataset(path)
+    if data.attrs.get("analysis") != "simulate":
+        raise CaseError("file", str(path), "a file of `stridor simulate`")
+    names = json.loads(data.attrs["names"])
+    scalars = json.loads(data.attrs["scalars"])
+    phases = tuple(
+        PhaseResult(
+            p["name"], p["start"], p["end"], {n: ContactStatistics(**c) for n, c in p["contacts"].items()}
+        )
+        for p in json.loads(data.attrs["phases"])
+    )
+    return Trajectory(
+        time=data["time"].values,
+        contact_names=tuple(names["contacts"]),
+        watch_names=tuple(names["watch"]),
+        **{
+            name: data[name].values
+            for name in (
+                "normal_force", "tangential_force", "slip_speed", "gap", "status", "displacement", "velocity",
+                "acceleration", "kinetic", "elastic",
+            )
+        },
+        works={name: data[f"work_{name}"].values for name in names["works"]},
+        phases=phases,
+        state={name: data[f"restart_{name}"].values for name in names["state"]},
+        provenance=json.loads(data.attrs["provenance"]),
+        **scalars,
+    )
+
+
+def _dataset(analysis: str, variables: Mapping[str, Any], coords: Mapping[str, Any], result: Result) -> Any:
+    import xarray as xr
+
+    if any("part" in v[0] for v in variables.values() if isinstance(v[0], tuple)):
+        coords = {**coords, "part": ("part", np.array(["re", "im"], dtype=object))}
+    attributes = {
+        "format": FORMAT,
+        "analysis": analysis,
+        "case": str(result.provenance.get("case", "")),
+        "provenance": json.dumps(result.provenance),
+    }
+    return xr.Dataset(dict(variables), dict(coords), attributes)
+
+
+def _split(dims: tuple[str, ...], values: Any, attributes: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Complex values as real ones with a last dimension (re, im): netCDF has no complex numbers."""
+    array = np.asarray(values, dtype=complex)
+    return (*dims, "part"), np.stack([array.real, array.imag], axis=-1), dict(attributes)
+
+
+def _modes(result: ComplexModes) -> Any:
+    pairs = ("mu", "branch")
+    variables: dict[str, Any] = {
+        "eigenvalue": _split(
+            pairs, result.eigenvalues, {"units": "1/s", "long_name": "growth rate + j angular frequency"}
+        ),
+        "frequency": (pairs, result.frequency_hz, {"units": "Hz"}),
+        "growth_rate": (pairs, result.growth_rate, {"units": "1/s"}),
+        "damping_ratio": (pairs, result.damping_ratio, {"units": "1"}),
+        "unstable": (pairs, result.unstable.astype(np.int8), {"units": "1"}),
+        "residual": (pairs, result.residual, {"units": "1", "long_name": "componentwise backward error"}),
+    }
+    for name, vectors in (("right_vector", result.right), ("left_vector", result.left)):
+        if vectors is not None:
+            variables[name] = _split((*pairs, "freedom"), vectors, {"units": "1"})
+    coords = {"mu": ("mu", result.mu, {"units": "1"}), "branch": ("branch", result.branch)}
+    data = _dataset("modes", variables, coords, result)
+    data.attrs["damped"] = int(result.damped)
+    return data
+
+
+def _onsets(result: Onsets) -> Any:
+    def column(name: str) -> list[float]:
+        return [np.nan if (v := getattr(o, name)) is None else float(v) for o in result.onsets]
+
+    def exceptional(onset: Onset) -> complex:
+        return complex(np.nan, np.nan) if onset.exceptional_mu is None else onset.exceptional_mu
+
+    units = {
+        "mu": "1",
+        "frequency_hz": "Hz",
+        "residual": "1",
+        "square_root_coefficient": "1/s",
+        "growth_slope": "1/s",
+    }
+    variables: dict[str, Any] = {name: ("onset", column(name), {"units": unit}) for name, unit in units.items()}
+    count = len(result.onsets)
+    variables["kind"] = ("onset", np.array([o.kind for o in result.onsets], dtype=object).reshape(count))
+    variables["stabilising"] = ("onset", np.array([o.stabilising for o in result.onsets], dtype=np.int8))
+    branches = np.array([o.branches for o in result.onsets], dtype=np.int64).reshape(-1, 2)
+    variables["branches"] = (("onset", "pair"), branches)
+    variables["exceptional_mu"] = _split(("onset",), [exceptional(o) for o in result.onsets], {"units": "1"})
+    data = _dataset("onsets", variables, {}, result)
+    data.attrs.update(damped=int(result.damped), max_frequency_hz=result.max_frequency_hz)
+    data.attrs["friction_range"] = list(result.friction_range)
+    return data
+
+
+def _trajectory(run: Trajectory) -> Any:
+    by_contact, by_point = ("time", "contact"), ("time", "point", "direction")
+    variables: dict[str, Any] = {
+        "normal_force": (by_contact, run.normal_force, {"units": "N"}),
+        "tangential_force": (by_contact, run.tangential_force, {"units": "N"}),
+        "slip_speed": (by_contact, run.slip_speed, {"units": "m/s"}),
+        "gap": (by_contact, run.gap, {"units": "m"}),
+        "status": (
+            by_contact,
+            run.status.astype(np.int8),
+            {"flag_values": [0, 1, 2], "flag_meanings": " ".join(STATUS)},
+        ),
+        "displacement": (by_point, run.displacement, {"units": "m"}),
+        "velocity": (by_point, run.velocity, {"units": "m/s"}),
+        "acceleration": (by_point, run.acceleration, {"units": "m/s2"}),
+        "kinetic": ("time", run.kinetic, {"units": "J", "long_name": "half a step before the record"}),
+        "elastic": ("time", run.elastic, {"units": "J", "long_name": "half a step before the record"}),
+    }
+    for name, work in run.works.items():
+        variables[f"work_{name}"] = ("time", work, {"units": "J"})
+    for name, array in run.state.items():
+        dims = tuple(f"restart_{name}_{k}" for k in range(np.ndim(array)))
+        variables[f"restart_{name}"] = (dims, array)
+    coords = {
+        "time": ("time", run.time, {"units": "s"}),
+        "contact": ("contact", np.array(run.contact_names, dtype=object)),
+        "point": ("point", np.array(run.watch_names, dtype=object)),
+        "direction": ("direction", np.array(["x", "y"], dtype=object)),
+    }
+    data = _dataset("simulate", variables, coords, run)
+    scalars = (
+        "step", "beta2", "record_every", "steps", "planned_steps", "path", "path_reason", "step_limit",
+        "limiting_body", "most_sweeps", "unconverged_steps", "interrupted", "wall_seconds",
+    )
+    data.attrs["scalars"] = json.dumps({name: getattr(run, name) for name in scalars})
+    data.attrs["names"] = json.dumps(
+        {
+            "contacts": run.contact_names,
+            "watch": run.watch_names,
+            "works": list(run.works),
+            "state": list(run.state),
+        }
+    )
+    data.attrs["phases"] = json.dumps(
+        [
+            {"name": p.name, "start": p.start, "end": p.end, "contacts": {n: vars(c) for n, c in p.contacts.items()}}
+            for p in run.phases
+        ]
+    )
+    return data
+
+
+def _agreement(result: Agreement) -> Any:
+    rows = result.comparisons
+
+    def column(values: list[float | None]) -> list[float]:
+        return [np.nan if v is None else float(v) for v in values]
+
+    variables: dict[str, Any] = {
+        "modal_eigenvalue": _split(("mu",), [c.modal_eigenvalue for c in rows], {"units": "1/s"}),
+        "temporal_eigenvalue": _split(("mu",), [c.perturbation.eigenvalue for c in rows], {"units": "1/s"}),
+        "frequency_error": ("mu", [c.frequency_error for c in rows], {"units": "1"}),
+        "growth_rate_error": ("mu", [c.growth_rate_error for c in rows], {"units": "1"}),
+        "mac": ("mu", column([c.mac for c in rows]), {"units": "1"}),
+        "dominant_frequency": ("mu", column([c.dominant_frequency_hz for c in rows]), {"units": "Hz"}),
+    }
+    data = _dataset("compare", variables, {"mu": ("mu", [c.mu for c in rows], {"units": "1"})}, result)
+    for name in ("critical_mu_modal", "critical_mu_temporal"):
+        value = getattr(result, name)
+        data.attrs[name] = np.nan if value is None else value
+    data.attrs["verdict"] = result.verdict
+    return data

@@ -1,0 +1,35 @@
+"""Who computed what with which versions: attached to every result and written into every file."""
+
+from __future__ import annotations
+
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from ..case import Case
+
+LIBRARIES = ("stridor", "numpy", "scipy", "numba", "pydantic")
+
+
+def versions() -> dict[str, str]:
+    """Versions of stridor, of what it computes with, and of Python."""
+    found = {"python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:  # run from a source tree without installation
+            found[name] = "unknown"
+    return found
+
+
+def provenance(case: Case, analysis: str, seconds: float, **settings: Any) -> dict[str, Any]:
+    """What a result needs to be made again: case, analysis, settings, versions, time."""
+    return {
+        "analysis": analysis,
+        "case": case.text,
+        "settings": settings,
+        "versions": versions(),
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "wall_seconds": seconds,
+    }

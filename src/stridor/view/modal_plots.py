@@ -1,0 +1,236 @@
+"""Figures of the modal approach: branches over friction, root loci, the friction curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ..modal.complex_modes import ComplexModes
+from ..modal.onsets import Onset, Onsets
+from ..typing import Array, BoolArray
+from .style import BLUE, COLOURS, GREY, INK, VERMILION, panel, styled, zero_line
+
+MU = "friction coefficient μ"
+FEW = 6  # up to so many branches each has its own colour and a name
+MARKED = 40  # unstable points marked along a branch, at most
+RANGE_OF_CURVE = (0.0, 1.0)
+
+
+@styled
+def root_locus(modes: ComplexModes, *, max_frequency_hz: float | None = None, ax: Axes | None = None) -> Figure:
+    """Eigenvalues of a sweep in the plane of growth rate and frequency, coloured by friction."""
+    figure, ax = panel(ax, 4.4)
+    top = _top(modes, max_frequency_hz)
+    scatter = None
+    for b in range(len(modes.branch)):
+        growth, frequency = modes.growth_rate[:, b], modes.frequency_hz[:, b] / 1e3
+        ax.plot(growth, frequency, color="#BBBBBB", linewidth=0.8, zorder=2)
+        scatter = ax.scatter(growth, frequency, c=modes.mu, cmap="viridis", s=7, zorder=3, linewidths=0)
+    ax.axvline(0.0, color=INK, linewidth=0.8, zorder=1.5)
+    ax.set(xlabel="growth rate Re λ [1/s]   (right of 0: grows)", ylabel="frequency [kHz]", ylim=(0, top / 1e3))
+    shown = modes.frequency_hz <= top
+    reach = 1.05 * float(np.abs(modes.growth_rate[shown]).max(initial=1.0))
+    # Growth spans decades between modes; the middle stays linear, so that the axis itself is seen crossed.
+    ax.set_xscale("symlog", linthresh=max(reach / 30, 1e-12))
+    ax.set_xlim(-reach, reach)
+    if scatter is not None and len(modes.mu) > 1:
+        figure.colorbar(scatter, ax=ax, label=MU, pad=0.01)
+    return figure
+
+
+@styled
+def frequency_branches(
+    modes: ComplexModes,
+    branches: Sequence[int] | None = None,
+    *,
+    onsets: Onsets | None = None,
+    max_frequency_hz: float | None = None,
+    ax: Axes | None = None,
+) -> Figure:
+    """Frequencies over friction, one line per branch; unstable stretches marked, onsets where given."""
+    columns = _columns(modes, branches)
+    figure, ax = panel(ax, 3.5 if len(columns) <= FEW else 5.2)
+    scale, unit = (1.0, "Hz") if len(columns) <= FEW else (1e3, "kHz")
+    few = len(columns) <= FEW
+    for place, b in enumerate(columns):
+        values, unstable = modes.frequency_hz[:, b] / scale, modes.unstable[:, b]
+        colour = COLOURS[place % len(COLOURS)] if few else BLUE
+        style = "--" if few and place % 2 else "-"
+        label = f"mode {modes.branch[b]}" if few else None
+        ax.plot(modes.mu, values, style, color=colour, label=label, linewidth=1.5 if few else 1.1)
+        _mark_unstable(ax, modes.mu, values, unstable)
+    if onsets is not None:
+        for onset in onsets.onsets:
+            if (branches is None or set(onset.branches) & set(branches)) and onset.mu <= modes.mu.max():
+                _mark_onset(ax, onset, onset.frequency_hz / scale)
+    if not few:
+        ax.set_ylim(0, 1.02 * _top(modes, max_frequency_hz) / scale)
+    _friction_axis(ax, modes)
+    ax.set_ylabel(f"frequency [{unit}]")
+    _legend(ax, bool(modes.unstable[:, columns].any()), onsets is not None)
+    return figure
+
+
+@styled
+def growth_branches(
+    modes: ComplexModes,
+    branches: Sequence[int] | None = None,
+    *,
+    imaginary_frequency: bool = False,
+    ax: Axes | None = None,
+) -> Figure:
+    """Growth rates Re λ over friction, one line per branch.
+
+    imaginary_frequency draws Im ω/2π = −Re λ/2π [Hz] of motion written as exp(jωt) instead: negative
+    where it grows.
+    """
+    columns = _columns(modes, branches)
+    figure, ax = panel(ax, 3.5)
+    few = len(columns) <= FEW
+    factor = -1 / (2 * np.pi) if imaginary_frequency else 1.0
+    for place, b in enumerate(columns):
+        colour = COLOURS[place % len(COLOURS)] if few else BLUE
+        style = "--" if few and place % 2 else "-"
+        values = factor * modes.growth_rate[:, b]
+        label = f"mode {modes.branch[b]}" if few else None
+        ax.plot(modes.mu, values, style, color=colour, label=label, linewidth=1.5 if few else 1.1)
+        _mark_unstable(ax, modes.mu, values, modes.unstable[:, b])
+    zero_line(ax)
+    _friction_axis(ax, modes)
+    name = "imaginary part of frequency Im ω/2π [Hz]" if imaginary_frequency else "growth rate Re λ [1/s]"
+    ax.set_ylabel(name)
+    _legend(ax, bool(modes.unstable[:, columns].any()), False)
+    return figure
+
+
+@styled
+def damping_branches(
+    modes: ComplexModes, branches: Sequence[int] | None = None, *, ax: Axes | None = None
+) -> Figure:
+    """Damping ratios −Re λ/|λ| in per cent over friction; negative: unstable."""
+    columns = _columns(modes, branches)
+    figure, ax = panel(ax, 3.5)
+    few = len(columns) <= FEW
+    for place, b in enumerate(columns):
+        colour = COLOURS[place % len(COLOURS)] if few else BLUE
+        values = 100 * modes.damping_ratio[:, b]
+        label = f"mode {modes.branch[b]}" if few else None
+        ax.plot(modes.mu, values, color=colour, label=label, linewidth=1.5 if few else 1.1)
+        _mark_unstable(ax, modes.mu, values, modes.unstable[:, b])
+    zero_line(ax)
+    _friction_axis(ax, modes)
+    ax.set_ylabel("damping ratio [%]")
+    _legend(ax, bool(modes.unstable[:, columns].any()), False)
+    return figure
+
+
+@styled
+def friction_curve(
+    mu: Array,
+    frequency_hz: Array,
+    *,
+    onsets: Onsets | None = None,
+    case_mu: float | None = None,
+    friction_range: tuple[float, float] = RANGE_OF_CURVE,
+    ax: Axes | None = None,
+) -> Figure:
+    """The friction μ(ω) at which the undamped system has the frequency ω; onsets are its maxima.
+
+    mu, frequency_hz (k,), frequencies ascending. A horizontal line at any μ cuts the curve at the
+    frequencies of the real modes there; above a maximum two of them are gone: they have become complex.
+    """
+    figure, ax = panel(ax, 4.0)
+    low, high = friction_range
+    span = high - low
+    for piece in _pieces(mu, low - 0.15 * span, high + 0.15 * span):
+        ax.plot(frequency_hz[piece] / 1e3, mu[piece], color=BLUE, linewidth=1.4)
+    if case_mu is not None:
+        ax.axhline(case_mu, color=GREY, linestyle=":", linewidth=1.2)
+        ax.annotate(f"μ = {case_mu:g}", (1.0, case_mu), xycoords=("axes fraction", "data"), ha="right",
+                    va="bottom", fontsize=8.5, color=GREY)
+    for onset in onsets.onsets if onsets is not None else ():
+        if low <= onset.mu <= high:
+            _mark_onset(ax, onset, onset.mu, x=onset.frequency_hz / 1e3)
+    ax.set(
+        xlabel="frequency [kHz]",
+        ylabel=MU,
+        ylim=(low - 0.02 * span, high + 0.06 * span),
+        xlim=(frequency_hz[0] / 1e3, frequency_hz[-1] / 1e3),
+    )
+    return figure
+
+
+def _columns(modes: ComplexModes, branches: Sequence[int] | None) -> list[int]:
+    """Columns of the branches with the given numbers, all by default."""
+    if branches is None:
+        return list(range(len(modes.branch)))
+    where = {int(number): column for column, number in enumerate(modes.branch)}
+    missing = [number for number in branches if number not in where]
+    if missing:
+        raise ValueError(f"branches {missing}: not among those followed, 1 to {len(modes.branch)}")
+    return [where[number] for number in branches]
+
+
+def _top(modes: ComplexModes, max_frequency_hz: float | None) -> float:
+    if max_frequency_hz is not None:
+        return max_frequency_hz
+    return 1.03 * float(modes.frequency_hz.max(initial=1.0))
+
+
+def _friction_axis(ax: Axes, modes: ComplexModes) -> None:
+    ax.set_xlabel(MU)
+    if len(modes.mu) > 1:
+        ax.set_xlim(float(modes.mu.min()), float(modes.mu.max()))
+
+
+def _mark_unstable(ax: Axes, mu: Array, values: Array, unstable: BoolArray) -> None:
+    """Thick line and open circles where a branch is unstable."""
+    if not unstable.any():
+        return
+    points = np.column_stack([mu, values])
+    both = unstable[:-1] & unstable[1:]
+    segments = np.stack([points[:-1][both], points[1:][both]], axis=1)
+    ax.add_collection(LineCollection(list(segments), colors=VERMILION, linewidths=2.2, zorder=3))
+    marked = np.flatnonzero(unstable)[:: max(1, len(mu) // MARKED)]
+    ax.plot(mu[marked], values[marked], "o", mfc="white", mec=VERMILION, ms=4, mew=1.0, zorder=3.5)
+
+
+def _mark_onset(ax: Axes, onset: Onset, y: float, x: float | None = None) -> None:
+    """A diamond at an onset, its μ and frequency beside it."""
+    at = (onset.mu if x is None else x, y)
+    ax.plot(*at, "D", color=INK, ms=4.5, zorder=4)
+    ax.annotate(
+        f"μ = {onset.mu:.4f}\n{onset.frequency_hz:.0f} Hz",
+        at,
+        xytext=(0, 7),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        fontsize=7.5,
+        zorder=5,
+        bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85},
+    )
+
+
+def _legend(ax: Axes, unstable: bool, onsets: bool) -> None:
+    handles, _ = ax.get_legend_handles_labels()
+    if unstable:
+        handles.append(
+            Line2D([], [], color=VERMILION, marker="o", mfc="white", ms=4, linewidth=2.2, label="unstable")
+        )
+    if onsets:
+        handles.append(Line2D([], [], color=INK, marker="D", ms=4.5, linestyle="none", label="onset, solved"))
+    if handles:
+        ax.legend(handles=handles, loc="best")
+
+
+def _pieces(values: Array, low: float, high: float) -> list[slice]:
+    """Stretches of a curve inside a band, one point beyond at each end so that lines leave the frame."""
+    inside = np.isfinite(values) & (values >= low) & (values <= high)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,0 +1,147 @@
+"""How stridor's figures look: one style, colours that colour-blind readers can tell apart, light background."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..typing import Array
+
+# Okabe and Ito (2008), in the order in which lines take them.
+BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9"
+INK, GREY, FAINT = "#222222", "#767676", "#D9D9D9"
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+STATUS_COLOURS = {"stick": "#C7DDF0", "slip": "#FFFFFF", "separation": "#F6CFA8"}
+
+WIDTH = 7.6  # inches: the text width of a report
+DRAWN_COLUMNS = 1400  # pieces that a long history is drawn in
+DRAWN_POINTS = 20 * DRAWN_COLUMNS  # histories shorter than this are drawn as they are
+
+STYLE: dict[str, object] = {
+    "figure.dpi": 100,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9.5,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.5,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": GREY,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.prop_cycle": mpl.cycler(color=COLOURS),  # pyright: ignore[reportUnknownMemberType]
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.limits": (-4, 5),
+    "grid.color": FAINT,
+    "grid.linewidth": 0.6,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "text.color": INK,
+    "lines.linewidth": 1.4,
+    "legend.fontsize": 8.5,
+    "legend.frameon": True,
+    "legend.framealpha": 0.92,
+    "legend.edgecolor": "none",
+    "svg.fonttype": "path",  # letters as outlines: looks the same without the font
+    "svg.hashsalt": "stridor",  # equal results give equal files
+    "agg.path.chunksize": 20000,
+}
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """The function, drawing in stridor's style without changing anybody else's."""
+
+    @wraps(draw)
+    def drawing(*args: P.args, **kwargs: P.kwargs) -> R:
+        with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType, reportUnknownMemberType]
+            return draw(*args, **kwargs)
+
+    return drawing
+
+
+def new_figure(height: float = 3.6, width: float = WIDTH) -> Figure:
+    """An empty figure [inches] that belongs to no window and needs no display."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def panel(ax: Axes | None, height: float = 3.6, width: float = WIDTH) -> tuple[Figure, Axes]:
+    """The given axes and their figure, or new ones."""
+    if ax is None:
+        figure = new_figure(height, width)
+        return figure, figure.subplots()
+    return root_figure(ax), ax
+
+
+def stacked(
+    axes: Sequence[Axes] | None, count: int, height: float, ratios: Sequence[float] | None = None
+) -> tuple[Figure, list[Axes]]:
+    """The given panels and their figure, or ``count`` new ones above each other with one x axis."""
+    if axes is not None:
+        if len(axes) != count:
+            raise ValueError(f"axes: {len(axes)} given, this figure has {count} panels")
+        return root_figure(axes[0]), list(axes)
+    figure = new_figure(height)
+    made = figure.subplots(count, 1, sharex=True, squeeze=False, height_ratios=ratios)
+    return figure, list(made[:, 0])
+
+
+def root_figure(ax: Axes) -> Figure:
+    """The figure that axes belong to, whatever lies between."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None, "axes that were removed from their figure"
+    return figure
+
+
+def zero_line(ax: Axes) -> None:
+    """A thin line at y = 0."""
+    ax.axhline(0.0, color=INK, linewidth=0.8, zorder=1.5)
+
+
+def draw_history(
+    ax: Axes, time: Array, values: Array, *, colour: str = BLUE, label: str | None = None, width: float = 0.9
+) -> None:
+    """A signal over time; a long one as the band between the extrema of short pieces, none lost."""
+    if len(time) <= DRAWN_POINTS:
+        ax.plot(time, values, color=colour, linewidth=width, label=label)
+        return
+    middle, low, high = extrema(time, values)
+    ax.fill_between(middle, low, high, color=colour, linewidth=0.5, label=label)
+
+
+def extrema(time: Array, values: Array, columns: int = DRAWN_COLUMNS) -> tuple[Array, Array, Array]:
+    """Time, smallest and largest value (columns,) of equal pieces of a history."""
+    size = max(1, len(time) // columns)
+    count = len(time) // size
+    pieces = values[: count * size].reshape(count, size)
+    return time[: count * size : size] + 0.0, pieces.min(axis=1), pieces.max(axis=1)
+
+
+def thinned(count: int, columns: int = DRAWN_COLUMNS) -> slice:
+    """Every so many records, for curves that are smooth between them."""
+    return slice(None, None, max(1, count // columns))
+
+
+def largest(values: Array) -> float:
+    """Largest absolute value, 1 where there is none that is finite and not zero."""
+    finite = np.abs(values[np.isfinite(values)])
+    size = float(finite.max(initial=0.0))
+    return size if size > 0 else 1.0
