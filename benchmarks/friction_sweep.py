@@ -10,9 +10,9 @@ import time
 
 import numpy as np
 import scipy.linalg as sl
-from _common import bench, best, machine, options
 
 import stridor as st
+from _common import bench, best, machine, options
 from stridor.modal.complex_modes import complex_modes
 
 

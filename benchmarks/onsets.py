@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import time
 
+import stridor as st
 from _common import bench, best, machine, options
 from friction_sweep import dense
-
-import stridor as st
 from stridor.modal.onsets import onsets
 
 

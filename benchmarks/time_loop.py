@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
-from _common import bench, machine, options
 
 import stridor as st
+from _common import bench, machine, options
 from stridor.study.analyses import phases_of, settings_of
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.simulate import simulate

@@ -1,4 +1,5 @@
-"""Small systems made by hand for the temporal tests, initial conditions, and the paper's scheme written out literally."""
+"""Small systems made by hand for the temporal tests, initial conditions, and the paper's scheme written out
+literally."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ from stridor.temporal.simulate import Settings, simulate
 
 
 def touch(normal, tangent, *, gap=0.0, slip=0.0, law=None, name="A", motions=0) -> Contact:
-    """A contact between freedoms: its rows, gap [m], and the slip speed [m/s] that the moving supports give."""
+    """A contact between freedoms: its rows, gap [m], and the slip speed [m/s] that the moving supports
+    give."""
     normal, tangent = np.asarray(normal, dtype=float), np.asarray(tangent, dtype=float)
     size = len(normal)
     lift = np.zeros(motions)
@@ -28,7 +30,8 @@ def touch(normal, tangent, *, gap=0.0, slip=0.0, law=None, name="A", motions=0) 
     nothing = Rows(np.zeros((2, size)), np.zeros((2, motions)))
     return Contact(
         name=name, slave=nothing, slave_position=np.zeros(2), master=nothing,
-        master_positions=np.array([[0.0, 0.0], [1.0, 0.0]]), chords=np.ones(1), segment=0, xi=0.0, side=1, gap=gap,
+        master_positions=np.array([[0.0, 0.0], [1.0, 0.0]]), chords=np.ones(1), segment=0, xi=0.0, side=1,
+        gap=gap,
         normal=np.array([0.0, 1.0]), tangent=np.array([1.0, 0.0]), normal_row=normal, tangent_row=tangent,
         normal_lift=np.zeros(motions), tangent_lift=lift, stiffness=np.inf, law=law or Coulomb(0.0),
     )  # fmt: skip
@@ -62,7 +65,10 @@ def block_on_belt(
         [0.0, 1.0], [1.0, 0.0], slip=0.0 if speed is None else -speed, law=law or Coulomb(0.3),
         motions=len(motion.names),
     )  # fmt: skip
-    points = {name: replace(rows, lift=np.zeros((2, len(motion.names)))) for name, rows in points_of(2, block=0).items()}
+    points = {
+        name: replace(rows, lift=np.zeros((2, len(motion.names))))
+        for name, rows in points_of(2, block=0).items()
+    }
     return System(
         np.diag([mass, bearing]), np.diag([damping, 0.0]), np.diag([stiffness, 0.0]), (contact,),
         {"press": np.array([0.0, -press])} if preload else {}, motion, points,
@@ -83,7 +89,8 @@ def one_phase(duration: float, *, loads=None, velocities=None, ramp=0.0, name="r
 
 
 def run(system: System, duration: float, *, loads=None, velocities=None, ramp=0.0, start=None, **settings):
-    """One phase, every step recorded unless told otherwise. start: u, v and a (n,) at t = 0 instead of rest."""
+    """One phase, every step recorded unless told otherwise. start: u, v and a (n,) at t = 0 instead of
+    rest."""
     settings = {"record_every": 1, **settings}
     if start is not None:
         start = tuple(np.broadcast_to(np.asarray(x, dtype=float), system.size) for x in start)
@@ -130,10 +137,12 @@ def paper_scheme(system: System, step: float, beta2: float, forces, steps: int, 
 
 
 def exponents(signals: np.ndarray, sampling: float, order: int) -> np.ndarray:
-    """Exponents (order,) [1/s] of signals (c, r) that share them: a matrix pencil on stacked Hankel matrices."""
+    """Exponents (order,) [1/s] of signals (c, r) that share them: a matrix pencil on stacked Hankel
+    matrices."""
     window = signals.shape[1] // 3
     rows = [
-        np.lib.stride_tricks.sliding_window_view(x / np.abs(x).max(), window)[::2] for x in np.atleast_2d(signals)
+        np.lib.stride_tricks.sliding_window_view(x / np.abs(x).max(), window)[::2]
+        for x in np.atleast_2d(signals)
     ]
     hankel = np.vstack(rows)
     left, values, right = np.linalg.svd(hankel[:, :-1], full_matrices=False)

@@ -23,7 +23,7 @@ from .temporal.shapes import operating_shape
 from .temporal.signals import Components, Growth, components, growth, low_passed, spectrum
 from .temporal.simulate import Settings, simulate
 from .temporal.trajectory import Trajectory
-from .typing import Array, ComplexArray
+from .typing import Array, ComplexArray, IntArray
 
 PERTURBATION = 1e-5  # of the slip speed, at the start
 LINEAR = 0.02  # of the slip speed: beyond it the perturbation is no longer small
@@ -140,7 +140,12 @@ class Agreement:
 
 
 def perturb(
-    system: System, mu: float, *, settings: Settings, max_frequency_hz: float = 40e3, duration: float | None = None
+    system: System,
+    mu: float,
+    *,
+    settings: Settings,
+    max_frequency_hz: float = 40e3,
+    duration: float | None = None,
 ) -> Perturbation:
     """March a small perturbation of steady sliding and take its fastest component.
 
@@ -153,9 +158,15 @@ def perturb(
     if not len(steady) or np.abs(steady).min() == 0:
         raise AnalysisError("a perturbation of steady sliding needs contacts that slide")
     speed = float(np.abs(steady).min())
-    rigid = replace(system, contacts=tuple(replace(c, stiffness=np.inf) for c in system.contacts))
+    # The reference configuration, as the modes have it, whatever the full run does (docs/case-file.md).
+    contacts = tuple(replace(c, stiffness=np.inf, sliding="small") for c in system.contacts)
+    rigid = replace(system, contacts=contacts)
     start = replace(
-        settings, initial="steady-sliding", perturbation=0.0, watch=(), record_every=_every(settings, max_frequency_hz)
+        settings,
+        initial="steady-sliding",
+        perturbation=0.0,
+        watch=(),
+        record_every=_every(settings, max_frequency_hz),
     )
     run = simulate(
         rigid,
@@ -173,9 +184,7 @@ def perturb(
     return Perturbation(mu, found.fastest, signal, run.sampling, found)
 
 
-def _band_limited(
-    system: System, mu: float, slip_speed: float, max_frequency_hz: float
-) -> tuple[Array, Array, Array]:
+def _band_limited(system: System, mu: float, slip_speed: float, max_frequency_hz: float) -> tuple[Array, Array, Array]:
     """Displacement, velocity, acceleration (n,) of all modes up to a frequency, equal in slip speed."""
     modes = complex_modes(system, mu, max_frequency_hz=max_frequency_hz, vectors=True)
     assert modes.right is not None
@@ -230,6 +239,11 @@ def critical_friction(
     return (low + high) / 2, (low, high)
 
 
+def _silent(text: str) -> None:
+    """Say nothing."""
+    del text
+
+
 def modal_assurance(first: ComplexArray, second: ComplexArray) -> float:
     """MAC |aᴴb|²/(aᴴa bᴴb) of two complex shapes, 1 for equal up to a factor."""
     a, b = np.ravel(first), np.ravel(second)
@@ -239,9 +253,7 @@ def modal_assurance(first: ComplexArray, second: ComplexArray) -> float:
 
 def mode_shape(system: System, vector: ComplexArray) -> dict[str, ComplexArray]:
     """Displacements (k, 2) of the nodes of each line in an eigenvector (n,)."""
-    return {
-        line.name: np.asarray(line.rows.free @ vector).reshape(-1, 2) for line in system.lines
-    }
+    return {line.name: np.asarray(line.rows.free @ vector).reshape(-1, 2) for line in system.lines}
 
 
 def compare(
@@ -262,7 +274,7 @@ def compare(
 
     runs may hand in full trajectories already computed at some of the μ. Raises what the analyses raise.
     """
-    say = progress or (lambda _text: None)
+    say = progress or _silent
     comparisons: list[Comparison] = []
     for mu in mus:
         say(f"both approaches at μ = {mu:g}")
@@ -275,7 +287,13 @@ def compare(
     modal = found.first.mu if found.first else None
     temporal: float | None = None
     last: tuple[float, float] | None = None
+    finite = [c.name for c in system.contacts if c.sliding == "finite"]
     notes: list[str] = []
+    if finite:
+        notes.append(
+            f"contact {', '.join(finite)} slides finitely in the full run; modes and perturbations are those of "
+            "its reference configuration"
+        )
     if critical:
         ends = bracket or _bracket(found)
         if ends is None:
@@ -284,13 +302,22 @@ def compare(
             say("critical friction, temporal")
             try:
                 temporal, last = critical_friction(
-                    system, ends, settings=settings, tolerance=tolerance,
-                    max_frequency_hz=max_frequency_hz, progress=progress,
+                    system,
+                    ends,
+                    settings=settings,
+                    tolerance=tolerance,
+                    max_frequency_hz=max_frequency_hz,
+                    progress=progress,
                 )
             except AnalysisError as error:
                 notes.append(str(error))
     return Agreement(
-        tuple(comparisons), modal, temporal, last, _overall(comparisons, modal, temporal, tolerance), tuple(notes)
+        tuple(comparisons),
+        modal,
+        temporal,
+        last,
+        _overall(comparisons, modal, temporal, tolerance),
+        tuple(notes),
     )
 
 
@@ -326,7 +353,8 @@ def _compare_at(
         assert modes.right is not None
         expected = mode_shape(system, modes.right[0, mode])
         mac = modal_assurance(
-            np.concatenate([shape[n].ravel() for n in shape]), np.concatenate([expected[n].ravel() for n in shape])
+            np.concatenate([shape[n].ravel() for n in shape]),
+            np.concatenate([expected[n].ravel() for n in shape]),
         )
     agrees, verdict = _judge(mu, len(unstable) > 0, here, perturbation, frequency_error, growth_error)
     if responding is not None:
@@ -368,7 +396,7 @@ def _judge(
     )
 
 
-def _responding(modes: ComplexModes, unstable: Array, dominant: float) -> int | None:
+def _responding(modes: ComplexModes, unstable: IntArray, dominant: float) -> int | None:
     """Unstable mode whose frequency is nearest to the run's dominant one, within 5 %."""
     if not len(unstable):
         return None
@@ -400,9 +428,7 @@ def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float |
     return frequency, growth(filtered, run.sampling, frequency)
 
 
-def _overall(
-    comparisons: Sequence[Comparison], modal: float | None, temporal: float | None, tolerance: float
-) -> str:
+def _overall(comparisons: Sequence[Comparison], modal: float | None, temporal: float | None, tolerance: float) -> str:
     parts = [c.verdict for c in comparisons]
     agree = all(c.agrees for c in comparisons)
     if modal is not None and temporal is not None:

@@ -16,7 +16,7 @@ import scipy.sparse.linalg as spl
 
 from .errors import AnalysisError
 from .system import System
-from .typing import Array
+from .typing import Array, BoolArray
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class SteadySliding:
     normal_force: Array
     slip_speed: Array
     sense: Array
-    active: Array
+    active: BoolArray
     friction_coefficient: Array
     residual: float
 
@@ -71,9 +71,7 @@ def steady_sliding(
                 "so there is no steady sliding; let the supports move along the master line"
             )
     coefficients = (
-        system.friction_coefficients(np.abs(speeds))
-        if mu is None
-        else np.full(len(system.contacts), float(mu))
+        system.friction_coefficients(np.abs(speeds)) if mu is None else np.full(len(system.contacts), float(mu))
     )
     for contact, speed, coefficient in zip(system.contacts, speeds, coefficients, strict=True):
         if speed == 0.0 and coefficient > 0.0:
@@ -117,9 +115,7 @@ def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: A
     return SteadySliding(displacement, normal, speeds, sense, active, mu, residual)
 
 
-def _solve(
-    system: System, force: Array, mu: Array, sense: Array, active: Array
-) -> tuple[Array, Array, float]:
+def _solve(system: System, force: Array, mu: Array, sense: Array, active: BoolArray) -> tuple[Array, Array, float]:
     touching = [k for k in range(len(system.contacts)) if active[k]]
     contacts = [system.contacts[k] for k in touching]
     normals = np.array([c.normal_row for c in contacts]).reshape(len(contacts), system.size)

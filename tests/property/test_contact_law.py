@@ -1,4 +1,5 @@
-"""The local contact problem, for any compliances, free motion and friction: Signorini and Coulomb hold, always."""
+"""The local contact problem, for any compliances, free motion and friction: Signorini and Coulomb hold,
+always."""
 
 from __future__ import annotations
 
@@ -20,7 +21,14 @@ compliance = st.tuples(size, size, st.floats(-0.999, 0.999)).map(
 coefficient = st.floats(-3, 3).map(lambda e: 10.0**e)
 
 
-@given(gap=size, slip=st.tuples(size, sense), w=compliance, mu=coefficient, raised=st.floats(1, 2), stuck=st.booleans())
+@given(
+    gap=size,
+    slip=st.tuples(size, sense),
+    w=compliance,
+    mu=coefficient,
+    raised=st.floats(1, 2),
+    stuck=st.booleans(),
+)
 def test_any_closing_contact_has_an_admissible_answer(gap, slip, w, mu, raised, stuck):
     """Also where μ is so large that the pair jams."""
     w_nn, w_nt, w_tt = w
@@ -61,7 +69,9 @@ def test_weakening_friction_is_that_of_the_speed_found(gap, slip, w, decay):
     w_nn, _, w_tt = w
     # A heavy slider: friction moves it little over a step.
     w_tt = min(w_tt, 0.05 * slip[0] * w_nn / gap, 0.05 * decay * w_nn / gap)
-    normal, tangential, status = solve_contact(-gap, slip[0] * slip[1], w_nn, 0.0, w_tt, 0.2, 0.5, decay, False, 1.0)
+    normal, tangential, status = solve_contact(
+        -gap, slip[0] * slip[1], w_nn, 0.0, w_tt, 0.2, 0.5, decay, False, 1.0
+    )
     assert status == SLIP
     moved = slip[0] * slip[1] + w_tt * tangential
     mu = 0.2 + 0.3 * math.exp(-abs(moved) / decay)
@@ -87,5 +97,7 @@ def test_a_point_on_an_oblique_guide(gap, belt, angle, mu):
     normal, tangential, status = solve_contact(-gap, belt, n * n, n * t, t * t, mu, mu, 0.0, False, 1.0)
     assert status in (STICK, SLIP)
     assert normal > 0.0
-    assert abs(-gap + n * n * normal + n * t * tangential) < 1e-6 * (gap + n * n * normal + abs(n * t * tangential))
+    assert abs(-gap + n * n * normal + n * t * tangential) < 1e-6 * (
+        gap + n * n * normal + abs(n * t * tangential)
+    )
     assert abs(tangential) <= mu * normal * (1 + 1e-9)

@@ -57,7 +57,8 @@ def test_loading_settles(standard):
 
 
 def test_it_grows_into_stick_slip_before_it_separates(standard):
-    """Phase II: exponential growth, then stick and slip with force peaks of 33–45 N (the paper: about 37 N)."""
+    """Phase II: exponential growth, then stick and slip with force peaks of 33–45 N (the paper: about 37
+    N)."""
     start = amplitude(standard, 0.0005, 0.0015)
     assert start < 10.0
     separation = standard.phases[1].contacts["A"].first_separation

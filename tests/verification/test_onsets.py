@@ -293,6 +293,23 @@ def test_a_growing_real_root_that_returns_to_zero_is_a_stabilising_divergence():
     assert np.linalg.cond(tangent) > 1e14
 
 
+def test_damped_divergence_lies_where_the_static_curve_says():
+    """At λ = 0 damping has no say: μ = −s (1/K_c + nᵀK⁻¹n)/(tᵀK⁻¹n). Real roots are many and close here."""
+    slave = Slave(
+        place=0.48315768, lean_deg=52.019316, length=0.069784677, thickness=0.56564614e-3, elements=6,
+        damping=(1.3155991, 3.5922711e-7), stiffness=1e5, end="clamped", young_modulus=3.8224144e9,
+    )  # fmt: skip
+    system = replace(bench(slave, angle_deg=-175.10909, elements=5), loads={})
+    contact = system.contacts[0]
+    answer = np.linalg.solve(system.stiffness.toarray(), contact.normal_row)
+    static = -(contact.compliance + contact.normal_row @ answer) / (contact.tangent_row @ answer)
+    static *= -np.sign(contact.tangent_lift.sum())
+    for damped in (False, True):
+        found = onsets(system, (0.0, 3.0), max_frequency_hz=40e3, damped=damped).onsets
+        divergence = [o.mu for o in found if o.kind == "divergence"]
+        assert divergence == [pytest.approx(static, rel=1e-9)]
+
+
 def test_two_contacts():
     """No curve here; the determinant's double roots against bisection on dense growth."""
     system = undamped(

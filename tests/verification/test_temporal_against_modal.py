@@ -1,6 +1,7 @@
 """Flagship: a small perturbation about steady sliding grows in time as the complex modes say.
 
-Nothing is shared between the two but the assembled system: eigenvalues of the coupled pencil on one side, the marched
+Nothing is shared between the two but the assembled system: eigenvalues of the coupled pencil on one side,
+the marched
 multipliers on the other.
 """
 
@@ -26,8 +27,11 @@ def rigid(system: System) -> System:
     return replace(system, contacts=tuple(replace(c, stiffness=np.inf) for c in system.contacts))
 
 
-def marched_exponents(system, mu, duration, perturbation, low, high, *, order=20, step=None, every=100, watch=()):
-    """Exponents (k,) of what lies between two frequencies [Hz] (0: of all), from the watched velocities along x."""
+def marched_exponents(
+    system, mu, duration, perturbation, low, high, *, order=20, step=None, every=100, watch=()
+):
+    """Exponents (k,) of what lies between two frequencies [Hz] (0: of all), from the watched velocities
+    along x."""
     result = simulate(
         system,
         one_phase(duration),
@@ -54,13 +58,14 @@ def nearest(values, target):
 WATCH = ("beam1.tip", "beam2@0.1")
 
 
-@pytest.mark.parametrize(("mu", "duration", "perturbation"), [(0.1, 6e-3, 1e-9), (0.12, 4e-3, 1e-10), (0.07, 5e-3, 1e-9)])
+@pytest.mark.parametrize(
+    ("mu", "duration", "perturbation"), [(0.1, 6e-3, 1e-9), (0.12, 4e-3, 1e-10), (0.07, 5e-3, 1e-9)]
+)
 def test_growth_rate_of_the_two_beam_bench(mu, duration, perturbation):
-    """8.6 kHz: growth rate within 0.5 %, frequency within 0.01 %, at the rigid contact and at the case's own K_c."""
+    """8.6 kHz: growth rate within 0.5 %, frequency within 0.01 %, at the rigid contact and at the case's own
+    K_c."""
     system = build_system(paper_case())
-    found = marched_exponents(
-        system, mu, duration, perturbation, 6e3, 14e3, step=2e-8, watch=WATCH, order=24
-    )
+    found = marched_exponents(system, mu, duration, perturbation, 6e3, 14e3, step=2e-8, watch=WATCH, order=24)
     for model, tolerance in ((rigid(system), 0.005), (system, 0.005)):
         modes = complex_modes(model, mu, max_frequency_hz=40e3)
         if mu > 0.08:
@@ -79,7 +84,8 @@ def test_growth_rate_of_the_two_beam_bench(mu, duration, perturbation):
 
 
 def test_fastest_mode_of_the_two_beam_bench():
-    """At μ = 0.1 a mode near 78 kHz grows four times as fast as the one of the paper: seen in time as well."""
+    """At μ = 0.1 a mode near 78 kHz grows four times as fast as the one of the paper: seen in time as
+    well."""
     system = build_system(paper_case())
     modes = complex_modes(rigid(system), 0.1, count=40)
     fast = modes.eigenvalues[np.unravel_index(np.argmax(modes.growth_rate), modes.growth_rate.shape)]
@@ -91,9 +97,17 @@ def test_fastest_mode_of_the_two_beam_bench():
 
 
 def test_growth_rate_of_another_bench():
-    """Other beams, a clamped slave below a tilted master, many unstable modes: the fastest shows first in time."""
+    """Other beams, a clamped slave below a tilted master, many unstable modes: the fastest shows first in
+    time."""
     slave = Slave(
-        place=0.75, lean_deg=12.0, length=0.07, thickness=2.5e-3, elements=8, end="clamped", side=-1, stiffness="rigid"
+        place=0.75,
+        lean_deg=12.0,
+        length=0.07,
+        thickness=2.5e-3,
+        elements=8,
+        end="clamped",
+        side=-1,
+        stiffness="rigid",
     )
     system = bench(
         slave, angle_deg=20.0, velocity=0.3, length=0.2, thickness=4e-3, elements=10, damping=(80.0, 2e-8)

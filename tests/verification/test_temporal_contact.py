@@ -30,7 +30,8 @@ def struck(record, name="normal_force"):
 
 
 def bar_on_wall(length, area, modulus, density, gap, speed, *, lumped, elements=200):
-    """A bar that flies at ``speed`` towards a wall ``gap`` away; its last node meets it. A side freedom carries the slip."""
+    """A bar that flies at ``speed`` towards a wall ``gap`` away; its last node meets it. A side freedom
+    carries the slip."""
     mass, stiffness = rod(length, area, modulus, density, elements, lumped=lumped)
     n = elements + 1
     whole = [np.pad(m, (0, 1)) for m in (mass, stiffness)]
@@ -77,14 +78,17 @@ def test_bar_against_a_wall(length, area, modulus, density, gap, speed, lumped):
     drift = np.polyfit(result.time[after], result.displacement[after].mean(axis=1)[:, 0], 1)[0]
     assert drift == pytest.approx(-speed, rel=0.02)
     # What the wall gave: the momentum turned round.
-    assert np.sum(result.normal_force[:, 0]) * result.sampling == pytest.approx(2 * speed * weights.sum(), rel=0.01)
+    assert np.sum(result.normal_force[:, 0]) * result.sampling == pytest.approx(
+        2 * speed * weights.sum(), rel=0.01
+    )
     # No penetration, ever: forces at t_n make the gap at t_{n+1} admissible.
     assert result.gap.min() > -1e-12 * gap
     assert np.all(result.normal_force[result.gap[:, 0] > 1e-9 * gap] == 0.0)
 
 
 def test_two_equal_rods():
-    """Carpenter, Taylor and Katona 1991 (SI): 14961.4 lb for 98.658 µs, both interface nodes at half the speed."""
+    """Carpenter, Taylor and Katona 1991 (SI): 14961.4 lb for 98.658 µs, both interface nodes at half the
+    speed."""
     inch, pound = 0.0254, 4.4482216152605
     length, area = 10 * inch, inch**2
     modulus, density = 30e6 * pound / inch**2, 7.3e-4 * pound / inch**4
@@ -120,11 +124,18 @@ def test_two_equal_rods():
 @pytest.mark.parametrize("path", ["modal", "nodal"])
 @pytest.mark.parametrize("beta2", [0.5, 0.6])
 def test_coulomb_oscillator(path, beta2):
-    """SDND100: M 1, K 1e4, μN 1 N, from 0.85e-3: extrema −0.65, 0.45, −0.25, 0.05 (×1e-3) at nπ/100, then stuck."""
+    """SDND100: M 1, K 1e4, μN 1 N, from 0.85e-3: extrema −0.65, 0.45, −0.25, 0.05 (×1e-3) at nπ/100, then
+    stuck."""
     system = block_on_belt(stiffness=1e4, law=Coulomb(0.1), press=10.0)
     step = 2e-6 if beta2 > 0.5 else 2e-5
     result = run(
-        system, 0.2, step=step, beta2=beta2, path=path, start=([0.85e-3, 0.0], 0.0, [-7.5, 0.0]), watch=("block",)
+        system,
+        0.2,
+        step=step,
+        beta2=beta2,
+        path=path,
+        start=([0.85e-3, 0.0], 0.0, [-7.5, 0.0]),
+        watch=("block",),
     )
     u = result.displacement[:, 0, 0]
     for number, extremum in enumerate((-0.65e-3, 0.45e-3, -0.25e-3, 0.05e-3), start=1):
@@ -142,9 +153,11 @@ def test_coulomb_oscillator(path, beta2):
 
 
 def test_block_is_carried_slips_and_settles_on_a_belt():
-    """One coefficient: the block rides along until k x = μN, then x = μN/k + v/ω sin ω(t − t₁), caught again at x = μN/k.
+    """One coefficient: the block rides along until k x = μN, then x = μN/k + v/ω sin ω(t − t₁), caught again
+    at x = μN/k.
 
-    With m = k = 1, μN = 0.3, v = 0.2: it lets go at t = 1.5 with the belt's speed and swings ±0.2 about 0.3, for ever
+    With m = k = 1, μN = 0.3, v = 0.2: it lets go at t = 1.5 with the belt's speed and swings ±0.2 about 0.3,
+    for ever
     touching the belt's speed once a period.
     """
     system = block_on_belt(law=Coulomb(0.3), speed=0.2)
@@ -223,7 +236,8 @@ def test_growth_under_weakening_friction():
 
 @pytest.mark.parametrize("path", ["modal", "nodal"])
 def test_redundant_contacts_are_solved_together(path):
-    """A body pressed on three feet, two of them at the same place: forces are not unique, motion is. Sweeps are reported."""
+    """A body pressed on three feet, two of them at the same place: forces are not unique, motion is. Sweeps
+    are reported."""
     feet = tuple(touch([0.0, 1.0], [1.0, 0.0], law=Coulomb(0.3), name=f"F{i}") for i in range(3))
     one = block_on_belt(stiffness=4.0, law=Coulomb(0.3))
     many = replace(one, contacts=feet)
@@ -238,9 +252,11 @@ def test_redundant_contacts_are_solved_together(path):
 
 
 def test_coupled_contacts_satisfy_all_laws():
-    """Three slaves on one leaning master: at each record gaps, cones and slip directions are admissible together."""
+    """Three slaves on one leaning master: at each record gaps, cones and slip directions are admissible
+    together."""
     system = bench(
-        Slave(place=0.5), Slave(place=0.52, lean_deg=-20.0), Slave(place=0.95, side=-1), angle_deg=30.0, velocity=0.5,
+        Slave(place=0.5), Slave(place=0.52, lean_deg=-20.0), Slave(place=0.95, side=-1), angle_deg=30.0,
+        velocity=0.5,
     )  # fmt: skip
     result = run(system, 1e-3, record_every=1)
     assert 2 < result.most_sweeps < 500
@@ -303,8 +319,11 @@ def test_penetration_at_the_start_is_undone_in_one_step():
 
 @pytest.mark.parametrize("path", ["modal", "nodal"])
 def test_contact_between_points_that_cannot_move_tangentially(path):
-    """A mass on a vertical guide has no tangential freedom: the normal force alone, and friction follows the belt."""
-    one = System(np.eye(1), np.zeros((1, 1)), np.eye(1), (touch([1.0], [0.0], law=Coulomb(0.5)),), {"w": -np.ones(1)})
+    """A mass on a vertical guide has no tangential freedom: the normal force alone, and friction follows the
+    belt."""
+    one = System(
+        np.eye(1), np.zeros((1, 1)), np.eye(1), (touch([1.0], [0.0], law=Coulomb(0.5)),), {"w": -np.ones(1)}
+    )
     held = run(one, 5.0, step=0.1, path=path)
     assert np.allclose(held.normal_force, 1.0)
     assert np.allclose(held.tangential_force, 0.0)

@@ -26,14 +26,18 @@ PATHS = ("modal", "nodal")
 @pytest.mark.parametrize("mass", ["consistent", "lumped"])
 @pytest.mark.parametrize("damping", [(50.0, 1e-8), (3e3, 1e-7)])
 def test_balance_closes_to_rounding(path, sliding, mass, damping):
-    """β2 = 1/2: impacts, stick, slip, separation, supports by ramp and suddenly, loads that change, two contacts."""
+    """β2 = 1/2: impacts, stick, slip, separation, supports by ramp and suddenly, loads that change, two
+    contacts."""
     system = bench(
-        Slave(lean_deg=15.0, damping=damping), Slave(place=0.3, side=-1), mass=mass, damping=damping, velocity=1.0,
+        Slave(lean_deg=15.0, damping=damping), Slave(place=0.3, side=-1), mass=mass, damping=damping,
+        velocity=1.0,
         angle_deg=0.0,
     )  # fmt: skip
     # Finite sliding finds its gap by itself.
     gap = 1e-6 if sliding == "small" else 0.0
-    system = replace(system, contacts=tuple(replace(c, sliding=sliding, gap=c.gap + gap) for c in system.contacts))
+    system = replace(
+        system, contacts=tuple(replace(c, sliding=sliding, gap=c.gap + gap) for c in system.contacts)
+    )
     phases = [
         PhaseSpec("press", 3e-4, {"press1": 0.5}, {"clamp": 0.0}, 1e-4),
         PhaseSpec("slide", 4e-4, {"press0": 2.0}, {"clamp": 1.0}, 2e-4),
@@ -43,7 +47,9 @@ def test_balance_closes_to_rounding(path, sliding, mass, damping):
     balance = energy_balance(result)
     assert balance.error < 1e-11
     for name in ("external", "support", "damping", "friction", "contact"):
-        assert np.abs(result.works[name]).max() > 1e-9 * max(np.abs(w).max() for w in result.works.values()), name
+        assert np.abs(result.works[name]).max() > 1e-9 * max(
+            np.abs(w).max() for w in result.works.values()
+        ), name
     assert result.works["damping"][-1] > 0
     assert np.all(np.diff(result.works["damping"]) >= 0)
     statuses = set(np.unique(result.status))
@@ -124,7 +130,8 @@ def test_friction_work_of_a_sliding_block(path):
 
 @pytest.mark.parametrize("path", PATHS)
 def test_steady_sliding_power(path):
-    """Support power = friction power μ N V, plus what the mass-proportional damping of the moving body takes, α m V²."""
+    """Support power = friction power μ N V, plus what the mass-proportional damping of the moving body
+    takes, α m V²."""
     speed, mu = 0.5, 0.2
     system = bench(Slave(), velocity=speed, damping=(50.0, 0.0)).with_friction(mu, np.array([speed]))
     result = run(system, 4e-4, initial="steady-sliding", record_every=10, path=path)
@@ -141,7 +148,8 @@ def test_steady_sliding_power(path):
 
 @pytest.mark.parametrize("path", PATHS)
 def test_support_work_gives_a_free_body_its_kinetic_energy(path):
-    """The clamp of an unloaded, undamped master brings it to speed by a ramp: ½ m V² when the vibration is slow to answer."""
+    """The clamp of an unloaded, undamped master brings it to speed by a ramp: ½ m V² when the vibration is
+    slow to answer."""
     speed = 2.0
     system = bench(Slave(damping=(0.0, 0.0)), velocity=speed, damping=(0.0, 0.0))
     system = replace(system, contacts=())
@@ -155,7 +163,9 @@ def test_support_work_gives_a_free_body_its_kinetic_energy(path):
 def test_coulomb_decay_loses_what_friction_takes():
     """SDND100: potential energy lost between extrema is 4 μN × amplitude change."""
     system = block_on_belt(stiffness=1e4, law=Coulomb(0.1), press=10.0)
-    result = run(system, 0.2, step=2e-6, record_every=10, start=([0.85e-3, 0.0], 0.0, [-7.5, 0.0]), watch=("block",))
+    result = run(
+        system, 0.2, step=2e-6, record_every=10, start=([0.85e-3, 0.0], 0.0, [-7.5, 0.0]), watch=("block",)
+    )
     lost = 0.5 * 1e4 * (0.85e-3**2 - 0.05e-3**2)
     assert result.works["friction"][-1] == pytest.approx(lost, rel=1e-3)
     way = (0.85 + 0.65 + 0.65 + 0.45 + 0.45 + 0.25 + 0.25 + 0.05) * 1e-3

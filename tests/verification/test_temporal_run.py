@@ -34,7 +34,8 @@ def histories(result: Trajectory) -> dict[str, np.ndarray]:
     return {name: a for name, a in arrays.items() if isinstance(a, np.ndarray)} | dict(result.works)
 
 
-# -- schedule ----------------------------------------------------------------------------------------------------------
+# -- schedule
+# ----------------------------------------------------------------------------------------------------------
 
 
 def blend(x):
@@ -43,9 +44,12 @@ def blend(x):
 
 
 def test_ramp_displacement_is_the_exact_integral_of_the_velocity():
-    """Increments of the support against quadrature of the quintic, within a ramp that ends between two steps."""
+    """Increments of the support against quadrature of the quintic, within a ramp that ends between two
+    steps."""
     step, ramp = 0.01, 0.5055
-    schedule = lay_out([PhaseSpec("still", 0.2, {}, {"a": 0.3}), PhaseSpec("go", 1.0, {}, {"a": 2.0}, ramp)], step, [], ["a"])
+    schedule = lay_out(
+        [PhaseSpec("still", 0.2, {}, {"a": 0.3}), PhaseSpec("go", 1.0, {}, {"a": 2.0}, ramp)], step, [], ["a"]
+    )
     increments = schedule.motion_increments(0, schedule.steps)[:, 0]
     assert np.array_equal(increments[:20], np.full(20, 0.3 * step))
     nodes, weights = np.polynomial.legendre.leggauss(8)
@@ -65,7 +69,9 @@ def test_ramp_is_smooth_and_a_sudden_start_is_not():
     step = 1e-3
     smooth = lay_out([PhaseSpec("go", 1.0, {"f": 1.0}, {"a": 1.0}, 0.5)], step, ["f"], ["a"])
     rate = smooth.motion_increments(0, 1000)[:, 0] / step
-    assert np.abs(np.diff(rate) / step).max() == pytest.approx(15 / 8 / 0.5, rel=1e-3)  # greatest slope of the quintic
+    assert np.abs(np.diff(rate) / step).max() == pytest.approx(
+        15 / 8 / 0.5, rel=1e-3
+    )  # greatest slope of the quintic
     assert np.abs(np.diff(rate, 2) / step**2).max() == pytest.approx(5.7735 / 0.5**2, rel=1e-2)
     assert np.abs(np.diff(rate, 3) / step**3).max() < 61 / 0.5**3  # C2: no jump of the second derivative
     load = smooth.load_factors(0, 1000)[:, 0]
@@ -88,7 +94,8 @@ def test_factors_hold_until_changed():
 
 
 def test_sudden_start_shakes_and_a_ramp_does_not():
-    """An undamped rod pulled at one end: peak force of a sudden start c√(Eρ) v, next to nothing with a slow ramp."""
+    """An undamped rod pulled at one end: peak force of a sudden start c√(Eρ) v, next to nothing with a slow
+    ramp."""
     system = bench(Slave(), damping=(0.0, 0.0), velocity=1.0)
     system = replace(system, contacts=())
     swing = {}
@@ -100,7 +107,8 @@ def test_sudden_start_shakes_and_a_ramp_does_not():
     assert swing[3e-3] < 1e-3
 
 
-# -- records and statistics --------------------------------------------------------------------------------------------
+# -- records and statistics
+# --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("path", PATHS)
@@ -138,7 +146,9 @@ def test_statistics_are_those_of_the_records_of_every_step(path):
                 assert event == (expected if expected is None else pytest.approx(expected))
             # The speed of a step lies between those at its ends, as the scheme has them.
             if found.slip_fraction > 0:
-                assert found.max_slip_speed == pytest.approx(np.abs(result.slip_speed[rows, c]).max(), rel=0.2)
+                assert found.max_slip_speed == pytest.approx(
+                    np.abs(result.slip_speed[rows, c]).max(), rel=0.2
+                )
 
 
 def test_a_contact_says_it_slips_only_when_it_moves():
@@ -151,7 +161,8 @@ def test_a_contact_says_it_slips_only_when_it_moves():
     assert np.abs(result.slip_speed[~stuck, 0]).max() > 1e-3
 
 
-# -- restart, interruption, checkpoints --------------------------------------------------------------------------------
+# -- restart, interruption, checkpoints
+# --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("path", PATHS)
@@ -199,15 +210,15 @@ def test_restart_refuses_another_scheme_or_model():
     first = run(system, 1e-4)
     with pytest.raises(CaseError, match="a state of the same scheme"):
         simulate(system, one_phase(2e-4), Settings(record_every=1, beta2=0.6), restart=first)
-    with pytest.raises(CaseError, match="a state of the same scheme: .*path nodal"):
+    with pytest.raises(CaseError, match=r"a state of the same scheme: .*path nodal"):
         simulate(system, one_phase(2e-4), Settings(record_every=1, path="nodal"), restart=first)
     other = bench(Slave(elements=4))
     # As many padded modes, other freedoms.
     with pytest.raises(CaseError, match="a state of the same model"):
         simulate(other, one_phase(2e-4), Settings(record_every=1, step=first.step), restart=first)
-    with pytest.raises(CaseError, match="every 1 steps of no points.*the same records as before"):
+    with pytest.raises(CaseError, match=r"every 1 steps of no points.*the same records as before"):
         simulate(system, one_phase(2e-4), Settings(record_every=2), restart=first)
-    with pytest.raises(CaseError, match="every 1 steps of base.end"):
+    with pytest.raises(CaseError, match=r"every 1 steps of base.end"):
         simulate(system, one_phase(2e-4), Settings(record_every=1, watch=("base.end",)), restart=first)
     tail = simulate(system, one_phase(2e-4), Settings(record_every=2), restart=first, join=False)
     assert tail.time[0] >= first.time[-1]
@@ -261,7 +272,8 @@ def test_chunks_do_not_matter(monkeypatch):
     assert np.array_equal(whole.normal_force, simulate(system, PHASES, Settings(record_every=2)).normal_force)
 
 
-# -- what a run is given -----------------------------------------------------------------------------------------------
+# -- what a run is given
+# -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -278,7 +290,12 @@ def test_chunks_do_not_matter(monkeypatch):
         (one_phase(1.0), {"step": float("nan")}, "temporal.step", "a number > 0"),
         (one_phase(1.0), {"beta2": 0.4}, "temporal.beta2", r"lies in \[0.5, 1\]"),
         (one_phase(1.0), {"record_every": 0}, "temporal.record_every", "an integer ≥ 1"),
-        (one_phase(1.0), {"watch": ("nose",)}, "temporal.watch.0", "no such point; the system has: base.start"),
+        (
+            one_phase(1.0),
+            {"watch": ("nose",)},
+            "temporal.watch.0",
+            "no such point; the system has: base.start",
+        ),
     ],
 )
 def test_bad_input_is_said_before_the_run(phases, settings, where, accepted):

@@ -27,7 +27,11 @@ app = typer.Typer(
 CaseFile = Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML).", show_default=False)]
 Set = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a value of the case, e.g. contacts.A.friction.coefficient=0.3. Repeatable."),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a value of the case, e.g. contacts.A.friction.coefficient=0.3. Repeatable.",
+    ),
 ]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results [default: CASE.out].")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else there.")]
@@ -91,7 +95,9 @@ def _pair(text: str, name: str) -> tuple[float, float]:
 @app.command()
 def new(
     template: Annotated[str, typer.Argument(metavar="TEMPLATE", help="Name of a template, e.g. two-beams.")],
-    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder to write into [default: here].")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder to write into [default: here].")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     json: Json = False,
     quiet: Quiet = False,
@@ -112,9 +118,7 @@ def new(
 
 
 @app.command()
-def check(
-    case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False
-) -> None:
+def check(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False) -> None:
     """Validate a case and print the model in words: bodies, contacts, time step against its limit."""
     from ..study.analyses import describe
     from .output import print_json, stdout
@@ -135,8 +139,13 @@ def check(
 @app.command()
 def modes(
     case: CaseFile,
-    mu: Annotated[str | None, typer.Option("--mu", metavar="μ|a,b|start:stop:count", help="Friction coefficients [default: the case's].")] = None,
-    count: Annotated[int | None, typer.Option("--count", min=1, help="How many branches [default: modal.modes].")] = None,
+    mu: Annotated[
+        str | None,
+        typer.Option("--mu", metavar="μ|a,b|start:stop:count", help="Friction coefficients [default: the case's]."),
+    ] = None,
+    count: Annotated[
+        int | None, typer.Option("--count", min=1, help="How many branches [default: modal.modes].")
+    ] = None,
     undamped: Undamped = False,
     set_: Set = None,
     out: Out = None,
@@ -181,8 +190,19 @@ def modes(
 @app.command()
 def onsets(
     case: CaseFile,
-    friction_range: Annotated[str | None, typer.Option("--range", metavar="low:high", help="Range of μ [default: modal.friction_range].")] = None,
-    max_frequency: Annotated[float | None, typer.Option("--max-frequency", metavar="HZ", min=0.0, help="Highest frequency [default: modal.max_frequency_hz].")] = None,
+    friction_range: Annotated[
+        str | None,
+        typer.Option("--range", metavar="low:high", help="Range of μ [default: modal.friction_range]."),
+    ] = None,
+    max_frequency: Annotated[
+        float | None,
+        typer.Option(
+            "--max-frequency",
+            metavar="HZ",
+            min=0.0,
+            help="Highest frequency [default: modal.max_frequency_hz].",
+        ),
+    ] = None,
     undamped: Undamped = False,
     set_: Set = None,
     out: Out = None,
@@ -217,7 +237,16 @@ def onsets(
         ]
         for o in result.onsets
     ]
-    columns = ["critical μ", "frequency [Hz]", "kind", "modes", "growth", "κ [1/s]", "slope [1/s]", "residual"]
+    columns = [
+        "critical μ",
+        "frequency [Hz]",
+        "kind",
+        "modes",
+        "growth",
+        "κ [1/s]",
+        "slope [1/s]",
+        "residual",
+    ]
     table("onsets, " + ("damped" if result.damped else "undamped"), columns, rows)
     stdout.print("κ: growth opens as κ √(μ − μ_c) without damping; slope: d growth/dμ at a damped onset")
 
@@ -225,8 +254,14 @@ def onsets(
 @app.command()
 def simulate(
     case: CaseFile,
-    mu: Annotated[float | None, typer.Option("--mu", min=0.0, help="Friction coefficient of every contact [default: the case's].")] = None,
-    restart: Annotated[Path | None, typer.Option("--restart", metavar="FILE", help="Go on from the file of an earlier, unfinished run.")] = None,
+    mu: Annotated[
+        float | None,
+        typer.Option("--mu", min=0.0, help="Friction coefficient of every contact [default: the case's]."),
+    ] = None,
+    restart: Annotated[
+        Path | None,
+        typer.Option("--restart", metavar="FILE", help="Go on from the file of an earlier, unfinished run."),
+    ] = None,
     set_: Set = None,
     out: Out = None,
     json: Json = False,
@@ -244,7 +279,11 @@ def simulate(
     try:
         with progress_bar("simulate", quiet=quiet) as progress:
             run = analyses.simulate(
-                loaded, mu, progress=progress, checkpoint=lambda part: save(part, path) and None, restart=before
+                loaded,
+                mu,
+                progress=progress,
+                checkpoint=lambda part: save(part, path) and None,
+                restart=before,
             )
     except AnalysisError as error:
         part = getattr(error, "trajectory", None)
@@ -256,7 +295,8 @@ def simulate(
     summary = analyses.summarise(loaded, run)
     if run.interrupted:
         say(
-            f"interrupted after {run.steps} of {run.planned_steps} steps; go on with --restart {path}", quiet=quiet
+            f"interrupted after {run.steps} of {run.planned_steps} steps; go on with --restart {path}",
+            quiet=quiet,
         )
     if json:
         print_json(summary.to_json())
@@ -299,8 +339,18 @@ def _show_run(summary: dict[str, Any]) -> None:
 @app.command()
 def compare(
     case: CaseFile,
-    mu: Annotated[str | None, typer.Option("--mu", metavar="μ|a,b|start:stop:count", help="Friction coefficients [default: comparison.mu].")] = None,
-    critical: Annotated[bool | None, typer.Option("--critical/--no-critical", help="Bisect the temporal critical friction [default: comparison.critical].", show_default=False)] = None,
+    mu: Annotated[
+        str | None,
+        typer.Option("--mu", metavar="μ|a,b|start:stop:count", help="Friction coefficients [default: comparison.mu]."),
+    ] = None,
+    critical: Annotated[
+        bool | None,
+        typer.Option(
+            "--critical/--no-critical",
+            help="Bisect the temporal critical friction [default: comparison.critical].",
+            show_default=False,
+        ),
+    ] = None,
     set_: Set = None,
     out: Out = None,
     json: Json = False,
@@ -339,7 +389,16 @@ def _show_agreement(document: dict[str, Any]) -> None:
         ]
         for c in document["comparisons"]
     ]
-    columns = ["μ", "modal [Hz]", "temporal [Hz]", "growth modal", "temporal", "error [%]", "run answers [Hz]", "MAC"]
+    columns = [
+        "μ",
+        "modal [Hz]",
+        "temporal [Hz]",
+        "growth modal",
+        "temporal",
+        "error [%]",
+        "run answers [Hz]",
+        "MAC",
+    ]
     table("modal against temporal", columns, rows)
     if document["critical_mu_modal"] is not None:
         stdout.print(
@@ -352,18 +411,14 @@ def _show_agreement(document: dict[str, Any]) -> None:
 
 
 @app.command()
-def run(
-    case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False
-) -> None:
+def run(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False) -> None:
     """Everything: modes, onsets, simulate, compare, and the report."""
     from .output import print_json, progress_bar, say, stdout
     from .pipeline import run as run_all
 
     loaded = _load(case, set_, quiet=quiet)
     with progress_bar("simulate", quiet=quiet) as progress:
-        outcome = run_all(
-            loaded, _folder(case, out), progress=progress, log=lambda text: say(text, quiet=quiet)
-        )
+        outcome = run_all(loaded, _folder(case, out), progress=progress, log=lambda text: say(text, quiet=quiet))
     if json:
         print_json(outcome.to_json())
     else:

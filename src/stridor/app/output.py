@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -46,7 +46,7 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
 
 @contextmanager
-def progress_bar(text: str, *, quiet: bool) -> Iterator[Any]:
+def progress_bar(text: str, *, quiet: bool) -> Generator[Any, None, None]:
     """Yields progress(done, planned) drawn on stderr with the time left."""
     if quiet:
         yield None

@@ -86,7 +86,14 @@ def pair(
     weights, slopes = np.zeros(4), np.zeros(4)
     nearest = int(np.argmin(np.linalg.norm(master_positions - slave_position, axis=1)))
     segment, xi, on_line = project(
-        *slave_position, master_positions, chords, min(nearest, len(chords) - 1), 0.0, weights, slopes
+        float(slave_position[0]),
+        float(slave_position[1]),
+        master_positions,
+        chords,
+        min(nearest, len(chords) - 1),
+        0.0,
+        weights,
+        slopes,
     )
     if not on_line:
         return None

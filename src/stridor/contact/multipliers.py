@@ -57,6 +57,7 @@ def solve_contact(
     limit = static if was_sticking or decay_speed > 0.0 else kinetic
     if normal >= 0.0 and abs(tangential) <= limit * normal:
         return normal, tangential, STICK
+    stiff = moved = 0.0
     # Sliding: friction acts as sticking would have to, only not enough.
     sense = 1.0 if tangential > 0.0 else -1.0
     for attempt in range(2):

@@ -14,6 +14,7 @@ from ..errors import CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..temporal.trajectory import STATUS, ContactStatistics, PhaseResult, Trajectory
+from ..typing import ComplexArray
 from .atomic import replacing
 
 Result = ComplexModes | Onsets | Trajectory | Agreement
@@ -62,9 +63,7 @@ def load_trajectory(path: str | Path) -> Trajectory:
     names = json.loads(data.attrs["names"])
     scalars = json.loads(data.attrs["scalars"])
     phases = tuple(
-        PhaseResult(
-            p["name"], p["start"], p["end"], {n: ContactStatistics(**c) for n, c in p["contacts"].items()}
-        )
+        PhaseResult(p["name"], p["start"], p["end"], {n: ContactStatistics(**c) for n, c in p["contacts"].items()})
         for p in json.loads(data.attrs["phases"])
     )
     return Trajectory(
@@ -74,8 +73,16 @@ def load_trajectory(path: str | Path) -> Trajectory:
         **{
             name: data[name].values
             for name in (
-                "normal_force", "tangential_force", "slip_speed", "gap", "status", "displacement", "velocity",
-                "acceleration", "kinetic", "elastic",
+                "normal_force",
+                "tangential_force",
+                "slip_speed",
+                "gap",
+                "status",
+                "displacement",
+                "velocity",
+                "acceleration",
+                "kinetic",
+                "elastic",
             )
         },
         works={name: data[f"work_{name}"].values for name in names["works"]},
@@ -102,8 +109,8 @@ def _dataset(analysis: str, variables: Mapping[str, Any], coords: Mapping[str, A
 
 def _split(dims: tuple[str, ...], values: Any, attributes: Mapping[str, Any]) -> tuple[Any, ...]:
     """Complex values as real ones with a last dimension (re, im): netCDF has no complex numbers."""
-    array = np.asarray(values, dtype=complex)
-    return (*dims, "part"), np.stack([array.real, array.imag], axis=-1), dict(attributes)
+    array: ComplexArray = np.asarray(values, dtype=complex)
+    return (*dims, "part"), np.stack([np.real(array), np.imag(array)], axis=-1), dict(attributes)
 
 
 def _modes(result: ComplexModes) -> Any:
@@ -185,8 +192,19 @@ def _trajectory(run: Trajectory) -> Any:
     }
     data = _dataset("simulate", variables, coords, run)
     scalars = (
-        "step", "beta2", "record_every", "steps", "planned_steps", "path", "path_reason", "step_limit",
-        "limiting_body", "most_sweeps", "unconverged_steps", "interrupted", "wall_seconds",
+        "step",
+        "beta2",
+        "record_every",
+        "steps",
+        "planned_steps",
+        "path",
+        "path_reason",
+        "step_limit",
+        "limiting_body",
+        "most_sweeps",
+        "unconverged_steps",
+        "interrupted",
+        "wall_seconds",
     )
     data.attrs["scalars"] = json.dumps({name: getattr(run, name) for name in scalars})
     data.attrs["names"] = json.dumps(
@@ -199,7 +217,12 @@ def _trajectory(run: Trajectory) -> Any:
     )
     data.attrs["phases"] = json.dumps(
         [
-            {"name": p.name, "start": p.start, "end": p.end, "contacts": {n: vars(c) for n, c in p.contacts.items()}}
+            {
+                "name": p.name,
+                "start": p.start,
+                "end": p.end,
+                "contacts": {n: vars(c) for n, c in p.contacts.items()},
+            }
             for p in run.phases
         ]
     )

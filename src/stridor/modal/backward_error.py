@@ -71,7 +71,7 @@ class BackwardError:
     def __init__(self, coupling: Coupling) -> None:
         system = coupling.system
         self.coupling = coupling
-        self._pattern = _common_pattern(system.stiffness, system.damping, system.mass)
+        self._pattern = common_pattern(system.stiffness, system.damping, system.mass)
         rows = system.contact_rows()
         # Contacts touch few freedoms: dense rows on those alone.
         self._touched = np.flatnonzero(np.abs(rows).max(axis=0, initial=0.0))
@@ -145,7 +145,7 @@ class BackwardError:
         return force
 
 
-def _common_pattern(*matrices: Sparse) -> tuple[IntArray, IntArray, Array]:
+def common_pattern(*matrices: Sparse) -> tuple[IntArray, IntArray, Array]:
     """indptr, indices and data (3, nnz) of matrices written on their common pattern."""
     pattern = sp.csr_array(sum(abs(m) for m in matrices))
     pattern.sort_indices()

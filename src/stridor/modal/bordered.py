@@ -16,7 +16,8 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from ..typing import ComplexArray, Sparse
+from ..typing import Array, ComplexArray, IntArray, Sparse
+from .backward_error import common_pattern
 from .coupling import Coupling
 
 NEWTON_STEPS = 30
@@ -29,49 +30,52 @@ class Bordered:
     def __init__(self, coupling: Coupling, lam: complex, mu: float) -> None:
         system, count = coupling.system, coupling.contacts
         rows = system.contact_rows()
+        normal, tangent = sp.csr_array(rows[0::2]), sp.csr_array(rows[1::2])
+        scale = float(np.abs(system.stiffness).max())
+        edge, corner = sp.csr_array((system.size, count)), sp.csr_array((count, count))
+        compliance = sp.diags_array(coupling.compliance) * scale**2
+
+        def moved(block: Sparse) -> Sparse:
+            return sp.block_array([[block, edge], [edge.T, corner]])
+
+        pushed = -scale * (sp.diags_array(coupling.sense) @ tangent).T
         self.coupling = coupling
         self.size = system.size
-        self._normal, self._tangent = sp.csr_array(rows[0::2]), sp.csr_array(rows[1::2])
-        self._scale = float(np.abs(system.stiffness).max())
-        self._corner = sp.csr_array((count, count))
-        self._edge = sp.csr_array((system.size, count))
+        self._scale = scale
+        # P = P0 + λ C + λ² M + μ F + λ Σ d t tᵀ, forces counted in units of the largest stiffness.
+        self._terms = [
+            sp.block_array([[system.stiffness, -scale * normal.T], [scale * normal, compliance]]),
+            moved(system.damping),
+            moved(system.mass),
+            sp.block_array([[sp.csr_array((system.size, system.size)), pushed], [edge.T, corner]]),
+            *(moved(sp.csr_array(tangent[[k]].T @ tangent[[k]])) for k in range(count) if coupling.sloped),
+        ]
         self._borders = self._null_vectors(lam, mu)
+        self._pattern = self._bordered_pattern()
 
-    def _forces(self, column: Sparse) -> Sparse:
-        return sp.csc_array(
-            sp.block_array([[sp.csr_array((self.size, self.size)), column], [None, self._corner]])
-        )
+    def _bordered_pattern(self) -> tuple[IntArray, IntArray, Array, ComplexArray]:
+        """indptr, indices, data (terms, nnz) and border (nnz) of the terms on one csc pattern."""
+        left, right = (v * self._scale for v in self._borders)
+        size = len(left)
+        nothing = np.zeros((size, size))
+        wide = [
+            sp.block_array([[term, sp.csr_array((size, 1))], [sp.csr_array((1, size)), None]]).T
+            for term in self._terms
+        ]
+        borders = np.block([[nothing, left[:, None]], [right.conj()[None, :], np.zeros((1, 1))]]).T
+        halves = [sp.csr_array(borders.real), sp.csr_array(borders.imag)]
+        # A csr pattern of the transposes is a csc pattern of the matrices.
+        indptr, indices, data = common_pattern(*wide, *halves)
+        return indptr, indices, data[:-2], data[-2] + 1j * data[-1]
 
-    def _motion(self, block: Sparse) -> Sparse:
-        return sp.csc_array(
-            sp.block_array([[block, self._edge], [self._edge.T, self._corner]]), dtype=complex
-        )
-
-    def _friction(self, values: np.ndarray) -> Sparse:
-        return self._tangent.T @ sp.diags_array(values) @ self._tangent
+    def _factors(self, lam: complex, mu: complex) -> ComplexArray:
+        d = self.coupling.friction_damping(float(np.real(mu))) if self.coupling.sloped else np.zeros(0)
+        return np.array([1.0, lam, lam**2, mu, *(lam * d)], dtype=complex)
 
     def problem(self, lam: complex, mu: complex) -> Sparse:
-        """P (n + m, n + m); forces are counted in units of the largest stiffness."""
-        system, coupling, scale = self.coupling.system, self.coupling, self._scale
-        damping = system.damping + self._friction(coupling.friction_damping(float(np.real(mu))))
-        dynamic = lam**2 * system.mass + lam * damping + system.stiffness
-        push = (self._normal + sp.diags_array(mu * coupling.sense) @ self._tangent).T
-        compliance = sp.diags_array(coupling.compliance) * scale**2
-        return sp.csc_array(
-            sp.block_array([[dynamic, -push * scale], [self._normal * scale, compliance]]), dtype=complex
-        )
-
-    def _slopes(self, lam: complex, mu: complex) -> tuple[Sparse, Sparse, Sparse, Sparse]:
-        """P_λ, P_μ, P_λλ, P_λμ."""
-        system, coupling = self.coupling.system, self.coupling
-        friction, change = (self._friction(d) for d in coupling.friction_damping_slope(float(np.real(mu))))
-        pushed = -(sp.diags_array(coupling.sense * self._scale) @ self._tangent).T
-        return (
-            self._motion(2 * lam * system.mass + system.damping + friction),
-            self._forces(pushed) + self._motion(lam * change),
-            self._motion(2 * system.mass),
-            self._motion(change),
-        )
+        """P (n + m, n + m)."""
+        factors = self._factors(lam, mu)
+        return sp.csc_array(sum(f * term for f, term in zip(factors, self._terms, strict=True)))
 
     def _null_vectors(self, lam: complex, mu: float) -> tuple[ComplexArray, ComplexArray]:
         """Left and right vectors that P(λ, μ) all but takes to zero, by inverse iteration."""
@@ -87,28 +91,39 @@ class Bordered:
 
     def derivatives(self, lam: complex, mu: complex) -> tuple[complex, complex, complex, complex, complex]:
         """f, f_λ, f_μ, f_λλ, f_λμ."""
-        left, right = self._borders
-        matrix = self.problem(lam, mu)
-        by_lambda, by_mu, second, mixed = self._slopes(lam, mu)
-        whole = sp.csc_array(
-            sp.block_array(
-                [[matrix, left[:, None] * self._scale], [right.conj()[None, :] * self._scale, None]]
+        indptr, indices, data, border = self._pattern
+        shape = (len(indptr) - 1, len(indptr) - 1)
+        d, change = (v if self.coupling.sloped else v[:0] for v in self._friction(mu))
+
+        def combined(factors: list[complex], plus: ComplexArray | float = 0.0) -> Sparse:
+            return sp.csc_array(
+                (np.array(factors, dtype=complex) @ data + plus, indices, indptr), shape=shape
             )
-        )
+
+        whole = combined([1.0, lam, lam**2, mu, *(lam * d)], border)
+        by_lambda = combined([0.0, 1.0, 2 * lam, 0.0, *d])
+        by_mu = combined([0.0, 0.0, 0.0, 1.0, *(lam * change)])
+        second = combined([0.0, 0.0, 2.0, 0.0, *(0.0 * d)])
+        mixed = combined([0.0, 0.0, 0.0, 0.0, *change])
         solver = spl.splu(whole)
 
-        def solve(top: ComplexArray, last: complex = 0.0) -> tuple[ComplexArray, complex]:
-            given = np.concatenate([top, [last]])
+        def solve(given: ComplexArray) -> tuple[ComplexArray, complex]:
             answer = solver.solve(given)
             answer = answer + solver.solve(given - whole @ answer)
-            return answer[:-1], complex(answer[-1])
+            # The last unknown is f; derivatives of P act on the others.
+            return np.append(answer[:-1], 0.0), complex(answer[-1])
 
-        v, f = solve(np.zeros(len(left), dtype=complex), self._scale)
+        unit = np.zeros(shape[0], dtype=complex)
+        unit[-1] = self._scale
+        v, f = solve(unit)
         v_l, f_l = solve(-by_lambda @ v)
         v_m, f_m = solve(-by_mu @ v)
         _, f_ll = solve(-second @ v - 2 * by_lambda @ v_l)
         _, f_lm = solve(-mixed @ v - by_lambda @ v_m - by_mu @ v_l)
         return f, f_l, f_m, f_ll, f_lm
+
+    def _friction(self, mu: complex) -> tuple[Array, Array]:
+        return self.coupling.friction_damping_slope(float(np.real(mu)))
 
     def crossing(self, root: complex, mu: float) -> tuple[float, float, float] | None:
         """ω, μ and d Re λ/dμ with λ = jω an eigenvalue, from a guess; None if Newton fails."""

@@ -11,13 +11,13 @@ import scipy.sparse as sp
 
 from ..errors import CaseError
 from ..system import System
+from ..system.uncoupled import uncoupled_modes
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .backward_error import BackwardError
 from .coupling import Coupling, couple
 from .refinement import refine
 from .roots import Spectrum, spectrum_of
 from .tracking import Tracker
-from .uncoupled import uncoupled_modes
 from .vectors import expand, fixed_vectors, modal_coordinates
 
 CHUNK = 256

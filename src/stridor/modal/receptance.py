@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from ..system.uncoupled import UncoupledModes
 from ..typing import Array, ComplexArray, IntArray
-from .uncoupled import UncoupledModes
 
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})

@@ -13,10 +13,10 @@ import numpy as np
 import scipy.linalg as sl
 
 from ..errors import AnalysisError
+from ..system.uncoupled import UncoupledModes
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .coupling import Coupling
 from .receptance import Receptance, wanted_pairs
-from .uncoupled import UncoupledModes
 
 CONVERGED = 1e-9  # of the step before last: convergence is at least quadratic
 MAX_STEPS = 40

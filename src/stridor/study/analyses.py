@@ -9,17 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from ..agreement import Agreement
+from ..agreement import Agreement, dominant_response
 from ..agreement import compare as compare_system
-from ..agreement import dominant_response
 from ..case import Case
 from ..errors import CaseError
 from ..modal.complex_modes import ComplexModes, complex_modes
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
-from ..modal.uncoupled import uncoupled_modes
 from ..sliding import steady_sliding
 from ..system import build_system
+from ..system.uncoupled import uncoupled_modes
 from ..temporal.energy import EnergyBalance, energy_balance
 from ..temporal.schedule import PhaseSpec
 from ..temporal.signals import Growth
@@ -28,6 +27,7 @@ from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
 from .provenance import provenance
+from .threads import calm
 
 
 def phases_of(case: Case) -> list[PhaseSpec]:
@@ -59,14 +59,15 @@ def modes(
     system = build_system(case)
     values = _own_friction(case) if mu is None else mu
     damped = case.modal.damped if damped is None else damped
-    result = complex_modes(
-        system,
-        values,
-        count=case.modal.modes if count is None else count,
-        max_frequency_hz=max_frequency_hz,
-        damped=damped,
-        vectors=vectors,
-    )
+    with calm(system.size):
+        result = complex_modes(
+            system,
+            values,
+            count=case.modal.modes if count is None else count,
+            max_frequency_hz=max_frequency_hz,
+            damped=damped,
+            vectors=vectors,
+        )
     seconds = time.perf_counter() - started
     return replace(result, provenance=provenance(case, "modes", seconds, damped=damped))
 
@@ -95,12 +96,14 @@ def onsets(
 ) -> Onsets:
     """Every critical friction coefficient in range (defaults from the case's [modal])."""
     started = time.perf_counter()
-    result = solve_onsets(
-        build_system(case),
-        case.modal.friction_range if friction_range is None else friction_range,
-        max_frequency_hz=max_frequency_hz or case.modal.max_frequency_hz,
-        damped=case.modal.damped if damped is None else damped,
-    )
+    system = build_system(case)
+    with calm(system.size):
+        result = solve_onsets(
+            system,
+            case.modal.friction_range if friction_range is None else friction_range,
+            max_frequency_hz=max_frequency_hz or case.modal.max_frequency_hz,
+            damped=case.modal.damped if damped is None else damped,
+        )
     return replace(result, provenance=provenance(case, "onsets", time.perf_counter() - started))
 
 
@@ -114,15 +117,17 @@ def simulate(
 ) -> Trajectory:
     """The temporal approach through the phases of the case; mu scales every contact's friction law."""
     started = time.perf_counter()
-    result = march(
-        build_system(case),
-        phases_of(case),
-        settings_of(case),
-        mu=mu,
-        progress=progress,
-        checkpoint=checkpoint,
-        restart=restart,
-    )
+    system = build_system(case)
+    with calm(system.size):
+        result = march(
+            system,
+            phases_of(case),
+            settings_of(case),
+            mu=mu,
+            progress=progress,
+            checkpoint=checkpoint,
+            restart=restart,
+        )
     return replace(result, provenance=provenance(case, "simulate", time.perf_counter() - started, mu=mu))
 
 
@@ -138,19 +143,21 @@ def compare(
     started = time.perf_counter()
     settings = case.comparison
     chosen = list(mus if mus is not None else settings.mu) or [_own_friction(case)]
-    result = compare_system(
-        build_system(case),
-        phases_of(case),
-        settings_of(case),
-        chosen,
-        friction_range=case.modal.friction_range,
-        max_frequency_hz=case.modal.max_frequency_hz,
-        critical=settings.critical if critical is None else critical,
-        bracket=settings.bracket,
-        tolerance=settings.tolerance,
-        runs=runs,
-        progress=progress,
-    )
+    system = build_system(case)
+    with calm(system.size):
+        result = compare_system(
+            system,
+            phases_of(case),
+            settings_of(case),
+            chosen,
+            friction_range=case.modal.friction_range,
+            max_frequency_hz=case.modal.max_frequency_hz,
+            critical=settings.critical if critical is None else critical,
+            bracket=settings.bracket,
+            tolerance=settings.tolerance,
+            runs=runs,
+            progress=progress,
+        )
     return replace(result, provenance=provenance(case, "compare", time.perf_counter() - started, mu=chosen))
 
 
@@ -199,7 +206,7 @@ class RunSummary:
 
 def first_regime(run: Trajectory) -> dict[str, dict[str, float | None]]:
     """The stretch of the last phase before a contact first separates, by contact: end [s], largest normal
-    force [N] and share of its last quarter spent in stick (of the records)."""
+    force [N] and slip speed [m/s], share of its last quarter spent in stick (all of the records)."""
     found: dict[str, dict[str, float | None]] = {}
     if not run.phases or not len(run.time):
         return found
@@ -210,7 +217,12 @@ def first_regime(run: Trajectory) -> dict[str, dict[str, float | None]]:
         end = phase.end if opened is None else opened
         inside = np.flatnonzero(run.time[part] < end)
         if not len(inside):
-            found[name] = {"end": end, "max_normal_force": None, "stick_fraction": None}
+            found[name] = {
+                "end": end,
+                "max_normal_force": None,
+                "max_slip_speed": None,
+                "stick_fraction": None,
+            }
             continue
         force = run.normal_force[part][inside, k]
         status = run.status[part][inside, k]
@@ -218,6 +230,7 @@ def first_regime(run: Trajectory) -> dict[str, dict[str, float | None]]:
         found[name] = {
             "end": float(end),
             "max_normal_force": float(force.max()),
+            "max_slip_speed": float(np.abs(run.slip_speed[part][inside, k]).max()),
             "stick_fraction": float(np.mean(tail == 1)),
         }
     return found
@@ -326,7 +339,9 @@ def describe(case: Case) -> Description:
             f"{body.thickness:g} m, {body.material}, {body.mass} mass, {count} free"
         )
     for name, support in case.supports.items():
-        moving = ", moves at " + ", ".join(f"{d} {v:g}" for d, v in support.velocity.items()) if support.velocity else ""
+        moving = (
+            ", moves at " + ", ".join(f"{d} {v:g}" for d, v in support.velocity.items()) if support.velocity else ""
+        )
         lines.append(f"  support {name} at {support.at} holds {', '.join(support.fixed)}{moving}")
     for name, load in case.loads.items():
         lines.append(f"  load {name} at {load.at}: ({load.force[0]:g}, {load.force[1]:g}) N, {load.moment:g} N m")
@@ -364,5 +379,3 @@ def describe(case: Case) -> Description:
     )
     lines.append(f"time loop: {path} path ({reason})")
     return Description(tuple(lines), data, tuple(case.warnings))
-
-

@@ -8,12 +8,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case import Case
-from ..case.schema import BeamBody, Contact as ContactCase
+from ..case.schema import BeamBody
+from ..case.schema import Contact as ContactCase
 from ..contact.interface import Contact, Rows, pair
 from ..errors import CaseError
 from ..fe.assembly import assemble_beam
 from ..fe.beam import DOF_PER_NODE, BeamElement, BeamMesh
-from ..typing import IntArray
+from ..typing import IntArray, Sparse
 from .model import Constraint, Line, PrescribedMotion, Structure, System, constrain
 
 _DIRECTIONS = {"x": 0, "y": 1, "rotation": 2}
@@ -122,7 +123,7 @@ class _View:
     motion: PrescribedMotion
     constraints: list[Constraint]
 
-    def rows(self, full: sp.csr_array) -> Rows:
+    def rows(self, full: Sparse) -> Rows:
         whole = np.zeros((self.total, len(self.motion.names)))
         whole[self.free] = self.motion.lift
         moving = [c for c in self.constraints if c.moves]

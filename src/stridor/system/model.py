@@ -102,9 +102,7 @@ class System:
 
     def with_friction(self, mu: float, speeds: Array) -> System:
         """The same system with every contact's law scaled so that it gives ``mu`` at ``speeds`` (m,)."""
-        contacts = tuple(
-            replace(c, law=c.law.scaled(mu, float(v))) for c, v in zip(self.contacts, speeds, strict=True)
-        )
+        contacts = tuple(replace(c, law=c.law.scaled(mu, float(v))) for c, v in zip(self.contacts, speeds, strict=True))
         return replace(self, contacts=contacts)
 
 

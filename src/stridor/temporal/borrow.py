@@ -14,7 +14,7 @@ from numba.extending import intrinsic
 
 
 @intrinsic
-def borrow(typing_context: Any, array: Any) -> Any:  # noqa: ARG001  (numba's signature)
+def _borrow(typing_context: Any, array: Any) -> Any:
     """The same array, sharing its data but not its owner. Valid only while the owner lives."""
     signature = array(array)
 
@@ -28,3 +28,7 @@ def borrow(typing_context: Any, array: Any) -> Any:  # noqa: ARG001  (numba's si
         return lent._getvalue()
 
     return signature, codegen
+
+
+# As compiled code calls it: numba gives the typing context itself.
+borrow: Any = _borrow

@@ -7,14 +7,14 @@ when due; then one pass adds the forces, completes u_{n+1} and predicts t_{n+2}.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ..typing import Array, IntArray
-from .borrow import borrow
 from .beta2 import Scheme
+from .borrow import borrow
 from .operators import ContactArrays, ModalArrays, NodalArrays
 from .stage import (
     CONTACT_RECORD,
@@ -36,6 +36,7 @@ from .stage import (
 
 # Reassociation lets dot products run in vector registers; NaN and infinity stay honoured, because a
 # run that blows up must be seen.
+_unsigned: Any = np.uint64
 _FAST = {"reassoc", "contract", "nsz", "arcp"}
 
 DONE, NEW_ROWS, OFF_LINE, NOT_FINITE = range(4)
@@ -77,13 +78,13 @@ class NodalRows(NamedTuple):
 
 
 class Record(NamedTuple):
-    """Decimated output: contacts (r, m, 6), watch (r, w, 3) of u, v, a, energies (r, 7), count (1,)."""
+    """Decimated output: contacts (r, m, 6), watch (r, w, 3) of u, v, a, energies (r, 7), kept (1,) how many."""
 
     every: int
     contacts: Array
     watch: Array
     energies: Array
-    count: IntArray
+    kept: IntArray
     watch_rows: Array  # (w, n) in the path's coordinates
     watch_lift: Array  # (w, p)
 
@@ -124,12 +125,22 @@ def _nodal_energies(nodal: NodalArrays, scheme: Scheme, u: Array, q: Array, buff
 
 @njit(cache=True, fastmath=_FAST)
 def _record(
-    kinetic: float, elastic: float, k: int, contacts: ContactArrays, scheme: Scheme, forcing: Forcing,
-    fields: Fields, increment: Array, state: LoopState, scratch: Scratch, record: Record, loads_at: int,
+    kinetic: float,
+    elastic: float,
+    k: int,
+    contacts: ContactArrays,
+    scheme: Scheme,
+    forcing: Forcing,
+    fields: Fields,
+    increment: Array,
+    state: LoopState,
+    scratch: Scratch,
+    record: Record,
+    loads_at: int,
 ) -> None:  # pragma: no cover - compiled
     """Keep one record at t_n; increment (n,) is the completed d."""
-    at = record.count[0]
-    record.count[0] += 1
+    at = record.kept[0]
+    record.kept[0] += 1
     dt, s, two_b = scheme.step, scheme.s, 2.0 * scheme.beta2
     for c in range(contacts.kind.shape[0]):
         base = contacts.base[c]
@@ -249,7 +260,7 @@ def _modal_pass(
     dissipated = 0.0
     predicted[:] = 0.0
     for b in range(modal.blocks.shape[0] - 1):
-        lo, hi = np.uint64(modal.blocks[b]), np.uint64(modal.blocks[b + 1])
+        lo, hi = _unsigned(modal.blocks[b]), _unsigned(modal.blocks[b + 1])
         _push(d, drive, rows.values, rows.pushing, rows.push_at[b], rows.push_at[b + 1], force, lo, hi)
         for i in range(lo, hi):
             velocity = q[i] + two_b * d[i]
@@ -334,20 +345,34 @@ def _leaves_segment(contacts: ContactArrays, state: LoopState) -> bool:  # pragm
 
 @njit(cache=True)
 def _all_finite(state: LoopState) -> bool:  # pragma: no cover - compiled
+    total = 0.0
     for r in range(state.value.shape[0] - 1):
-        if not np.isfinite(state.value[r]):
-            return False
-    return True
+        total += state.value[r]
+    return bool(np.isfinite(total))
 
 
 @njit(cache=True, inline="always")
 def _lent_modal(x: ModalArrays) -> ModalArrays:  # pragma: no cover - compiled
-    return ModalArrays(borrow(x.forward), borrow(x.restore), borrow(x.drive), borrow(x.damping), borrow(x.stiffness), borrow(x.blocks))
+    return ModalArrays(
+        borrow(x.forward), borrow(x.restore), borrow(x.drive), borrow(x.damping), borrow(x.stiffness), borrow(x.blocks)
+    )
 
 
 @njit(cache=True, inline="always")
 def _lent_nodal(x: NodalArrays) -> NodalArrays:  # pragma: no cover - compiled
-    return NodalArrays(borrow(x.k_ptr), borrow(x.k_col), borrow(x.k_val), borrow(x.m_ptr), borrow(x.m_col), borrow(x.m_val), borrow(x.c_ptr), borrow(x.c_col), borrow(x.c_val), borrow(x.factor), x.load_gain)
+    return NodalArrays(
+        borrow(x.k_ptr),
+        borrow(x.k_col),
+        borrow(x.k_val),
+        borrow(x.m_ptr),
+        borrow(x.m_col),
+        borrow(x.m_val),
+        borrow(x.c_ptr),
+        borrow(x.c_col),
+        borrow(x.c_val),
+        borrow(x.factor),
+        x.load_gain,
+    )
 
 
 @njit(cache=True, inline="always")
@@ -362,12 +387,30 @@ def _lent_nodal_rows(x: NodalRows) -> NodalRows:  # pragma: no cover - compiled
 
 @njit(cache=True, inline="always")
 def _lent_contacts(x: ContactArrays) -> ContactArrays:  # pragma: no cover - compiled
-    return ContactArrays(borrow(x.kind), borrow(x.base), borrow(x.friction), borrow(x.gap), borrow(x.table), borrow(x.nodes_at), borrow(x.nodes), borrow(x.chords), borrow(x.slave), borrow(x.side))
+    return ContactArrays(
+        borrow(x.kind),
+        borrow(x.base),
+        borrow(x.friction),
+        borrow(x.gap),
+        borrow(x.table),
+        borrow(x.nodes_at),
+        borrow(x.nodes),
+        borrow(x.chords),
+        borrow(x.slave),
+        borrow(x.side),
+    )
 
 
 @njit(cache=True, inline="always")
 def _lent_forcing(x: Forcing) -> Forcing:  # pragma: no cover - compiled
-    return Forcing(borrow(x.loads), borrow(x.increments), borrow(x.mass_own), borrow(x.damping_own), borrow(x.stiffness_own), borrow(x.lift))
+    return Forcing(
+        borrow(x.loads),
+        borrow(x.increments),
+        borrow(x.mass_own),
+        borrow(x.damping_own),
+        borrow(x.stiffness_own),
+        borrow(x.lift),
+    )
 
 
 @njit(cache=True, inline="always")
@@ -377,23 +420,65 @@ def _lent_fields(x: Fields) -> Fields:  # pragma: no cover - compiled
 
 @njit(cache=True, inline="always")
 def _lent_state(x: LoopState) -> LoopState:  # pragma: no cover - compiled
-    return LoopState(borrow(x.predicted), borrow(x.value), borrow(x.rate), borrow(x.force), borrow(x.normal), borrow(x.tangential), borrow(x.status), borrow(x.segment), borrow(x.xi), borrow(x.works), borrow(x.statistics), borrow(x.counters), borrow(x.active), borrow(x.motion))
+    return LoopState(
+        borrow(x.predicted),
+        borrow(x.value),
+        borrow(x.rate),
+        borrow(x.force),
+        borrow(x.normal),
+        borrow(x.tangential),
+        borrow(x.status),
+        borrow(x.segment),
+        borrow(x.xi),
+        borrow(x.works),
+        borrow(x.statistics),
+        borrow(x.counters),
+        borrow(x.active),
+        borrow(x.motion),
+    )
 
 
 @njit(cache=True, inline="always")
 def _lent_scratch(x: Scratch) -> Scratch:  # pragma: no cover - compiled
-    return Scratch(borrow(x.place), borrow(x.moved), borrow(x.shape), borrow(x.slide), borrow(x.weights), borrow(x.slopes), borrow(x.nodes), borrow(x.delta), borrow(x.buffer))
+    return Scratch(
+        borrow(x.place),
+        borrow(x.moved),
+        borrow(x.shape),
+        borrow(x.slide),
+        borrow(x.weights),
+        borrow(x.slopes),
+        borrow(x.nodes),
+        borrow(x.delta),
+        borrow(x.buffer),
+    )
 
 
 @njit(cache=True, inline="always")
 def _lent_record(x: Record) -> Record:  # pragma: no cover - compiled
-    return Record(x.every, borrow(x.contacts), borrow(x.watch), borrow(x.energies), borrow(x.count), borrow(x.watch_rows), borrow(x.watch_lift))
+    return Record(
+        x.every,
+        borrow(x.contacts),
+        borrow(x.watch),
+        borrow(x.energies),
+        borrow(x.kept),
+        borrow(x.watch_rows),
+        borrow(x.watch_lift),
+    )
 
 
 @njit(cache=True)
 def run_modal(
-    steps: int, modal: ModalArrays, rows: ModalRows, contacts: ContactArrays, scheme: Scheme,
-    forcing: Forcing, compliance: Array, fields: Fields, state: LoopState, scratch: Scratch, record: Record,
+    steps: int,
+    modal: ModalArrays,
+    rows: ModalRows,
+    contacts: ContactArrays,
+    scheme: Scheme,
+    forcing: Forcing,
+    compliance: Array,
+    fields: Fields,
+    state: LoopState,
+    scratch: Scratch,
+    record: Record,
     loads_at: int,
 ) -> tuple[int, int]:  # pragma: no cover - compiled
     """Up to ``steps`` steps in the modal basis; forcing holds one step more. Steps done and why it ended.
@@ -415,7 +500,17 @@ def run_modal(
             _complete_modal(modal, rows, state.force, fields, loads_at)
             kinetic, elastic = _modal_energies(modal, scheme, fields.u, fields.q)
             _record(
-                kinetic, elastic, k, contacts, scheme, forcing, fields, fields.buffer, state, scratch, record,
+                kinetic,
+                elastic,
+                k,
+                contacts,
+                scheme,
+                forcing,
+                fields,
+                fields.buffer,
+                state,
+                scratch,
+                record,
                 loads_at,
             )
         accumulate(k, contacts, scheme, forcing, state, scratch, loads_at)
@@ -432,8 +527,17 @@ def run_modal(
 
 @njit(cache=True)
 def run_nodal(
-    steps: int, nodal: NodalArrays, rows: NodalRows, contacts: ContactArrays, scheme: Scheme,
-    forcing: Forcing, compliance: Array, fields: Fields, state: LoopState, scratch: Scratch, record: Record,
+    steps: int,
+    nodal: NodalArrays,
+    rows: NodalRows,
+    contacts: ContactArrays,
+    scheme: Scheme,
+    forcing: Forcing,
+    compliance: Array,
+    fields: Fields,
+    state: LoopState,
+    scratch: Scratch,
+    record: Record,
     loads_at: int,
 ) -> tuple[int, int]:  # pragma: no cover - compiled
     """The same on freedoms, for any damping and any mass."""
@@ -452,7 +556,17 @@ def run_nodal(
             kinetic, elastic = _nodal_energies(nodal, scheme, fields.u, fields.q, fields.buffer)
             _complete_nodal(rows, state.force, fields)
             _record(
-                kinetic, elastic, k, contacts, scheme, forcing, fields, fields.buffer, state, scratch, record,
+                kinetic,
+                elastic,
+                k,
+                contacts,
+                scheme,
+                forcing,
+                fields,
+                fields.buffer,
+                state,
+                scratch,
+                record,
                 loads_at,
             )
         accumulate(k, contacts, scheme, forcing, state, scratch, loads_at)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from ..modal.uncoupled import UncoupledModes
 from ..system import System
+from ..system.uncoupled import UncoupledModes
 from ..typing import Array, IntArray
 from .beta2 import Scheme
 from .kernel import Fields, ModalRows, NodalRows, Record, run_modal, run_nodal
@@ -50,7 +51,7 @@ class Machine:
 
     @property
     def path(self) -> str:
-        """"modal" or "nodal"."""
+        """ "modal" or "nodal"."""
         return "modal" if self.modal is not None else "nodal"
 
     @property
@@ -113,7 +114,7 @@ class Machine:
             )
             self.compliance = np.ascontiguousarray(values[:-1] @ answers)
 
-    def _effective(self) -> spl.SuperLU:
+    def _effective(self) -> Any:
         order = self.order
         system, scheme = self.system, self.scheme
         effective = sp.csr_array(system.mass + scheme.beta2 * scheme.step * system.damping)
@@ -152,7 +153,8 @@ class Machine:
         """March up to ``steps`` steps; what was done and why it ended (kernel codes)."""
         first = int(self.state.counters[0])
         motion = self.system.motion
-        assert self.lift is not None and self.compliance is not None
+        assert self.lift is not None
+        assert self.compliance is not None
         forcing = Forcing(
             schedule.load_factors(first, steps + 1),
             schedule.motion_increments(first, steps + 1),
@@ -161,12 +163,13 @@ class Machine:
             motion.stiffness_own,
             self.lift,
         )
-        arrays = self.modal if self.modal is not None else self.nodal
-        loop = run_modal if self.modal is not None else run_nodal
+        arrays: Any = self.modal if self.modal is not None else self.nodal
+        rows: Any = self.rows
+        loop: Any = run_modal if self.modal is not None else run_nodal
         return loop(
             steps,
             arrays,
-            self.rows,
+            rows,
             self.table.contacts,
             self.scheme,
             forcing,
@@ -267,7 +270,14 @@ def _machine(
         active=np.zeros(active, dtype=np.int64),
         motion=np.zeros((2, table.motions)),
     )
-    fields = Fields(*(np.zeros(size) for _ in range(4)), np.zeros(table.auxiliary), np.zeros(size))
+    fields = Fields(
+        u=np.zeros(size),
+        q=np.zeros(size),
+        d=np.zeros(size),
+        constant=np.zeros(size),
+        coefficients=np.zeros(table.auxiliary),
+        buffer=np.zeros(size),
+    )
     scratch = Scratch(
         place=np.zeros(active + 1),
         moved=np.zeros(active + 1),

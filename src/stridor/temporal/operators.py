@@ -162,9 +162,7 @@ def nodal_arrays(system: System, scheme: Scheme) -> tuple[NodalArrays, IntArray]
     """Arrays of the nodal path and the order (n,) of freedoms that keeps its band narrow."""
     effective = sp.csr_array(system.mass + scheme.beta2 * scheme.step * system.damping)
     effective.eliminate_zeros()
-    order = np.asarray(
-        sp.csgraph.reverse_cuthill_mckee(sp.csr_matrix(effective), symmetric_mode=True), dtype=np.int64
-    )
+    order = np.asarray(sp.csgraph.reverse_cuthill_mckee(sp.csr_matrix(effective), symmetric_mode=True), dtype=np.int64)
     gain = scheme.step**2 * scheme.s / 2
 
     def permuted(matrix: Sparse) -> Sparse:
@@ -193,9 +191,7 @@ def _band_factor(matrix: Sparse) -> Array:
     try:
         factor = sl.cholesky_banded(band, lower=True)
     except sl.LinAlgError as error:
-        raise AnalysisError(
-            "the mass matrix is not positive definite: a freedom has stiffness but no mass"
-        ) from error
+        raise AnalysisError("the mass matrix is not positive definite: a freedom has stiffness but no mass") from error
     diagonal = factor[0].copy()
     factor = factor / diagonal
     factor[0] = 1.0 / diagonal**2

@@ -102,9 +102,7 @@ class Schedule:
         return r * (2.5 * x**4 - 3 * x**5 + x**6) + np.maximum(number - r, 0.0)
 
 
-def lay_out(
-    phases: Sequence[PhaseSpec], step: float, loads: Sequence[str], supports: Sequence[str]
-) -> Schedule:
+def lay_out(phases: Sequence[PhaseSpec], step: float, loads: Sequence[str], supports: Sequence[str]) -> Schedule:
     """Phases in steps. A factor not named stays as in the phase before; before the first phase loads and
     velocities are zero, and what the first phase does not name is one."""
     stretches: list[Stretch] = []
@@ -122,8 +120,6 @@ def lay_out(
         )
         time += phase.duration
         last = max(round(time / step), first + 1)
-        stretches.append(
-            Stretch(phase.name, first, last, phase.ramp / step, load, next_load, velocity, next_velocity)
-        )
+        stretches.append(Stretch(phase.name, first, last, phase.ramp / step, load, next_load, velocity, next_velocity))
         load, velocity, first = next_load, next_velocity, last
     return Schedule(step, tuple(stretches))

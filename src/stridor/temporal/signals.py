@@ -64,9 +64,7 @@ def spectrum(signal: Array, sampling: float, *, window: str = "hann") -> Spectru
     weights = ss.get_window(window, count)
     values = np.abs(np.fft.rfft((signal - np.mean(signal)) * weights)) * 2 / weights.sum()
     spacing = 1.0 / (count * sampling)
-    return Spectrum(
-        np.fft.rfftfreq(count, sampling), values, window, spacing, _WIDTH.get(window, 2.0) * spacing
-    )
+    return Spectrum(np.fft.rfftfreq(count, sampling), values, window, spacing, _WIDTH.get(window, 2.0) * spacing)
 
 
 @dataclass(frozen=True)

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ..errors import AnalysisError, CaseError
-from ..modal.uncoupled import UncoupledModes, uncoupled_modes
 from ..sliding import slip_speeds, steady_sliding
 from ..system import System
+from ..system.uncoupled import UncoupledModes, uncoupled_modes
 from ..typing import Array
 from .beta2 import Scheme, StepLimit, scheme, step_limit
 from .inputs import check_inputs
@@ -183,14 +183,12 @@ class _Run:
             contacts=np.zeros((count, machine.contacts, CONTACT_RECORD)),
             watch=np.zeros((count, len(rows), 3)),
             energies=np.zeros((count, ENERGY_RECORD)),
-            count=np.zeros(1, dtype=np.int64),
+            kept=np.zeros(1, dtype=np.int64),
             watch_rows=rows,
             watch_lift=lift,
         )
 
-    def march(
-        self, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float
-    ) -> Trajectory:
+    def march(self, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float) -> Trajectory:
         started = last_saved = clock.perf_counter()
         machine, schedule = self.machine, self.schedule
         interrupted = False
@@ -267,7 +265,7 @@ class _Run:
         if interrupted and done < self.schedule.steps:
             stretch = self.schedule.stretch_at(done)
             phases.append(self._phase(stretch.name, stretch.first, done))
-        kept = int(self.record.count[0])
+        kept = int(self.record.kept[0])
         every = settings.record_every
         start = -(-_first_step(self.restart) // every)
         contacts, watch = self.record.contacts[:kept], self.record.watch[:kept]
@@ -312,9 +310,7 @@ def _first_step(restart: Trajectory | None) -> int:
     return 0 if restart is None else restart.steps
 
 
-def watch_rows(
-    machine: Machine, modes: UncoupledModes | None, names: Sequence[str]
-) -> tuple[Array, Array]:
+def watch_rows(machine: Machine, modes: UncoupledModes | None, names: Sequence[str]) -> tuple[Array, Array]:
     """Rows (2w, n) in the path's coordinates and lift (2w, p) of watched points' x and y."""
     system = machine.system
     rows = [system.points[name].free[:2].toarray() for name in names]
@@ -436,9 +432,8 @@ def _restore(machine: Machine, restart: Trajectory, settings: Settings, *, join:
             f"the same records as before (here every {settings.record_every} steps of "
             f"{', '.join(settings.watch) or 'no points'}), or join=False",
         )
-    pairs: list[tuple[Mapping[str, Array] | object, str, str]] = [
-        (machine.fields, name, f"field_{name}") for name in STATE_FIELDS
-    ] + [(machine.state, name, f"state_{name}") for name in machine.state._fields]
+    pairs: list[tuple[Any, str, str]] = [(machine.fields, name, f"field_{name}") for name in STATE_FIELDS]
+    pairs += [(machine.state, name, f"state_{name}") for name in machine.state._fields]
     for target, name, key in pairs:
         array = getattr(target, name)
         if key not in restart.state or restart.state[key].shape != array.shape:
@@ -455,8 +450,17 @@ def _joined(before: Trajectory, after: Trajectory) -> Trajectory:
     together = {
         name: np.concatenate([getattr(before, name), getattr(after, name)])
         for name in (
-            "time", "normal_force", "tangential_force", "slip_speed", "gap", "status", "displacement",
-            "velocity", "acceleration", "kinetic", "elastic",
+            "time",
+            "normal_force",
+            "tangential_force",
+            "slip_speed",
+            "gap",
+            "status",
+            "displacement",
+            "velocity",
+            "acceleration",
+            "kinetic",
+            "elastic",
         )
     }
     works = {name: np.concatenate([before.works[name], after.works[name]]) for name in after.works}

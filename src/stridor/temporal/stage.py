@@ -183,9 +183,7 @@ def _solve_all(
         for c in range(count):
             base = contacts.base[c]
             width = 10 if contacts.kind[c] == _FINITE else 2
-            gap, slip, w_nn, w_nt, w_tt = _local_problem(
-                c, base, width, contacts, compliance, state, scratch
-            )
+            gap, slip, w_nn, w_nt, w_tt = _local_problem(c, base, width, contacts, compliance, state, scratch)
             # Free of this contact's own present forces.
             old_n, old_t = state.normal[c], state.tangential[c]
             gap -= w_nn * old_n + w_nt * old_t
@@ -256,8 +254,13 @@ def _local_problem(
 
 @njit(cache=True, inline="always")
 def contact_stage(
-    k: int, contacts: ContactArrays, scheme: Scheme, forcing: Forcing, compliance: Array,
-    state: LoopState, scratch: Scratch,
+    k: int,
+    contacts: ContactArrays,
+    scheme: Scheme,
+    forcing: Forcing,
+    compliance: Array,
+    state: LoopState,
+    scratch: Scratch,
 ) -> int:  # pragma: no cover - compiled
     """Solve the contacts of step n and bring every row to t_{n+1}; scratch.moved holds d/Δt."""
     rows = state.force.shape[0] - 1
@@ -275,7 +278,12 @@ def contact_stage(
 
 @njit(cache=True, inline="always")
 def accumulate(
-    k: int, contacts: ContactArrays, scheme: Scheme, forcing: Forcing, state: LoopState, scratch: Scratch,
+    k: int,
+    contacts: ContactArrays,
+    scheme: Scheme,
+    forcing: Forcing,
+    state: LoopState,
+    scratch: Scratch,
     loads_at: int,
 ) -> None:  # pragma: no cover - compiled
     """Works [J] over the step with velocities at t_n, and the statistics of the contacts."""

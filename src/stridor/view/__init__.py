@@ -1,1 +1,77 @@
+"""Figures and reports of results. Takes results, computes no physics; matplotlib is loaded at first use.
 
+`from stridor.view import plots` for figures (`plots.root_locus(modes, ax=ax)`), `write_report` for the page.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from . import plots
+    from .inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
+    from .plots import (
+        acceleration_history,
+        contact_force_and_velocity,
+        contact_history,
+        critical_friction_map,
+        damping_branches,
+        energy_plot,
+        frequency_branches,
+        friction_curve,
+        growth_branches,
+        mode_shape,
+        model_plot,
+        perturbation_growth,
+        phase_portrait,
+        root_locus,
+        shapes_side_by_side,
+        spectrogram_plot,
+        spectrum_map,
+        spectrum_plot,
+    )
+    from .report import write_report
+
+__all__ = [
+    "BodyModes",
+    "FrictionCurve",
+    "NamedShape",
+    "ReportInputs",
+    "acceleration_history",
+    "contact_force_and_velocity",
+    "contact_history",
+    "critical_friction_map",
+    "damping_branches",
+    "energy_plot",
+    "frequency_branches",
+    "friction_curve",
+    "growth_branches",
+    "mode_shape",
+    "model_plot",
+    "perturbation_growth",
+    "phase_portrait",
+    "plots",
+    "root_locus",
+    "shapes_side_by_side",
+    "spectrogram_plot",
+    "spectrum_map",
+    "spectrum_plot",
+    "write_report",
+]
+
+_HOME = {"BodyModes": "inputs", "FrictionCurve": "inputs", "NamedShape": "inputs", "ReportInputs": "inputs",
+         "write_report": "report"}
+
+
+def __getattr__(name: str) -> object:
+    """What is asked for, its module loaded only then."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name == "plots":
+        return import_module(".plots", __name__)
+    return getattr(import_module(f".{_HOME.get(name, 'plots')}", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -13,8 +13,9 @@ from matplotlib.lines import Line2D
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..typing import Array, BoolArray
-from .style import BLUE, COLOURS, GREY, INK, VERMILION, panel, styled, zero_line
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, legend_above, panel, styled, zero_line
 
+LINES = (BLUE, GREEN, PURPLE, SKY, ORANGE)  # vermilion is kept for what is unstable
 MU = "friction coefficient μ"
 FEW = 6  # up to so many branches each has its own colour and a name
 MARKED = 40  # unstable points marked along a branch, at most
@@ -30,14 +31,20 @@ def root_locus(modes: ComplexModes, *, max_frequency_hz: float | None = None, ax
     for b in range(len(modes.branch)):
         growth, frequency = modes.growth_rate[:, b], modes.frequency_hz[:, b] / 1e3
         ax.plot(growth, frequency, color="#BBBBBB", linewidth=0.8, zorder=2)
-        scatter = ax.scatter(growth, frequency, c=modes.mu, cmap="viridis", s=7, zorder=3, linewidths=0)
+        scatter = ax.scatter(
+            growth, frequency, c=modes.mu, cmap="viridis", s=9, zorder=3, linewidths=0, rasterized=True
+        )
     ax.axvline(0.0, color=INK, linewidth=0.8, zorder=1.5)
     ax.set(xlabel="growth rate Re λ [1/s]   (right of 0: grows)", ylabel="frequency [kHz]", ylim=(0, top / 1e3))
     shown = modes.frequency_hz <= top
     reach = 1.05 * float(np.abs(modes.growth_rate[shown]).max(initial=1.0))
     # Growth spans decades between modes; the middle stays linear, so that the axis itself is seen crossed.
-    ax.set_xscale("symlog", linthresh=max(reach / 30, 1e-12))
-    ax.set_xlim(-reach, reach)
+    linear = 10.0 ** np.floor(np.log10(max(reach / 30, 1e-9)))
+    ax.set_xscale("symlog", linthresh=linear, linscale=0.6)
+    ticks = [linear * 10**k for k in range(8) if linear * 10**k <= reach]
+    ax.set_xticks([*(-t for t in reversed(ticks)), 0.0, *ticks])
+    ax.minorticks_off()
+    ax.set_xlim(-1.2 * reach, 1.2 * reach)
     if scatter is not None and len(modes.mu) > 1:
         figure.colorbar(scatter, ax=ax, label=MU, pad=0.01)
     return figure
@@ -59,7 +66,7 @@ def frequency_branches(
     few = len(columns) <= FEW
     for place, b in enumerate(columns):
         values, unstable = modes.frequency_hz[:, b] / scale, modes.unstable[:, b]
-        colour = COLOURS[place % len(COLOURS)] if few else BLUE
+        colour = LINES[place % len(LINES)] if few else BLUE
         style = "--" if few and place % 2 else "-"
         label = f"mode {modes.branch[b]}" if few else None
         ax.plot(modes.mu, values, style, color=colour, label=label, linewidth=1.5 if few else 1.1)
@@ -67,9 +74,9 @@ def frequency_branches(
     if onsets is not None:
         for onset in onsets.onsets:
             if (branches is None or set(onset.branches) & set(branches)) and onset.mu <= modes.mu.max():
-                _mark_onset(ax, onset, onset.frequency_hz / scale)
+                _mark_onset(ax, onset, onset.frequency_hz / scale, beside=few)
     if not few:
-        ax.set_ylim(0, 1.02 * _top(modes, max_frequency_hz) / scale)
+        ax.set_ylim(0, _top(modes, max_frequency_hz) / scale)
     _friction_axis(ax, modes)
     ax.set_ylabel(f"frequency [{unit}]")
     _legend(ax, bool(modes.unstable[:, columns].any()), onsets is not None)
@@ -94,7 +101,7 @@ def growth_branches(
     few = len(columns) <= FEW
     factor = -1 / (2 * np.pi) if imaginary_frequency else 1.0
     for place, b in enumerate(columns):
-        colour = COLOURS[place % len(COLOURS)] if few else BLUE
+        colour = LINES[place % len(LINES)] if few else BLUE
         style = "--" if few and place % 2 else "-"
         values = factor * modes.growth_rate[:, b]
         label = f"mode {modes.branch[b]}" if few else None
@@ -117,7 +124,7 @@ def damping_branches(
     figure, ax = panel(ax, 3.5)
     few = len(columns) <= FEW
     for place, b in enumerate(columns):
-        colour = COLOURS[place % len(COLOURS)] if few else BLUE
+        colour = LINES[place % len(LINES)] if few else BLUE
         values = 100 * modes.damping_ratio[:, b]
         label = f"mode {modes.branch[b]}" if few else None
         ax.plot(modes.mu, values, color=colour, label=label, linewidth=1.5 if few else 1.1)
@@ -200,18 +207,18 @@ def _mark_unstable(ax: Axes, mu: Array, values: Array, unstable: BoolArray) -> N
     ax.plot(mu[marked], values[marked], "o", mfc="white", mec=VERMILION, ms=4, mew=1.0, zorder=3.5)
 
 
-def _mark_onset(ax: Axes, onset: Onset, y: float, x: float | None = None) -> None:
-    """A diamond at an onset, its μ and frequency beside it."""
+def _mark_onset(ax: Axes, onset: Onset, y: float, x: float | None = None, *, beside: bool = False) -> None:
+    """A diamond at an onset, its μ and frequency above it or, where branches come down there, below right."""
     at = (onset.mu if x is None else x, y)
     ax.plot(*at, "D", color=INK, ms=4.5, zorder=4)
     ax.annotate(
         f"μ = {onset.mu:.4f}\n{onset.frequency_hz:.0f} Hz",
         at,
-        xytext=(0, 7),
+        xytext=(8, -8) if beside else (0, 7),
         textcoords="offset points",
-        ha="center",
-        va="bottom",
-        fontsize=7.5,
+        ha="left" if beside else "center",
+        va="top" if beside else "bottom",
+        fontsize=8,
         zorder=5,
         bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85},
     )
@@ -225,12 +232,20 @@ def _legend(ax: Axes, unstable: bool, onsets: bool) -> None:
         )
     if onsets:
         handles.append(Line2D([], [], color=INK, marker="D", ms=4.5, linestyle="none", label="onset, solved"))
-    if handles:
-        ax.legend(handles=handles, loc="best")
+    legend_above(ax, handles)
 
 
 def _pieces(values: Array, low: float, high: float) -> list[slice]:
-    """Stretches of a curve inside a band, one point beyond at each end so that lines leave the frame."""
-    inside = np.isfinite(values) & (values >= low) & (values <= high)
+    """Stretches of a curve inside a band, with the points just beyond so that lines leave the frame.
+
+    From a pole the curve comes back with the other sign: those two points are never joined.
+    """
+    with np.errstate(invalid="ignore"):
+        inside = np.isfinite(values) & (values >= low) & (values <= high)
+        steady = np.abs(np.diff(np.sign(values - (low + high) / 2))) < 1
+    before, after = np.roll(inside, -1), np.roll(inside, 1)
+    before[-1] = after[0] = False
+    beyond = (before & np.append(steady, False)) | (after & np.insert(steady, 0, False))
+    inside = inside | (beyond & np.isfinite(values))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

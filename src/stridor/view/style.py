@@ -8,6 +8,7 @@ from typing import ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -59,6 +60,7 @@ STYLE: dict[str, object] = {
     "legend.framealpha": 0.92,
     "legend.edgecolor": "none",
     "svg.fonttype": "path",  # letters as outlines: looks the same without the font
+    "savefig.dpi": 160,
     "svg.hashsalt": "stridor",  # equal results give equal files
     "agg.path.chunksize": 20000,
 }
@@ -109,6 +111,13 @@ def root_figure(ax: Axes) -> Figure:
     figure = ax.get_figure(root=True)
     assert figure is not None, "axes that were removed from their figure"
     return figure
+
+
+def legend_above(ax: Axes, handles: Sequence[Artist] | None = None, *, columns: int = 4) -> None:
+    """A legend above the frame, where it hides nothing."""
+    shown = ax.get_legend_handles_labels()[0] if handles is None else list(handles)
+    if shown:
+        ax.legend(handles=shown, loc="lower left", bbox_to_anchor=(0, 1.0), ncols=columns, borderaxespad=0.2)
 
 
 def zero_line(ax: Axes) -> None:

@@ -13,8 +13,8 @@ import numpy as np
 import scipy.linalg as sl
 
 from ..errors import AnalysisError
-from ..system import System
 from ..typing import Array, ComplexArray, IntArray
+from .model import System
 
 PROPORTIONAL_TOLERANCE = 1e-9
 DENSE_LIMIT = 6000
@@ -88,8 +88,7 @@ def uncoupled_modes(system: System) -> UncoupledModes:
     for part in system.components:
         if len(part) > DENSE_LIMIT:
             raise AnalysisError(
-                f"a component of {len(part)} freedoms is too large for a complete modal basis "
-                f"(limit {DENSE_LIMIT})"
+                f"a component of {len(part)} freedoms is too large for a complete modal basis (limit {DENSE_LIMIT})"
             )
         m, c, k = (a[part][:, part].toarray() for a in (mass, damping, stiffness))
         block = _solve_block(part, m, c, k)
@@ -104,9 +103,7 @@ def _solve_block(part: IntArray, m: Array, c: Array, k: Array) -> RealBlock | Co
     try:
         _, vectors = sl.eigh(k, m)
     except sl.LinAlgError as error:
-        raise AnalysisError(
-            "the mass matrix is not positive definite: a freedom has stiffness but no mass"
-        ) from error
+        raise AnalysisError("the mass matrix is not positive definite: a freedom has stiffness but no mass") from error
     # Rayleigh quotients carry the small eigenvalues to more digits than the dense solver does:
     # its error is relative to the largest one (docs/theory-modal.md).
     masses = np.einsum("ij,ij->j", vectors, m @ vectors)

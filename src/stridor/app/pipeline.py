@@ -1,0 +1,165 @@
+"""`stridor run`: every analysis of a case, its files, its report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..agreement import modal_assurance
+from ..case import Case
+from ..io.atomic import write_text
+from ..io.datasets import save
+from ..sliding import steady_sliding
+from ..study import analyses
+from ..study.everything import Everything, compute_everything
+from ..study.provenance import versions
+from ..temporal.signals import spectrogram, spectrum
+from ..temporal.simulate import Progress
+from ..view.inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
+from ..view.report import write_report
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run left: where the report and the files are, everything computed, one verdict."""
+
+    report: Path
+    files: tuple[Path, ...]
+    everything: Everything
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the simulation was cut short."""
+        return self.everything.run.interrupted
+
+    @property
+    def verdict(self) -> str:
+        """One sentence."""
+        agreement = self.everything.agreement
+        if agreement is not None:
+            return agreement.verdict
+        first = self.everything.onsets_damped.first
+        if first is None:
+            return "no onset in range"
+        return f"modal onset at μ = {first.mu:.5f}, {first.frequency_hz:.1f} Hz; no comparison was made"
+
+    def to_json(self) -> dict[str, Any]:
+        """The documents of all verbs under their names, and where the report is."""
+        e = self.everything
+        return {
+            "verdict": self.verdict,
+            "report": str(self.report),
+            "files": [str(f) for f in self.files],
+            "check": e.description.to_json(),
+            "modes": analyses.modes(e.case).to_json(),
+            "onsets": e.onsets_damped.to_json(),
+            "simulate": e.summary.to_json(),
+            "compare": None if e.agreement is None else e.agreement.to_json(),
+            "seconds": dict(e.seconds),
+            "notes": list(e.notes),
+        }
+
+
+def run(
+    case: Case,
+    folder: str | Path,
+    *,
+    progress: Progress | None = None,
+    log: Callable[[str], None] | None = None,
+) -> Outcome:
+    """Compute everything, keep each result as soon as it is there, write the report into ``folder``."""
+    target = Path(folder)
+    files: list[Path] = []
+
+    def keep(name: str, result: Any) -> None:
+        files.append(save(result, target / f"{name}.nc"))
+
+    write_text(target / "case.toml", case.text)
+    everything = compute_everything(case, progress=progress, log=log, keep=keep)
+    if log is not None:
+        log("report")
+    report = write_report(report_inputs(everything), target)
+    return Outcome(report, tuple(files), everything)
+
+
+def report_inputs(e: Everything) -> ReportInputs:
+    """Everything, sorted into what the report takes."""
+    own = {c.friction.coefficient for c in e.case.contacts.values()}
+    mu = own.pop() if len(own) == 1 else None
+    agreement = e.agreement
+    steady = steady_sliding(e.system) if e.system.contacts and e.system.loads else None
+    shapes = _shapes(e)
+    return ReportInputs(
+        case=e.case,
+        system=e.system,
+        mu=mu,
+        steady=steady,
+        modes=None if mu is None else analyses.modes(e.case, mu, max_frequency_hz=e.case.modal.max_frequency_hz),
+        undamped_sweep=e.sweep_undamped,
+        damped_sweep=e.sweep_damped,
+        undamped_pair=e.zoom_undamped,
+        damped_pair=e.zoom_damped,
+        body_modes={name: BodyModes(b.frequency_hz, b.labels) for name, b in e.bodies.items()},
+        coupled_hz=np.sort(e.coupled.frequency_hz[0]),
+        undamped_onsets=e.onsets_undamped,
+        damped_onsets=e.onsets_damped,
+        curve=None if e.curve is None else FrictionCurve(mu=e.curve[1], frequency_hz=e.curve[0]),
+        trajectory=e.run,
+        energy=e.summary.energy,
+        **_signals(e),
+        **shapes,
+        agreement=agreement,
+        values=_values(e),
+        timings=e.seconds,
+        versions=versions(),
+        case_text=e.case.text,
+        created=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
+        warnings=e.description.warnings,
+        notes=e.notes,
+    )
+
+
+def _signals(e: Everything) -> dict[str, Any]:
+    """Spectra of the accelerations along x and the spectrogram of a velocity, from the last phase."""
+    run = e.run
+    part = run.phase_slice()
+    start, stop = part.start, part.stop
+    if stop - start < 64 or not run.watch_names:
+        return {}
+    half = slice((start + stop) // 2, stop)
+    spectra = {name: spectrum(run.acceleration[half, k, 0], run.sampling) for k, name in enumerate(run.watch_names)}
+    limit = e.case.modal.max_frequency_hz
+    # Six samples per period of the highest frequency shown are plenty for a picture.
+    every = max(1, int(1.0 / (6 * limit * run.sampling)))
+    picture = spectrogram(run.velocity[part, 0, 0][::every], run.sampling * every, resolution_hz=limit / 100)
+    return {"spectra": spectra, "spectrogram": picture, "spectrogram_start": float(run.time[start])}
+
+
+def _shapes(e: Everything) -> dict[str, Any]:
+    if e.operating is None or e.shape is None or e.shape_mode is None:
+        return {}
+    by_body = {name: modal_assurance(e.operating[name], e.shape[name]) for name in e.operating}
+    dominant = e.summary.dominant_frequency_hz or 0.0
+    return {
+        "operating_shape": NamedShape(dominant, e.operating),
+        "unstable_shape": NamedShape(e.shape_mode.imag / (2 * np.pi), e.shape, e.shape_mode.real),
+        "mac_by_body": by_body,
+    }
+
+
+def _values(e: Everything) -> dict[str, float]:
+    """Computed values by the names that a case's reference values may carry."""
+    values: dict[str, float] = {}
+    if e.summary.dominant_frequency_hz is not None:
+        values["dominant_frequency_hz"] = e.summary.dominant_frequency_hz
+    regimes = analyses.first_regime(e.run)
+    for name in ("max_normal_force", "max_slip_speed"):
+        found = [value for regime in regimes.values() if (value := regime[name]) is not None]
+        if found:
+            values[name] = max(found)
+    return values

@@ -1,0 +1,186 @@
+"""Every analysis of a case in one go: what the report shows and what the files keep."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+
+from ..agreement import Agreement, mode_shape
+from ..case import Case
+from ..errors import AnalysisError
+from ..modal.complex_modes import ComplexModes
+from ..modal.onsets import Onsets
+from ..system import System, build_system
+from ..temporal.shapes import operating_shape
+from ..temporal.simulate import Progress
+from ..temporal.trajectory import Trajectory
+from ..typing import Array, ComplexArray
+from . import analyses
+from .analyses import BodyModes, Description, RunSummary
+
+T = TypeVar("T")
+Log = Callable[[str], None]
+CURVE_POINTS = 8001
+ZOOM = 2.5  # the sweep around the first onset reaches this many times its μ
+
+
+@dataclass(frozen=True)
+class Everything:
+    """Results of all analyses of one case; None where an analysis was not possible (see notes).
+
+    sweeps run over the whole friction range, zooms around the first onset. curve: frequency_hz and μ(ω) of the
+    undamped receptance. operating: velocity shape of the run at its dominant frequency by body (k, 2);
+    shape: that of the mode to compare with, and shape_mode its λ. seconds by analysis.
+    """
+
+    case: Case
+    system: System
+    description: Description
+    bodies: Mapping[str, BodyModes]
+    coupled: ComplexModes
+    sweep_undamped: ComplexModes
+    sweep_damped: ComplexModes
+    zoom_undamped: ComplexModes | None
+    zoom_damped: ComplexModes | None
+    onsets_undamped: Onsets
+    onsets_damped: Onsets
+    curve: tuple[Array, Array] | None
+    run: Trajectory
+    summary: RunSummary
+    operating: Mapping[str, ComplexArray] | None
+    shape: Mapping[str, ComplexArray] | None
+    shape_mode: complex | None
+    agreement: Agreement | None
+    seconds: Mapping[str, float]
+    notes: tuple[str, ...] = field(default=())
+
+
+class _Clock:
+    """Times of the parts."""
+
+    def __init__(self, log: Log) -> None:
+        self.log = log
+        self.seconds: dict[str, float] = {}
+
+    def __call__(self, name: str, call: Callable[[], T]) -> T:
+        self.log(name)
+        started = time.perf_counter()
+        try:
+            return call()
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - started
+
+
+def compute_everything(
+    case: Case,
+    *,
+    progress: Progress | None = None,
+    log: Log | None = None,
+    keep: Callable[[str, object], None] | None = None,
+) -> Everything:
+    """Modes, onsets, the full run, the comparison. keep(name, result) is called as soon as each is there, so
+    that nothing computed is lost by what comes after it. Raises what the analyses raise."""
+    clock = _Clock(log or _silent)
+    keep = keep or _keep_nothing
+    system = build_system(case)
+    description = analyses.describe(case)
+    limit = case.modal.max_frequency_hz
+    mus = np.linspace(*case.modal.friction_range, case.modal.sweep_points)
+    bodies = analyses.body_modes(case)
+    coupled = clock("modes", lambda: analyses.modes(case, 0.0, max_frequency_hz=limit, damped=False))
+    bare = clock("modes", lambda: analyses.modes(case, mus, max_frequency_hz=limit, damped=False))
+    damped = clock("modes", lambda: analyses.modes(case, mus, max_frequency_hz=limit, damped=True))
+    keep("modes", damped)
+    onsets_bare = clock("onsets", lambda: analyses.onsets(case, damped=False))
+    onsets_damped = clock("onsets", lambda: analyses.onsets(case, damped=True))
+    keep("onsets", onsets_damped)
+    zooms = clock("modes", lambda: _zooms(case, onsets_bare))
+    curve = clock("onsets", lambda: _curve(case))
+    run = clock("simulate", lambda: analyses.simulate(case, progress=progress))
+    keep("simulate", run)
+    summary = analyses.summarise(case, run)
+    agreement, notes = None, list[str]()
+    operating = shape = shape_mode = None
+    if not run.interrupted:
+        try:
+            agreement = clock("compare", lambda: _compare(case, run, clock.log))
+            keep("compare", agreement)
+        except AnalysisError as error:
+            notes.append(f"no comparison: {error}")
+        operating, shape, shape_mode = clock("compare", lambda: _shapes(case, system, run, summary))
+    return Everything(
+        case=case,
+        system=system,
+        description=description,
+        bodies=bodies,
+        coupled=coupled,
+        sweep_undamped=bare,
+        sweep_damped=damped,
+        zoom_undamped=zooms[0],
+        zoom_damped=zooms[1],
+        onsets_undamped=onsets_bare,
+        onsets_damped=onsets_damped,
+        curve=curve,
+        run=run,
+        summary=summary,
+        operating=operating,
+        shape=shape,
+        shape_mode=shape_mode,
+        agreement=agreement,
+        seconds=clock.seconds,
+        notes=tuple(notes),
+    )
+
+
+def _silent(text: str) -> None:
+    """Say nothing."""
+    del text
+
+
+def _keep_nothing(name: str, result: object) -> None:
+    """Leave results in memory alone."""
+    del name, result
+
+
+def _zooms(case: Case, found: Onsets) -> tuple[ComplexModes | None, ComplexModes | None]:
+    """Fine sweeps from 0 past the first onset, without and with damping."""
+    if found.first is None:
+        return None, None
+    mus = np.linspace(0.0, ZOOM * found.first.mu, 251)
+    limit = case.modal.max_frequency_hz
+    bare, damped = (analyses.modes(case, mus, max_frequency_hz=limit, damped=d) for d in (False, True))
+    return bare, damped
+
+
+def _curve(case: Case) -> tuple[Array, Array] | None:
+    if len(case.contacts) != 1:
+        return None
+    frequency = np.linspace(0.0, case.modal.max_frequency_hz, CURVE_POINTS)[1:]
+    return frequency, analyses.friction_curve(case, frequency)
+
+
+def _compare(case: Case, run: Trajectory, log: Log) -> Agreement:
+    own = {c.friction.coefficient for c in case.contacts.values()}
+    runs = {own.pop(): run} if len(own) == 1 else {}
+    return analyses.compare(case, runs=runs, progress=log)
+
+
+def _shapes(
+    case: Case, system: System, run: Trajectory, summary: RunSummary
+) -> tuple[Mapping[str, ComplexArray] | None, Mapping[str, ComplexArray] | None, complex | None]:
+    """Velocity shape of the run at its dominant frequency, and the mode to hold it against."""
+    frequency = summary.dominant_frequency_hz
+    if frequency is None or frequency <= 0:
+        return None, None, None
+    operating = operating_shape(system, analyses.phases_of(case), analyses.settings_of(case), run, frequency)
+    modes = analyses.modes(case, max_frequency_hz=case.modal.max_frequency_hz, vectors=True)
+    assert modes.right is not None
+    candidates = np.flatnonzero(modes.unstable[0])
+    if not len(candidates):
+        candidates = np.arange(len(modes.branch))
+    nearest = candidates[int(np.argmin(np.abs(modes.frequency_hz[0][candidates] - frequency)))]
+    return operating, mode_shape(system, modes.right[0, nearest]), complex(modes.eigenvalues[0, nearest])

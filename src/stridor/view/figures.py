@@ -1,0 +1,299 @@
+"""The figures of a report, each with its title, caption and a text for who cannot see it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from ..modal.complex_modes import ComplexModes
+from ..modal.onsets import Onset
+from . import plots
+from .inputs import ReportInputs
+from .windows import Window
+
+
+@dataclass(frozen=True)
+class ReportFigure:
+    """A figure: name (its file and anchor), title, caption, alternative text, the drawing."""
+
+    name: str
+    title: str
+    caption: str
+    alt: str
+    figure: Figure
+
+
+def model_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
+    """The model as it stands."""
+    if inputs.system is not None and inputs.system.lines:
+        yield ReportFigure(
+            "model", "The model",
+            "Bodies as lines, supports as squares with the directions they hold (φ: rotation), contacts as circles, "
+            "loads and prescribed velocities as arrows, watched points as small circles.",
+            f"Drawing of {', '.join(line.name for line in inputs.system.lines)} with supports, loads and contacts.",
+            plots.model_plot(inputs.system, inputs.case),
+        )
+
+
+def first_onset(inputs: ReportInputs) -> Onset | None:
+    """The onset whose pair of modes the report follows: the first one without damping, else with."""
+    for onsets in (inputs.undamped_onsets, inputs.damped_onsets):
+        if onsets is not None and onsets.first is not None:
+            return onsets.first
+    return None
+
+
+def modal_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
+    """Branches over friction, the pair that meets first, the friction curve, the root locus."""
+    onset = first_onset(inputs)
+    undamped = inputs.undamped_pair or inputs.undamped_sweep
+    damped = inputs.damped_pair or inputs.damped_sweep
+    if onset is not None and onset.kind == "flutter":
+        if undamped is not None and _holds(undamped, onset):
+            yield from _undamped_pair(inputs, undamped, onset)
+        if damped is not None and _holds(damped, onset):
+            yield from _damped_pair(inputs, damped, onset)
+    yield from _all_branches(inputs)
+    if inputs.curve is not None and len(inputs.curve.mu) > 1:
+        yield ReportFigure(
+            "friction-curve", "Friction over frequency",
+            "μ(ω) = −s (1/Kc + Gnn(ω)) / Gnt(ω), from the receptances of the structure without contact and damping. "
+            "Any horizontal line cuts the curve at the frequencies that exist at that friction coefficient; at a "
+            "maximum two of them meet and become complex: all onsets of flutter are maxima of one explicit curve. "
+            "Diamonds: the onsets, solved on the assembled matrices.",
+            "Friction coefficient over frequency with its local maxima marked as onsets of instability.",
+            plots.friction_curve(
+                inputs.curve.mu, inputs.curve.frequency_hz, onsets=inputs.undamped_onsets, case_mu=inputs.mu,
+                friction_range=inputs.case.modal.friction_range,
+            ),
+        )
+
+
+def _holds(modes: ComplexModes, onset: Onset) -> bool:
+    return set(onset.branches) <= {int(b) for b in modes.branch} and len(modes.mu) > 1
+
+
+def _undamped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> Iterator[ReportFigure]:
+    a, b = onset.branches
+    onsets = inputs.undamped_onsets
+    yield ReportFigure(
+        "frequency-pair", f"Frequencies of modes {a} and {b}, without damping",
+        f"The two modes come together as friction grows and meet at μ = {onset.mu:.5f}, {onset.frequency_hz:.1f} Hz; "
+        "beyond it they share one frequency and one of them grows (marked).",
+        f"Frequencies of modes {a} and {b} over friction, merging at {onset.mu:.4f}.",
+        plots.frequency_branches(modes, onset.branches, onsets=onsets),
+    )
+    yield ReportFigure(
+        "imaginary-pair", f"Imaginary part of the frequencies of modes {a} and {b}, without damping",
+        "For motion written as exp(jωt), a negative imaginary part of ω grows: Im ω = −Re λ. Below the onset both are "
+        "real; beyond it the pair opens as the square root of μ − μc.",
+        f"Imaginary parts of modes {a} and {b}, zero up to {onset.mu:.4f}, then opening like a square root.",
+        plots.growth_branches(modes, onset.branches, imaginary_frequency=True),
+    )
+
+
+def _damped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> Iterator[ReportFigure]:
+    a, b = onset.branches
+    crossing = next((o for o in _damped(inputs) if set(o.branches) == {a, b}), None)
+    where = f" Growth begins at μ = {crossing.mu:.5f}, at {crossing.frequency_hz:.1f} Hz." if crossing else ""
+    yield ReportFigure(
+        "damped-frequency-pair", f"Frequencies of modes {a} and {b}, with structural damping",
+        "Im λ/2π of the damped pair: the frequencies come close without being exactly equal." + where,
+        f"Damped frequencies of modes {a} and {b} over friction.",
+        plots.frequency_branches(modes, onset.branches, onsets=inputs.damped_onsets),
+    )
+    yield ReportFigure(
+        "damped-growth-pair", f"Growth rates of modes {a} and {b}, with structural damping",
+        "Re λ of the damped pair; positive grows. Damping shifts both downwards, and so the onset to a slightly "
+        "larger friction coefficient." + where,
+        f"Growth rates of modes {a} and {b} over friction, one becoming positive.",
+        plots.growth_branches(modes, onset.branches),
+    )
+
+
+def _damped(inputs: ReportInputs) -> tuple[Onset, ...]:
+    return inputs.damped_onsets.onsets if inputs.damped_onsets is not None else ()
+
+
+def _all_branches(inputs: ReportInputs) -> Iterator[ReportFigure]:
+    for modes, onsets, name, words in (
+        (inputs.undamped_sweep, inputs.undamped_onsets, "frequencies", "without damping"),
+        (inputs.damped_sweep, inputs.damped_onsets, "frequencies-damped", "with structural damping"),
+    ):
+        if modes is None or len(modes.mu) < 2 or (name == "frequencies-damped" and inputs.undamped_sweep is not None):
+            continue
+        shown = int((modes.frequency_hz.min(axis=0) <= inputs.max_frequency_hz).sum())
+        yield ReportFigure(
+            name, f"The first {shown} frequencies over friction, {words}",
+            "Every line is one mode, followed from μ = 0 through crossings and coalescences. Circles: potentially "
+            "unstable (the mode grows). Diamonds: onsets, solved.",
+            f"Frequencies of {shown} modes over the friction coefficient with unstable stretches marked.",
+            plots.frequency_branches(modes, onsets=onsets, max_frequency_hz=inputs.max_frequency_hz),
+        )
+    if inputs.damped_sweep is not None and len(inputs.damped_sweep.mu) > 1:
+        yield ReportFigure(
+            "root-locus", "Root locus",
+            "Eigenvalues as friction grows, with structural damping. The horizontal axis is linear near zero and "
+            "logarithmic beyond.",
+            "Eigenvalues in the plane of growth rate and frequency, coloured by friction coefficient.",
+            plots.root_locus(inputs.damped_sweep, max_frequency_hz=inputs.max_frequency_hz),
+        )
+
+
+def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[ReportFigure]:
+    """Histories, spectra, the contact, energies."""
+    run = inputs.trajectory
+    if run is not None and run.watch_names and len(run.time) > 1:
+        yield ReportFigure(
+            "acceleration", f"Acceleration of {run.watch_names[0]}",
+            f"Along x, over the whole run. The dark band is what lies below {inputs.max_frequency_hz / 1e3:g} kHz, the "
+            "light one everything the time step resolves, impacts included. Dotted lines: where phases begin.",
+            f"Acceleration of {run.watch_names[0]} over time with the phases of the run marked.",
+            plots.acceleration_history(run, max_frequency_hz=inputs.max_frequency_hz),
+        )
+    if run is not None and run.contact_names and len(run.time) > 1:
+        for k, name in enumerate(run.contact_names):
+            yield ReportFigure(
+                f"contact-{name}", f"Contact {name} over the whole run",
+                "Normal force and slip velocity of the slave against the master, extrema of every short piece.",
+                f"Normal force and slip velocity of contact {name} over time.",
+                plots.contact_history(run, contact=k),
+            )
+    yield from _spectra(inputs)
+    if run is not None and window is not None:
+        yield from _contact_window(inputs, window)
+    if run is not None and inputs.energy is not None and len(run.time) > 1:
+        yield ReportFigure(
+            "energy", "Energy balance",
+            "Above: what was put in, what is stored and what was taken out. Below: what is missing in the balance, "
+            "relative to the largest energy that changed hands.",
+            "Energies over time, and the imbalance of the energy balance.",
+            plots.energy_plot(run, inputs.energy),
+        )
+
+
+def _spectra(inputs: ReportInputs) -> Iterator[ReportFigure]:
+    if inputs.spectra:
+        spec = next(iter(inputs.spectra.values()))
+        yield ReportFigure(
+            "spectrum", f"Spectrum of {inputs.spectra_of.split(' over ')[0]}",
+            f"Of {inputs.spectra_of}; {spec.window} window, bins every {spec.resolution_hz:.1f} Hz, a line is "
+            f"{spec.bandwidth_hz:.1f} Hz wide at −6 dB. In dB of the amplitude, 0 dB is 1 {inputs.spectra_unit}. Dotted: "
+            "the dominant frequency and its multiples.",
+            f"Amplitude spectra of {', '.join(inputs.spectra)}.",
+            plots.spectrum_plot(
+                inputs.spectra, max_frequency_hz=inputs.max_frequency_hz, unit=inputs.spectra_unit,
+                marked_hz=inputs.dominant_hz,
+            ),
+        )
+    if inputs.spectrogram is not None and inputs.spectrogram.amplitude.size > 1:
+        content = inputs.spectrogram
+        yield ReportFigure(
+            "spectrogram", "Spectrogram",
+            f"Of the {inputs.spectrogram_of}; resolution {content.resolution_hz:.0f} Hz. How the tone builds up, and "
+            "its multiples with it.",
+            "Spectrum over time as a colour map.",
+            plots.spectrogram_plot(
+                content, start=inputs.spectrogram_start, max_frequency_hz=inputs.max_frequency_hz,
+                unit=inputs.spectrogram_unit,
+            ),
+        )
+
+
+def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigure]:
+    run, system = inputs.trajectory, inputs.system
+    assert run is not None, "asked for with a run only"
+    name = run.contact_names[0]
+    slave = inputs.case.contacts[name].slave if name in inputs.case.contacts else ""
+    contact = next((c for c in system.contacts if c.name == name), None) if system is not None else None
+    steady = float(inputs.steady.normal_force[0]) if inputs.steady is not None else None
+    shares = [f"{100 * window.stick_fraction:.0f} % stick"]
+    if window.separation_fraction:
+        shares.append(f"{100 * window.separation_fraction:.0f} % separation")
+    caption = (
+        f"Contact {name} over three periods ({window.reason}): normal force up to {window.max_normal_force:.1f} N, slip "
+        f"speed up to {window.max_slip_speed:.3f} m/s, {', '.join(shares)}. Where it sticks, slave and master move "
+        "together, though not evenly: both vibrate."
+    )
+    yield ReportFigure(
+        "contact-window", "Normal force and velocities over three periods", caption,
+        f"Normal force and tangential velocities of contact {name} over three periods; stick and slip shaded.",
+        plots.contact_force_and_velocity(
+            run, window, slave=slave if slave in run.watch_names else None,
+            tangent=(1.0, 0.0) if contact is None else (float(contact.tangent[0]), float(contact.tangent[1])),
+            steady_force=steady,
+        ),
+    )
+    yield ReportFigure(
+        "portrait", "Normal force over slip velocity",
+        "The same three periods. On the vertical line at zero the contact sticks.",
+        f"Closed loops of normal force over slip velocity of contact {name}.",
+        plots.phase_portrait(run, window),
+    )
+
+
+def agreement_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
+    """Components in time over the modes, growth of the perturbation, both shapes."""
+    comparisons = inputs.agreement.comparisons if inputs.agreement is not None else ()
+    chosen = next((c for c in comparisons if inputs.mu is None or abs(c.mu - inputs.mu) < 1e-12), None)
+    if chosen is not None:
+        top = inputs.max_frequency_hz
+        if inputs.modes is not None and len(chosen.perturbation.components.eigenvalues):
+            yield ReportFigure(
+                "spectrum-map", "What the time signal is made of",
+                f"Growth rate over frequency at μ = {chosen.mu:g}. Circles: complex modes. Crosses: damped exponentials "
+                "found in the slip speed of a small perturbation, marched in time. Every cross inside a circle is a mode "
+                "that both approaches see alike.",
+                "Complex modes and identified components in the plane of frequency and growth rate.",
+                plots.spectrum_map(inputs.modes, chosen.perturbation.components, mu=chosen.mu, max_frequency_hz=top),
+            )
+        if len(chosen.perturbation.signal) > 1:
+            yield ReportFigure(
+                "perturbation", "Growth of a small perturbation",
+                f"Slip speed minus its steady value at μ = {chosen.mu:g}, up to where friction stays linear. The dashed line "
+                f"has the slope of the modal growth rate. Grey: what lies above {top / 1e3:g} kHz, out of the range compared, "
+                "may grow as well.",
+                "Size of the perturbation over time on a logarithmic scale beside the modal growth rate.",
+                plots.perturbation_growth(
+                    chosen.perturbation, modal_growth_rate=chosen.modal_eigenvalue.real, max_frequency_hz=top
+                ),
+            )
+    yield from _shape_figures(inputs)
+
+
+def _shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
+    system, operating, mode = inputs.system, inputs.operating_shape, inputs.unstable_shape
+    if system is None:
+        return
+    if operating is not None:
+        yield ReportFigure(
+            "operating-shape", f"Velocity of the bodies at {operating.frequency_hz:.0f} Hz, in time",
+            "The line at the dominant frequency taken out of the velocity of every node. Arrows: velocities; thin lines: a "
+            "quarter of a period later; dotted: at rest.",
+            f"Velocity shape of the bodies at {operating.frequency_hz:.0f} Hz from the run in time.",
+            plots.mode_shape(system, operating.shape, velocity=True),
+        )
+    if mode is not None:
+        growth = f", growth rate {mode.growth_rate:.0f} 1/s" if mode.growth_rate is not None else ""
+        yield ReportFigure(
+            "unstable-mode", f"The mode at {mode.frequency_hz:.0f} Hz",
+            f"Displacements{growth}, drawn where the motion is largest and, thin, a quarter of a period later: the mode is "
+            "complex, the bodies do not move in phase.",
+            f"Deformed bodies in the mode at {mode.frequency_hz:.0f} Hz.",
+            plots.mode_shape(system, mode.shape),
+        )
+    if operating is not None and mode is not None:
+        by_body = ", ".join(f"{name} {value:.2f}" for name, value in inputs.mac_by_body.items())
+        extra = f" Likeness (MAC) by body: {by_body}." if by_body else ""
+        yield ReportFigure(
+            "shapes", "Both shapes side by side",
+            "Left the velocities of the run, right the mode, turned to agree in sign." + extra,
+            "Operating shape of the run beside the unstable mode.",
+            plots.shapes_side_by_side(
+                system,
+                [(f"run, {operating.frequency_hz:.0f} Hz", operating.shape, True),
+                 (f"mode, {mode.frequency_hz:.0f} Hz", mode.shape, False)],
+            ),
+        )

@@ -1,0 +1,220 @@
+"""Tables of frequencies, onsets and modes, computed beside printed where the case has a reference."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..case.schema import ReferenceFrequency, ReferenceOnset
+from ..modal.complex_modes import ComplexModes
+from ..modal.onsets import Onset, Onsets
+from ..typing import Array
+from .inputs import BodyModes, ReportInputs
+from .tables import (
+    Row,
+    Table,
+    difference,
+    drop_empty,
+    is_far,
+    number,
+    paired,
+    percent,
+    same_as_printed,
+    significant,
+)
+
+SAME_ONSET = 0.05  # relative distance of frequencies within which a printed onset is the computed one
+PRINTED = "Differences beyond 0.5 % are marked with ▲."
+
+
+def frequency_tables(inputs: ReportInputs) -> list[Table]:
+    """Frequencies of each body alone and of all in contact without friction."""
+    reference = inputs.case.reference
+    tables = [
+        body_table(name, modes, reference.bodies.get(name, ()) if reference else ())
+        for name, modes in inputs.body_modes.items()
+    ]
+    if inputs.coupled_hz is not None:
+        printed = reference.coupled if reference else ()
+        tables.append(coupled_table(inputs.coupled_hz, printed, inputs.undamped_onsets))
+    return tables
+
+
+def body_table(name: str, modes: BodyModes, printed: tuple[ReferenceFrequency, ...]) -> Table:
+    """Natural frequencies of one body, beside the printed ones."""
+    rows: list[Row] = []
+    for i, j in paired(modes.frequency_hz, [p.frequency_hz for p in printed]):
+        label = modes.labels[i] if i is not None and i < len(modes.labels) else ""
+        other = printed[j] if j is not None else None
+        if other is not None and other.label and label and other.label != label:
+            label = f"{label} (printed {other.label})"
+        elif not label and other is not None:
+            label = other.label
+        computed = float(modes.frequency_hz[i]) if i is not None else None
+        rows.append(_frequency_row((label,), computed, other, bool(printed)))
+    heads = ("mode", "computed [Hz]", "printed [Hz]", "difference", "note")
+    caption = "F: bending, T: traction."
+    if printed:
+        caption += " " + PRINTED
+    return drop_empty(
+        Table(f"frequencies-{name}", f"{name} alone", heads, tuple(rows), frozenset({0, 4}), caption)
+    )
+
+
+def coupled_table(frequencies: Array, printed: tuple[ReferenceFrequency, ...], onsets: Onsets | None) -> Table:
+    """Frequencies in contact without friction; which of them meet where."""
+    meets: dict[int, str] = {}
+    for onset in reversed(onsets.onsets if onsets is not None else ()):
+        for branch in onset.branches:
+            meets[branch] = f"μ = {onset.mu:.4f}, {onset.frequency_hz:.0f} Hz"
+    rows: list[Row] = []
+    for i, j in paired(frequencies, [p.frequency_hz for p in printed]):
+        first = (str(i + 1) if i is not None else "", meets.get(i + 1, "") if i is not None else "")
+        computed = float(frequencies[i]) if i is not None else None
+        rows.append(_frequency_row(first, computed, printed[j] if j is not None else None, bool(printed)))
+    # The place of a mode first, the meeting point after the numbers.
+    moved = tuple(Row((r.cells[0], *r.cells[2:5], r.cells[1], r.cells[5]), r.kind) for r in rows)
+    heads = ("mode", "computed [Hz]", "printed [Hz]", "difference", "meets another at", "note")
+    caption = f"Undamped, friction coefficient zero. {PRINTED if printed else ''}".strip()
+    return drop_empty(
+        Table("frequencies-coupled", "In contact, without friction", heads, moved, frozenset({4, 5}), caption)
+    )
+
+
+def _frequency_row(
+    first: tuple[str, ...], computed: float | None, printed: ReferenceFrequency | None, compared: bool
+) -> Row:
+    if printed is None:
+        note = "not printed in the source" if compared else ""
+        return Row((*first, number(computed, 1), "", "", note), "new" if compared else "")
+    fraction = difference(computed, printed.frequency_hz) if computed is not None else None
+    mark = " ▲" if is_far(fraction) else ""
+    note = printed.note if computed is not None else "; ".join(filter(None, [printed.note, "not computed"]))
+    cells = (number(computed, 1), significant(printed.frequency_hz, 8), percent(fraction) + mark, note)
+    return Row((*first, *cells), "far" if mark or computed is None else "")
+
+
+def onset_tables(inputs: ReportInputs) -> list[Table]:
+    """Onsets beside printed ones, and how well each is solved."""
+    tables: list[Table] = []
+    printed = inputs.case.reference.onsets if inputs.case.reference else ()
+    for onsets, name in ((inputs.undamped_onsets, "undamped"), (inputs.damped_onsets, "damped")):
+        if onsets is None:
+            continue
+        if not onsets.onsets:
+            continue
+        tables.append(_onsets(onsets, name, printed))
+    solved = [onset for o in (inputs.undamped_onsets, inputs.damped_onsets) if o is not None for onset in o.onsets]
+    if solved:
+        tables.append(_solutions(solved))
+    return tables
+
+
+def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> Table:
+    rows: list[Row] = []
+    partners = _onset_partners(onsets.onsets, printed)
+    for number_, onset in enumerate(onsets.onsets):
+        other = partners.get(number_)
+        f_diff = difference(onset.frequency_hz, other.frequency_hz) if other else None
+        mu_diff = difference(onset.mu, other.mu) if other else None
+        rounded = other is not None and same_as_printed(onset.mu, other.mu)
+        mark = " ▲" if is_far(mu_diff) and not rounded else ""
+        remark = percent(mu_diff, 1) + mark + (" (equal when rounded)" if rounded else "")
+        rows.append(
+            Row(
+                (
+                    number(onset.mu, 5),
+                    significant(other.mu, 8) if other else "",
+                    remark,
+                    number(onset.frequency_hz, 1),
+                    significant(other.frequency_hz, 8) if other else "",
+                    percent(f_diff),
+                    f"{onset.branches[0]} and {onset.branches[1]}" if onset.kind == "flutter" else str(onset.branches[0]),
+                    onset.kind + (", growth ends" if onset.stabilising else ""),
+                    other.note if other else "",
+                ),
+                "far" if mark or is_far(f_diff) else "",
+            )
+        )
+    lost = [p for p in printed if p not in partners.values()]
+    inside = [p for p in lost if onsets.friction_range[0] <= p.mu <= onsets.friction_range[1]]
+    for p in inside:
+        cells = ("", significant(p.mu, 8), "", "", significant(p.frequency_hz, 8), "", "", "not found here", p.note)
+        rows.append(Row(cells, "far"))
+    heads = ("critical μ", "printed μ", "difference", "frequency [Hz]", "printed [Hz]", "difference", "modes that meet",
+             "kind", "note")
+    low, high = onsets.friction_range
+    caption = (
+        f"All onsets with {low:g} ≤ μ ≤ {high:g} and frequencies up to {onsets.max_frequency_hz / 1e3:g} kHz, "
+        f"{'with structural damping' if onsets.damped else 'without damping'}. Modes are numbered by frequency "
+        "at μ = 0."
+    )
+    return drop_empty(
+        Table(f"onsets-{name}", f"Onsets, {name}", heads, tuple(rows), frozenset({6, 7, 8}), caption)
+    )
+
+
+def _onset_partners(found: tuple[Onset, ...], printed: tuple[ReferenceOnset, ...]) -> dict[int, ReferenceOnset]:
+    pairs = paired([o.frequency_hz for o in found], [p.frequency_hz for p in printed])
+    partners: dict[int, ReferenceOnset] = {}
+    for i, j in pairs:
+        if i is None or j is None:
+            continue
+        if abs(found[i].frequency_hz - printed[j].frequency_hz) <= SAME_ONSET * printed[j].frequency_hz:
+            partners[i] = printed[j]
+    return partners
+
+
+def _solutions(found: list[Onset]) -> Table:
+    """How each onset was solved and how growth opens beyond it."""
+    rows: list[Row] = []
+    for onset in found:
+        point = onset.exceptional_mu
+        exceptional = ""
+        if point is not None:
+            sign = "+" if point.imag >= 0 else "−"
+            exceptional = f"{number(point.real, 7)} {sign} {significant(abs(point.imag), 2)} j"
+        rows.append(
+            Row(
+                (
+                    "damped" if onset.damped else "undamped",
+                    number(onset.mu, 10),
+                    number(onset.frequency_hz, 4),
+                    significant(onset.residual, 2),
+                    significant(onset.square_root_coefficient, 5),
+                    significant(onset.growth_slope, 4),
+                    exceptional,
+                )
+            )
+        )
+    heads = ("", "critical μ", "frequency [Hz]", "residual", "κ [1/s]", "d Re λ/dμ [1/s]", "exceptional point μ")
+    caption = (
+        "Residual: componentwise backward error of the eigenpair in the assembled matrices. Beyond an undamped onset "
+        "the growth rate opens as κ √(μ − μc); with damping, two eigenvalues are equal at the exceptional point, a "
+        "complex μ close by, and growth crosses zero with the slope given."
+    )
+    return drop_empty(Table("onset-solutions", "How the onsets are solved", heads, tuple(rows), frozenset({0}), caption))
+
+
+def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float) -> Table:
+    """Complex modes at one μ, by frequency."""
+    row = modes.at(mu)
+    order = np.argsort(modes.frequency_hz[row], kind="stable")
+    order = [int(b) for b in order if modes.frequency_hz[row, b] <= max_frequency_hz]
+    rows = tuple(
+        Row(
+            (
+                str(int(modes.branch[b])),
+                number(float(modes.frequency_hz[row, b]), 2),
+                number(float(modes.growth_rate[row, b]), 2),
+                number(100 * float(modes.damping_ratio[row, b]), 4),
+                "unstable" if modes.unstable[row, b] else "stable",
+                significant(float(modes.residual[row, b]), 2),
+            ),
+            "unstable" if modes.unstable[row, b] else "",
+        )
+        for b in order
+    )
+    heads = ("mode", "frequency [Hz]", "growth rate [1/s]", "damping ratio [%]", "", "residual")
+    damping = "with structural damping" if modes.damped else "without damping"
+    caption = f"Up to {max_frequency_hz / 1e3:g} kHz, {damping}. Growth rate is Re λ: positive grows."
+    return Table("modes", f"Complex modes at μ = {modes.mu[row]:g}", heads, rows, frozenset({4}), caption)

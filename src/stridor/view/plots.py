@@ -1,0 +1,39 @@
+"""Every figure stridor draws, each from results: `st.plot.root_locus(modes)`, into your axes with `ax=`.
+
+Each returns the matplotlib figure; it belongs to no window, so it needs no display. Save it with
+`figure.savefig(...)`, or pass the axes of a pyplot figure of yours to see it on screen.
+"""
+
+from .agreement_plots import critical_friction_map, perturbation_growth, spectrum_map
+from .modal_plots import damping_branches, frequency_branches, friction_curve, growth_branches, root_locus
+from .shape_plots import mode_shape, model_plot, shapes_side_by_side
+from .temporal_plots import (
+    acceleration_history,
+    contact_force_and_velocity,
+    contact_history,
+    energy_plot,
+    phase_portrait,
+    spectrogram_plot,
+    spectrum_plot,
+)
+
+__all__ = [
+    "acceleration_history",
+    "contact_force_and_velocity",
+    "contact_history",
+    "critical_friction_map",
+    "damping_branches",
+    "energy_plot",
+    "frequency_branches",
+    "friction_curve",
+    "growth_branches",
+    "mode_shape",
+    "model_plot",
+    "perturbation_growth",
+    "phase_portrait",
+    "root_locus",
+    "shapes_side_by_side",
+    "spectrogram_plot",
+    "spectrum_map",
+    "spectrum_plot",
+]

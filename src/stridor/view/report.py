@@ -1,0 +1,238 @@
+"""The report: one HTML file that needs nothing else, and every figure as PNG and SVG beside it."""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from .figures import ReportFigure, agreement_figures, modal_figures, model_figures, temporal_figures
+from .inputs import ReportInputs
+from .modal_tables import frequency_tables, modes_table, onset_tables
+from .style import styled
+from .tables import Row, Table, number
+from .temporal_tables import agreement_table, contact_table, energy_table, identified_table, values_table
+from .windows import Window, regime_window
+from .words import bodies_table, model_in_words, simulation_table, summary_table, verdict
+
+PNG_DPI = 180
+
+
+@dataclass(frozen=True)
+class Section:
+    """A chapter: anchor, title, opening paragraphs, a list of short lines, then tables and figures in turn."""
+
+    name: str
+    title: str
+    paragraphs: tuple[str, ...] = ()
+    lines: tuple[str, ...] = ()
+    parts: tuple[Table | ReportFigure, ...] = ()
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is nothing to show."""
+        return not (self.paragraphs or self.lines or self.parts)
+
+
+def write_report(inputs: ReportInputs, folder: Path) -> Path:
+    """Write folder/report.html and folder/figures/NAME.png and .svg; the path of the page.
+
+    Each file appears whole or not at all. Raises OSError where the folder cannot be written.
+    """
+    folder = Path(folder)
+    figures = folder / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
+    chapters = sections(inputs)
+    drawings: dict[str, str] = {}
+    for part in (p for chapter in chapters for p in chapter.parts):
+        if isinstance(part, ReportFigure):
+            vector = _rendered(part.figure, "svg")
+            _write(figures / f"{part.name}.svg", vector)
+            _write(figures / f"{part.name}.png", _rendered(part.figure, "png"))
+            drawings[part.name] = "data:image/svg+xml;base64," + base64.b64encode(vector).decode("ascii")
+    page = folder / "report.html"
+    _write(page, render(inputs, chapters, drawings).encode("utf-8"))
+    return page
+
+
+def render(inputs: ReportInputs, chapters: list[Section], drawings: dict[str, str]) -> str:
+    """The page as HTML; drawings holds each figure's picture as a data URL."""
+    reference = inputs.case.reference
+    places = inputs.source_places
+    numbers = {
+        part.name: count
+        for count, part in enumerate(
+            (p for chapter in chapters for p in chapter.parts if isinstance(p, ReportFigure)), start=1
+        )
+    }
+    return _environment().get_template("report.html.j2").render(
+        inputs=inputs,
+        title=inputs.case.title or "Friction-induced instabilities",
+        verdict=verdict(inputs),
+        summary=summary_table(inputs),
+        sections=chapters,
+        drawings=drawings,
+        numbers=numbers,
+        places={name: place for name, place in places.items() if reference is not None},
+        reference=reference,
+        settings=inputs.case.to_toml(defaults=True),
+        is_table=lambda part: isinstance(part, Table),
+    )
+
+
+def sections(inputs: ReportInputs) -> list[Section]:
+    """All chapters that have something to show."""
+    window = _window(inputs)
+    chapters = [
+        Section(
+            "model",
+            "The model",
+            lines=tuple(model_in_words(inputs)),
+            parts=(*model_figures(inputs), bodies_table(inputs.case)),
+        ),
+        Section("frequencies", "Natural frequencies", parts=tuple(frequency_tables(inputs))),
+        _modal(inputs),
+        _temporal(inputs, window),
+        _agreement(inputs),
+        _reference(inputs, window),
+    ]
+    return [chapter for chapter in chapters if not chapter.empty]
+
+
+def _window(inputs: ReportInputs) -> Window | None:
+    run = inputs.trajectory
+    if run is None or not run.contact_names or not run.phases or len(run.time) < 3:
+        return None
+    return regime_window(run, inputs.dominant_hz)
+
+
+def _modal(inputs: ReportInputs) -> Section:
+    parts: list[Table | ReportFigure] = [*onset_tables(inputs), *modal_figures(inputs)]
+    if inputs.modes is not None:
+        mu = float(inputs.modes.mu[0]) if inputs.mu is None else inputs.mu
+        parts.append(modes_table(inputs.modes, mu, inputs.max_frequency_hz))
+    said: list[str] = []
+    for onsets, damping in ((inputs.undamped_onsets, "Without damping"), (inputs.damped_onsets, "With damping")):
+        if onsets is not None and not onsets.onsets:
+            low, high = onsets.friction_range
+            said.append(f"{damping} there is no onset of instability for {low:g} ≤ μ ≤ {high:g}.")
+    if parts or said:
+        said.insert(
+            0,
+            "Eigenvalues λ of the system coupled by friction, linear about steady sliding: the growth rate is Re λ, the "
+            "frequency Im λ/2π. A mode with positive growth rate is potentially unstable.",
+        )
+    return Section("modal", "Modal approach", tuple(said), parts=tuple(parts))
+
+
+def _temporal(inputs: ReportInputs, window: Window | None) -> Section:
+    parts: list[Table | ReportFigure] = []
+    if inputs.trajectory is not None:
+        parts = [simulation_table(inputs), contact_table(inputs.trajectory)]
+    parts.extend(temporal_figures(inputs, window))
+    if inputs.energy is not None:
+        parts.append(energy_table(inputs.energy))
+    said = ()
+    if parts:
+        said = (
+            "The equations of motion marched in time with unilateral contact and Coulomb friction: the contact sticks, "
+            "slips or separates as it must.",
+        )
+    return Section("temporal", "Temporal approach", said, parts=tuple(parts))
+
+
+def _agreement(inputs: ReportInputs) -> Section:
+    parts: list[Table | ReportFigure] = []
+    said: tuple[str, ...] = ()
+    if inputs.agreement is not None:
+        said = (f"Verdict: {inputs.agreement.verdict}.", *inputs.agreement.notes)
+        for comparison in inputs.agreement.comparisons:
+            parts.append(agreement_table(comparison))
+            same = inputs.mu is None or abs(comparison.mu - inputs.mu) < 1e-12
+            if inputs.modes is not None and same:
+                parts.append(identified_table(comparison, inputs.modes, inputs.max_frequency_hz))
+    parts.extend(agreement_figures(inputs))
+    return Section("agreement", "Do both approaches agree?", said, parts=tuple(parts))
+
+
+def _reference(inputs: ReportInputs, window: Window | None) -> Section:
+    reference = inputs.case.reference
+    if reference is None:
+        return Section("reference", "The source")
+    table = values_table(inputs, window)
+    said = (f"Printed values are from: {reference.source}",) if reference.source else ()
+    if reference.notes:
+        said += ("What to know about the source:",)
+    return Section("reference", "The source", said, reference.notes, () if table is None else (table,))
+
+
+def about_tables(inputs: ReportInputs) -> list[Table]:
+    """Versions and times taken."""
+    tables: list[Table] = []
+    if inputs.versions:
+        rows = tuple(Row((name, version)) for name, version in inputs.versions.items())
+        tables.append(Table("versions", "Versions", ("program", "version"), rows, frozenset({0, 1})))
+    if inputs.timings:
+        rows = [Row((name, number(seconds, 2))) for name, seconds in inputs.timings.items()]
+        rows.append(Row(("in all", number(sum(inputs.timings.values()), 2))))
+        tables.append(Table("timings", "Time taken", ("analysis", "wall time [s]"), tuple(rows), frozenset({0})))
+    return tables
+
+
+@styled
+def _rendered(figure: Figure, kind: str) -> bytes:
+    """The figure as a file of that kind, equal for equal figures."""
+    target = io.BytesIO()
+    if kind == "svg":
+        figure.savefig(target, format="svg", metadata={"Date": None})
+    else:
+        figure.savefig(target, format=kind, dpi=PNG_DPI, metadata={"Software": "stridor"})
+    return target.getvalue()
+
+
+def _write(path: Path, content: bytes) -> None:
+    """The file with that content, or the one that was there before: never a part of it."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        # mkstemp lets only the owner read; a report is for others, too.
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+@cache
+def _umask() -> int:
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=FunctionLoader(_template), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.globals["about_tables"] = about_tables  # pyright: ignore[reportArgumentType]
+    return environment
+
+
+def _template(name: str) -> str:
+    return (resources.files("stridor.view") / "templates" / name).read_text(encoding="utf-8")
+
+
+def figures_of(chapters: Iterable[Section]) -> list[ReportFigure]:
+    """All figures in their order."""
+    return [part for chapter in chapters for part in chapter.parts if isinstance(part, ReportFigure)]

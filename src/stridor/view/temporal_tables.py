@@ -1,0 +1,217 @@
+"""Tables of the run in time and of the comparison of both approaches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..agreement import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, Agreement, Comparison
+from ..modal.complex_modes import ComplexModes
+from ..temporal.energy import EnergyBalance
+from ..temporal.trajectory import Trajectory
+from .inputs import ReportInputs
+from .tables import Row, Table, assigned, difference, drop_empty, is_far, number, percent, same_as_printed, significant
+from .windows import Window
+
+SAME_MODE = 0.02  # |Δλ|/|λ| within which an identified component is that mode
+
+
+def contact_table(trajectory: Trajectory) -> Table:
+    """Statistics of every contact in every phase, from every step."""
+    rows = tuple(
+        Row(
+            (
+                phase.name,
+                name,
+                f"{phase.start:g} … {phase.end:g}",
+                number(100 * s.stick_fraction, 1),
+                number(100 * s.slip_fraction, 1),
+                number(100 * s.separation_fraction, 1),
+                number(s.max_normal_force, 1),
+                number(s.max_tangential_force, 2),
+                number(s.max_slip_speed, 4),
+                significant(s.first_stick, 5),
+                significant(s.first_separation, 5),
+            )
+        )
+        for phase in trajectory.phases
+        for name, s in phase.contacts.items()
+    )
+    heads = ("phase", "contact", "time [s]", "stick [%]", "slip [%]", "separation [%]", "largest normal force [N]",
+             "largest friction force [N]", "largest slip speed [m/s]", "first stick [s]", "first separation [s]")
+    caption = "Counted in every step of the run, not only in the recorded ones; extrema include single impacts."
+    return drop_empty(Table("contacts", "What the contacts did", heads, rows, frozenset({0, 1}), caption))
+
+
+def energy_table(balance: EnergyBalance) -> Table:
+    """Where the energy came from and where it went."""
+    entries = (
+        ("at the start", balance.initial, 1),
+        ("put in by loads", balance.external, 1),
+        ("put in by moving supports", balance.support, 1),
+        ("taken out by damping", balance.damping, -1),
+        ("taken out by friction", balance.friction, -1),
+        ("taken out by impacts", balance.contact, -1),
+        ("stored at the end as motion", balance.kinetic, -1),
+        ("stored at the end as deformation", balance.elastic, -1),
+    )
+    rows = [Row((name, number(1e3 * value, 4))) for name, value, _ in entries]
+    missing = sum(sign * value for _, value, sign in entries)
+    rows.append(Row(("missing at the end", significant(1e3 * missing, 2)), "good" if balance.error < 1e-3 else "bad"))
+    caption = f"Largest imbalance at any time: {significant(balance.error, 2)} of the largest energy that changed hands."
+    return Table("energy", "Energy balance", ("", "energy [mJ]"), tuple(rows), frozenset({0}), caption)
+
+
+def agreement_table(comparison: Comparison) -> Table:
+    """Both approaches at one μ."""
+    modal, temporal = comparison.modal_eigenvalue, comparison.perturbation
+    unstable = len(comparison.unstable_hz) > 0
+    names = {True: "unstable", False: "stable"}
+    same = unstable == temporal.grows
+    rows = [
+        Row(("steady sliding is", names[unstable], names[temporal.grows], "", _judged(same)), _kind(same)),
+        _row("frequency [Hz]", modal.imag / (2 * np.pi), temporal.frequency_hz, comparison.frequency_error, GOOD_FREQUENCY),
+        _row("growth rate [1/s]", modal.real, temporal.growth_rate, comparison.growth_rate_error, GOOD_GROWTH),
+    ]
+    if comparison.dominant_frequency_hz is not None:
+        heard = comparison.dominant_frequency_hz
+        mode = None if comparison.responding is None else comparison.unstable_hz[comparison.responding]
+        error = None if mode is None else heard / mode - 1
+        rows.append(
+            Row(("dominant frequency of the full run [Hz]", number(mode, 1), number(heard, 1), percent(error),
+                 "an unstable mode responds" if mode is not None else "no unstable mode within 5 %"))
+        )
+    if comparison.run_growth is not None:
+        fitted = comparison.run_growth
+        state = "saturated" if fitted.saturated else "not saturated"
+        rows.append(Row(("growth fitted in the full run [1/s]", "", number(fitted.rate, 1), "", state)))
+    if comparison.mac is not None:
+        good = comparison.mac >= GOOD_MAC
+        rows.append(Row(("likeness of shapes (MAC), full run against mode", "", number(comparison.mac, 3), "",
+                         "alike" if good else "alike in part")))
+    title = f"Both approaches at μ = {comparison.mu:g}"
+    caption = (
+        "Small perturbations of steady sliding obey the equations that the modes solve: frequency and growth rate must "
+        "be equal up to the accuracy of the time step. The full run sticks, slips and separates; it may only be similar."
+    )
+    heads = ("", "modal", "temporal", "difference", "")
+    return Table(f"agreement-{comparison.mu:g}", title, heads, tuple(rows), frozenset({0, 4}), caption)
+
+
+def _row(name: str, modal: float, temporal: float, error: float, limit: float) -> Row:
+    good = error <= limit
+    difference_ = percent((temporal - modal) / abs(modal) if modal else None)
+    return Row((name, number(modal, 1), number(temporal, 1), difference_, _judged(good)), _kind(good))
+
+
+def _judged(good: bool) -> str:
+    return "✓ agree" if good else "✗ differ"
+
+
+def _kind(good: bool) -> str:
+    return "good" if good else "bad"
+
+
+def critical_row(agreement: Agreement) -> Row | None:
+    """Critical friction of both approaches as a line of the summary."""
+    modal, temporal = agreement.critical_mu_modal, agreement.critical_mu_temporal
+    if modal is None and temporal is None:
+        return None
+    if modal is None or temporal is None:
+        return Row(("critical friction coefficient", number(modal, 5), number(temporal, 5), "", ""))
+    width = agreement.bracket[1] - agreement.bracket[0] if agreement.bracket else 0.0
+    good = abs(modal - temporal) <= max(width, GOOD_CRITICAL * modal)
+    cells = ("critical friction coefficient", number(modal, 5), number(temporal, 5), percent(temporal / modal - 1))
+    return Row((*cells, _judged(good)), _kind(good))
+
+
+def identified_table(comparison: Comparison, modes: ComplexModes, max_frequency_hz: float) -> Table:
+    """Every component found in the time signal beside the complex mode it is."""
+    lam = modes.eigenvalues[modes.at(comparison.mu)]
+    lam = lam[(lam.imag > 0) & (lam.imag <= 2 * np.pi * max_frequency_hz)]
+    lam = lam[np.argsort(lam.imag)]
+    found = comparison.perturbation.components.eigenvalues
+    partners = assigned(np.abs(lam[:, None] - found) / np.abs(lam)[:, None], SAME_MODE) if len(found) else {}
+    rows: list[Row] = []
+    for i, mode in enumerate(lam):
+        j = partners.get(i)
+        seen = complex(found[j]) if j is not None else None
+        rows.append(
+            Row(
+                (
+                    number(mode.imag / (2 * np.pi), 1),
+                    number(seen.imag / (2 * np.pi), 1) if seen is not None else "",
+                    percent(seen.imag / mode.imag - 1, 3) if seen is not None else "",
+                    number(mode.real, 1),
+                    number(seen.real, 1) if seen is not None else "",
+                    "" if seen is not None else "not seen in the signal",
+                ),
+                "unstable" if mode.real > 0 else "",
+            )
+        )
+    heads = ("modal [Hz]", "in time [Hz]", "difference", "Re λ modal [1/s]", "Re λ in time [1/s]", "")
+    spare = len(found) - len(partners)
+    caption = (
+        f"Components of the perturbed slip speed at μ = {comparison.mu:g}, taken apart by the matrix pencil, and the "
+        "complex modes nearest to them. A mode that barely slides leaves no trace in the slip speed."
+    )
+    if spare:
+        caption += f" {spare} weak component{'s' if spare > 1 else ''} of the signal belong{'' if spare > 1 else 's'} to no mode."
+    return drop_empty(
+        Table("identified", "Modes found in time", heads, tuple(rows), frozenset({5}), caption)
+    )
+
+
+def computed_values(inputs: ReportInputs, window: Window | None) -> dict[str, tuple[float, str]]:
+    """Values of this run by the names a reference may use, each with what it is."""
+    values: dict[str, tuple[float, str]] = {}
+    if inputs.dominant_hz is not None:
+        values["dominant_frequency_hz"] = (inputs.dominant_hz, "second half of the last phase")
+    if window is not None:
+        there = f"in the window of the contact figure ({window.reason})"
+        values["max_normal_force"] = (window.max_normal_force, there)
+        values["max_slip_speed"] = (window.max_slip_speed, there)
+        values["stick_fraction"] = (window.stick_fraction, there)
+    agreement = inputs.agreement
+    if agreement is not None:
+        values["growth_rate"] = (agreement.comparisons[0].modal_eigenvalue.real, "modal")
+        if agreement.critical_mu_temporal is not None:
+            values["critical_mu_temporal"] = (agreement.critical_mu_temporal, "bisection in time")
+    first = inputs.damped_onsets.first if inputs.damped_onsets else None
+    if first is not None:
+        values["critical_mu_modal"] = (first.mu, "first damped onset")
+    elif agreement is not None and agreement.critical_mu_modal is not None:
+        values["critical_mu_modal"] = (agreement.critical_mu_modal, "first onset")
+    values.update({name: (value, "") for name, value in inputs.values.items()})
+    return values
+
+
+def values_table(inputs: ReportInputs, window: Window | None) -> Table | None:
+    """Other printed values beside those computed here."""
+    reference = inputs.case.reference
+    if reference is None or not reference.values:
+        return None
+    known = computed_values(inputs, window)
+    rows: list[Row] = []
+    for printed in reference.values:
+        computed, what = known.get(printed.name, (None, ""))
+        fraction = difference(computed, printed.value) if computed is not None else None
+        rounded = computed is not None and same_as_printed(computed, printed.value)
+        mark = " ▲" if is_far(fraction) and not rounded else ""
+        rows.append(
+            Row(
+                (
+                    printed.name.replace("_hz", "").replace("_", " "),
+                    significant(computed, 5) if computed is not None else "not computed",
+                    significant(printed.value, 8),
+                    printed.unit,
+                    percent(fraction, 1) + mark + (" (equal when rounded)" if rounded else ""),
+                    "; ".join(filter(None, [what, printed.note])),
+                ),
+                "far" if mark else "",
+            )
+        )
+    heads = ("value", "computed", "printed", "unit", "difference", "note")
+    return drop_empty(
+        Table("values", "Other values of the source", heads, tuple(rows), frozenset({0, 3, 5}),
+              "Differences beyond 0.5 % are marked with ▲.")
+    )

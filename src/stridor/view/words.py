@@ -1,0 +1,254 @@
+"""A case and its results in words and input tables: what a reader wants to know before any figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case import Case
+from ..case.schema import Contact
+from .inputs import ReportInputs
+from .tables import Row, Table, drop_empty, number, significant
+from .temporal_tables import critical_row
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The answer: a headline, one paragraph, whether it squeals and whether both approaches agree (None where
+    that was not asked)."""
+
+    headline: str
+    paragraph: str
+    squeals: bool | None
+    agrees: bool | None
+
+
+def verdict(inputs: ReportInputs) -> Verdict:
+    """Will it squeal, at which frequency, from which friction on, and do both approaches say so?"""
+    growing = _growing(inputs)
+    at = f" at μ = {inputs.mu:g}" if inputs.mu is not None else ""
+    agreement = inputs.agreement
+    agrees = None if agreement is None else agreement.verdict.startswith("agree")
+    parts = [_modal_sentence(growing, at), _onset_sentence(inputs), _run_sentence(inputs), _agreement_sentence(inputs)]
+    paragraph = " ".join(part for part in parts if part)
+    squeals = None if growing is None else bool(growing)
+    if growing is None:
+        return Verdict("Not decided: no modes at the friction of the case", paragraph, None, agrees)
+    if not growing:
+        return Verdict(f"It does not squeal{at}", paragraph, squeals, agrees)
+    frequency = inputs.dominant_hz or max(growing, key=lambda pair: pair[1])[0]
+    return Verdict(f"It squeals{at}, at {frequency:.0f} Hz", paragraph, squeals, agrees)
+
+
+def _growing(inputs: ReportInputs) -> list[tuple[float, float]] | None:
+    """Frequency [Hz] and growth rate [1/s] of every unstable mode in range at the friction of the case."""
+    modes = inputs.modes
+    if modes is None and inputs.mu is not None and inputs.damped_sweep is not None:
+        near = inputs.damped_sweep
+        modes = near if abs(near.mu[near.at(inputs.mu)] - inputs.mu) < 1e-9 else None
+    if modes is not None:
+        row = 0 if inputs.mu is None else modes.at(inputs.mu)
+        chosen = modes.unstable[row] & (modes.frequency_hz[row] <= inputs.max_frequency_hz)
+        pairs = zip(modes.frequency_hz[row][chosen], modes.growth_rate[row][chosen], strict=True)
+        return [(float(f), float(g)) for f, g in pairs]
+    for comparison in inputs.agreement.comparisons if inputs.agreement is not None else ():
+        if inputs.mu is None or abs(comparison.mu - inputs.mu) < 1e-12:
+            return list(zip(comparison.unstable_hz, comparison.unstable_growth, strict=True))
+    return None
+
+
+def _modal_sentence(growing: list[tuple[float, float]] | None, at: str) -> str:
+    if growing is None:
+        return ""
+    if not growing:
+        return f"Steady sliding{at} is stable: no mode in the range of frequencies grows."
+    named = [f"{f:.0f} Hz (growth {g:.0f} 1/s)" for f, g in sorted(growing, key=lambda pair: -pair[1])]
+    modes = "one mode grows" if len(named) == 1 else f"{len(named)} modes grow"
+    return f"Steady sliding{at} is unstable: {modes}, {_listed(named)}."
+
+
+def _onset_sentence(inputs: ReportInputs) -> str:
+    onsets = inputs.damped_onsets or inputs.undamped_onsets
+    if onsets is None:
+        return ""
+    low, high = onsets.friction_range
+    first = onsets.first
+    if first is None:
+        return f"No friction coefficient between {low:g} and {high:g} makes it unstable up to {_khz(inputs)}."
+    damping = "" if onsets.damped else " (without damping)"
+    more = sum(1 for o in onsets.onsets if not o.stabilising) - 1
+    text = f"It becomes unstable from μ = {first.mu:.4f} on, at {first.frequency_hz:.0f} Hz{damping}"
+    if more:
+        text += f"; {more} more onset{'s follow' if more > 1 else ' follows'} up to μ = {high:g}"
+    return text + "."
+
+
+def _run_sentence(inputs: ReportInputs) -> str:
+    run = inputs.trajectory
+    if run is None:
+        return ""
+    if not run.phases or not run.contact_names:
+        return "The run in time has no contact to report on."
+    last = run.phases[-1]
+    text = f"In the run over {run.time[-1]:.3g} s the contact"
+    shares: list[str] = []
+    for name in run.contact_names:
+        s = last.contacts[name]
+        shares.append(
+            f"{name} sticks {100 * s.stick_fraction:.0f} %, slips {100 * s.slip_fraction:.0f} % and is open "
+            f"{100 * s.separation_fraction:.0f} % of the phase “{last.name}”"
+        )
+    text += f"{'s' if len(shares) > 1 else ''} {_listed(shares)}"
+    if inputs.dominant_hz is not None:
+        text += f"; the dominant frequency is {inputs.dominant_hz:.0f} Hz"
+    return text + (". It was interrupted before its planned end." if run.interrupted else ".")
+
+
+def _agreement_sentence(inputs: ReportInputs) -> str:
+    agreement = inputs.agreement
+    if agreement is None:
+        return ""
+    texts: list[str] = []
+    for c in agreement.comparisons:
+        if len(c.unstable_hz) and c.perturbation.grows:
+            said = (f"at μ = {c.mu:g} both find growth at {c.perturbation.frequency_hz:.0f} Hz, with rates of "
+                    f"{c.modal_eigenvalue.real:.0f} and {c.perturbation.growth_rate:.0f} 1/s")
+        elif c.agrees:
+            said = f"at μ = {c.mu:g} both find steady sliding stable"
+        else:
+            said = f"at μ = {c.mu:g} they contradict each other"
+        texts.append(said)
+    row = critical_row(agreement)
+    if row is not None and row.cells[1] and row.cells[2]:
+        texts.append(f"the critical friction coefficient is {row.cells[1]} by the modes and {row.cells[2]} in time")
+    opening = "agree" if agreement.verdict.startswith("agree") else "do not agree"
+    return f"The modal and the temporal approach {opening}: {'; '.join(texts)}."
+
+
+def _khz(inputs: ReportInputs) -> str:
+    return f"{inputs.max_frequency_hz / 1e3:g} kHz"
+
+
+def _listed(items: list[str]) -> str:
+    return items[0] if len(items) == 1 else ", ".join(items[:-1]) + " and " + items[-1]
+
+
+def model_in_words(inputs: ReportInputs) -> list[str]:
+    """Bodies, supports, loads, contacts and phases, a sentence each."""
+    case = inputs.case
+    lines: list[str] = []
+    for name, body in case.bodies.items():
+        x, y = body.direction
+        lines.append(
+            f"{name}: a beam of {case.materials[body.material].young_modulus / 1e9:g} GPa and "
+            f"{case.materials[body.material].density:g} kg/m³, {1e3 * body.length_m:g} × {1e3 * body.width:g} × "
+            f"{1e3 * body.thickness:g} mm, from ({1e3 * body.start[0]:g}, {1e3 * body.start[1]:g}) mm at "
+            f"{np.degrees(np.arctan2(y, x)):.4g}° to the x axis; {body.elements} elements, {body.mass} mass."
+        )
+    for name, support in case.supports.items():
+        moving = [f"{v:g} {'rad/s' if d == 'rotation' else 'm/s'} ({d})" for d, v in support.velocity.items()]
+        text = f"{name}: holds {_listed(list(support.fixed))} of {support.at}"
+        lines.append(text + (f" and moves it with {_listed(moving)}." if moving else "."))
+    for name, load in case.loads.items():
+        parts = [f"{np.hypot(*load.force):g} N along ({load.force[0]:g}, {load.force[1]:g})"] if any(load.force) else []
+        parts += [f"a moment of {load.moment:g} N m"] if load.moment else []
+        lines.append(f"{name}: pushes {load.at} with {_listed(parts or ['nothing'])}.")
+    lines += [_contact_words(name, contact) for name, contact in case.contacts.items()]
+    if inputs.system is not None:
+        lines.append(f"In all {inputs.system.size} freedoms that are not held.")
+    if inputs.steady is not None and inputs.system is not None:
+        for contact, force, speed in zip(
+            inputs.system.contacts, inputs.steady.normal_force, inputs.steady.slip_speed, strict=True
+        ):
+            lines.append(
+                f"In steady sliding contact {contact.name} carries {force:.4g} N and slips at {abs(speed):.4g} m/s."
+            )
+    return lines
+
+
+def _contact_words(name: str, contact: Contact) -> str:
+    friction = contact.friction.model_dump()
+    law = friction.pop("law")
+    settings = ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in friction.items())
+    stiffness = "rigid" if contact.stiffness == "rigid" else f"with {contact.stiffness:g} N/m"
+    return (
+        f"{name}: {contact.slave} slides on {contact.master} ({contact.sliding} sliding), {stiffness} in the modal "
+        f"approach; friction law {law}, {settings}."
+    )
+
+
+def bodies_table(case: Case) -> Table:
+    """What the bodies are made of, one column each."""
+    bodies = list(case.bodies.items())
+    materials = [case.materials[body.material] for _, body in bodies]
+    lines = (
+        ("length × width × thickness [m]", [f"{b.length_m:g} × {b.width:g} × {b.thickness:g}" for _, b in bodies]),
+        ("Young's modulus [GPa]", [f"{m.young_modulus / 1e9:g}" for m in materials]),
+        ("density [kg/m³]", [f"{m.density:g}" for m in materials]),
+        ("damping α₁ (mass) [1/s]", [f"{b.damping.mass:g}" for _, b in bodies]),
+        ("damping α₂ (stiffness) [s]", [significant(b.damping.stiffness) for _, b in bodies]),
+        ("elements", [str(b.elements) for _, b in bodies]),
+        ("mass matrix", [b.mass for _, b in bodies]),
+    )
+    rows = tuple(Row((name, *values)) for name, values in lines)
+    return Table("bodies", "Bodies", ("", *(name for name, _ in bodies)), rows, frozenset({0}))
+
+
+def simulation_table(inputs: ReportInputs) -> Table:
+    """How the run in time was made."""
+    case, run = inputs.case, inputs.trajectory
+    lines: list[tuple[str, str]] = []
+    for name, load in case.loads.items():
+        lines.append((f"force {name}", f"{np.hypot(*load.force):g} N"))
+    for name, support in case.supports.items():
+        lines += [(f"velocity {name}, {d}", f"{v:g} {'rad/s' if d == 'rotation' else 'm/s'}") for d, v in support.velocity.items()]
+    if inputs.mu is not None:
+        lines.append(("friction coefficient μ", f"{inputs.mu:g}"))
+    if run is not None:
+        lines += [
+            ("time step Δt", f"{significant(run.step)} s"),
+            ("stability limit of the time step", f"{significant(run.step_limit)} s, set by {run.limiting_body}"),
+            ("numerical damping β₂", f"{run.beta2:g}"),
+            ("steps", f"{run.steps} of {run.planned_steps}" if run.interrupted else str(run.steps)),
+            ("recorded", f"every {run.record_every} steps, {significant(run.sampling)} s"),
+            ("unknowns of the time loop", f"{run.path} ({run.path_reason})"),
+            ("wall time", f"{run.wall_seconds:.2f} s, {1e6 * run.wall_seconds / max(run.steps, 1):.2f} µs per step"),
+        ]
+    else:
+        lines += [("time step Δt", f"{significant(case.temporal.step)} s" if case.temporal.step else ""),
+                  ("numerical damping β₂", f"{case.temporal.beta2:g}")]
+    for phase in case.phases:
+        factors = [f"{n} × {v:g}" for n, v in (*phase.loads.items(), *phase.velocities.items())]
+        ramp = f", ramp {phase.ramp:g} s" if phase.ramp else ""
+        lines.append((f"phase “{phase.name}”", f"{phase.duration:g} s{ramp}" + (f": {', '.join(factors)}" if factors else "")))
+    rows = tuple(Row(line) for line in lines)
+    return drop_empty(Table("simulation", "Simulation", ("", "value"), rows, frozenset({0, 1})))
+
+
+def summary_table(inputs: ReportInputs) -> Table | None:
+    """The verdict in numbers: modal against temporal."""
+    agreement = inputs.agreement
+    rows: list[Row] = []
+    if agreement is not None:
+        for c in agreement.comparisons:
+            both = len(c.unstable_hz) > 0, c.perturbation.grows
+            names = ("stable", "unstable")
+            good = "✓ agree" if c.agrees else "✗ differ"
+            at = f"at μ = {c.mu:g}"
+            rows.append(Row((f"steady sliding {at}", names[both[0]], names[both[1]], "", good), "good" if c.agrees else "bad"))
+            if any(both):
+                modal = c.modal_eigenvalue
+                rows.append(Row((f"frequency {at} [Hz]", number(modal.imag / 2 / np.pi), number(c.perturbation.frequency_hz),
+                                 number(100 * c.frequency_error, 3) + " %", "")))
+                rows.append(Row((f"growth rate {at} [1/s]", number(modal.real), number(c.perturbation.growth_rate),
+                                 number(100 * c.growth_rate_error, 2) + " %", "")))
+        row = critical_row(agreement)
+        if row is not None:
+            rows.append(row)
+    if not rows:
+        return None
+    return drop_empty(
+        Table("summary-table", "Modal against temporal", ("", "modal", "temporal", "difference", "verdict"),
+              tuple(rows), frozenset({0, 4}))
+    )
