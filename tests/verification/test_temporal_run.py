@@ -161,6 +161,23 @@ def test_a_contact_says_it_slips_only_when_it_moves():
     assert np.abs(result.slip_speed[~stuck, 0]).max() > 1e-3
 
 
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("beta2", [0.5, 0.8])
+def test_slip_speed_of_a_record_is_that_of_the_watched_points(path, beta2):
+    """Slave minus master along the tangent, by the velocities of the same record."""
+    system = bench(Slave(place=0.5), velocity=1.0)
+    watch = ("s0.start", "base@0.075")
+    rows = {name: system.points.get(name) for name in watch}
+    contact = system.contacts[0]
+    node = slice(2 * (contact.segment + round(contact.xi)), 2 * (contact.segment + round(contact.xi)) + 2)
+    rows["base@0.075"] = type(rows["s0.start"])(contact.master.free[node], contact.master.lift[node])
+    system = replace(system, points=rows)
+    result = run(system, 3e-4, beta2=beta2, path=path, record_every=3, watch=watch)
+    relative = (result.velocity[:, 0] - result.velocity[:, 1]) @ contact.tangent
+    assert np.abs(result.slip_speed[:, 0] - relative).max() < 1e-9
+    assert np.ptp(relative) > 0.01
+
+
 # -- restart, interruption, checkpoints
 # --------------------------------------------------------------------------------
 
@@ -203,6 +220,26 @@ def test_restart_is_bit_for_bit(path, sliding, beta2, part):
     # The new part by itself.
     tail = simulate(system, PHASES, settings, restart=first, join=False)
     assert np.array_equal(tail.time, whole.time[len(first.time) :])
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_restart_remembers_that_a_contact_sticks(path, monkeypatch):
+    """Stopped between the kinetic and the static limit: only the state of sticking decides how it goes on."""
+    system = block_on_belt(law=StaticKinetic(0.3, 0.4), speed=0.2)
+    settings = Settings(step=1e-3, record_every=1, path=path)
+    start = (np.zeros(2), np.array([0.2, 0.0]), np.zeros(2))
+    whole = simulate(system, one_phase(5.0), settings, disturbance=start)
+    assert whole.tangential_force[1750, 0] == pytest.approx(0.35, abs=1e-3)
+    monkeypatch.setattr(engine, "CHUNK", 1750)
+
+    def stop(done, planned):
+        raise KeyboardInterrupt
+
+    first = simulate(system, one_phase(5.0), settings, disturbance=start, progress=stop)
+    assert first.steps == 1750
+    again = simulate(system, one_phase(5.0), settings, restart=first)
+    assert np.array_equal(again.tangential_force, whole.tangential_force)
+    assert np.array_equal(again.status, whole.status)
 
 
 def test_restart_refuses_another_scheme_or_model():

@@ -219,6 +219,20 @@ def test_stable_just_below_the_limit_and_not_just_above(beta2, path):
     assert np.abs(kept).max() > 1e100
 
 
+@pytest.mark.parametrize("path", PATHS)
+def test_blow_up_is_noticed_between_records(path):
+    """No record is due after the first, and no row sees the motion."""
+    mass, stiffness = rod(1.0, 1.0, 1.0, 1.0, 4)
+    system = System(mass, 0 * mass, stiffness)
+    step = 1.1 * step_limit(system, 0.5).step
+    start = (np.array([1.0, -1.0, 1.0, -1.0, 1.0]), 0.0, 0.0)
+    with (
+        mock.patch.object(engine, "choose_step", lambda limit, settings: settings.step),
+        pytest.raises(AnalysisError, match="no longer finite"),
+    ):
+        run(system, 5000 * step, step=step, start=start, path=path, record_every=10**6)
+
+
 @pytest.mark.parametrize("beta2", [0.5, 0.75, 1.0])
 def test_damping_moves_the_limit_as_derived(beta2):
     """Δt²ω² = (2/β2)(1 + (β2 − 1/2) cΔt), where an eigenvalue passes −1."""

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
         acceleration_history,
         contact_force_and_velocity,
         contact_history,
-        critical_friction_map,
         damping_branches,
         energy_plot,
         frequency_branches,
         friction_curve,
         growth_branches,
+        growth_comparison,
         mode_shape,
         model_plot,
         perturbation_growth,
@@ -41,12 +41,12 @@ __all__ = [
     "acceleration_history",
     "contact_force_and_velocity",
     "contact_history",
-    "critical_friction_map",
     "damping_branches",
     "energy_plot",
     "frequency_branches",
     "friction_curve",
     "growth_branches",
+    "growth_comparison",
     "mode_shape",
     "model_plot",
     "perturbation_growth",
@@ -60,8 +60,13 @@ __all__ = [
     "write_report",
 ]
 
-_HOME = {"BodyModes": "inputs", "FrictionCurve": "inputs", "NamedShape": "inputs", "ReportInputs": "inputs",
-         "write_report": "report"}
+_HOME = {
+    "BodyModes": "inputs",
+    "FrictionCurve": "inputs",
+    "NamedShape": "inputs",
+    "ReportInputs": "inputs",
+    "write_report": "report",
+}
 
 
 def __getattr__(name: str) -> object:

@@ -32,8 +32,15 @@ def spectrum_map(
     unstable = lam.real > 0
     for part, colour, name in ((~unstable, BLUE, "complex modes, stable"), (unstable, VERMILION, "unstable")):
         ax.plot(lam[part].imag / 2e3 / np.pi, lam[part].real, "o", mfc="none", mec=colour, ms=9, mew=1.5, label=name)
-    ax.plot(found.eigenvalues.imag / 2e3 / np.pi, found.eigenvalues.real, "x", color="black", ms=6, mew=1.4,
-            label="identified in the time signal")
+    ax.plot(
+        found.eigenvalues.imag / 2e3 / np.pi,
+        found.eigenvalues.real,
+        "x",
+        color="black",
+        ms=6,
+        mew=1.4,
+        label="identified in the time signal",
+    )
     ax.set(xlabel="frequency [kHz]", ylabel="growth rate Re λ [1/s]", xlim=(0, max_frequency_hz / 1e3))
     reach = float(np.abs(lam.real).max(initial=0.0)) * RANGE_FACTOR
     if reach > 0:
@@ -64,8 +71,9 @@ def perturbation_growth(
     time = (start + np.arange(len(band))) * sampling
     if len(band) < len(signal):
         every = np.arange(len(signal)) * sampling
-        ax.semilogy(1e3 * every, np.maximum(np.abs(signal), 1e-300), color="#BBBBBB", linewidth=0.6,
-                    label="all frequencies")
+        ax.semilogy(
+            1e3 * every, np.maximum(np.abs(signal), 1e-300), color="#BBBBBB", linewidth=0.6, label="all frequencies"
+        )
     name = "the perturbation" if max_frequency_hz is None else f"up to {max_frequency_hz / 1e3:g} kHz"
     ax.semilogy(1e3 * time, np.maximum(np.abs(band), 1e-300), color=BLUE, linewidth=0.7, label=name)
     if modal_growth_rate is not None:
@@ -76,8 +84,14 @@ def perturbation_growth(
         peaks = np.maximum(np.maximum(np.abs(low), np.abs(high)), 1e-300)
         level = np.median((np.log(peaks) - modal_growth_rate * at)[late])
         ends = time[[0, -1]]
-        ax.semilogy(1e3 * ends, np.exp(level + modal_growth_rate * ends), "--", color=VERMILION, linewidth=2.0,
-                    label=f"modal growth rate, {modal_growth_rate:.1f} 1/s")
+        ax.semilogy(
+            1e3 * ends,
+            np.exp(level + modal_growth_rate * ends),
+            "--",
+            color=VERMILION,
+            linewidth=2.0,
+            label=f"modal growth rate, {modal_growth_rate:.1f} 1/s",
+        )
     size = float(np.abs(band).max())
     ax.set_ylim(size / 1e3, 10 * size)
     ax.set_xlim(0, 1e3 * len(signal) * sampling)
@@ -86,7 +100,7 @@ def perturbation_growth(
 
 
 @styled
-def critical_friction_map(comparisons: tuple[Comparison, ...], *, ax: Axes | None = None) -> Figure:
+def growth_comparison(comparisons: tuple[Comparison, ...], *, ax: Axes | None = None) -> Figure:
     """Growth rates of both approaches at every μ compared."""
     figure, ax = panel(ax, 3.2)
     mu = [c.mu for c in comparisons]

@@ -29,7 +29,8 @@ def model_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     """The model as it stands."""
     if inputs.system is not None and inputs.system.lines:
         yield ReportFigure(
-            "model", "The model",
+            "model",
+            "The model",
             "Bodies as lines, supports as squares with the directions they hold (φ: rotation), contacts as circles, "
             "loads and prescribed velocities as arrows, watched points as small circles.",
             f"Drawing of {', '.join(line.name for line in inputs.system.lines)} with supports, loads and contacts.",
@@ -58,14 +59,18 @@ def modal_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     yield from _all_branches(inputs)
     if inputs.curve is not None and len(inputs.curve.mu) > 1:
         yield ReportFigure(
-            "friction-curve", "Friction over frequency",
+            "friction-curve",
+            "Friction over frequency",
             "μ(ω) = −s (1/Kc + Gnn(ω)) / Gnt(ω), from the receptances of the structure without contact and damping. "
-            "Any horizontal line cuts the curve at the frequencies that exist at that friction coefficient; at a "
-            "maximum two of them meet and become complex: all onsets of flutter are maxima of one explicit curve. "
+            "A horizontal line cuts the curve at the frequencies of the modes that the contact sees at that friction "
+            "coefficient; at a maximum two of them meet and become complex: all onsets of flutter are maxima of one explicit curve. "
             "Diamonds: the onsets, solved on the assembled matrices.",
             "Friction coefficient over frequency with its local maxima marked as onsets of instability.",
             plots.friction_curve(
-                inputs.curve.mu, inputs.curve.frequency_hz, onsets=inputs.undamped_onsets, case_mu=inputs.mu,
+                inputs.curve.mu,
+                inputs.curve.frequency_hz,
+                onsets=inputs.undamped_onsets,
+                case_mu=inputs.mu,
                 friction_range=inputs.case.modal.friction_range,
             ),
         )
@@ -79,14 +84,16 @@ def _undamped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> I
     a, b = onset.branches
     onsets = inputs.undamped_onsets
     yield ReportFigure(
-        "frequency-pair", f"Frequencies of modes {a} and {b}, without damping",
+        "frequency-pair",
+        f"Frequencies of modes {a} and {b}, without damping",
         f"The two modes come together as friction grows and meet at μ = {onset.mu:.5f}, {onset.frequency_hz:.1f} Hz; "
         "beyond it they share one frequency and one of them grows (marked).",
         f"Frequencies of modes {a} and {b} over friction, merging at {onset.mu:.4f}.",
         plots.frequency_branches(modes, onset.branches, onsets=onsets),
     )
     yield ReportFigure(
-        "imaginary-pair", f"Imaginary part of the frequencies of modes {a} and {b}, without damping",
+        "imaginary-pair",
+        f"Imaginary part of the frequencies of modes {a} and {b}, without damping",
         "For motion written as exp(jωt), a negative imaginary part of ω grows: Im ω = −Re λ. Below the onset both are "
         "real; beyond it the pair opens as the square root of μ − μc.",
         f"Imaginary parts of modes {a} and {b}, zero up to {onset.mu:.4f}, then opening like a square root.",
@@ -99,13 +106,15 @@ def _damped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> Ite
     crossing = next((o for o in _damped(inputs) if set(o.branches) == {a, b}), None)
     where = f" Growth begins at μ = {crossing.mu:.5f}, at {crossing.frequency_hz:.1f} Hz." if crossing else ""
     yield ReportFigure(
-        "damped-frequency-pair", f"Frequencies of modes {a} and {b}, with structural damping",
+        "damped-frequency-pair",
+        f"Frequencies of modes {a} and {b}, with structural damping",
         "Im λ/2π of the damped pair: the frequencies come close without being exactly equal." + where,
         f"Damped frequencies of modes {a} and {b} over friction.",
         plots.frequency_branches(modes, onset.branches, onsets=inputs.damped_onsets),
     )
     yield ReportFigure(
-        "damped-growth-pair", f"Growth rates of modes {a} and {b}, with structural damping",
+        "damped-growth-pair",
+        f"Growth rates of modes {a} and {b}, with structural damping",
         "Re λ of the damped pair; positive grows. Damping shifts both downwards, and so the onset to a slightly "
         "larger friction coefficient." + where,
         f"Growth rates of modes {a} and {b} over friction, one becoming positive.",
@@ -126,7 +135,8 @@ def _all_branches(inputs: ReportInputs) -> Iterator[ReportFigure]:
             continue
         shown = int((modes.frequency_hz.min(axis=0) <= inputs.max_frequency_hz).sum())
         yield ReportFigure(
-            name, f"The first {shown} frequencies over friction, {words}",
+            name,
+            f"The first {shown} frequencies over friction, {words}",
             "Every line is one mode, followed from μ = 0 through crossings and coalescences. Circles: potentially "
             "unstable (the mode grows). Diamonds: onsets, solved.",
             f"Frequencies of {shown} modes over the friction coefficient with unstable stretches marked.",
@@ -134,7 +144,8 @@ def _all_branches(inputs: ReportInputs) -> Iterator[ReportFigure]:
         )
     if inputs.damped_sweep is not None and len(inputs.damped_sweep.mu) > 1:
         yield ReportFigure(
-            "root-locus", "Root locus",
+            "root-locus",
+            "Root locus",
             "Eigenvalues as friction grows, with structural damping. The horizontal axis is linear near zero and "
             "logarithmic beyond.",
             "Eigenvalues in the plane of growth rate and frequency, coloured by friction coefficient.",
@@ -147,7 +158,8 @@ def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[Re
     run = inputs.trajectory
     if run is not None and run.watch_names and len(run.time) > 1:
         yield ReportFigure(
-            "acceleration", f"Acceleration of {run.watch_names[0]}",
+            "acceleration",
+            f"Acceleration of {run.watch_names[0]}",
             f"Along x, over the whole run. The dark band is what lies below {inputs.max_frequency_hz / 1e3:g} kHz, the "
             "light one everything the time step resolves, impacts included. Dotted lines: where phases begin.",
             f"Acceleration of {run.watch_names[0]} over time with the phases of the run marked.",
@@ -156,7 +168,8 @@ def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[Re
     if run is not None and run.contact_names and len(run.time) > 1:
         for k, name in enumerate(run.contact_names):
             yield ReportFigure(
-                f"contact-{name}", f"Contact {name} over the whole run",
+                f"contact-{name}-history",
+                f"Contact {name} over the whole run",
                 "Normal force and slip velocity of the slave against the master, extrema of every short piece.",
                 f"Normal force and slip velocity of contact {name} over time.",
                 plots.contact_history(run, contact=k),
@@ -166,7 +179,8 @@ def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[Re
         yield from _contact_window(inputs, window)
     if run is not None and inputs.energy is not None and len(run.time) > 1:
         yield ReportFigure(
-            "energy", "Energy balance",
+            "energy",
+            "Energy balance",
             "Above: what was put in, what is stored and what was taken out. Below: what is missing in the balance, "
             "relative to the largest energy that changed hands.",
             "Energies over time, and the imbalance of the energy balance.",
@@ -178,25 +192,31 @@ def _spectra(inputs: ReportInputs) -> Iterator[ReportFigure]:
     if inputs.spectra:
         spec = next(iter(inputs.spectra.values()))
         yield ReportFigure(
-            "spectrum", f"Spectrum of {inputs.spectra_of.split(' over ')[0]}",
+            "spectrum",
+            f"Spectrum of {inputs.spectra_of.split(' over ')[0]}",
             f"Of {inputs.spectra_of}; {spec.window} window, bins every {spec.resolution_hz:.1f} Hz, a line is "
-            f"{spec.bandwidth_hz:.1f} Hz wide at −6 dB. In dB of the amplitude, 0 dB is 1 {inputs.spectra_unit}. Dotted: "
-            "the dominant frequency and its multiples.",
+            f"{spec.bandwidth_hz:.1f} Hz wide at −6 dB. 0 dB is an amplitude of 1 {inputs.spectra_unit}. "
+            "Dotted: the dominant frequency and its multiples.",
             f"Amplitude spectra of {', '.join(inputs.spectra)}.",
             plots.spectrum_plot(
-                inputs.spectra, max_frequency_hz=inputs.max_frequency_hz, unit=inputs.spectra_unit,
+                inputs.spectra,
+                max_frequency_hz=inputs.max_frequency_hz,
+                unit=inputs.spectra_unit,
                 marked_hz=inputs.dominant_hz,
             ),
         )
     if inputs.spectrogram is not None and inputs.spectrogram.amplitude.size > 1:
         content = inputs.spectrogram
         yield ReportFigure(
-            "spectrogram", "Spectrogram",
+            "spectrogram",
+            "Spectrogram",
             f"Of the {inputs.spectrogram_of}; resolution {content.resolution_hz:.0f} Hz. How the tone builds up, and "
             "its multiples with it.",
             "Spectrum over time as a colour map.",
             plots.spectrogram_plot(
-                content, start=inputs.spectrogram_start, max_frequency_hz=inputs.max_frequency_hz,
+                content,
+                start=inputs.spectrogram_start,
+                max_frequency_hz=inputs.max_frequency_hz,
                 unit=inputs.spectrogram_unit,
             ),
         )
@@ -213,21 +233,26 @@ def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigu
     if window.separation_fraction:
         shares.append(f"{100 * window.separation_fraction:.0f} % separation")
     caption = (
-        f"Contact {name} over three periods ({window.reason}): normal force up to {window.max_normal_force:.1f} N, slip "
-        f"speed up to {window.max_slip_speed:.3f} m/s, {', '.join(shares)}. Where it sticks, slave and master move "
-        "together, though not evenly: both vibrate."
+        f"Contact {name} over three periods ({window.reason}): normal force up to {window.max_normal_force:.1f} N, "
+        f"slip speed up to {window.max_slip_speed:.3f} m/s, {', '.join(shares)}. Where it sticks, slave and "
+        "master move together, though not evenly: both vibrate."
     )
     yield ReportFigure(
-        "contact-window", "Normal force and velocities over three periods", caption,
+        "contact-window",
+        "Normal force and velocities over three periods",
+        caption,
         f"Normal force and tangential velocities of contact {name} over three periods; stick and slip shaded.",
         plots.contact_force_and_velocity(
-            run, window, slave=slave if slave in run.watch_names else None,
+            run,
+            window,
+            slave=slave if slave in run.watch_names else None,
             tangent=(1.0, 0.0) if contact is None else (float(contact.tangent[0]), float(contact.tangent[1])),
             steady_force=steady,
         ),
     )
     yield ReportFigure(
-        "portrait", "Normal force over slip velocity",
+        "portrait",
+        "Normal force over slip velocity",
         "The same three periods. On the vertical line at zero the contact sticks.",
         f"Closed loops of normal force over slip velocity of contact {name}.",
         plots.phase_portrait(run, window),
@@ -242,24 +267,34 @@ def agreement_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
         top = inputs.max_frequency_hz
         if inputs.modes is not None and len(chosen.perturbation.components.eigenvalues):
             yield ReportFigure(
-                "spectrum-map", "What the time signal is made of",
-                f"Growth rate over frequency at μ = {chosen.mu:g}. Circles: complex modes. Crosses: damped exponentials "
-                "found in the slip speed of a small perturbation, marched in time. Every cross inside a circle is a mode "
-                "that both approaches see alike.",
+                "spectrum-map",
+                "What the time signal is made of",
+                f"Growth rate over frequency at μ = {chosen.mu:g}. Circles: complex modes. Crosses: damped "
+                "exponentials found in the slip speed of a small perturbation, marched in time. Every cross inside a "
+                "circle is a mode that both approaches see alike.",
                 "Complex modes and identified components in the plane of frequency and growth rate.",
                 plots.spectrum_map(inputs.modes, chosen.perturbation.components, mu=chosen.mu, max_frequency_hz=top),
             )
         if len(chosen.perturbation.signal) > 1:
             yield ReportFigure(
-                "perturbation", "Growth of a small perturbation",
-                f"Slip speed minus its steady value at μ = {chosen.mu:g}, up to where friction stays linear. The dashed line "
-                f"has the slope of the modal growth rate. Grey: what lies above {top / 1e3:g} kHz, out of the range compared, "
-                "may grow as well.",
+                "perturbation",
+                "Growth of a small perturbation",
+                f"Slip speed minus its steady value at μ = {chosen.mu:g}, up to where friction stays linear. The "
+                f"dashed line has the slope of the modal growth rate. Grey: what lies above {top / 1e3:g} kHz, "
+                "out of the range compared, may grow as well.",
                 "Size of the perturbation over time on a logarithmic scale beside the modal growth rate.",
                 plots.perturbation_growth(
                     chosen.perturbation, modal_growth_rate=chosen.modal_eigenvalue.real, max_frequency_hz=top
                 ),
             )
+    if len(comparisons) > 1:
+        yield ReportFigure(
+            "growth-comparison",
+            "Growth rates by both approaches",
+            "Circles: the mode that grows fastest. Crosses: the fastest component of a small perturbation in time.",
+            "Growth rates of both approaches over the friction coefficient.",
+            plots.growth_comparison(comparisons),
+        )
     yield from _shape_figures(inputs)
 
 
@@ -269,18 +304,20 @@ def _shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
         return
     if operating is not None:
         yield ReportFigure(
-            "operating-shape", f"Velocity of the bodies at {operating.frequency_hz:.0f} Hz, in time",
-            "The line at the dominant frequency taken out of the velocity of every node. Arrows: velocities; thin lines: a "
-            "quarter of a period later; dotted: at rest.",
+            "operating-shape",
+            f"Velocity of the bodies at {operating.frequency_hz:.0f} Hz, in time",
+            "The line at the dominant frequency taken out of the velocity of every node. Arrows: velocities; thin "
+            "lines: a quarter of a period later; dotted: at rest.",
             f"Velocity shape of the bodies at {operating.frequency_hz:.0f} Hz from the run in time.",
             plots.mode_shape(system, operating.shape, velocity=True),
         )
     if mode is not None:
         growth = f", growth rate {mode.growth_rate:.0f} 1/s" if mode.growth_rate is not None else ""
         yield ReportFigure(
-            "unstable-mode", f"The mode at {mode.frequency_hz:.0f} Hz",
-            f"Displacements{growth}, drawn where the motion is largest and, thin, a quarter of a period later: the mode is "
-            "complex, the bodies do not move in phase.",
+            "unstable-mode",
+            f"The mode at {mode.frequency_hz:.0f} Hz",
+            f"Displacements{growth}, drawn where the motion is largest and, thin, a quarter of a period later: "
+            "the mode is complex, the bodies do not move in phase.",
             f"Deformed bodies in the mode at {mode.frequency_hz:.0f} Hz.",
             plots.mode_shape(system, mode.shape),
         )
@@ -288,12 +325,15 @@ def _shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
         by_body = ", ".join(f"{name} {value:.2f}" for name, value in inputs.mac_by_body.items())
         extra = f" Likeness (MAC) by body: {by_body}." if by_body else ""
         yield ReportFigure(
-            "shapes", "Both shapes side by side",
+            "shapes",
+            "Both shapes side by side",
             "Left the velocities of the run, right the mode, turned to agree in sign." + extra,
             "Operating shape of the run beside the unstable mode.",
             plots.shapes_side_by_side(
                 system,
-                [(f"run, {operating.frequency_hz:.0f} Hz", operating.shape, True),
-                 (f"mode, {mode.frequency_hz:.0f} Hz", mode.shape, False)],
+                [
+                    (f"run, {operating.frequency_hz:.0f} Hz", operating.shape, True),
+                    (f"mode, {mode.frequency_hz:.0f} Hz", mode.shape, False),
+                ],
             ),
         )

@@ -53,9 +53,9 @@ class ReportInputs:
     spectrogram, whose signal begins at spectrogram_start [s]. operating_shape: velocities at the dominant
     frequency of the run; unstable_shape: the mode that grows fastest. mac_by_body: assurance of these two.
     values: computed values by the names used in case.reference.values, in front of those that the results
-    give. source_places: where in the source of case.reference something is found, by the name of the figure
-    or table here ("frequency-pair": "figure 3"). timings [s] by analysis; versions by program; case_text: the
-    case file as written; created: date and time; warnings and notes in words.
+    give; value_notes: what each of them is. source_places: where in the source of case.reference something is
+    found, by the name of the figure or table here ("frequency-pair": "figure 3"). timings [s] by analysis;
+    versions by program; case_text: the case file as written; created: date and time; warnings and notes in words.
     """
 
     case: Case
@@ -86,6 +86,7 @@ class ReportInputs:
     mac_by_body: Mapping[str, float] = field(default_factory=dict[str, float])
     agreement: Agreement | None = None
     values: Mapping[str, float] = field(default_factory=dict[str, float])
+    value_notes: Mapping[str, str] = field(default_factory=dict[str, str])
     source_places: Mapping[str, str] = field(default_factory=dict[str, str])
     timings: Mapping[str, float] = field(default_factory=dict[str, float])
     versions: Mapping[str, str] = field(default_factory=dict[str, str])

@@ -116,9 +116,7 @@ def growth_branches(
 
 
 @styled
-def damping_branches(
-    modes: ComplexModes, branches: Sequence[int] | None = None, *, ax: Axes | None = None
-) -> Figure:
+def damping_branches(modes: ComplexModes, branches: Sequence[int] | None = None, *, ax: Axes | None = None) -> Figure:
     """Damping ratios −Re λ/|λ| in per cent over friction; negative: unstable."""
     columns = _columns(modes, branches)
     figure, ax = panel(ax, 3.5)
@@ -158,8 +156,15 @@ def friction_curve(
         ax.plot(frequency_hz[piece] / 1e3, mu[piece], color=BLUE, linewidth=1.4)
     if case_mu is not None:
         ax.axhline(case_mu, color=GREY, linestyle=":", linewidth=1.2)
-        ax.annotate(f"μ = {case_mu:g}", (1.0, case_mu), xycoords=("axes fraction", "data"), ha="right",
-                    va="bottom", fontsize=8.5, color=GREY)
+        ax.annotate(
+            f"μ = {case_mu:g}",
+            (1.0, case_mu),
+            xycoords=("axes fraction", "data"),
+            ha="right",
+            va="bottom",
+            fontsize=8.5,
+            color=GREY,
+        )
     for onset in onsets.onsets if onsets is not None else ():
         if low <= onset.mu <= high:
             _mark_onset(ax, onset, onset.mu, x=onset.frequency_hz / 1e3)
@@ -227,9 +232,7 @@ def _mark_onset(ax: Axes, onset: Onset, y: float, x: float | None = None, *, bes
 def _legend(ax: Axes, unstable: bool, onsets: bool) -> None:
     handles, _ = ax.get_legend_handles_labels()
     if unstable:
-        handles.append(
-            Line2D([], [], color=VERMILION, marker="o", mfc="white", ms=4, linewidth=2.2, label="unstable")
-        )
+        handles.append(Line2D([], [], color=VERMILION, marker="o", mfc="white", ms=4, linewidth=2.2, label="unstable"))
     if onsets:
         handles.append(Line2D([], [], color=INK, marker="D", ms=4.5, linestyle="none", label="onset, solved"))
     legend_above(ax, handles)

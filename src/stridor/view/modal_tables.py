@@ -55,9 +55,7 @@ def body_table(name: str, modes: BodyModes, printed: tuple[ReferenceFrequency, .
     caption = "F: bending, T: traction."
     if printed:
         caption += " " + PRINTED
-    return drop_empty(
-        Table(f"frequencies-{name}", f"{name} alone", heads, tuple(rows), frozenset({0, 4}), caption)
-    )
+    return drop_empty(Table(f"frequencies-{name}", f"{name} alone", heads, tuple(rows), frozenset({0, 4}), caption))
 
 
 def coupled_table(frequencies: Array, printed: tuple[ReferenceFrequency, ...], onsets: Onsets | None) -> Table:
@@ -103,6 +101,7 @@ def onset_tables(inputs: ReportInputs) -> list[Table]:
         if not onsets.onsets:
             continue
         tables.append(_onsets(onsets, name, printed))
+        printed = ()  # compared once
     solved = [onset for o in (inputs.undamped_onsets, inputs.damped_onsets) if o is not None for onset in o.onsets]
     if solved:
         tables.append(_solutions(solved))
@@ -118,7 +117,7 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
         mu_diff = difference(onset.mu, other.mu) if other else None
         rounded = other is not None and same_as_printed(onset.mu, other.mu)
         mark = " ▲" if is_far(mu_diff) and not rounded else ""
-        remark = percent(mu_diff, 1) + mark + (" (equal when rounded)" if rounded else "")
+        remark = percent(mu_diff, 1) + mark + (" ≙" if rounded else "")
         rows.append(
             Row(
                 (
@@ -128,8 +127,11 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
                     number(onset.frequency_hz, 1),
                     significant(other.frequency_hz, 8) if other else "",
                     percent(f_diff),
-                    f"{onset.branches[0]} and {onset.branches[1]}" if onset.kind == "flutter" else str(onset.branches[0]),
-                    onset.kind + (", growth ends" if onset.stabilising else ""),
+                    f"{onset.branches[0]} and {onset.branches[1]}"
+                    if onset.kind == "flutter"
+                    else str(onset.branches[0]),
+                    "" if onset.kind == "flutter" else onset.kind,
+                    "growth ends here" if onset.stabilising else "",
                     other.note if other else "",
                 ),
                 "far" if mark or is_far(f_diff) else "",
@@ -138,19 +140,31 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
     lost = [p for p in printed if p not in partners.values()]
     inside = [p for p in lost if onsets.friction_range[0] <= p.mu <= onsets.friction_range[1]]
     for p in inside:
-        cells = ("", significant(p.mu, 8), "", "", significant(p.frequency_hz, 8), "", "", "not found here", p.note)
+        cells = ("", significant(p.mu, 8), "", "", significant(p.frequency_hz, 8), "", "", "", "not found here", p.note)
         rows.append(Row(cells, "far"))
-    heads = ("critical μ", "printed μ", "difference", "frequency [Hz]", "printed [Hz]", "difference", "modes that meet",
-             "kind", "note")
+    heads = (
+        "critical μ",
+        "printed μ",
+        "difference",
+        "frequency [Hz]",
+        "printed [Hz]",
+        "difference",
+        "modes that meet",
+        "kind",
+        "remark",
+        "note",
+    )
     low, high = onsets.friction_range
     caption = (
         f"All onsets with {low:g} ≤ μ ≤ {high:g} and frequencies up to {onsets.max_frequency_hz / 1e3:g} kHz, "
         f"{'with structural damping' if onsets.damped else 'without damping'}. Modes are numbered by frequency "
         "at μ = 0."
     )
-    return drop_empty(
-        Table(f"onsets-{name}", f"Onsets, {name}", heads, tuple(rows), frozenset({6, 7, 8}), caption)
-    )
+    if all(o.kind == "flutter" for o in onsets.onsets):
+        caption += " All are flutter: two modes meet."
+    if printed:
+        caption += " Differences beyond 0.5 % are marked with ▲; ≙: equal when rounded to the digits printed."
+    return drop_empty(Table(f"onsets-{name}", f"Onsets, {name}", heads, tuple(rows), frozenset({6, 7, 8, 9}), caption))
 
 
 def _onset_partners(found: tuple[Onset, ...], printed: tuple[ReferenceOnset, ...]) -> dict[int, ReferenceOnset]:
@@ -192,7 +206,9 @@ def _solutions(found: list[Onset]) -> Table:
         "the growth rate opens as κ √(μ − μc); with damping, two eigenvalues are equal at the exceptional point, a "
         "complex μ close by, and growth crosses zero with the slope given."
     )
-    return drop_empty(Table("onset-solutions", "How the onsets are solved", heads, tuple(rows), frozenset({0}), caption))
+    return drop_empty(
+        Table("onset-solutions", "How the onsets are solved", heads, tuple(rows), frozenset({0}), caption)
+    )
 
 
 def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float) -> Table:

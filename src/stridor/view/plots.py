@@ -4,7 +4,7 @@ Each returns the matplotlib figure; it belongs to no window, so it needs no disp
 `figure.savefig(...)`, or pass the axes of a pyplot figure of yours to see it on screen.
 """
 
-from .agreement_plots import critical_friction_map, perturbation_growth, spectrum_map
+from .agreement_plots import growth_comparison, perturbation_growth, spectrum_map
 from .modal_plots import damping_branches, frequency_branches, friction_curve, growth_branches, root_locus
 from .shape_plots import mode_shape, model_plot, shapes_side_by_side
 from .temporal_plots import (
@@ -21,12 +21,12 @@ __all__ = [
     "acceleration_history",
     "contact_force_and_velocity",
     "contact_history",
-    "critical_friction_map",
     "damping_branches",
     "energy_plot",
     "frequency_branches",
     "friction_curve",
     "growth_branches",
+    "growth_comparison",
     "mode_shape",
     "model_plot",
     "perturbation_growth",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import base64
 import io
 import os
+import re
 import tempfile
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -25,6 +25,7 @@ from .windows import Window, regime_window
 from .words import bodies_table, model_in_words, simulation_table, summary_table, verdict
 
 PNG_DPI = 180
+_UNIT = re.compile(r"(\d) (Hz|kHz|N/m|N|m/s²|m/s|1/s|mm|s|GPa|%)(?!\w)")
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,7 @@ def write_report(inputs: ReportInputs, folder: Path) -> Path:
     for part in (p for chapter in chapters for p in chapter.parts):
         if isinstance(part, ReportFigure):
             vector = _rendered(part.figure, "svg")
+            part.figure.set_layout_engine("none")  # laid out once; the second file takes it as it is
             _write(figures / f"{part.name}.svg", vector)
             _write(figures / f"{part.name}.png", _rendered(part.figure, "png"))
             drawings[part.name] = "data:image/svg+xml;base64," + base64.b64encode(vector).decode("ascii")
@@ -74,19 +76,27 @@ def render(inputs: ReportInputs, chapters: list[Section], drawings: dict[str, st
             (p for chapter in chapters for p in chapter.parts if isinstance(p, ReportFigure)), start=1
         )
     }
-    return _environment().get_template("report.html.j2").render(
-        inputs=inputs,
-        title=inputs.case.title or "Friction-induced instabilities",
-        verdict=verdict(inputs),
-        summary=summary_table(inputs),
-        sections=chapters,
-        drawings=drawings,
-        numbers=numbers,
-        places={name: place for name, place in places.items() if reference is not None},
-        reference=reference,
-        settings=inputs.case.to_toml(defaults=True),
-        is_table=lambda part: isinstance(part, Table),
+    return (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            inputs=inputs,
+            title=inputs.case.title or "Friction-induced instabilities",
+            verdict=verdict(inputs),
+            summary=summary_table(inputs),
+            sections=chapters,
+            drawings=drawings,
+            numbers=numbers,
+            places={name: place for name, place in places.items() if reference is not None},
+            reference=reference,
+            settings=inputs.case.to_toml(defaults=True),
+            is_table=_is_table,
+        )
     )
+
+
+def _is_table(part: Table | ReportFigure) -> bool:
+    return isinstance(part, Table)
 
 
 def sections(inputs: ReportInputs) -> list[Section]:
@@ -128,8 +138,8 @@ def _modal(inputs: ReportInputs) -> Section:
     if parts or said:
         said.insert(
             0,
-            "Eigenvalues λ of the system coupled by friction, linear about steady sliding: the growth rate is Re λ, the "
-            "frequency Im λ/2π. A mode with positive growth rate is potentially unstable.",
+            "Eigenvalues λ of the system coupled by friction, linear about steady sliding: the growth rate is Re λ, "
+            "the frequency Im λ/2π. A mode with positive growth rate is potentially unstable.",
         )
     return Section("modal", "Modal approach", tuple(said), parts=tuple(parts))
 
@@ -137,7 +147,9 @@ def _modal(inputs: ReportInputs) -> Section:
 def _temporal(inputs: ReportInputs, window: Window | None) -> Section:
     parts: list[Table | ReportFigure] = []
     if inputs.trajectory is not None:
-        parts = [simulation_table(inputs), contact_table(inputs.trajectory)]
+        parts = [simulation_table(inputs)]
+        if inputs.trajectory.contact_names:
+            parts.append(contact_table(inputs.trajectory))
     parts.extend(temporal_figures(inputs, window))
     if inputs.energy is not None:
         parts.append(energy_table(inputs.energy))
@@ -223,8 +235,13 @@ def _umask() -> int:
 @cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=FunctionLoader(_template), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FunctionLoader(_template),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
+    environment.filters["tidy"] = tidy
     environment.globals["about_tables"] = about_tables  # pyright: ignore[reportArgumentType]
     return environment
 
@@ -233,6 +250,7 @@ def _template(name: str) -> str:
     return (resources.files("stridor.view") / "templates" / name).read_text(encoding="utf-8")
 
 
-def figures_of(chapters: Iterable[Section]) -> list[ReportFigure]:
-    """All figures in their order."""
-    return [part for chapter in chapters for part in chapter.parts if isinstance(part, ReportFigure)]
+def tidy(text: str) -> str:
+    """The text with numbers and units that stay on one line."""
+    joined = text.replace("μ = ", "μ\u00a0=\u00a0").replace(" ≤ ", "\u00a0≤\u00a0").replace(" · ", "\u202f·\u202f")
+    return _UNIT.sub("\\1\u00a0\\2", joined)

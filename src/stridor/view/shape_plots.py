@@ -29,9 +29,16 @@ def model_plot(system: System, case: Case | None = None, *, ax: Axes | None = No
         middle = 1e3 * line.coordinates[len(line.coordinates) // 2]
         # Beside the line, not on it: across its direction.
         across = _across(line.coordinates)
-        ax.annotate(line.name, (middle[0], middle[1]), xytext=(14 * across[0], 14 * across[1]),
-                    textcoords="offset points", color=colour, ha="left" if across[0] > 0.5 else "center",
-                    va="center", fontweight="bold")
+        ax.annotate(
+            line.name,
+            (middle[0], middle[1]),
+            xytext=(14 * across[0], 14 * across[1]),
+            textcoords="offset points",
+            color=colour,
+            ha="left" if across[0] > 0.5 else "center",
+            va="center",
+            fontweight="bold",
+        )
     if case is not None:
         _draw_case(ax, case, 1e3 * reach)
     _mark_contacts(ax, system, named=True)
@@ -65,7 +72,7 @@ def shapes_side_by_side(
 ) -> Figure:
     """Shapes beside each other, each (title, shape, whether a velocity), turned to agree with the first."""
     if axes is None:
-        figure = new_figure(3.4 if len(shapes) > 1 else 3.2)
+        figure = new_figure(3.0)
         axes = list(figure.subplots(1, len(shapes), sharex=True, sharey=True, squeeze=False)[0])
     else:
         figure = root_figure(axes[0])
@@ -113,8 +120,15 @@ def _draw_shape(ax: Axes, system: System, motion: Mapping[str, ComplexArray], *,
         if arrows:
             some = np.unique(np.linspace(0, len(rest) - 1, min(ARROWS, len(rest))).astype(int))
             ax.quiver(
-                *rest[some].T, *(scale * motion[line.name][some].real).T, angles="xy", scale_units="xy", scale=1,
-                color=colour, width=0.004, alpha=0.75, zorder=2.5,
+                *rest[some].T,
+                *(scale * motion[line.name][some].real).T,
+                angles="xy",
+                scale_units="xy",
+                scale=1,
+                color=colour,
+                width=0.004,
+                alpha=0.75,
+                zorder=2.5,
             )
     _mark_contacts(ax, system, named=False)
     _lengths(ax)
@@ -128,8 +142,15 @@ def _draw_case(ax: Axes, case: Case, reach: float) -> None:
         at = 1e3 * _place(case, support.at)
         ax.plot(*at, "s", mfc="white", mec=INK, ms=8, mew=1.4, zorder=4)
         held = ", ".join({"rotation": "φ"}.get(d, d) for d in support.fixed)
-        ax.annotate(f"holds {held}", (at[0], at[1]), xytext=(-9, 0), textcoords="offset points", ha="right",
-                    va="center", fontsize=8.5)
+        ax.annotate(
+            f"holds {held}",
+            (at[0], at[1]),
+            xytext=(-9, 0),
+            textcoords="offset points",
+            ha="right",
+            va="center",
+            fontsize=8.5,
+        )
         speed = np.array([support.velocity.get("x", 0.0), support.velocity.get("y", 0.0)])
         if np.any(speed):
             beside = 0.06 * reach * np.array([-speed[1], speed[0]]) / np.hypot(*speed)
@@ -147,9 +168,7 @@ def _draw_case(ax: Axes, case: Case, reach: float) -> None:
         legend_above(ax)
 
 
-def _arrow(
-    ax: Axes, at: Array, along: Array, length: float, colour: str, text: str, *, away: bool
-) -> None:
+def _arrow(ax: Axes, at: Array, along: Array, length: float, colour: str, text: str, *, away: bool) -> None:
     """An arrow along a direction that ends at a point (``away``) or starts there, with its name."""
     unit = along / np.hypot(*along)
     tail, head = (at - length * unit, at) if away else (at, at + length * unit)
@@ -157,8 +176,16 @@ def _arrow(
     ax.annotate("", (head[0], head[1]), xytext=(tail[0], tail[1]), arrowprops=style, zorder=5)
     end = tail if away else head
     side = (8, 2) if abs(unit[1]) > 0.5 else (0, 8)
-    ax.annotate(text, (end[0], end[1]), xytext=side, textcoords="offset points", color=colour, fontsize=8.5,
-                ha="left" if side[0] else "center", va="bottom")
+    ax.annotate(
+        text,
+        (end[0], end[1]),
+        xytext=side,
+        textcoords="offset points",
+        color=colour,
+        fontsize=8.5,
+        ha="left" if side[0] else "center",
+        va="bottom",
+    )
     ax.plot(end[0], end[1], alpha=0)  # counts for the limits of the axes
 
 
@@ -173,8 +200,15 @@ def _mark_contacts(ax: Axes, system: System, *, named: bool) -> None:
         ax.plot(*at, "o", mfc="none", mec=INK, ms=10, mew=1.2, zorder=4)
         if named:
             below = -13 * np.sign(contact.normal)
-            ax.annotate(contact.name, (at[0], at[1]), xytext=(0, below[1] or -13), textcoords="offset points",
-                        ha="center", va="center", fontweight="bold")
+            ax.annotate(
+                contact.name,
+                (at[0], at[1]),
+                xytext=(0, below[1] or -13),
+                textcoords="offset points",
+                ha="center",
+                va="center",
+                fontweight="bold",
+            )
 
 
 def _across(coordinates: Array) -> Array:

@@ -8,6 +8,7 @@ from typing import ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
+from cycler import cycler
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -42,8 +43,7 @@ STYLE: dict[str, object] = {
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
-    "axes.prop_cycle": mpl.cycler(color=COLOURS),  # pyright: ignore[reportUnknownMemberType]
-    "axes.formatter.use_mathtext": True,
+    "axes.prop_cycle": cycler(color=COLOURS),
     "axes.formatter.limits": (-4, 5),
     "grid.color": FAINT,
     "grid.linewidth": 0.6,

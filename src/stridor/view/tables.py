@@ -64,7 +64,8 @@ def significant(value: float | None, digits: int = 4) -> str:
     text = f"{value:.{digits}g}"
     if "e" in text:
         mantissa, exponent = text.split("e")
-        text = f"{mantissa} · 10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+        power = f"10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+        text = {"1": power, "-1": f"-{power}"}.get(mantissa, f"{mantissa} · {power}")
     return text.replace("-", "−")
 
 
@@ -100,7 +101,7 @@ def paired(computed: Sequence[float] | Array, printed: Sequence[float] | Array) 
     """
     a, b = np.asarray(computed, dtype=float), np.asarray(printed, dtype=float)
     if not len(a) or not len(b):
-        return [(i, None) for i in range(len(a))] + [(None, j) for j in range(len(b))]
+        return [*((i, None) for i in range(len(a))), *((None, j) for j in range(len(b)))]
     partner = assigned(np.abs(np.log((a[:, None] + 1.0) / (b + 1.0))), UNPAIRED)
     pairs: list[tuple[int | None, int | None]] = [(i, partner.get(i)) for i in range(len(a))]
     alone = sorted(set(range(len(b))) - set(partner.values()))

@@ -139,9 +139,17 @@ def spectrogram_plot(
     inside = content.frequency_hz <= max_frequency_hz
     amplitude = content.amplitude[inside]
     level = 20 * np.log10(np.maximum(amplitude / largest_of(amplitude), 1e-300))
-    image = ax.pcolormesh(
-        (start + content.time), content.frequency_hz[inside] / 1e3, level,
-        vmin=-60, vmax=0, cmap="cividis", shading="gouraud", rasterized=True,
+    time, frequency = start + content.time, content.frequency_hz[inside] / 1e3
+    half = 0.5 * float(time[1] - time[0]) if len(time) > 1 else 0.5 / content.resolution_hz
+    image = ax.imshow(
+        level,
+        extent=(float(time[0]) - half, float(time[-1]) + half, float(frequency[0]), float(frequency[-1])),
+        origin="lower",
+        aspect="auto",
+        interpolation="bilinear",
+        vmin=-60,
+        vmax=0,
+        cmap="cividis",
     )
     ax.set(xlabel="time [s]", ylabel="frequency [kHz]")
     ax.grid(False)
@@ -194,9 +202,7 @@ def contact_force_and_velocity(
     return figure
 
 
-def _velocities(
-    ax: Axes, trajectory: Trajectory, part: slice, contact: int, slave: str | None, tangent: Array
-) -> None:
+def _velocities(ax: Axes, trajectory: Trajectory, part: slice, contact: int, slave: str | None, tangent: Array) -> None:
     time, slip = 1e3 * trajectory.time[part], trajectory.slip_speed[part, contact]
     if slave is None:
         ax.plot(time, slip, color=BLUE, label="slave against master")
@@ -254,9 +260,7 @@ def phase_portrait(
 
 
 @styled
-def energy_plot(
-    trajectory: Trajectory, balance: EnergyBalance, *, axes: Sequence[Axes] | None = None
-) -> Figure:
+def energy_plot(trajectory: Trajectory, balance: EnergyBalance, *, axes: Sequence[Axes] | None = None) -> Figure:
     """Energies over time: what was put in, stored and taken out; below, what is missing in the balance."""
     figure, (above, below) = stacked(axes, 2, 4.8, (2.2, 1))
     step = thinned(len(trajectory.time))
@@ -293,8 +297,17 @@ def mark_phases(ax: Axes, trajectory: Trajectory, *, named: bool = True) -> None
             ax.axvline(phase.start, color=INK, linestyle=":", linewidth=1.0)
         if named:
             middle = (phase.start + min(phase.end, float(trajectory.time[-1]))) / 2
-            ax.annotate(f"phase “{phase.name}”", (middle, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 3),
-                        textcoords="offset points", ha="center", va="bottom", fontsize=8.5, color=GREY)
+            ax.annotate(
+                f"phase “{phase.name}”",
+                (middle, 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(0, 3),
+                textcoords="offset points",
+                ha="center",
+                va="bottom",
+                fontsize=8.5,
+                color=GREY,
+            )
 
 
 def _usual_limits(ax: Axes, values: Array, *, around: Array | None = None, symmetric: bool = True) -> None:
@@ -311,9 +324,16 @@ def _usual_limits(ax: Axes, values: Array, *, around: Array | None = None, symme
     margin = (0.08 if around is None else 0.25) * (top - bottom)
     ax.set_ylim(bottom - margin, top + margin)
     peak = max(ends, key=abs)
-    ax.annotate(f"single peaks leave the frame, the largest {peak:.3g}", (0.995, 0.015), xycoords="axes fraction",
-                ha="right", va="bottom", fontsize=8, color=GREY,
-                bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.85})
+    ax.annotate(
+        f"single peaks leave the frame, the largest {abs(peak):.3g}",
+        (0.995, 0.015),
+        xycoords="axes fraction",
+        ha="right",
+        va="bottom",
+        fontsize=8,
+        color=GREY,
+        bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.85},
+    )
 
 
 def _mark_harmonics(ax: Axes, fundamental: float, top: float, *, named: bool) -> None:

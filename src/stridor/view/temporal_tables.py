@@ -22,7 +22,6 @@ def contact_table(trajectory: Trajectory) -> Table:
             (
                 phase.name,
                 name,
-                f"{phase.start:g} … {phase.end:g}",
                 number(100 * s.stick_fraction, 1),
                 number(100 * s.slip_fraction, 1),
                 number(100 * s.separation_fraction, 1),
@@ -36,8 +35,18 @@ def contact_table(trajectory: Trajectory) -> Table:
         for phase in trajectory.phases
         for name, s in phase.contacts.items()
     )
-    heads = ("phase", "contact", "time [s]", "stick [%]", "slip [%]", "separation [%]", "largest normal force [N]",
-             "largest friction force [N]", "largest slip speed [m/s]", "first stick [s]", "first separation [s]")
+    heads = (
+        "phase",
+        "contact",
+        "stick [%]",
+        "slip [%]",
+        "separation [%]",
+        "largest normal force [N]",
+        "largest friction force [N]",
+        "largest slip speed [m/s]",
+        "first stick [s]",
+        "first separation [s]",
+    )
     caption = "Counted in every step of the run, not only in the recorded ones; extrema include single impacts."
     return drop_empty(Table("contacts", "What the contacts did", heads, rows, frozenset({0, 1}), caption))
 
@@ -57,7 +66,9 @@ def energy_table(balance: EnergyBalance) -> Table:
     rows = [Row((name, number(1e3 * value, 4))) for name, value, _ in entries]
     missing = sum(sign * value for _, value, sign in entries)
     rows.append(Row(("missing at the end", significant(1e3 * missing, 2)), "good" if balance.error < 1e-3 else "bad"))
-    caption = f"Largest imbalance at any time: {significant(balance.error, 2)} of the largest energy that changed hands."
+    caption = (
+        f"Largest imbalance at any time: {significant(balance.error, 2)} of the largest energy that changed hands."
+    )
     return Table("energy", "Energy balance", ("", "energy [mJ]"), tuple(rows), frozenset({0}), caption)
 
 
@@ -69,38 +80,69 @@ def agreement_table(comparison: Comparison) -> Table:
     same = unstable == temporal.grows
     rows = [
         Row(("steady sliding is", names[unstable], names[temporal.grows], "", _judged(same)), _kind(same)),
-        _row("frequency [Hz]", modal.imag / (2 * np.pi), temporal.frequency_hz, comparison.frequency_error, GOOD_FREQUENCY),
-        _row("growth rate [1/s]", modal.real, temporal.growth_rate, comparison.growth_rate_error, GOOD_GROWTH),
+        agreed("frequency [Hz]", modal.imag / (2 * np.pi), temporal.frequency_hz, GOOD_FREQUENCY),
+        agreed("growth rate [1/s]", modal.real, temporal.growth_rate, GOOD_GROWTH),
     ]
     if comparison.dominant_frequency_hz is not None:
         heard = comparison.dominant_frequency_hz
         mode = None if comparison.responding is None else comparison.unstable_hz[comparison.responding]
         error = None if mode is None else heard / mode - 1
         rows.append(
-            Row(("dominant frequency of the full run [Hz]", number(mode, 1), number(heard, 1), percent(error),
-                 "an unstable mode responds" if mode is not None else "no unstable mode within 5 %"))
+            Row(
+                (
+                    "dominant frequency of the full run [Hz]",
+                    number(mode, 1),
+                    number(heard, 1),
+                    percent(error),
+                    "an unstable mode responds" if mode is not None else "no unstable mode within 5 %",
+                )
+            )
         )
     if comparison.run_growth is not None:
         fitted = comparison.run_growth
         state = "saturated" if fitted.saturated else "not saturated"
         rows.append(Row(("growth fitted in the full run [1/s]", "", number(fitted.rate, 1), "", state)))
     if comparison.mac is not None:
-        good = comparison.mac >= GOOD_MAC
-        rows.append(Row(("likeness of shapes (MAC), full run against mode", "", number(comparison.mac, 3), "",
-                         "alike" if good else "alike in part")))
+        rows.append(
+            Row(
+                (
+                    "likeness of shapes (MAC), full run against mode",
+                    "",
+                    number(comparison.mac, 3),
+                    "",
+                    _likeness(comparison.mac),
+                )
+            )
+        )
     title = f"Both approaches at μ = {comparison.mu:g}"
     caption = (
         "Small perturbations of steady sliding obey the equations that the modes solve: frequency and growth rate must "
-        "be equal up to the accuracy of the time step. The full run sticks, slips and separates; it may only be similar."
+        "be equal up to the accuracy of the time step. The full run sticks, slips and separates; it may only be "
+        "similar, and the growth fitted there, from a sudden start and with sticking, is no measure of Re λ."
     )
     heads = ("", "modal", "temporal", "difference", "")
     return Table(f"agreement-{comparison.mu:g}", title, heads, tuple(rows), frozenset({0, 4}), caption)
 
 
-def _row(name: str, modal: float, temporal: float, error: float, limit: float) -> Row:
-    good = error <= limit
-    difference_ = percent((temporal - modal) / abs(modal) if modal else None)
-    return Row((name, number(modal, 1), number(temporal, 1), difference_, _judged(good)), _kind(good))
+def _likeness(mac: float) -> str:
+    if mac >= GOOD_MAC:
+        return "alike"
+    return "alike in part" if mac >= 0.5 * GOOD_MAC else "not alike"
+
+
+def mac_row(comparison: Comparison) -> Row | None:
+    """Likeness of the shapes of run and mode as a line of the summary."""
+    if comparison.mac is None:
+        return None
+    name = f"likeness of run and mode (MAC) at μ = {comparison.mu:g}"
+    return Row((name, "", number(comparison.mac, 3), "", _likeness(comparison.mac)))
+
+
+def agreed(name: str, modal: float, temporal: float, limit: float) -> Row:
+    """One quantity by both approaches, judged by a relative limit."""
+    error = (temporal - modal) / abs(modal) if modal else None
+    good = error is not None and abs(error) <= limit
+    return Row((name, number(modal, 1), number(temporal, 1), percent(error, 3), _judged(good)), _kind(good))
 
 
 def _judged(good: bool) -> str:
@@ -155,10 +197,9 @@ def identified_table(comparison: Comparison, modes: ComplexModes, max_frequency_
         "complex modes nearest to them. A mode that barely slides leaves no trace in the slip speed."
     )
     if spare:
-        caption += f" {spare} weak component{'s' if spare > 1 else ''} of the signal belong{'' if spare > 1 else 's'} to no mode."
-    return drop_empty(
-        Table("identified", "Modes found in time", heads, tuple(rows), frozenset({5}), caption)
-    )
+        belong = "components of the signal belong" if spare > 1 else "component of the signal belongs"
+        caption += f" {spare} weak {belong} to no mode."
+    return drop_empty(Table("identified", "Modes found in time", heads, tuple(rows), frozenset({5}), caption))
 
 
 def computed_values(inputs: ReportInputs, window: Window | None) -> dict[str, tuple[float, str]]:
@@ -172,16 +213,16 @@ def computed_values(inputs: ReportInputs, window: Window | None) -> dict[str, tu
         values["max_slip_speed"] = (window.max_slip_speed, there)
         values["stick_fraction"] = (window.stick_fraction, there)
     agreement = inputs.agreement
-    if agreement is not None:
+    if agreement is not None and agreement.comparisons:
         values["growth_rate"] = (agreement.comparisons[0].modal_eigenvalue.real, "modal")
-        if agreement.critical_mu_temporal is not None:
-            values["critical_mu_temporal"] = (agreement.critical_mu_temporal, "bisection in time")
+    if agreement is not None and agreement.critical_mu_temporal is not None:
+        values["critical_mu_temporal"] = (agreement.critical_mu_temporal, "bisection in time")
     first = inputs.damped_onsets.first if inputs.damped_onsets else None
     if first is not None:
         values["critical_mu_modal"] = (first.mu, "first damped onset")
     elif agreement is not None and agreement.critical_mu_modal is not None:
         values["critical_mu_modal"] = (agreement.critical_mu_modal, "first onset")
-    values.update({name: (value, "") for name, value in inputs.values.items()})
+    values.update({name: (value, inputs.value_notes.get(name, "")) for name, value in inputs.values.items()})
     return values
 
 
@@ -200,11 +241,11 @@ def values_table(inputs: ReportInputs, window: Window | None) -> Table | None:
         rows.append(
             Row(
                 (
-                    printed.name.replace("_hz", "").replace("_", " "),
+                    printed.name.removesuffix("_hz").replace("_mu", " μ").replace("_", " "),
                     significant(computed, 5) if computed is not None else "not computed",
                     significant(printed.value, 8),
                     printed.unit,
-                    percent(fraction, 1) + mark + (" (equal when rounded)" if rounded else ""),
+                    percent(fraction, 1) + mark + (" ≙" if rounded else ""),
                     "; ".join(filter(None, [what, printed.note])),
                 ),
                 "far" if mark else "",
@@ -212,6 +253,12 @@ def values_table(inputs: ReportInputs, window: Window | None) -> Table | None:
         )
     heads = ("value", "computed", "printed", "unit", "difference", "note")
     return drop_empty(
-        Table("values", "Other values of the source", heads, tuple(rows), frozenset({0, 3, 5}),
-              "Differences beyond 0.5 % are marked with ▲.")
+        Table(
+            "values",
+            "Other values of the source",
+            heads,
+            tuple(rows),
+            frozenset({0, 3, 5}),
+            "Differences beyond 0.5 % are marked with ▲; ≙: equal when rounded to the digits printed.",
+        )
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -79,7 +80,4 @@ def status_spans(trajectory: Trajectory, part: slice, contact: int = 0) -> list[
         return []
     edges = np.concatenate([[0], np.flatnonzero(np.diff(status)) + 1, [len(status)]])
     ends = np.append(time, time[-1] + trajectory.sampling)
-    return [
-        (STATUS[int(status[a])], float(ends[a]), float(ends[b]))
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
+    return [(STATUS[int(status[a])], float(ends[a]), float(ends[b])) for a, b in pairwise(edges)]

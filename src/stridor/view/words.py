@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..agreement import GOOD_FREQUENCY, GOOD_GROWTH
 from ..case import Case
 from ..case.schema import Contact
 from .inputs import ReportInputs
-from .tables import Row, Table, drop_empty, number, significant
-from .temporal_tables import critical_row
+from .tables import Row, Table, drop_empty, significant
+from .temporal_tables import agreed, critical_row, mac_row
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,22 @@ def verdict(inputs: ReportInputs) -> Verdict:
         return Verdict("Not decided: no modes at the friction of the case", paragraph, None, agrees)
     if not growing:
         return Verdict(f"It does not squeal{at}", paragraph, squeals, agrees)
-    frequency = inputs.dominant_hz or max(growing, key=lambda pair: pair[1])[0]
-    return Verdict(f"It squeals{at}, at {frequency:.0f} Hz", paragraph, squeals, agrees)
+    answering = _answering(inputs)
+    frequency = max(growing, key=_growth_of)[0] if answering is None else answering
+    may = "squeals" if answering is not None or agrees else "may squeal"
+    return Verdict(f"It {may}{at}, at {frequency:.0f} Hz", paragraph, squeals, agrees)
+
+
+def _growth_of(pair: tuple[float, float]) -> float:
+    return pair[1]
+
+
+def _answering(inputs: ReportInputs) -> float | None:
+    """Dominant frequency of the full run at the friction of the case where an unstable mode answers [Hz]."""
+    for c in inputs.agreement.comparisons if inputs.agreement is not None else ():
+        if (inputs.mu is None or abs(c.mu - inputs.mu) < 1e-12) and c.responding is not None:
+            return c.dominant_frequency_hz
+    return None
 
 
 def _growing(inputs: ReportInputs) -> list[tuple[float, float]] | None:
@@ -63,7 +78,7 @@ def _modal_sentence(growing: list[tuple[float, float]] | None, at: str) -> str:
         return ""
     if not growing:
         return f"Steady sliding{at} is stable: no mode in the range of frequencies grows."
-    named = [f"{f:.0f} Hz (growth {g:.0f} 1/s)" for f, g in sorted(growing, key=lambda pair: -pair[1])]
+    named = [f"{f:.0f} Hz (growth {g:.0f} 1/s)" for f, g in sorted(growing, key=_growth_of, reverse=True)]
     modes = "one mode grows" if len(named) == 1 else f"{len(named)} modes grow"
     return f"Steady sliding{at} is unstable: {modes}, {_listed(named)}."
 
@@ -112,8 +127,10 @@ def _agreement_sentence(inputs: ReportInputs) -> str:
     texts: list[str] = []
     for c in agreement.comparisons:
         if len(c.unstable_hz) and c.perturbation.grows:
-            said = (f"at μ = {c.mu:g} both find growth at {c.perturbation.frequency_hz:.0f} Hz, with rates of "
-                    f"{c.modal_eigenvalue.real:.0f} and {c.perturbation.growth_rate:.0f} 1/s")
+            said = (
+                f"at μ = {c.mu:g} both find growth at {c.perturbation.frequency_hz:.0f} Hz, with rates of "
+                f"{c.modal_eigenvalue.real:.0f} and {c.perturbation.growth_rate:.0f} 1/s"
+            )
         elif c.agrees:
             said = f"at μ = {c.mu:g} both find steady sliding stable"
         else:
@@ -151,7 +168,11 @@ def model_in_words(inputs: ReportInputs) -> list[str]:
         text = f"{name}: holds {_listed(list(support.fixed))} of {support.at}"
         lines.append(text + (f" and moves it with {_listed(moving)}." if moving else "."))
     for name, load in case.loads.items():
-        parts = [f"{np.hypot(*load.force):g} N along ({load.force[0]:g}, {load.force[1]:g})"] if any(load.force) else []
+        parts = (
+            [f"{np.hypot(*load.force):g} N, ({significant(load.force[0])}, {significant(load.force[1])}) N"]
+            if any(load.force)
+            else []
+        )
         parts += [f"a moment of {load.moment:g} N m"] if load.moment else []
         lines.append(f"{name}: pushes {load.at} with {_listed(parts or ['nothing'])}.")
     lines += [_contact_words(name, contact) for name, contact in case.contacts.items()]
@@ -171,7 +192,7 @@ def _contact_words(name: str, contact: Contact) -> str:
     friction = contact.friction.model_dump()
     law = friction.pop("law")
     settings = ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in friction.items())
-    stiffness = "rigid" if contact.stiffness == "rigid" else f"with {contact.stiffness:g} N/m"
+    stiffness = "rigid" if contact.stiffness == "rigid" else f"with a stiffness of {significant(contact.stiffness)} N/m"
     return (
         f"{name}: {contact.slave} slides on {contact.master} ({contact.sliding} sliding), {stiffness} in the modal "
         f"approach; friction law {law}, {settings}."
@@ -202,7 +223,10 @@ def simulation_table(inputs: ReportInputs) -> Table:
     for name, load in case.loads.items():
         lines.append((f"force {name}", f"{np.hypot(*load.force):g} N"))
     for name, support in case.supports.items():
-        lines += [(f"velocity {name}, {d}", f"{v:g} {'rad/s' if d == 'rotation' else 'm/s'}") for d, v in support.velocity.items()]
+        lines += [
+            (f"velocity {name}, {d}", f"{v:g} {'rad/s' if d == 'rotation' else 'm/s'}")
+            for d, v in support.velocity.items()
+        ]
     if inputs.mu is not None:
         lines.append(("friction coefficient μ", f"{inputs.mu:g}"))
     if run is not None:
@@ -216,12 +240,16 @@ def simulation_table(inputs: ReportInputs) -> Table:
             ("wall time", f"{run.wall_seconds:.2f} s, {1e6 * run.wall_seconds / max(run.steps, 1):.2f} µs per step"),
         ]
     else:
-        lines += [("time step Δt", f"{significant(case.temporal.step)} s" if case.temporal.step else ""),
-                  ("numerical damping β₂", f"{case.temporal.beta2:g}")]
+        lines += [
+            ("time step Δt", f"{significant(case.temporal.step)} s" if case.temporal.step else ""),
+            ("numerical damping β₂", f"{case.temporal.beta2:g}"),
+        ]
     for phase in case.phases:
         factors = [f"{n} × {v:g}" for n, v in (*phase.loads.items(), *phase.velocities.items())]
         ramp = f", ramp {phase.ramp:g} s" if phase.ramp else ""
-        lines.append((f"phase “{phase.name}”", f"{phase.duration:g} s{ramp}" + (f": {', '.join(factors)}" if factors else "")))
+        lines.append(
+            (f"phase “{phase.name}”", f"{phase.duration:g} s{ramp}" + (f": {', '.join(factors)}" if factors else ""))
+        )
     rows = tuple(Row(line) for line in lines)
     return drop_empty(Table("simulation", "Simulation", ("", "value"), rows, frozenset({0, 1})))
 
@@ -236,19 +264,28 @@ def summary_table(inputs: ReportInputs) -> Table | None:
             names = ("stable", "unstable")
             good = "✓ agree" if c.agrees else "✗ differ"
             at = f"at μ = {c.mu:g}"
-            rows.append(Row((f"steady sliding {at}", names[both[0]], names[both[1]], "", good), "good" if c.agrees else "bad"))
+            rows.append(
+                Row((f"steady sliding {at}", names[both[0]], names[both[1]], "", good), "good" if c.agrees else "bad")
+            )
             if any(both):
                 modal = c.modal_eigenvalue
-                rows.append(Row((f"frequency {at} [Hz]", number(modal.imag / 2 / np.pi), number(c.perturbation.frequency_hz),
-                                 number(100 * c.frequency_error, 3) + " %", "")))
-                rows.append(Row((f"growth rate {at} [1/s]", number(modal.real), number(c.perturbation.growth_rate),
-                                 number(100 * c.growth_rate_error, 2) + " %", "")))
+                here = c.perturbation
+                rows.append(agreed(f"frequency {at} [Hz]", modal.imag / 2 / np.pi, here.frequency_hz, GOOD_FREQUENCY))
+                rows.append(agreed(f"growth rate {at} [1/s]", modal.real, here.growth_rate, GOOD_GROWTH))
+            alike = mac_row(c)
+            if alike is not None:
+                rows.append(alike)
         row = critical_row(agreement)
         if row is not None:
             rows.append(row)
     if not rows:
         return None
     return drop_empty(
-        Table("summary-table", "Modal against temporal", ("", "modal", "temporal", "difference", "verdict"),
-              tuple(rows), frozenset({0, 4}))
+        Table(
+            "summary-table",
+            "Modal against temporal",
+            ("", "modal", "temporal", "difference", "verdict"),
+            tuple(rows),
+            frozenset({0, 4}),
+        )
     )

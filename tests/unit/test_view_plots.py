@@ -1,0 +1,258 @@
+"""Figures from small made-up results: each is drawn, shows what it should, and leaves others' style alone."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from functools import cache
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from benches import paper_case
+from stridor.agreement import Agreement, Comparison, Perturbation
+from stridor.modal.complex_modes import ComplexModes
+from stridor.modal.onsets import Onset, Onsets
+from stridor.system import System, build_system
+from stridor.temporal.energy import EnergyBalance, energy_balance
+from stridor.temporal.signals import Components, Growth, spectrogram, spectrum
+from stridor.temporal.trajectory import ContactStatistics, PhaseResult, Trajectory
+from stridor.view import plots
+from stridor.view.shape_plots import at_best_phase
+from stridor.view.windows import regime_window
+
+HZ = 2 * np.pi
+CRITICAL = 0.0766
+
+
+@cache
+def small_system() -> System:
+    """The two beams with few elements."""
+    return build_system(paper_case(bodies__beam1__elements=4, bodies__beam2__elements=6))
+
+
+def sweep(*, damped: bool = True, top: float = 0.2) -> ComplexModes:
+    """Three branches; the last two meet at CRITICAL."""
+    mu = np.linspace(0.0, top, 61)
+    half = HZ * 200 * np.emath.sqrt(1 - mu / CRITICAL)
+    shift = -30.0 if damped else 0.0
+    pair = [shift + 1j * (HZ * 8635 + half), shift + 1j * (HZ * 8635 - half)]
+    lam = np.column_stack([np.full(len(mu), shift + 1j * HZ * 500), pair[1], pair[0]])
+    return ComplexModes(mu, lam, np.arange(1, 4), np.full(lam.shape, 1e-15), damped)
+
+
+def found_onsets(*, damped: bool = True) -> Onsets:
+    """Two onsets of flutter."""
+
+    def one(mu: float, frequency: float, branches: tuple[int, int]) -> Onset:
+        slope, point = (2.4e5, complex(mu - 1e-4, 1e-8)) if damped else (None, None)
+        return Onset(mu, frequency, "flutter", damped, False, branches, 1e-16, 4410.0, slope, point)
+
+    return Onsets((one(0.07664, 8635.4, (2, 3)), one(0.13761, 16683.6, (4, 5))), (0.0, 1.0), 40e3, damped)
+
+
+def trajectory(*, step: float = 1e-5, count: int = 20_000) -> Trajectory:
+    """0.2 s of 1 kHz: sticks for half of each period while sliding, opens now and then near the end."""
+    time = np.arange(count) * step
+    wave = np.sin(HZ * 1000 * time)
+    sliding = time >= 0.1
+    status = np.where(sliding & (wave < 0), 2, 1)
+    status[(time > 0.18) & (wave < -0.9)] = 0
+    slip = np.where(status == 1, 0.0, -0.02 + 0.05 * wave)
+    force = 20 + np.where(sliding, 15 * wave, 0.0)
+    motion = np.zeros((count, 2, 2))
+    motion[:, 0, 0] = np.where(sliding, 1e-6 * wave, 0.0)
+    motion[:, 1] = 0.5 * motion[:, 0]
+    ramp = time[-1] - time
+    statistics = {"A": ContactStatistics(0.5, 0.45, 0.05, 35.0, 3.5, 0.07, 0.1, 0.18)}
+    works = {"external": 2 - ramp, "support": 0 * time, "damping": 1 - ramp, "friction": 0 * time, "contact": 0 * time}
+    return Trajectory(
+        time=time,
+        contact_names=("A",),
+        normal_force=force[:, None],
+        tangential_force=0.1 * force[:, None],
+        slip_speed=slip[:, None],
+        gap=np.zeros((count, 1)),
+        status=status[:, None].astype(np.int64),
+        watch_names=("beam1.tip", "beam2.end"),
+        displacement=motion,
+        velocity=HZ * 1000 * motion,
+        acceleration=(HZ * 1000) ** 2 * motion,
+        kinetic=0.5 + 0 * time,
+        elastic=0.5 + 0 * time,
+        works=works,
+        phases=(PhaseResult("press", 0.0, 0.1, statistics), PhaseResult("slide", 0.1, 0.2, statistics)),
+        step=step,
+        beta2=0.5,
+        record_every=1,
+        steps=count,
+        planned_steps=count,
+        path="modal",
+        path_reason="made up",
+        step_limit=2e-5,
+        limiting_body="beam2",
+        most_sweeps=1,
+        unconverged_steps=0,
+        interrupted=False,
+        wall_seconds=0.1,
+    )
+
+
+def balance(run: Trajectory) -> EnergyBalance:
+    return energy_balance(run)
+
+
+def perturbation() -> Perturbation:
+    time = np.arange(4000) * 2e-6
+    signal = 1e-7 * np.exp(637 * time) * np.sin(HZ * 8641 * time)
+    found = Components(np.array([636.0 + 1j * HZ * 8641.3, -30 + 1j * HZ * 500.1]), np.array([1e-7, 1e-8]))
+    return Perturbation(0.1, complex(found.eigenvalues[0]), signal, 2e-6, found)
+
+
+def comparison(*, mu: float = 0.1, mac: float | None = 0.9) -> Comparison:
+    seen = perturbation()
+    return Comparison(
+        mu=mu,
+        modal_eigenvalue=637.0 + 1j * HZ * 8641.0,
+        unstable_hz=(8641.0,),
+        unstable_growth=(637.0,),
+        perturbation=seen,
+        dominant_frequency_hz=1000.0,
+        run_growth=Growth(200.0, 0.1, 0.15, 0.1, True, 1.0),
+        frequency_error=3e-5,
+        growth_rate_error=1.5e-3,
+        mac=mac,
+        responding=0,
+        agrees=True,
+        verdict=f"μ = {mu:g}: both unstable",
+    )
+
+
+def agreement(*more: Comparison) -> Agreement:
+    return Agreement((comparison(), *more), 0.0767, 0.0766, (0.0764, 0.0768), "agree: as it should", ("a note",))
+
+
+def shape(turn: complex = 1.0) -> dict[str, np.ndarray]:
+    return {
+        line.name: turn * np.outer(np.sin(np.linspace(0, 3, len(line.coordinates))), [0.3, 1.0 + 0.2j])
+        for line in small_system().lines
+    }
+
+
+def spectra() -> dict:
+    run = trajectory()
+    return {name: spectrum(run.acceleration[10_000:, k, 0], run.sampling) for k, name in enumerate(run.watch_names)}
+
+
+def everything_drawn() -> dict[str, Figure]:
+    run, system = trajectory(), small_system()
+    window = regime_window(run, 1000.0)
+    content = spectrogram(run.velocity[:, 0, 0], run.sampling, resolution_hz=200.0)
+    return {
+        "root_locus": plots.root_locus(sweep()),
+        "frequency_branches": plots.frequency_branches(sweep(), onsets=found_onsets()),
+        "growth_branches": plots.growth_branches(sweep(), (2, 3)),
+        "damping_branches": plots.damping_branches(sweep()),
+        "friction_curve": plots.friction_curve(
+            np.array([0.5, 0.2, np.inf, -3.0, 0.4, 0.1]), np.linspace(1e3, 6e3, 6), onsets=found_onsets(), case_mu=0.1
+        ),
+        "acceleration_history": plots.acceleration_history(run, "beam2.end", direction="y", max_frequency_hz=5e3),
+        "contact_history": plots.contact_history(run),
+        "spectrum_plot": plots.spectrum_plot(spectra(), marked_hz=1000.0),
+        "spectrogram_plot": plots.spectrogram_plot(content, max_frequency_hz=5e3),
+        "contact_force_and_velocity": plots.contact_force_and_velocity(
+            run, window, slave="beam1.tip", steady_force=20.0
+        ),
+        "phase_portrait": plots.phase_portrait(run, (0.11, 0.113)),
+        "energy_plot": plots.energy_plot(run, balance(run)),
+        "spectrum_map": plots.spectrum_map(sweep(), perturbation().components, mu=0.1),
+        "perturbation_growth": plots.perturbation_growth(
+            perturbation(), modal_growth_rate=637.0, max_frequency_hz=40e3
+        ),
+        "growth_comparison": plots.growth_comparison((comparison(), comparison(mu=0.12))),
+        "model_plot": plots.model_plot(system, paper_case()),
+        "mode_shape": plots.mode_shape(system, shape(), velocity=True, title="a mode"),
+        "shapes_side_by_side": plots.shapes_side_by_side(system, [("a", shape(), True), ("b", shape(-1j), False)]),
+    }
+
+
+def test_every_public_figure_can_be_drawn_and_saved():
+    drawn = everything_drawn()
+    assert set(drawn) == set(plots.__all__)
+    for name, figure in drawn.items():
+        target = io.BytesIO()
+        figure.savefig(target, format="png", dpi=40)
+        assert target.getvalue().startswith(b"\x89PNG"), name
+        assert all(ax.get_xlabel() or ax.get_ylabel() or ax.get_title() for ax in figure.axes), name
+
+
+def test_axes_of_the_user_are_drawn_into_and_no_style_is_left_behind():
+    before = dict(mpl.rcParams)
+    own = Figure()
+    ax = own.subplots()
+    assert plots.growth_branches(sweep(), (2, 3), ax=ax) is own
+    assert len(ax.lines) >= 2
+    assert dict(mpl.rcParams) == before
+
+
+def test_only_unstable_stretches_are_marked():
+    def circles(figure: Figure) -> list[float]:
+        marked = [line for line in figure.axes[0].lines if line.get_marker() == "o" and len(line.get_xdata())]
+        return [float(x) for line in marked for x in line.get_xdata()]
+
+    assert circles(plots.frequency_branches(sweep(top=0.07))) == []
+    beyond = circles(plots.frequency_branches(sweep()))
+    assert beyond
+    assert min(beyond) > CRITICAL
+
+
+def test_imaginary_frequencies_have_the_sign_of_the_paper():
+    figure = plots.growth_branches(sweep(damped=False), (2, 3), imaginary_frequency=True)
+    lines = [line for line in figure.axes[0].lines if str(line.get_label()).startswith("mode")]
+    ends = sorted(float(line.get_ydata()[-1]) for line in lines)
+    growth = float(sweep(damped=False).growth_rate[-1].max())
+    assert ends[0] == pytest.approx(-growth / HZ)  # what grows has a negative imaginary part
+
+
+def test_the_friction_curve_is_not_joined_across_a_pole():
+    # Falls through the frame, jumps from −∞ to +∞ and falls through it again: two lines, not one.
+    mu, frequency = np.array([2.0, 0.8, 0.4, -2.0, 3.0, 0.6, 0.3, -1.0]), np.linspace(1e3, 8e3, 8)
+    figure = plots.friction_curve(mu, frequency)
+    drawn = [line.get_ydata().tolist() for line in figure.axes[0].lines]
+    assert drawn == [[2.0, 0.8, 0.4, -2.0], [3.0, 0.6, 0.3, -1.0]]
+
+
+def test_long_histories_lose_no_peak():
+    run = trajectory(step=5e-7, count=200_000)
+    run.acceleration[123_456, 0, 0] = 1e9
+    figure = plots.acceleration_history(run, whole=True)
+    assert figure.axes[0].dataLim.y1 == 1e9
+
+
+def test_a_real_shape_has_nothing_a_quarter_of_a_period_later():
+    real = {"beam": np.outer([0.0, 1.0, 2.0], [0.0, 1.0]).astype(complex)}
+    turned = {"beam": real["beam"] * np.exp(0.7j)}
+    best = at_best_phase(turned)["beam"]
+    assert np.abs(best.imag).max() < 1e-12
+    assert np.abs(best.real).max() == pytest.approx(1.0)
+    assert not at_best_phase({"beam": np.zeros((3, 2), dtype=complex)})["beam"].any()
+
+
+def test_shapes_beside_each_other_agree_in_sign():
+    figure = plots.shapes_side_by_side(small_system(), [("a", shape(), False), ("b", shape(-1.0), False)])
+    tips = [[line.get_ydata()[-1] for line in ax.lines if line.get_label() == "beam2"][0] for ax in figure.axes]
+    assert tips[0] == pytest.approx(tips[1])
+
+
+def test_unknown_branches_are_named():
+    with pytest.raises(ValueError, match=r"branches \[7\]: not among those followed, 1 to 3"):
+        plots.growth_branches(sweep(), (2, 7))
+
+
+def test_figures_are_loaded_only_when_asked_for():
+    code = "import sys, stridor, stridor.view; print('matplotlib' in sys.modules, 'jinja2' in sys.modules)"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert said.split() == ["False", "False"]

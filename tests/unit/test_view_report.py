@@ -1,0 +1,245 @@
+"""The report: one file that needs nothing else, whatever of its inputs is there."""
+
+from __future__ import annotations
+
+import base64
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benches import paper_case
+from stridor.temporal.signals import spectrogram
+from stridor.view import BodyModes, FrictionCurve, NamedShape, ReportInputs, write_report
+from stridor.view import report as report_module
+from stridor.view.report import sections, tidy
+from stridor.view.words import verdict
+from test_view_plots import (
+    agreement,
+    balance,
+    comparison,
+    found_onsets,
+    shape,
+    small_system,
+    spectra,
+    sweep,
+    trajectory,
+)
+
+VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class Page(HTMLParser):
+    """Reads a page, checks that tags are nested, collects what is referred to."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.targets: list[str] = []
+        self.images: list[dict] = []
+        self.tags: list[str] = []
+        self.words: list[str] = []
+        self.attributes: list[str] = []
+        self.feed(text)
+        self.close()
+        assert self.open == [], "not closed"
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.tags.append(tag)
+        if "id" in values:
+            self.ids.append(values["id"])
+        self.attributes += [name for name, _ in attrs]
+        self.targets += [values[name] for name in ("src", "href", "data", "action") if values.get(name)]
+        if tag == "img":
+            self.images.append(values)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] != "style":
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).replace("\u00a0", " ").split())
+
+
+def full_inputs(**changes) -> ReportInputs:
+    run, system = trajectory(), small_system()
+    modes = sweep()
+    values = {
+        "case": paper_case(),
+        "system": system,
+        "mu": 0.1,
+        "modes": modes,
+        "undamped_sweep": sweep(damped=False),
+        "damped_sweep": modes,
+        "body_modes": {"beam1": BodyModes(np.array([0.0, 491.9]), ("rigid", "F1"))},
+        "coupled_hz": np.array([102.4, 489.3]),
+        "undamped_onsets": found_onsets(damped=False),
+        "damped_onsets": found_onsets(),
+        "curve": FrictionCurve(np.linspace(0, 1, 20), np.linspace(1e3, 2e4, 20)),
+        "trajectory": run,
+        "energy": balance(run),
+        "spectra": spectra(),
+        "spectrogram": spectrogram(run.velocity[:, 0, 0], run.sampling, resolution_hz=500.0),
+        "operating_shape": NamedShape(1000.0, shape()),
+        "unstable_shape": NamedShape(8641.0, shape(1j), 637.0),
+        "mac_by_body": {"beam1": 0.42, "beam2": 0.98},
+        "agreement": agreement(comparison(mu=0.12)),
+        "source_places": {"frequency-pair": "figure 3", "bodies": "table I"},
+        "timings": {"modes": 0.5, "simulate": 4.0},
+        "versions": {"stridor": "0.1"},
+        "case_text": 'title = "x"  # <b>bold</b>',
+        "created": "2026-01-01 12:00",
+        "warnings": ("a warning",),
+        "notes": ("a note",),
+    }
+    return ReportInputs(**{**values, **changes})
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Path:
+    return write_report(full_inputs(), tmp_path_factory.mktemp("out"))
+
+
+@pytest.fixture(scope="module")
+def page(written) -> Page:
+    return Page(written.read_text(encoding="utf-8"))
+
+
+def test_the_page_is_one_file_that_refers_to_nothing_outside(written, page):
+    text = written.read_text(encoding="utf-8")
+    assert text.startswith("<!DOCTYPE html>")
+    assert '<html lang="en">' in text
+    assert page.targets
+    assert all(target.startswith(("#", "data:image/svg+xml;base64,")) for target in page.targets)
+    assert "script" not in page.tags
+    assert "link" not in page.tags
+    assert not any(name.startswith("on") for name in page.attributes)
+    assert not re.search(r"url\(|@import", text)
+    assert written.stat().st_size < 8e6
+
+
+def test_pictures_need_nothing_either(page):
+    for image in page.images:
+        drawing = base64.b64decode(image["src"].split(",", 1)[1]).decode("utf-8")
+        outside = [target for target in re.findall(r'href="([^"]+)"', drawing) if not target.startswith(("#", "data:"))]
+        assert outside == []
+        assert "<text" not in drawing  # letters are outlines: no font is needed
+
+
+def test_every_anchor_has_its_place_and_no_place_is_there_twice(page):
+    assert len(set(page.ids)) == len(page.ids)
+    wanted = {target[1:] for target in page.targets if target.startswith("#")}
+    assert wanted <= set(page.ids)
+
+
+def test_pictures_have_words_for_who_cannot_see_them(page):
+    assert len(page.images) >= 18
+    assert all(len(image["alt"]) > 20 for image in page.images)
+
+
+def test_figures_lie_beside_the_page_as_png_and_svg(written, page):
+    names = {path.stem for path in (written.parent / "figures").glob("*.png")}
+    assert names == {path.stem for path in (written.parent / "figures").glob("*.svg")}
+    assert len(names) == len(page.images)
+    assert {f"figure-{name}" for name in names} <= set(page.ids)
+
+
+def test_the_answer_comes_first(page):
+    assert "It squeals at μ = 0.1, at 1000 Hz." in page.text
+    assert "from μ = 0.0766 on, at 8635 Hz" in page.text
+    assert "approach agree" in page.text
+    assert (
+        page.text.index("It squeals") < page.text.index("The model Bodies") if "The model Bodies" in page.text else True
+    )
+
+
+def test_places_in_the_source_and_its_notes_are_named(page):
+    assert "In the source: figure 3." in page.text
+    assert "(table I of the source)" in page.text
+    for note in paper_case().reference.notes:
+        assert note in page.text
+    assert "misprint" not in page.text  # the misprinted modes are not among those computed here
+
+
+def test_a_case_without_reference_mentions_no_source(tmp_path):
+    inputs = full_inputs(case=paper_case().with_({"reference": None}))
+    text = Page(write_report(inputs, tmp_path).read_text(encoding="utf-8")).text
+    assert "source" not in text
+    assert "printed" not in text
+
+
+@pytest.mark.parametrize(
+    "inputs",
+    [
+        ReportInputs(paper_case()),
+        ReportInputs(paper_case(), mu=0.1, modes=sweep()),
+        ReportInputs(paper_case(), damped_sweep=sweep(top=0.05), damped_onsets=found_onsets()),
+        ReportInputs(paper_case(), trajectory=trajectory()),
+        ReportInputs(paper_case(), system=small_system(), mu=0.1, agreement=agreement()),
+    ],
+    ids=["case alone", "modes", "sweep and onsets", "run", "agreement"],
+)
+def test_what_is_missing_is_left_out(inputs, tmp_path):
+    page = Page(write_report(inputs, tmp_path).read_text(encoding="utf-8"))
+    assert "None" not in page.text
+    assert "nan" not in page.text.lower().split()
+    listed = {target[1:] for target in page.targets if target.startswith("#")}
+    assert listed <= set(page.ids)
+
+
+def test_text_of_the_user_is_text(tmp_path):
+    evil = '<script>alert("x")</script>'
+    case = paper_case().with_({"title": evil, "reference.source": evil})
+    inputs = full_inputs(case=case, notes=(evil,), warnings=(evil,), versions={evil: evil}, created=evil)
+    page = Page(write_report(inputs, tmp_path).read_text(encoding="utf-8"))
+    assert "script" not in page.tags
+    assert "b" in page.tags  # figure captions; the one of the case text is not a tag
+    assert page.text.count("alert") >= 5
+    assert "<b>bold</b>" in page.text
+
+
+def test_equal_inputs_give_an_equal_page(tmp_path):
+    inputs = ReportInputs(paper_case(), undamped_sweep=sweep(damped=False), undamped_onsets=found_onsets(damped=False))
+    first = write_report(inputs, tmp_path / "a").read_bytes()
+    assert write_report(inputs, tmp_path / "b").read_bytes() == first
+
+
+def test_an_older_page_stays_when_writing_fails(tmp_path, monkeypatch):
+    inputs = ReportInputs(paper_case())
+    before = write_report(inputs, tmp_path).read_bytes()
+
+    def broken(source, target):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(report_module.os, "replace", broken)
+    with pytest.raises(OSError, match="disk full"):
+        write_report(full_inputs(), tmp_path)
+    assert (tmp_path / "report.html").read_bytes() == before
+    assert [path.name for path in tmp_path.rglob("*.part")] == []
+
+
+def test_the_verdict_says_no_more_than_was_computed():
+    assert verdict(ReportInputs(paper_case())).squeals is None
+    calm = verdict(ReportInputs(paper_case(), mu=0.05, modes=sweep(top=0.05)))
+    assert (calm.headline, calm.squeals, calm.agrees) == ("It does not squeal at μ = 0.05", False, None)
+    alone = verdict(ReportInputs(paper_case(), mu=0.2, modes=sweep()))
+    assert alone.headline == "It may squeal at μ = 0.2, at 8635 Hz"  # in time nobody has looked
+
+
+def test_chapters_without_content_are_not_there():
+    names = [chapter.name for chapter in sections(ReportInputs(paper_case().with_({"reference": None})))]
+    assert names == ["model"]
+
+
+def test_numbers_keep_their_units_on_one_line():
+    assert tidy("at μ = 0.1, 8641 Hz (2 s)") == "at μ\u00a0=\u00a00.1, 8641\u00a0Hz (2\u00a0s)"
