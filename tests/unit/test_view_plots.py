@@ -186,7 +186,7 @@ def test_every_public_figure_can_be_drawn_and_saved():
         target = io.BytesIO()
         figure.savefig(target, format="png", dpi=40)
         assert target.getvalue().startswith(b"\x89PNG"), name
-        assert all(ax.get_xlabel() or ax.get_ylabel() or ax.get_title() for ax in figure.axes), name
+        assert all(ax.get_xlabel() or ax.get_ylabel() or ax.get_title("left") for ax in figure.axes), name
 
 
 def test_axes_of_the_user_are_drawn_into_and_no_style_is_left_behind():
@@ -243,7 +243,7 @@ def test_a_real_shape_has_nothing_a_quarter_of_a_period_later():
 
 def test_shapes_beside_each_other_agree_in_sign():
     figure = plots.shapes_side_by_side(small_system(), [("a", shape(), False), ("b", shape(-1.0), False)])
-    tips = [[line.get_ydata()[-1] for line in ax.lines if line.get_label() == "beam2"][0] for ax in figure.axes]
+    tips = [next(line.get_ydata()[-1] for line in ax.lines if line.get_label() == "beam2") for ax in figure.axes]
     assert tips[0] == pytest.approx(tips[1])
 
 

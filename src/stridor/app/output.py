@@ -48,7 +48,8 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 @contextmanager
 def progress_bar(text: str, *, quiet: bool) -> Generator[Any, None, None]:
     """Yields progress(done, planned) drawn on stderr with the time left."""
-    if quiet:
+    if quiet or not stderr.is_terminal:
+        # A bar in a log file is noise.
         yield None
         return
     bar = Progress(

@@ -63,8 +63,8 @@ def modal_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "Friction over frequency",
             "μ(ω) = −s (1/Kc + Gnn(ω)) / Gnt(ω), from the receptances of the structure without contact and damping. "
             "A horizontal line cuts the curve at the frequencies of the modes that the contact sees at that friction "
-            "coefficient; at a maximum two of them meet and become complex: all onsets of flutter are maxima of one explicit curve. "
-            "Diamonds: the onsets, solved on the assembled matrices.",
+            "coefficient; at a maximum two of them meet and become complex: all onsets of flutter are maxima of one "
+            "explicit curve. Diamonds: the onsets, solved on the assembled matrices.",
             "Friction coefficient over frequency with its local maxima marked as onsets of instability.",
             plots.friction_curve(
                 inputs.curve.mu,

@@ -243,12 +243,17 @@ def _pieces(values: Array, low: float, high: float) -> list[slice]:
 
     From a pole the curve comes back with the other sign: those two points are never joined.
     """
-    with np.errstate(invalid="ignore"):
-        inside = np.isfinite(values) & (values >= low) & (values <= high)
-        steady = np.abs(np.diff(np.sign(values - (low + high) / 2))) < 1
-    before, after = np.roll(inside, -1), np.roll(inside, 1)
-    before[-1] = after[0] = False
-    beyond = (before & np.append(steady, False)) | (after & np.insert(steady, 0, False))
-    inside = inside | (beyond & np.isfinite(values))
+    inside = np.isfinite(values) & (values >= low) & (values <= high)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    middle, last = (low + high) / 2, len(values)
+    found: list[slice] = []
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        first = a - 1 if a > 0 and _same_side(float(values[a - 1]), float(values[a]), middle) else a
+        end = b + 1 if b < last and _same_side(float(values[b]), float(values[b - 1]), middle) else b
+        found.append(slice(int(first), int(end)))
+    return found
+
+
+def _same_side(beyond: float, within: float, middle: float) -> bool:
+    """Whether a curve that leaves its band next goes on to ``beyond`` and has not jumped at a pole."""
+    return bool(np.isfinite(beyond)) and (beyond > middle) == (within > middle)

@@ -1,0 +1,282 @@
+"""The command line: what each verb prints where, exit codes, files."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import stridor as st
+
+# A coarse bench that runs in a second: few elements, large steps, short phases.
+COARSE = [
+    "bodies.beam1.elements=6",
+    "bodies.beam2.elements=18",
+    "temporal.step=4e-7",
+    "temporal.record_every=5",
+    "phases.press.duration=0.002",
+    "phases.slide.duration=0.004",
+]
+SETS = [word for item in COARSE for word in ("--set", item)]
+
+
+def stridor(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "stridor.app.cli", *words],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    done = stridor("new", "two-beams", "--quiet", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    return tmp_path
+
+
+def document(done: subprocess.CompletedProcess[str]) -> dict:
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_new_does_not_overwrite(folder: Path) -> None:
+    again = stridor("new", "two-beams", cwd=folder)
+    assert again.returncode == 2
+    assert "two-beams.toml" in again.stderr
+    assert stridor("new", "two-beams", "--force", cwd=folder).returncode == 0
+
+
+def test_new_lists_templates(tmp_path: Path) -> None:
+    done = stridor("new", "three-beams", cwd=tmp_path)
+    assert done.returncode == 2
+    assert (
+        done.stderr
+        == "stridor: template: 'three-beams' – no such template; did you mean 'two-beams'? there are: two-beams\n"
+    )
+
+
+def test_check_says_the_model_in_words(folder: Path) -> None:
+    done = stridor("check", "two-beams.toml", cwd=folder)
+    assert done.returncode == 0
+    assert "361 free degrees of freedom" in done.stdout
+    assert "95 % of the stability limit 2.116e-08 s (set by beam2)" in done.stdout
+    data = document(stridor("check", "two-beams.toml", "--json", cwd=folder))
+    assert data["degrees_of_freedom"] == 361
+    assert data["contacts"]["A"]["normal_force"] == pytest.approx(20.0, rel=1e-9)
+
+
+def test_modes_json_has_the_promised_keys(folder: Path) -> None:
+    done = stridor("modes", "two-beams.toml", "--mu", "0:0.2:3", "--json", "--quiet", *SETS, cwd=folder)
+    data = document(done)
+    assert done.stderr == ""
+    assert data["mu"] == [0.0, 0.1, 0.2]
+    assert len(data["modes"]) == 3
+    for modes in data["modes"]:
+        frequencies = [m["frequency_hz"] for m in modes]
+        assert frequencies == sorted(frequencies)
+        keys = {"frequency_hz", "growth_rate", "damping_ratio", "unstable", "residual", "branch"}
+        assert all(keys <= set(m) for m in modes)
+        assert max(m["residual"] for m in modes) < 1e-8
+    assert {m["branch"] for m in data["modes"][0]} == {m["branch"] for m in data["modes"][2]}
+    assert (folder / "two-beams.out" / "modes.nc").exists()
+
+
+def test_overrides_reach_the_model(folder: Path) -> None:
+    words = ("modes", "two-beams.toml", "--json", "--quiet", *SETS)
+    plain = document(stridor(*words, cwd=folder))
+    other = document(stridor(*words, "--set", "contacts.A.friction.coefficient=0.3", cwd=folder))
+    assert plain["mu"] == [0.1]
+    assert other["mu"] == [0.3]
+
+
+def test_onsets_json(folder: Path) -> None:
+    data = document(stridor("onsets", "two-beams.toml", "--json", "--quiet", "--out", "there", cwd=folder))
+    first = data["onsets"][0]
+    assert first["mu"] == pytest.approx(0.076725, rel=1e-4)
+    assert first["frequency_hz"] == pytest.approx(8635.43, rel=1e-5)
+    assert (first["kind"], first["damped"], first["branches"]) == ("flutter", True, [8, 10])
+    assert first["residual"] < 1e-12
+    assert (folder / "there" / "onsets.nc").exists()
+
+
+def test_simulate_and_compare_json(folder: Path) -> None:
+    done = stridor("simulate", "two-beams.toml", "--json", "--quiet", *SETS, cwd=folder)
+    data = document(done)
+    assert done.stderr == ""
+    promised = {
+        "dominant_frequency_hz",
+        "growth_rate",
+        "saturated",
+        "contacts",
+        "energy",
+        "steps",
+        "dt",
+        "wall_seconds",
+    }
+    assert promised <= set(data)
+    contact = data["contacts"]["A"]
+    fractions = [contact[f"{status}_fraction"] for status in ("stick", "slip", "separation")]
+    assert sum(fractions) == pytest.approx(1.0)
+    assert contact["max_normal_force"] > 20
+    assert contact["max_slip_speed"] > 0.02
+    assert data["energy"]["error"] < 1e-9
+    assert data["steps"] == 15_000
+    done = stridor("compare", "two-beams.toml", "--no-critical", "--json", "--quiet", *SETS, cwd=folder)
+    data = document(done)
+    promised = {"mu", "modal", "temporal", "frequency_error", "growth_rate_error", "mac", "critical_mu_modal"}
+    assert promised | {"critical_mu_temporal", "verdict"} <= set(data)
+    assert data["critical_mu_temporal"] is None
+    assert data["frequency_error"] < 0.01
+
+
+def interrupted_run(folder: Path, words: list[str], seconds: float) -> tuple[int, str]:
+    """Start a long run, press Ctrl-C after some seconds; exit code and log."""
+    command = [sys.executable, "-m", "stridor.app.cli", "simulate", "two-beams.toml", *words]
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        time.sleep(seconds)
+        os.kill(process.pid, signal.SIGINT)
+        _, log = process.communicate(timeout=120)
+    return process.returncode, log
+
+
+def test_interruption_keeps_what_was_computed_and_a_restart_ends_alike(folder: Path) -> None:
+    long = [*SETS, "--set", "phases.slide.duration=8.0", "--set", "temporal.record_every=200"]
+    assert stridor("simulate", "two-beams.toml", "--quiet", "--out", "warm", *SETS, cwd=folder).returncode == 0
+    path = folder / "two-beams.out" / "simulate.nc"
+    # On a loaded machine Ctrl-C may come while the program is still loading: then there is nothing to keep.
+    for seconds in (2.5, 5.0, 10.0, 20.0):
+        code, log = interrupted_run(folder, long, seconds)
+        if path.exists():
+            break
+        assert code == 130
+    assert code == 130, log
+    assert "go on with --restart" in log
+    part = st.load_trajectory(path)
+    assert part.interrupted
+    assert 0 < part.steps < part.planned_steps
+    short = [w.replace("=8.0", f"={(part.steps + 20_000) * 4e-7 - 0.002:.7f}") for w in long]
+    done = stridor("simulate", "two-beams.toml", "--quiet", "--restart", str(path), "--out", "on", *short, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    whole = stridor("simulate", "two-beams.toml", "--quiet", "--out", "whole", *short, cwd=folder)
+    assert whole.returncode == 0, whole.stderr
+    one, two = (st.load_trajectory(folder / name / "simulate.nc") for name in ("on", "whole"))
+    assert np.array_equal(one.normal_force, two.normal_force)
+    assert np.array_equal(one.displacement, two.displacement)
+    assert one.phases == two.phases
+
+
+def test_run_writes_a_self_contained_report(folder: Path) -> None:
+    sets = [
+        *SETS,
+        "--set",
+        "modal.max_frequency_hz=20e3",
+        "--set",
+        "modal.sweep_points=21",
+        "--set",
+        "comparison.critical=false",
+    ]
+    done = stridor("run", "two-beams.toml", "--json", *sets, cwd=folder)
+    data = document(done)
+    assert set(data) >= {"modes", "onsets", "simulate", "compare", "report", "verdict"}
+    report = (folder / data["report"]).read_text(encoding="utf-8")
+    assert "<html" in report
+    assert 'src="http' not in report
+    for name in ("modes", "onsets", "simulate", "compare"):
+        assert (folder / "two-beams.out" / f"{name}.nc").exists()
+    assert list((folder / "two-beams.out" / "figures").glob("*.png"))
+    assert list((folder / "two-beams.out" / "figures").glob("*.svg"))
+    assert not list((folder / "two-beams.out").glob(".*")), "a temporary file was left behind"
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (("check", "none.toml"), 2, "stridor: none.toml: no such file"),
+        (
+            ("modes", "two-beams.toml", "--mu", "abc"),
+            2,
+            "stridor: --mu: 'abc' – a number, numbers with commas, or start:stop:count, each number ≥ 0",
+        ),
+        (
+            ("modes", "two-beams.toml", "--mu", "-0.1"),
+            2,
+            "stridor: --mu: '-0.1' – a number, numbers with commas, or start:stop:count, each number ≥ 0",
+        ),
+        (
+            ("modes", "two-beams.toml", "--mu", "0:1:0"),
+            2,
+            "stridor: --mu: '0:1:0' – a number, numbers with commas, or start:stop:count, each number ≥ 0",
+        ),
+        (
+            ("modes", "two-beams.toml", "--mu", "nan"),
+            2,
+            "stridor: --mu: 'nan' – a number, numbers with commas, or start:stop:count, each number ≥ 0",
+        ),
+        (("onsets", "two-beams.toml", "--range", "1"), 2, "stridor: --range: '1' – two numbers, low:high"),
+        (
+            ("onsets", "two-beams.toml", "--range", "1:0"),
+            2,
+            "stridor: friction_range: [1.0, 0.0] – two numbers 0 ≤ a < b",
+        ),
+        (
+            ("simulate", "two-beams.toml", "--set", "temporal.step=3e-8"),
+            2,
+            'stridor: temporal.step: 3e-08 – the explicit scheme is unstable beyond 2.116e-08 s, set by beam2; take a smaller step, coarser elements or mass = "lumped"',
+        ),
+        (
+            ("simulate", "two-beams.toml", "--restart", "two-beams.toml"),
+            2,
+            "stridor: file: 'two-beams.toml' – a results file written by stridor (netCDF-4/HDF5)",
+        ),
+        (
+            ("simulate", "two-beams.toml", "--restart", "none.nc"),
+            2,
+            "stridor: file: 'none.nc' – a results file written by stridor (netCDF-4/HDF5)",
+        ),
+        (
+            ("onsets", "two-beams.toml", "--set", "loads.press.force=[0.0, 20.0]"),
+            1,
+            "stridor: steady sliding has no equilibrium: the structure can move freely under its loads; contacts that would pull: A; fix a freedom of the loose body, or turn the load so that it presses the bodies together",
+        ),
+        (("onsets", "two-beams.toml", "--set", "contacts.A.friction.coefficient=-0.1"), 2, None),
+    ],
+)
+def test_bad_calls_give_one_line_and_no_traceback(
+    folder: Path, words: tuple[str, ...], code: int, message: str | None
+) -> None:
+    done = stridor(*words, cwd=folder)
+    assert done.returncode == code
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    if message is not None:
+        assert done.stderr == message + "\n"
+    else:
+        assert done.stderr.count("\n") == 1
+
+
+def test_help_is_quick_and_complete(tmp_path: Path) -> None:
+    done = stridor("--help", cwd=tmp_path)
+    assert done.returncode == 0
+    for verb in ("new", "check", "modes", "onsets", "simulate", "compare", "run"):
+        assert verb in done.stdout
+
+
+def test_import_stays_light() -> None:
+    code = (
+        "import sys, stridor; print(sorted(m for m in ('numba', 'matplotlib', 'scipy', 'xarray') if m in sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
