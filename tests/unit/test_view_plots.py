@@ -210,11 +210,13 @@ def test_only_unstable_stretches_are_marked():
 
 
 def test_imaginary_frequencies_have_the_sign_of_the_paper():
-    figure = plots.growth_branches(sweep(damped=False), (2, 3), imaginary_frequency=True)
-    lines = [line for line in figure.axes[0].lines if str(line.get_label()).startswith("mode")]
-    ends = sorted(float(line.get_ydata()[-1]) for line in lines)
-    growth = float(sweep(damped=False).growth_rate[-1].max())
-    assert ends[0] == pytest.approx(-growth / HZ)  # what grows has a negative imaginary part
+    modes = sweep(damped=False)
+    figure = plots.growth_branches(modes, (2, 3), imaginary_frequency=True)
+    ends = {str(line.get_label()): float(line.get_ydata()[-1]) for line in figure.axes[0].lines}
+    growing = int(np.argmax(modes.growth_rate[-1]))
+    # exp(jωt): what grows has a negative imaginary part.
+    assert ends[f"mode {modes.branch[growing]}"] == pytest.approx(-modes.growth_rate[-1, growing] / HZ)
+    assert ends[f"mode {modes.branch[growing]}"] < 0
 
 
 def test_the_friction_curve_is_not_joined_across_a_pole():

@@ -94,9 +94,10 @@ def _modal_energies(modal: ModalArrays, scheme: Scheme, u: Array, q: Array) -> t
     # pragma: no cover - compiled
     """Kinetic and elastic energy at t_{n−1/2}: ½ q·q and ½ u_n·ω²·u_{n−1}."""
     kinetic = elastic = 0.0
+    stiffness, step = modal.stiffness, scheme.step
     for i in range(u.shape[0]):
         kinetic += q[i] * q[i]
-        elastic += modal.stiffness[i] * u[i] * (u[i] - scheme.step * q[i])
+        elastic += stiffness[i] * u[i] * (u[i] - step * q[i])
     return 0.5 * kinetic, 0.5 * elastic
 
 
@@ -155,12 +156,14 @@ def _record(
         row[REC_STATUS] = state.status[c]
         row[REC_PLACE] = state.segment[c] + state.xi[c]
     motions = forcing.increments.shape[1]
-    for w in range(record.watch_rows.shape[0]):
+    # Arrays out of their tuples before the inner loop: inside it each access would count as a new owner.
+    u, q, rows = fields.u, fields.q, record.watch_rows
+    for w in range(rows.shape[0]):
         su = sq = sd = 0.0
         for i in range(increment.shape[0]):
-            r = record.watch_rows[w, i]
-            su += r * fields.u[i]
-            sq += r * fields.q[i]
+            r = rows[w, i]
+            su += r * u[i]
+            sq += r * q[i]
             sd += r * increment[i]
         for p in range(motions):
             lift = record.watch_lift[w, p]
@@ -586,40 +589,44 @@ def _complete_modal(
     modal: ModalArrays, rows: ModalRows, force: Array, fields: Fields, loads_at: int
 ) -> None:  # pragma: no cover - compiled
     """fields.buffer = d with the contact forces in it."""
-    for i in range(fields.d.shape[0]):
+    d, out, drive, values = fields.d, fields.buffer, modal.drive, rows.values
+    for i in range(d.shape[0]):
         push = 0.0
         for r in range(loads_at):
-            push += force[r] * rows.values[r, i]
-        fields.buffer[i] = fields.d[i] + modal.drive[i] * push
+            push += force[r] * values[r, i]
+        out[i] = d[i] + drive[i] * push
 
 
 @njit(cache=True)
 def _complete_nodal(rows: NodalRows, force: Array, fields: Fields) -> None:  # pragma: no cover - compiled
-    for i in range(fields.d.shape[0]):
-        total = fields.d[i]
-        for f in range(rows.answers.shape[1]):
-            total += rows.answers[i, f] * force[f]
-        fields.buffer[i] = total
+    d, out, answers = fields.d, fields.buffer, rows.answers
+    for i in range(d.shape[0]):
+        total = d[i]
+        for f in range(answers.shape[1]):
+            total += answers[i, f] * force[f]
+        out[i] = total
 
 
 @njit(cache=True)
 def _modal_constant(modal: ModalArrays, rows: ModalRows, fields: Fields, loads_at: int) -> None:
     # pragma: no cover - compiled
     """Part of d that loads and supports make."""
-    for i in range(fields.constant.shape[0]):
+    constant, coefficients, drive, values = fields.constant, fields.coefficients, modal.drive, rows.values
+    for i in range(constant.shape[0]):
         total = 0.0
-        for j in range(fields.coefficients.shape[0]):
-            total += fields.coefficients[j] * rows.values[loads_at + j, i]
-        fields.constant[i] = modal.drive[i] * total
+        for j in range(coefficients.shape[0]):
+            total += coefficients[j] * values[loads_at + j, i]
+        constant[i] = drive[i] * total
 
 
 @njit(cache=True)
 def _nodal_constant(nodal: NodalArrays, rows: NodalRows, fields: Fields) -> None:  # pragma: no cover
-    for i in range(fields.constant.shape[0]):
+    constant, coefficients, auxiliary = fields.constant, fields.coefficients, rows.auxiliary
+    for i in range(constant.shape[0]):
         total = 0.0
-        for j in range(fields.coefficients.shape[0]):
-            total += fields.coefficients[j] * rows.auxiliary[j, i]
-        fields.constant[i] = nodal.load_gain * total
+        for j in range(coefficients.shape[0]):
+            total += coefficients[j] * auxiliary[j, i]
+        constant[i] = nodal.load_gain * total
 
 
 __all__ = ["CONTACT_RECORD", "run_modal", "run_nodal"]

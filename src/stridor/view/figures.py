@@ -234,9 +234,10 @@ def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigu
         shares.append(f"{100 * window.separation_fraction:.0f} % separation")
     caption = (
         f"Contact {name} over three periods ({window.reason}): normal force up to {window.max_normal_force:.1f} N, "
-        f"slip speed up to {window.max_slip_speed:.3f} m/s, {', '.join(shares)}. Where it sticks, slave and "
-        "master move together, though not evenly: both vibrate."
+        f"slip speed up to {window.max_slip_speed:.3f} m/s, {', '.join(shares)}."
     )
+    if window.stick_fraction:
+        caption += " Where it sticks, slave and master move together, though not evenly: both vibrate."
     yield ReportFigure(
         "contact-window",
         "Normal force and velocities over three periods",

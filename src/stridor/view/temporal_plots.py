@@ -319,7 +319,8 @@ def _usual_limits(ax: Axes, values: Array, *, around: Array | None = None, symme
         top = max(top, -bottom)
         bottom = -top
     ends = float(values.min(initial=0.0)), float(values.max(initial=0.0))
-    if top <= bottom or (ends[1] <= 1.3 * top and ends[0] >= 1.3 * bottom):
+    beyond = 0.3 * (top - bottom)
+    if top <= bottom or (ends[1] <= top + beyond and ends[0] >= bottom - beyond):
         return
     margin = (0.08 if around is None else 0.25) * (top - bottom)
     ax.set_ylim(bottom - margin, top + margin)

@@ -102,7 +102,7 @@ def agreement_table(comparison: Comparison) -> Table:
         fitted = comparison.run_growth
         state = "saturated" if fitted.saturated else "not saturated"
         rows.append(Row(("growth fitted in the full run [1/s]", "", number(fitted.rate, 1), "", state)))
-    if comparison.mac is not None:
+    if comparison.mac is not None and comparison.responding is not None:
         rows.append(
             Row(
                 (
@@ -132,7 +132,8 @@ def _likeness(mac: float) -> str:
 
 def mac_row(comparison: Comparison) -> Row | None:
     """Likeness of the shapes of run and mode as a line of the summary."""
-    if comparison.mac is None:
+    # Without an unstable mode that answers there is no shape to hold the run against.
+    if comparison.mac is None or comparison.responding is None:
         return None
     name = f"likeness of run and mode (MAC) at μ = {comparison.mu:g}"
     return Row((name, "", number(comparison.mac, 3), "", _likeness(comparison.mac)))
