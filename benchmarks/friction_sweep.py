@@ -17,7 +17,7 @@ from stridor.modal.complex_modes import complex_modes
 
 
 def dense(system: st.System, mu: float) -> np.ndarray:
-    """Eigenvalues of the damped state matrix at μ."""
+    """Eigenvalues of the damped state matrix at μ, with the vectors that a residual needs."""
     contact = system.contacts[0]
     n, t = contact.normal_row, contact.tangent_row
     stiffness = system.stiffness.toarray() + contact.stiffness * np.outer(n + mu * t, n)
@@ -29,7 +29,7 @@ def dense(system: st.System, mu: float) -> np.ndarray:
             [-inverse @ stiffness, -inverse @ system.damping.toarray()],
         ]
     )
-    return sl.eigvals(state)
+    return sl.eig(state)[0]
 
 
 def main() -> None:

@@ -23,6 +23,7 @@ from .temporal.shapes import operating_shape
 from .temporal.signals import Components, Growth, components, growth, low_passed, spectrum
 from .temporal.simulate import Settings, simulate
 from .temporal.trajectory import Trajectory
+from .threads import one_thread_if_small
 from .typing import Array, ComplexArray, IntArray
 
 PERTURBATION = 1e-5  # of the slip speed, at the start
@@ -139,6 +140,7 @@ class Agreement:
         }
 
 
+@one_thread_if_small
 def perturb(
     system: System,
     mu: float,
@@ -256,6 +258,7 @@ def mode_shape(system: System, vector: ComplexArray) -> dict[str, ComplexArray]:
     return {line.name: np.asarray(line.rows.free @ vector).reshape(-1, 2) for line in system.lines}
 
 
+@one_thread_if_small
 def compare(
     system: System,
     phases: Sequence[PhaseSpec],

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 import stridor as st
 
 # A coarse bench that runs in a second: few elements, large steps, short phases.

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 import stridor as st
 from stridor.io.atomic import replacing, write_text
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 import stridor as st
 from stridor.agreement import critical_friction, modal_assurance, perturb
 from stridor.case import template_text

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from ..errors import CaseError
 from ..system import System
 from ..system.uncoupled import uncoupled_modes
+from ..threads import one_thread_if_small
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .backward_error import BackwardError
 from .coupling import Coupling, couple
@@ -114,6 +115,7 @@ def prepare(system: System, *, mu: float | None = None) -> tuple[Spectrum, Coupl
     return spectrum_of(coupling, modes), coupling, open_contacts
 
 
+@one_thread_if_small
 def complex_modes(
     system: System,
     mu: float | Sequence[float] | Array,

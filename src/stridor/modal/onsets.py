@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import AnalysisError, CaseError
 from ..system import System
+from ..threads import one_thread_if_small
 from ..typing import ComplexArray
 from .backward_error import BackwardError
 from .bordered import Bordered
@@ -109,6 +110,7 @@ class _Event:
     new: State
 
 
+@one_thread_if_small
 def onsets(
     system: System,
     friction_range: tuple[float, float] = (0.0, 1.0),

@@ -27,7 +27,6 @@ from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
 from .provenance import provenance
-from .threads import calm
 
 
 def phases_of(case: Case) -> list[PhaseSpec]:
@@ -59,15 +58,14 @@ def modes(
     system = build_system(case)
     values = _own_friction(case) if mu is None else mu
     damped = case.modal.damped if damped is None else damped
-    with calm(system.size):
-        result = complex_modes(
-            system,
-            values,
-            count=case.modal.modes if count is None else count,
-            max_frequency_hz=max_frequency_hz,
-            damped=damped,
-            vectors=vectors,
-        )
+    result = complex_modes(
+        system,
+        values,
+        count=case.modal.modes if count is None else count,
+        max_frequency_hz=max_frequency_hz,
+        damped=damped,
+        vectors=vectors,
+    )
     seconds = time.perf_counter() - started
     return replace(result, provenance=provenance(case, "modes", seconds, damped=damped))
 
@@ -97,13 +95,12 @@ def onsets(
     """Every critical friction coefficient in range (defaults from the case's [modal])."""
     started = time.perf_counter()
     system = build_system(case)
-    with calm(system.size):
-        result = solve_onsets(
-            system,
-            case.modal.friction_range if friction_range is None else friction_range,
-            max_frequency_hz=max_frequency_hz or case.modal.max_frequency_hz,
-            damped=case.modal.damped if damped is None else damped,
-        )
+    result = solve_onsets(
+        system,
+        case.modal.friction_range if friction_range is None else friction_range,
+        max_frequency_hz=max_frequency_hz or case.modal.max_frequency_hz,
+        damped=case.modal.damped if damped is None else damped,
+    )
     return replace(result, provenance=provenance(case, "onsets", time.perf_counter() - started))
 
 
@@ -118,16 +115,15 @@ def simulate(
     """The temporal approach through the phases of the case; mu scales every contact's friction law."""
     started = time.perf_counter()
     system = build_system(case)
-    with calm(system.size):
-        result = march(
-            system,
-            phases_of(case),
-            settings_of(case),
-            mu=mu,
-            progress=progress,
-            checkpoint=checkpoint,
-            restart=restart,
-        )
+    result = march(
+        system,
+        phases_of(case),
+        settings_of(case),
+        mu=mu,
+        progress=progress,
+        checkpoint=checkpoint,
+        restart=restart,
+    )
     return replace(result, provenance=provenance(case, "simulate", time.perf_counter() - started, mu=mu))
 
 
@@ -144,20 +140,19 @@ def compare(
     settings = case.comparison
     chosen = list(mus if mus is not None else settings.mu) or [_own_friction(case)]
     system = build_system(case)
-    with calm(system.size):
-        result = compare_system(
-            system,
-            phases_of(case),
-            settings_of(case),
-            chosen,
-            friction_range=case.modal.friction_range,
-            max_frequency_hz=case.modal.max_frequency_hz,
-            critical=settings.critical if critical is None else critical,
-            bracket=settings.bracket,
-            tolerance=settings.tolerance,
-            runs=runs,
-            progress=progress,
-        )
+    result = compare_system(
+        system,
+        phases_of(case),
+        settings_of(case),
+        chosen,
+        friction_range=case.modal.friction_range,
+        max_frequency_hz=case.modal.max_frequency_hz,
+        critical=settings.critical if critical is None else critical,
+        bracket=settings.bracket,
+        tolerance=settings.tolerance,
+        runs=runs,
+        progress=progress,
+    )
     return replace(result, provenance=provenance(case, "compare", time.perf_counter() - started, mu=chosen))
 
 

@@ -38,6 +38,8 @@ from .stage import (
 # run that blows up must be seen.
 _unsigned: Any = np.uint64
 _FAST = {"reassoc", "contract", "nsz", "arcp"}
+# At the contacts the order of additions stays as written; divisions by constants may become products.
+_CAREFUL = {"contract", "nsz", "arcp"}
 
 DONE, NEW_ROWS, OFF_LINE, NOT_FINITE = range(4)
 # Energies of a record [J]: kinetic and elastic at t_{n−1/2}, then the works up to there.
@@ -186,7 +188,7 @@ def _record(
         record.energies[at, 2 + j] = state.works[j]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=_FAST, inline="always")
 def _push(
     d: Array, drive: Array, rows: Array, chosen: IntArray, at: int, end: int, force: Array, lo: int, hi: int
 ) -> None:  # pragma: no cover - compiled
@@ -213,7 +215,7 @@ def _push(
             at += 1
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=_FAST, inline="always")
 def _pull(
     u: Array, d: Array, rows: Array, chosen: IntArray, at: int, end: int, lo: int, hi: int, predicted: Array
 ) -> None:  # pragma: no cover - compiled
@@ -469,7 +471,7 @@ def _lent_record(x: Record) -> Record:  # pragma: no cover - compiled
     )
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=_CAREFUL)
 def run_modal(
     steps: int,
     modal: ModalArrays,
@@ -528,7 +530,7 @@ def run_modal(
     return steps, DONE
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=_CAREFUL)
 def run_nodal(
     steps: int,
     nodal: NodalArrays,

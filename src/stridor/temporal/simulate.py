@@ -13,6 +13,7 @@ from ..errors import AnalysisError, CaseError
 from ..sliding import slip_speeds, steady_sliding
 from ..system import System
 from ..system.uncoupled import UncoupledModes, uncoupled_modes
+from ..threads import one_thread_if_small
 from ..typing import Array
 from .beta2 import Scheme, StepLimit, scheme, step_limit
 from .inputs import check_inputs
@@ -104,6 +105,7 @@ def choose_path(system: System, settings: Settings) -> tuple[UncoupledModes | No
     return None, "damping is not proportional in every component"
 
 
+@one_thread_if_small
 def simulate(
     system: System,
     phases: Sequence[PhaseSpec],
