@@ -106,7 +106,8 @@ def temporal(case: st.Case, *, critical: bool) -> None:
         row(
             "critical μ in time by bisection",
             "0.075–0.082",
-            f"{agreement.critical_mu_temporal:.5f} (in {low:.5f} … {high:.5f}; modal {agreement.critical_mu_modal:.5f})",
+            f"{agreement.critical_mu_temporal:.5f} (in {low:.5f} … {high:.5f}; "
+            f"modal {agreement.critical_mu_modal:.5f})",
         )
 
 

@@ -66,7 +66,7 @@ class Comparison:
 
     modal_eigenvalue: the mode that belongs to what the temporal side shows growing fastest (or decaying
     slowest); frequency_error, growth_rate_error relative; mac between the operating shape of the full run
-    at its dominant frequency and that mode (None without a run); unstable_hz: all unstable modes in range;
+    at its dominant frequency and the mode that responds (None if none does); unstable_hz: all unstable modes in range;
     responding: position in that list of the mode that the full run answers with, None if none.
     """
 
@@ -350,18 +350,20 @@ def _compare_at(
     dominant, fitted = dominant_response(run, max_frequency_hz)
     mac, responding = None, None
     if dominant:
-        shape = operating_shape(system, phases, settings, run, dominant, mu=mu)
         responding = _responding(modes, unstable, dominant)
-        mode = partner if responding is None else int(unstable[responding])
+    if dominant and responding is not None:
+        # Without a mode that responds there is nothing to hold the shape against.
+        shape = operating_shape(system, phases, settings, run, dominant, mu=mu)
         assert modes.right is not None
-        expected = mode_shape(system, modes.right[0, mode])
+        expected = mode_shape(system, modes.right[0, int(unstable[responding])])
         mac = modal_assurance(
             np.concatenate([shape[n].ravel() for n in shape]),
             np.concatenate([expected[n].ravel() for n in shape]),
         )
     agrees, verdict = _judge(mu, len(unstable) > 0, here, perturbation, frequency_error, growth_error)
-    if responding is not None:
-        verdict += f"; the full run answers at {dominant:.0f} Hz"
+    if responding is not None and mac is not None:
+        likeness = "in its shape" if mac >= GOOD_MAC else f"in a shape that is no longer linear, MAC {mac:.2f}"
+        verdict += f"; the full run answers at {dominant:.0f} Hz {likeness}"
     return Comparison(
         mu=mu,
         modal_eigenvalue=here,

@@ -1,6 +1,6 @@
 """Broken case files and overrides, each with the exact message that its author gets."""
 
-# ruff: noqa: E501  (messages stand here as they are printed)
+
 
 from __future__ import annotations
 

@@ -71,9 +71,14 @@ def test_trajectory_round_trip_is_exact(case: st.Case, tmp_path: Path) -> None:
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "result.txt"
     write_text(path, "old")
-    with pytest.raises(RuntimeError, match="on purpose"), replacing(path) as temporary:
-        temporary.write_text("half of the new")
-        raise RuntimeError("on purpose")
+
+    def fail() -> None:
+        with replacing(path) as temporary:
+            temporary.write_text("half of the new")
+            raise RuntimeError("on purpose")
+
+    with pytest.raises(RuntimeError, match="on purpose"):
+        fail()
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["result.txt"]
 

@@ -18,7 +18,7 @@ from ..sliding import steady_sliding
 from ..study import analyses
 from ..study.everything import Everything, compute_everything
 from ..study.provenance import versions
-from ..temporal.signals import spectrogram, spectrum
+from ..temporal.signals import low_passed, spectrogram, spectrum
 from ..temporal.simulate import Progress
 from ..view.inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
 from ..view.report import write_report
@@ -115,6 +115,8 @@ def report_inputs(e: Everything) -> ReportInputs:
         **shapes,
         agreement=agreement,
         values=_values(e),
+        value_notes={"dominant_frequency_hz": "second half of the last phase"},
+        source_places={} if e.case.reference is None else dict(e.case.reference.places),
         timings=e.seconds,
         versions=versions(),
         case_text=e.case.text,
@@ -136,8 +138,10 @@ def _signals(e: Everything) -> dict[str, Any]:
     limit = e.case.modal.max_frequency_hz
     # Six samples per period of the highest frequency shown are plenty for a picture.
     every = max(1, int(1.0 / (6 * limit * run.sampling)))
-    picture = spectrogram(run.velocity[part, 0, 0][::every], run.sampling * every, resolution_hz=limit / 100)
-    return {"spectra": spectra, "spectrogram": picture, "spectrogram_start": float(run.time[start])}
+    signal = low_passed(run.velocity[part, 0, 0], run.sampling, limit)
+    cut = (stop - start - len(signal)) // 2
+    picture = spectrogram(signal[::every], run.sampling * every, resolution_hz=limit / 100)
+    return {"spectra": spectra, "spectrogram": picture, "spectrogram_start": float(run.time[start + cut])}
 
 
 def _shapes(e: Everything) -> dict[str, Any]:
@@ -157,9 +161,4 @@ def _values(e: Everything) -> dict[str, float]:
     values: dict[str, float] = {}
     if e.summary.dominant_frequency_hz is not None:
         values["dominant_frequency_hz"] = e.summary.dominant_frequency_hz
-    regimes = analyses.first_regime(e.run)
-    for name in ("max_normal_force", "max_slip_speed"):
-        found = [value for regime in regimes.values() if (value := regime[name]) is not None]
-        if found:
-            values[name] = max(found)
     return values

@@ -362,6 +362,10 @@ class Reference(Table):
         default=(), description="a list of { name, value, unit, note }"
     )
     notes: tuple[str, ...] = Field(default=(), description="a list of texts, what to know about the source")
+    places: Mapping[str, str] = Field(
+        default_factory=dict[str, str],
+        description="a table { NAME = \"figure 3\" }, where in the source a figure or table of the report is found",
+    )
 
 
 ENTRIES: Mapping[str, Any] = {

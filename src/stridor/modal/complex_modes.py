@@ -223,7 +223,8 @@ def _pairs(
         doubtful = np.flatnonzero(~(errors[part] < DOUBTFUL))
         chosen = np.arange(len(part)) if shapes is not None else doubtful
         left = np.zeros_like(right)
-        left[:, chosen] = expand(spectrum, lam[part[chosen]], pull[part[chosen]])
+        if len(chosen):
+            left[:, chosen] = expand(spectrum, lam[part[chosen]], pull[part[chosen]])
         for k in doubtful:
             at = part[k]
             value, x, y = refine(

@@ -139,9 +139,7 @@ def onsets(
     order = _numbering(spectrum, tracker.origin)
     judge = BackwardError(coupling)
     found = [_located(spectrum, judge, event, order, has_damping) for event in events]
-    inside = [
-        o for o in found if o is not None and low <= o.mu <= high and o.frequency_hz <= max_frequency_hz
-    ]
+    inside = [o for o in found if o is not None and low <= o.mu <= high and o.frequency_hz <= max_frequency_hz]
     return Onsets(
         tuple(sorted(_distinct(inside), key=lambda o: o.mu)),
         (low, high),
@@ -203,10 +201,8 @@ def _passages(spectrum: Spectrum, old: State, new: State, has_damping: bool) -> 
         first = ((a - old.roots[j]) / 2) ** 2 if j >= 0 else a**2
         second = ((b - new.roots[j]) / 2) ** 2 if j >= 0 else b**2
         fraction = float(np.clip((first / (first - second)).real, 0.0, 1.0)) if first != second else 0.5
-        if j >= 0:
-            middle = (1 - fraction) * (a + old.roots[j]) / 2 + fraction * (b + new.roots[j]) / 2
-        else:
-            middle = 0.0
+        means = ((a + old.roots[j]) / 2, (b + new.roots[j]) / 2) if j >= 0 else (0.0, 0.0)
+        middle = (1 - fraction) * means[0] + fraction * means[1]
         at = old.mu + fraction * step
         events.append(_Event(at, complex(middle), int(new.branch[i]), _named(new, j), was, True, i, old, new))
     return events
@@ -268,9 +264,7 @@ def _located(
         if onset is not None:
             reach = 0.5 * (event.new.mu - event.old.mu) + 1e-9
             near = event.old.mu - reach <= onset.mu <= event.new.mu + reach
-            here = event.double or abs(2 * np.pi * onset.frequency_hz - abs(event.root.imag)) <= _distance(
-                event
-            )
+            here = event.double or abs(2 * np.pi * onset.frequency_hz - abs(event.root.imag)) <= _distance(event)
             if near and here and onset.residual <= BELIEVED:
                 return onset
         closer = _narrowed(spectrum, event, has_damping)

@@ -90,9 +90,7 @@ def spectrum_of(coupling: Coupling, modes: UncoupledModes) -> Spectrum:
     )
 
 
-def _split_unseen(
-    modes: UncoupledModes, real: Array, *, sloped: bool
-) -> tuple[ComplexArray, Array, Array, BoolArray]:
+def _split_unseen(modes: UncoupledModes, real: Array, *, sloped: bool) -> tuple[ComplexArray, Array, Array, BoolArray]:
     """Group equal poles and turn each group so that the fewest of its modes meet the contacts.
 
     A mode without normal motion at any contact keeps its eigenvalue at every μ (its friction force
@@ -343,10 +341,8 @@ def _step(
     lam = roots[index]
     with np.errstate(all="ignore"):
         value, by_lambda, _ = spectrum.evaluate(lam, mu)
-        if value.shape[1] == 1:
-            slope = by_lambda[:, 0, 0] / value[:, 0, 0]
-        else:
-            slope = _trace_of_quotient(value, by_lambda)
+        single = value.shape[1] == 1
+        slope = by_lambda[:, 0, 0] / value[:, 0, 0] if single else _trace_of_quotient(value, by_lambda)
         stiffness, damping = poles
         column = lam[:, None]
         slope = slope + ((2 * column + damping) / (column * (column + damping) + stiffness)).sum(axis=1)

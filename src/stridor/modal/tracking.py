@@ -65,6 +65,7 @@ class Tracker:
                 raise AnalysisError("the eigenvalues at vanishing friction do not settle")
         self.state = State(mu, roots, implied, self._tangents(roots, mu), np.arange(len(roots)))
         self._step, self._leaps = 0.01, 0
+        self._before: State | None = None
 
     @classmethod
     def resumed(cls, spectrum: Spectrum, state: State) -> Tracker:
@@ -72,7 +73,7 @@ class Tracker:
         tracker = cls.__new__(cls)
         tracker.spectrum, tracker.limit, tracker.watch = spectrum, float(np.abs(state.roots).max()), None
         tracker.state, tracker.origin, tracker.smallest_step = state, state.roots, 1e-9
-        tracker._step, tracker._leaps = 0.01, 0
+        tracker._step, tracker._leaps, tracker._before = 0.01, 0, None
         return tracker
 
     def _tangents(self, roots: ComplexArray, mu: float) -> ComplexArray:
@@ -101,7 +102,7 @@ class Tracker:
                 taken, self._step = self._leap(mu), 1e-4
             if self.watch is not None:
                 self.watch(self.state, taken)
-            self.state = taken
+            self._before, self.state = self.state, taken
             if step >= 0.999 * self._step:
                 self._step = min(self._step * 2, 0.02)
         return self.state
@@ -175,6 +176,9 @@ class Tracker:
                 implied[i] = False
                 twins.append(splits[i][0] - half)
                 origins.append(int(old.branch[i]))
+        alone = np.ones(len(predicted), dtype=bool)
+        alone[[k for pair in pairs for k in pair if k >= 0]] = False
+        predicted[alone] = self._extrapolated(old, step, predicted)[alone]
         both = np.concatenate([predicted, twins])
         implied = np.concatenate([implied, np.zeros(len(twins), dtype=bool)])
         roots, converged = polish(self.spectrum, both, implied, mu, steps=CONTINUATION_STEPS)
@@ -186,6 +190,23 @@ class Tracker:
             return None
         branch = np.concatenate([old.branch, np.array(origins, dtype=np.int64)])
         return State(mu, roots, implied, self._tangents(roots, mu), branch)
+
+    def _extrapolated(self, old: State, step: float, predicted: ComplexArray) -> ComplexArray:
+        """The cubic through the last two states and their tangents, where it does not reach too far."""
+        before = self._before
+        if before is None or len(before.roots) != len(old.roots):
+            return predicted
+        length = old.mu - before.mu
+        if not 0.0 < step <= 2.0 * length:
+            return predicted
+        start, end = length * before.tangents, length * old.tangents
+        cubic = start + end + 2.0 * (before.roots - old.roots)
+        square = before.roots - old.roots + end + cubic
+        t = step / length
+        further = old.roots + t * (end + t * (square + t * cubic))
+        # Beside a coalescence that just passed, the cubic knows less than the tangent.
+        near = np.abs(further - predicted) <= np.abs(step * old.tangents)
+        return np.where(near & np.isfinite(further), further, predicted)
 
     def _pairs(self, old: State, predicted: ComplexArray) -> list[tuple[int, int]]:
         """Pairs (i, j) whose distance is not large against the step; j = −1 is i's own conjugate."""

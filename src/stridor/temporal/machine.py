@@ -51,7 +51,7 @@ class Machine:
 
     @property
     def path(self) -> str:
-        """ "modal" or "nodal"."""
+        """Which path it takes: modal or nodal."""
         return "modal" if self.modal is not None else "nodal"
 
     @property
