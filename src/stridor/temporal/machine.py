@@ -13,7 +13,8 @@ from ..system import System
 from ..system.uncoupled import UncoupledModes
 from ..typing import Array, IntArray
 from .beta2 import Scheme
-from .kernel import Fields, ModalRows, NodalRows, Record, run_modal, run_nodal
+from .kernel import run_modal, run_nodal
+from .layout import Fields, ModalRows, NodalRows, Record
 from .operators import (
     FINITE,
     POINTS_PER_FINITE_CONTACT,

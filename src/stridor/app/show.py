@@ -1,0 +1,76 @@
+"""Results of the verbs as readable tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .output import stdout, table
+
+
+def show_run(summary: dict[str, Any]) -> None:
+    """Contacts by phase, dominant frequency, energies, cost."""
+    rows = [
+        [
+            phase["name"],
+            name,
+            f"{c['max_normal_force']:.2f}",
+            f"{c['max_slip_speed']:.4f}",
+            f"{100 * c['stick_fraction']:.1f}",
+            f"{100 * c['slip_fraction']:.1f}",
+            f"{100 * c['separation_fraction']:.1f}",
+        ]
+        for phase in summary["phases"]
+        for name, c in phase["contacts"].items()
+    ]
+    columns = ["phase", "contact", "max N [N]", "max slip [m/s]", "stick [%]", "slip [%]", "open [%]"]
+    table("contacts", columns, rows)
+    if summary["dominant_frequency_hz"] is not None:
+        state = "saturated" if summary["saturated"] else "not saturated"
+        stdout.print(
+            f"last phase: {summary['dominant_frequency_hz']:.1f} Hz dominates, growth "
+            f"{summary['growth_rate']:.1f} 1/s where exponential, {state}"
+        )
+    stdout.print(f"energy balance closes to {summary['energy']['error']:.1e} of the energy turned over")
+    stdout.print(
+        f"{summary['steps']} steps of {summary['dt']:.4g} s in {summary['wall_seconds']:.1f} s, {summary['path']} path"
+    )
+
+
+def show_agreement(document: dict[str, Any]) -> None:
+    """Both approaches side by side, critical friction, verdict."""
+
+    def number(value: float | None, form: str) -> str:
+        return "–" if value is None else format(value, form)
+
+    rows = [
+        [
+            f"{c['mu']:g}",
+            number(c["modal"]["frequency_hz"], ".2f"),
+            number(c["temporal"]["frequency_hz"], ".2f"),
+            number(c["modal"]["growth_rate"], ".2f"),
+            number(c["temporal"]["growth_rate"], ".2f"),
+            f"{100 * c['growth_rate_error']:.2f}",
+            number(c["temporal"]["dominant_frequency_hz"], ".1f"),
+            number(c["mac"], ".3f"),
+        ]
+        for c in document["comparisons"]
+    ]
+    columns = [
+        "μ",
+        "modal [Hz]",
+        "temporal [Hz]",
+        "growth modal",
+        "temporal",
+        "error [%]",
+        "run answers [Hz]",
+        "MAC",
+    ]
+    table("modal against temporal", columns, rows)
+    if document["critical_mu_modal"] is not None:
+        stdout.print(
+            f"critical μ: {document['critical_mu_modal']:.6f} modal, "
+            f"{number(document['critical_mu_temporal'], '.6f')} temporal"
+        )
+    for note in document["notes"]:
+        stdout.print(f"note: {note}", markup=False)
+    stdout.print(document["verdict"], markup=False)

@@ -1,0 +1,61 @@
+"""What moves through the loop besides the contacts: fields of the path, rows in use, records."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..typing import Array, IntArray
+
+# Reassociation lets dot products run in vector registers; NaN and infinity stay honoured, because a
+# run that blows up must be seen.
+FAST = {"reassoc", "contract", "nsz", "arcp"}
+# At the contacts the order of additions stays as written; divisions by constants may become products.
+CAREFUL = {"contract", "nsz", "arcp"}
+
+# Energies of a record [J]: kinetic and elastic at t_{n−1/2}, then the works up to there.
+ENERGY_RECORD = 7
+
+
+class Fields(NamedTuple):
+    """State of the path: u, q and the free increment d (n,) each, in modal coordinates or freedoms;
+    constant (n,): its part from loads and supports, coefficients (aux,) that made it, buffer (n,)."""
+
+    u: Array
+    q: Array
+    d: Array
+    constant: Array
+    coefficients: Array
+    buffer: Array
+
+
+class ModalRows(NamedTuple):
+    """Active rows on modes: values (a + 1, n), a zero row at the end. For each block of modes the rows that
+    push on it (contact forces) and those that read it, with offsets (b + 1,) into both lists."""
+
+    values: Array
+    pushing: IntArray
+    push_at: IntArray
+    pulling: IntArray
+    pull_at: IntArray
+
+
+class NodalRows(NamedTuple):
+    """Active rows on freedoms as CSR (a rows), and the answers (n, f) of the structure to force rows."""
+
+    ptr: IntArray
+    col: IntArray
+    val: Array
+    answers: Array
+    auxiliary: Array  # (aux, n) dense rows that carry loads and supports
+
+
+class Record(NamedTuple):
+    """Decimated output: contacts (r, m, 6), watch (r, w, 3) of u, v, a, energies (r, 7), kept (1,) how many."""
+
+    every: int
+    contacts: Array
+    watch: Array
+    energies: Array
+    kept: IntArray
+    watch_rows: Array  # (w, n) in the path's coordinates
+    watch_lift: Array  # (w, p)

@@ -1,0 +1,65 @@
+"""How to march: settings of a temporal run, and the choices they leave open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..errors import CaseError
+from ..system import System
+from ..system.uncoupled import UncoupledModes, uncoupled_modes
+from .beta2 import StepLimit
+from .machine import MODAL_LIMIT
+
+SAFE_FRACTION = 0.9
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to march: step Δt [s] (None: 0.9 of the limit), β2 in [0.5, 1], steps between records, path,
+    initial state, perturbation [m/s] of the slip speed (steady sliding only), watched points."""
+
+    step: float | None = None
+    beta2: float = 0.5
+    record_every: int = 50
+    path: Literal["auto", "modal", "nodal"] = "auto"
+    initial: Literal["rest", "steady-sliding"] = "rest"
+    perturbation: float = 0.0
+    watch: tuple[str, ...] = ()
+
+
+def choose_step(limit: StepLimit, settings: Settings) -> float:
+    """Δt [s] within the limit; raises CaseError for a step beyond it."""
+    if settings.step is None:
+        if not np.isfinite(limit.step):
+            raise CaseError("temporal.step", None, "nothing in the system oscillates, so no step follows; give one")
+        return SAFE_FRACTION * limit.step
+    if settings.step > limit.step:
+        raise CaseError(
+            "temporal.step",
+            settings.step,
+            f"the explicit scheme is unstable beyond {limit.step:.4g} s, set by {limit.body}; take a smaller "
+            'step, coarser elements or mass = "lumped"',
+        )
+    return settings.step
+
+
+def choose_path(system: System, settings: Settings) -> tuple[UncoupledModes | None, str]:
+    """Complete modal basis where it is exact and affordable, else None; and the reason in words."""
+    if settings.path == "nodal":
+        return None, "asked for"
+    largest = max(len(part) for part in system.components)
+    if settings.path == "auto" and system.size > MODAL_LIMIT:
+        return None, f"{system.size} freedoms are too many for a complete modal basis"
+    if largest > MODAL_LIMIT:
+        raise CaseError("temporal.path", "modal", f"a body of {largest} freedoms is too large; take nodal")
+    modes = uncoupled_modes(system)
+    if modes.proportional:
+        return modes, "complete modal basis: damping is proportional in every component, the scheme is the same"
+    if settings.path == "modal":
+        raise CaseError(
+            "temporal.path", "modal", "damping is not proportional, so modes stay coupled; take nodal or auto"
+        )
+    return None, "damping is not proportional in every component"

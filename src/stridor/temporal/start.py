@@ -1,0 +1,171 @@
+"""Where a run starts: at rest, in steady sliding, or from the saved state of another run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from ..errors import CaseError
+from ..sliding import steady_sliding
+from ..system import System
+from ..system.uncoupled import UncoupledModes
+from ..typing import Array
+from .beta2 import Scheme
+from .machine import Machine
+from .schedule import Schedule
+from .settings import Settings
+from .trajectory import Trajectory
+
+STATE_FIELDS = ("u", "q", "d", "constant", "coefficients")
+# Displacement, velocity and acceleration (n,) added to the initial state.
+Disturbance = tuple[Array, Array, Array]
+
+
+def watch_rows(machine: Machine, modes: UncoupledModes | None, names: Sequence[str]) -> tuple[Array, Array]:
+    """Rows (2w, n) in the path's coordinates and lift (2w, p) of watched points' x and y."""
+    system = machine.system
+    rows = [system.points[name].free[:2].toarray() for name in names]
+    lift = [system.points[name].lift[:2] for name in names]
+    free = np.vstack([np.zeros((0, system.size)), *rows])
+    inner = free if modes is None else modes.project(free)[0]
+    return np.ascontiguousarray(machine.laid_out(inner)), np.vstack([np.zeros((0, machine.table.motions)), *lift])
+
+
+def initial_state(
+    machine: Machine,
+    modes: UncoupledModes | None,
+    schedule: Schedule,
+    settings: Settings,
+    disturbance: Disturbance | None = None,
+) -> None:
+    """Put a machine at rest or into steady sliding, disturbed if so asked, and predict its first step."""
+    system, fields, state = machine.system, machine.fields, machine.state
+    if settings.initial == "steady-sliding":
+        stretch = schedule.stretches[0]
+        # The loop's contacts are rigid whatever K_c the modal approach uses: an equilibrium that rests on
+        # the spring would start with a penetration, and undoing it in one step is a blow.
+        rigid = replace(system, contacts=tuple(replace(c, stiffness=np.inf) for c in system.contacts))
+        steady = steady_sliding(
+            rigid,
+            load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
+            motion_factors=stretch.velocities_after,
+        )
+        velocity = np.zeros(system.size)
+        for contact in system.contacts:
+            velocity += settings.perturbation * _slip_impulse(system, contact.tangent_row)
+        fields.u[:] = machine.coordinates(steady.displacement, modes)
+        fields.q[:] = machine.coordinates(velocity, modes)
+        state.motion[1] = stretch.velocities_after
+        state.status[:] = np.where(steady.active, 2, 0)
+        if stretch.ramp_steps:
+            raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
+    if disturbance is not None:
+        displacement, velocity, acceleration = disturbance
+        # q_0 = v_0 − β2 Δt a_0 starts the scheme without a jump (docs/theory-temporal.md).
+        rate = velocity - machine.scheme.beta2 * machine.scheme.step * acceleration
+        fields.u[:] += machine.coordinates(displacement, modes)
+        fields.q[:] += machine.coordinates(rate, modes)
+    machine.repack()
+    coefficients = _start_coefficients(machine, schedule)
+    machine.free_increment(coefficients)
+    machine.predict()
+
+
+def _slip_impulse(system: System, tangent_row: Array) -> Array:
+    """Velocity (n,) that an impulse along a contact's tangent gives, one unit of slip speed."""
+    answer = spl.splu(sp.csc_array(system.mass)).solve(tangent_row)
+    return answer / float(tangent_row @ answer)
+
+
+def _start_coefficients(machine: Machine, schedule: Schedule) -> Array:
+    """Forcing coefficients of step 0: loads, −a and −v of the supports."""
+    scheme: Scheme = machine.scheme
+    rate = schedule.motion_increments(0, 1)[0] / scheme.step
+    before = machine.state.motion[1]
+    rate = np.where(np.abs(rate - before) <= 1e-13 * np.abs(before), before, rate)
+    acceleration = -2.0 * (rate - before) / (scheme.step * scheme.s)
+    velocity = -(before + 2.0 * scheme.beta2 * rate) / scheme.s
+    return np.concatenate([schedule.load_factors(0, 1)[0], acceleration, velocity])
+
+
+def saved_state(machine: Machine, settings: Settings) -> dict[str, Array]:
+    """Everything a restart needs, as arrays."""
+    saved = {f"field_{name}": getattr(machine.fields, name).copy() for name in STATE_FIELDS}
+    for name in machine.state._fields:
+        saved[f"state_{name}"] = np.array(getattr(machine.state, name))
+    saved["settings"] = np.array([machine.scheme.step, machine.scheme.beta2, float(settings.record_every)])
+    saved["model"] = _model_numbers(machine.system)
+    return saved
+
+
+def _model_numbers(system: System) -> Array:
+    """A few numbers by which two models differ: freedoms, contacts, traces of M, C and K."""
+    traces = [float(matrix.trace()) for matrix in (system.mass, system.damping, system.stiffness)]
+    return np.array([float(system.size), float(len(system.contacts)), *traces])
+
+
+def restore(machine: Machine, restart: Trajectory, settings: Settings, *, join: bool) -> None:
+    """Go on from a saved state; raises CaseError where it belongs to another model, scheme or record."""
+    given, own = restart.state.get("settings"), np.array([machine.scheme.step, machine.scheme.beta2])
+    if given is None or restart.path != machine.path or not np.array_equal(given[:2], own):
+        raise CaseError(
+            "restart",
+            f"step {restart.step:g} s, beta2 {restart.beta2:g}, path {restart.path}",
+            f"a state of the same scheme: step {own[0]:g} s, beta2 {own[1]:g}, path {machine.path}",
+        )
+    # Padded modes can have the same shape in different models.
+    if not np.allclose(restart.state.get("model", np.zeros(5)), _model_numbers(machine.system), rtol=1e-9, atol=0):
+        raise CaseError("restart", "model", "a state of the same model: this one has other freedoms or contacts")
+    if join and (restart.record_every != settings.record_every or restart.watch_names != settings.watch):
+        raise CaseError(
+            "restart",
+            f"a record every {restart.record_every} steps of {', '.join(restart.watch_names) or 'no points'}",
+            f"the same records as before (here every {settings.record_every} steps of "
+            f"{', '.join(settings.watch) or 'no points'}), or join=False",
+        )
+    pairs: list[tuple[Any, str, str]] = [(machine.fields, name, f"field_{name}") for name in STATE_FIELDS]
+    pairs += [(machine.state, name, f"state_{name}") for name in machine.state._fields]
+    for target, name, key in pairs:
+        array = getattr(target, name)
+        if key not in restart.state or restart.state[key].shape != array.shape:
+            raise CaseError("restart", key, "a state of the same model: this one has other freedoms or contacts")
+        array[:] = restart.state[key]
+    kept = {name: getattr(machine.state, name).copy() for name in ("predicted", "value", "rate")}
+    machine.repack()
+    for name, values in kept.items():
+        getattr(machine.state, name)[:] = values
+
+
+def joined(before: Trajectory, after: Trajectory) -> Trajectory:
+    """Records of a restarted run behind those of the run it went on from."""
+    together = {
+        name: np.concatenate([getattr(before, name), getattr(after, name)])
+        for name in (
+            "time",
+            "normal_force",
+            "tangential_force",
+            "slip_speed",
+            "gap",
+            "status",
+            "displacement",
+            "velocity",
+            "acceleration",
+            "kinetic",
+            "elastic",
+        )
+    }
+    works = {name: np.concatenate([before.works[name], after.works[name]]) for name in after.works}
+    # A phase that the interruption cut is counted on: the saved statistics went on in the second run.
+    finished = [p for p in before.phases if not any(q.name == p.name for q in after.phases)]
+    return replace(
+        after,
+        **together,
+        works=works,
+        phases=(*finished, *after.phases),
+        wall_seconds=before.wall_seconds + after.wall_seconds,
+    )
