@@ -153,7 +153,7 @@ def interrupted_run(folder: Path, words: list[str], seconds: float) -> tuple[int
 
 
 def test_interruption_keeps_what_was_computed_and_a_restart_ends_alike(folder: Path) -> None:
-    long = [*SETS, "--set", "phases.slide.duration=8.0", "--set", "temporal.record_every=200"]
+    long = [*SETS, "--set", "phases.slide.duration=40.0", "--set", "temporal.record_every=2000"]
     assert stridor("simulate", "two-beams.toml", "--quiet", "--out", "warm", *SETS, cwd=folder).returncode == 0
     path = folder / "two-beams.out" / "simulate.nc"
     # On a loaded machine Ctrl-C may come while the program is still loading: then there is nothing to keep.
@@ -167,7 +167,7 @@ def test_interruption_keeps_what_was_computed_and_a_restart_ends_alike(folder: P
     part = st.load_trajectory(path)
     assert part.interrupted
     assert 0 < part.steps < part.planned_steps
-    short = [w.replace("=8.0", f"={(part.steps + 20_000) * 4e-7 - 0.002:.7f}") for w in long]
+    short = [w.replace("=40.0", f"={(part.steps + 20_000) * 4e-7 - 0.002:.7f}") for w in long]
     done = stridor("simulate", "two-beams.toml", "--quiet", "--restart", str(path), "--out", "on", *short, cwd=folder)
     assert done.returncode == 0, done.stderr
     whole = stridor("simulate", "two-beams.toml", "--quiet", "--out", "whole", *short, cwd=folder)

@@ -10,7 +10,8 @@ import math
 
 from ..typing import Array
 
-MAX_PROJECTION_STEPS = 25
+# Gauss–Newton: quadratic on the line, a factor of (distance × curvature) per step away from it.
+MAX_PROJECTION_STEPS = 100
 
 
 def spline_weights(segment: int, xi: float, chords: Array, weights: Array, slopes: Array) -> None:
