@@ -140,6 +140,17 @@ class Agreement:
         }
 
 
+def linear_part(run: Trajectory, steady: Array, *, skip: int = 0) -> Array:
+    """Slip speed minus its steady value (m,) of the contact that moves most, while all of them stay below
+    2 % of it; ``skip`` records at the start, which may hold the spike of a sudden impulse, are left out."""
+    signals = run.slip_speed - steady
+    over = np.flatnonzero(np.any(np.abs(signals) > LINEAR * np.abs(steady), axis=1))
+    last = int(over[0]) if len(over) else len(signals)
+    first = min(last // 8, skip)
+    contact = int(np.argmax(np.abs(signals[first:last]).max(axis=0, initial=0.0)))
+    return signals[first:last, contact]
+
+
 @one_thread_if_small
 def perturb(
     system: System,
@@ -177,11 +188,7 @@ def perturb(
         mu=mu,
         disturbance=_band_limited(rigid, mu, PERTURBATION * speed, max_frequency_hz),
     )
-    signals = run.slip_speed - steady
-    over = np.flatnonzero(np.abs(signals).max(axis=1) > LINEAR * speed)
-    last = int(over[0]) if len(over) else len(signals)
-    contact = int(np.argmax(np.abs(signals[:last]).max(axis=0, initial=0.0)))
-    signal = signals[:last, contact]
+    signal = linear_part(run, steady)
     found = components(signal, run.sampling, max_frequency_hz=max_frequency_hz)
     return Perturbation(mu, found.fastest, signal, run.sampling, found)
 

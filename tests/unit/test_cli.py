@@ -245,7 +245,7 @@ def test_run_writes_a_self_contained_report(folder: Path) -> None:
         (
             ("simulate", "two-beams.toml", "--restart", "none.nc"),
             2,
-            "stridor: file: 'none.nc' – a results file written by stridor (netCDF-4/HDF5)",
+            "stridor: --restart: 'none.nc' – no such file",
         ),
         (
             ("onsets", "two-beams.toml", "--set", "loads.press.force=[0.0, 20.0]"),
@@ -281,3 +281,63 @@ def test_import_stays_light() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_growth_from_steady_sliding_is_that_of_the_fastest_mode(folder: Path) -> None:
+    sets = [
+        *("--set", "temporal.initial=steady-sliding", "--set", "temporal.perturbation=2e-7"),
+        *("--set", "phases=[{name='slide', duration=0.03}]", "--set", "contacts.A.stiffness=rigid"),
+        *("--set", "temporal.record_every=10"),
+    ]
+    data = document(stridor("simulate", "two-beams.toml", "--json", "--quiet", *sets, cwd=folder))
+    modes = document(stridor("modes", "two-beams.toml", "--json", "--quiet", *sets, cwd=folder))
+    fastest = max(m["growth_rate"] for m in modes["modes"][0] if m["frequency_hz"] < 40e3)
+    assert data["growth_rate"] == pytest.approx(fastest, rel=0.01)
+
+
+def test_weakening_friction_is_taken_at_its_slip_speed(folder: Path) -> None:
+    law = 'contacts.A.friction={law="weakening",coefficient=0.05,static_coefficient=0.15,decay_speed=0.02}'
+    data = document(stridor("modes", "two-beams.toml", "--json", "--quiet", "--set", law, cwd=folder))
+    assert data["mu"][0] == pytest.approx(0.05 + 0.1 * np.exp(-1.0), rel=1e-12)
+    found = document(
+        stridor("onsets", "two-beams.toml", "--json", "--quiet", "--range", "0:0.1", "--set", law, cwd=folder)
+    )
+    assert all(onset["residual"] < 1e-8 for onset in found["onsets"])
+
+
+def test_two_contacts_with_different_friction_still_give_a_report(folder: Path) -> None:
+    path = folder / "two-beams.toml"
+    text = path.read_text(encoding="utf-8")
+    beam = text[text.index("[bodies.beam1]") : text.index("[bodies.beam2]")]
+    second = beam.replace("beam1", "beam3").replace("[0.1, 0.0]", "[0.05, 0.0]")
+    more = (
+        '[supports.guide2]\nat = "beam3.top"\nfixed = ["x", "rotation"]\n'
+        '[loads.press2]\nat = "beam3.top"\nforce = [0.0, -20.0]\n'
+        '[contacts.B]\nslave = "beam3.tip"\nmaster = "beam2"\nstiffness = 1e10\nfriction = { law = "coulomb", coefficient = 0.2 }\n'
+    )
+    path.write_text(text.replace("[bodies.beam2]", second + more + "[bodies.beam2]"), encoding="utf-8")
+    sets = [*SETS, "--set", "bodies.beam3.elements=6", "--set", "comparison.critical=false"]
+    sets += ["--set", "modal.max_frequency_hz=10e3", "--set", "modal.sweep_points=11"]
+    done = stridor("run", "two-beams.toml", "--json", "--quiet", *sets, cwd=folder)
+    assert (folder / document(done)["report"]).exists()
+    alone = stridor("modes", "two-beams.toml", "--quiet", *sets, cwd=folder)
+    assert alone.returncode == 2
+    assert "the case gives them different ones" in alone.stderr
+
+
+@pytest.mark.bad_input
+def test_an_overlap_is_refused_by_simulate_and_told_by_check(folder: Path) -> None:
+    sets = ("--set", "bodies.beam1.start=[0.1,-0.0001]")
+    done = stridor("simulate", "two-beams.toml", *sets, cwd=folder)
+    assert done.returncode == 2
+    assert done.stderr.startswith("stridor: contacts.A: 'overlap 0.0001 m' – bodies that touch or are apart")
+    assert "overlap by 0.0001 m" in stridor("check", "two-beams.toml", "--json", *sets, cwd=folder).stdout
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("item", ["phases.slide.duration=1e9", "temporal.step=1e-30"])
+def test_what_no_memory_holds_is_refused_with_numbers(folder: Path, item: str) -> None:
+    done = stridor("simulate", "two-beams.toml", "--set", item, "--set", "temporal.record_every=1", cwd=folder)
+    assert done.returncode == 2
+    assert "GB of records" in done.stderr
+    assert done.stderr.count("\n") == 1

@@ -275,6 +275,8 @@ def simulate(
 
     loaded = _load(case, set_, quiet=quiet)
     path = _folder(case, out) / "simulate.nc"
+    if restart is not None and not restart.exists():
+        raise CaseError("--restart", str(restart), "no such file")
     before = None if restart is None else load_trajectory(restart)
     try:
         with progress_bar("simulate", quiet=quiet) as progress:
@@ -389,6 +391,9 @@ def _guarded(call: Callable[[], Any]) -> int:
         return 130
     except BrokenPipeError:
         return 0
+    except (OverflowError, MemoryError) as error:
+        print(f"stridor: a number of the case is out of range for this computation ({error})", file=sys.stderr)
+        return 1
     return 0
 
 

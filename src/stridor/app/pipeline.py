@@ -51,12 +51,13 @@ class Outcome:
     def to_json(self) -> dict[str, Any]:
         """The documents of all verbs under their names, and where the report is."""
         e = self.everything
+        mu = analyses.own_friction(e.case)
         return {
             "verdict": self.verdict,
             "report": str(self.report),
             "files": [str(f) for f in self.files],
             "check": e.description.to_json(),
-            "modes": analyses.modes(e.case).to_json(),
+            "modes": e.sweep_damped.to_json() if mu is None else analyses.modes(e.case, mu).to_json(),
             "onsets": e.onsets_damped.to_json(),
             "simulate": e.summary.to_json(),
             "compare": None if e.agreement is None else e.agreement.to_json(),
@@ -89,8 +90,7 @@ def run(
 
 def report_inputs(e: Everything) -> ReportInputs:
     """Everything, sorted into what the report takes."""
-    own = {c.friction.coefficient for c in e.case.contacts.values()}
-    mu = own.pop() if len(own) == 1 else None
+    mu = analyses.own_friction(e.case)
     agreement = e.agreement
     steady = steady_sliding(e.system) if e.system.contacts and e.system.loads else None
     shapes = _shapes(e)

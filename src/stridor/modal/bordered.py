@@ -153,9 +153,12 @@ class Bordered:
         κ² = ∓2 f_μ/f_λλ; ``real`` keeps λ on the axis and μ real.
         """
         lam, mu = complex(lam), complex(mu)
-        start = lam
+        start, start_mu = lam, mu
         last = np.inf
         for _ in range(NEWTON_STEPS):
+            # Far from where it began Newton has lost its way, and friction there may have no equilibrium.
+            if abs(mu - start_mu) > 0.5 * max(abs(start_mu), 0.1):
+                return None
             f, f_l, f_m, f_ll, f_lm = self.derivatives(lam, mu)
             try:
                 change = np.linalg.solve(np.array([[f_l, f_m], [f_ll, f_lm]]), [-f, -f_l])

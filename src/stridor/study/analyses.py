@@ -9,24 +9,29 @@ from typing import Any
 
 import numpy as np
 
-from ..agreement import Agreement, dominant_response
+from ..agreement import Agreement, dominant_response, linear_part
 from ..agreement import compare as compare_system
 from ..case import Case
-from ..errors import CaseError
+from ..errors import CaseError, Problem
 from ..modal.complex_modes import ComplexModes, complex_modes
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
-from ..sliding import steady_sliding
-from ..system import build_system
+from ..sliding import full_motion, slip_speeds, steady_sliding
+from ..system import System, build_system
 from ..system.uncoupled import uncoupled_modes
+from ..temporal.beta2 import step_limit
 from ..temporal.energy import EnergyBalance, energy_balance
 from ..temporal.schedule import PhaseSpec
-from ..temporal.signals import Growth
-from ..temporal.simulate import Checkpoint, Progress, Settings
+from ..temporal.settings import SAFE_FRACTION, Settings
+from ..temporal.signals import Growth, components
+from ..temporal.simulate import Checkpoint, Progress
 from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
 from .provenance import provenance
+
+EXPONENTIAL = 0.5  # rms of ln amplitude about the fitted line, above which nothing is called exponential
+MOST_BYTES = 8e9  # of records kept in memory
 
 
 def phases_of(case: Case) -> list[PhaseSpec]:
@@ -70,19 +75,27 @@ def modes(
     return replace(result, provenance=provenance(case, "modes", seconds, damped=damped))
 
 
-def _own_friction(case: Case) -> float:
-    """The friction coefficient that all contacts share; raises CaseError where they do not."""
-    found = {c.friction.coefficient for c in case.contacts.values()}
-    if not found:
+def own_friction(case: Case) -> float | None:
+    """The coefficient of all contacts at their slip speeds in steady sliding; None where they differ."""
+    system = build_system(case)
+    speeds = np.abs(slip_speeds(system, full_motion(system)))
+    found = system.friction_coefficients(speeds)
+    if not len(found):
         return 0.0
-    if len(found) > 1:
+    return float(found[0]) if np.ptp(found) <= 1e-12 * np.max(np.abs(found)) else None
+
+
+def _own_friction(case: Case) -> float:
+    """The same; raises CaseError where contacts differ."""
+    found = own_friction(case)
+    if found is None:
         raise CaseError(
             "mu",
-            sorted(found),
+            None,
             "one friction coefficient for all contacts, since the case gives them different ones: name it "
             "(--mu 0.3), it scales every contact's law",
         )
-    return found.pop()
+    return found
 
 
 def onsets(
@@ -115,6 +128,7 @@ def simulate(
     """The temporal approach through the phases of the case; mu scales every contact's friction law."""
     started = time.perf_counter()
     system = build_system(case)
+    _check_extent(case, system)
     result = march(
         system,
         phases_of(case),
@@ -125,6 +139,34 @@ def simulate(
         restart=restart,
     )
     return replace(result, provenance=provenance(case, "simulate", time.perf_counter() - started, mu=mu))
+
+
+def _check_extent(case: Case, system: System) -> None:
+    """Refuse runs that start inside one another or that no memory holds."""
+    problems = [
+        Problem(
+            f"contacts.{c.name}",
+            f"overlap {-c.gap:g} m",
+            "bodies that touch or are apart at the start; an overlap would be thrown open in one step: move a body",
+        )
+        for c in system.contacts
+        if c.gap < -1e-9 and case.temporal.initial == "rest"
+    ]
+    step = case.temporal.step or SAFE_FRACTION * step_limit(system, case.temporal.beta2).step
+    steps = sum(p.duration for p in case.phases) / step
+    size = 8.0 * (6 * len(system.contacts) + 6 * len(case.temporal.watch) + 8)
+    needed = steps / case.temporal.record_every * size
+    if steps > 1e12 or needed > MOST_BYTES:
+        problems.append(
+            Problem(
+                "temporal",
+                f"{steps:.3g} steps, records of {needed / 1e9:.3g} GB",
+                f"at most 1e12 steps and {MOST_BYTES / 1e9:g} GB of records: shorten the phases, take a larger "
+                "step or record less often",
+            )
+        )
+    if problems:
+        raise CaseError.many(problems)
 
 
 def compare(
@@ -164,6 +206,17 @@ class RunSummary:
     growth: Growth | None
     energy: EnergyBalance
     trajectory: Trajectory
+    linear: complex | None = None
+
+    @property
+    def growth_rate(self) -> float | None:
+        """Growth [1/s]: of the fastest component of a small perturbation, where the run starts from steady
+        sliding; else of the dominant line where it grows exponentially, None where it does not."""
+        if self.linear is not None:
+            return self.linear.real
+        if self.growth is None or self.growth.spread > EXPONENTIAL:
+            return None
+        return self.growth.rate
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -171,7 +224,10 @@ class RunSummary:
         last = run.phases[-1] if run.phases else None
         return {
             "dominant_frequency_hz": self.dominant_frequency_hz,
-            "growth_rate": None if self.growth is None else self.growth.rate,
+            "growth_rate": self.growth_rate,
+            "growth_fit": None
+            if self.growth is None
+            else {"start": self.growth.start, "end": self.growth.end, "spread": self.growth.spread},
             "saturated": None if self.growth is None else self.growth.saturated,
             "contacts": {} if last is None else {name: vars(c).copy() for name, c in last.contacts.items()},
             "first_regime": first_regime(run),
@@ -234,7 +290,14 @@ def first_regime(run: Trajectory) -> dict[str, dict[str, float | None]]:
 def summarise(case: Case, run: Trajectory) -> RunSummary:
     """Dominant frequency, growth, energy balance of a run."""
     dominant, fitted = dominant_response(run, case.modal.max_frequency_hz)
-    return RunSummary(dominant, fitted, energy_balance(run), run)
+    linear: complex | None = None
+    perturbed = case.temporal.initial == "steady-sliding" and case.temporal.perturbation > 0
+    if perturbed and run.contact_names and case.contacts:
+        system = build_system(case)
+        found = linear_part(run, slip_speeds(system, full_motion(system)), skip=16)
+        band = components(found, run.sampling, max_frequency_hz=case.modal.max_frequency_hz)
+        linear = band.fastest or None
+    return RunSummary(dominant, fitted, energy_balance(run), run, linear)
 
 
 @dataclass(frozen=True)
@@ -317,8 +380,7 @@ class Description:
 
 def describe(case: Case) -> Description:
     """Build the model, find its steady sliding and its step limit, and say it in words."""
-    from ..temporal.beta2 import step_limit
-    from ..temporal.simulate import choose_path, choose_step
+    from ..temporal.settings import choose_path, choose_step
 
     system = build_system(case)
     settings = settings_of(case)
@@ -373,4 +435,14 @@ def describe(case: Case) -> Description:
         f"(set by {limit.body}); {data['steps']} steps"
     )
     lines.append(f"time loop: {path} path ({reason})")
-    return Description(tuple(lines), data, tuple(case.warnings))
+    warnings = list(case.warnings)
+    for contact in system.contacts:
+        if contact.gap < -1e-9:
+            warnings.append(f"contact {contact.name}: the bodies overlap by {-contact.gap:g} m; simulate refuses that")
+        elif contact.gap > 1e-9:
+            lines.append(f"contact {contact.name} is open by {contact.gap:g} m at the start")
+    if system.contacts and not any(np.any(v) for v in system.loads.values()):
+        warnings.append(
+            "no load presses the bodies together: modes take the contacts as closed, a run would not keep them so"
+        )
+    return Description(tuple(lines), data, tuple(warnings))

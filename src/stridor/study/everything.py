@@ -164,8 +164,8 @@ def _curve(case: Case) -> tuple[Array, Array] | None:
 
 
 def _compare(case: Case, run: Trajectory, log: Log) -> Agreement:
-    own = {c.friction.coefficient for c in case.contacts.values()}
-    runs = {own.pop(): run} if len(own) == 1 else {}
+    own = analyses.own_friction(case)
+    runs = {} if own is None else {own: run}
     return analyses.compare(case, runs=runs, progress=log)
 
 
@@ -174,7 +174,8 @@ def _shapes(
 ) -> tuple[Mapping[str, ComplexArray] | None, Mapping[str, ComplexArray] | None, complex | None]:
     """Velocity shape of the run at its dominant frequency, and the mode to hold it against."""
     frequency = summary.dominant_frequency_hz
-    if frequency is None or frequency <= 0:
+    if frequency is None or frequency <= 0 or analyses.own_friction(case) is None:
+        # With different coefficients no single μ gives the modes of the run.
         return None, None, None
     operating = operating_shape(system, analyses.phases_of(case), analyses.settings_of(case), run, frequency)
     modes = analyses.modes(case, max_frequency_hz=case.modal.max_frequency_hz, vectors=True)
