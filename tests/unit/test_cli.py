@@ -140,11 +140,22 @@ def test_simulate_and_compare_json(folder: Path) -> None:
     assert data["frequency_error"] < 0.01
 
 
+def _heed_interrupts() -> None:
+    """A shell that starts the tests in the background has interrupts ignored, and children inherit that."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def interrupted_run(folder: Path, words: list[str], seconds: float) -> tuple[int, str]:
     """Start a long run, press Ctrl-C after some seconds; exit code and log."""
     command = [sys.executable, "-m", "stridor.app.cli", "simulate", "two-beams.toml", *words]
     with subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
+        command,
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=_heed_interrupts,
     ) as process:
         time.sleep(seconds)
         os.kill(process.pid, signal.SIGINT)

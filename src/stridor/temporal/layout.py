@@ -12,10 +12,6 @@ FAST = {"reassoc", "contract", "nsz", "arcp"}
 # At the contacts the order of additions stays as written; divisions by constants may become products.
 CAREFUL = {"contract", "nsz", "arcp"}
 
-# A force [N] that keeps strongly damped modes, once nothing drives them, from decaying into denormal numbers,
-# which processors handle a hundred times slower. It moves nothing by more than 1e-130 m.
-FAINT = 1e-140
-
 # Energies of a record [J]: kinetic and elastic at t_{n−1/2}, then the works up to there.
 ENERGY_RECORD = 7
 

@@ -14,7 +14,7 @@ from ..system.uncoupled import UncoupledModes
 from ..typing import Array, IntArray
 from .beta2 import Scheme
 from .kernel import run_modal, run_nodal
-from .layout import FAINT, Fields, ModalRows, NodalRows, Record
+from .layout import Fields, ModalRows, NodalRows, Record
 from .operators import (
     FINITE,
     POINTS_PER_FINITE_CONTACT,
@@ -135,7 +135,7 @@ class Machine:
         fields = self.fields
         fields.coefficients[:] = coefficients
         auxiliary = self.table_values[-1 - self.table.auxiliary : -1]
-        push = auxiliary.T @ coefficients + FAINT
+        push = auxiliary.T @ coefficients
         if self.modal is not None:
             fields.constant[:] = self.modal.drive * push
             fields.d[:] = self.modal.forward * fields.q - self.modal.restore * fields.u + fields.constant

@@ -9,7 +9,7 @@ from numba import njit
 
 from ..typing import Array, IntArray
 from .beta2 import Scheme
-from .layout import FAINT, FAST, Fields, ModalRows
+from .layout import FAST, Fields, ModalRows
 from .operators import ModalArrays
 
 _unsigned: Any = np.uint64
@@ -141,4 +141,4 @@ def modal_constant(modal: ModalArrays, rows: ModalRows, fields: Fields, loads_at
         total = 0.0
         for j in range(coefficients.shape[0]):
             total += coefficients[j] * values[loads_at + j, i]
-        constant[i] = drive[i] * (total + FAINT)
+        constant[i] = drive[i] * total

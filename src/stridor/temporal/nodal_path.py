@@ -6,7 +6,7 @@ from numba import njit
 
 from ..typing import Array, IntArray
 from .beta2 import Scheme
-from .layout import FAINT, FAST, Fields, NodalRows
+from .layout import FAST, Fields, NodalRows
 from .operators import NodalArrays
 
 
@@ -109,4 +109,4 @@ def nodal_constant(nodal: NodalArrays, rows: NodalRows, fields: Fields) -> None:
         total = 0.0
         for j in range(coefficients.shape[0]):
             total += coefficients[j] * auxiliary[j, i]
-        constant[i] = nodal.load_gain * (total + FAINT)
+        constant[i] = nodal.load_gain * total
