@@ -66,6 +66,15 @@ def test_new_lists_templates(tmp_path: Path) -> None:
     )
 
 
+def test_new_takes_overrides(tmp_path: Path) -> None:
+    words = ("new", "two-beams", "--quiet", "--set", "contacts.A.friction.coefficient=0.3")
+    assert stridor(*words, cwd=tmp_path).returncode == 0
+    assert st.load(tmp_path / "two-beams.toml").contacts["A"].friction.coefficient == 0.3
+    wrong = stridor("new", "two-beams", "--force", "--set", "contacts.A.friction.coefficient=-1", cwd=tmp_path)
+    assert wrong.returncode == 2
+    assert st.load(tmp_path / "two-beams.toml").contacts["A"].friction.coefficient == 0.3
+
+
 def test_check_says_the_model_in_words(folder: Path) -> None:
     done = stridor("check", "two-beams.toml", cwd=folder)
     assert done.returncode == 0

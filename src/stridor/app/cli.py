@@ -99,15 +99,19 @@ def new(
         Path | None, typer.Option("--out", metavar="DIR", help="Folder to write into [default: here].")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    set_: Set = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Write a commented case file, ready to edit."""
-    from ..case import template_text
+    from ..case import loads, template_text
     from ..io.atomic import write_text
     from .output import print_json, say
 
     text = template_text(template)
+    if set_:
+        # Changed values cannot keep the comments that speak of the old ones.
+        text = loads(text, set_, source=template).text
     path = (out or Path()) / f"{template}.toml"
     if path.exists() and not force:
         raise CaseError("TEMPLATE", str(path), "a file that does not exist yet; remove it or add --force")
