@@ -5,7 +5,7 @@ Nothing after it asks whether the freedoms came from beams, solids or another pr
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,9 +13,14 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ..contact.interface import Contact, Rows
+from ..contact.nodes import ContactNodes, stack
+from ..contact.surfaces import SurfaceContact
 from ..errors import AnalysisError
 from ..fe.assembly import connected_components
 from ..typing import Array, IntArray, Sparse
+
+
+COMPLETE_BASIS_LIMIT = 2500
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,27 @@ class Line:
     coordinates: Array
     rows: Rows
     freedoms: IntArray
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A meshed body as drawings and files need it: points (k, d) [m], cells by kind (meshio's names and order),
+    rows (k d, n) of its nodes' displacements, its free freedoms (n_body,)."""
+
+    name: str
+    points: Array
+    cells: Mapping[str, IntArray]
+    rows: Rows
+    freedoms: IntArray
+
+
+@dataclass(frozen=True)
+class CubicSprings:
+    """Springs whose force is coefficient · (elongation)³ beside what the stiffness matrix holds: rows (q, n) of their
+    elongations [m] with their lift, coefficient (q,) [N/m³]."""
+
+    rows: Rows
+    coefficient: Array
 
 
 @dataclass(frozen=True)
@@ -63,6 +89,10 @@ class System:
     contacts: the sliding pairs. loads: name → force vector (n,) at factor one. motion: moving
     supports. points: name → rows (2 or 3, n) of the named points that can be watched. lines: bodies
     as drawn. dof_names (n,) say in words what a freedom is.
+
+    surfaces: contacts with many slave nodes; dimension 2 or 3; solids: meshed bodies as drawn; cubic: springs beyond
+    the linear; initial_velocity (n,) [m/s] of bodies that start in motion; stress_stiffness gives the geometric
+    stiffness (n, n) csr that the stresses of a displacement (n,) [m] make, None where no body has any.
     """
 
     mass: Sparse
@@ -74,6 +104,12 @@ class System:
     points: Mapping[str, Rows] = field(default_factory=dict)
     lines: tuple[Line, ...] = ()
     dof_names: tuple[str, ...] = ()
+    surfaces: tuple[SurfaceContact, ...] = ()
+    dimension: int = 2
+    solids: tuple[Solid, ...] = ()
+    cubic: CubicSprings | None = None
+    initial_velocity: Array | None = None
+    stress_stiffness: Callable[[Array], Sparse] | None = None
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness"):
@@ -91,6 +127,17 @@ class System:
         """Freedoms that the structure (contacts aside) leaves uncoupled from the others."""
         return connected_components(self.mass, self.damping, self.stiffness)
 
+    @property
+    def assembled(self) -> bool:
+        """Whether it is computed with on the assembled sparse matrices: contact over surfaces, forces beyond the
+        linear, or too many freedoms for the complete basis that point contacts use."""
+        return bool(self.surfaces) or self.cubic is not None or self.size > COMPLETE_BASIS_LIMIT
+
+    def contact_nodes(self) -> ContactNodes:
+        """Every contact, point or surface, as one list of slave nodes: points first, then surfaces in order."""
+        parts = [_point_nodes(c) for c in self.contacts] + [s.nodes for s in self.surfaces]
+        return stack(parts, self.size, len(self.motion.names), self.dimension)
+
     def contact_rows(self) -> Array:
         """G (2m, n): normal and tangential relative displacement of contact 0, of contact 1, …"""
         rows = [row for c in self.contacts for row in (c.normal_row, c.tangent_row)]
@@ -104,6 +151,25 @@ class System:
         """The same system with every contact's law scaled so that it gives ``mu`` at ``speeds`` (m,)."""
         contacts = tuple(replace(c, law=c.law.scaled(mu, float(v))) for c, v in zip(self.contacts, speeds, strict=True))
         return replace(self, contacts=contacts)
+
+
+def _point_nodes(contact: Contact) -> ContactNodes:
+    """A point contact as a list of one node."""
+    return ContactNodes(
+        names=(contact.name,),
+        owner=np.zeros(1, dtype=np.int64),
+        laws=(contact.law,),
+        normal=sp.csr_array(contact.normal_row[None, :]),
+        tangent=sp.csr_array(contact.tangent_row[None, :]),
+        normal_lift=np.atleast_2d(contact.normal_lift),
+        tangent_lift=np.atleast_2d(contact.tangent_lift),
+        gap=np.array([contact.gap]),
+        area=np.array([np.nan]),
+        compliance=np.array([contact.compliance]),
+        position=contact.slave_position[None, :],
+        normals=contact.normal[None, :],
+        tangents=contact.tangent[None, None, :],
+    )
 
 
 @dataclass(frozen=True)

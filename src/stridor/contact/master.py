@@ -1,0 +1,50 @@
+"""What every master surface answers: where slave points are on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..typing import Array, BoolArray, IntArray
+
+
+@dataclass(frozen=True)
+class Location:
+    """Slave points (m,) on a master surface of k nodes.
+
+    nodes (m, r) and weights (m, r): the master point is Σ weights · node positions (r = 0 for an obstacle; unused
+    places hold node 0 with weight 0). point (m, d) [m], normal (m, d) unit, out of the master. gap (m,) [m] =
+    normal · (slave − point), positive when open. facet (m,): where to begin the next search. inside (m,): False where
+    the point has left the surface over its edge (the nearest point of the edge is then given).
+    """
+
+    nodes: IntArray
+    weights: Array
+    point: Array
+    normal: Array
+    gap: Array
+    facet: IntArray
+    inside: BoolArray
+
+
+class MasterSurface(Protocol):
+    """A surface that slave nodes slide on; its k nodes are numbered as its rows of displacements are."""
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes k, 0 for an obstacle."""
+        ...
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        ...
+
+    def locate(
+        self, slaves: Array, displacement: Array | None = None, *, guess: IntArray | None = None
+    ) -> Location:
+        """Places of slave positions (m, d) [m] on the surface displaced by (k, d) [m] (None: undisplaced).
+
+        guess (m,): facets of an earlier Location to begin with.
+        """
+        ...

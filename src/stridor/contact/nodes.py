@@ -1,0 +1,138 @@
+"""Many slave nodes in contact as sparse operators: what both approaches need of them.
+
+Signs are those of `interface`: the normal points from the master to the slave, gaps are positive when open, normal
+forces positive in compression, slip is the motion of the slave relative to the master.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..laws.friction import FrictionLaw
+from ..typing import Array, BoolArray, IntArray, Sparse
+
+
+@dataclass(frozen=True)
+class ContactNodes:
+    """m nodes in contact, d = 2 or 3, on n freedoms and p prescribed motions.
+
+    names: the contacts, owner (m,) which of them a node belongs to, laws one friction law for each contact.
+    normal (m, n) csr and tangent ((d−1) m, n) csr give the relative displacement slave − master along the normal and
+    the d − 1 tangents; rows i (d−1) + k of tangent belong to node i. normal_lift (m, p) and tangent_lift ((d−1) m, p)
+    do so for the prescribed motions. gap (m,) [m] in the reference configuration. area (m,) [m²] is the part of the
+    slave surface a node stands for, NaN for a point contact. compliance (m,) [m/N] is one over contact stiffness
+    (stiffness per area times area), 0 for rigid contact. position (m, d) [m], normals (m, d), tangents (m, d−1, d).
+    """
+
+    names: tuple[str, ...]
+    owner: IntArray
+    laws: tuple[FrictionLaw, ...]
+    normal: Sparse
+    tangent: Sparse
+    normal_lift: Array
+    tangent_lift: Array
+    gap: Array
+    area: Array
+    compliance: Array
+    position: Array
+    normals: Array
+    tangents: Array
+
+    @property
+    def count(self) -> int:
+        """Number of nodes m."""
+        return len(self.gap)
+
+    @property
+    def directions(self) -> int:
+        """Tangential directions per node, d − 1."""
+        return int(self.tangents.shape[1]) if self.tangents.ndim == 3 else 1
+
+    def slip_velocity(self, motion_factors: Array) -> Array:
+        """Slip velocity (m, d−1) [m/s] along the tangents where the structure is at rest in the moving frame."""
+        return (self.tangent_lift @ motion_factors).reshape(self.count, self.directions)
+
+    def friction_coefficients(self, speeds: Array) -> Array:
+        """μ (m,) at slip speeds (m,) [m/s], each by the law of its contact."""
+        found = np.zeros(self.count)
+        for k, law in enumerate(self.laws):
+            mine = np.flatnonzero(self.owner == k)
+            constant = law.slope(0.0) == 0.0 and law.slope(1.0) == 0.0
+            found[mine] = law.sliding(1.0) if constant else [law.sliding(float(v)) for v in speeds[mine]]
+        return found
+
+    def friction_slopes(self, speeds: Array) -> Array:
+        """dμ/d|v| (m,) [s/m] at slip speeds (m,) [m/s]."""
+        return np.array([self.laws[k].slope(float(v)) for k, v in zip(self.owner, speeds, strict=True)])
+
+    def along(self, direction: Array) -> Sparse:
+        """Rows (m, n) csr of the relative tangential displacement along one direction (m, d−1) per node."""
+        count, d = self.count, self.directions
+        rows = np.repeat(np.arange(count), d)
+        pick = sp.csr_array((direction.ravel(), (rows, np.arange(count * d))), shape=(count, count * d))
+        return sp.csr_array(pick @ self.tangent)
+
+    def select(self, chosen: BoolArray | IntArray) -> ContactNodes:
+        """The same contacts with only some of their nodes."""
+        index = np.flatnonzero(chosen) if np.asarray(chosen).dtype == bool else np.asarray(chosen)
+        d = self.directions
+        rows = (index[:, None] * d + np.arange(d)).ravel()
+        return replace(
+            self,
+            owner=self.owner[index],
+            normal=self.normal[index],
+            tangent=self.tangent[rows],
+            normal_lift=self.normal_lift[index],
+            tangent_lift=self.tangent_lift[rows],
+            gap=self.gap[index],
+            area=self.area[index],
+            compliance=self.compliance[index],
+            position=self.position[index],
+            normals=self.normals[index],
+            tangents=self.tangents[index],
+        )
+
+
+def stack(parts: Sequence[ContactNodes], freedoms: int, motions: int, dimension: int) -> ContactNodes:
+    """Several contacts as one list of nodes; an empty list is one without nodes."""
+    d = dimension - 1
+    if not parts:
+        return ContactNodes(
+            names=(),
+            owner=np.zeros(0, dtype=np.int64),
+            laws=(),
+            normal=sp.csr_array((0, freedoms)),
+            tangent=sp.csr_array((0, freedoms)),
+            normal_lift=np.zeros((0, motions)),
+            tangent_lift=np.zeros((0, motions)),
+            gap=np.zeros(0),
+            area=np.zeros(0),
+            compliance=np.zeros(0),
+            position=np.zeros((0, dimension)),
+            normals=np.zeros((0, dimension)),
+            tangents=np.zeros((0, d, dimension)),
+        )
+    starts = np.cumsum([0, *(len(p.names) for p in parts)])
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(p, name) for p in parts])
+
+    return ContactNodes(
+        names=tuple(name for p in parts for name in p.names),
+        owner=np.concatenate([p.owner + start for p, start in zip(parts, starts[:-1], strict=True)]),
+        laws=tuple(law for p in parts for law in p.laws),
+        normal=sp.csr_array(sp.vstack([p.normal for p in parts])),
+        tangent=sp.csr_array(sp.vstack([p.tangent for p in parts])),
+        normal_lift=joined("normal_lift"),
+        tangent_lift=joined("tangent_lift"),
+        gap=joined("gap"),
+        area=joined("area"),
+        compliance=joined("compliance"),
+        position=joined("position"),
+        normals=joined("normals"),
+        tangents=joined("tangents"),
+    )

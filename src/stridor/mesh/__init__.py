@@ -1,0 +1,1 @@
+"""Meshes of solid bodies: built-in shapes, files, and what a mesh must be to be computed with."""
