@@ -1,0 +1,35 @@
+"""Histories of every slave node of the surface contacts: what stick–slip–separation waves are seen in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..typing import Array, IntArray
+
+
+@dataclass(frozen=True)
+class NodeHistory:
+    """m slave nodes of contacts `names`, r records, d dimensions.
+
+    time (r,) [s]; owner (m,) index into names; position (m, d) [m] in the reference configuration; area (m,) [m²],
+    NaN for point contacts. normal_force (r, m) [N] in compression; tangential_force (r, m, d−1) [N] on the slave and
+    slip_velocity (r, m, d−1) [m/s] of the slave relative to the master along the node's tangents (m, d−1, d);
+    gap (r, m) [m]; status (r, m) 0 separation, 1 stick, 2 slip.
+    """
+
+    names: tuple[str, ...]
+    owner: IntArray
+    position: Array
+    area: Array
+    tangents: Array
+    time: Array
+    normal_force: Array
+    tangential_force: Array
+    slip_velocity: Array
+    gap: Array
+    status: IntArray
+
+    @property
+    def pressure(self) -> Array:
+        """Normal force per area (r, m) [Pa]; NaN for point contacts."""
+        return self.normal_force / self.area
