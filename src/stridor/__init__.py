@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         modes,
         onsets,
         simulate,
+        steady_sliding,
         summarise,
     )
     from .system import System, build_system
@@ -54,6 +55,7 @@ _HOMES = {
     "run": ".app.pipeline",
     "save": ".io.datasets",
     "simulate": ".study.analyses",
+    "steady_sliding": ".study.analyses",
     "summarise": ".study.analyses",
     "to_dataset": ".io.datasets",
 }
@@ -80,6 +82,7 @@ __all__ = [
     "run",
     "save",
     "simulate",
+    "steady_sliding",
     "summarise",
     "to_dataset",
 ]

@@ -151,12 +151,12 @@ FILES = {
     "body type": (
         'type = "beam"\nmaterial = "steel"\nstart = [0.1',
         'type = "baem"\nmaterial = "steel"\nstart = [0.1',
-        "bodies.pin.type: 'baem' – must be \"beam\", the type of the body; did you mean 'beam'?",
+        "bodies.pin.type: 'baem' – must be \"beam\", \"solid\", \"mass\" or \"obstacle\", the type of the body; did you mean 'beam'?",
     ),
     "no body type": (
         'type = "beam"\nmaterial = "steel"\nstart = [0.1',
         'material = "steel"\nstart = [0.1',
-        'bodies.pin.type: missing – give "beam", the type of the body',
+        'bodies.pin.type: missing – give "beam", "solid", "mass" or "obstacle", the type of the body',
     ),
     "mass matrix": (
         "elements = 90",
@@ -181,12 +181,12 @@ FILES = {
     "fixed empty": (
         'fixed = ["x", "rotation"]',
         "fixed = []",
-        'supports.guide.fixed: [] – must be a list of "x", "y" and "rotation", at least one: the directions held',
+        'supports.guide.fixed: [] – must be a list of "x", "y", "z" and "rotation", at least one: the directions held',
     ),
     "fixed direction": (
         'fixed = ["x", "rotation"]',
         'fixed = ["x", "z"]',
-        'supports.guide.fixed: [\'x\', \'z\'] – must be a list of "x", "y" and "rotation", at least one: the directions held',
+        'supports.guide.fixed: \'z\' – pin moves along x, y, rotation only',
     ),
     "fixed twice": (
         'fixed = ["x", "rotation"]',
@@ -196,27 +196,27 @@ FILES = {
     "velocity key": (
         "velocity = { x = 0.02 }",
         "velocity = { z = 0.02 }",
-        "supports.clamp.velocity.z: unknown key; accepted: x, y, rotation",
+        "supports.clamp.velocity.z: 0.02 – a velocity needs 'z' in fixed, which has: x, y, rotation",
     ),
     "stiffness word": (
         "stiffness = 1e10",
         'stiffness = "rigit"',
-        "contacts.A.stiffness: 'rigit' – must be a number > 0 [N/m] or \"rigid\", the normal stiffness; did you mean 'rigid'?",
+        "contacts.A.stiffness: 'rigit' – must be a number > 0 [N/m], between boundaries per area [N/m³], or \"rigid\", the normal stiffness; did you mean 'rigid'?",
     ),
     "stiffness number in quotes": (
         "stiffness = 1e10",
         'stiffness = "1e10"',
-        "contacts.A.stiffness: '1e10' – must be a number > 0 [N/m] or \"rigid\", the normal stiffness; write it without quotes",
+        "contacts.A.stiffness: '1e10' – must be a number > 0 [N/m], between boundaries per area [N/m³], or \"rigid\", the normal stiffness; write it without quotes",
     ),
     "stiffness zero": (
         "stiffness = 1e10",
         "stiffness = 0",
-        'contacts.A.stiffness: 0 – must be a number > 0 [N/m] or "rigid", the normal stiffness',
+        'contacts.A.stiffness: 0 – must be a number > 0 [N/m], between boundaries per area [N/m³], or "rigid", the normal stiffness',
     ),
     "side": (
         'master = "disc"',
         'master = "disc"\nside = "top"',
-        'contacts.A.side: \'top\' – must be "left" or "right", the side of the master\'s direction on which the slave lies',
+        'contacts.A.side: \'top\' – must be "left" or "right", the side of a beam\'s direction on which the slave lies',
     ),
     "sliding": (
         'master = "disc"',
@@ -328,17 +328,17 @@ FILES = {
     "misspelt": (
         "friction = {",
         "frictoin = {",
-        "contacts.A.frictoin: unknown key; did you mean 'friction'? accepted: slave, master, stiffness, sliding, side, friction",
+        "contacts.A.frictoin: unknown key; did you mean 'friction'? accepted: slave, master, stiffness, sliding, side, adjust, friction",
     ),
     "unknown section": (
         "[materials.steel]",
         "[mesh]\nsize = 1\n[materials.steel]",
-        "mesh: unknown key; accepted: title, materials, bodies, supports, loads, contacts, phases, modal, temporal, comparison, reference",
+        "mesh: unknown key; accepted: title, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, modal, temporal, comparison, reference",
     ),
     "misspelt section": (
         "[contacts.A]",
         "[contact.A]",
-        "contact: unknown key; did you mean 'contacts'? accepted: title, materials, bodies, supports, loads, contacts, phases, modal, temporal, comparison, reference",
+        "contact: unknown key; did you mean 'contacts'? accepted: title, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, modal, temporal, comparison, reference",
     ),
     "missing": (
         "width = 0.01\n",
@@ -348,7 +348,7 @@ FILES = {
     "missing slave": (
         'slave = "pin.tip"\n',
         "",
-        'contacts.A.slave: missing – give a point, "body.point" or "body@distance"',
+        'contacts.A.slave: missing – give a point, "body.point" or "body@distance", or a boundary, "body.boundary"',
     ),
     "bad name": (
         "[loads.press]",
@@ -561,12 +561,12 @@ FILES = {
     "misspelt section of names": (
         "[materials.steel]",
         "[material.steel]",
-        "material: unknown key; did you mean 'materials'? accepted: title, materials, bodies, supports, loads, contacts, phases, modal, temporal, comparison, reference",
+        "material: unknown key; did you mean 'materials'? accepted: title, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, modal, temporal, comparison, reference",
     ),
     "table entry that is a number": (
         "[loads.press]",
         "[loads]\npull = 3\n[loads.press]",
-        "loads.pull: 3 – must be a table with the keys at, force, moment",
+        "loads.pull: 3 – must be a table with the keys at, force, moment, pressure",
     ),
     "title": ("[materials.steel]", "title = 3\n[materials.steel]", "title: 3 – must be a text"),
     "point name": (
@@ -587,7 +587,7 @@ FILES = {
     "velocity that is not finite": (
         "velocity = { x = 0.02 }",
         "velocity = { x = inf }",
-        "supports.clamp.velocity.x: inf – must be a number, x and y [m/s], rotation [rad/s]; it must be finite",
+        "supports.clamp.velocity.x: inf – must be a number, x, y, z [m/s], rotation [rad/s]; it must be finite",
     ),
     "point distance text": (
         "points = { tip = 0.0, top = 0.05 }",
@@ -607,7 +607,7 @@ OVERRIDES = {
     "phases.2.duration=1": "phases.2: no such item; the list has: 0 (press), 1 (slide)",
     "phases.slid.duration=1": "phases.slid: no such item; the list has: 0 (press), 1 (slide)",
     "bodies.pin.length.x=1": "bodies.pin.length.x: bodies.pin.length is 0.05, not a table",
-    "contcts.A.stiffness=1": "contcts: unknown key; did you mean 'contacts'? accepted: title, materials, bodies, supports, loads, contacts, phases, modal, temporal, comparison, reference",
+    "contcts.A.stiffness=1": "contcts: unknown key; did you mean 'contacts'? accepted: title, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, modal, temporal, comparison, reference",
     "contacts.A.friction.coefficient=.3": "contacts.A.friction.coefficient: '.3' – not a value; accepted: a number such as 0.3, true, false, a word, \"a text\", [a, list], { a = table }",
     "contacts.A.friction.coefficient=0,3": "contacts.A.friction.coefficient: '0,3' – not a value; accepted: a number such as 0.3, true, false, a word, \"a text\", [a, list], { a = table }",
     "contacts.A.friction.coefficient=high": "contacts.A.friction.coefficient: 'high' – must be a number >= 0, the friction coefficient while sliding",
@@ -622,7 +622,7 @@ OVERRIDES = {
     "contacts.A.friction.coefficient=nan": "contacts.A.friction.coefficient: nan – must be a number >= 0, the friction coefficient while sliding; it must be finite",
     "materials.steel.young_modulus=-1": "materials.steel.young_modulus: -1 – must be a number > 0 [Pa], Young's modulus",
     "phases.0=3": "phases.0: 3 – must be a table with the keys name, duration, loads, velocities, ramp",
-    "loads.press.force.0=up": "loads.press.force: ['up', -20.0] – must be [x, y], two numbers [N]: the force",
+    "loads.press.force.0=up": "loads.press.force: ['up', -20.0] – must be [x, y] or [x, y, z], numbers [N]: the force, on a boundary spread evenly",
     "loads.press.force.2=1": "loads.press.force.2: no such item; the list has: 0, 1",
 }
 

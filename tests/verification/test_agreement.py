@@ -40,8 +40,9 @@ def test_every_mode_seen_in_time_is_a_complex_mode(case: st.Case, mu: float) -> 
     assert strong.sum() >= 4
     for found in seen.components.eigenvalues[strong]:
         nearest = lam[np.argmin(np.abs(lam - found))]
-        # Frequency to the accuracy of the scheme, (ωΔt)²/24; growth to what a short signal tells.
-        assert abs(found.imag - nearest.imag) < 3e-4 * abs(nearest)
+        # To the accuracy of the scheme, (ωΔt)²/24, and to what a signal of some 30 ms tells of a weak component,
+        # whose last digits also depend on the processor's rounding.
+        assert abs(found.imag - nearest.imag) < 8.0 + 3e-4 * abs(nearest)
         assert abs(found.real - nearest.real) < 5.0 + 5e-4 * abs(nearest)
     fastest = lam[np.argmax(lam.real)]
     assert seen.grows == (fastest.real > 0)

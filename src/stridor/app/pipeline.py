@@ -14,6 +14,7 @@ from ..agreement import modal_assurance
 from ..case import Case
 from ..io.atomic import write_text
 from ..io.datasets import save
+from ..modal.complex_modes import ComplexModes
 from ..sliding import steady_sliding
 from ..study import analyses
 from ..study.everything import Everything, compute_everything
@@ -57,7 +58,7 @@ class Outcome:
             "report": str(self.report),
             "files": [str(f) for f in self.files],
             "check": e.description.to_json(),
-            "modes": e.sweep_damped.to_json() if mu is None else analyses.modes(e.case, mu).to_json(),
+            "modes": _listed_modes(e, mu),
             "onsets": e.onsets_damped.to_json(),
             "simulate": e.summary.to_json(),
             "compare": None if e.agreement is None else e.agreement.to_json(),
@@ -92,14 +93,15 @@ def report_inputs(e: Everything) -> ReportInputs:
     """Everything, sorted into what the report takes."""
     mu = analyses.own_friction(e.case)
     agreement = e.agreement
-    steady = steady_sliding(e.system) if e.system.contacts and e.system.loads else None
+    on_lines = e.system.contacts and e.system.loads and not e.system.assembled
+    steady = steady_sliding(e.system) if on_lines else None
     shapes = _shapes(e)
     return ReportInputs(
         case=e.case,
         system=e.system,
         mu=mu,
         steady=steady,
-        modes=None if mu is None else analyses.modes(e.case, mu, max_frequency_hz=e.case.modal.max_frequency_hz),
+        modes=_own_modes(e, mu),
         undamped_sweep=e.sweep_undamped,
         damped_sweep=e.sweep_damped,
         undamped_pair=e.zoom_undamped,
@@ -123,7 +125,23 @@ def report_inputs(e: Everything) -> ReportInputs:
         created=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         warnings=e.description.warnings,
         notes=e.notes,
+        surface_steady=e.steady,
+        shape_vector=e.vector,
+        friction_energy=e.energy,
     )
+
+
+def _own_modes(e: Everything, mu: float | None) -> ComplexModes | None:
+    """Modes at the friction of the case, computed again only where that costs nothing."""
+    if e.own is not None or mu is None:
+        return e.own
+    return analyses.modes(e.case, mu, max_frequency_hz=e.case.modal.max_frequency_hz)
+
+
+def _listed_modes(e: Everything, mu: float | None) -> dict[str, Any]:
+    if mu is None:
+        return e.sweep_damped.to_json()
+    return (analyses.modes(e.case, mu) if e.own is None else e.own).to_json()
 
 
 def _signals(e: Everything) -> dict[str, Any]:
@@ -145,8 +163,10 @@ def _signals(e: Everything) -> dict[str, Any]:
 
 
 def _shapes(e: Everything) -> dict[str, Any]:
-    if e.operating is None or e.shape is None or e.shape_mode is None:
+    if e.shape is None or e.shape_mode is None:
         return {}
+    if e.operating is None:
+        return {"unstable_shape": NamedShape(e.shape_mode.imag / (2 * np.pi), e.shape, e.shape_mode.real)}
     by_body = {name: modal_assurance(e.operating[name], e.shape[name]) for name in e.operating}
     dominant = e.summary.dominant_frequency_hz or 0.0
     return {

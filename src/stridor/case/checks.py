@@ -7,28 +7,33 @@ values.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from ..errors import CaseError, Problem
-from .points import PointRef, no_such, parse_point
+from .bodies import AnyBody, BeamBody, MassBody, SolidBody
+from .body_checks import body_problems, shape_problems
+from .points import BoundaryRef, Place, PointRef, no_such, parse_place, parse_point
 from .schema import (
     DEFAULT_PHASES,
-    Body,
     Comparison,
     Contact,
     CoulombTable,
+    Dashpot,
     Load,
     MaterialTable,
     Modal,
     Phase,
     Reference,
+    Spring,
     Support,
     Temporal,
+    Tie,
 )
 
 NODE_TOLERANCE = 1e-6  # of an element, so that twelve printed digits still hit a node
 _SIDE_TOLERANCE = 1e-9  # of the slave body's length
+GROUND = "ground"
 _LEAST_MASTER_ELEMENTS = 3  # a C1 spline needs neighbours on both sides
 
 
@@ -40,10 +45,13 @@ class Parts:
     """
 
     materials: Mapping[str, MaterialTable] = field(default_factory=dict[str, MaterialTable])
-    bodies: Mapping[str, Body] = field(default_factory=dict[str, Body])
+    bodies: Mapping[str, AnyBody] = field(default_factory=dict[str, AnyBody])
     supports: Mapping[str, Support] = field(default_factory=dict[str, Support])
     loads: Mapping[str, Load] = field(default_factory=dict[str, Load])
     contacts: Mapping[str, Contact] = field(default_factory=dict[str, Contact])
+    ties: Mapping[str, Tie] = field(default_factory=dict[str, Tie])
+    springs: Mapping[str, Spring] = field(default_factory=dict[str, Spring])
+    dashpots: Mapping[str, Dashpot] = field(default_factory=dict[str, Dashpot])
     phases: tuple[Phase, ...] = DEFAULT_PHASES
     modal: Modal = field(default_factory=Modal)
     temporal: Temporal = field(default_factory=Temporal)
@@ -62,75 +70,55 @@ class Parts:
 
 def problems_between(parts: Parts) -> list[Problem]:
     """Everything wrong between (not within) the values of the sound parts, in the order of the file."""
-    shapes = [*_shape_problems(parts)]
+    shapes = [*shape_problems(parts.bodies)]
     unsound = {problem.where.split(".")[1] for problem in shapes}
     if unsound:
         parts.bodies = {name: body for name, body in parts.bodies.items() if name not in unsound}
         parts.broken |= {("bodies", name) for name in unsound}
     return [
         *shapes,
-        *_body_problems(parts),
+        *_material_problems(parts),
+        *body_problems(parts.bodies),
         *_support_problems(parts),
         *_load_problems(parts),
         *_contact_problems(parts),
+        *_tie_problems(parts),
+        *_link_problems(parts),
         *_phase_problems(parts),
         *_setting_problems(parts),
         *_reference_problems(parts),
     ]
 
 
-def signed_distance(body: Body, x: float, y: float) -> tuple[float, float]:
+def signed_distance(body: BeamBody, x: float, y: float) -> tuple[float, float]:
     """How far (x, y) [m] lies along a body's line from its start, and how far off it, positive left [m]."""
     (x0, y0), (c, s) = body.start, body.direction
     return c * (x - x0) + s * (y - y0), c * (y - y0) - s * (x - x0)
 
 
-def slave_side(slave: Body, master: Body) -> int:
+def slave_side(slave: BeamBody, master: BeamBody) -> int:
     """+1 where the middle of the slave body lies left of the master's line, -1 right, 0 on the line."""
     _, off = signed_distance(master, *slave.coordinates(slave.length_m / 2))
     return 0 if abs(off) <= _SIDE_TOLERANCE * slave.length_m else int(math.copysign(1, off))
 
 
-def _shape_problems(parts: Parts) -> Iterator[Problem]:
-    """Bodies without one definite axis."""
+def _material_problems(parts: Parts) -> Iterator[Problem]:
     for name, body in parts.bodies.items():
-        where = f"bodies.{name}"
-        if body.end is not None:
-            for key in ("angle_deg", "length"):
-                if (given := getattr(body, key)) is not None:
-                    yield Problem(
-                        f"{where}.{key}", given, "not used with end; give end, or angle_deg and length"
-                    )
-            if math.dist(body.start, body.end) == 0.0:
-                yield Problem(f"{where}.end", body.end, "must not be the start")
+        if not isinstance(body, BeamBody | SolidBody):
             continue
-        if body.angle_deg is None and body.length is None:
-            accepted = "has no direction – give angle_deg [degrees] and length [m], or end = [x, y] [m]"
-            yield Problem(where, None, accepted)
-            continue
-        for key, unit in (("angle_deg", "degrees"), ("length", "m")):
-            if getattr(body, key) is None:
-                accepted = f"missing – give a number [{unit}], or only end = [x, y] [m]"
-                yield Problem(f"{where}.{key}", None, accepted)
-
-
-def _body_problems(parts: Parts) -> Iterator[Problem]:
-    for name, body in parts.bodies.items():
-        where = f"bodies.{name}"
-        if body.material not in parts.materials and not parts.is_broken("materials", body.material):
+        if body.material is None:
+            if not isinstance(body, BeamBody) and not (body.file or "").lower().endswith(".inp"):
+                accepted = "missing – give the NAME of a [materials.NAME] (only an Abaqus file may bring its own)"
+                yield Problem(f"bodies.{name}.material", None, accepted)
+        elif body.material not in parts.materials and not parts.is_broken("materials", body.material):
             yield Problem(
-                f"{where}.material",
+                f"bodies.{name}.material",
                 body.material,
                 no_such("material", body.material, parts.names("materials")),
             )
-        for point, distance in body.points.items():
-            if point in ("start", "end"):
-                yield Problem(
-                    f"{where}.points.{point}", distance, "start and end always exist; choose another name"
-                )
-            elif distance > body.length_m:
-                accepted = f"beyond the body; {name} reaches from 0 to {body.length_m:.9g} m"
-                yield Problem(f"{where}.points.{point}", distance, accepted)
+
+
+_AXES = {2: ("x", "y"), 3: ("x", "y", "z")}
 
 
 def _support_problems(parts: Parts) -> Iterator[Problem]:
@@ -143,31 +131,55 @@ def _support_problems(parts: Parts) -> Iterator[Problem]:
                 yield Problem(f"{where}.velocity.{direction}", support.velocity[direction], accepted)
         if len(set(support.fixed)) < len(support.fixed):
             yield Problem(f"{where}.fixed", support.fixed, "must name each direction once")
-        point = yield from _point(parts, support.at, f"{where}.at")
+        point = yield from _place(parts, support.at, f"{where}.at")
         if point is None:
             continue
         body = parts.bodies[point.body]
-        position = point.distance * body.elements / body.length_m
-        if abs(position - round(position)) > NODE_TOLERANCE:
-            step = body.length_m / body.elements
-            nearest = math.floor(position) * step, math.ceil(position) * step
-            yield Problem(
-                f"{where}.at",
-                support.at,
-                f"no mesh node at {point.distance:.9g} m; the nearest are at {nearest[0]:.12g} "
-                f"and {nearest[1]:.12g} m: move the support or change bodies.{point.body}.elements",
-            )
-            continue
+        known = ("x", "y", "rotation") if isinstance(body, BeamBody) else _AXES[body.dimension]
         for direction in dict.fromkeys(support.fixed):
-            other = held.setdefault((point.body, round(position), direction), name)
-            if other != name:
-                accepted = f"{direction} of this point is already fixed by supports.{other}"
-                yield Problem(f"{where}.fixed", support.fixed, accepted)
+            if direction not in known:
+                accepted = f"{point.body} moves along {', '.join(known)} only"
+                yield Problem(f"{where}.fixed", direction, accepted)
+        if isinstance(body, BeamBody) and isinstance(point, PointRef):
+            yield from _beam_support_problems(name, support, point, body, held)
+
+
+def _beam_support_problems(
+    name: str, support: Support, point: PointRef, body: BeamBody, held: dict[tuple[str, int, str], str]
+) -> Iterator[Problem]:
+    where = f"supports.{name}"
+    position = point.distance * body.elements / body.length_m
+    if abs(position - round(position)) > NODE_TOLERANCE:
+        step = body.length_m / body.elements
+        nearest = math.floor(position) * step, math.ceil(position) * step
+        yield Problem(
+            f"{where}.at",
+            support.at,
+            f"no mesh node at {point.distance:.9g} m; the nearest are at {nearest[0]:.12g} "
+            f"and {nearest[1]:.12g} m: move the support or change bodies.{point.body}.elements",
+        )
+        return
+    for direction in dict.fromkeys(support.fixed):
+        other = held.setdefault((point.body, round(position), direction), name)
+        if other != name:
+            accepted = f"{direction} of this point is already fixed by supports.{other}"
+            yield Problem(f"{where}.fixed", support.fixed, accepted)
 
 
 def _load_problems(parts: Parts) -> Iterator[Problem]:
     for name, load in parts.loads.items():
-        yield from _point(parts, load.at, f"loads.{name}.at")
+        where = f"loads.{name}"
+        place = yield from _place(parts, load.at, f"{where}.at")
+        if place is None:
+            continue
+        body = parts.bodies[place.body]
+        if len(load.force) != body.dimension and any(load.force):
+            accepted = f"must have {body.dimension} numbers, as {place.body} lives in {body.dimension} dimensions"
+            yield Problem(f"{where}.force", load.force, accepted)
+        if load.moment and not isinstance(body, BeamBody):
+            yield Problem(f"{where}.moment", load.moment, "only a beam takes a moment; give a pair of forces")
+        if load.pressure and not isinstance(place, BoundaryRef):
+            yield Problem(f"{where}.pressure", load.pressure, "a pressure acts on a boundary; a point takes a force")
 
 
 def _contact_problems(parts: Parts) -> Iterator[Problem]:
@@ -177,28 +189,47 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
         if not isinstance(friction, CoulombTable) and friction.static_coefficient < friction.coefficient:
             accepted = f"must be at least the coefficient, {friction.coefficient:.9g}"
             yield Problem(f"{where}.friction.static_coefficient", friction.static_coefficient, accepted)
-        slave = yield from _point(parts, contact.slave, f"{where}.slave")
-        master = parts.bodies.get(contact.master)
+        slave = yield from _place(parts, contact.slave, f"{where}.slave")
+        owner, _, boundary = contact.master.partition(".")
+        master = parts.bodies.get(owner)
         if master is None:
-            if not parts.is_broken("bodies", contact.master):
-                yield Problem(
-                    f"{where}.master", contact.master, no_such("body", contact.master, parts.names("bodies"))
-                )
-        elif slave is not None and slave.body == contact.master:
+            if not parts.is_broken("bodies", owner):
+                yield Problem(f"{where}.master", contact.master, no_such("body", owner, parts.names("bodies")))
+            continue
+        if slave is not None and slave.body == owner:
             yield Problem(f"{where}.master", contact.master, "must be another body than the slave's")
-        else:
-            if master.elements < _LEAST_MASTER_ELEMENTS:
-                accepted = f"a master needs at least 3 elements; {contact.master} has {master.elements}"
+            continue
+        if isinstance(master, MassBody):
+            yield Problem(f"{where}.master", contact.master, "a point mass has no surface to slide on")
+        elif isinstance(master, SolidBody):
+            if not boundary:
+                accepted = f'must be a boundary of it, such as "{owner}.top"'
                 yield Problem(f"{where}.master", contact.master, accepted)
-            if slave is not None:
+            else:
+                yield from _place(parts, contact.master, f"{where}.master", boundary=True)
+        elif boundary:
+            kind = "beam" if isinstance(master, BeamBody) else "obstacle"
+            yield Problem(f"{where}.master", contact.master, f'a {kind} is a master as a whole; write "{owner}"')
+        elif isinstance(master, BeamBody):
+            if master.elements < _LEAST_MASTER_ELEMENTS:
+                accepted = f"a master needs at least 3 elements; {owner} has {master.elements}"
+                yield Problem(f"{where}.master", contact.master, accepted)
+            if isinstance(slave, PointRef):
                 yield from _pairing_problems(parts, where, contact, slave, master)
+        if contact.side is not None and not isinstance(master, BeamBody):
+            accepted = "only a beam has sides; a boundary and an obstacle know theirs"
+            yield Problem(f"{where}.side", contact.side, accepted)
 
 
 def _pairing_problems(
-    parts: Parts, where: str, contact: Contact, slave: PointRef, master: Body
+    parts: Parts, where: str, contact: Contact, slave: PointRef, master: BeamBody
 ) -> Iterator[Problem]:
     body = parts.bodies[slave.body]
-    along, _ = signed_distance(master, *body.coordinates(slave.distance))
+    position = body.coordinates(slave.distance) if isinstance(body, BeamBody) else slave.coordinates
+    assert position is not None
+    if len(position) != 2:
+        return
+    along, _ = signed_distance(master, *position)
     if not -1e-9 <= along / master.length_m <= 1 + 1e-9:
         yield Problem(
             f"{where}.slave",
@@ -206,16 +237,72 @@ def _pairing_problems(
             f"lies beyond the ends of {contact.master}: at {along:.6g} m along it, which reaches from 0 to "
             f"{master.length_m:.6g} m; move one of the bodies",
         )
-    if contact.side is None and slave_side(body, master) == 0:
+    if contact.side is None and isinstance(body, BeamBody) and slave_side(body, master) == 0:
         accepted = (
             f'missing – {slave.body} lies on the line of {contact.master}; give "left" or "right" of it'
         )
         yield Problem(f"{where}.side", None, accepted)
+    if contact.side is None and not isinstance(body, BeamBody):
+        yield Problem(f"{where}.side", None, f'missing – give "left" or "right" of {contact.master}')
+
+
+def _tie_problems(parts: Parts) -> Iterator[Problem]:
+    for name, tie in parts.ties.items():
+        where = f"ties.{name}"
+        slave = yield from _place(parts, tie.slave, f"{where}.slave", boundary=True)
+        master = yield from _place(parts, tie.master, f"{where}.master", boundary=True)
+        if slave is not None and master is not None and slave.body == master.body:
+            yield Problem(f"{where}.master", tie.master, "must belong to another body than the slave's")
+
+
+def _link_problems(parts: Parts) -> Iterator[Problem]:
+    """Springs and dashpots."""
+    links: list[tuple[str, Spring | Dashpot]] = [
+        *((f"springs.{name}", link) for name, link in parts.springs.items()),
+        *((f"dashpots.{name}", link) for name, link in parts.dashpots.items()),
+    ]
+    for where, link in links:
+        first, second = link.between
+        if first == GROUND:
+            yield Problem(f"{where}.between.0", first, "only the second end may be ground; turn them round")
+            continue
+        point = yield from _point(parts, first, f"{where}.between.0")
+        other = None
+        if second != GROUND:
+            other = yield from _point(parts, second, f"{where}.between.1")
+        if point is None:
+            continue
+        dimension = parts.bodies[point.body].dimension
+        if link.direction is None and (second == GROUND or (other is not None and _same(parts, point, other))):
+            accepted = "missing – its ends give no line to act along; give direction = [x, y]"
+            yield Problem(f"{where}.direction", None, accepted)
+        elif link.direction is not None:
+            if len(link.direction) != dimension:
+                yield Problem(f"{where}.direction", link.direction, f"must have {dimension} numbers")
+            elif not any(link.direction):
+                yield Problem(f"{where}.direction", link.direction, "must not be zero")
+
+
+def _same(parts: Parts, first: PointRef, second: PointRef) -> bool:
+    ends = [position_of(parts.bodies[p.body], p) for p in (first, second)]
+    return math.dist(*ends) == 0.0 if len(ends[0]) == len(ends[1]) else False
+
+
+def position_of(body: AnyBody, point: PointRef) -> tuple[float, ...]:
+    """Coordinates [m] of a point of a body."""
+    if isinstance(body, BeamBody):
+        return body.coordinates(point.distance)
+    assert point.coordinates is not None
+    return point.coordinates
 
 
 def _phase_problems(parts: Parts) -> Iterator[Problem]:
     seen: set[str] = set()
     moving = [name for name, support in parts.supports.items() if support.velocity]
+    moving += [name for name, body in parts.bodies.items() if getattr(body, "sliding", None) is not None]
+    for name in sorted(set(parts.supports) & set(parts.bodies)):
+        if moving.count(name) > 1:
+            yield Problem(f"supports.{name}", None, f"bodies.{name} slides under the same name; rename the support")
     for number, phase in enumerate(parts.phases):
         where = f"phases.{number}"
         if phase.name in seen:
@@ -231,7 +318,9 @@ def _phase_problems(parts: Parts) -> Iterator[Problem]:
         for name, factor in phase.velocities.items():
             if name in parts.supports and name not in moving:
                 yield Problem(f"{where}.velocities.{name}", factor, f"supports.{name} has no velocity")
-            elif name not in parts.supports and not parts.is_broken("supports", name):
+            elif name in parts.bodies and name not in moving:
+                yield Problem(f"{where}.velocities.{name}", factor, f"bodies.{name} has no sliding")
+            elif name not in moving and not any(parts.is_broken(t, name) for t in ("supports", "bodies")):
                 accepted = no_such("support with a velocity", name, moving)
                 yield Problem(f"{where}.velocities.{name}", factor, accepted)
 
@@ -256,7 +345,25 @@ def _reference_problems(parts: Parts) -> Iterator[Problem]:
             yield Problem(f"reference.bodies.{name}", None, no_such("body", name, parts.names("bodies")))
 
 
-def _point(parts: Parts, reference: str, where: str) -> Iterator[Problem]:
+def _place(
+    parts: Parts, reference: str, where: str, *, boundary: bool = False
+) -> Generator[Problem, None, Place | None]:
+    """The point or boundary, None where it cannot be known; yields the problem where it is the reference's fault."""
+    head = reference.partition("@" if "@" in reference else ".")[0]
+    if parts.is_broken("bodies", head):
+        return None
+    try:
+        place = parse_place(reference, parts.bodies, where)
+    except CaseError as error:
+        yield from error.problems
+        return None
+    if boundary and isinstance(place, PointRef):
+        yield Problem(where, reference, 'must be a boundary, "body.boundary"')
+        return None
+    return place
+
+
+def _point(parts: Parts, reference: str, where: str) -> Generator[Problem, None, PointRef | None]:
     """The point, None where it cannot be known; yields the problem where it is the reference's fault."""
     head = reference.partition("@" if "@" in reference else ".")[0]
     if parts.is_broken("bodies", head):

@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from ..errors import CaseError
 from .model import Case
@@ -33,11 +34,16 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Case:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise CaseError(source, None, f"cannot be read: {reason}") from None
-    return loads(text, overrides, source)
+    return loads(text, overrides, source, folder=Path(path).resolve().parent)
 
 
-def loads(text: str, overrides: Sequence[str] = (), source: str = "<text>") -> Case:
-    """The case in a TOML text, with overrides applied; `source` is its name in messages. Raises CaseError."""
+def loads(
+    text: str, overrides: Sequence[str] = (), source: str = "<text>", *, folder: Path | None = None
+) -> Case:
+    """The case in a TOML text, with overrides applied; `source` is its name in messages. Raises CaseError.
+
+    Mesh files are sought from `folder` (default: the working directory) and kept with their full path.
+    """
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -49,7 +55,16 @@ def loads(text: str, overrides: Sequence[str] = (), source: str = "<text>") -> C
     problems = override(data, overrides)
     if problems:
         raise CaseError.many(problems)
+    _resolve_files(data, folder or Path.cwd())
     return Case.checked(data)
+
+
+def _resolve_files(data: dict[str, Any], folder: Path) -> None:
+    """Paths of mesh files made absolute, so that a case means the same wherever it is saved."""
+    bodies = data.get("bodies")
+    for body in bodies.values() if isinstance(bodies, dict) else ():
+        if isinstance(body, dict) and isinstance(body.get("file"), str) and body["file"]:
+            body["file"] = str(folder / body["file"])
 
 
 def templates() -> list[str]:

@@ -8,27 +8,31 @@ from typing import Annotated, Any, cast
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError, model_validator
 
 from ..errors import CaseError, Problem
+from .bodies import BeamBody
 from .checks import Parts, problems_between, slave_side
+from .fields import Name
 from .messages import problems_of
 from .oddities import oddities
 from .overrides import apply, split_path
-from .points import PointRef, nearest, parse_point
+from .points import Place, PointRef, nearest, parse_place, parse_point
 from .schema import (
     DEFAULT_PHASES,
     ENTRIES,
     Body,
     Comparison,
     Contact,
+    Dashpot,
     Load,
     MaterialTable,
     Modal,
-    Name,
     Phase,
     Phases,
     Reference,
+    Spring,
     Support,
     Table,
     Temporal,
+    Tie,
 )
 
 
@@ -46,13 +50,12 @@ class Case(Table):
     bodies: Annotated[Mapping[Name, Body], Field(min_length=1)] = Field(
         description="tables [bodies.NAME], at least one"
     )
-    supports: Mapping[Name, Support] = Field(
-        default_factory=dict[str, Support], description="tables [supports.NAME]"
-    )
+    supports: Mapping[Name, Support] = Field(default_factory=dict[str, Support], description="tables [supports.NAME]")
     loads: Mapping[Name, Load] = Field(default_factory=dict[str, Load], description="tables [loads.NAME]")
-    contacts: Mapping[Name, Contact] = Field(
-        default_factory=dict[str, Contact], description="tables [contacts.NAME]"
-    )
+    contacts: Mapping[Name, Contact] = Field(default_factory=dict[str, Contact], description="tables [contacts.NAME]")
+    ties: Mapping[Name, Tie] = Field(default_factory=dict[str, Tie], description="tables [ties.NAME]")
+    springs: Mapping[Name, Spring] = Field(default_factory=dict[str, Spring], description="tables [springs.NAME]")
+    dashpots: Mapping[Name, Dashpot] = Field(default_factory=dict[str, Dashpot], description="tables [dashpots.NAME]")
     phases: Phases = Field(default=DEFAULT_PHASES, description="a list of tables [[phases]]")
     modal: Modal = Field(default=Modal(), description="a table [modal]")
     temporal: Temporal = Field(default=Temporal(), description="a table [temporal]")
@@ -67,9 +70,7 @@ class Case(Table):
         except ValidationError as error:
             found = problems_of(error, data, cls)
             told = {problem.where for problem in found}
-            between = [
-                problem for problem in problems_between(_sound(data, error)) if problem.where not in told
-            ]
+            between = [problem for problem in problems_between(_sound(data, error)) if problem.where not in told]
             raise CaseError.many(_in_file_order([*found, *between])) from None
 
     @model_validator(mode="after")
@@ -114,12 +115,35 @@ class Case(Table):
         """The point that "body.point" or "body@distance" names. Raises CaseError at `where` if none."""
         return parse_point(reference, self.bodies, where)
 
+    def place(self, reference: str, *, where: str = "at") -> Place:
+        """The point or the boundary that a reference names. Raises CaseError at `where` if none."""
+        return parse_place(reference, self.bodies, where)
+
+    @property
+    def dimension(self) -> int:
+        """2 in the plane, 3 in space."""
+        return next(iter(self.bodies.values())).dimension
+
+    @property
+    def moving(self) -> list[str]:
+        """Names of what moves with a prescribed velocity: supports, then bodies that slide through their mesh."""
+        supports = [name for name, support in self.supports.items() if support.velocity]
+        return supports + [name for name, body in self.bodies.items() if getattr(body, "sliding", None) is not None]
+
+    @property
+    def beams(self) -> dict[str, BeamBody]:
+        """The bodies that are beams."""
+        return {name: body for name, body in self.bodies.items() if isinstance(body, BeamBody)}
+
     def side(self, contact: str) -> int:
         """+1 where the slave of a contact lies left of its master's direction, start to end, -1 right."""
         table = self.contacts[contact]
         if table.side is not None:
             return 1 if table.side == "left" else -1
-        return slave_side(self.bodies[self.point(table.slave).body], self.bodies[table.master])
+        slave, master = self.bodies[self.place(table.slave).body], self.bodies[table.master]
+        assert isinstance(slave, BeamBody), "checked: others name their side"
+        assert isinstance(master, BeamBody), "checked: only beams have sides"
+        return slave_side(slave, master)
 
     def load_factors(self) -> tuple[dict[str, float], ...]:
         """For each phase, the factor of every load at its end."""
@@ -127,8 +151,7 @@ class Case(Table):
 
     def velocity_factors(self) -> tuple[dict[str, float], ...]:
         """For each phase, the factor of every moving support's velocity at its end."""
-        moving = [name for name, support in self.supports.items() if support.velocity]
-        return tuple(_carried(self.phases, moving, lambda phase: phase.velocities))
+        return tuple(_carried(self.phases, self.moving, lambda phase: phase.velocities))
 
     def _data(self, *, defaults: bool = False) -> dict[str, Any]:
         return self.model_dump(mode="json", exclude_unset=not defaults, exclude_none=True)
@@ -150,9 +173,7 @@ def _sound(data: Mapping[str, Any], error: ValidationError) -> Parts:
     parts = Parts()
     errors = error.errors(include_url=False, include_input=False)
     faults = {item["loc"][:2] for item in errors}
-    unknown = [
-        str(item["loc"][0]) for item in errors if item["type"] == "extra_forbidden" and len(item["loc"]) == 1
-    ]
+    unknown = [str(item["loc"][0]) for item in errors if item["type"] == "extra_forbidden" and len(item["loc"]) == 1]
     misspelt = {nearest(key, Case.model_fields) for key in unknown}
     for table, kind in ENTRIES.items():
         entries = data.get(table, {})

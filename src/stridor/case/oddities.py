@@ -4,36 +4,48 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from .bodies import AnyBody, BeamBody, MassBody, SolidBody
 from .checks import signed_distance
-from .points import parse_point
-from .schema import Body, Contact, MaterialTable
+from .points import PointRef, parse_place
+from .schema import Contact, MaterialTable
 
 _SLENDER = 5.0  # length / thickness below which Euler–Bernoulli beams are off by percents
 
 
 def oddities(
-    materials: Mapping[str, MaterialTable], bodies: Mapping[str, Body], contacts: Mapping[str, Contact]
+    materials: Mapping[str, MaterialTable], bodies: Mapping[str, AnyBody], contacts: Mapping[str, Contact]
 ) -> Iterator[str]:
     """One line for each value that is probably not meant."""
     for name, material in materials.items():
         yield from _outside(f"materials.{name}.young_modulus", material.young_modulus, 1e3, 1e13, "Pa")
         yield from _outside(f"materials.{name}.density", material.density, 1e-1, 1e5, "kg/m³")
     for name, body in bodies.items():
-        yield from _outside(f"bodies.{name}.length", body.length_m, 1e-7, 1e4, "m")
-        for key, value in (("width", body.width), ("thickness", body.thickness)):
-            yield from _outside(f"bodies.{name}.{key}", value, 1e-8, 1e3, "m")
-        if body.length_m < _SLENDER * body.thickness:
-            ratio = body.length_m / body.thickness
-            yield f"bodies.{name}: only {ratio:.3g} times as long as thick; shear matters, and is neglected"
+        if isinstance(body, BeamBody):
+            yield from _beam(name, body)
+        elif isinstance(body, MassBody):
+            yield from _outside(f"bodies.{name}.mass", body.mass, 1e-9, 1e6, "kg")
+        elif isinstance(body, SolidBody):
+            yield from _outside(f"bodies.{name}.thickness", body.thickness, 1e-8, 1e3, "m")
     for name, contact in contacts.items():
         coefficient = contact.friction.coefficient
         if coefficient > 2:
             yield f"contacts.{name}.friction.coefficient: {coefficient:.6g} is unusually high"
-        slave = parse_point(contact.slave, bodies)
-        master = bodies[contact.master]
-        _, gap = signed_distance(master, *bodies[slave.body].coordinates(slave.distance))
+        slave = parse_place(contact.slave, bodies)
+        body, master = bodies[slave.body], bodies.get(contact.master)
+        if not (isinstance(slave, PointRef) and isinstance(body, BeamBody) and isinstance(master, BeamBody)):
+            continue
+        _, gap = signed_distance(master, *body.coordinates(slave.distance))
         if abs(gap) > 0.01 * master.length_m:
             yield f"contacts.{name}: {contact.slave} starts {abs(gap):.3g} m off the line of {contact.master}"
+
+
+def _beam(name: str, body: BeamBody) -> Iterator[str]:
+    yield from _outside(f"bodies.{name}.length", body.length_m, 1e-7, 1e4, "m")
+    for key, value in (("width", body.width), ("thickness", body.thickness)):
+        yield from _outside(f"bodies.{name}.{key}", value, 1e-8, 1e3, "m")
+    if body.length_m < _SLENDER * body.thickness:
+        ratio = body.length_m / body.thickness
+        yield f"bodies.{name}: only {ratio:.3g} times as long as thick; shear matters, and is neglected"
 
 
 def _outside(where: str, value: float, least: float, most: float, unit: str) -> Iterator[str]:

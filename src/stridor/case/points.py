@@ -1,4 +1,4 @@
-"""Point references: "body.point", or "body@distance", distance from the body's start along its axis [m]."""
+"""References: "body.point", "body@distance" (from a beam's start along its axis [m]), "body.boundary"."""
 
 from __future__ import annotations
 
@@ -7,38 +7,113 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from ..errors import CaseError
-from .schema import Body
+from .bodies import MASS_POINT, AnyBody, BeamBody, MassBody, ObstacleBody, SolidBody
 
 _ROUNDING = 1e-12
+FULL_TURN = 360.0 * (1 - 1e-9)
+BOUNDARIES = {
+    "rectangle": ("left", "right", "bottom", "top"),
+    "quadrilateral": ("left", "right", "bottom", "top"),
+    "annulus": ("inner", "outer", "start", "end"),
+    "block": ("left", "right", "front", "back", "bottom", "top"),
+    "disc": ("inner", "outer", "bottom", "top"),
+    "pad": ("inner", "outer", "start", "end", "bottom", "top"),
+}
 
 
 @dataclass(frozen=True)
 class PointRef:
-    """A point of a body: the body's name and the distance [m] from its start along its axis."""
+    """A point of a body: on a beam its distance [m] from the start along the axis, else its coordinates [m]."""
 
     body: str
     distance: float
+    coordinates: tuple[float, ...] | None = None
 
 
-def parse_point(reference: str, bodies: Mapping[str, Body], where: str = "point") -> PointRef:
+@dataclass(frozen=True)
+class BoundaryRef:
+    """A boundary of a solid body; the whole line where the body is a beam."""
+
+    body: str
+    boundary: str
+
+
+Place = PointRef | BoundaryRef
+
+
+def parse_point(reference: str, bodies: Mapping[str, AnyBody], where: str = "point") -> PointRef:
     """The point that a reference names. Raises CaseError at `where` if there is no such point."""
+    place = parse_place(reference, bodies, where)
+    if isinstance(place, PointRef):
+        return place
+    body = bodies[place.body]
+    known = [f"{place.body}.{name}" for name in getattr(body, "points", ())]
+    have = f"{place.body} has: {', '.join(known)}" if known else f"give one in bodies.{place.body}.points"
+    raise CaseError(where, reference, f"no such point; {have}")
+
+
+def parse_place(reference: str, bodies: Mapping[str, AnyBody], where: str = "at") -> Place:
+    """The point or the boundary that a reference names. Raises CaseError at `where` if there is none.
+
+    Whether the mesh of a file has the boundary shows when it is read.
+    """
     head, at, distance = reference.partition("@")
     point = ""
     if not at:
         head, _, point = reference.partition(".")
+    body = bodies.get(head)
+    if isinstance(body, MassBody) and not at and point in ("", MASS_POINT):
+        return PointRef(head, 0.0, body.position)
     if not head or not (distance if at else point):
-        example = f"{next(iter(bodies), 'beam1')}.start"
-        raise CaseError(
-            where, reference, f'must be a point, "body.point" or "body@distance", such as {example}'
-        )
-    if head not in bodies:
+        first = next(iter(bodies), "beam1")
+        example = f"{first}.{_first_point(bodies.get(first))}"
+        raise CaseError(where, reference, f'must be a point, "body.point" or "body@distance", such as {example}')
+    if body is None:
         raise CaseError(where, reference, no_such("body", head, bodies))
-    body = bodies[head]
+    if isinstance(body, ObstacleBody):
+        raise CaseError(where, reference, "an obstacle has no points or boundaries; only a contact's master is one")
+    if isinstance(body, MassBody):
+        raise CaseError(where, reference, f'a mass is one point; write "{head}"')
+    if isinstance(body, SolidBody):
+        return _of_solid(reference, head, body, point, where)
     if at:
         return PointRef(head, _distance(reference, distance, head, body, where))
     if point not in body.point_names:
         raise CaseError(where, reference, f"no such point{choice(point, body.point_names, f'{head} has')}")
     return PointRef(head, body.point_distance(point))
+
+
+def _first_point(body: AnyBody | None) -> str:
+    if isinstance(body, SolidBody):
+        return next(iter([*body.points, *boundary_names(body)]), "boundary")
+    return MASS_POINT if isinstance(body, MassBody) else "start"
+
+
+def _of_solid(reference: str, name: str, body: SolidBody, point: str, where: str) -> Place:
+    if not point:
+        raise CaseError(where, reference, f'a solid has no axis; name a point in bodies.{name}.points')
+    if point in body.points:
+        return PointRef(name, 0.0, body.points[point])
+    known = boundary_names(body)
+    if body.mesh is not None and point not in known:
+        raise CaseError(
+            where, reference, f"no such point or boundary{choice(point, [*body.points, *known], f'{name} has')}"
+        )
+    return BoundaryRef(name, point)
+
+
+def boundary_names(body: SolidBody) -> tuple[str, ...]:
+    """Boundaries of a built-in mesh; none for a file, which must be read to know them."""
+    mesh = body.mesh
+    if mesh is None:
+        return ()
+    names = BOUNDARIES[mesh.shape]
+    if mesh.shape == "annulus":
+        full = mesh.sweep_deg >= FULL_TURN
+        return tuple(
+            n for n in names if not (full and n in ("start", "end")) and not (mesh.inner_radius == 0 and n == "inner")
+        )
+    return names
 
 
 def no_such(kind: str, name: str, known: Iterable[str]) -> str:
@@ -63,7 +138,7 @@ def did_you_mean(word: str) -> str:
     return f"; did you mean {word!r}?" if word else ""
 
 
-def _distance(reference: str, text: str, name: str, body: Body, where: str) -> float:
+def _distance(reference: str, text: str, name: str, body: BeamBody, where: str) -> float:
     try:
         distance = float(text)
     except ValueError:

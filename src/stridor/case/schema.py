@@ -2,37 +2,44 @@
 
 Each description completes the sentence "must be …" and is what a user reads when a value is refused; that
 of a table of values says after ", each " what one of them must be. Rules that take more than one value (a
-ramp longer than its phase, a point that does not exist) are in `checks`.
+ramp longer than its phase, a point that does not exist) are in `checks`. Bodies are in `bodies`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
-from ..laws import Coulomb, FrictionLaw, Material, Rayleigh, RectangularSection, StaticKinetic, Weakening
+from ..laws import Coulomb, FrictionLaw, Material, StaticKinetic, Weakening
+from .bodies import BeamBody, Body, DampingTable, MassBody, ObstacleBody, SlidingTable, SolidBody
+from .fields import (
+    NAME_RULE,
+    PLACE,
+    POINT,
+    Direction,
+    Label,
+    NotNegative,
+    Number,
+    PlaneOrSpace,
+    Positive,
+    Table,
+    Truth,
+)
 
-NAME_RULE = "a letter, then letters, digits, _ or -"
-
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
-Label = Annotated[str, Field(min_length=1)]
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
-Truth = Annotated[bool, Field(strict=True)]
-Vector = tuple[Number, Number]
-Direction = Literal["x", "y", "rotation"]
-
-POINT = 'a point, "body.point" or "body@distance"'
-
-
-class Table(BaseModel):
-    """A table of the case file: frozen, and without keys it does not know."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+__all__ = [
+    "NAME_RULE",
+    "POINT",
+    "BeamBody",
+    "Body",
+    "DampingTable",
+    "MassBody",
+    "ObstacleBody",
+    "SlidingTable",
+    "SolidBody",
+    "Table",
+]
 
 
 class MaterialTable(Table):
@@ -49,120 +56,28 @@ class MaterialTable(Table):
         return Material(self.young_modulus, self.density, self.poisson_ratio)
 
 
-class DampingTable(Table):
-    """Rayleigh damping of a body, C = mass · M + stiffness · K."""
-
-    mass: NotNegative = Field(
-        default=0.0, description="a number >= 0 [1/s], Rayleigh's factor of the mass matrix"
-    )
-    stiffness: NotNegative = Field(
-        default=0.0, description="a number >= 0 [s], Rayleigh's factor of the stiffness matrix"
-    )
-
-    def law_object(self) -> Rayleigh:
-        """The damping as a law."""
-        return Rayleigh(self.mass, self.stiffness)
-
-
-class BeamBody(Table):
-    """[bodies.NAME] of type "beam": straight, uniform, Euler–Bernoulli with traction, in the x–y plane."""
-
-    type: Literal["beam"] = Field(description='"beam", the type of the body')
-    material: str = Field(description="the NAME of a [materials.NAME]")
-    start: Vector = Field(description="[x, y], two numbers [m]: where the beam starts")
-    angle_deg: Number | None = Field(
-        default=None, description="a number [degrees], the direction of the axis counter-clockwise from +x"
-    )
-    length: Positive | None = Field(default=None, description="a number > 0 [m], the length along the axis")
-    end: Vector | None = Field(
-        default=None,
-        description="[x, y], two numbers [m]: where the beam ends, instead of angle_deg and length",
-    )
-    width: Positive = Field(description="a number > 0 [m], the width out of the plane")
-    thickness: Positive = Field(description="a number > 0 [m], the thickness in the plane of bending")
-    elements: Annotated[int, Field(strict=True, ge=1, le=100_000)] = Field(
-        description="a whole number from 1 to 100000, the number of elements"
-    )
-    mass: Literal["consistent", "lumped"] = Field(
-        default="consistent", description='"consistent" or "lumped" (HRZ), the mass matrix'
-    )
-    damping: DampingTable = Field(
-        default=DampingTable(),
-        description="a table { mass = α₁ [1/s], stiffness = α₂ [s] }, Rayleigh damping",
-    )
-    points: Mapping[Name, NotNegative] = Field(
-        default_factory=dict[str, float],
-        description="a table of named points, each a number >= 0 [m], the distance along the axis",
-    )
-
-    @property
-    def length_m(self) -> float:
-        """Length of the axis [m], whichever way it was given."""
-        if self.end is not None:
-            return math.dist(self.start, self.end)
-        assert self.length is not None, "a checked beam has an end or a length"
-        return self.length
-
-    @property
-    def direction(self) -> tuple[float, float]:
-        """Unit vector (2,) along the axis from start to end; exact zeros and ones along x and y."""
-        if self.end is not None:
-            return (self.end[0] - self.start[0]) / self.length_m, (
-                self.end[1] - self.start[1]
-            ) / self.length_m
-        assert self.angle_deg is not None, "a checked beam has an end or an angle"
-        quarters, rest = divmod(self.angle_deg % 360.0, 90.0)
-        if rest == 0.0:
-            return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
-        angle = math.radians(self.angle_deg)
-        return math.cos(angle), math.sin(angle)
-
-    @property
-    def end_point(self) -> tuple[float, float]:
-        """Coordinates (2,) [m] of the end of the axis."""
-        return self.end if self.end is not None else self.coordinates(self.length_m)
-
-    def coordinates(self, distance: float) -> tuple[float, float]:
-        """Coordinates (2,) [m] of the point of the axis at a distance [m] from the start."""
-        return self.start[0] + distance * self.direction[0], self.start[1] + distance * self.direction[1]
-
-    @property
-    def point_names(self) -> tuple[str, ...]:
-        """Every named point: start, the user's in their order, end."""
-        return ("start", *self.points, "end")
-
-    def point_distance(self, name: str) -> float:
-        """Distance [m] of a named point from the start. Raises KeyError where there is none of that name."""
-        return {**self.points, "start": 0.0, "end": self.length_m}[name]
-
-    @property
-    def section(self) -> RectangularSection:
-        """The cross-section."""
-        return RectangularSection(self.width, self.thickness)
-
-
-Body = BeamBody  # later Annotated[BeamBody | SolidBody, Field(discriminator="type")]
-
-
 class Support(Table):
-    """[supports.NAME]: degrees of freedom of a point held, or moved with a prescribed velocity."""
+    """[supports.NAME]: degrees of freedom of a point or a boundary held, or moved with a prescribed velocity."""
 
-    at: str = Field(description=POINT)
+    at: str = Field(description=PLACE)
     fixed: Annotated[tuple[Direction, ...], Field(min_length=1)] = Field(
-        description='a list of "x", "y" and "rotation", at least one: the directions held'
+        description='a list of "x", "y", "z" and "rotation", at least one: the directions held'
     )
     velocity: Mapping[Direction, Number] = Field(
         default_factory=dict[Direction, float],
-        description="a table of prescribed velocities, each a number, x and y [m/s], rotation [rad/s]",
+        description="a table of prescribed velocities, each a number, x, y, z [m/s], rotation [rad/s]",
     )
 
 
 class Load(Table):
-    """[loads.NAME]: a force and a moment on a point, in global directions."""
+    """[loads.NAME]: a force and a moment on a point, in global directions; a force or a pressure on a boundary."""
 
-    at: str = Field(description=POINT)
-    force: Vector = Field(default=(0.0, 0.0), description="[x, y], two numbers [N]: the force")
-    moment: Number = Field(default=0.0, description="a number [N m], the moment, counter-clockwise")
+    at: str = Field(description=PLACE)
+    force: PlaneOrSpace = Field(
+        default=(0.0, 0.0), description="[x, y] or [x, y, z], numbers [N]: the force, on a boundary spread evenly"
+    )
+    moment: Number = Field(default=0.0, description="a number [N m], the moment, counter-clockwise, on a beam")
+    pressure: Number = Field(default=0.0, description="a number [Pa], the pressure that pushes on a boundary")
 
 
 _COEFFICIENT = "a number >= 0, the friction coefficient while sliding"
@@ -213,21 +128,60 @@ Friction = Annotated[CoulombTable | StaticKineticTable | WeakeningTable, Field(d
 
 
 class Contact(Table):
-    """[contacts.NAME]: a point of one body (slave) sliding along the line of another (master)."""
+    """[contacts.NAME]: a point of one body (slave) sliding along the line of another (master), or a boundary
+    sliding on a boundary or an obstacle."""
 
-    slave: str = Field(description=POINT)
-    master: str = Field(description="the NAME of a [bodies.NAME], the body whose line is touched")
+    slave: str = Field(description=PLACE)
+    master: str = Field(
+        description='the NAME of a beam or an obstacle, or a boundary, "body.boundary": what is touched'
+    )
     stiffness: Positive | Literal["rigid"] = Field(
-        description='a number > 0 [N/m] or "rigid", the normal stiffness'
+        description='a number > 0 [N/m], between boundaries per area [N/m³], or "rigid", the normal stiffness'
     )
     sliding: Literal["small", "finite"] = Field(
         default="small", description='"small" (the slave stays where it is on the master) or "finite"'
     )
     side: Literal["left", "right"] | None = Field(
         default=None,
-        description='"left" or "right", the side of the master\'s direction on which the slave lies',
+        description='"left" or "right", the side of a beam\'s direction on which the slave lies',
+    )
+    adjust: NotNegative = Field(
+        default=0.0,
+        description="a number >= 0 [m], gaps and overlaps of slave nodes up to this count as touching",
     )
     friction: Friction = Field(description='a table such as { law = "coulomb", coefficient = 0.1 }')
+
+
+class Tie(Table):
+    """[ties.NAME]: a boundary bonded to a boundary of another body; their meshes need not match."""
+
+    slave: str = Field(description='a boundary, "body.boundary", the one that follows (the finer mesh)')
+    master: str = Field(description='a boundary, "body.boundary", the one that leads')
+    tolerance: NotNegative | None = Field(
+        default=None, description="a number >= 0 [m], the largest distance between them (left out: 1 % of an element)"
+    )
+
+
+_END = 'a list of two points, "body.point" or for a mass "body"; the second may be "ground"'
+_ALONG = "[x, y] or [x, y, z], numbers: the direction it acts in (left out: the line between its ends)"
+
+
+class Spring(Table):
+    """[springs.NAME]: a massless spring between two points, or from a point to ground; relaxed at the start."""
+
+    between: tuple[str, str] = Field(description=_END)
+    stiffness: Number = Field(description="a number [N/m], the stiffness")
+    cubic: Number = Field(default=0.0, description="a number [N/m³], the factor of the cube of the elongation")
+    damping: NotNegative = Field(default=0.0, description="a number >= 0 [N s/m], a dashpot beside the spring")
+    direction: PlaneOrSpace | None = Field(default=None, description=_ALONG)
+
+
+class Dashpot(Table):
+    """[dashpots.NAME]: a viscous damper between two points, or from a point to ground."""
+
+    between: tuple[str, str] = Field(description=_END)
+    damping: NotNegative = Field(description="a number >= 0 [N s/m], the damping")
+    direction: PlaneOrSpace | None = Field(default=None, description=_ALONG)
 
 
 class Phase(Table):
@@ -277,6 +231,16 @@ class Modal(Table):
         default=201, description="a whole number >= 2, how many friction coefficients a sweep takes"
     )
     damped: Truth = Field(default=True, description="true or false, with or without damping")
+    friction_damping: Truth = Field(
+        default=False,
+        description="true or false, damping μN/v of friction across the direction of sliding (surfaces in space)",
+    )
+    prestress: Truth = Field(
+        default=False, description="true or false, geometric stiffness by the stresses of steady sliding (solids)"
+    )
+    solver: Literal["auto", "mumps", "pardiso", "superlu"] = Field(
+        default="auto", description='"auto", "mumps", "pardiso" or "superlu", the sparse direct solver'
+    )
 
 
 class Temporal(Table):
@@ -374,6 +338,9 @@ ENTRIES: Mapping[str, Any] = {
     "supports": Support,
     "loads": Load,
     "contacts": Contact,
+    "ties": Tie,
+    "springs": Spring,
+    "dashpots": Dashpot,
 }
 """Tables of named tables, and what each of their entries is."""
 SINGULAR = {
@@ -382,4 +349,7 @@ SINGULAR = {
     "supports": "support",
     "loads": "load",
     "contacts": "contact",
+    "ties": "tie",
+    "springs": "spring",
+    "dashpots": "dashpot",
 }

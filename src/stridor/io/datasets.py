@@ -13,6 +13,7 @@ from ..agreement import Agreement
 from ..errors import CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
+from ..temporal.node_history import NodeHistory
 from ..temporal.trajectory import STATUS, ContactStatistics, PhaseResult, Trajectory
 from ..typing import ComplexArray
 from .atomic import replacing
@@ -89,8 +90,30 @@ def load_trajectory(path: str | Path) -> Trajectory:
         phases=phases,
         state={name: data[f"restart_{name}"].values for name in names["state"]},
         provenance=json.loads(data.attrs["provenance"]),
+        nodes=_load_nodes(data, tuple(names["contacts"])),
         **scalars,
     )
+
+
+_NODE_FIELDS = {
+    "owner": (("slave_node",), "1"),
+    "position": (("slave_node", "direction"), "m"),
+    "area": (("slave_node",), "m2"),
+    "tangents": (("slave_node", "tangent", "direction"), "1"),
+    "normal_force": (("node_time", "slave_node"), "N"),
+    "tangential_force": (("node_time", "slave_node", "tangent"), "N"),
+    "slip_velocity": (("node_time", "slave_node", "tangent"), "m/s"),
+    "gap": (("node_time", "slave_node"), "m"),
+    "status": (("node_time", "slave_node"), "1"),
+}
+
+
+def _load_nodes(data: Any, contacts: tuple[str, ...]) -> NodeHistory | None:
+    """Histories of every slave node, None where the run kept none."""
+    if "node_status" not in data:
+        return None
+    fields = {name: data[f"node_{name}"].values for name in _NODE_FIELDS}
+    return NodeHistory(names=contacts, time=data["node_time"].values, **fields)
 
 
 def _dataset(analysis: str, variables: Mapping[str, Any], coords: Mapping[str, Any], result: Result) -> Any:
@@ -184,11 +207,18 @@ def _trajectory(run: Trajectory) -> Any:
     for name, array in run.state.items():
         dims = tuple(f"restart_{name}_{k}" for k in range(np.ndim(array)))
         variables[f"restart_{name}"] = (dims, array)
+    if run.nodes is not None:
+        for name, (dims, units) in _NODE_FIELDS.items():
+            values = getattr(run.nodes, name)
+            small = np.int8 if name == "status" else values.dtype
+            variables[f"node_{name}"] = (dims, values.astype(small), {"units": units})
+        variables["node_time"] = ("node_time", run.nodes.time, {"units": "s"})
+    axes = np.array(["x", "y", "z"][: run.displacement.shape[2]], dtype=object)
     coords = {
         "time": ("time", run.time, {"units": "s"}),
         "contact": ("contact", np.array(run.contact_names, dtype=object)),
         "point": ("point", np.array(run.watch_names, dtype=object)),
-        "direction": ("direction", np.array(["x", "y"], dtype=object)),
+        "direction": ("direction", axes),
     }
     data = _dataset("simulate", variables, coords, run)
     scalars = (

@@ -124,16 +124,33 @@ def complex_modes(
     max_frequency_hz: float | None = None,
     damped: bool = True,
     vectors: bool = False,
+    friction_damping: bool = False,
+    prestress: bool = False,
+    solver: str | None = None,
 ) -> ComplexModes:
     """Modes at the friction coefficients ``mu``, branches followed from μ = 0.
 
     count: how many branches, lowest frequencies at μ = 0 first; max_frequency_hz instead takes all
-    that start below it. vectors keeps left and right ones. Raises AnalysisError where contacts do
+    that start below it. vectors keeps left and right ones. Large systems and contacts over surfaces are solved on
+    the assembled matrices (`modal.assembled`); friction_damping (across the direction of sliding), prestress and
+    the direct solver matter there only. Raises AnalysisError where contacts do
     not slide, have no equilibrium, or branches cannot be told apart.
     """
     values = np.atleast_1d(np.asarray(mu, dtype=float))
     if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)) or np.any(values < 0):
         raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
+    if system.assembled:
+        from .assembled import Options, complex_modes_assembled
+
+        return complex_modes_assembled(
+            system,
+            values,
+            count=count,
+            max_frequency_hz=max_frequency_hz,
+            damped=damped,
+            vectors=vectors,
+            options=Options(friction_damping=friction_damping, prestress=prestress, solver=solver),
+        )
     if not damped:
         system = undamped(system)
     spectrum, coupling, open_contacts = prepare(system, mu=float(values.max()) if len(values) == 1 else None)

@@ -117,14 +117,27 @@ def onsets(
     *,
     max_frequency_hz: float = 40e3,
     damped: bool = True,
+    friction_damping: bool = False,
+    prestress: bool = False,
+    solver: str | None = None,
 ) -> Onsets:
     """Every critical μ in ``friction_range`` with a frequency up to ``max_frequency_hz``.
 
-    Raises CaseError for an empty range and AnalysisError where branches cannot be followed.
+    friction_damping, prestress and solver as in `complex_modes`. Raises CaseError for an empty range and AnalysisError where branches cannot be followed.
     """
     low, high = (float(v) for v in friction_range)
     if not (0 <= low < high and np.isfinite(high)):
         raise CaseError("friction_range", friction_range, "two numbers 0 ≤ a < b")
+    if system.assembled:
+        from .assembled import Options, onsets_assembled
+
+        return onsets_assembled(
+            system,
+            (low, high),
+            max_frequency_hz=max_frequency_hz,
+            damped=damped,
+            options=Options(friction_damping=friction_damping, prestress=prestress, solver=solver),
+        )
     if not damped:
         system = undamped(system)
     spectrum, coupling, open_contacts = prepare(system)

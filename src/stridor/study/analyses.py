@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,33 +16,43 @@ from ..errors import CaseError, Problem
 from ..modal.complex_modes import ComplexModes, complex_modes
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
-from ..sliding import full_motion, slip_speeds, steady_sliding
+from ..sliding import full_motion, slip_speeds
+from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
-from ..system.uncoupled import uncoupled_modes
 from ..temporal.beta2 import step_limit
 from ..temporal.energy import EnergyBalance, energy_balance
-from ..temporal.schedule import PhaseSpec
-from ..temporal.settings import SAFE_FRACTION, Settings
+from ..temporal.settings import SAFE_FRACTION
 from ..temporal.signals import Growth, components
 from ..temporal.simulate import Checkpoint, Progress
 from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
+from .body_modes import BodyModes, body_modes
+from .description import Description, describe
 from .provenance import provenance
+from .settings import phases_of, settings_of
+
+__all__ = [
+    "BodyModes",
+    "Description",
+    "RunSummary",
+    "body_modes",
+    "compare",
+    "describe",
+    "first_regime",
+    "friction_curve",
+    "modes",
+    "onsets",
+    "own_friction",
+    "phases_of",
+    "settings_of",
+    "simulate",
+    "steady_sliding",
+    "summarise",
+]
 
 EXPONENTIAL = 0.5  # rms of ln amplitude about the fitted line, above which nothing is called exponential
 MOST_BYTES = 8e9  # of records kept in memory
-
-
-def phases_of(case: Case) -> list[PhaseSpec]:
-    """The load phases of a case as the temporal approach takes them."""
-    return [PhaseSpec(p.name, p.duration, p.loads, p.velocities, p.ramp) for p in case.phases]
-
-
-def settings_of(case: Case) -> Settings:
-    """The temporal settings of a case."""
-    t = case.temporal
-    return Settings(t.step, t.beta2, t.record_every, t.path, t.initial, t.perturbation, tuple(t.watch))
 
 
 def modes(
@@ -70,16 +80,38 @@ def modes(
         max_frequency_hz=max_frequency_hz,
         damped=damped,
         vectors=vectors,
+        **_modal_options(case),
     )
     seconds = time.perf_counter() - started
     return replace(result, provenance=provenance(case, "modes", seconds, damped=damped))
 
 
+def _modal_options(case: Case) -> dict[str, Any]:
+    """What only large models and surfaces ask for."""
+    settings = case.modal
+    return {
+        "friction_damping": settings.friction_damping,
+        "prestress": settings.prestress,
+        "solver": None if settings.solver == "auto" else settings.solver,
+    }
+
+
+def steady_sliding(case: Case, mu: float | None = None) -> SurfaceSliding:
+    """The equilibrium under load and friction that both approaches start from, node by node of every contact.
+
+    mu replaces the friction coefficient of every contact. Raises AnalysisError where there is none.
+    """
+    return steady_sliding_nodes(build_system(case), mu=mu)
+
+
 def own_friction(case: Case) -> float | None:
     """The coefficient of all contacts at their slip speeds in steady sliding; None where they differ."""
     system = build_system(case)
-    speeds = np.abs(slip_speeds(system, full_motion(system)))
-    found = system.friction_coefficients(speeds)
+    nodes = system.contact_nodes()
+    speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
+    # The centre of a turning surface slides at no speed and has no say.
+    moving = speeds > 1e-9 * speeds.max(initial=0.0)
+    found = nodes.friction_coefficients(speeds)[moving] if moving.any() else nodes.friction_coefficients(speeds)
     if not len(found):
         return 0.0
     return float(found[0]) if np.ptp(found) <= 1e-12 * np.max(np.abs(found)) else None
@@ -113,6 +145,7 @@ def onsets(
         case.modal.friction_range if friction_range is None else friction_range,
         max_frequency_hz=max_frequency_hz or case.modal.max_frequency_hz,
         damped=case.modal.damped if damped is None else damped,
+        **_modal_options(case),
     )
     return replace(result, provenance=provenance(case, "onsets", time.perf_counter() - started))
 
@@ -137,8 +170,28 @@ def simulate(
         progress=progress,
         checkpoint=checkpoint,
         restart=restart,
+        disturbance=None if system.assembled else _initial_state(case, system),
     )
     return replace(result, provenance=provenance(case, "simulate", time.perf_counter() - started, mu=mu))
+
+
+def _initial_state(case: Case, system: System) -> tuple[Array, Array, Array] | None:
+    """Displacement, velocity and acceleration (n,) that bodies start with, None at rest."""
+    if system.initial_displacement is None and system.initial_velocity is None:
+        return None
+    zero = np.zeros(system.size)
+    displacement = zero if system.initial_displacement is None else system.initial_displacement
+    velocity = zero if system.initial_velocity is None else system.initial_velocity
+    force = -(system.stiffness @ displacement) - system.damping @ velocity
+    factors = {**dict.fromkeys(system.loads, 1.0), **case.phases[0].loads}
+    if case.phases[0].ramp == 0:
+        for name, vector in system.loads.items():
+            force = force + factors[name] * vector
+    mass = system.mass
+    diagonal = mass.diagonal()
+    # The scheme starts from the acceleration that the forces give; a consistent mass only delays it by half a step.
+    acceleration = force / diagonal if mass.nnz == np.count_nonzero(diagonal) else zero
+    return displacement, velocity, acceleration
 
 
 def _check_extent(case: Case, system: System) -> None:
@@ -150,11 +203,11 @@ def _check_extent(case: Case, system: System) -> None:
             "bodies that touch or are apart at the start; an overlap would be thrown open in one step: move a body",
         )
         for c in system.contacts
-        if c.gap < -1e-9 and case.temporal.initial == "rest"
+        if c.gap < -1e-9 and case.temporal.initial == "rest" and not system.assembled
     ]
     step = case.temporal.step or SAFE_FRACTION * step_limit(system, case.temporal.beta2).step
     steps = sum(p.duration for p in case.phases) / step
-    size = 8.0 * (6 * len(system.contacts) + 6 * len(case.temporal.watch) + 8)
+    size = 8.0 * (6 * len(system.contacts) + 6 * len(system.surfaces) + 6 * len(case.temporal.watch) + 8)
     needed = steps / case.temporal.record_every * size
     if steps > 1e12 or needed > MOST_BYTES:
         problems.append(
@@ -292,58 +345,12 @@ def summarise(case: Case, run: Trajectory) -> RunSummary:
     dominant, fitted = dominant_response(run, case.modal.max_frequency_hz)
     linear: complex | None = None
     perturbed = case.temporal.initial == "steady-sliding" and case.temporal.perturbation > 0
-    if perturbed and run.contact_names and case.contacts:
-        system = build_system(case)
+    system = build_system(case) if perturbed and run.contact_names and case.contacts else None
+    if system is not None and not system.assembled:
         found = linear_part(run, slip_speeds(system, full_motion(system)), skip=16)
         band = components(found, run.sampling, max_frequency_hz=case.modal.max_frequency_hz)
         linear = band.fastest or None
     return RunSummary(dominant, fitted, energy_balance(run), run, linear)
-
-
-@dataclass(frozen=True)
-class BodyModes:
-    """Undamped modes of one body alone, supports included: frequency_hz (k,) and what they are
-    ("rigid", "F1" bending, "T1" traction, "FT3" mixed), by frequency."""
-
-    frequency_hz: Array
-    labels: tuple[str, ...]
-
-
-def body_modes(case: Case, *, max_frequency_hz: float | None = None) -> Mapping[str, BodyModes]:
-    """Modes of every body by itself (the first columns of the paper's Table II)."""
-    limit = max_frequency_hz or case.modal.max_frequency_hz
-    system = build_system(case)
-    modes_ = uncoupled_modes(replace(system, damping=0 * system.damping))
-    result: dict[str, BodyModes] = {}
-    for line in system.lines:
-        axis = np.array(case.bodies[line.name].direction)
-        entries: list[tuple[float, float]] = []
-        for block in modes_.real:
-            if not np.isin(block.freedoms[0], line.freedoms):
-                continue
-            shapes = np.zeros((system.size, len(block.stiffness)))
-            shapes[block.freedoms] = block.vectors
-            motion = (line.rows.free @ shapes).reshape(-1, 2, len(block.stiffness))
-            along = (np.einsum("kdm,d->km", motion, axis) ** 2).sum(axis=0)
-            share = along / np.maximum((motion**2).sum(axis=(0, 1)), 1e-300)
-            frequency = np.sqrt(np.maximum(block.stiffness, 0.0)) / (2 * np.pi)
-            entries += [(float(f), float(a)) for f, a in zip(frequency, share, strict=True) if f <= limit]
-        result[line.name] = _labelled(sorted(entries))
-    return result
-
-
-def _labelled(entries: list[tuple[float, float]]) -> BodyModes:
-    """Count bending and traction modes separately, from the share of motion along the axis."""
-    counts = {"F": 0, "T": 0, "FT": 0}
-    labels: list[str] = []
-    for frequency, along in entries:
-        if frequency == 0.0:
-            labels.append("rigid")
-            continue
-        kind = "T" if along > 0.7 else "F" if along < 0.3 else "FT"
-        counts[kind] += 1
-        labels.append(f"{kind}{counts[kind]}")
-    return BodyModes(np.array([f for f, _ in entries]), tuple(labels))
 
 
 def friction_curve(case: Case, frequency_hz: Array) -> Array:
@@ -353,7 +360,7 @@ def friction_curve(case: Case, frequency_hz: Array) -> Array:
     (docs/theory-modal.md). Raises CaseError for a case with another number of contacts.
     """
     system = build_system(case)
-    if len(system.contacts) != 1:
+    if len(system.contacts) != 1 or system.assembled:
         raise CaseError("contacts", len(system.contacts), "one contact: μ(ω) is a single curve only then")
     bare = replace(system, damping=0 * system.damping)
     from ..modal.complex_modes import prepare
@@ -363,86 +370,3 @@ def friction_curve(case: Case, frequency_hz: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         curve = -coupling.sense[0] * (coupling.compliance[0] + h[:, 0, 0].real) / h[:, 0, 1].real
     return np.asarray(curve)
-
-
-@dataclass(frozen=True)
-class Description:
-    """The model in words and numbers, as `stridor check` prints it."""
-
-    lines: tuple[str, ...]
-    data: dict[str, Any]
-    warnings: tuple[str, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain values."""
-        return {**self.data, "text": list(self.lines), "warnings": list(self.warnings)}
-
-
-def describe(case: Case) -> Description:
-    """Build the model, find its steady sliding and its step limit, and say it in words."""
-    from ..temporal.settings import choose_path, choose_step
-
-    system = build_system(case)
-    settings = settings_of(case)
-    limit = step_limit(system, settings.beta2)
-    step = choose_step(limit, settings)
-    _, reason = choose_path(system, settings)
-    path = "modal" if reason.startswith("complete") else "nodal"
-    lines = [f"{case.title or 'case'}: {len(case.bodies)} bodies, {system.size} free degrees of freedom"]
-    for name, body in case.bodies.items():
-        count = next(len(line.freedoms) for line in system.lines if line.name == name)
-        lines.append(
-            f"  {name}: beam of {body.elements} elements, {body.length_m:g} m × {body.width:g} m × "
-            f"{body.thickness:g} m, {body.material}, {body.mass} mass, {count} free"
-        )
-    for name, support in case.supports.items():
-        moving = (
-            ", moves at " + ", ".join(f"{d} {v:g}" for d, v in support.velocity.items()) if support.velocity else ""
-        )
-        lines.append(f"  support {name} at {support.at} holds {', '.join(support.fixed)}{moving}")
-    for name, load in case.loads.items():
-        lines.append(f"  load {name} at {load.at}: ({load.force[0]:g}, {load.force[1]:g}) N, {load.moment:g} N m")
-    data: dict[str, Any] = {
-        "title": case.title,
-        "bodies": {line.name: len(line.freedoms) for line in system.lines},
-        "degrees_of_freedom": system.size,
-        "contacts": {},
-        "step": step,
-        "step_limit": limit.step,
-        "limiting_body": limit.body,
-        "path": path,
-        "steps": sum(round(p.duration / step) for p in case.phases),
-    }
-    if system.contacts and system.loads:
-        steady = steady_sliding(system)
-        for k, contact in enumerate(system.contacts):
-            stiffness = "rigid" if np.isinf(contact.stiffness) else f"{contact.stiffness:g} N/m"
-            state = f"{steady.normal_force[k]:.6g} N" if steady.active[k] else "open"
-            table = case.contacts[contact.name]
-            lines.append(
-                f"  contact {contact.name}: {table.slave} on {table.master}, μ = "
-                f"{steady.friction_coefficient[k]:g}, {stiffness}, {contact.sliding} sliding, normal force {state}, "
-                f"slip speed {abs(steady.slip_speed[k]):g} m/s in steady sliding"
-            )
-            data["contacts"][contact.name] = {
-                "normal_force": float(steady.normal_force[k]),
-                "slip_speed": float(steady.slip_speed[k]),
-                "touches": bool(steady.active[k]),
-                "gap": contact.gap,
-            }
-    lines.append(
-        f"time step {step:.4g} s, {100 * step / limit.step:.0f} % of the stability limit {limit.step:.4g} s "
-        f"(set by {limit.body}); {data['steps']} steps"
-    )
-    lines.append(f"time loop: {path} path ({reason})")
-    warnings = list(case.warnings)
-    for contact in system.contacts:
-        if contact.gap < -1e-9:
-            warnings.append(f"contact {contact.name}: the bodies overlap by {-contact.gap:g} m; simulate refuses that")
-        elif contact.gap > 1e-9:
-            lines.append(f"contact {contact.name} is open by {contact.gap:g} m at the start")
-    if system.contacts and not any(np.any(v) for v in system.loads.values()):
-        warnings.append(
-            "no load presses the bodies together: modes take the contacts as closed, a run would not keep them so"
-        )
-    return Description(tuple(lines), data, tuple(warnings))

@@ -12,8 +12,10 @@ import numpy as np
 from ..agreement import Agreement, mode_shape
 from ..case import Case
 from ..errors import AnalysisError
+from ..modal.assembled import friction_energy
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
+from ..sliding.surfaces import SurfaceSliding
 from ..system import System, build_system
 from ..temporal.shapes import operating_shape
 from ..temporal.simulate import Progress
@@ -34,7 +36,10 @@ class Everything:
 
     sweeps run over the whole friction range, zooms around the first onset. curve: frequency_hz and μ(ω) of the
     undamped receptance. operating: velocity shape of the run at its dominant frequency by body (k, 2);
-    shape: that of the mode to compare with, and shape_mode its λ. seconds by analysis.
+    shape: that of the mode to compare with, and shape_mode its λ. seconds by analysis. For large models and contact
+    over surfaces there are no undamped sweeps, no curve and no operating shape; steady is their equilibrium, own the
+    modes at the friction of the case, vector
+    (n,) the mode that grows fastest (or decays slowest) and energy (m,) what friction feeds into it at each node.
     """
 
     case: Case
@@ -42,11 +47,11 @@ class Everything:
     description: Description
     bodies: Mapping[str, BodyModes]
     coupled: ComplexModes
-    sweep_undamped: ComplexModes
+    sweep_undamped: ComplexModes | None
     sweep_damped: ComplexModes
     zoom_undamped: ComplexModes | None
     zoom_damped: ComplexModes | None
-    onsets_undamped: Onsets
+    onsets_undamped: Onsets | None
     onsets_damped: Onsets
     curve: tuple[Array, Array] | None
     run: Trajectory
@@ -57,6 +62,10 @@ class Everything:
     agreement: Agreement | None
     seconds: Mapping[str, float]
     notes: tuple[str, ...] = field(default=())
+    steady: SurfaceSliding | None = None
+    own: ComplexModes | None = None
+    vector: ComplexArray | None = None
+    energy: Array | None = None
 
 
 class _Clock:
@@ -87,6 +96,8 @@ def compute_everything(
     clock = _Clock(log or _silent)
     keep = keep or _keep_nothing
     system = build_system(case)
+    if system.assembled:
+        return _large(case, system, clock, progress, keep)
     description = analyses.describe(case)
     limit = case.modal.max_frequency_hz
     mus = np.linspace(*case.modal.friction_range, case.modal.sweep_points)
@@ -134,6 +145,89 @@ def compute_everything(
         seconds=clock.seconds,
         notes=tuple(notes),
     )
+
+
+def _large(
+    case: Case,
+    system: System,
+    clock: _Clock,
+    progress: Progress | None,
+    keep: Callable[[str, object], None],
+) -> Everything:
+    """Large models and contact over surfaces: what tells most for its time."""
+    notes: list[str] = []
+    limit = case.modal.max_frequency_hz
+    description = clock("check", lambda: analyses.describe(case))
+    steady = clock("check", lambda: _or_note(lambda: analyses.steady_sliding(case), notes, "no steady sliding"))
+    bodies = clock("modes", lambda: analyses.body_modes(case))
+    coupled = clock("modes", lambda: analyses.modes(case, 0.0, max_frequency_hz=limit, damped=False))
+    mus = np.linspace(*case.modal.friction_range, case.modal.sweep_points)
+    sweep = clock("modes", lambda: analyses.modes(case, mus, max_frequency_hz=limit))
+    keep("modes", sweep)
+    found = clock("onsets", lambda: analyses.onsets(case))
+    keep("onsets", found)
+    mu = analyses.own_friction(case)
+    own = (
+        None
+        if mu is None
+        else clock("modes", lambda: analyses.modes(case, mu, max_frequency_hz=limit, vectors=True))
+    )
+    vector, mode, energy = (None, None, None) if own is None else _squealing(system, own)
+    run = clock("simulate", lambda: analyses.simulate(case, progress=progress))
+    keep("simulate", run)
+    summary = analyses.summarise(case, run)
+    agreement = None
+    if not run.interrupted:
+        agreement = clock("compare", lambda: _or_note(lambda: _compare(case, run, clock.log), notes, "no comparison"))
+        if agreement is not None:
+            keep("compare", agreement)
+    return Everything(
+        case=case,
+        system=system,
+        description=description,
+        bodies=bodies,
+        coupled=coupled,
+        sweep_undamped=None if case.modal.damped else sweep,
+        sweep_damped=sweep,
+        zoom_undamped=None,
+        zoom_damped=None,
+        onsets_undamped=None if case.modal.damped else found,
+        onsets_damped=found,
+        curve=None,
+        run=run,
+        summary=summary,
+        operating=None,
+        shape=None if vector is None else mode_shape(system, vector),
+        shape_mode=mode,
+        agreement=agreement,
+        seconds=clock.seconds,
+        notes=tuple(notes),
+        steady=steady,
+        own=own,
+        vector=vector,
+        energy=energy,
+    )
+
+
+def _or_note(call: Callable[[], T], notes: list[str], what: str) -> T | None:
+    """The result, or None and a note why there is none."""
+    try:
+        return call()
+    except AnalysisError as error:
+        notes.append(f"{what}: {error}")
+        return None
+
+
+def _squealing(
+    system: System, modes: ComplexModes
+) -> tuple[ComplexArray | None, complex | None, Array | None]:
+    """The mode that grows fastest or decays slowest, its λ, and the energy friction feeds in at each node."""
+    vibrating = np.flatnonzero(modes.frequency_hz[0] > 0)
+    if modes.right is None or not len(vibrating):
+        return None, None, None
+    fastest = int(vibrating[np.argmax(modes.growth_rate[0][vibrating])])
+    energy = friction_energy(system, modes, 0, fastest) if system.contact_nodes().count else None
+    return modes.right[0, fastest], complex(modes.eigenvalues[0, fastest]), energy
 
 
 def _silent(text: str) -> None:

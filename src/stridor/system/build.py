@@ -1,198 +1,207 @@
-"""A case becomes a System: bodies assembled, supports applied, contacts paired."""
+"""A case becomes a System: bodies assembled, bonded, supported, linked and loaded, contacts paired."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..case import Case
-from ..case.schema import BeamBody
-from ..case.schema import Contact as ContactCase
-from ..contact.interface import Contact, Rows, pair
-from ..errors import CaseError
-from ..fe.assembly import assemble_beam
-from ..fe.beam import DOF_PER_NODE, BeamElement, BeamMesh
-from ..typing import IntArray, Sparse
-from .model import Constraint, Line, PrescribedMotion, Structure, System, constrain
-
-_DIRECTIONS = {"x": 0, "y": 1, "rotation": 2}
-
-
-@dataclass(frozen=True)
-class _Body:
-    """A meshed body and where its freedoms start in the structure."""
-
-    name: str
-    mesh: BeamMesh
-    offset: int
-
-    @property
-    def size(self) -> int:
-        return DOF_PER_NODE * (self.mesh.elements + 1)
+from ..case.bodies import MassBody, SolidBody
+from ..case.points import BoundaryRef
+from ..case.schema import Load
+from ..contact.interface import Rows
+from ..fe.solid import stress_stiffness
+from ..mesh.boundary import require_boundary
+from ..mesh.facets import facet_areas, pressure_load, traction_load
+from ..typing import Array, IntArray, Sparse
+from .bodies import BuiltBody, build_bodies
+from .links import Links, links_of
+from .model import CubicSprings, Line, PrescribedMotion, Solid, Structure, System, constrain
+from .pairs import is_point_on_line, point_contact, surface_contact
+from .supports import constraints_of, tie_matrix, tied_mass
+from .view import View
 
 
 def build_system(case: Case) -> System:
-    """Assemble a case. Raises CaseError where bodies that shall touch do not."""
-    bodies, structure = _assemble(case)
-    constraints = [_constraint(case, bodies, name) for name in case.supports]
-    free, motion = constrain(structure, constraints)
-    view = _View(bodies, structure.mass.shape[0], free, motion, constraints)
-    references = {
-        **{f"{name}.{point}": None for name, body in case.bodies.items() for point in body.point_names},
-        **{at: None for at in case.temporal.watch},
-    }
-    points = {at: view.point_rows(case, at) for at in references}
-    loads = {
-        name: view.point_rows(case, load.at).free.T @ np.array([*load.force, load.moment])
-        for name, load in case.loads.items()
-    }
-    contacts = tuple(_contact(case, view, name, contact) for name, contact in case.contacts.items())
-    lines = tuple(
-        Line(
-            body.name,
-            body.mesh.coordinates(),
-            view.node_rows(body),
-            np.flatnonzero((free >= body.offset) & (free < body.offset + body.size)),
-        )
+    """Assemble a case. Raises CaseError where a mesh will not do or bodies that shall touch do not."""
+    bodies = build_bodies(case)
+    total = sum(body.size for body in bodies.values())
+    links = links_of(case, bodies, total)
+    constraints = constraints_of(case, bodies)
+    held = {f for c in constraints for f in c.freedoms}
+    tied = tie_matrix(case, bodies, total, held)
+    tie, followers = (None, np.zeros(0, dtype=np.int64)) if tied is None else tied
+    structure = _structure(bodies, links, tie)
+    free, motion = constrain(structure, constraints, dropped=followers)
+    motion = _with_sliding(case, motion)
+    view = View(bodies, total, free, motion, constraints, tie)
+    points = {at: view.point_rows(case, at) for at in _references(case)}
+    loads = {name: _load(case, view, name, load) for name, load in case.loads.items()}
+    contacts, surfaces = [], []
+    for name, contact in case.contacts.items():
+        if is_point_on_line(case, contact):
+            contacts.append(point_contact(case, view, name, contact))
+        else:
+            surfaces.append(surface_contact(case, view, name, contact))
+    names = _dof_names(bodies)
+    solids = tuple(
+        Solid(body.name, body.points, _cells(body), view.node_rows(body), view.freedoms_of(body))
         for body in bodies.values()
+        if body.beam is None
     )
     return System(
         mass=structure.mass[free][:, free],
         damping=structure.damping[free][:, free],
         stiffness=structure.stiffness[free][:, free],
-        contacts=contacts,
+        contacts=tuple(contacts),
         loads=loads,
         motion=motion,
         points=points,
-        lines=lines,
-        dof_names=tuple(view.dof_name(int(i)) for i in free),
+        lines=tuple(
+            Line(body.name, body.points, view.node_rows(body), view.freedoms_of(body))
+            for body in bodies.values()
+            if body.beam is not None
+        ),
+        dof_names=tuple(names[i] for i in free.tolist()),
+        surfaces=tuple(surfaces),
+        dimension=case.dimension,
+        solids=solids,
+        cubic=_cubic(view, links),
+        initial_velocity=_initial(case, view, "initial_velocity"),
+        initial_displacement=_initial(case, view, "initial_displacement"),
+        stress_stiffness=_stress_stiffness(case, view),
     )
 
 
-def _assemble(case: Case) -> tuple[dict[str, _Body], Structure]:
-    bodies: dict[str, _Body] = {}
-    masses, dampings, stiffnesses = [], [], []
-    offset = 0
+def _structure(bodies: Mapping[str, BuiltBody], links: Links, tie: Sparse | None) -> Structure:
+    parts = list(bodies.values())
+    mass, damping, stiffness = (
+        sp.csr_array(sp.block_diag([getattr(b, kind) for b in parts], format="csr"))
+        for kind in ("mass", "damping", "stiffness")
+    )
+    if links.rows.shape[0]:
+        damping = damping + links.rows.T @ sp.diags_array(links.damping) @ links.rows
+        stiffness = stiffness + links.rows.T @ sp.diags_array(links.stiffness) @ links.rows
+    if tie is not None:
+        mass = tied_mass(mass, tie)
+        damping, stiffness = tie.T @ damping @ tie, tie.T @ stiffness @ tie
+    return Structure(sp.csr_array(mass), sp.csr_array(damping), sp.csr_array(stiffness))
+
+
+def _with_sliding(case: Case, motion: PrescribedMotion) -> PrescribedMotion:
+    """Bodies that slide through their mesh, as motions that move no freedom."""
+    names = tuple(name for name in case.moving if name not in motion.names)
+    if not names:
+        return motion
+    extra, before = len(names), len(motion.names)
+
+    def wider(matrix: Array) -> Array:
+        return np.hstack([matrix, np.zeros((len(matrix), extra))])
+
+    def own(matrix: Array) -> Array:
+        whole = np.zeros((before + extra, before + extra))
+        whole[:before, :before] = matrix
+        return whole
+
+    return PrescribedMotion(
+        (*motion.names, *names),
+        wider(motion.lift),
+        wider(motion.mass),
+        wider(motion.damping),
+        own(motion.mass_own),
+        own(motion.damping_own),
+        own(motion.stiffness_own),
+    )
+
+
+def _references(case: Case) -> list[str]:
+    """Every named point, and those that are watched."""
+    named = [f"{name}.{point}" for name, beam in case.beams.items() for point in beam.point_names]
     for name, body in case.bodies.items():
-        mesh = _mesh(case, body)
-        mass, stiffness = assemble_beam(mesh, lumped=body.mass == "lumped")
-        masses.append(mass)
-        stiffnesses.append(stiffness)
-        dampings.append(body.damping.mass * mass + body.damping.stiffness * stiffness)
-        bodies[name] = _Body(name, mesh, offset)
-        offset += bodies[name].size
-    block = [sp.block_diag(part, format="csr") for part in (masses, dampings, stiffnesses)]
-    return bodies, Structure(*(sp.csr_array(b) for b in block))
+        if isinstance(body, MassBody):
+            named.append(name)
+        elif name not in case.beams:
+            named += [f"{name}.{point}" for point in getattr(body, "points", ())]
+    return list(dict.fromkeys([*named, *case.temporal.watch]))
 
 
-def _mesh(case: Case, body: BeamBody) -> BeamMesh:
-    material = case.materials[body.material]
-    area = body.width * body.thickness
-    second_moment = body.width * body.thickness**3 / 12
-    element = BeamElement(
-        length=body.length_m / body.elements,
-        axial_stiffness=material.young_modulus * area,
-        bending_stiffness=material.young_modulus * second_moment,
-        line_density=material.density * area,
-        direction=body.direction,
-    )
-    return BeamMesh(start=body.start, elements=body.elements, element=element)
+def _load(case: Case, view: View, name: str, load: Load) -> Array:
+    """Force vector (n,) of a load at factor one."""
+    at = case.place(load.at)
+    body = view.bodies[at.body]
+    if not isinstance(at, BoundaryRef):
+        rows = view.point_rows(case, load.at).free
+        if body.beam is not None:
+            return rows.T @ np.array([*load.force, load.moment])
+        force = np.zeros(body.dimension)
+        force[: len(load.force)] = load.force
+        return rows.T @ force
+    assert body.mesh is not None, "checked: boundaries belong to meshes"
+    require_boundary(body.mesh, at.boundary, f"loads.{name}.at")
+    facets = body.mesh.boundaries[at.boundary]
+    thickness = getattr(case.bodies[at.body], "thickness", 1.0) if body.dimension == 2 else 1.0
+    nodal = load.pressure * pressure_load(body.points, facets, thickness=thickness)
+    if any(load.force):
+        area = sum(float(a.sum()) for a in facet_areas(body.points, facets, thickness=thickness).values())
+        nodal = nodal + traction_load(body.points, facets, np.array(load.force) / area, thickness=thickness)
+    chosen = np.flatnonzero(np.any(nodal != 0.0, axis=1))
+    return view.node_rows(body, chosen).free.T @ nodal[chosen].ravel()
 
 
-def _constraint(case: Case, bodies: dict[str, _Body], name: str) -> Constraint:
-    support = case.supports[name]
-    at = case.point(support.at)
-    body = bodies[at.body]
-    node = body.mesh.node_at(at.distance)
-    if node is None:
-        raise CaseError(f"supports.{name}.at", support.at, "no mesh node there")
-    freedoms = tuple(body.offset + DOF_PER_NODE * node + _DIRECTIONS[d] for d in support.fixed)
-    velocity = tuple(float(support.velocity.get(d, 0.0)) for d in support.fixed)
-    return Constraint(name, freedoms, velocity)
+def _initial(case: Case, view: View, key: str) -> Array | None:
+    """Initial velocity or displacement (n,) of bodies that start so, None where none does."""
+    found: Array | None = None
+    for name, body in view.bodies.items():
+        vector = getattr(case.bodies[name], key, None)
+        if vector is None:
+            continue
+        if found is None:
+            found = np.zeros(len(view.free))
+        mine = view.freedoms_of(body)
+        found[mine] = np.array(vector)[(view.free[mine] - body.offset) % body.stride]
+    return found
 
 
-@dataclass(frozen=True)
-class _View:
-    """Rows on all freedoms turned into rows on free freedoms and prescribed motions."""
-
-    bodies: dict[str, _Body]
-    total: int
-    free: IntArray
-    motion: PrescribedMotion
-    constraints: list[Constraint]
-
-    def rows(self, full: Sparse) -> Rows:
-        whole = np.zeros((self.total, len(self.motion.names)))
-        whole[self.free] = self.motion.lift
-        moving = [c for c in self.constraints if c.moves]
-        for column, c in enumerate(moving):
-            whole[list(c.freedoms), column] = c.velocity
-        return Rows(sp.csr_array(full[:, self.free]), np.asarray(full @ whole))
-
-    def point_rows(self, case: Case, reference: str) -> Rows:
-        at = case.point(reference)
-        body = self.bodies[at.body]
-        freedoms, values = body.mesh.interpolation(at.distance)
-        full = sp.lil_array((3, self.total))
-        full[:, body.offset + freedoms] = values
-        return self.rows(full.tocsr())
-
-    def node_rows(self, body: _Body) -> Rows:
-        """Rows (2k, n): x and y of each node in turn."""
-        nodes = np.arange(body.mesh.elements + 1)
-        columns = (body.offset + DOF_PER_NODE * nodes[:, None] + np.arange(2)).ravel()
-        ones = np.ones(len(columns))
-        full = sp.coo_array((ones, (np.arange(len(columns)), columns)), shape=(len(columns), self.total))
-        return self.rows(full.tocsr())
-
-    def dof_name(self, index: int) -> str:
-        body = next(b for b in self.bodies.values() if b.offset <= index < b.offset + b.size)
-        node, direction = divmod(index - body.offset, DOF_PER_NODE)
-        return f"{body.name} node {node} {list(_DIRECTIONS)[direction]}"
+def _cubic(view: View, links: Links) -> CubicSprings | None:
+    chosen = np.flatnonzero(links.cubic)
+    if not len(chosen):
+        return None
+    return CubicSprings(view.rows(links.rows[chosen]), links.cubic[chosen])
 
 
-def _contact(case: Case, view: _View, name: str, contact: ContactCase) -> Contact:
-    at = case.point(contact.slave)
-    master = view.bodies[contact.master]
-    position = np.array(case.bodies[at.body].coordinates(at.distance))
-    slave = view.point_rows(case, contact.slave)
-    positions = master.mesh.coordinates()
-    built = pair(
-        name,
-        slave=Rows(slave.free[:2], slave.lift[:2]),
-        slave_position=position,
-        master=view.node_rows(master),
-        master_positions=positions,
-        side=_side(case, name, contact, at.body),
-        stiffness=np.inf if contact.stiffness == "rigid" else float(contact.stiffness),
-        law=contact.friction.law_object(),
-        sliding=contact.sliding,
-    )
-    if built is None:
-        raise CaseError(
-            f"contacts.{name}.slave",
-            contact.slave,
-            f"the point ({position[0]:g}, {position[1]:g}) m lies beyond the ends of {contact.master}; "
-            "move a body so that the slave faces the master line",
-        )
-    return built
+def _cells(body: BuiltBody) -> Mapping[str, IntArray]:
+    return {"vertex": np.zeros((1, 1), dtype=np.int64)} if body.mesh is None else dict(body.mesh.cells)
 
 
-def _side(case: Case, name: str, contact: ContactCase, slave_body: str) -> int:
-    """+1 where the slave body lies on the left of the master's direction, −1 on the right."""
-    if contact.side is not None:
-        return 1 if contact.side == "left" else -1
-    body, master = case.bodies[slave_body], case.bodies[contact.master]
-    middle = np.array(body.coordinates(body.length_m / 2)) - np.array(master.start)
-    c, s = master.direction
-    offset = float(c * middle[1] - s * middle[0])
-    if abs(offset) < 1e-9 * body.length_m:
-        raise CaseError(
-            f"contacts.{name}",
-            f"{slave_body} on {contact.master}",
-            "the slave body's middle lies on the master line, so the side of the contact is open; "
-            'write side = "left" or "right"',
-        )
-    return 1 if offset > 0 else -1
+def _dof_names(bodies: Mapping[str, BuiltBody]) -> list[str]:
+    return [body.freedom_name(local) for body in bodies.values() for local in range(body.size)]
+
+
+def _stress_stiffness(case: Case, view: View) -> Callable[[Array], Sparse] | None:
+    """Geometric stiffness on the free freedoms from the stresses of a displacement, None without solids."""
+    solids = [body for body in view.bodies.values() if body.mesh is not None]
+    if not solids:
+        return None
+    rows: dict[str, Rows] = {body.name: view.node_rows(body) for body in solids}
+
+    def stiffness(displacement: Array) -> Sparse:
+        total = sp.csr_array((len(view.free), len(view.free)))
+        for body in solids:
+            table = case.bodies[body.name]
+            assert isinstance(table, SolidBody), "meshed bodies are solids"
+            assert body.mesh is not None, "chosen for its mesh"
+            assert body.material is not None, "solids have a material"
+            own = rows[body.name].free
+            matrix = stress_stiffness(
+                body.mesh,
+                body.material,
+                model=table.model,
+                thickness=table.thickness,
+                displacement=own @ displacement,
+            )
+            total = total + own.T @ matrix @ own
+        return sp.csr_array(total)
+
+    return stiffness

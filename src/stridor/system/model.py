@@ -15,10 +15,10 @@ import scipy.sparse as sp
 from ..contact.interface import Contact, Rows
 from ..contact.nodes import ContactNodes, stack
 from ..contact.surfaces import SurfaceContact
+from ..direct import factorise
 from ..errors import AnalysisError
 from ..fe.assembly import connected_components
 from ..typing import Array, IntArray, Sparse
-
 
 COMPLETE_BASIS_LIMIT = 2500
 
@@ -91,8 +91,9 @@ class System:
     as drawn. dof_names (n,) say in words what a freedom is.
 
     surfaces: contacts with many slave nodes; dimension 2 or 3; solids: meshed bodies as drawn; cubic: springs beyond
-    the linear; initial_velocity (n,) [m/s] of bodies that start in motion; stress_stiffness gives the geometric
-    stiffness (n, n) csr that the stresses of a displacement (n,) [m] make, None where no body has any.
+    the linear; initial_velocity (n,) [m/s] and initial_displacement (n,) [m] of bodies that start so; stress_stiffness
+    gives the geometric stiffness (n, n) csr that the stresses of a displacement (n,) [m] make, None where no body
+    has any.
     """
 
     mass: Sparse
@@ -109,6 +110,7 @@ class System:
     solids: tuple[Solid, ...] = ()
     cubic: CubicSprings | None = None
     initial_velocity: Array | None = None
+    initial_displacement: Array | None = None
     stress_stiffness: Callable[[Array], Sparse] | None = None
 
     def __post_init__(self) -> None:
@@ -195,10 +197,17 @@ class Constraint:
         return any(v != 0.0 for v in self.velocity)
 
 
-def constrain(structure: Structure, constraints: list[Constraint]) -> tuple[IntArray, PrescribedMotion]:
-    """Free freedoms (n,) and the prescribed motions of a structure held by ``constraints``."""
+def constrain(
+    structure: Structure, constraints: list[Constraint], dropped: IntArray | None = None
+) -> tuple[IntArray, PrescribedMotion]:
+    """Free freedoms (n,) and the prescribed motions of a structure held by ``constraints``.
+
+    dropped: freedoms that follow others and are no unknowns of their own.
+    """
     total = structure.mass.shape[0]
     held = np.zeros(total, dtype=bool)
+    if dropped is not None:
+        held[dropped] = True
     for c in constraints:
         held[list(c.freedoms)] = True
     free = np.flatnonzero(~held)
@@ -226,6 +235,27 @@ def constrain(structure: Structure, constraints: list[Constraint]) -> tuple[IntA
     return free, PrescribedMotion(names, lift, mass, damping, mass_own, damping_own, stiffness_own)
 
 
+DENSE_LIFT = 3000
+
+
+def _answer(block: Sparse, load: Array) -> Array:
+    """Least-norm answer of a semidefinite block; large ones are held by faint springs instead."""
+    if block.shape[0] > DENSE_LIFT:
+        faint = sp.diags_array(1e-9 * block.diagonal())
+        factor = factorise(sp.csr_array(block + faint), symmetric=True)
+        answer = factor.solve(load)
+        for _ in range(3):
+            answer = answer + factor.solve(load - block @ answer)
+        return answer
+    dense = block.toarray()
+    try:
+        held = sl.cho_factor(dense)
+        answer = sl.cho_solve(held, load)
+        return answer + sl.cho_solve(held, load - dense @ answer)
+    except sl.LinAlgError:
+        return np.linalg.lstsq(dense, load, rcond=1e-12)[0]
+
+
 def _static_lift(structure: Structure, free: IntArray, selection: Array) -> Array:
     """L with K_ff L = −K_fp: the static answer, of least norm where the structure is free to move."""
     stiffness = sp.csr_array(structure.stiffness)
@@ -235,13 +265,8 @@ def _static_lift(structure: Structure, free: IntArray, selection: Array) -> Arra
     for part in connected_components(inner):
         if not np.any(load[part]):
             continue
-        block = inner[part][:, part].toarray()
-        try:
-            factor = sl.cho_factor(block)
-            answer = sl.cho_solve(factor, load[part])
-            answer += sl.cho_solve(factor, load[part] - block @ answer)
-        except sl.LinAlgError:
-            answer = np.linalg.lstsq(block, load[part], rcond=1e-12)[0]
+        block = sp.csr_array(inner[part][:, part])
+        answer = _answer(block, load[part])
         if np.linalg.norm(block @ answer - load[part]) > 1e-6 * np.linalg.norm(load[part]):
             raise AnalysisError(
                 "a moving support cannot be followed statically: its motion loads a mechanism that "

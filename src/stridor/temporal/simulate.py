@@ -82,6 +82,20 @@ def simulate(
         record_every=settings.record_every,
         watch=settings.watch,
     )
+    if system.assembled:
+        from .assembled import simulate_assembled
+
+        return simulate_assembled(
+            system,
+            phases,
+            settings,
+            mu=mu,
+            progress=progress,
+            checkpoint=checkpoint,
+            checkpoint_seconds=checkpoint_seconds,
+            restart=restart,
+            disturbance=disturbance,
+        )
     if mu is not None:
         system = system.with_friction(mu, np.abs(slip_speeds(system, np.ones(len(system.motion.names)))))
     limit = step_limit(system, settings.beta2)

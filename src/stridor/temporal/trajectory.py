@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array, IntArray
+from .node_history import NodeHistory
 
 STATUS = ("separation", "stick", "slip")
 
@@ -84,6 +85,7 @@ class Trajectory:
     body_velocity: Mapping[str, Array] = field(default_factory=dict)
     state: Mapping[str, Array] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
+    nodes: NodeHistory | None = None
 
     @property
     def sampling(self) -> float:

@@ -36,6 +36,14 @@ def model_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             f"Drawing of {', '.join(line.name for line in inputs.system.lines)} with supports, loads and contacts.",
             plots.model_plot(inputs.system, inputs.case),
         )
+    if inputs.system is not None and any(solid.cells.keys() - {"vertex"} for solid in inputs.system.solids):
+        yield ReportFigure(
+            "mesh",
+            "The mesh",
+            "Bodies as meshed, each in its colour; dots are the slave nodes of the contacts.",
+            f"Drawing of the meshes of {', '.join(solid.name for solid in inputs.system.solids)}.",
+            plots.mesh(inputs.system),
+        )
 
 
 def first_onset(inputs: ReportInputs) -> Onset | None:

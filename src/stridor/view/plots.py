@@ -5,8 +5,11 @@ Each returns the matplotlib figure; it belongs to no window, so it needs no disp
 """
 
 from .agreement_plots import growth_comparison, perturbation_growth, spectrum_map
+from .field_plots import contact_map, contact_snapshot, interface_energy
 from .modal_plots import damping_branches, frequency_branches, friction_curve, growth_branches, root_locus
 from .shape_plots import mode_shape, model_plot, shapes_side_by_side
+from .solid_plots import mesh
+from .solid_plots import mode_shape as solid_mode_shape
 from .temporal_plots import (
     acceleration_history,
     contact_force_and_velocity,
@@ -21,18 +24,23 @@ __all__ = [
     "acceleration_history",
     "contact_force_and_velocity",
     "contact_history",
+    "contact_map",
+    "contact_snapshot",
     "damping_branches",
     "energy_plot",
     "frequency_branches",
     "friction_curve",
     "growth_branches",
     "growth_comparison",
+    "interface_energy",
+    "mesh",
     "mode_shape",
     "model_plot",
     "perturbation_growth",
     "phase_portrait",
     "root_locus",
     "shapes_side_by_side",
+    "solid_mode_shape",
     "spectrogram_plot",
     "spectrum_map",
     "spectrum_plot",

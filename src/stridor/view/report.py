@@ -15,14 +15,16 @@ from pathlib import Path
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.figure import Figure
 
+from .body_words import bodies_table
 from .figures import ReportFigure, agreement_figures, modal_figures, model_figures, temporal_figures
 from .inputs import ReportInputs
 from .modal_tables import frequency_tables, modes_table, onset_tables
 from .style import styled
+from .surface_figures import contact_figures, shape_figures, surface_table
 from .tables import Row, Table, number
 from .temporal_tables import agreement_table, contact_table, energy_table, identified_table, values_table
 from .windows import Window, regime_window
-from .words import bodies_table, model_in_words, simulation_table, summary_table, verdict
+from .words import model_in_words, simulation_table, summary_table, verdict
 
 PNG_DPI = 180
 _UNIT = re.compile(r"(\d) (Hz|kHz|N/m|N|m/s²|m/s|1/s|mm|s|GPa|%)(?!\w)")
@@ -107,7 +109,7 @@ def sections(inputs: ReportInputs) -> list[Section]:
             "model",
             "The model",
             lines=tuple(model_in_words(inputs)),
-            parts=(*model_figures(inputs), bodies_table(inputs.case)),
+            parts=(*model_figures(inputs), bodies_table(inputs.case), *_surfaces(inputs)),
         ),
         Section("frequencies", "Natural frequencies", parts=tuple(frequency_tables(inputs))),
         _modal(inputs),
@@ -116,6 +118,11 @@ def sections(inputs: ReportInputs) -> list[Section]:
         _reference(inputs, window),
     ]
     return [chapter for chapter in chapters if not chapter.empty]
+
+
+def _surfaces(inputs: ReportInputs) -> tuple[Table, ...]:
+    table = surface_table(inputs)
+    return () if table is None else (table,)
 
 
 def _window(inputs: ReportInputs) -> Window | None:
@@ -127,6 +134,7 @@ def _window(inputs: ReportInputs) -> Window | None:
 
 def _modal(inputs: ReportInputs) -> Section:
     parts: list[Table | ReportFigure] = [*onset_tables(inputs), *modal_figures(inputs)]
+    parts.extend(shape_figures(inputs))
     if inputs.modes is not None:
         mu = float(inputs.modes.mu[0]) if inputs.mu is None else inputs.mu
         parts.append(modes_table(inputs.modes, mu, inputs.max_frequency_hz))
@@ -151,6 +159,7 @@ def _temporal(inputs: ReportInputs, window: Window | None) -> Section:
         if inputs.trajectory.contact_names:
             parts.append(contact_table(inputs.trajectory))
     parts.extend(temporal_figures(inputs, window))
+    parts.extend(contact_figures(inputs))
     if inputs.energy is not None:
         parts.append(energy_table(inputs.energy))
     said = ()

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..agreement import GOOD_FREQUENCY, GOOD_GROWTH
-from ..case import Case
-from ..case.schema import Contact
+from .body_words import body_words, contact_words
 from .inputs import ReportInputs
 from .tables import Row, Table, drop_empty, significant
 from .temporal_tables import agreed, critical_row, mac_row
@@ -155,29 +154,29 @@ def model_in_words(inputs: ReportInputs) -> list[str]:
     """Bodies, supports, loads, contacts and phases, a sentence each."""
     case = inputs.case
     lines: list[str] = []
-    for name, body in case.bodies.items():
-        x, y = body.direction
-        lines.append(
-            f"{name}: a beam of {case.materials[body.material].young_modulus / 1e9:g} GPa and "
-            f"{case.materials[body.material].density:g} kg/m³, {1e3 * body.length_m:g} × {1e3 * body.width:g} × "
-            f"{1e3 * body.thickness:g} mm, from ({1e3 * body.start[0]:g}, {1e3 * body.start[1]:g}) mm at "
-            f"{np.degrees(np.arctan2(y, x)):.4g}° to the x axis; {body.elements} elements, {body.mass} mass."
-        )
+    lines += [body_words(case, name, body) for name, body in case.bodies.items()]
     for name, support in case.supports.items():
         moving = [f"{v:g} {'rad/s' if d == 'rotation' else 'm/s'} ({d})" for d, v in support.velocity.items()]
         text = f"{name}: holds {_listed(list(support.fixed))} of {support.at}"
         lines.append(text + (f" and moves it with {_listed(moving)}." if moving else "."))
     for name, load in case.loads.items():
-        parts = (
-            [f"{np.hypot(*load.force):g} N, ({significant(load.force[0])}, {significant(load.force[1])}) N"]
-            if any(load.force)
-            else []
-        )
+        components = ", ".join(significant(f) for f in load.force)
+        parts = [f"{np.linalg.norm(load.force):g} N, ({components}) N"] if any(load.force) else []
+        parts += [f"a pressure of {load.pressure:g} Pa"] if load.pressure else []
         parts += [f"a moment of {load.moment:g} N m"] if load.moment else []
         lines.append(f"{name}: pushes {load.at} with {_listed(parts or ['nothing'])}.")
-    lines += [_contact_words(name, contact) for name, contact in case.contacts.items()]
+    lines += [
+        contact_words(name, contact, on_line=contact.master in case.beams) for name, contact in case.contacts.items()
+    ]
     if inputs.system is not None:
         lines.append(f"In all {inputs.system.size} freedoms that are not held.")
+    for name, tie in case.ties.items():
+        lines.append(f"{name}: {tie.slave} is bonded to {tie.master}.")
+    for name, spring in case.springs.items():
+        cubic = f" and {spring.cubic:g} N/m³ times the cube" if spring.cubic else ""
+        lines.append(f"{name}: a spring of {spring.stiffness:g} N/m{cubic} between {_listed(list(spring.between))}.")
+    for name, dashpot in case.dashpots.items():
+        lines.append(f"{name}: a dashpot of {dashpot.damping:g} N s/m between {_listed(list(dashpot.between))}.")
     if inputs.steady is not None and inputs.system is not None:
         for contact, force, speed in zip(
             inputs.system.contacts, inputs.steady.normal_force, inputs.steady.slip_speed, strict=True
@@ -188,40 +187,15 @@ def model_in_words(inputs: ReportInputs) -> list[str]:
     return lines
 
 
-def _contact_words(name: str, contact: Contact) -> str:
-    friction = contact.friction.model_dump()
-    law = friction.pop("law")
-    settings = ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in friction.items())
-    stiffness = "rigid" if contact.stiffness == "rigid" else f"with a stiffness of {significant(contact.stiffness)} N/m"
-    return (
-        f"{name}: {contact.slave} slides on {contact.master} ({contact.sliding} sliding), {stiffness} in the modal "
-        f"approach; friction law {law}, {settings}."
-    )
-
-
-def bodies_table(case: Case) -> Table:
-    """What the bodies are made of, one column each."""
-    bodies = list(case.bodies.items())
-    materials = [case.materials[body.material] for _, body in bodies]
-    lines = (
-        ("length × width × thickness [m]", [f"{b.length_m:g} × {b.width:g} × {b.thickness:g}" for _, b in bodies]),
-        ("Young's modulus [GPa]", [f"{m.young_modulus / 1e9:g}" for m in materials]),
-        ("density [kg/m³]", [f"{m.density:g}" for m in materials]),
-        ("damping α₁ (mass) [1/s]", [f"{b.damping.mass:g}" for _, b in bodies]),
-        ("damping α₂ (stiffness) [s]", [significant(b.damping.stiffness) for _, b in bodies]),
-        ("elements", [str(b.elements) for _, b in bodies]),
-        ("mass matrix", [b.mass for _, b in bodies]),
-    )
-    rows = tuple(Row((name, *values)) for name, values in lines)
-    return Table("bodies", "Bodies", ("", *(name for name, _ in bodies)), rows, frozenset({0}))
-
-
 def simulation_table(inputs: ReportInputs) -> Table:
     """How the run in time was made."""
     case, run = inputs.case, inputs.trajectory
     lines: list[tuple[str, str]] = []
     for name, load in case.loads.items():
-        lines.append((f"force {name}", f"{np.hypot(*load.force):g} N"))
+        if any(load.force) or not load.pressure:
+            lines.append((f"force {name}", f"{np.linalg.norm(load.force):g} N"))
+        if load.pressure:
+            lines.append((f"pressure {name}", f"{load.pressure:g} Pa"))
     for name, support in case.supports.items():
         lines += [
             (f"velocity {name}, {d}", f"{v:g} {'rad/s' if d == 'rotation' else 'm/s'}")

@@ -8,56 +8,26 @@ separation, shows which of the unstable modes responds and how it settles (paper
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from .errors import AnalysisError
-from .modal.complex_modes import ComplexModes, complex_modes
-from .modal.onsets import Onsets, onsets
-from .sliding import full_motion, slip_speeds
-from .system import System
-from .temporal.schedule import PhaseSpec
-from .temporal.shapes import operating_shape
-from .temporal.signals import Components, Growth, components, growth, low_passed, spectrum
-from .temporal.simulate import Settings, simulate
-from .temporal.trajectory import Trajectory
-from .threads import one_thread_if_small
-from .typing import Array, ComplexArray, IntArray
+from ..errors import AnalysisError
+from ..modal.complex_modes import ComplexModes, complex_modes
+from ..modal.onsets import Onsets, onsets
+from ..system import System
+from ..temporal.schedule import PhaseSpec
+from ..temporal.shapes import operating_shape
+from ..temporal.signals import Growth, growth, low_passed, spectrum
+from ..temporal.simulate import Settings, simulate
+from ..temporal.trajectory import Trajectory
+from ..threads import one_thread_if_small
+from ..typing import ComplexArray, IntArray
+from .assembled import modes_as_in_time, perturb_assembled
+from .perturbation import Perturbation, perturb
 
-PERTURBATION = 1e-5  # of the slip speed, at the start
-LINEAR = 0.02  # of the slip speed: beyond it the perturbation is no longer small
-PERTURBATION_DURATION = 0.03  # s, or this many periods of the lowest frequency of interest
 GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
-
-
-@dataclass(frozen=True)
-class Perturbation:
-    """Free vibration about steady sliding at one μ: λ of what grows fastest within the frequency range,
-    the signal (slip speed minus its steady value) [m/s] where it is linear, its sampling [s], and every
-    component found in it."""
-
-    mu: float
-    eigenvalue: complex
-    signal: Array
-    sampling: float
-    components: Components
-
-    @property
-    def growth_rate(self) -> float:
-        """Re λ [1/s]."""
-        return self.eigenvalue.real
-
-    @property
-    def frequency_hz(self) -> float:
-        """Im λ / 2π."""
-        return self.eigenvalue.imag / (2 * np.pi)
-
-    @property
-    def grows(self) -> bool:
-        """Whether it is unstable."""
-        return self.eigenvalue.real > 0
 
 
 @dataclass(frozen=True)
@@ -140,85 +110,6 @@ class Agreement:
         }
 
 
-def linear_part(run: Trajectory, steady: Array, *, skip: int = 0) -> Array:
-    """Slip speed minus its steady value (m,) of the contact that moves most, while all of them stay below
-    2 % of it; ``skip`` records at the start, which may hold the spike of a sudden impulse, are left out."""
-    signals = run.slip_speed - steady
-    over = np.flatnonzero(np.any(np.abs(signals) > LINEAR * np.abs(steady), axis=1))
-    last = int(over[0]) if len(over) else len(signals)
-    first = min(last // 8, skip)
-    contact = int(np.argmax(np.abs(signals[first:last]).max(axis=0, initial=0.0)))
-    return signals[first:last, contact]
-
-
-@one_thread_if_small
-def perturb(
-    system: System,
-    mu: float,
-    *,
-    settings: Settings,
-    max_frequency_hz: float = 40e3,
-    duration: float | None = None,
-) -> Perturbation:
-    """March a small perturbation of steady sliding and take its fastest component.
-
-    It starts with every mode of rigid contact up to ``max_frequency_hz`` in equal measure, 1e-5 of the
-    slip speed in all, so that frequencies out of range, which may grow faster, start from nothing; the
-    time scheme alone decides what becomes of them. It is used as long as it stays below 2 % of the slip
-    speed, where friction is still linear. Raises AnalysisError without steady sliding.
-    """
-    steady = slip_speeds(system, full_motion(system))
-    if not len(steady) or np.abs(steady).min() == 0:
-        raise AnalysisError("a perturbation of steady sliding needs contacts that slide")
-    speed = float(np.abs(steady).min())
-    # The reference configuration, as the modes have it, whatever the full run does (docs/case-file.md).
-    contacts = tuple(replace(c, stiffness=np.inf, sliding="small") for c in system.contacts)
-    rigid = replace(system, contacts=contacts)
-    start = replace(
-        settings,
-        initial="steady-sliding",
-        perturbation=0.0,
-        watch=(),
-        record_every=_every(settings, max_frequency_hz),
-    )
-    run = simulate(
-        rigid,
-        [PhaseSpec("perturbed", duration or PERTURBATION_DURATION, {}, {})],
-        start,
-        mu=mu,
-        disturbance=_band_limited(rigid, mu, PERTURBATION * speed, max_frequency_hz),
-    )
-    signal = linear_part(run, steady)
-    found = components(signal, run.sampling, max_frequency_hz=max_frequency_hz)
-    return Perturbation(mu, found.fastest, signal, run.sampling, found)
-
-
-def _band_limited(system: System, mu: float, slip_speed: float, max_frequency_hz: float) -> tuple[Array, Array, Array]:
-    """Displacement, velocity, acceleration (n,) of all modes up to a frequency, equal in slip speed."""
-    modes = complex_modes(system, mu, max_frequency_hz=max_frequency_hz, vectors=True)
-    assert modes.right is not None
-    tangents = system.contact_rows()[1::2]
-    total = np.zeros((3, system.size))
-    for number, (lam, vector) in enumerate(zip(modes.eigenvalues[0], modes.right[0], strict=True)):
-        slip = lam * (tangents @ vector)
-        largest = float(np.abs(slip).max())
-        # Modes that do not slip would need a huge amplitude to show in the slip speed; leave them out.
-        if largest < 1e-6 * abs(lam) * float(np.abs(vector).max()) or lam.imag == 0:
-            continue
-        # Phases spread by the golden angle, so that nothing adds up at the start.
-        scaled = vector / largest * np.exp(2.399963j * number)
-        total += np.real([scaled, lam * scaled, lam**2 * scaled])
-    count = max(len(modes.branch), 1)
-    return tuple(total * (slip_speed / count))  # type: ignore[return-value]
-
-
-def _every(settings: Settings, max_frequency_hz: float) -> int:
-    """Steps between records that keep six samples per period of the highest frequency."""
-    if settings.step is None:
-        return settings.record_every
-    return max(1, int(1.0 / (12 * max_frequency_hz * settings.step)))
-
-
 def critical_friction(
     system: System,
     bracket: tuple[float, float],
@@ -261,8 +152,11 @@ def modal_assurance(first: ComplexArray, second: ComplexArray) -> float:
 
 
 def mode_shape(system: System, vector: ComplexArray) -> dict[str, ComplexArray]:
-    """Displacements (k, 2) of the nodes of each line in an eigenvector (n,)."""
-    return {line.name: np.asarray(line.rows.free @ vector).reshape(-1, 2) for line in system.lines}
+    """Displacements (k, d) of the nodes of each body in an eigenvector (n,)."""
+    return {
+        body.name: np.asarray(body.rows.free @ vector).reshape(-1, system.dimension)
+        for body in (*system.lines, *system.solids)
+    }
 
 
 @one_thread_if_small
@@ -297,7 +191,7 @@ def compare(
     modal = found.first.mu if found.first else None
     temporal: float | None = None
     last: tuple[float, float] | None = None
-    finite = [c.name for c in system.contacts if c.sliding == "finite"]
+    finite = [c.name for c in (*system.contacts, *system.surfaces) if c.sliding == "finite"]
     notes: list[str] = []
     if finite:
         notes.append(
@@ -344,8 +238,14 @@ def _compare_at(
     run: Trajectory,
     max_frequency_hz: float,
 ) -> Comparison:
-    modes = complex_modes(system, mu, max_frequency_hz=1.02 * max_frequency_hz, vectors=True)
-    perturbation = perturb(system, mu, settings=settings, max_frequency_hz=max_frequency_hz)
+    if system.assembled:
+        modes = modes_as_in_time(system, mu, 1.02 * max_frequency_hz)
+        perturbation = perturb_assembled(
+            system, mu, settings=settings, max_frequency_hz=max_frequency_hz, modes=modes
+        )
+    else:
+        modes = complex_modes(system, mu, max_frequency_hz=1.02 * max_frequency_hz, vectors=True)
+        perturbation = perturb(system, mu, settings=settings, max_frequency_hz=max_frequency_hz)
     lam = modes.eigenvalues[0]
     inside = modes.unstable[0] & (modes.frequency_hz[0] <= max_frequency_hz)
     unstable = np.flatnonzero(inside)
@@ -358,7 +258,7 @@ def _compare_at(
     mac, responding = None, None
     if dominant:
         responding = _responding(modes, unstable, dominant)
-    if dominant and responding is not None:
+    if dominant and responding is not None and not system.assembled:
         # Without a mode that responds there is nothing to hold the shape against.
         shape = operating_shape(system, phases, settings, run, dominant, mu=mu)
         assert modes.right is not None

@@ -14,9 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from .errors import AnalysisError
-from .system import System
-from .typing import Array, BoolArray
+from ..errors import AnalysisError
+from ..system import System
+from ..typing import Array, BoolArray
 
 
 @dataclass(frozen=True)

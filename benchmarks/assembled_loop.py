@@ -1,0 +1,196 @@
+"""Time per step on assembled matrices: against the memory's speed, and against the loop one writes first with SciPy.
+
+A block of regular hexahedra (one element matrix, lumped mass) is marched by central differences, free and then resting
+with friction on a plane that moves. The plain loop is `K @ u` with SciPy's csr and three NumPy updates, no damping, no
+energies, no contact. Bandwidth is measured by a compiled in-place triad, a += s b, with as many threads and on as
+many bytes as the step streams, so that caches help both alike. Also shown: products of the forms of storage that were
+considered, with two threads where they can be shared out.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit, prange
+
+from _common import best, machine, options
+from stridor.contact.nodes import ContactNodes
+from stridor.laws import Coulomb
+from stridor.system import System
+from stridor.system.model import PrescribedMotion
+from stridor.temporal.assembled.machine import Machine, assembled_machine
+from stridor.temporal.assembled.march import simulate_assembled
+from stridor.temporal.assembled.products import add_rows, advance
+from stridor.temporal.assembled.storage import lay_out_freedoms, upper_blocks
+from stridor.temporal.beta2 import scheme
+from stridor.temporal.schedule import PhaseSpec
+from stridor.temporal.settings import Settings
+
+YOUNG, POISSON, DENSITY, EDGE = 200e9, 0.3, 7800.0, 1e-3
+
+
+def element_stiffness() -> np.ndarray:
+    """K (24, 24) of a cube of trilinear shape functions, 2 × 2 × 2 points, nodes with x fastest."""
+    corner = np.array([[i, j, k] for k, j, i in product((-1, 1), repeat=3)])
+    lam, mu = YOUNG * POISSON / (1 + POISSON) / (1 - 2 * POISSON), YOUNG / 2 / (1 + POISSON)
+    law = np.diag([2 * mu] * 3 + [mu] * 3)
+    law[:3, :3] += lam
+    stiffness = np.zeros((24, 24))
+    for point in product((-1 / np.sqrt(3), 1 / np.sqrt(3)), repeat=3):
+        factors = 1 + corner * np.array(point)
+        slope = np.stack([corner[:, d] * np.prod(np.delete(factors, d, axis=1), axis=1) / 8 for d in range(3)], axis=1)
+        slope *= 2 / EDGE
+        strain = np.zeros((6, 24))
+        for n, (x, y, z) in enumerate(slope):
+            strain[:, 3 * n : 3 * n + 3] = [[x, 0, 0], [0, y, 0], [0, 0, z], [y, x, 0], [0, z, y], [z, 0, x]]
+        stiffness += strain.T @ law @ strain * (EDGE / 2) ** 3
+    return stiffness
+
+
+def block(cells: int) -> tuple[System, np.ndarray]:
+    """A free cube of cells³ elements, and the numbers of its nodes (cells + 1, …) as [z, y, x]."""
+    count = cells + 1
+    node = np.arange(count**3).reshape(count, count, count)
+    corners = [node[k : k + cells, j : j + cells, i : i + cells].ravel() for k, j, i in product((0, 1), repeat=3)]
+    freedom = (3 * np.stack(corners, axis=1)[:, :, None] + np.arange(3)).reshape(-1, 24)
+    values = np.tile(element_stiffness().ravel(), len(freedom))
+    place = (np.repeat(freedom, 24, axis=1).ravel(), np.tile(freedom, (1, 24)).ravel())
+    stiffness = sp.coo_array((values, place)).tocsr()
+    mass = np.bincount(np.stack(corners).ravel(), minlength=count**3) * DENSITY * EDGE**3 / 8
+    size = 3 * count**3
+    return System(sp.diags_array(np.repeat(mass, 3)), sp.csr_array((size, size)), stiffness, dimension=3), node
+
+
+def resting(system: System, node: np.ndarray) -> System:
+    """The block pressed on a plane that moves along x at 1 m/s: every node of its lowest layer is a slave."""
+    feet = node[0].ravel()
+    m, n = len(feet), system.size
+    normal = sp.csr_array((np.ones(m), (np.arange(m), 3 * feet + 2)), shape=(m, n))
+    columns = (3 * feet[:, None] + np.arange(2)).ravel()
+    tangent = sp.csr_array((np.ones(2 * m), (np.arange(2 * m), columns)), shape=(2 * m, n))
+    nodes = ContactNodes(
+        names=("floor",), owner=np.zeros(m, dtype=np.int64), laws=(Coulomb(0.3),), normal=normal, tangent=tangent,
+        normal_lift=np.zeros((m, 1)), tangent_lift=np.tile([[-1.0], [0.0]], (m, 1)), gap=np.zeros(m),
+        area=np.full(m, EDGE**2), compliance=np.zeros(m), position=np.zeros((m, 3)),
+        normals=np.tile([0.0, 0.0, 1.0], (m, 1)), tangents=np.tile(np.eye(3)[:2], (m, 1, 1)),
+    )  # fmt: skip
+    empty, own = np.zeros((n, 1)), np.zeros((1, 1))
+    press = np.zeros(n)
+    press[3 * node[-1].ravel() + 2] = -1.0
+
+    class Resting(System):
+        def contact_nodes(self) -> ContactNodes:
+            return nodes
+
+    return Resting(
+        system.mass, system.damping, system.stiffness, (), {"press": press},
+        PrescribedMotion(("floor",), empty, empty, empty, own, own, own), dimension=3,
+    )  # fmt: skip
+
+
+@njit(parallel=True)
+def triad(a: np.ndarray, b: np.ndarray, threads: int) -> None:
+    for t in prange(threads):
+        for i in range(t * a.size // threads, (t + 1) * a.size // threads):
+            a[i] += 0.5 * b[i]
+
+
+@njit
+def scalar_upper(ptr, col, val, x, y):
+    for i in range(x.size):
+        total = 0.0
+        for p in range(ptr[i], ptr[i + 1]):
+            total += val[p] * x[col[p]]
+            y[col[p]] += val[p] * x[i]
+        y[i] += total
+
+
+@njit(parallel=True)
+def scalar_rows(ptr, col, val, x, y):
+    for t in prange(2):
+        for i in range(t * x.size // 2, (t + 1) * x.size // 2):
+            total = 0.0
+            for p in range(ptr[i], ptr[i + 1]):
+                total += val[p] * x[col[p]]
+            y[i] = total
+
+
+def plain_loop(system: System, dt: float, steps: int) -> float:
+    """Seconds per step of central differences as first written."""
+    stiffness, factor = system.stiffness, dt**2 / system.mass.diagonal()
+    u, before = np.random.default_rng(0).standard_normal(system.size), np.zeros(system.size)
+    started = time.perf_counter()
+    for _ in range(steps):
+        u, before = 2 * u - before - factor * (stiffness @ u), u
+    return (time.perf_counter() - started) / steps
+
+
+def step_bytes(ready: Machine) -> int:
+    """What a step has to stream: the matrix once, and of the vectors push, keep, kick once, u, q, y to and fro."""
+    stiffness = ready.structure.stiffness
+    return sum(x.nbytes for x in stiffness) + 9 * 8 * ready.layout.size
+
+
+def forms(system: System) -> None:
+    """Products with the forms of storage considered."""
+    x, y = np.random.default_rng(0).standard_normal(system.size), np.zeros(system.size)
+    full, half = system.stiffness, sp.triu(system.stiffness, format="csr")
+    arrays = [(m.indptr.astype(np.int64), m.indices, m.data) for m in (full, half)]
+    layout = lay_out_freedoms(system)
+    blocks = upper_blocks(full, layout)
+    z = layout.spread(x)
+    w = np.zeros_like(z)
+    every = replace(layout).blocks
+    print(f"  product, full csr, SciPy         {best(lambda: full @ x)[0] * 1e3:7.3f} ms")
+    print(f"  product, full csr, 2 threads     {best(lambda: scalar_rows(*arrays[0], x, y))[0] * 1e3:7.3f} ms")
+    print(f"  product, upper csr               {best(lambda: scalar_upper(*arrays[1], x, y))[0] * 1e3:7.3f} ms")
+    print(f"  product, upper {layout.width}×{layout.width} blocks        {best(lambda: add_rows(blocks, z, w, 0, every))[0] * 1e3:7.3f} ms")
+
+
+def measure(cells: int, short: bool) -> None:
+    system, node = block(cells)
+    dt = 0.5 * EDGE / np.sqrt(YOUNG * (1 - POISSON) / (1 + POISSON) / (1 - 2 * POISSON) / DENSITY)
+    ready = assembled_machine(system, scheme(dt, 0.5), system.contact_nodes())
+    fields, power = ready.fields, np.zeros(16)
+    fields.u[:] = 1e-9 * np.random.default_rng(0).standard_normal(ready.layout.size)
+    steps = 20 if short else 200
+
+    def march() -> None:
+        for _ in range(steps):
+            advance(ready.structure, fields, power)
+
+    ours = best(march, 2 if short else 4)[0] / steps
+    plain = min(plain_loop(system, dt, steps // 2) for _ in range(2))
+    threads = 2 if ready.structure.parts[0] < ready.layout.blocks else 1
+    streamed = step_bytes(ready)
+    a, b = np.zeros(streamed // 16), np.ones(streamed // 16)
+    speed = 24 * a.size / best(lambda: [triad(a, b, threads) for _ in range(steps)])[0] * steps
+    print(f"{system.size} freedoms, hex8, {threads} threads ({machine()})")
+    forms(system)
+    print(f"  step of the structure            {ours * 1e3:7.3f} ms, {system.size / ours / 1e6:.0f} million DOF-steps/s")
+    print(f"  streamed                         {streamed / 1e6:7.1f} MB, {streamed / ours / 1e9:.1f} GB/s, "
+          f"{streamed / ours / speed:.2f} of the triad's {speed / 1e9:.1f} GB/s on as many bytes")  # fmt: skip
+    print(f"  plain SciPy loop                 {plain * 1e3:7.3f} ms, ratio {plain / ours:.1f}")
+    floor = resting(system, node)
+    phase = [PhaseSpec("press", 2 * steps * dt, {"press": 1.0}, {"floor": 1.0})]
+    settings = Settings(step=dt, record_every=50)
+    simulate_assembled(floor, [PhaseSpec("press", 5 * dt, {}, {})], settings)
+    run = simulate_assembled(floor, phase, settings)
+    each = run.wall_seconds / run.steps
+    touching = int((run.nodes.status[-1] > 0).sum()) if run.nodes is not None else 0
+    print(f"  on a moving floor, all included  {each * 1e3:7.3f} ms, {touching} nodes touch, "
+          f"up to {run.most_sweeps} sweeps, ratio {plain / each:.1f}")  # fmt: skip
+
+
+def main() -> None:
+    args = options(__doc__ or "")
+    for cells in (26,) if args.short else (26, 32, 46):
+        measure(cells, args.short)
+
+
+if __name__ == "__main__":
+    main()

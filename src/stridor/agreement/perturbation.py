@@ -1,0 +1,135 @@
+"""Small perturbations of steady sliding, marched in time: λ as the temporal approach shows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..modal.complex_modes import complex_modes
+from ..sliding import full_motion, slip_speeds
+from ..system import System
+from ..temporal.schedule import PhaseSpec
+from ..temporal.signals import Components, components
+from ..temporal.simulate import Settings, simulate
+from ..temporal.trajectory import Trajectory
+from ..threads import one_thread_if_small
+from ..typing import Array
+
+PERTURBATION = 1e-5  # of the slip speed, at the start
+LINEAR = 0.02  # of the slip speed: beyond it the perturbation is no longer small
+PERTURBATION_DURATION = 0.03  # s, or this many periods of the lowest frequency of interest
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """Free vibration about steady sliding at one μ: λ of what grows fastest within the frequency range,
+    the signal (slip speed minus its steady value) [m/s] where it is linear, its sampling [s], and every
+    component found in it."""
+
+    mu: float
+    eigenvalue: complex
+    signal: Array
+    sampling: float
+    components: Components
+
+    @property
+    def growth_rate(self) -> float:
+        """Re λ [1/s]."""
+        return self.eigenvalue.real
+
+    @property
+    def frequency_hz(self) -> float:
+        """Im λ / 2π."""
+        return self.eigenvalue.imag / (2 * np.pi)
+
+    @property
+    def grows(self) -> bool:
+        """Whether it is unstable."""
+        return self.eigenvalue.real > 0
+
+
+def linear_part(run: Trajectory, steady: Array, *, skip: int = 0) -> Array:
+    """Slip speed minus its steady value (m,) of the contact that moves most, while all of them stay below
+    2 % of it; ``skip`` records at the start, which may hold the spike of a sudden impulse, are left out."""
+    signals = run.slip_speed - steady
+    over = np.flatnonzero(np.any(np.abs(signals) > LINEAR * np.abs(steady), axis=1))
+    last = int(over[0]) if len(over) else len(signals)
+    first = min(last // 8, skip)
+    contact = int(np.argmax(np.abs(signals[first:last]).max(axis=0, initial=0.0)))
+    return signals[first:last, contact]
+
+
+@one_thread_if_small
+def perturb(
+    system: System,
+    mu: float,
+    *,
+    settings: Settings,
+    max_frequency_hz: float = 40e3,
+    duration: float | None = None,
+) -> Perturbation:
+    """March a small perturbation of steady sliding and take its fastest component.
+
+    It starts with every mode of rigid contact up to ``max_frequency_hz`` in equal measure, 1e-5 of the
+    slip speed in all, so that frequencies out of range, which may grow faster, start from nothing; the
+    time scheme alone decides what becomes of them. It is used as long as it stays below 2 % of the slip
+    speed, where friction is still linear. Raises AnalysisError without steady sliding.
+    """
+    if system.assembled:
+        from .assembled import perturb_assembled
+
+        return perturb_assembled(
+            system, mu, settings=settings, max_frequency_hz=max_frequency_hz, duration=duration
+        )
+    steady = slip_speeds(system, full_motion(system))
+    if not len(steady) or np.abs(steady).min() == 0:
+        raise AnalysisError("a perturbation of steady sliding needs contacts that slide")
+    speed = float(np.abs(steady).min())
+    # The reference configuration, as the modes have it, whatever the full run does (docs/case-file.md).
+    contacts = tuple(replace(c, stiffness=np.inf, sliding="small") for c in system.contacts)
+    rigid = replace(system, contacts=contacts)
+    start = replace(
+        settings,
+        initial="steady-sliding",
+        perturbation=0.0,
+        watch=(),
+        record_every=_every(settings, max_frequency_hz),
+    )
+    run = simulate(
+        rigid,
+        [PhaseSpec("perturbed", duration or PERTURBATION_DURATION, {}, {})],
+        start,
+        mu=mu,
+        disturbance=_band_limited(rigid, mu, PERTURBATION * speed, max_frequency_hz),
+    )
+    signal = linear_part(run, steady)
+    found = components(signal, run.sampling, max_frequency_hz=max_frequency_hz)
+    return Perturbation(mu, found.fastest, signal, run.sampling, found)
+
+
+def _band_limited(system: System, mu: float, slip_speed: float, max_frequency_hz: float) -> tuple[Array, Array, Array]:
+    """Displacement, velocity, acceleration (n,) of all modes up to a frequency, equal in slip speed."""
+    modes = complex_modes(system, mu, max_frequency_hz=max_frequency_hz, vectors=True)
+    assert modes.right is not None
+    tangents = system.contact_rows()[1::2]
+    total = np.zeros((3, system.size))
+    for number, (lam, vector) in enumerate(zip(modes.eigenvalues[0], modes.right[0], strict=True)):
+        slip = lam * (tangents @ vector)
+        largest = float(np.abs(slip).max())
+        # Modes that do not slip would need a huge amplitude to show in the slip speed; leave them out.
+        if largest < 1e-6 * abs(lam) * float(np.abs(vector).max()) or lam.imag == 0:
+            continue
+        # Phases spread by the golden angle, so that nothing adds up at the start.
+        scaled = vector / largest * np.exp(2.399963j * number)
+        total += np.real([scaled, lam * scaled, lam**2 * scaled])
+    count = max(len(modes.branch), 1)
+    return tuple(total * (slip_speed / count))  # type: ignore[return-value]
+
+
+def _every(settings: Settings, max_frequency_hz: float) -> int:
+    """Steps between records that keep six samples per period of the highest frequency."""
+    if settings.step is None:
+        return settings.record_every
+    return max(1, int(1.0 / (12 * max_frequency_hz * settings.step)))

@@ -1,0 +1,32 @@
+"""Kinds of values that tables of a case file hold."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+NAME_RULE = "a letter, then letters, digits, _ or -"
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
+Label = Annotated[str, Field(min_length=1)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+Truth = Annotated[bool, Field(strict=True)]
+Vector = tuple[Number, Number]
+PlaneOrSpace = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
+Space = tuple[Number, Number, Number]
+Positives = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=3)]
+Count = Annotated[int, Field(strict=True, ge=1, le=100_000)]
+Counts = Annotated[tuple[Count, ...], Field(min_length=1, max_length=3)]
+Direction = Literal["x", "y", "z", "rotation"]
+
+POINT = 'a point, "body.point" or "body@distance"'
+PLACE = 'a point, "body.point" or "body@distance", or a boundary, "body.boundary"'
+
+
+class Table(BaseModel):
+    """A table of the case file: frozen, and without keys it does not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")

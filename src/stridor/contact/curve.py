@@ -1,0 +1,325 @@
+"""The boundary of a plane body as a master: a C1 cubic spline through its nodes, split at corners.
+
+The spline is that of `surface`: cubic Hermite, slopes from the neighbours, linear in the node positions. Since the
+normal is perpendicular to it and the master point the nearest one, the normal row of a contact is the exact
+derivative of the gap: dg = n · (du_slave − Σ weights du_master), at any gap and any curvature.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy.spatial import cKDTree
+
+from ..mesh.facets import Chain, chain_of
+from ..mesh.model import Blocks
+from ..typing import Array, IntArray
+from . import surface
+from .master import Location
+
+# Beyond an end by less than this part of a segment is still on the line.
+END_TOLERANCE = 1e-6
+# Nearer to a node than this part of a segment is that node: four weights there would only blur the rows.
+NODE_TOLERANCE = 1e-9
+# A node is seen from both its segments; beyond it by rounding is no reason to walk to and fro.
+ROUNDING = 1e-10
+CANDIDATES = 4
+INSIDE, BEFORE, AFTER = 0, 1, 2
+
+_spline_weights = njit(cache=True)(surface.spline_weights)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """k nodes in order, the body on the left of their direction, so that the outward normal is on the right.
+
+    nodes (k,) are the mesh's own numbers of the curve's nodes, the order in which displacements and rows are
+    expected. positions (k, 2) [m] undisplaced. A closed curve has no ends. Between segments that turn by more than
+    the corner angle the spline is broken, so that the side of a rectangle stays straight; off an outward corner the
+    gap is the distance from it. facets (f, 3): first, last and middle node (−1 for linear facets) of the curve's
+    numbering, as the finite elements interpolate.
+    stencils (c, 4): nodes that shape each of the c segments, −1 where the spline begins or ends; chords (c, 3) [m]:
+    undisplaced lengths of the segments before, of and after it. before, after (c,): segments that continue it
+    smoothly, −1 at ends and corners.
+    """
+
+    nodes: IntArray
+    positions: Array
+    closed: bool
+    facets: IntArray
+    stencils: IntArray
+    chords: Array
+    before: IntArray
+    after: IntArray
+
+    @classmethod
+    def from_facets(cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = 40.0) -> Curve:
+        """The curve that facets "line" and "line3" of a mesh with points (·, 2) make up.
+
+        Middle nodes of line3 become nodes of the spline. corner_deg: consecutive segments that turn by more make a
+        corner. Raises CaseError naming ``where`` for facets that branch, that lie in several pieces or have no length.
+        """
+        chain = chain_of(points, facets, where=where)
+        return cls._of_chain(points, chain, corner_deg)
+
+    @classmethod
+    def _of_chain(cls, points: Array, chain: Chain, corner_deg: float) -> Curve:
+        positions = np.asarray(points, dtype=float)[chain.nodes]
+        count = len(positions) if chain.closed else len(positions) - 1
+        start = np.arange(count)
+        end = (start + 1) % len(positions)
+        chord = positions[end] - positions[start]
+        length = np.linalg.norm(chord, axis=1)
+        direction = chord / length[:, None]
+        previous, following = (start - 1) % count, (start + 1) % count
+        turn = np.sum(direction * direction[previous], axis=1)  # cosine at the start of each segment
+        smooth = turn >= np.cos(np.radians(corner_deg))
+        if not chain.closed:
+            smooth[0] = False
+        before = np.where(smooth, previous, -1)
+        after = np.where(smooth[following], following, -1)
+        stencils = np.stack(
+            [np.where(before < 0, -1, start[before]), start, end, np.where(after < 0, -1, end[after])], axis=1
+        )
+        chords = np.stack(
+            [np.where(before < 0, 0.0, length[before]), length, np.where(after < 0, 0.0, length[after])], axis=1
+        )
+        return cls(chain.nodes, positions, chain.closed, chain.facets, stencils, chords, before, after)
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes k."""
+        return len(self.nodes)
+
+    @property
+    def dimension(self) -> int:
+        """2."""
+        return 2
+
+    @property
+    def corners(self) -> IntArray:
+        """Nodes of the curve's own numbering where it turns sharply."""
+        broken = self.stencils[self.before < 0, 1]
+        return broken if self.closed else broken[broken > 0]
+
+    @property
+    def chord_height(self) -> float:
+        """Largest height [m] of the spline above its chords, about h²/8R: what a polygon would be wrong by."""
+        xi = np.full(len(self.chords), 0.5)
+        weights, _ = weights_at(np.arange(len(self.chords)), xi, self.stencils, self.chords)
+        middle = np.einsum("cr,crd->cd", weights, self.positions[self.stencils])
+        chord_middle = self.positions[self.stencils[:, 1:3]].mean(axis=1)
+        return float(np.linalg.norm(middle - chord_middle, axis=1).max())
+
+    def locate(self, slaves: Array, displacement: Array | None = None, *, guess: IntArray | None = None) -> Location:
+        """Nearest points of the displaced curve to slave positions (m, 2) [m].
+
+        displacement (k, 2) [m] of the curve's nodes. With guess (m,) the search walks from those segments and stays
+        on their side of a body; only slaves that leave over an end or corner are searched for anew. Without, it
+        begins at the nearest segments.
+        """
+        current = self.positions if displacement is None else self.positions + displacement
+        slaves = np.ascontiguousarray(slaves, dtype=float)
+        if guess is not None:
+            found = self._walk(slaves, current, np.asarray(guess, dtype=np.int64)[:, None])
+            again = np.flatnonzero(found[2] != INSIDE)
+            if len(again):
+                anew = self._walk(slaves[again], current, self._nearest_segments(slaves[again], current))
+                for whole, part in zip(found, anew, strict=True):
+                    whole[again] = part
+        else:
+            found = self._walk(slaves, current, self._nearest_segments(slaves, current))
+        return self._location(slaves, current, *found)
+
+    def _walk(self, slaves: Array, current: Array, starts: IntArray) -> tuple[IntArray, Array, IntArray]:
+        """Segment (m,), xi (m,) and state (m,) of the nearest points found from starts (m, q)."""
+        found = _walk_all(
+            slaves, np.ascontiguousarray(current), self.stencils, self.chords, self.before, self.after, starts
+        )
+        return found[0], found[1], found[2]
+
+    def _nearest_segments(self, slaves: Array, current: Array) -> IntArray:
+        """Segments (m, q) to begin with: long ones are sampled more often, lest short ones seem nearer."""
+        length = self.chords[:, 1]
+        parts = np.clip(np.ceil(length / np.median(length)), 1, 16).astype(np.int64)
+        owner = np.repeat(np.arange(len(parts)), parts)
+        xi = (np.arange(len(owner)) - np.repeat(np.cumsum(parts) - parts, parts) + 0.5) / parts[owner]
+        ends = current[self.stencils[:, 1:3]][owner]
+        samples = ends[:, 0] + xi[:, None] * (ends[:, 1] - ends[:, 0])
+        count = min(CANDIDATES, len(owner))
+        nearest = np.asarray(cKDTree(samples).query(slaves, k=count)[1], dtype=np.int64)
+        return owner[nearest.reshape(len(slaves), count)]
+
+    def _location(self, slaves: Array, current: Array, segment: IntArray, xi: Array, state: IntArray) -> Location:
+        xi = np.where(xi < NODE_TOLERANCE, 0.0, np.where(xi > 1.0 - NODE_TOLERANCE, 1.0, xi))
+        weights, slopes = weights_at(segment, xi, self.stencils, self.chords)
+        nodes = np.where(weights == 0.0, 0, self.stencils[segment])
+        around = current[np.maximum(self.stencils[segment], 0)]
+        point = np.einsum("mr,mrd->md", weights, around)
+        along = np.einsum("mr,mrd->md", slopes, around)
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        inside = state == INSIDE
+        at = np.where(state == BEFORE, self.stencils[segment, 1], self.stencils[segment, 2])
+        cornered = np.flatnonzero(~inside & np.isin(at, self.corners))
+        if len(cornered):
+            normal[cornered] = self._corner_normals(at[cornered], slaves[cornered] - point[cornered], current)
+            inside[cornered] = True
+        gap = np.sum(normal * (slaves - point), axis=1)
+        return Location(nodes, weights, point, normal, gap, segment, inside)
+
+    def _corner_normals(self, corner: IntArray, offset: Array, current: Array) -> Array:
+        """Out of a corner towards (from, inside the body) slaves at an offset (q, 2) from it."""
+        count = len(self.chords)
+        chord = current[self.stencils[:, 2]] - current[self.stencils[:, 1]]
+        chord /= np.linalg.norm(chord, axis=1, keepdims=True)
+        along = chord[corner % count] + chord[(corner - 1) % count]
+        mean = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+        distance = np.linalg.norm(offset, axis=1)
+        apart = distance > NODE_TOLERANCE * self.chords[:, 1].min()
+        side = np.where(np.sum(mean * offset, axis=1) < 0, -1.0, 1.0)
+        scaled = side[:, None] * offset / np.where(apart, distance, 1.0)[:, None]
+        return np.where(apart[:, None], scaled, mean)
+
+
+def weights_at(segment: IntArray, xi: Array, stencils: IntArray, chords: Array) -> tuple[Array, Array]:
+    """Weights (m, 4) of the nodes of the stencil in the spline points, and in their derivatives along xi."""
+    weights, slopes = np.zeros((len(segment), 4)), np.zeros((len(segment), 4))
+    _fill_weights(np.asarray(segment, dtype=np.int64), xi, stencils, chords, weights, slopes)
+    return weights, slopes
+
+
+@njit(cache=True)
+def _segment_weights(
+    segment: int, xi: float, stencils: IntArray, chords: Array, weights: Array, slopes: Array
+) -> None:  # pragma: no cover - compiled
+    first = 1 if stencils[segment, 0] < 0 else 0
+    last = 2 if stencils[segment, 3] < 0 else 3
+    _spline_weights(1 - first, xi, chords[segment, first:last], weights, slopes)
+
+
+@njit(cache=True)
+def _fill_weights(
+    segment: IntArray, xi: Array, stencils: IntArray, chords: Array, weights: Array, slopes: Array
+) -> None:  # pragma: no cover - compiled
+    for i in range(segment.shape[0]):
+        _segment_weights(segment[i], xi[i], stencils, chords, weights[i], slopes[i])
+
+
+@njit(cache=True)
+def _sum(stencil: IntArray, current: Array, weights: Array) -> tuple[float, float]:  # pragma: no cover - compiled
+    x = 0.0
+    y = 0.0
+    for k in range(4):
+        if weights[k] != 0.0:
+            x += weights[k] * current[stencil[k], 0]
+            y += weights[k] * current[stencil[k], 1]
+    return x, y
+
+
+@njit(cache=True)
+def _project(
+    x: float,
+    y: float,
+    current: Array,
+    stencils: IntArray,
+    chords: Array,
+    before: IntArray,
+    after: IntArray,
+    segment: int,
+    weights: Array,
+    slopes: Array,
+) -> tuple[int, float, int, float]:  # pragma: no cover - compiled
+    """Segment, xi, state and squared distance of the nearest point, walking from the middle of ``segment``."""
+    xi = 0.5
+    state = INSIDE
+    for _ in range(surface.MAX_PROJECTION_STEPS):
+        stencil = stencils[segment]
+        # The slope is quadratic in xi, so that its central difference over one is exactly its derivative.
+        _segment_weights(segment, xi + 0.5, stencils, chords, weights, slopes)
+        ax, ay = _sum(stencil, current, slopes)
+        _segment_weights(segment, xi - 0.5, stencils, chords, weights, slopes)
+        bx, by = _sum(stencil, current, slopes)
+        _segment_weights(segment, xi, stencils, chords, weights, slopes)
+        px, py = _sum(stencil, current, weights)
+        sx, sy = _sum(stencil, current, slopes)
+        square = sx * sx + sy * sy
+        # Newton's method; past the centre of curvature the full curvature would lead away from the nearest point.
+        bent = square - (x - px) * (ax - bx) - (y - py) * (ay - by)
+        new = xi + ((x - px) * sx + (y - py) * sy) / max(bent, 0.1 * square)
+        state = INSIDE
+        if new < 0.0:
+            if before[segment] >= 0:
+                if new < -ROUNDING:
+                    ratio = chords[segment, 1] / chords[segment, 0]
+                    segment = before[segment]
+                    xi = max(1.0 + new * ratio, 0.0)
+                    continue
+            elif new < -END_TOLERANCE:
+                state = BEFORE
+            new = 0.0
+        elif new > 1.0:
+            if after[segment] >= 0:
+                if new > 1.0 + ROUNDING:
+                    ratio = chords[segment, 1] / chords[segment, 2]
+                    segment = after[segment]
+                    xi = min((new - 1.0) * ratio, 1.0)
+                    continue
+            elif new > 1.0 + END_TOLERANCE:
+                state = AFTER
+            new = 1.0
+        moved = abs(new - xi)
+        xi = new
+        if moved < 1e-13:
+            break
+    _segment_weights(segment, xi, stencils, chords, weights, slopes)
+    px, py = _sum(stencils[segment], current, weights)
+    return segment, xi, state, (x - px) * (x - px) + (y - py) * (y - py)
+
+
+@njit(cache=True)
+def _walk_all(
+    slaves: Array,
+    current: Array,
+    stencils: IntArray,
+    chords: Array,
+    before: IntArray,
+    after: IntArray,
+    starts: IntArray,
+) -> tuple[IntArray, Array, IntArray]:  # pragma: no cover - compiled
+    """The nearest of the points found from each start; one on the line rather than an end equally near."""
+    count = slaves.shape[0]
+    segments = np.empty(count, dtype=np.int64)
+    places = np.empty(count)
+    states = np.empty(count, dtype=np.int64)
+    weights = np.zeros(4)
+    slopes = np.zeros(4)
+    for i in range(count):
+        best = np.inf
+        for j in range(starts.shape[1]):
+            repeated = False
+            for earlier in range(j):
+                repeated = repeated or starts[i, earlier] == starts[i, j]
+            if repeated:
+                continue
+            segment, xi, state, square = _project(
+                slaves[i, 0],
+                slaves[i, 1],
+                current,
+                stencils,
+                chords,
+                before,
+                after,
+                starts[i, j],
+                weights,
+                slopes,
+            )
+            if state != INSIDE:
+                square += 1e-9 * (square + chords[segment, 1] * chords[segment, 1] * 1e-9)
+            if square < best:
+                best = square
+                segments[i], places[i], states[i] = segment, xi, state
+    return segments, places, states

@@ -1,0 +1,238 @@
+"""The compiled search of `facets`: from slave points to places on facets, facet by facet over their edges.
+
+Reference places are (ξ, η) of the triangle (0, 0), (1, 0), (0, 1) and the square [0, 1]². Edge e begins at corner e.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ..typing import Array, BoolArray, IntArray
+
+NEWTON_STEPS = 25
+# A guess is a few facets away, a start by nearness hardly any.
+WALK_STEPS = 200
+# Beyond an edge of the surface by less than this part of a facet is still on it (in reference coordinates).
+EDGE_TOLERANCE = 1e-6
+# An edge is seen from both its facets; beyond it by rounding is no reason to walk to and fro.
+ROUNDING = 1e-10
+
+
+def shape_of(triangle: BoolArray, place: Array) -> Array:
+    """Weights (m, 4) of the corners at places (m, 2); a triangle's fourth is 0.
+
+    Weights within 1e-9 of nothing are set to it: a point within rounding of a node is that node.
+    """
+    x, y = np.asarray(place, dtype=float).T
+    linear = np.stack([1 - x - y, x, y, np.zeros_like(x)], axis=1)
+    bilinear = np.stack([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y], axis=1)
+    weights = np.where(triangle[:, None], linear, bilinear)
+    weights[np.abs(weights) < 1e-9] = 0.0
+    return weights / weights.sum(axis=1, keepdims=True)
+
+
+def edge_place(triangle: BoolArray, edge: IntArray, along: Array) -> Array:
+    """Reference places (m, 2) at parts ``along`` (m,) in [0, 1] of the edges (m,)."""
+    t, one, zero = along, np.ones_like(along), np.zeros_like(along)
+    on_triangle = np.stack([np.stack([t, zero], 1), np.stack([1 - t, t], 1), np.stack([zero, 1 - t], 1)])
+    on_square = np.stack(
+        [np.stack([t, zero], 1), np.stack([one, t], 1), np.stack([1 - t, one], 1), np.stack([zero, 1 - t], 1)]
+    )
+    each = np.arange(len(along))
+    return np.where(triangle[:, None], on_triangle[np.minimum(edge, 2), each], on_square[edge, each])
+
+
+@njit(cache=True)
+def nearest_edges(
+    slaves: Array, begin: Array, end: Array
+) -> tuple[IntArray, Array, Array]:  # pragma: no cover - compiled
+    """Which of the edges from begin (b, 3) to end (b, 3) is nearest to each slave (m, 3), where on it, how far [m]."""
+    count = slaves.shape[0]
+    which = np.zeros(count, dtype=np.int64)
+    along = np.zeros(count)
+    distance = np.empty(count)
+    for i in range(count):
+        best = np.inf
+        for b in range(begin.shape[0]):
+            square = 0.0
+            product = 0.0
+            for d in range(3):
+                side = end[b, d] - begin[b, d]
+                square += side * side
+                product += side * (slaves[i, d] - begin[b, d])
+            t = min(max(product / square, 0.0), 1.0)
+            away = 0.0
+            for d in range(3):
+                off = slaves[i, d] - begin[b, d] - t * (end[b, d] - begin[b, d])
+                away += off * off
+            if away < best:
+                best = away
+                which[i] = b
+                along[i] = t
+        distance[i] = np.sqrt(best)
+    return which, along, distance
+
+
+@njit(cache=True)
+def _fill_shape(triangle: bool, x: float, y: float, shape: Array) -> None:  # pragma: no cover - compiled
+    """Values (row 0) and derivatives (rows 1, 2) of the four corner functions."""
+    if triangle:
+        shape[0, 0], shape[0, 1], shape[0, 2], shape[0, 3] = 1.0 - x - y, x, y, 0.0
+        shape[1, 0], shape[1, 1], shape[1, 2], shape[1, 3] = -1.0, 1.0, 0.0, 0.0
+        shape[2, 0], shape[2, 1], shape[2, 2], shape[2, 3] = -1.0, 0.0, 1.0, 0.0
+    else:
+        shape[0, 0], shape[0, 1], shape[0, 2], shape[0, 3] = (1.0 - x) * (1.0 - y), x * (1.0 - y), x * y, (1.0 - x) * y
+        shape[1, 0], shape[1, 1], shape[1, 2], shape[1, 3] = y - 1.0, 1.0 - y, y, -y
+        shape[2, 0], shape[2, 1], shape[2, 2], shape[2, 3] = x - 1.0, -x, x, 1.0 - x
+
+
+@njit(cache=True)
+def _solve(
+    slave: Array, current: Array, facet: IntArray, normals: Array, place: Array, shape: Array, work: Array
+) -> bool:  # pragma: no cover - compiled
+    """x = X(ξ, η) + g N(ξ, η) on one facet by Newton's method; place (3,) takes ξ, η and g |N|.
+
+    N is the interpolated normal, not of unit length: its direction alone counts. work (6, 3) is space for the offset
+    X + gN − x, the two tangents of that, N and its derivatives. False where the equations are singular or the steps
+    do not settle.
+    """
+    triangle = facet[3] < 0
+    corners = 3 if triangle else 4
+    x = y = 1.0 / 3.0 if triangle else 0.5
+    g = 0.0
+    settled = False
+    r, a, b, n = work[0], work[1], work[2], work[3]
+    for iteration in range(NEWTON_STEPS):
+        _fill_shape(triangle, x, y, shape)
+        for d in range(3):
+            point = along_x = along_y = normal = 0.0
+            bend_x = bend_y = 0.0
+            for c in range(corners):
+                node, out = current[facet[c], d], normals[c, d]
+                point += shape[0, c] * node
+                along_x += shape[1, c] * node
+                along_y += shape[2, c] * node
+                normal += shape[0, c] * out
+                bend_x += shape[1, c] * out
+                bend_y += shape[2, c] * out
+            work[0, d] = point - slave[d]
+            work[1, d], work[2, d], work[3, d] = along_x, along_y, normal
+            work[4, d], work[5, d] = bend_x, bend_y
+        if iteration == 0:
+            square = product = 0.0
+            for d in range(3):
+                square += work[3, d] * work[3, d]
+                product -= work[3, d] * work[0, d]
+            g = product / square
+        for d in range(3):
+            work[0, d] += g * work[3, d]
+            work[1, d] += g * work[4, d]
+            work[2, d] += g * work[5, d]
+        det = _triple(a, b, n)
+        size = np.sqrt((a[0] ** 2 + a[1] ** 2 + a[2] ** 2) * (b[0] ** 2 + b[1] ** 2 + b[2] ** 2))
+        if abs(det) <= 1e-10 * size:
+            return False
+        step_x, step_y = -_triple(r, b, n) / det, -_triple(a, r, n) / det
+        g -= _triple(a, b, r) / det
+        # Far outside, the facet says little about where the slave is: a limited step, then on to the neighbour.
+        new_x = min(max(x + step_x, -1.0), 2.0)
+        new_y = min(max(y + step_y, -1.0), 2.0)
+        moved = abs(new_x - x) + abs(new_y - y)
+        x, y = new_x, new_y
+        settled = moved < 1e-6
+        if moved < 1e-12 and iteration > 0:
+            break
+    place[0], place[1], place[2] = x, y, g * np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
+    return settled
+
+
+@njit(cache=True)
+def _triple(a: Array, b: Array, c: Array) -> float:  # pragma: no cover - compiled
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+
+
+@njit(cache=True)
+def _beyond(triangle: bool, edge: int, x: float, y: float) -> float:  # pragma: no cover - compiled
+    """How far (x, y) lies beyond an edge, in reference coordinates; negative on the facet's side."""
+    if edge == 0:
+        return -y
+    if triangle:
+        return x + y - 1.0 if edge == 1 else -x
+    if edge == 1:
+        return x - 1.0
+    return y - 1.0 if edge == 2 else -x
+
+
+@njit(cache=True)
+def _walk(
+    slave: Array,
+    current: Array,
+    facets: IntArray,
+    normals: Array,
+    neighbours: IntArray,
+    blocked: BoolArray,
+    facet: int,
+    place: Array,
+    shape: Array,
+    work: Array,
+) -> tuple[int, bool]:  # pragma: no cover - compiled
+    """The facet where the slave's place (3,) is, from ``facet`` on, and whether there is one."""
+    came_from = -1
+    for _ in range(WALK_STEPS):
+        if not _solve(slave, current, facets[facet], normals[facet], place, shape, work):
+            return facet, False
+        triangle = facets[facet, 3] < 0
+        leave, worst, out = -1, ROUNDING, 0.0
+        for edge in range(3 if triangle else 4):
+            over = _beyond(triangle, edge, place[0], place[1])
+            if blocked[facet, edge]:
+                out = max(out, over)
+            elif over > worst:
+                leave, worst = edge, over
+        if leave < 0:
+            return facet, out <= EDGE_TOLERANCE
+        following = neighbours[facet, leave]
+        if following == came_from and worst < 1e-7:
+            return facet, out <= EDGE_TOLERANCE
+        came_from = facet
+        facet = following
+    return facet, False
+
+
+@njit(cache=True)
+def locate_all(
+    slaves: Array,
+    current: Array,
+    facets: IntArray,
+    normals: Array,
+    neighbours: IntArray,
+    blocked: BoolArray,
+    starts: IntArray,
+) -> tuple[IntArray, Array, BoolArray]:  # pragma: no cover - compiled
+    """Facet (m,), reference place (m, 2) and whether it is on the surface (m,), the least gap of those found.
+
+    normals (f, 4, 3) at the corners; blocked (f, 4): edges not walked over; starts (m, q): facets to begin with.
+    """
+    count = slaves.shape[0]
+    found = np.zeros(count, dtype=np.int64)
+    places = np.zeros((count, 2))
+    inside = np.zeros(count, dtype=np.bool_)
+    place, shape, work = np.zeros(3), np.zeros((3, 4)), np.zeros((6, 3))
+    for i in range(count):
+        best = np.inf
+        for j in range(starts.shape[1]):
+            repeated = inside[i] and starts[i, j] == found[i]
+            for earlier in range(j):
+                repeated = repeated or starts[i, earlier] == starts[i, j]
+            if repeated:
+                continue
+            facet, ended = _walk(
+                slaves[i], current, facets, normals, neighbours, blocked, starts[i, j], place, shape, work
+            )
+            if ended and abs(place[2]) < best:
+                best = abs(place[2])
+                inside[i] = True
+                found[i] = facet
+                places[i, 0], places[i, 1] = place[0], place[1]
+    return found, places, inside

@@ -1,0 +1,205 @@
+"""Slave nodes paired with a master surface, at the start and again as they slide."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import CaseError
+from ..laws.friction import FrictionLaw
+from ..typing import Array, BoolArray, IntArray
+from .interface import Rows
+from .master import Location, MasterSurface
+from .surfaces import SurfaceContact, operators
+
+
+def pair_surface(
+    name: str,
+    *,
+    where: str,
+    slave: Rows,
+    slave_position: Array,
+    slave_normals: Array,
+    area: Array,
+    master: MasterSurface,
+    master_rows: Rows,
+    drift: Array,
+    stiffness_per_area: float,
+    law: FrictionLaw,
+    sliding: Literal["small", "finite"] = "small",
+    reach: float | None = None,
+    allowed_overlap: float | None = None,
+    adjust: bool = False,
+) -> SurfaceContact:
+    """A surface contact of those slave nodes that the undisplaced master faces.
+
+    slave: rows (m d, n) of m slave nodes at slave_position (m, d) [m] with outward unit normals slave_normals (m, d)
+    (zero where unknown) and area (m,) [m²]; the others are those of `SurfaceContact`. A node takes part where it lies
+    over the master rather than beyond its edges, where both outward normals oppose each other, and where its gap is
+    at most ``reach`` [m] (None: however far, as for a cylinder on a plane).
+
+    Overlaps up to ``allowed_overlap`` [m] count as touching and stay as negative gaps. None stands for what facets
+    make of curved surfaces, 1.5 times the height h²/8R of their chords on both sides. ``adjust`` moves the contact's
+    own positions of slave nodes with |gap| up to that tolerance onto the master, without strain; the bodies' meshes
+    are not touched.
+
+    Raises CaseError naming ``where`` when no node faces the master, or when nodes overlap it by more than that.
+    """
+    facing, location = _facing(where, slave_position, slave_normals, master, reach)
+    d = slave_position.shape[1]
+    own = (facing[:, None] * d + np.arange(d)).ravel()
+    slave, area, drift = Rows(slave.free[own], slave.lift[own]), area[facing], drift[facing]
+    position = slave_position[facing]
+    tolerance = allowed_overlap
+    if tolerance is None:
+        tolerance = overlap_tolerance(position, slave_normals[facing], master)
+    deepest = int(np.argmin(location.gap))
+    if location.gap[deepest] < -tolerance:
+        raise CaseError(where, None, _overlapping(position, location, deepest, tolerance))
+    if adjust:
+        moved = np.where(np.abs(location.gap) <= tolerance, location.gap, 0.0)
+        position = position - moved[:, None] * location.normal
+        location = replace(location, gap=location.gap - moved)
+    nodes = operators(
+        name,
+        slave=slave,
+        slave_position=position,
+        area=area,
+        master_rows=master_rows,
+        drift=drift,
+        stiffness_per_area=stiffness_per_area,
+        law=law,
+        location=location,
+    )
+    return SurfaceContact(
+        name=name,
+        slave=slave,
+        slave_position=position,
+        area=area,
+        master=master,
+        master_rows=master_rows,
+        drift=drift,
+        stiffness_per_area=stiffness_per_area,
+        law=law,
+        sliding=sliding,
+        location=location,
+        nodes=nodes,
+    )
+
+
+def _facing(
+    where: str, position: Array, normals: Array, master: MasterSurface, reach: float | None
+) -> tuple[IntArray, Location]:
+    """Indices (q,) of the slave nodes that take part and their places. CaseError where there are none."""
+    location = master.locate(position)
+    # A node that looks along the master is beside it: rounding must not decide.
+    opposed = np.sum(normals * location.normal, axis=1) < -1e-9
+    opposed |= ~np.any(normals, axis=1)
+    near = location.gap <= (np.inf if reach is None else reach)
+    facing = np.flatnonzero(location.inside & opposed & near)
+    if not len(facing):
+        raise CaseError(where, None, _never_touching(position, location, opposed, reach))
+    return facing, _only(location, facing)
+
+
+def repair(
+    contact: SurfaceContact, slave_displacement: Array, master_displacement: Array
+) -> tuple[SurfaceContact, IntArray]:
+    """The contact paired anew where its slave nodes are now, and which of them have left the master.
+
+    slave_displacement (m, d) and master_displacement (k, d) [m] are whole displacements from the positions the contact
+    was made with, prescribed motions included. The search begins where the nodes were found last. The new operators
+    are linear about the present configuration: with normal row N and reference gap g0 the gap is g0 + N u, and g0 is
+    chosen so that this is exactly the present gap at the present displacement.
+
+    Nodes (q,) that have left over an edge stay in the list, on the nearest point of that edge, so that m does not
+    change; the caller has to hold them open. Drift is kept node by node.
+    """
+    location = contact.master.locate(
+        contact.slave_position + slave_displacement, master_displacement, guess=contact.location.facet
+    )
+    relative = slave_displacement
+    if location.nodes.shape[1]:
+        carried = np.einsum("mr,mrd->md", location.weights, master_displacement[location.nodes])
+        relative = slave_displacement - carried
+    reference_gap = location.gap - np.sum(location.normal * relative, axis=1)
+    nodes = operators(
+        contact.name,
+        slave=contact.slave,
+        slave_position=contact.slave_position,
+        area=contact.area,
+        master_rows=contact.master_rows,
+        drift=contact.drift,
+        stiffness_per_area=contact.stiffness_per_area,
+        law=contact.law,
+        location=replace(location, gap=reference_gap),
+    )
+    return replace(contact, location=location, nodes=nodes), np.flatnonzero(~location.inside)
+
+
+def overlap_tolerance(position: Array, normals: Array, master: MasterSurface) -> float:
+    """How far [m] curved surfaces that fit may seem to overlap: 1.5 times the chord heights h²/8R of both.
+
+    position (m, d), normals (m, d): the slave nodes, whose chords are taken between nearest neighbours.
+    """
+    rounding = 1e-9 * float(np.linalg.norm(np.ptp(position, axis=0)))
+    rounding += 1e-12 * float(np.abs(position).max(initial=0.0))
+    height = float(getattr(master, "chord_height", 0.0))
+    count = min(len(position), 2 * position.shape[1] - 1)
+    if count > 1:
+        near = np.asarray(cKDTree(position).query(position, k=count)[1], dtype=np.int64)[:, 1:]
+        turned = normals[near] - normals[:, None]
+        # Across a corner of the slave there is no chord of a curve.
+        smooth = np.sum(normals[near] * normals[:, None], axis=2) > np.cos(np.radians(40.0))
+        heights = np.abs(np.sum(turned * (position[near] - position[:, None]), axis=2)) / 8.0
+        height += float(np.where(smooth, heights, 0.0).max())
+    return 1.5 * height + rounding
+
+
+def _only(location: Location, index: IntArray) -> Location:
+    return Location(
+        nodes=location.nodes[index],
+        weights=location.weights[index],
+        point=location.point[index],
+        normal=location.normal[index],
+        gap=location.gap[index],
+        facet=location.facet[index],
+        inside=location.inside[index],
+    )
+
+
+def _never_touching(position: Array, location: Location, opposed: BoolArray, reach: float | None) -> str:
+    if not len(position):
+        return "the slave has no nodes"
+    distance = np.linalg.norm(position - location.point, axis=1)
+    over = location.inside & opposed
+    among = np.flatnonzero(over) if over.any() else np.arange(len(position))
+    nearest = int(among[np.argmin(distance[among])])
+    lead = (
+        f"the bodies never touch: the nearest node of the slave is {distance[nearest]:.3g} m from the master, "
+        f"at {_coordinates(position[nearest])}"
+    )
+    if over.any():
+        return f"{lead}, beyond the reach of {reach:.3g} m; move a body or set a longer reach"
+    if location.inside.any():
+        return f"{lead}, and their outward normals do not oppose each other; check which boundaries are meant"
+    return f"{lead}, and none lies over the master; all are beyond its edges. Move a body or take a longer boundary"
+
+
+def _overlapping(position: Array, location: Location, deepest: int, tolerance: float) -> str:
+    overlap = -float(location.gap[deepest])
+    count = int(np.sum(location.gap < -tolerance))
+    nodes = "1 node of the slave lies" if count == 1 else f"{count} nodes of the slave lie"
+    direction = ", ".join(f"{x + 0.0:.3g}" for x in np.round(location.normal[deepest], 3))
+    return (
+        f"the bodies overlap: {nodes} inside the master, the deepest by {overlap:.3g} m at "
+        f"{_coordinates(position[deepest])}; up to {tolerance:.3g} m is allowed. Move the slave's body by "
+        f"{overlap:.6g} m along ({direction}), or the master's the opposite way"
+    )
+
+
+def _coordinates(point: Array) -> str:
+    return "(" + ", ".join(f"{x:.6g}" for x in point) + ") m"

@@ -1,0 +1,203 @@
+"""Bonded surfaces whose meshes do not match: slave nodes follow the master by its own interpolation.
+
+A slave node on a facet moves as the facet does at that place. Since the weights interpolate positions as well, any
+motion linear in the coordinates, a rotation or a constant strain, is carried over exactly. A node beside the master by
+a distance δ is an exception: a rotation θ then strains the slave by θ δ at that node. `Tie.point` says where to move
+such nodes before the matrices are made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import CaseError
+from ..typing import Array, IntArray, Sparse
+from .curve import Curve
+from .master import MasterSurface
+
+CANDIDATES = 3
+PROJECTION_STEPS = 30
+CHAIN_DOUBLINGS = 12
+
+
+@dataclass(frozen=True)
+class Tie:
+    """s slave nodes on a master: displacement of the slave = Σ weights · displacement of nodes.
+
+    nodes (s, r) in the master's numbering and weights (s, r), unused places holding node 0 with weight 0; point (s, d)
+    [m] the places on the master, distance (s,) [m] of the slave nodes from them.
+    """
+
+    nodes: IntArray
+    weights: Array
+    point: Array
+    distance: Array
+
+
+@dataclass(frozen=True)
+class Bond:
+    """A tie between freedoms of a structure: slave (s, d) and master (k, d) indices of the displacements of the nodes.
+
+    where names it in messages.
+    """
+
+    where: str
+    tie: Tie
+    slave: IntArray
+    master: IntArray
+
+
+def tie(slave_points: Array, master: MasterSurface, *, where: str, tolerance: float) -> Tie:
+    """Places of slave points (s, d) [m] on the undisplaced master, as its facets interpolate.
+
+    On a Curve the facets themselves count, straight or quadratic, not the spline through their nodes; on a
+    FacetSurface the linear facets that it is split into. Raises CaseError naming ``where`` for a slave point
+    farther than ``tolerance`` [m] from the master, over its edges included, and for a master without nodes.
+    """
+    if master.node_count == 0:
+        raise CaseError(where, None, "nothing can be tied to an obstacle; fix those nodes by a support instead")
+    if isinstance(master, Curve):
+        nodes, weights = _on_lines(slave_points, master)
+    else:
+        location = master.locate(slave_points)
+        nodes, weights = location.nodes, location.weights
+        # Not the location's point: of sharp edges and corners that one belongs to the gap, this one to the weights.
+    positions = _positions(master)
+    point = np.einsum("sr,srd->sd", weights, positions[nodes])
+    distance = np.linalg.norm(slave_points - point, axis=1)
+    far = np.flatnonzero(distance > tolerance)
+    if len(far):
+        worst = int(np.argmax(distance))
+        at = ", ".join(f"{x:.6g}" for x in slave_points[worst])
+        count = f"{len(far)} of {len(distance)} slave nodes are"
+        accepted = (
+            f"{count} farther than {tolerance:.3g} m from the master, the farthest by {distance[worst]:.3g} m at "
+            f"({at}) m; tie only nodes that lie on it, or set a larger tolerance"
+        )
+        raise CaseError(where, None, accepted)
+    return Tie(nodes, weights, point, distance)
+
+
+def tie_transformation(total: int, bonds: Sequence[Bond]) -> Sparse:
+    """T (N, N) csr of u = T u_independent on N = ``total`` freedoms: identity but for the rows of tied ones.
+
+    The columns of tied freedoms are empty. Matrices become Tᵀ M T, forces Tᵀ f; rows and columns of tied freedoms are
+    then empty and to be dropped. A master node that is itself tied elsewhere is followed on to what it hangs on.
+    Raises CaseError for a node that is slave in two bonds and for nodes that hang on nothing but each other.
+    """
+    tied = np.zeros(total, dtype=bool)
+    owner = np.full(total, -1)
+    rows: list[IntArray] = []
+    columns: list[IntArray] = []
+    values: list[Array] = []
+    for number, bond in enumerate(bonds):
+        _claim(bond, number, bonds, owner)
+        tied[bond.slave] = True
+        r, d = bond.tie.weights.shape[1], bond.slave.shape[1]
+        rows.append(np.repeat(bond.slave[:, None, :], r, axis=1).ravel())
+        columns.append(bond.master[bond.tie.nodes].ravel())
+        values.append(np.repeat(bond.tie.weights[:, :, None], d, axis=2).ravel())
+    free = np.flatnonzero(~tied)
+    transformation = sp.csr_array(
+        (
+            np.concatenate([np.ones(len(free)), *values]),
+            (np.concatenate([free, *rows]), np.concatenate([free, *columns])),
+        ),
+        shape=(total, total),
+    )
+    transformation.eliminate_zeros()
+    for _ in range(CHAIN_DOUBLINGS):
+        if not np.any(tied[transformation.indices]):
+            return transformation
+        transformation = sp.csr_array(transformation @ transformation)
+        transformation.eliminate_zeros()
+    hanging = owner[np.unique(transformation.indices[tied[transformation.indices]])]
+    names = [bonds[k].where for k in np.unique(hanging)]
+    raise CaseError(
+        names[0],
+        None,
+        f"nodes hang on nothing but each other in a circle of ties: {', '.join(names)}; exchange slave and master",
+    )
+
+
+def _claim(bond: Bond, number: int, bonds: Sequence[Bond], owner: IntArray) -> None:
+    """Enter the slaves of a bond as tied; CaseError where they are already."""
+    unique, times = np.unique(bond.slave, return_counts=True)
+    twice = np.isin(bond.slave, unique[times > 1]).any(axis=1)
+    taken = (owner[bond.slave] >= 0).any(axis=1) | twice
+    if taken.any():
+        node = int(np.argmax(taken))
+        at = ", ".join(f"{x:.6g}" for x in bond.tie.point[node])
+        other = int(owner[bond.slave[node]].max())
+        by = f"also by {bonds[other].where}" if other >= 0 else "twice"
+        accepted = f"the node at ({at}) m is tied {by}; a node can be slave once, leave it out of one of them"
+        raise CaseError(bond.where, None, accepted)
+    owner[bond.slave] = number
+
+
+def _positions(master: MasterSurface) -> Array:
+    positions: Array = np.asarray(getattr(master, "positions"))  # noqa: B009 - not part of the protocol
+    return positions
+
+
+def _on_lines(points: Array, curve: Curve) -> tuple[IntArray, Array]:
+    """Nodes (s, 3) and weights (s, 3) of the nearest points on the line facets of a curve."""
+    corners = curve.positions[curve.facets]
+    quadratic = curve.facets[:, 2] >= 0
+    # A straight facet is a quadratic one with its middle half way.
+    corners[~quadratic, 2] = 0.5 * (corners[~quadratic, 0] + corners[~quadratic, 1])
+    count = min(CANDIDATES, len(corners))
+    nearest = np.concatenate([_nearest_chords(part, corners, count) for part in _portions(points, len(corners))])
+    facets = corners[nearest]  # (s, q, 3, d)
+    xi = _project(points[:, None, :], facets)
+    away = np.linalg.norm(np.einsum("sqr,sqrd->sqd", _line3(xi), facets) - points[:, None, :], axis=2)
+    best = np.argmin(away, axis=1)
+    each = np.arange(len(points))
+    facet, place = nearest[each, best], xi[each, best]
+    linear = np.stack([1.0 - place, place, np.zeros_like(place)], axis=1)
+    weights = np.where(quadratic[facet][:, None], _line3(place), linear)
+    weights[np.abs(weights) < 1e-12] = 0.0
+    return np.where(weights == 0.0, 0, curve.facets[facet]), weights
+
+
+def _portions(points: Array, facets: int) -> list[Array]:
+    """The points in portions whose distances from all facets fit comfortably into memory."""
+    return np.array_split(points, max(1, len(points) * facets // 1_000_000))
+
+
+def _nearest_chords(points: Array, corners: Array, count: int) -> IntArray:
+    """The ``count`` facets (s, q) whose two half chords are nearest to each point."""
+    away = np.full((len(points), len(corners)), np.inf)
+    for first, second in ((0, 2), (2, 1)):
+        begin, along = corners[:, first], corners[:, second] - corners[:, first]
+        offset = points[:, None, :] - begin
+        part = np.clip(np.sum(offset * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
+        away = np.minimum(away, np.sum((offset - part[..., None] * along) ** 2, axis=2))
+    return np.argsort(away, axis=1)[:, :count]
+
+
+def _project(points: Array, facets: Array) -> Array:
+    """ξ (s, q) in [0, 1] of the nearest points on quadratic lines (s, q, 3, d), by Newton's method."""
+    start, end, middle = facets[..., 0, :], facets[..., 1, :], facets[..., 2, :]
+    along, bend = end - start, 2.0 * (start + end) - 4.0 * middle
+    xi = np.clip(np.sum((points - start) * along, axis=-1) / np.sum(along**2, axis=-1), 0.0, 1.0)
+    for _ in range(PROJECTION_STEPS):
+        offset = points - np.einsum("sqr,sqrd->sqd", _line3(xi), facets)
+        slope = along + (2.0 * xi[..., None] - 1.0) * bend
+        square = np.sum(slope**2, axis=-1)
+        bent = np.maximum(square - 2.0 * np.sum(offset * bend, axis=-1), 0.1 * square)
+        new = np.clip(xi + np.sum(offset * slope, axis=-1) / bent, 0.0, 1.0)
+        moved = float(np.abs(new - xi).max(initial=0.0))
+        xi = new
+        if moved < 1e-14:
+            break
+    return xi
+
+
+def _line3(xi: Array) -> Array:
+    """Shape functions (…, 3) of first, last and middle node of a quadratic line on [0, 1]."""
+    return np.stack([(1.0 - xi) * (1.0 - 2.0 * xi), xi * (2.0 * xi - 1.0), 4.0 * xi * (1.0 - xi)], axis=-1)

@@ -1,0 +1,9 @@
+"""Sparse direct solvers behind one small interface: factorise once, solve many times.
+
+Whichever program does the work, answers are refined to a small backward error and a singular matrix is an error.
+"""
+
+from .backends import available
+from .factor import Factor, SingularMatrix, factorise
+
+__all__ = ["Factor", "SingularMatrix", "available", "factorise"]

@@ -1,0 +1,230 @@
+"""Factorise and solve with any of the sparse direct solvers, to a backward error that all of them share."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import AnalysisError
+from ..typing import Array, ComplexArray, IntArray, Sparse
+from .backends import Backend, Breakdown, choose, start
+
+# Solvers keep a copy of the block they work on; wider blocks win nothing more.
+BLOCK = 64
+BACKWARD_ERROR = 1e-14
+REFINEMENTS = 5
+# A matrix that a relative change of its entries of this size makes singular is singular for us.
+SINGULAR = 1e-13
+# Pivots that a program makes up are not larger than this, relative to the matrix.
+PERTURBED = 1e-5
+
+
+class SingularMatrix(AnalysisError):
+    """The matrix has no inverse to working precision; motion (n,) is what it does not resist, None if unknown."""
+
+    def __init__(self, message: str, motion: Any = None) -> None:
+        super().__init__(message)
+        self.motion = motion
+
+
+class Factor:
+    """A factorised matrix (n, n). Use it in a `with` block, or call `free`, where memory is short.
+
+    solver: name of the program. seconds spent on factorising. memory_bytes: its own estimate for the factors.
+    inertia: number of negative pivots, hence eigenvalues, of a real symmetric matrix; None where it is not told.
+    """
+
+    solver: str
+    seconds: float
+    memory_bytes: int
+    inertia: int | None
+
+    def __init__(self, matrix: Sparse, backend: Backend, solver: str, started: float) -> None:
+        self._matrix = matrix
+        self._sizes: Sparse = sp.csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+        self._largest: Array = self._sizes.max(axis=1).toarray().ravel()
+        self._largest_transposed: Array = self._sizes.max(axis=0).toarray().ravel()
+        self._backend: Backend | None = backend
+        self.solver = solver
+        self.memory_bytes = backend.memory_bytes
+        self.inertia = backend.inertia
+        self.seconds = time.perf_counter() - started
+
+    def solve(self, right: Array | ComplexArray, *, transpose: bool = False) -> Any:
+        """A⁻¹ right, or A⁻ᵀ right (never conjugated), refined to a componentwise backward error of about 10⁻¹⁴.
+
+        right (n,) or (n, r); the answer has its shape and is complex where right or the matrix is. Many columns at
+        once cost far less than one after the other. Raises SingularMatrix where refinement does not converge.
+        """
+        if self._backend is None:
+            raise ValueError("this factor has been freed")
+        given: Any = np.asarray(right)
+        n = self._matrix.shape[0]
+        if given.ndim not in (1, 2) or given.shape[0] != n:
+            raise ValueError(f"the right side has shape {given.shape}; expected ({n},) or ({n}, r)")
+        block = given[:, None] if given.ndim == 1 else given
+        if self._matrix.dtype.kind == "f" and block.dtype.kind == "c":
+            r = block.shape[1]
+            parts = self._solve_block(np.concatenate([block.real, block.imag], axis=1), transpose)
+            answer = parts[:, :r] + 1j * parts[:, r:]
+        else:
+            answer = self._solve_block(block.astype(self._matrix.dtype), transpose)
+        return answer[:, 0] if given.ndim == 1 else answer
+
+    def free(self) -> None:
+        """Give the memory of the factors back; solving is over then."""
+        if self._backend is not None:
+            self._backend.free()
+            self._backend = None
+
+    def __enter__(self) -> Factor:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.free()
+
+    def _solve_block(self, right: Any, transpose: bool) -> Any:
+        answer = np.empty(right.shape, dtype=self._matrix.dtype)
+        for first in range(0, right.shape[1], BLOCK):
+            columns = slice(first, first + BLOCK)
+            answer[:, columns] = self._refined(np.ascontiguousarray(right[:, columns]), transpose)
+        return answer
+
+    def _refined(self, right: Any, transpose: bool) -> Any:
+        assert self._backend is not None
+        answer = self._backend.solve(right.copy(), transpose)
+        residual, error = self._residual(right, answer, transpose)
+        for _ in range(REFINEMENTS):
+            if not error > BACKWARD_ERROR:
+                break
+            better = answer + self._backend.solve(residual.copy(), transpose)
+            residual, improved = self._residual(right, better, transpose)
+            if not improved < error:
+                break
+            stalled = improved > 0.5 * error
+            answer, error = better, improved
+            if stalled:
+                break
+        if not error < 1e-8:
+            raise SingularMatrix(
+                f"the matrix is singular or badly scaled: solving leaves a backward error of {error:.1e}"
+            )
+        return answer
+
+    def _residual(self, right: Any, answer: Any, transpose: bool) -> tuple[Any, float]:
+        """b − A x and max |b − A x| / (|A| |x| + |b|) over all rows (Arioli, Demmel and Duff 1989)."""
+        matrix, sizes = (self._matrix.T, self._sizes.T) if transpose else (self._matrix, self._sizes)
+        with np.errstate(all="ignore"):
+            residual = right - matrix @ answer
+            length = np.abs(answer)
+            terms = sizes @ length + np.abs(right)
+            # Rows whose terms are nothing but rounding are measured against the largest that they could be.
+            widest = self._largest_transposed if transpose else self._largest
+            largest = widest[:, None] * length.max(axis=0, initial=0.0)
+            terms = np.where(terms < 1e3 * np.finfo(float).eps * largest, terms + largest, terms)
+            ratio = np.abs(residual) / np.where(terms > 0, terms, 1.0)
+        return residual, float(np.max(ratio, initial=0.0)) if np.isfinite(ratio).all() else np.inf
+
+    def unresisted(self) -> tuple[float, Any]:
+        """How near the matrix is to a singular one, ‖A x‖ / ‖|A| |x|‖ row by row scaled, and that motion x (n,).
+
+        One step of inverse iteration from an arbitrary force finds x: a singular matrix answers with its null vector.
+        Raises Breakdown where elimination overflowed.
+        """
+        if self._backend is None:
+            raise ValueError("this factor has been freed")
+        n = self._matrix.shape[0]
+        sign = np.where(np.random.default_rng(1).random(n) < 0.5, -1.0, 1.0)
+        with np.errstate(all="ignore"):
+            motion = self._backend.solve((sign * self._largest).astype(self._matrix.dtype)[:, None], False)[:, 0]
+            motion = motion / np.abs(motion).max(initial=0.0)
+            if not np.isfinite(motion).all():
+                raise Breakdown("elimination overflows")
+            ratio = self._resistance(motion)
+            # Some programs perturb small pivots, and what is found then is the null vector of the perturbed matrix.
+            # Refining it towards A x = 0 leaves what is in the null space of the matrix itself, and nothing else.
+            for _ in range(4):
+                if not SINGULAR <= ratio < PERTURBED:
+                    break
+                cleaned = motion - self._backend.solve((self._matrix @ motion)[:, None], False)[:, 0]
+                cleaned = cleaned / np.abs(cleaned).max()
+                if not np.isfinite(cleaned).all():
+                    break
+                motion, ratio = cleaned, min(ratio, self._resistance(cleaned))
+            return ratio, motion
+
+    def _resistance(self, motion: Any) -> float:
+        left = np.abs(self._matrix @ motion) / self._largest
+        return float(left.max() / ((self._sizes @ np.abs(motion)) / self._largest).max())
+
+
+def factorise(
+    matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, solver: str | None = None
+) -> Factor:
+    """Factorise a sparse matrix (n, n), real or complex.
+
+    symmetric: A = Aᵀ (not conjugated), which halves the work. saddle: [[K, Bᵀ], [B, −C]] with K positive
+    (semi)definite and rows of zeros allowed on the diagonal of C, as multipliers make them; with friction Bᵀ may be
+    another matrix. solver: "mumps", "pardiso" or "superlu"; by default the environment variable STRIDOR_SOLVER, else
+    the first that is installed.
+
+    Raises SingularMatrix (an AnalysisError) for a matrix without inverse to working precision, CaseError for an
+    unknown or missing solver.
+    """
+    name = choose(solver)
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise ValueError(f"the matrix has shape {matrix.shape}; expected a square one")
+    kind = np.complex128 if matrix.dtype.kind == "c" else np.float64
+    held = sp.csr_array(matrix, dtype=kind)
+    held.sum_duplicates()
+    if not np.isfinite(held.data).all():
+        raise AnalysisError("the matrix has entries that are not finite numbers")
+    started = time.perf_counter()
+    empty = _empty_rows(held)
+    if len(empty):
+        motion = np.zeros(held.shape[0])
+        motion[empty[0]] = 1.0
+        raise SingularMatrix(f"the matrix is singular: row {empty[0]} is empty{_of(len(empty))}", motion)
+    if symmetric:
+        _require_symmetry(held)
+    begin = start(name)
+    try:
+        factor = Factor(held, begin(held, symmetric, saddle), name, started)
+        ratio, motion = factor.unresisted() if held.shape[0] else (1.0, None)
+    except Breakdown:
+        # Enough on the diagonal to get through: solved with that, the matrix still shows what it does not resist.
+        stiffened = sp.csr_array(held + sp.diags_array(1e-3 * PERTURBED * abs(held).max(axis=1).toarray().ravel()))
+        try:
+            factor = Factor(held, begin(stiffened, symmetric, saddle), name, started)
+            ratio, motion = 0.0, factor.unresisted()[1]
+        except Breakdown as error:
+            raise SingularMatrix("the matrix is singular: elimination meets a pivot of zero") from error
+    if ratio < SINGULAR:
+        factor.free()
+        at = "" if motion is None else f"; nothing resists a motion of freedom {int(np.argmax(np.abs(motion)))}"
+        raise SingularMatrix(f"the matrix is singular to working precision{at}", motion)
+    return factor
+
+
+def _empty_rows(matrix: Sparse) -> IntArray:
+    largest = abs(matrix)
+    rows, columns = largest.max(axis=1).toarray().ravel(), largest.max(axis=0).toarray().ravel()
+    return np.flatnonzero((rows == 0) | (columns == 0))
+
+
+def _of(count: int) -> str:
+    return "" if count == 1 else f" (and {count - 1} more)"
+
+
+def _require_symmetry(matrix: Sparse) -> None:
+    """Two arbitrary vectors tell: xᵀ A y = yᵀ A x."""
+    x, y = np.random.default_rng(2).standard_normal((2, matrix.shape[0]))
+    terms = float(np.abs(x) @ (abs(matrix) @ np.abs(y)))
+    if abs(x @ (matrix @ y) - y @ (matrix @ x)) > 1e-11 * terms:
+        raise ValueError("the matrix is not symmetric; factorise it with symmetric=False")

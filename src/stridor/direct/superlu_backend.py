@@ -1,0 +1,59 @@
+"""SuperLU as SciPy brings it: always there, an order of magnitude slower in space."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from ..typing import Array, Sparse
+from .backends import Breakdown
+
+
+class SuperluFactor:
+    """LU factors of the equilibrated matrix. SuperLU tells no inertia."""
+
+    def __init__(self, matrix: Sparse, symmetric: bool, saddle: bool) -> None:
+        self.inertia: int | None = None
+        self._row, self._column = equilibrate(matrix)
+        scaled = sp.csc_array(sp.diags_array(self._row) @ matrix @ sp.diags_array(self._column))
+        # Minimum degree on A + Aᵀ with pivots kept to the diagonal fills in far less than SciPy's default. Where a
+        # multiplier's diagonal is zero SuperLU takes another pivot of its column: 20 % more fill than with a diagonal
+        # made up for it, but exact, so that no solve needs a second one to refine it.
+        options = {"SymmetricMode": True, "PrintStat": False, "Equil": False}
+        try:
+            self._factor: Any = spl.splu(
+                scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01 if saddle else 1e-3, options=options
+            )
+        except RuntimeError as error:
+            raise Breakdown(str(error)) from error
+        width = scaled.dtype.itemsize + 4
+        self.memory_bytes = int(self._factor.nnz) * width
+
+    def solve(self, right: Any, transpose: bool) -> Any:
+        """One unrefined solve."""
+        before, after = (self._column, self._row) if transpose else (self._row, self._column)
+        answer = self._factor.solve(np.ascontiguousarray(right * before[:, None]), trans="T" if transpose else "N")
+        return answer * after[:, None]
+
+    def free(self) -> None:
+        """SuperLU frees its memory with the object."""
+        self._factor = None
+
+
+def equilibrate(matrix: Sparse, passes: int = 3) -> tuple[Array, Array]:
+    """Powers of two (n,), (n,) for rows and columns that bring every largest entry near one (Ruiz)."""
+    size = abs(matrix).tocsr()
+    row, column = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
+    for _ in range(passes):
+        scaled = sp.csr_array(sp.diags_array(row) @ size @ sp.diags_array(column))
+        row = row * _root(scaled.max(axis=1).toarray().ravel())
+        column = column * _root(scaled.max(axis=0).toarray().ravel())
+    return row, column
+
+
+def _root(largest: Array) -> Array:
+    # Powers of two scale without rounding.
+    return np.exp2(-np.round(0.5 * np.log2(np.where(largest > 0, largest, 1.0))))

@@ -1,0 +1,49 @@
+"""Files that are to be read: there, regular, not empty, and of a kind that is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import CaseError
+
+_LONGEST = 120
+_LONGEST_PATH = 56
+
+
+def check_file(file: Path, where: str, suffixes: tuple[str, ...]) -> str:
+    """The suffix, in lower case, of a file that is there and holds something. Raises CaseError otherwise."""
+    suffix = file.suffix.lower()
+    try:
+        if file.is_dir():
+            raise CaseError(where, shown_path(file), f"is a folder; must be a mesh file: {', '.join(suffixes)}")
+        if suffix not in suffixes:
+            raise CaseError(where, shown_path(file), f"is no mesh file by its suffix; accepted: {', '.join(suffixes)}")
+        if not file.exists():
+            raise CaseError(where, shown_path(file), "no such file")
+        if not file.is_file():
+            raise CaseError(where, shown_path(file), "is no regular file")
+        if file.stat().st_size == 0:
+            raise CaseError(where, shown_path(file), "the file is empty (0 bytes)")
+        with file.open("rb"):
+            pass
+    except (OSError, ValueError) as error:  # ValueError: a name with a NUL
+        raise CaseError(where, shown_path(file), f"cannot be read: {in_one_line(error)}") from error
+    return suffix
+
+
+def shown_path(file: Path) -> str:
+    """A path for a message: where it is too long its beginning is left out, not the name of the file."""
+    text = str(file)
+    return text if len(text) <= _LONGEST_PATH else "…" + text[1 - _LONGEST_PATH :]
+
+
+def in_one_line(error: BaseException) -> str:
+    """What an error says, in one line, shortened."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    text = " ".join(str(error).split())
+    if isinstance(error, KeyError):
+        text = f"unknown entry {text}"
+    elif isinstance(error, SystemExit):
+        text = ""
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"

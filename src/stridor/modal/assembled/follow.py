@@ -1,0 +1,196 @@
+"""Branches of the projected problem followed over μ.
+
+All eigenpairs are known at every μ, so following is matching: each branch to the eigenvalue its tangent predicts, the
+shapes agreeing. Where two meet, their tangents say nothing; they are matched as a pair by their mean a and the square b of
+half their difference, which are smooth in μ where the two are not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from ...typing import Array, BoolArray, ComplexArray, IntArray
+from .reduced import Eigenpairs, Reduced
+
+CLEAR = 0.3  # an eigenvalue is the predicted one if it is this much nearer than any other
+ALIKE = 0.5  # and its shape has at least this much in common
+SMALLEST_STEP = 1e-9
+NARROW = 1e-5  # step over μ below which two values that pass each other beside zero count as having met
+ROUNDING = 1e-9
+FOLLOWED = 1.25  # branches are followed up to this much above the band
+
+
+@dataclass(frozen=True)
+class State:
+    """Branches (b,) at one μ: their places among the eigenpairs found there."""
+
+    found: Eigenpairs
+    place: IntArray
+
+    @property
+    def mu(self) -> float:
+        """The friction coefficient."""
+        return self.found.mu
+
+    @property
+    def coordinate(self) -> ComplexArray:
+        """x (b,): λ² without damping, else λ."""
+        return self.found.coordinate[self.place]
+
+    @property
+    def values(self) -> ComplexArray:
+        """λ (b,)."""
+        return self.found.values[self.place]
+
+    @property
+    def tangents(self) -> ComplexArray:
+        """dx/dμ (b,)."""
+        return self.found.tangents[self.place]
+
+
+class Follower:
+    """Follows branches, numbered by frequency at μ = 0, towards larger μ in steps up to ``longest``.
+
+    watch, where given, is called with each accepted pair of neighbouring states.
+    """
+
+    def __init__(
+        self, reduced: Reduced, *, longest: float = 0.05, watch: Callable[[State, State], None] | None = None
+    ) -> None:
+        self.reduced = reduced
+        self.longest, self.watch = longest, watch
+        found = reduced.eigenpairs(0.0)
+        followed = np.flatnonzero(np.abs(found.values) <= FOLLOWED * reduced.frequency)
+        order = np.lexsort((np.abs(found.values[followed]), np.abs(found.values[followed].imag)))
+        self.state = State(found, followed[order])
+        self._step = longest
+
+    def advance(self, mu: float) -> State:
+        """Follow to ``mu``, not below the present one."""
+        while self.state.mu < mu:
+            left = mu - self.state.mu
+            step = min(self._step, self.longest, left)
+            found = self.reduced.eigenpairs(mu if step == left else self.state.mu + step)
+            place = matched(self.reduced, self.state, found, surely=step > SMALLEST_STEP)
+            if place is None:
+                self._step = step / 4
+                continue
+            new = State(found, place)
+            if self.watch is not None:
+                self.watch(self.state, new)
+            self.state = new
+            self._step = max(self._step, 2 * step)
+        return self.state
+
+
+def matched(reduced: Reduced, old: State, found: Eigenpairs, *, surely: bool = True) -> IntArray | None:
+    """Places (b,) among ``found`` of the branches of ``old``; None where that is not clear and ``surely`` is asked."""
+    step = found.mu - old.mu
+    moved = step * old.tangents
+    reach = 0.5 * np.maximum(np.abs(old.coordinate), 1e-3 * np.abs(old.coordinate).max(initial=0.0))
+    moved = np.where(np.isfinite(moved) & (np.abs(moved) < reach), moved, 0.0)
+    distance = np.abs((old.coordinate + moved)[:, None] - found.coordinate)
+    if distance.shape[1] < distance.shape[0]:
+        return None if surely else np.argmin(distance, axis=1)
+    # Of two real values at the same distance the one that grows.
+    scale = float(np.abs(found.coordinate).max(initial=1.0))
+    rows, columns = linear_sum_assignment(distance / scale - 1e-9 * found.coordinate.real / scale)
+    place = np.zeros(len(distance), dtype=np.int64)
+    place[rows] = columns
+    if not surely:
+        return place
+    clear = _clear(reduced, old, found, place, distance)
+    for i in np.flatnonzero(~clear):
+        if clear[i]:
+            continue
+        pair = _as_pair(old, found, int(i), place, clear)
+        if pair is None:
+            return None
+        (j, first, second) = pair
+        place[i], place[j] = first, second
+        clear[[i, j]] = True
+    return place if len(np.unique(place)) == len(place) else None
+
+
+def _clear(reduced: Reduced, old: State, found: Eigenpairs, place: IntArray, distance: Array) -> BoolArray:
+    """Whether each branch's match (b,) is beyond doubt."""
+    mine = distance[np.arange(len(place)), place]
+    others = distance.copy()
+    others[np.arange(len(place)), place] = np.inf
+    own = reduced.pairs.count
+    before, after = old.found.right[:own, old.place], found.right[:own, place]
+    common = np.abs(np.einsum("ij,ij->j", before.conj(), after)) ** 2
+    alike = common / np.maximum(np.sum(np.abs(before) ** 2, axis=0) * np.sum(np.abs(after) ** 2, axis=0), 1e-300)
+    rounding = 1e-9 * np.abs(found.coordinate[place])
+    same = others.min(axis=1, initial=np.inf) <= rounding  # identical eigenvalues: either will do
+    return ((mine <= CLEAR * others.min(axis=1, initial=np.inf)) & (alike >= ALIKE)) | (same & (mine <= rounding))
+
+
+def _as_pair(
+    old: State, found: Eigenpairs, i: int, place: IntArray, clear: BoolArray
+) -> tuple[int, int, int] | None:
+    """Branch i matched together with its nearest: (j, place of i, place of j), None where they are no pair."""
+    gap = np.abs(old.coordinate - old.coordinate[i])
+    gap[i] = np.inf
+    j = int(np.argmin(gap))
+    if len(gap) < 2 or clear[j]:
+        return None
+    step = found.mu - old.mu
+    mean, square = halves(old.coordinate[i], old.coordinate[j])
+    slopes = old.tangents[[i, j]]
+    if not np.all(np.isfinite(slopes)):
+        return None
+    mean_to = mean + step * slopes.mean()
+    square_to = square + step * (old.coordinate[i] - old.coordinate[j]) * (slopes[0] - slopes[1]) / 2
+    near = np.argsort(np.abs(found.coordinate - mean_to))
+    both = near[:2]
+    new_mean, new_square = halves(*found.coordinate[both])
+    third = float(np.abs(found.coordinate[near[2]] - mean_to)) if len(near) > 2 else np.inf
+    change = abs(square_to - square)
+    doubtful = abs(new_mean - mean_to) > 0.25 * third or abs(new_square - square_to) > 0.5 * change
+    taken = set(place[clear].tolist())
+    if doubtful or abs(np.sqrt(new_square)) > 0.5 * third or taken & set(both.tolist()):
+        return None
+    aside, strayed = _past_zero(new_square, square), abs(new_square - square_to)
+    if ROUNDING * abs(new_square - square) < aside < 2 * strayed:
+        # The way is not known well enough to say on which side of zero it passes.
+        if step > NARROW * max(found.mu, 1e-2):
+            return None
+        new_square = -abs(new_square / square) * square
+    half = continued(new_square, square, (old.coordinate[i] - old.coordinate[j]) / 2)
+    if i > j and _turned(new_square, square):
+        half = -half
+    first = int(np.argmin(np.abs(found.coordinate[both] - new_mean - half)))
+    return j, int(both[first]), int(both[1 - first])
+
+
+def halves(first: complex, second: complex) -> tuple[complex, complex]:
+    """Mean and squared half difference of two values."""
+    return (first + second) / 2, ((first - second) / 2) ** 2
+
+
+def _past_zero(square: complex, before: complex) -> float:
+    """How far the straight line between two complex numbers passes from zero; infinite where it leads away from it."""
+    if (square * before.conjugate()).real >= 0:
+        return np.inf
+    return abs((square * before.conjugate()).imag) / abs(square - before)
+
+
+def _turned(square: complex, before: complex) -> bool:
+    """Whether the squared half difference has passed through zero on a straight line."""
+    ratio = square / before if before else -1.0 + 0j
+    return bool(ratio.real < 0 and abs(ratio.imag) < ROUNDING * abs(ratio))
+
+
+def continued(square: complex, before: complex, half: complex) -> complex:
+    """√square continuous with ``half`` = √before; where zero lies between, the first of the two grows beyond."""
+    if not _turned(square, before):
+        return half * np.sqrt(complex(square / before))
+    root = complex(np.sqrt(complex(square)))
+    if abs(root.imag) > 1e-9 * abs(root):
+        return root if root.imag > 0 else -root
+    return -root if root.real > 0 else root

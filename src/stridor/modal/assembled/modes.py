@@ -1,0 +1,105 @@
+"""Complex modes of systems with many contact nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...errors import CaseError
+from ...system import System
+from ...threads import one_thread_if_small
+from ...typing import Array
+from ..complex_modes import ComplexModes, undamped
+from .follow import Follower
+from .problem import problem_of
+from .reduced import Reduced
+from .refine import Band, converge, left_vectors, projected
+from .steady import Options
+
+SAMPLES = 5
+
+
+@one_thread_if_small
+def complex_modes_assembled(
+    system: System,
+    mu: float | Sequence[float] | Array,
+    *,
+    count: int = 20,
+    max_frequency_hz: float | None = None,
+    damped: bool = True,
+    vectors: bool = False,
+    options: Options | None = None,
+) -> ComplexModes:
+    """Modes at the friction coefficients ``mu``, branches followed from μ = 0, as `complex_modes` gives them.
+
+    count: how many branches, lowest frequencies at μ = 0 first; max_frequency_hz instead takes all that start below it.
+    vectors keeps left and right ones, n numbers for each. Raises CaseError for friction coefficients or counts that are
+    none, AnalysisError where contacts do not slide, have no equilibrium, or the modes do not settle.
+    """
+    values = checked_friction(mu)
+    if count < 1:
+        raise CaseError("count", count, "at least one mode")
+    if max_frequency_hz is not None and not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
+        raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
+    if not damped:
+        system = undamped(system)
+    single = float(values.max()) if len(values) == 1 else None
+    problem = problem_of(system, single, options or Options(), damped=damped)
+    band = Band(count, None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz)
+    reduced = projected(problem, band)
+    top = float(values.max())
+    converge(reduced, samples(top), left=vectors)
+    converge(reduced, values, left=vectors)
+    return _followed(reduced, values, band, damped=damped, vectors=vectors)
+
+
+def _followed(reduced: Reduced, values: Array, band: Band, *, damped: bool, vectors: bool) -> ComplexModes:
+    """The branches of the band at all μ, judged in the sparse problem."""
+    problem = reduced.problem
+    longest = max(float(values.max()) / 10, 1e-3)
+    follower = Follower(reduced, longest=longest)
+    start = follower.state
+    if band.frequency is None:
+        branches = np.arange(min(band.count, len(start.place)))
+    else:
+        branches = np.flatnonzero(start.values.imag <= band.frequency * (1 + 1e-12))
+    shape = (len(values), len(branches))
+    eigenvalues, residual = np.zeros(shape, dtype=complex), np.zeros(shape)
+    right, left = np.zeros((2, *shape, problem.size if vectors else 0), dtype=complex)
+    for k in np.argsort(values, kind="stable"):
+        mu = float(values[k])
+        state = follower.advance(mu)
+        lam, place = state.values[branches], state.place[branches]
+        u, p = reduced.expand(state.found.right[:, place])
+        eigenvalues[k], residual[k] = lam, problem.backward_error(lam, u, p, mu)
+        if vectors:
+            right[k] = u.T
+            left[k] = left_vectors(reduced, lam, state.found.left[:, place], mu)[0].T
+    return ComplexModes(
+        mu=values,
+        eigenvalues=eigenvalues,
+        branch=np.arange(1, len(branches) + 1),
+        residual=residual,
+        damped=damped,
+        right=right if vectors else None,
+        left=left if vectors else None,
+        open_contacts=problem.open_contacts,
+    )
+
+
+def checked_friction(mu: float | Sequence[float] | Array) -> Array:
+    """Friction coefficients (k,). Raises CaseError for what is none."""
+    values = np.atleast_1d(np.asarray(mu, dtype=float))
+    if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)) or np.any(values < 0):
+        raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
+    return values
+
+
+def samples(top: float, count: int = SAMPLES) -> Array:
+    """Friction coefficients (k,) from ``top`` down to 0, closer at the ends, where polynomials are interpolated best."""
+    if top == 0.0:
+        return np.zeros(1)
+    return top * (1 + np.cos(np.linspace(0, np.pi, count))) / 2
+
+

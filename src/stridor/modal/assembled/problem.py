@@ -1,0 +1,199 @@
+"""The sparse problem that friction makes of a system, displacements and contact forces together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...errors import AnalysisError
+from ...system import System
+from ...typing import Array, ComplexArray, IntArray, Sparse
+from .steady import Options, Steadiness, steadiness, touching_nodes
+
+CHUNK = 64  # columns worked on at a time
+
+
+@dataclass(frozen=True)
+class Extras:
+    """What steady sliding at one μ adds: weakening d (m,) = N dμ/d|v| [N s/m] on slip, damping (n, n), stiffness (n, n)."""
+
+    weakening: Array | None = None
+    damping: Sparse | None = None
+    stiffness: Sparse | None = None
+
+    @property
+    def damps(self) -> bool:
+        """Whether any of it works on velocities."""
+        return self.weakening is not None or self.damping is not None
+
+
+NOTHING = Extras()
+
+
+@dataclass(frozen=True)
+class ContactProblem:
+    """P(λ, μ) of m touching nodes on n freedoms: (λ²M + λC + K) u − (N + μS)ᵀ p = 0 and N u + c p = 0.
+
+    normal N (m, n), slide S (m, n): relative displacement slave − master along the normal and against the slip;
+    compliance c (m,) [m/N], 0 for rigid contact. touching (m,) are the places of the nodes among all the system's.
+    extras gives what steady sliding at a μ adds, None where nothing does. damped: whether anything works on velocities.
+    """
+
+    mass: Sparse
+    damping: Sparse
+    stiffness: Sparse
+    normal: Sparse
+    slide: Sparse
+    compliance: Array
+    touching: IntArray
+    open_contacts: tuple[str, ...]
+    damped: bool
+    extras: Callable[[float], Extras] | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of freedoms n."""
+        return int(self.mass.shape[0])
+
+    @property
+    def nodes(self) -> int:
+        """Number of touching nodes m."""
+        return int(self.normal.shape[0])
+
+    def at(self, mu: float) -> Extras:
+        """What steady sliding at ``mu`` adds; nothing at μ = 0, where no friction force is there to vary."""
+        return NOTHING if self.extras is None else self.extras(mu)
+
+    def residual(self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float) -> ComplexArray:
+        """(λ²M + λC + K) u − (N + μS)ᵀ p (n, k) for λ (k,), u (n, k), p (m, k); real where everything is."""
+        return self._terms(lam, u, p, mu)
+
+    def backward_error(self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float) -> Array:
+        """Componentwise backward errors (k,), contact forces kept as unknowns and their equations judged alike.
+
+        ‖P(λ)x‖∞ / ‖|P|(|λ|) |x|‖∞ of the equations of motion, and of the contacts' own, whichever is larger.
+        """
+        result = np.zeros(len(lam))
+        for start in range(0, len(lam), CHUNK):
+            part = slice(start, start + CHUNK)
+            result[part] = self._judged(lam[part], u[:, part], p[:, part], mu, left=False)
+        return result
+
+    def left_backward_error(self, lam: ComplexArray, y: ComplexArray, q: ComplexArray, mu: float) -> Array:
+        """The same of left vectors: yᵀ(λ²M + λC + K) − qᵀN = 0 and yᵀ(N + μS)ᵀ + qᵀc = 0."""
+        result = np.zeros(len(lam))
+        for start in range(0, len(lam), CHUNK):
+            part = slice(start, start + CHUNK)
+            result[part] = self._judged(lam[part], y[:, part], q[:, part], mu, left=True)
+        return result
+
+    def left_residual(self, lam: ComplexArray, y: ComplexArray, q: ComplexArray, mu: float) -> ComplexArray:
+        """(λ²M + λC + K)ᵀ y − Nᵀ q (n, k)."""
+        return self._terms(lam, y, q, mu, left=True)
+
+    def _terms(
+        self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float, *, left: bool = False
+    ) -> ComplexArray:
+        """The residual of the equations of motion, from the right or from the left."""
+        extras = self.at(mu)
+
+        def flip(matrix: Sparse) -> Sparse:
+            return matrix.T if left else matrix
+
+        total = (lam**2) * times(self.mass, u) + times(self.stiffness, u) - times(self.normal.T, p)
+        if mu and not left:
+            total -= mu * times(self.slide.T, p)
+        if self.damping.nnz:
+            total += lam * times(self.damping, u)
+        if extras.weakening is not None:
+            total += lam * times(self.slide.T, extras.weakening[:, None] * times(self.slide, u))
+        if extras.damping is not None:
+            total += lam * times(flip(extras.damping), u)
+        if extras.stiffness is not None:
+            total += times(flip(extras.stiffness), u)
+        return total
+
+    def _judged(self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float, *, left: bool) -> Array:
+        extras = self.at(mu)
+        size, force, rate = np.abs(u), np.abs(p), np.abs(lam)
+        scale = rate**2 * (abs(self.mass) @ size) + rate * (abs(self.damping) @ size) + abs(self.stiffness) @ size
+        scale += abs(self.normal).T @ force
+        if not left:
+            scale += mu * (abs(self.slide).T @ force)
+        for matrix, factor in ((extras.damping, rate), (extras.stiffness, 1.0)):
+            if matrix is not None:
+                scale += factor * (abs(matrix.T if left else matrix) @ size)
+        error = np.abs(self._terms(lam, u, p, mu, left=left)).max(axis=0) / tiny(scale.max(axis=0))
+        if not self.nodes:
+            return error
+        rows = sp.csr_array(self.normal + mu * self.slide) if left else self.normal
+        closure = np.abs(times(rows, u) + self.compliance[:, None] * p).max(axis=0)
+        reach = (abs(rows) @ size + self.compliance[:, None] * force).max(axis=0)
+        return np.maximum(error, closure / tiny(reach))
+
+
+def times(matrix: Sparse, block: Any) -> Any:
+    """matrix @ block for a real sparse matrix and a real or complex block (n, k), in real arithmetic."""
+    if block.dtype.kind != "c":
+        return matrix @ block
+    return matrix @ np.ascontiguousarray(block.real) + 1j * (matrix @ np.ascontiguousarray(block.imag))
+
+
+def tiny(values: Array) -> Array:
+    """The values, where they are zero the smallest number to divide by."""
+    return np.maximum(values, 1e-300)
+
+
+def problem_of(system: System, mu: float | None, options: Options, *, damped: bool) -> ContactProblem:
+    """The problem of the nodes that touch in steady sliding at ``mu`` (None: at the laws' own coefficients).
+
+    Raises AnalysisError where a touching node does not slide, or a law with a slope has no load to press it.
+    """
+    nodes = system.contact_nodes()
+    steady = touching_nodes(system, nodes, mu)
+    touching = np.flatnonzero(steady.active)
+    chosen = nodes.select(touching)
+    speed = np.linalg.norm(steady.slip_velocity[touching], axis=1)
+    still = touching[speed == 0.0]
+    if len(still):
+        names = sorted({nodes.names[k] for k in nodes.owner[still]})
+        raise AnalysisError(
+            f"contact {', '.join(names)} does not slide at {len(still)} of its nodes: no support moves one of its "
+            "bodies along the tangent; give a support a velocity"
+        )
+    closed = {nodes.names[k] for k in nodes.owner[touching]}
+    with_state = steadiness(system, nodes, touching, options)
+    has_damping = bool(system.damping.nnz and np.abs(system.damping.data).max() > 0)
+    return ContactProblem(
+        mass=system.mass,
+        damping=system.damping if has_damping else sp.csr_array(system.damping.shape),
+        stiffness=system.stiffness,
+        normal=chosen.normal,
+        slide=chosen.along(-steady.slip_velocity[touching] / tiny(speed)[:, None]),
+        compliance=chosen.compliance,
+        touching=touching,
+        open_contacts=tuple(name for name in nodes.names if name not in closed),
+        damped=has_damping or with_state.damps,
+        extras=None if with_state.neutral else _extras(with_state),
+    )
+
+
+def _extras(state: Steadiness) -> Callable[[float], Extras]:
+    """What each μ adds, kept for the μ asked for before: each costs an equilibrium."""
+    known: dict[float, Extras] = {}
+
+    def at(mu: float) -> Extras:
+        if mu not in known:
+            known[mu] = NOTHING if mu == 0.0 and not state.prestress else Extras(*state.terms(mu))
+        return known[mu]
+
+    return at
+
+
+def without_friction(problem: ContactProblem) -> ContactProblem:
+    """The same contacts at μ = 0 without what steady sliding adds."""
+    return replace(problem, extras=None)

@@ -1,0 +1,297 @@
+"""The projected problem: small dense matrices that stand for the sparse ones, and their eigenpairs at any μ.
+
+Trial vectors are pairs (u, p) that respect the contacts, N u + c p = 0. Where contact is rigid, u says nothing about p, and
+forces p̂ of their own are added (u = 0), each with a test vector ℓ that lifts it, N ℓ = p̂. Tested with [U, ℓ],
+
+    Wᵀ(λ²M + λC + K) U z − (N W)ᵀ p − μ (S W)ᵀ p = 0,    p = P z + P̂ a .
+
+The rows of ℓ determine a from z, with λ² and λ: that is how inertia and damping get into the contact force. At μ = 0 the rows
+of U hold a symmetric problem alone, (λ²UᵀMU + λUᵀCU + UᵀKU + PᵀcP) z = 0, with frequencies from above as in any
+conforming method: no spurious modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+
+from ...errors import AnalysisError
+from ...typing import Array, ComplexArray, Sparse
+from .problem import ContactProblem, Extras
+from .shifted import Pair, Shifted, orthonormal
+
+
+@dataclass(frozen=True)
+class Eigenpairs:
+    """Eigenpairs of the projected problem at one μ, one of each conjugate pair of λ.
+
+    coordinate x (k,): λ² without damping, else λ. values λ (k,) with Im λ ≥ 0. right (r, k) and left (r, k) vectors,
+    wᵀ P(λ) z = 0, tangents dx/dμ (k,).
+    """
+
+    mu: float
+    coordinate: ComplexArray
+    values: ComplexArray
+    right: ComplexArray
+    left: ComplexArray
+    tangents: ComplexArray
+
+
+class Reduced:
+    """A basis and the problem projected on it, both of which grow.
+
+    pairs: trial vectors with contact forces; forces P̂ (m, f): forces of rigid contacts of their own; lifts (n, f) their
+    test vectors. solves counts right sides solved for.
+    """
+
+    def __init__(self, problem: ContactProblem, shifted: Shifted, modes: Pair, frequency: float) -> None:
+        self.problem = problem
+        self.shifted = shifted
+        self.frequency = frequency
+        self.pairs = Pair(np.zeros((problem.size, 0)), np.zeros((problem.nodes, 0)))
+        self.forces = np.zeros((problem.nodes, 0))
+        self.lifts = np.zeros((problem.size, 0))
+        self.solves = 0
+        self._rigid = np.flatnonzero(problem.compliance == 0.0)
+        self._force_scale = float(np.linalg.norm(modes.p, axis=0).max(initial=0.0)) or 1.0
+        self._matrices: tuple[Array, Array, Array, Array] = (np.zeros((0, 0)),) * 4
+        self._products = [(np.zeros((0, 0)), np.zeros((0, 0)))] * 3
+        self._slide = np.zeros((problem.nodes, 0))
+        self._known: dict[float, Eigenpairs] = {}
+        self._extra: dict[float, tuple[Array, Array]] = {}
+        self.add(modes)
+
+    @property
+    def count(self) -> int:
+        """Number of unknowns r."""
+        return self.pairs.count + self.forces.shape[1]
+
+    def add(self, candidates: Pair) -> int:
+        """Take pairs in as far as they are new; returns how many unknowns that made."""
+        before = self.count
+        new, _ = orthonormal(self.problem, self.pairs, candidates)
+        if len(self._rigid):
+            self._add_forces(candidates.p)
+            free = new.p.copy()
+            free[self._rigid] = 0.0
+            new = Pair(new.u, free)
+        self.pairs = self.pairs.with_(new)
+        if self.count > before:
+            self._project()
+        return self.count - before
+
+    def enrich(self, force: Array) -> int:
+        """Take in what forces (n, k) do to the frictionless problem; returns how many unknowns that made."""
+        self.solves += force.shape[1]
+        return self.add(Pair(*self.shifted.solve(force)))
+
+    def enrich_left(self, force: Array, opening: Array) -> int:
+        """Take in what left vectors need: answers to forces (n, k), and lifts of gap openings (m, l)."""
+        grown = self.enrich(force)
+        before = self.count
+        if len(self._rigid):
+            self._add_forces(opening)
+        soft = opening.copy()
+        soft[self._rigid] = 0.0
+        soft = soft[:, np.abs(soft).max(axis=0, initial=0.0) > 0]
+        if soft.shape[1]:
+            self.solves += soft.shape[1]
+            u, _ = self.shifted.solve(np.zeros((self.problem.size, soft.shape[1])), soft)
+            compliance = self.problem.compliance
+            p = np.zeros_like(soft)
+            given = compliance > 0
+            p[given] = -(self.problem.normal @ u)[given] / compliance[given, None]
+            new, _ = orthonormal(self.problem, self.pairs, Pair(u, p))
+            self.pairs = self.pairs.with_(new)
+        if self.count > before:
+            self._project()
+        return grown + self.count - before
+
+    def _add_forces(self, candidates: Array) -> None:
+        """Take forces (m, k) on rigid contacts in as far as they are new, each with its lift."""
+        block = np.zeros_like(candidates)
+        block[self._rigid] = candidates[self._rigid]
+        length = np.linalg.norm(block, axis=0)
+        block = block[:, length > 0] / length[length > 0]
+        known = self.forces / self._force_scale
+        for _ in range(2):
+            block = block - known @ (known.T @ block)
+        if not block.shape[1]:
+            return
+        q, r, _ = sl.qr(block, mode="economic", pivoting=True)
+        new = q[:, np.abs(np.diag(r)) > 1e-9]
+        new = new - known @ (known.T @ new)
+        if not new.shape[1]:
+            return
+        new = sl.qr(new, mode="economic")[0]
+        self.solves += new.shape[1]
+        lift, _ = self.shifted.solve(np.zeros((self.problem.size, new.shape[1])), new)
+        lift /= np.sqrt(np.maximum(np.einsum("ij,ij->j", lift, self.problem.mass @ lift), 1e-300))
+        self.forces = np.hstack([self.forces, new * self._force_scale])
+        self.lifts = np.hstack([self.lifts, lift])
+
+    # -- the projected matrices ---------------------------------------------------------------------------------------
+    def _project(self) -> None:
+        """The matrices M, C, K and friction F (r, r): unknowns [z, a], equations tested with [U, ℓ]."""
+        problem, own = self.problem, self.pairs.count
+        force = np.hstack([self.pairs.p, self.forces])
+        tests = [self.pairs.u, self.lifts]
+        r = self.count
+        mass, damping, stiffness = np.zeros((3, r, r))
+        for place, (matrix, target) in enumerate(
+            ((problem.mass, mass), (problem.stiffness, stiffness), (problem.damping, damping))
+        ):
+            if matrix.nnz:
+                self._products[place] = _grown(self._products[place], matrix, *tests)
+                target[:own, :own], target[own:, :own] = self._products[place]
+        normal = np.hstack([problem.normal @ t for t in tests])
+        self._slide = np.hstack([problem.slide @ t for t in tests])
+        self._matrices = (mass, damping, stiffness - normal.T @ force, -self._slide.T @ force)
+        self._known.clear()
+        self._extra.clear()
+
+    def matrices(self, mu: complex) -> tuple[Array, Array, Array]:
+        """M, C and K (r, r) at μ, friction and what steady sliding adds included; complex where μ is."""
+        mass, damping, stiffness, friction = self._matrices
+        if self.problem.extras is None:
+            return mass, damping, stiffness + mu * friction
+        if float(mu.real) not in self._extra:
+            self._extra[float(mu.real)] = self._projected(self.problem.at(float(mu.real)))
+        more_damping, more_stiffness = self._extra[float(mu.real)]
+        return mass, damping + more_damping, stiffness + mu * friction + more_stiffness
+
+    def _projected(self, extras: Extras) -> tuple[Array, Array]:
+        own = self.pairs.count
+        damping, stiffness = np.zeros((2, self.count, self.count))
+        tests = np.hstack([self.pairs.u, self.lifts])
+        if extras.weakening is not None:
+            damping[:, :own] += self._slide.T @ (extras.weakening[:, None] * self._slide[:, :own])
+        if extras.damping is not None:
+            damping[:, :own] += tests.T @ (extras.damping @ self.pairs.u)
+        if extras.stiffness is not None:
+            stiffness[:, :own] += tests.T @ (extras.stiffness @ self.pairs.u)
+        return damping, stiffness
+
+    # -- eigenpairs ---------------------------------------------------------------------------------------------------
+    def eigenpairs(self, mu: float) -> Eigenpairs:
+        """All eigenpairs at ``mu`` with |λ| up to three times the frequency of interest."""
+        if mu not in self._known:
+            coordinate, right, left = self.solve(mu)
+            values = coordinate if self.problem.damped else upper_root(coordinate)
+            tangents = self.tangents(mu, coordinate, values, right, left)
+            self._known[mu] = Eigenpairs(mu, coordinate, values, right, left, tangents)
+        return self._known[mu]
+
+    def solve(self, mu: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Coordinates x (k,), right and left vectors (r, k) at a real or complex μ, |λ| up to three times the band."""
+        mass, damping, stiffness = self.matrices(mu)
+        x, right, left = (_quadratic if self.problem.damped else _linear)(mass, damping, stiffness, self.frequency)
+        size = np.abs(x) if self.problem.damped else np.sqrt(np.abs(x))
+        chosen = np.isfinite(size) & (size <= 3.0 * self.frequency)
+        if self.problem.damped and not isinstance(mu, complex):
+            chosen &= x.imag >= 0.0
+        chosen = np.flatnonzero(chosen)
+        chosen = chosen[np.lexsort((x[chosen].real, size[chosen]))]
+        return x[chosen], right[:, chosen], left[:, chosen]
+
+    def tangents(
+        self, mu: float, coordinate: ComplexArray, values: ComplexArray, right: ComplexArray, left: ComplexArray
+    ) -> ComplexArray:
+        """dx/dμ (k,) = −wᵀ P_μ z / wᵀ P_x z."""
+        mass, damping, _ = self.matrices(mu)
+        change = self._matrices[3] @ right
+        if self.problem.extras is not None and mu:
+            # Steady forces change little with μ, the laws' slopes are proportional to it.
+            change = change + values * (self._extra[mu][0] / mu @ right)
+        by_x = mass @ right
+        if self.problem.damped:
+            by_x = 2 * coordinate * by_x + damping @ right
+        with np.errstate(all="ignore"):
+            return -np.einsum("ij,ij->j", left, change) / np.einsum("ij,ij->j", left, by_x)
+
+    def null_vector(self, lam: complex, mu: float) -> ComplexArray:
+        """The vector (r,) that P(λ, μ) all but takes to zero, for λ that may be double."""
+        mass, damping, stiffness = self.matrices(mu)
+        matrix = lam**2 * mass + lam * damping + stiffness
+        rows = np.maximum(np.abs(matrix).max(axis=1), 1e-300)
+        columns = np.maximum(np.abs(matrix / rows[:, None]).max(axis=0), 1e-300)
+        return sl.svd(matrix / rows[:, None] / columns)[2][-1].conj() / columns
+
+    def expand(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """u (n, k) of unit norm and p (m, k) of right vectors z (r, k)."""
+        own = self.pairs.count
+        u = combined(self.pairs.u, z[:own])
+        p = combined(self.pairs.p, z[:own]) + combined(self.forces, z[own:])
+        norm = np.linalg.norm(u, axis=0)
+        return u / norm, p / norm
+
+    def expand_left(self, w: ComplexArray) -> ComplexArray:
+        """y (n, k) of unit norm of left vectors w (r, k)."""
+        own = self.pairs.count
+        y = combined(self.pairs.u, w[:own]) + combined(self.lifts, w[own:])
+        return y / np.linalg.norm(y, axis=0)
+
+
+def _grown(known: tuple[Array, Array], matrix: Sparse, u: Array, lifts: Array) -> tuple[Array, Array]:
+    """Uᵀ A U (r, r) and ℓᵀ A U (f, r) of a symmetric matrix, of which the leading parts are known."""
+    (f0, r0), r, f = known[1].shape, u.shape[1], lifts.shape[1]
+    new = matrix @ u[:, r0:]
+    square, across = np.zeros((r, r)), np.zeros((f, r))
+    square[:r0, :r0], across[:f0, :r0] = known
+    square[:, r0:] = u.T @ new
+    square[r0:, :r0] = square[:r0, r0:].T
+    across[:, r0:] = lifts.T @ new
+    across[f0:, :r0] = (matrix @ lifts[:, f0:]).T @ u[:, :r0]
+    return square, across
+
+
+def combined(basis: Array, weights: ComplexArray) -> ComplexArray:
+    """basis @ weights in real arithmetic; real where the weights are."""
+    if weights.dtype.kind != "c" or not np.any(weights.imag):
+        return basis @ np.ascontiguousarray(weights.real)
+    return basis @ np.ascontiguousarray(weights.real) + 1j * (basis @ np.ascontiguousarray(weights.imag))
+
+
+def upper_root(squares: ComplexArray) -> ComplexArray:
+    """λ (k,) of λ² with Im λ ≥ 0, and Re λ ≥ 0 where it is real."""
+    root = np.sqrt(squares.astype(complex))
+    return np.where((root.imag < 0) | ((root.imag == 0) & (root.real < 0)), -root, root)
+
+
+def _linear(mass: Array, damping: Array, stiffness: Array, frequency: float) -> tuple[ComplexArray, ...]:
+    """x = λ² and right and left vectors of (xM + K) z = 0, shifted and inverted at x = frequency²."""
+    shift = frequency**2
+    factor = _factor(stiffness + shift * mass)
+    theta, left, right = sl.eig(sl.lu_solve(factor, shift * mass), left=True, right=True)
+    with np.errstate(all="ignore"):
+        x = shift - shift / theta
+    return x, right, sl.lu_solve(factor, left.conj(), trans=1)
+
+
+def _quadratic(mass: Array, damping: Array, stiffness: Array, frequency: float) -> tuple[ComplexArray, ...]:
+    """x = λ and right and left vectors of (x²M + xC + K) z = 0, shifted and inverted at x = frequency."""
+    mass, damping = frequency**2 * mass, frequency * damping
+    r = len(mass)
+    factor = _factor(mass + damping + stiffness)
+    companion = np.zeros((2 * r, 2 * r), dtype=stiffness.dtype)
+    companion[:r, :r] = -sl.lu_solve(factor, damping + 2 * mass)
+    companion[:r, r:] = -sl.lu_solve(factor, mass)
+    companion[r:, :r] = np.eye(r)
+    theta, left, right = sl.eig(companion, left=True, right=True)
+    with np.errstate(all="ignore"):
+        x = frequency * (1 + 1 / theta)
+    chosen = np.abs(theta) > 1e-3
+    top, bottom = right[:r, chosen], right[r:, chosen]
+    z = np.where(np.abs(theta[chosen]) > 1, top, bottom)
+    return x[chosen], z, sl.lu_solve(factor, left[:r, chosen].conj(), trans=1)
+
+
+def _factor(matrix: Array) -> tuple[Array, Array]:
+    if not np.all(np.isfinite(matrix)):
+        raise AnalysisError("the projected contact problem is not finite; check the model's units and stiffnesses")
+    factor = sl.lu_factor(matrix)
+    if np.abs(np.diag(factor[0])).min(initial=np.inf) == 0.0:
+        raise AnalysisError("the projected contact problem is singular: the same contact is given twice, or friction jams")
+    return factor

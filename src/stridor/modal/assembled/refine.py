@@ -1,0 +1,167 @@
+"""Growing the projected problem until its eigenpairs satisfy the sparse one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+
+from ...errors import AnalysisError
+from ...typing import Array, ComplexArray, IntArray
+from .problem import ContactProblem, times, tiny
+from .reduced import Eigenpairs, Reduced
+from .shifted import Shifted, frictionless_modes, real_columns, shift_for
+
+TOLERANCE = 1e-10  # backward error at which an eigenpair counts as found
+ACCURACY = 1e-7  # and its residual against the inertia forces
+BELIEVED = 1e-8  # backward error above which the answer is refused
+SWEEPS = 40
+WIDEST = 64  # right sides of one enrichment
+WEAKEST = 1e-3  # of the strongest direction: residuals below it wait for the next sweep
+MARGIN = 1.1  # modes up to this much above the band are made exact
+GUARD = 1.5  # and frictionless ones up to this much above take part
+
+
+@dataclass(frozen=True)
+class Band:
+    """Which modes are asked for: the ``count`` lowest at μ = 0, or all up to a frequency [1/s] where it is given."""
+
+    count: int
+    frequency: float | None
+
+    def enough(self, squares: Array, _: int) -> bool:
+        """Whether frictionless ω² found so far reach beyond the band."""
+        if self.frequency is not None:
+            return bool(len(squares) and squares[-1] > (GUARD * self.frequency) ** 2)
+        return len(squares) > self.count and bool(squares[-1] > GUARD**2 * squares[self.count - 1])
+
+    def top(self, squares: Array) -> float:
+        """The band's upper end [1/s]."""
+        if self.frequency is not None:
+            return self.frequency
+        if not len(squares):
+            return 1.0
+        highest = float(squares[min(self.count, len(squares)) - 1])
+        return float(np.sqrt(max(highest, 1e-12 * float(squares[-1])))) or 1.0
+
+
+def projected(problem: ContactProblem, band: Band) -> Reduced:
+    """The problem on its frictionless modes up to beyond the band, and on what their friction forces do to it."""
+    shifted = Shifted(problem, shift_for(problem, band.frequency))
+    squares, modes = frictionless_modes(shifted, band.enough)
+    top = band.top(squares)
+    reduced = Reduced(problem, shifted, modes, top)
+    near = squares <= (MARGIN * top) ** 2
+    if problem.nodes and near.any():
+        forces = problem.slide.T @ modes.p[:, near]
+        reduced.enrich(principal(problem, forces))
+    return reduced
+
+
+def wanted(reduced: Reduced, found: Eigenpairs) -> IntArray:
+    """Places of the eigenpairs that are to be exact: those of the band and a margin."""
+    return np.flatnonzero(np.abs(found.values) <= MARGIN * reduced.frequency)
+
+
+def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float = TOLERANCE, left: bool = False) -> None:
+    """Enrich the basis until the band's eigenpairs at all ``frictions`` satisfy the sparse problem.
+
+    ``left`` asks it of the left vectors too. Raises AnalysisError where they do not settle within BELIEVED.
+    """
+    pending = list(dict.fromkeys(float(mu) for mu in frictions))
+    worst: dict[float, float] = dict.fromkeys(pending, np.inf)
+    for _ in range(SWEEPS):
+        if not pending:
+            return
+        for mu in list(pending):
+            worst[mu], force, opening = unbalanced(reduced, mu, tolerance, left=left)
+            if not force.shape[1] and not opening.shape[1]:
+                pending.remove(mu)
+                continue
+            force = principal(reduced.problem, force)
+            grown = reduced.enrich_left(force, opening) if left else reduced.enrich(force)
+            if not grown:
+                pending.remove(mu)
+    stuck = [mu for mu in pending if worst[mu] > BELIEVED]
+    if stuck:
+        raise AnalysisError(
+            f"the modes at μ = {stuck[0]:g} do not settle: a backward error of {worst[stuck[0]]:.1e} is left; ask for "
+            "fewer modes or smaller friction coefficients"
+        )
+
+
+def unbalanced(
+    reduced: Reduced, mu: float, tolerance: float, *, left: bool = False
+) -> tuple[float, Array, Array]:
+    """Largest backward error at ``mu``, and what the band's eigenpairs that are not exact leave unbalanced: forces
+    (n, k) against their inertia forces, and for left vectors the slips (m, l) that must open the gaps."""
+    problem = reduced.problem
+    found = reduced.eigenpairs(mu)
+    chosen = wanted(reduced, found)
+    lam = found.values[chosen]
+    u, p = reduced.expand(found.right[:, chosen])
+    error = problem.backward_error(lam, u, p, mu)
+    rest = problem.residual(lam, u, p, mu)
+    forces = [_relative(reduced, rest, lam, u, error > tolerance)]
+    openings = [np.zeros((problem.nodes, 0))]
+    if left:
+        y, q = left_vectors(reduced, lam, found.left[:, chosen], mu)
+        left_error = problem.left_backward_error(lam, y, q, mu)
+        wrong = left_error > tolerance
+        forces.append(_relative(reduced, problem.left_residual(lam, y, q, mu), lam, y, wrong))
+        openings.append(real_columns(times(problem.slide, y[:, wrong])))
+        error = np.maximum(error, left_error)
+    return float(error.max(initial=0.0)), np.hstack(forces), np.hstack(openings)
+
+
+def _relative(reduced: Reduced, rest: ComplexArray, lam: ComplexArray, u: ComplexArray, inexact: Array) -> Array:
+    """Residuals (n, k) over the pairs' inertia forces, of those that are inexact or large against them."""
+    weight = lumped(reduced.problem)[:, None]
+    inertia = (np.abs(lam) ** 2 + reduced.shifted.shift) * np.linalg.norm(np.sqrt(weight) * u, axis=0)
+    size = np.linalg.norm(rest / np.sqrt(weight), axis=0) / tiny(inertia)
+    chosen = inexact | (size > ACCURACY * 1e3)
+    return real_columns(rest[:, chosen] / tiny(inertia[chosen]))
+
+
+def left_vectors(
+    reduced: Reduced, lam: ComplexArray, w: ComplexArray, mu: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """y (n, k) of unit norm and q (m, k) of left vectors: −(N + μS) y / c, where rigid what fits the equations best."""
+    problem = reduced.problem
+    y = reduced.expand_left(w)
+    rows = problem.normal + mu * problem.slide
+    q = np.zeros((problem.nodes, len(lam)), dtype=complex)
+    soft = problem.compliance > 0
+    q[soft] = -times(rows, y)[soft] / problem.compliance[soft, None]
+    if not soft.all() and len(lam):
+        rest = problem.left_residual(lam, y, q, mu)
+        normal = problem.normal[~soft]
+        q[~soft] = fitted(normal, rest)
+    return y, q
+
+
+def fitted(rows: ContactProblem | object, rest: ComplexArray) -> ComplexArray:
+    """Forces (m, k) on rows (m, n) that come closest to ``rest`` (n, k): least squares by the normal equations."""
+    from ...direct import factorise
+
+    matrix = rows @ rows.T  # type: ignore[operator]
+    return factorise(matrix, symmetric=True).solve(times(rows, rest))
+
+
+def principal(problem: ContactProblem, forces: Array) -> Array:
+    """The few directions (n, l) that the forces (n, k) mostly have, weighted by their compliance in the lumped mass."""
+    if not forces.shape[1]:
+        return forces
+    scaled = forces / np.sqrt(lumped(problem))[:, None]
+    gram = scaled.T @ scaled
+    squares, vectors = sl.eigh(gram)
+    keep = np.flatnonzero(squares > WEAKEST**2 * squares[-1])[-WIDEST:]
+    return forces @ (vectors[:, keep] / np.sqrt(squares[keep]))
+
+
+def lumped(problem: ContactProblem) -> Array:
+    """Diagonal masses (n,), massless freedoms given a little."""
+    diagonal = problem.mass.diagonal()
+    return np.maximum(diagonal, 1e-6 * float(diagonal.mean()) + 1e-300)

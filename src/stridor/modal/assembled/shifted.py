@@ -1,0 +1,182 @@
+"""The one factorisation everything rests on: the frictionless problem at a shift below all its frequencies.
+
+A₀ = [[K + sM, −Nᵀ], [−N, −c]] with s > 0 is symmetric, and regular also where the structure can move as a whole. Its
+inverse takes forces to motions that respect the contacts exactly, which is what every basis vector is made of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+
+from ...direct import factorise
+from ...errors import AnalysisError
+from ...typing import Array, ComplexArray
+from .problem import ContactProblem
+
+BLOCK = 24  # right sides solved for at once while modes are sought
+CONVERGED = 1e-11  # of an eigenvalue of the inverse: what a Ritz vector may leave
+MOST_BLOCKS = 200
+SEED = 20061
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Shapes u (n, k) with the contact forces p (m, k) that go with them: N u + c p = 0 for every column."""
+
+    u: Array
+    p: Array
+
+    @property
+    def count(self) -> int:
+        """Number of columns k."""
+        return int(self.u.shape[1])
+
+    def turned(self, by: Array) -> Pair:
+        """Linear combinations, by (k, l)."""
+        return Pair(self.u @ by, self.p @ by)
+
+    def less(self, other: Pair, weights: Array) -> Pair:
+        """Minus the combinations of ``other`` with weights (l, k)."""
+        return Pair(self.u - other.u @ weights, self.p - other.p @ weights)
+
+    def with_(self, other: Pair) -> Pair:
+        """Both side by side."""
+        return Pair(np.hstack([self.u, other.u]), np.hstack([self.p, other.p]))
+
+
+class Shifted:
+    """A₀⁻¹ of a problem at ω² = −s [1/s²].
+
+    Multipliers are scaled to the stiffness inside, so that the factorisation is well balanced.
+    """
+
+    def __init__(self, problem: ContactProblem, shift: float) -> None:
+        self.problem = problem
+        self.shift = shift
+        stiffness = sp.csr_array(problem.stiffness + shift * problem.mass)
+        self._scale = float(np.abs(stiffness.diagonal()).mean()) or 1.0
+        if problem.nodes:
+            normal = sp.csr_array(-self._scale * problem.normal)
+            corner = sp.diags_array(-(self._scale**2) * problem.compliance, format="csr")
+            stiffness = sp.block_array([[stiffness, normal.T], [normal, corner]], format="csr")
+        self._factor = factorise(stiffness, symmetric=True, saddle=problem.nodes > 0)
+
+    def solve(self, force: Any, opening: Any = None) -> tuple[Any, Any]:
+        """u (n, k), p (m, k) with (K + sM) u − Nᵀp = force (n, k) and N u + c p = opening (m, k), zero by default."""
+        n, m = self.problem.size, self.problem.nodes
+        right = np.zeros((n + m, force.shape[1]), dtype=np.result_type(force, 0.0 if opening is None else opening))
+        right[:n] = force
+        if opening is not None:
+            right[n:] = -self._scale * opening
+        answer = self._factor.solve(right)
+        return answer[:n], self._scale * answer[n:]
+
+
+def shift_for(problem: ContactProblem, frequency: float | None) -> float:
+    """s [1/s²]: a tenth of the angular frequency of interest, squared.
+
+    Where that frequency is not known, a millionth of the largest ratio of stiffness to mass.
+    """
+    if frequency is not None:
+        return (0.1 * frequency) ** 2
+    mass, stiffness = problem.mass.diagonal(), problem.stiffness.diagonal()
+    moving = mass > 0
+    largest = float((stiffness[moving] / mass[moving]).max(initial=1.0))
+    return 1e-6 * largest
+
+
+def frictionless_modes(shifted: Shifted, enough: Callable[[Array, int], bool]) -> tuple[Array, Pair]:
+    """ω² (k,) [1/s²] ascending, and the modes as pairs of unit modal mass.
+
+    Block Lanczos with every vector kept: one block solve brings BLOCK vectors, and multiple frequencies come as they
+    are. ``enough`` is asked with all converged ω² below the first that is not, and the number of vectors so far.
+    """
+    mass = shifted.problem.mass
+    empty = Pair(np.zeros((shifted.problem.size, 0)), np.zeros((0, 0)))
+    block, _ = orthonormal(shifted.problem, empty, _start(shifted))
+    basis, image = block, np.zeros((0, 0))
+    for _ in range(MOST_BLOCKS):
+        answer = Pair(shifted.solve(mass @ block.u)[0], np.zeros((0, block.count)))
+        new, rest = orthonormal(shifted.problem, basis, answer)
+        column = basis.u.T @ (mass @ answer.u)
+        # The inverse is symmetric in the mass: what the earlier vectors give of the last is known.
+        image = np.hstack([np.vstack([image, column[: len(image)].T]), column])
+        values, vectors = sl.eigh((image + image.T) / 2)
+        values, vectors = values[::-1], vectors[:, ::-1]
+        left = np.linalg.norm(rest @ vectors[-block.count :], axis=0)
+        good = (values > 0) & (left <= CONVERGED * values + 1e-14 * values[0])
+        count = len(good) if good.all() else int(np.argmin(good))
+        if not new.count or enough(1.0 / values[:count] - shifted.shift, basis.count):
+            return _polished(shifted, basis.u @ vectors[:, :count])
+        basis, block = basis.with_(new), new
+    raise AnalysisError("the frictionless modes do not converge; ask for fewer modes or a lower max_frequency_hz")
+
+
+def _start(shifted: Shifted) -> Pair:
+    """A first block that respects the contacts."""
+    problem = shifted.problem
+    width = max(1, min(BLOCK, problem.size))
+    random = np.random.default_rng(SEED).standard_normal((problem.size, width))
+    return Pair(shifted.solve(problem.mass @ random)[0], np.zeros((0, width)))
+
+
+def _polished(shifted: Shifted, shapes: Array) -> tuple[Array, Pair]:
+    """One more inverse iteration of all together, which also gives the contact forces, and Rayleigh–Ritz."""
+    problem = shifted.problem
+    if not shapes.shape[1]:
+        return np.zeros(0), Pair(shapes, np.zeros((problem.nodes, 0)))
+    u, p = shifted.solve(problem.mass @ shapes)
+    mass = u.T @ (problem.mass @ u)
+    stiffness = u.T @ (problem.stiffness @ u) + p.T @ (problem.compliance[:, None] * p)
+    squares, turn = sl.eigh((stiffness + stiffness.T) / 2, (mass + mass.T) / 2)
+    return squares, Pair(u, p).turned(turn)
+
+
+def orthonormal(
+    problem: ContactProblem, basis: Pair, block: Pair, *, smallest: float = 1e-8
+) -> tuple[Pair, Array]:
+    """What pairs ``block`` (k) add to the M-orthonormal pairs ``basis``, and the weights (a, k) with which they hold it.
+
+    Contact forces are transformed as their shapes are. Directions that leave less than ``smallest`` of their column's
+    length, which is all that distinguishes them from rounding, are left out.
+    """
+    mass = problem.mass
+    length = np.sqrt(np.maximum(np.einsum("ij,ij->j", block.u, mass @ block.u), 0.0))
+    alive = np.flatnonzero(length > 0)
+    new = block.turned(np.eye(len(length))[:, alive] / length[alive])
+    weight = np.sqrt(np.maximum(mass.diagonal(), 1e-6 * mass.diagonal().mean()))[:, None]
+    for last in (False, True):
+        for _ in range(2):
+            new = new.less(basis, basis.u.T @ (mass @ new.u))
+        if not new.count:
+            break
+        if last:
+            gram = new.u.T @ (mass @ new.u)
+            squares, vectors = sl.eigh((gram + gram.T) / 2)
+            good = squares > 1e-6 * squares[-1]
+            new = new.turned(vectors[:, good] / np.sqrt(squares[good]))
+        else:
+            # Pivoted QR in the lumped mass sees ranks down to rounding; a Gram matrix only to its root.
+            r, order = sl.qr(weight * new.u, mode="r", pivoting=True)
+            keep = int((np.abs(np.diag(r)) > smallest).sum())
+            step = np.zeros((new.count, keep))
+            step[order[:keep]] = sl.solve_triangular(r[:keep, :keep], np.eye(keep))
+            new = new.turned(step)
+    return new, new.u.T @ (mass @ block.u)
+
+
+def real_columns(block: ComplexArray | Array) -> Array:
+    """Real and imaginary parts side by side, the imaginary ones only where there are any."""
+    if block.dtype.kind != "c":
+        return np.asarray(block)
+    parts = [block.real]
+    imaginary = np.flatnonzero(np.abs(block.imag).max(axis=0, initial=0.0) > 0)
+    if len(imaginary):
+        parts.append(block.imag[:, imaginary])
+    return np.concatenate(parts, axis=1)

@@ -1,0 +1,18 @@
+"""Steady sliding: the equilibrium that both approaches start from, of point contacts and of whole surfaces."""
+
+from .points import SteadySliding, full_motion, slip_speeds, steady_sliding
+from .resultants import Balance, Resultant
+from .surfaces import SurfaceSliding, friction_damping_matrix, steady_sliding_nodes, touching
+
+__all__ = [
+    "Balance",
+    "Resultant",
+    "SteadySliding",
+    "SurfaceSliding",
+    "friction_damping_matrix",
+    "full_motion",
+    "slip_speeds",
+    "steady_sliding",
+    "steady_sliding_nodes",
+    "touching",
+]

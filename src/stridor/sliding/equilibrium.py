@@ -1,0 +1,177 @@
+"""The equations of steady sliding for a given set of touching nodes, and their solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from .. import direct
+from ..contact.nodes import ContactNodes
+from ..errors import AnalysisError
+from ..system import System
+from ..typing import Array, BoolArray, IntArray, Sparse
+
+# Contact springs stiffer than this, relative to the structure, would drown it in rounding if added to its matrix.
+CONDENSED = 1e3
+NEWTON_STEPS = 60
+
+
+@dataclass(frozen=True)
+class State:
+    """Displacement (n,) [m], normal force (m,) [N] and gap (m,) [m] for one set of touching nodes."""
+
+    active: BoolArray
+    displacement: Array
+    normal_force: Array
+    gap: Array
+
+
+class Equilibrium:
+    """K u + cubic(u) − Pᵀ N = f,  g₀ + n u + c N = 0 on the touching nodes, with P = n + μ s·t.
+
+    Touching nodes of finite stiffness go into K; rigid and nearly rigid ones become unknown multipliers.
+    """
+
+    def __init__(
+        self, system: System, nodes: ContactNodes, push: Sparse, force: Array, *, symmetric: bool, solver: str | None
+    ) -> None:
+        self.system, self.nodes, self.push, self.force = system, nodes, push, force
+        self.symmetric, self.solver = symmetric, solver
+        self.scale = float(np.abs(system.stiffness.data).max(initial=0.0)) or 1.0
+        self.condensed: BoolArray = nodes.compliance * self.scale * CONDENSED > 1.0
+        self.factorisations = 0
+
+    def solve(self, active: BoolArray, start: Array | None = None) -> State:
+        """The equilibrium with exactly these nodes touching, whichever the signs of gap and force.
+
+        start (n,): where Newton's method begins for springs beyond the linear. Raises direct.SingularMatrix where the
+        structure can move, AnalysisError where Newton's method does not converge.
+        """
+        u = np.zeros(self.system.size) if start is None else start
+        cubic = self.system.cubic
+        if cubic is None or not cubic.coefficient.size:
+            u, normal = self._linear(active, None, None)
+            return State(active, u, normal, self.nodes.gap + self.nodes.normal @ u)
+        rows, before = cubic.rows.free, u
+        for _ in range(NEWTON_STEPS):
+            stretch = rows @ before
+            tangent = sp.csr_array(rows.T @ sp.diags_array(3 * cubic.coefficient * stretch**2) @ rows)
+            u, normal = self._linear(active, tangent, 2 * (rows.T @ (cubic.coefficient * stretch**3)))
+            moved, size = float(np.abs(rows @ u - stretch).max()), float(np.abs(rows @ u).max())
+            before = u
+            if moved <= 1e-12 * size:
+                return State(active, u, normal, self.nodes.gap + self.nodes.normal @ u)
+        raise AnalysisError(
+            "steady sliding: the springs beyond the linear find no equilibrium in "
+            f"{NEWTON_STEPS} steps; check their coefficients (softening springs may have none)"
+        )
+
+    def residual(self, state: State) -> float:
+        """Largest imbalance of a freedom over the largest force that takes part."""
+        u, normal = state.displacement, state.normal_force
+        internal = self.system.stiffness @ u
+        terms = abs(self.system.stiffness) @ np.abs(u) + np.abs(self.force) + abs(self.push).T @ np.abs(normal)
+        if self.system.cubic is not None:
+            cubic = self.system.cubic
+            internal = internal + cubic.rows.free.T @ (cubic.coefficient * (cubic.rows.free @ u) ** 3)
+        imbalance = internal - self.force - self.push.T @ normal
+        return float(np.abs(imbalance).max(initial=0.0) / max(float(terms.max(initial=0.0)), 1e-300))
+
+    def _linear(self, active: BoolArray, tangent: Sparse | None, extra: Array | None) -> tuple[Array, Array]:
+        nodes, n = self.nodes, self.system.size
+        springs, rigid = np.flatnonzero(active & self.condensed), np.flatnonzero(active & ~self.condensed)
+        stiffness = self.system.stiffness if tangent is None else self.system.stiffness + tangent
+        right = self.force if extra is None else self.force + extra
+        if len(springs):
+            spring = 1.0 / nodes.compliance[springs]
+            pushing = sp.csr_array(self.push[springs].T @ sp.diags_array(spring))
+            stiffness = stiffness + pushing @ nodes.normal[springs]
+            right = right - pushing @ nodes.gap[springs]
+        matrix: Any = stiffness
+        if len(rigid):
+            # Multipliers are scaled to the stiffness so that the bordered matrix is well balanced.
+            s = self.scale
+            softness = sp.diags_array(-nodes.compliance[rigid] * s * s)
+            matrix = sp.block_array(
+                [[stiffness, -s * self.push[rigid].T], [-s * nodes.normal[rigid], softness]], format="csr"
+            )
+            right = np.concatenate([right, s * nodes.gap[rigid]])
+        self.factorisations += 1
+        with direct.factorise(
+            sp.csr_array(matrix), symmetric=self.symmetric, saddle=len(rigid) > 0, solver=self.solver
+        ) as factor:
+            answer = factor.solve(right)
+        normal = np.zeros(nodes.count)
+        normal[rigid] = answer[n:] * self.scale
+        if len(springs):
+            normal[springs] = -(nodes.gap[springs] + nodes.normal[springs] @ answer[:n]) / nodes.compliance[springs]
+        return answer[:n], normal
+
+
+def settle(equilibrium: Equilibrium, *, limit: int = 60) -> tuple[State, int]:
+    """Find the touching nodes: N ≥ 0 where they touch, gap ≥ 0 where they do not. Also returns the steps taken.
+
+    All nodes touch at first. Each step lets go of those that pull and takes in those that penetrate, which is
+    Newton's method on the complementarity and settles in a few steps. Where it returns to a set it has seen, it goes
+    on more carefully: first letting go only, then half of the worst offenders, then one. Where letting go frees the
+    structure, fewer are let go. Raises direct.SingularMatrix, or AnalysisError where nothing settles.
+    """
+    nodes = equilibrium.nodes
+    # A node that no freedom moves along its normal (held, over an obstacle) can neither press nor give way.
+    movable = np.diff(nodes.normal.indptr) > 0
+    active: BoolArray = movable.copy()
+    last: State | None = None
+    seen: set[bytes] = set()
+    care = 0
+    for step in range(1, limit + 1):
+        try:
+            state = equilibrium.solve(active, None if last is None else last.displacement)
+        except direct.SingularMatrix:
+            freed = np.flatnonzero(last.active & ~active) if last is not None else np.zeros(0, dtype=np.int64)
+            if last is None or len(freed) < 2:
+                raise
+            back = freed[np.argsort(last.normal_force[freed])][len(freed) // 2 :]
+            active = active.copy()
+            active[back] = True
+            care = max(care, 2)
+            continue
+        pulled, closing = offenders(state, movable)
+        if not len(pulled) and not len(closing):
+            return state, step
+        last = state
+        seen.add(active.tobytes())
+        active = changed(active, pulled, closing, care)
+        if active.tobytes() in seen:
+            care += 1
+            seen.clear()
+            active = changed(state.active, pulled, closing, care)
+    raise AnalysisError(
+        f"steady sliding: the set of touching nodes does not settle in {limit} steps; "
+        "lower the friction coefficient, or give the contact a finite stiffness"
+    )
+
+
+def offenders(state: State, movable: BoolArray) -> tuple[IntArray, IntArray]:
+    """Touching nodes that pull and open nodes that penetrate, beyond rounding, the worst first."""
+    force, gap = state.normal_force, state.gap
+    least_force = 1e-12 * float(np.abs(force).max(initial=0.0))
+    least_gap = 1e-12 * float(np.abs(gap).max(initial=0.0))
+    pulled = np.flatnonzero(state.active & (force < -least_force))
+    closing = np.flatnonzero(~state.active & movable & (gap < -least_gap))
+    return pulled[np.argsort(force[pulled])], closing[np.argsort(gap[closing])]
+
+
+def changed(active: BoolArray, pulled: IntArray, closing: IntArray, care: int) -> BoolArray:
+    """The next set of touching nodes, the more careful the fewer change."""
+    if care >= 1 and len(pulled):
+        closing = closing[:0]
+    if care >= 2:
+        few = (max(len(pulled), len(closing)) + 1) // 2 if care == 2 else 1
+        pulled, closing = pulled[:few], closing[:few]
+    following = active.copy()
+    following[pulled] = False
+    following[closing] = True
+    return following

@@ -1,0 +1,210 @@
+"""Steady sliding of any number of contact nodes, in the plane or in space, on sparse matrices.
+
+K u − Σ (n + μ s·t) N = f − C_L v,   g₀ + n u + N/K_c = 0,   N ≥ 0
+
+with s = −w/|w| the direction opposite to a node's slip velocity w, so that friction opposes the slip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..contact.nodes import ContactNodes
+from ..direct import SingularMatrix
+from ..errors import AnalysisError
+from ..system import System
+from ..typing import Array, BoolArray, Sparse
+from .equilibrium import Equilibrium, State, settle
+from .points import full_motion
+from .resultants import Balance, Resultant, balance, resultants
+
+# Slip below this part of the fastest node's is that of the centre of a spin: its direction is rounding.
+STILL = 1e-9
+
+
+@dataclass(frozen=True)
+class SurfaceSliding:
+    """Equilibrium under friction of m contact nodes in d = 2 or 3 dimensions.
+
+    displacement (n,) [m] relative to the moving supports. normal_force (m,) [N] in compression; friction_force
+    (m, d−1) [N] on the slave along the tangents; slip_velocity (m, d−1) [m/s] of the slave relative to the master;
+    sense (m, d−1) = −slip/|slip|, zero where a node does not slip and hence has no friction. active (m,) whether a
+    node carries load; friction_coefficient (m,); gap (m,) [m], negative by N/K_c where contact has a stiffness.
+    residual: largest imbalance of a freedom over the largest force. iterations: sets of touching nodes tried.
+    resultants: contact → Resultant; balance: loads against contact forces.
+    """
+
+    displacement: Array
+    normal_force: Array
+    friction_force: Array
+    slip_velocity: Array
+    sense: Array
+    active: BoolArray
+    friction_coefficient: Array
+    gap: Array
+    residual: float
+    iterations: int
+    resultants: Mapping[str, Resultant] = field(default_factory=dict)
+    balance: Balance = Balance(np.nan, np.nan)
+
+    @property
+    def slip_speed(self) -> Array:
+        """Size (m,) [m/s] of the slip velocity."""
+        return np.linalg.norm(self.slip_velocity, axis=1)
+
+
+def steady_sliding_nodes(
+    system: System,
+    *,
+    mu: float | None = None,
+    load_factors: Mapping[str, float] | None = None,
+    motion_factors: Array | None = None,
+    solver: str | None = None,
+) -> SurfaceSliding:
+    """Solve the steady sliding equilibrium of every contact, over points and over surfaces.
+
+    mu replaces the friction coefficient of every contact; load_factors default to one for every load,
+    motion_factors (p,) to one for every support; solver is that of `direct.factorise`.
+    Raises AnalysisError where a contact does not slide or would change its gap, where no contact carries load, and
+    where the structure is not held.
+    """
+    nodes = system.contact_nodes()
+    factors = full_motion(system) if motion_factors is None else np.asarray(motion_factors, dtype=float)
+    slip = nodes.slip_velocity(factors)
+    speed = np.linalg.norm(slip, axis=1)
+    _require_constant_gap(nodes, factors, speed)
+    coefficient = nodes.friction_coefficients(speed) if mu is None else np.full(nodes.count, float(mu))
+    slips = speed > STILL * float(speed.max(initial=0.0))
+    _require_slip(nodes, slips, coefficient)
+    sense = np.where(slips[:, None], -slip / np.where(slips, speed, 1.0)[:, None], 0.0)
+    rubbing = coefficient[:, None] * sense
+    push = sp.csr_array(nodes.normal + nodes.along(rubbing)) if np.any(rubbing) else nodes.normal
+    force = _external_force(system, load_factors) - system.motion.damping @ factors
+    equilibrium = Equilibrium(system, nodes, push, force, symmetric=not np.any(rubbing), solver=solver)
+    try:
+        state, iterations = settle(equilibrium)
+    except SingularMatrix as error:
+        raise AnalysisError(_loose(system, nodes, error.motion)) from error
+    residual = equilibrium.residual(state)
+    _require_held(system, nodes, state, residual)
+    active = state.active & (state.normal_force > 0.0)
+    if nodes.count and not active.any():
+        raise AnalysisError(
+            f"no contact carries load in steady sliding (contacts: {', '.join(nodes.names)}): the loads pull the "
+            "bodies apart, or friction lifts them off at this coefficient; check the direction of the loads"
+        )
+    friction = rubbing * state.normal_force[:, None]
+    return SurfaceSliding(
+        displacement=state.displacement,
+        normal_force=state.normal_force,
+        friction_force=friction,
+        slip_velocity=slip,
+        sense=sense,
+        active=state.active,
+        friction_coefficient=coefficient,
+        gap=state.gap,
+        residual=residual,
+        iterations=iterations,
+        resultants=resultants(nodes, state.normal_force, friction, state.active),
+        balance=balance(system, force, push.T @ state.normal_force),
+    )
+
+
+def touching(system: System, steady: SurfaceSliding) -> ContactNodes:
+    """The contact nodes that carry load, in the order of the system's."""
+    return system.contact_nodes().select(steady.active)
+
+
+def friction_damping_matrix(system: System, steady: SurfaceSliding) -> Sparse:
+    """Damping (n, n) csr [N s/m] that friction adds to small motions about steady sliding.
+
+    Friction keeps opposing the slip as its direction turns, which damps motion across it with μ N/|w| (in space
+    only); along it the law's slope N dμ/d|w| counts, negative where friction weakens with speed. A node that does
+    not slip adds nothing.
+    """
+    nodes = system.contact_nodes()
+    speed = steady.slip_speed
+    working = steady.active & np.any(steady.sense != 0.0, axis=1)
+    chosen = nodes.select(working)
+    speed, mu = speed[working], steady.friction_coefficient[working]
+    normal, sense = steady.normal_force[working], steady.sense[working]
+    parallel = chosen.along(sense)
+    matrix = parallel.T @ sp.diags_array(normal * _slopes(chosen, speed, mu)) @ parallel
+    if nodes.directions == 2:
+        across = chosen.along(np.stack([-sense[:, 1], sense[:, 0]], axis=1))
+        matrix = matrix + across.T @ sp.diags_array(mu * normal / speed) @ across
+    return sp.csr_array(matrix)
+
+
+def _slopes(nodes: ContactNodes, speed: Array, mu: Array) -> Array:
+    """dμ/d|w| (m,) [s/m] of the laws, scaled where another coefficient was asked for than they have."""
+    slopes, own = nodes.friction_slopes(speed), nodes.friction_coefficients(speed)
+    for i in np.flatnonzero((mu != own) & (slopes != 0.0)):
+        slopes[i] = nodes.laws[nodes.owner[i]].scaled(float(mu[i]), float(speed[i])).slope(float(speed[i]))
+    return slopes
+
+
+def _external_force(system: System, load_factors: Mapping[str, float] | None) -> Array:
+    force = np.zeros(system.size)
+    for name, vector in system.loads.items():
+        force += vector * (1.0 if load_factors is None else load_factors.get(name, 1.0))
+    return force
+
+
+def _require_constant_gap(nodes: ContactNodes, factors: Array, speed: Array) -> None:
+    opening = np.abs(nodes.normal_lift @ factors)
+    for k, name in enumerate(nodes.names):
+        mine = nodes.owner == k
+        fastest, slip = float(opening[mine].max(initial=0.0)), float(speed[mine].max(initial=0.0))
+        if fastest > 1e-9 * max(slip, 1e-30) and fastest > 1e-15:
+            raise AnalysisError(
+                f"contact {name}: the prescribed velocities change its gap at {fastest:g} m/s, "
+                "so there is no steady sliding; let the supports move along the master surface"
+            )
+
+
+def _require_slip(nodes: ContactNodes, slips: BoolArray, coefficient: Array) -> None:
+    for k, name in enumerate(nodes.names):
+        mine = nodes.owner == k
+        if mine.any() and not slips[mine].any() and np.any(coefficient[mine] > 0.0):
+            raise AnalysisError(
+                f"contact {name} does not slide: no support moves one of its bodies along the "
+                "tangent; give a support a velocity"
+            )
+
+
+def _loose(system: System, nodes: ContactNodes, motion: Array | None) -> str:
+    n = system.size
+    if motion is not None and len(motion) > n:
+        most = float(np.abs(motion[n:]).max())
+        if float(np.abs(motion[:n]).max(initial=0.0)) < 1e-6 * most:
+            return (
+                f"steady sliding: rigid contact presses on the same freedoms twice (contacts: {', '.join(nodes.names)}), "
+                "so that its forces cannot be told apart; give the contact a stiffness"
+            )
+    who = "the structure" if motion is None else _moved_most(system, np.abs(motion[:n]))
+    return (
+        f"steady sliding has no equilibrium: {who} can move freely under the loads; fix a freedom of the loose "
+        "body, or turn the load so that it presses the bodies together"
+    )
+
+
+def _moved_most(system: System, size: Array) -> str:
+    freedom = int(np.argmax(size))
+    for body in (*system.lines, *system.solids):
+        if np.any(body.freedoms == freedom):
+            return f"body {body.name}"
+    return system.dof_names[freedom] if freedom < len(system.dof_names) else f"freedom {freedom}"
+
+
+def _require_held(system: System, nodes: ContactNodes, state: State, residual: float) -> None:
+    """A mechanism that rounding keeps from being singular shows in displacements beyond any structure's size."""
+    extents = [float(np.ptp(line.coordinates, axis=0).max()) for line in system.lines]
+    extents += [float(np.ptp(solid.points, axis=0).max()) for solid in system.solids]
+    limit = 1e6 * max(extents) if extents else 1e12
+    if residual > 1e-8 or float(np.abs(state.displacement).max(initial=0.0)) > limit:
+        raise AnalysisError(_loose(system, nodes, state.displacement))

@@ -1,0 +1,105 @@
+"""Natural frequencies of each body by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from ..case import Case
+from ..direct import factorise
+from ..system import System, build_system
+from ..system.model import Line, Solid
+from ..system.uncoupled import uncoupled_modes
+from ..typing import Array
+
+DENSE = 1500  # freedoms up to which all modes are computed
+MOST = 40  # modes of a larger body
+
+
+@dataclass(frozen=True)
+class BodyModes:
+    """Undamped modes of one body alone, supports included: frequency_hz (k,) and what they are
+    ("rigid", "F1" bending, "T1" traction, "FT3" mixed), by frequency."""
+
+    frequency_hz: Array
+    labels: tuple[str, ...]
+
+
+def body_modes(case: Case, *, max_frequency_hz: float | None = None) -> Mapping[str, BodyModes]:
+    """Modes of every body by itself (the first columns of the paper's Table II).
+
+    In large models and those with surfaces a body's modes are those with all other bodies held, up to the 40 lowest
+    of a large one; point masses have none.
+    """
+    limit = max_frequency_hz or case.modal.max_frequency_hz
+    system = build_system(case)
+    result: dict[str, BodyModes] = {}
+    if system.assembled or system.solids:
+        for body in (*system.lines, *system.solids):
+            if len(body.freedoms) > system.dimension:
+                result[body.name] = _of_freedoms(system, body, limit)
+        return result
+    modes_ = uncoupled_modes(replace(system, damping=0 * system.damping))
+    for line in system.lines:
+        axis = np.array(case.beams[line.name].direction)
+        entries: list[tuple[float, float]] = []
+        for block in modes_.real:
+            if not np.isin(block.freedoms[0], line.freedoms):
+                continue
+            shapes = np.zeros((system.size, len(block.stiffness)))
+            shapes[block.freedoms] = block.vectors
+            motion = (line.rows.free @ shapes).reshape(-1, 2, len(block.stiffness))
+            along = (np.einsum("kdm,d->km", motion, axis) ** 2).sum(axis=0)
+            share = along / np.maximum((motion**2).sum(axis=(0, 1)), 1e-300)
+            frequency = np.sqrt(np.maximum(block.stiffness, 0.0)) / (2 * np.pi)
+            entries += [(float(f), float(a)) for f, a in zip(frequency, share, strict=True) if f <= limit]
+        result[line.name] = _labelled(sorted(entries))
+    return result
+
+
+def _labelled(entries: list[tuple[float, float]]) -> BodyModes:
+    """Count bending and traction modes separately, from the share of motion along the axis."""
+    counts = {"F": 0, "T": 0, "FT": 0}
+    labels: list[str] = []
+    for frequency, along in entries:
+        if frequency == 0.0:
+            labels.append("rigid")
+            continue
+        kind = "T" if along > 0.7 else "F" if along < 0.3 else "FT"
+        counts[kind] += 1
+        labels.append(f"{kind}{counts[kind]}")
+    return BodyModes(np.array([f for f, _ in entries]), tuple(labels))
+
+
+def _of_freedoms(system: System, body: Line | Solid, limit: float) -> BodyModes:
+    """Modes on the freedoms of one body, all others held."""
+    part = body.freedoms
+    mass = sp.csr_array(system.mass[part][:, part])
+    stiffness = sp.csr_array(system.stiffness[part][:, part])
+    if len(part) <= DENSE:
+        squares = sl.eigh(stiffness.toarray(), mass.toarray(), eigvals_only=True)
+    else:
+        # A shift below zero, as a free body has rigid modes at zero.
+        shift = -((2 * np.pi * max(limit, 1.0) / 20) ** 2)
+        factor = factorise(sp.csr_array(stiffness - shift * mass), symmetric=True)
+        inverse = spl.LinearOperator(stiffness.shape, matvec=factor.solve, dtype=float)
+        squares = spl.eigsh(
+            stiffness, MOST, mass, sigma=shift, OPinv=inverse, return_eigenvectors=False, tol=1e-10
+        )
+    # What is left of a rigid motion is rounding of stiffness entries that cancel.
+    faint = 1e-9 * float(np.abs(stiffness.diagonal() / mass.diagonal()).max(initial=0.0))
+    squares = np.sort(np.where(np.abs(squares) < faint, 0.0, squares))
+    frequency = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+    inside = frequency[frequency <= limit]
+    names = ["rigid" if f == 0.0 else "" for f in inside]
+    elastic = 0
+    for k, name in enumerate(names):
+        if not name:
+            elastic += 1
+            names[k] = f"E{elastic}"
+    return BodyModes(inside, tuple(names))

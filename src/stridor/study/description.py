@@ -1,0 +1,239 @@
+"""The model in words and numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..case import Case
+from ..case.bodies import BeamBody, MassBody, ObstacleBody, SolidBody
+from ..case.schema import Load
+from ..errors import AnalysisError
+from ..fe.solid import wave_speeds
+from ..mesh.model import Mesh
+from ..mesh.quality import edge_lengths
+from ..sliding import steady_sliding
+from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
+from ..system import System, build_system
+from ..temporal.beta2 import step_limit
+from .settings import settings_of
+
+LEAST_PER_WAVE = 4.0  # elements per shear wavelength below which a frequency is not resolved
+MOST_PER_WAVE = 1e5  # above it, lengths are hardly in metres
+
+@dataclass(frozen=True)
+class Description:
+    """The model in words and numbers, as `stridor check` prints it."""
+
+    lines: tuple[str, ...]
+    data: dict[str, Any]
+    warnings: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {**self.data, "text": list(self.lines), "warnings": list(self.warnings)}
+
+
+def describe(case: Case) -> Description:
+    """Build the model, find its steady sliding and its step limit, and say it in words."""
+    from ..temporal.settings import choose_path, choose_step
+
+    system = build_system(case)
+    settings = settings_of(case)
+    limit = step_limit(system, settings.beta2)
+    step = choose_step(limit, settings)
+    if system.assembled:
+        path, reason = "assembled", "sparse matrices, every slave node a contact"
+    else:
+        _, reason = choose_path(system, settings)
+        path = "modal" if reason.startswith("complete") else "nodal"
+    lines = [f"{case.title or 'case'}: {len(case.bodies)} bodies, {system.size} free degrees of freedom"]
+    lines += [_body_words(case, system, name) for name in case.bodies]
+    for name, support in case.supports.items():
+        moving = (
+            ", moves at " + ", ".join(f"{d} {v:g}" for d, v in support.velocity.items()) if support.velocity else ""
+        )
+        lines.append(f"  support {name} at {support.at} holds {', '.join(support.fixed)}{moving}")
+    for name, load in case.loads.items():
+        lines.append(f"  load {name} at {load.at}: {_load_words(load)}")
+    lines += [f"  tie {name}: {tie.slave} follows {tie.master}" for name, tie in case.ties.items()]
+    lines += [
+        f"  spring {name}: {' to '.join(link.between)}, {link.stiffness:g} N/m" for name, link in case.springs.items()
+    ]
+    lines += [
+        f"  dashpot {name}: {' to '.join(link.between)}, {link.damping:g} N s/m" for name, link in case.dashpots.items()
+    ]
+    data: dict[str, Any] = {
+        "title": case.title,
+        "bodies": {body.name: len(body.freedoms) for body in (*system.lines, *system.solids)},
+        "degrees_of_freedom": system.size,
+        "contacts": {},
+        "step": step,
+        "step_limit": limit.step,
+        "limiting_body": limit.body,
+        "path": path,
+        "steps": sum(round(p.duration / step) for p in case.phases),
+    }
+    if system.assembled:
+        lines += _surface_lines(case, system, data)
+    elif system.contacts and system.loads:
+        steady = steady_sliding(system)
+        for k, contact in enumerate(system.contacts):
+            stiffness = "rigid" if np.isinf(contact.stiffness) else f"{contact.stiffness:g} N/m"
+            state = f"{steady.normal_force[k]:.6g} N" if steady.active[k] else "open"
+            table = case.contacts[contact.name]
+            lines.append(
+                f"  contact {contact.name}: {table.slave} on {table.master}, μ = "
+                f"{steady.friction_coefficient[k]:g}, {stiffness}, {contact.sliding} sliding, normal force {state}, "
+                f"slip speed {abs(steady.slip_speed[k]):g} m/s in steady sliding"
+            )
+            data["contacts"][contact.name] = {
+                "normal_force": float(steady.normal_force[k]),
+                "slip_speed": float(steady.slip_speed[k]),
+                "touches": bool(steady.active[k]),
+                "gap": contact.gap,
+            }
+    lines.append(
+        f"time step {step:.4g} s, {100 * step / limit.step:.0f} % of the stability limit {limit.step:.4g} s "
+        f"(set by {limit.body}); {data['steps']} steps"
+    )
+    lines.append(f"time loop: {path} path ({reason})")
+    warnings = [*case.warnings, *mesh_warnings(case, system)]
+    for contact in system.contacts:
+        if contact.gap < -1e-9:
+            warnings.append(f"contact {contact.name}: the bodies overlap by {-contact.gap:g} m; simulate refuses that")
+        elif contact.gap > 1e-9:
+            lines.append(f"contact {contact.name} is open by {contact.gap:g} m at the start")
+    if (system.contacts or system.surfaces) and not any(np.any(v) for v in system.loads.values()):
+        warnings.append(
+            "no load presses the bodies together: modes take the contacts as closed, a run would not keep them so"
+        )
+    return Description(tuple(lines), data, tuple(warnings))
+
+
+def _body_words(case: Case, system: System, name: str) -> str:
+    body = case.bodies[name]
+    count = next((len(b.freedoms) for b in (*system.lines, *system.solids) if b.name == name), 0)
+    if isinstance(body, BeamBody):
+        return (
+            f"  {name}: beam of {body.elements} elements, {body.length_m:g} m × {body.width:g} m × "
+            f"{body.thickness:g} m, {body.material}, {body.mass} mass, {count} free"
+        )
+    if isinstance(body, MassBody):
+        return f"  {name}: point mass of {body.mass:g} kg at {_vector(body.position)} m, {count} free"
+    if isinstance(body, ObstacleBody):
+        radius = "" if body.radius is None else f", radius {body.radius:g} m"
+        return f"  {name}: rigid {body.shape} at {_vector(body.point)} m{radius}{_sliding_words(body)}"
+    solid = next(b for b in system.solids if b.name == name)
+    kinds = ", ".join(f"{len(cells)} {kind}" for kind, cells in solid.cells.items())
+    source = body.file if body.mesh is None else body.mesh.shape
+    return (
+        f"  {name}: solid ({body.model}), {source}, {len(solid.points)} nodes, {kinds}, "
+        f"{body.material or 'material of the file'}, {body.mass} mass, {count} free{_sliding_words(body)}"
+    )
+
+
+def _sliding_words(body: SolidBody | ObstacleBody) -> str:
+    if body.sliding is None:
+        return ""
+    parts = [] if body.sliding.velocity is None else [f"at {_vector(body.sliding.velocity)} m/s"]
+    parts += [f"turning at {body.sliding.spin:g} rad/s"] if body.sliding.spin else []
+    return ", its material slides " + " and ".join(parts or ["not"])
+
+
+def _vector(values: tuple[float, ...]) -> str:
+    return "(" + ", ".join(f"{v:g}" for v in values) + ")"
+
+
+def _load_words(load: Load) -> str:
+    parts = [f"{_vector(load.force)} N"] if any(load.force) else []
+    parts += [f"{load.moment:g} N m"] if load.moment else []
+    parts += [f"pressure {load.pressure:g} Pa"] if load.pressure else []
+    return ", ".join(parts or ["nothing"])
+
+
+def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
+    """Every contact in steady sliding: nodes that touch, forces and moments, pressure, the balance."""
+    nodes = system.contact_nodes()
+    if not nodes.count or not system.loads:
+        return []
+    try:
+        steady = steady_sliding_nodes(system)
+    except AnalysisError as error:
+        # Bodies that fly or swing have no steady sliding, and are a case all the same.
+        return [f"  no steady sliding: {error}"]
+    speeds = np.linalg.norm(steady.slip_velocity, axis=1)
+    lines: list[str] = []
+    for k, name in enumerate(nodes.names):
+        mine = nodes.owner == k
+        touching = mine & steady.active
+        resultant = steady.resultants[name]
+        table = case.contacts[name]
+        normal = float(steady.normal_force[mine].sum())
+        unit = "N/m" if np.isnan(nodes.area[mine]).any() else "N/m³"
+        stiffness = "rigid" if table.stiffness == "rigid" else f"{table.stiffness:g} {unit}"
+        text = (
+            f"  contact {name}: {table.slave} on {table.master}, {int(touching.sum())} of {int(mine.sum())} slave "
+            f"nodes touch, {stiffness}, {table.sliding} sliding, normal force {normal:.6g} N, resultant on the slave "
+            f"{_vector(tuple(float(f) for f in resultant.force))} N, slip speed up to "
+            f"{float(speeds[mine].max(initial=0.0)):g} m/s"
+        )
+        if np.isfinite(resultant.largest_pressure):
+            text += f", pressure up to {resultant.largest_pressure:.4g} Pa on {resultant.area:.4g} m²"
+        lines.append(text)
+        data["contacts"][name] = {
+            "normal_force": normal,
+            "slip_speed": float(speeds[mine].max(initial=0.0)),
+            "touches": bool(touching.any()),
+            "touching_nodes": int(touching.sum()),
+            "nodes": int(mine.sum()),
+            "force": [float(f) for f in resultant.force],
+            "moment": np.atleast_1d(resultant.moment).astype(float).tolist(),
+            "gap": float(nodes.gap[mine].min()),
+        }
+    lines.append(f"  {balance_words(steady)}")
+    return lines
+
+
+def balance_words(steady: SurfaceSliding) -> str:
+    """How well the equilibrium is solved, and loads balanced by the contacts where nothing else holds a body."""
+    text = f"equilibrium of every freedom to {steady.residual:.1e} of the largest force"
+    parts = [
+        f"{what} to {error:.1e}"
+        for what, error in (("forces", steady.balance.force_error), ("moments", steady.balance.moment_error))
+        if np.isfinite(error)
+    ]
+    return text + (f"; in motions that only contact holds, {' and '.join(parts)}" if parts else "")
+
+
+def mesh_warnings(case: Case, system: System) -> list[str]:
+    """Meshes too coarse for the highest frequency asked for, and points that were moved to a node."""
+    found: list[str] = []
+    limit = case.modal.max_frequency_hz
+    for solid in system.solids:
+        body = case.bodies[solid.name]
+        if not isinstance(body, SolidBody) or body.material is None:
+            continue
+        material = case.materials[body.material].law_object()
+        slow = wave_speeds(material, body.model)[1]
+        largest = edge_lengths(Mesh(solid.points, solid.cells))[1]
+        size = float(np.ptp(solid.points, axis=0).max())
+        per_wave = slow / limit / largest
+        if per_wave < LEAST_PER_WAVE:
+            found.append(
+                f"bodies.{solid.name}: {per_wave:.2g} elements per shear wavelength ({slow / limit:.3g} m) at "
+                f"modal.max_frequency_hz = {limit:g} Hz, the longest edge is {largest:.3g} m; refine the mesh, lower "
+                "the frequency, or check the unit of length"
+            )
+        elif per_wave > MOST_PER_WAVE or not 1e-6 < size < 1e3:
+            found.append(
+                f"bodies.{solid.name}: {size:.3g} m in extent, {per_wave:.2g} elements per shear wavelength at "
+                f"modal.max_frequency_hz = {limit:g} Hz; are the lengths in metres (scale = 0.001 for millimetres)?"
+            )
+        for point, position in body.points.items():
+            off = float(np.min(np.linalg.norm(solid.points - np.array(position), axis=1)))
+            if off > 0.5 * largest:
+                found.append(f"bodies.{solid.name}.points.{point}: the nearest node is {off:.3g} m away")
+    return found

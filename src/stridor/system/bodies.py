@@ -1,0 +1,138 @@
+"""Bodies of a case with their own matrices, and where their freedoms start in the structure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..case import Case
+from ..case.bodies import BeamBody, MassBody, ObstacleBody, SolidBody
+from ..errors import CaseError
+from ..fe.assembly import assemble_beam
+from ..fe.beam import DOF_PER_NODE, BeamElement, BeamMesh
+from ..fe.solid import assemble_solid
+from ..laws import Material
+from ..mesh.model import Mesh
+from ..typing import Array, IntArray, Sparse
+from .meshes import LoadedMesh, load_mesh
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class BuiltBody:
+    """A body and its matrices (size, size) csr. stride freedoms per node, of which the first ``dimension`` are
+    displacements; points (k, d) [m] are its nodes. beam or mesh is what it was built from."""
+
+    name: str
+    offset: int
+    stride: int
+    points: Array
+    mass: Sparse
+    damping: Sparse
+    stiffness: Sparse
+    beam: BeamMesh | None = None
+    mesh: Mesh | None = None
+    material: Material | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of freedoms before supports."""
+        return self.stride * len(self.points)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return int(self.points.shape[1])
+
+    def displacements(self, nodes: IntArray) -> IntArray:
+        """Freedoms (s, d) in the structure of the displacements of nodes (s,)."""
+        return self.offset + self.stride * nodes[:, None] + np.arange(self.dimension)
+
+    def freedom_name(self, local: int) -> str:
+        """What a freedom of the body is, in words."""
+        node, direction = divmod(local, self.stride)
+        return f"{self.name} node {node} {'rotation' if direction >= self.dimension else AXES[direction]}"
+
+
+def build_bodies(case: Case) -> dict[str, BuiltBody]:
+    """Every body that deforms or moves, in the order of the case. Raises CaseError for meshes that will not do."""
+    bodies: dict[str, BuiltBody] = {}
+    offset = 0
+    for name, body in case.bodies.items():
+        if isinstance(body, BeamBody):
+            built = _beam(case, name, body, offset)
+        elif isinstance(body, SolidBody):
+            built = _solid(case, name, body, offset)
+        elif isinstance(body, MassBody):
+            built = _mass(name, body, offset)
+        else:
+            continue
+        bodies[name] = built
+        offset += built.size
+    return bodies
+
+
+def _beam(case: Case, name: str, body: BeamBody, offset: int) -> BuiltBody:
+    material = case.materials[body.material]
+    section = body.section
+    element = BeamElement(
+        length=body.length_m / body.elements,
+        axial_stiffness=material.young_modulus * section.area,
+        bending_stiffness=material.young_modulus * section.second_moment,
+        line_density=material.density * section.area,
+        direction=body.direction,
+    )
+    mesh = BeamMesh(start=body.start, elements=body.elements, element=element)
+    mass, stiffness = assemble_beam(mesh, lumped=body.mass == "lumped")
+    damping = body.damping.mass * mass + body.damping.stiffness * stiffness
+    return BuiltBody(name, offset, DOF_PER_NODE, mesh.coordinates(), mass, damping, stiffness, beam=mesh)
+
+
+def _solid(case: Case, name: str, body: SolidBody, offset: int) -> BuiltBody:
+    loaded: LoadedMesh = load_mesh(name, body)
+    material = _material(case, name, body, loaded)
+    matrices = assemble_solid(
+        loaded.mesh, material, model=body.model, thickness=body.thickness, lumped=body.mass == "lumped"
+    )
+    damping = body.damping.mass * matrices.mass + body.damping.stiffness * matrices.stiffness
+    return BuiltBody(
+        name,
+        offset,
+        body.dimension,
+        loaded.mesh.points,
+        matrices.mass,
+        sp.csr_array(damping),
+        matrices.stiffness,
+        mesh=loaded.mesh,
+        material=material,
+    )
+
+
+def _material(case: Case, name: str, body: SolidBody, loaded: LoadedMesh) -> Material:
+    if body.material is not None:
+        return case.materials[body.material].law_object()
+    where = f"bodies.{name}.material"
+    material, reason = loaded.material
+    if material is None:
+        raise CaseError(where, None, f"missing – {reason}; give the NAME of a [materials.NAME]")
+    if body.scale != 1.0:
+        accepted = (
+            f"missing – the file's material is in the units of the file, whose lengths are scaled by {body.scale:g}; "
+            "give the NAME of a [materials.NAME] in SI units"
+        )
+        raise CaseError(where, None, accepted)
+    return material
+
+
+def _mass(name: str, body: MassBody, offset: int) -> BuiltBody:
+    d = body.dimension
+    empty = sp.csr_array((d, d))
+    return BuiltBody(name, offset, d, np.array([body.position]), sp.csr_array(body.mass * np.eye(d)), empty, empty)
+
+
+def is_obstacle(case: Case, name: str) -> bool:
+    """Whether a body is rigid and has no freedoms."""
+    return isinstance(case.bodies.get(name), ObstacleBody)

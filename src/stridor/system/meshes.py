@@ -1,0 +1,116 @@
+"""The mesh of a solid body: built in, or from a file, checked before it is computed with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..case.bodies import (
+    AnnulusMesh,
+    BlockMesh,
+    BuiltInMesh,
+    PadMesh,
+    QuadrilateralMesh,
+    RectangleMesh,
+    SolidBody,
+)
+from ..case.points import FULL_TURN
+from ..errors import CaseError
+from ..laws import Material
+from ..mesh import shapes
+from ..mesh.abaqus import AbaqusModel, read_abaqus
+from ..mesh.files import read_mesh
+from ..mesh.model import Mesh
+from ..mesh.quality import check_mesh
+
+
+@dataclass(frozen=True)
+class LoadedMesh:
+    """A mesh, and the material that its file gave, in the units of the file, or why it gave none."""
+
+    mesh: Mesh
+    material: tuple[Material | None, str] = (None, "")
+
+
+@lru_cache(maxsize=8)
+def _read(path: str, scale: float, group: str | None, where: str, stamp: tuple[int, int]) -> LoadedMesh:
+    del stamp  # only there so that a changed file is read again
+    if not path.lower().endswith(".inp"):
+        return LoadedMesh(read_mesh(path, scale=scale, group=group, where=where))
+    model = read_abaqus(path, scale=scale, group=group, where=where)
+    return LoadedMesh(model.mesh, _material_of(model, group))
+
+
+def _material_of(model: AbaqusModel, group: str | None) -> tuple[Material | None, str]:
+    """The one material of a body from an Abaqus file, or why there is none."""
+    own = [section for section in model.sections if group is not None and section.elset.upper() == group.upper()]
+    names = list(dict.fromkeys(section.material for section in own or model.sections))
+    if not names:
+        return None, "the file has no *SOLID SECTION for it"
+    if len(names) > 1:
+        return None, f"the file gives it several materials ({', '.join(names)}); read each as its own body by group"
+    if names[0] in model.materials:
+        return model.materials[names[0]], ""
+    return None, model.incomplete.get(names[0], f"the file has no *MATERIAL {names[0]}")
+
+
+def load_mesh(name: str, body: SolidBody) -> LoadedMesh:
+    """Mesh of a body. Raises CaseError where a file, a group or an element will not do."""
+    where = f"bodies.{name}"
+    if body.mesh is not None:
+        loaded = LoadedMesh(built_in(body.mesh, f"{where}.mesh"))
+    else:
+        assert body.file is not None, "checked: a solid has a mesh or a file"
+        loaded = _from_file(where, body)
+    if loaded.mesh.dimension != body.dimension:
+        raise CaseError(
+            f"{where}.model",
+            body.model,
+            f"the mesh has {loaded.mesh.dimension} dimensions; take "
+            + ('"3d"' if loaded.mesh.dimension == 3 else '"plane stress" or "plane strain"'),
+        )
+    check_mesh(loaded.mesh, where)
+    return loaded
+
+
+def _from_file(where: str, body: SolidBody) -> LoadedMesh:
+    assert body.file is not None
+    path = Path(body.file)
+    try:
+        status = path.stat()
+        stamp = (status.st_mtime_ns, status.st_size)
+    except OSError:
+        stamp = (0, 0)
+    loaded = _read(str(path), body.scale, body.group, where, stamp)
+    if body.translation is not None and len(body.translation) == loaded.mesh.dimension:
+        loaded = replace(loaded, mesh=replace(loaded.mesh, points=loaded.mesh.points + np.array(body.translation)))
+    return loaded
+
+
+def built_in(mesh: BuiltInMesh, where: str) -> Mesh:
+    """The mesh that a [bodies.NAME] mesh = { shape = … } describes. Raises CaseError below ``where``."""
+    common: dict[str, Any] = {"element_size": mesh.element_size, "kind": mesh.cells, "where": where}
+    if isinstance(mesh, RectangleMesh):
+        return shapes.rectangle(mesh.corner, mesh.size, mesh.divisions, angle_deg=mesh.angle_deg, **common)
+    if isinstance(mesh, QuadrilateralMesh):
+        return shapes.quadrilateral(mesh.corners, mesh.divisions, **common)
+    if isinstance(mesh, AnnulusMesh):
+        return shapes.annulus(
+            mesh.centre,
+            mesh.inner_radius,
+            mesh.outer_radius,
+            mesh.divisions,
+            start_deg=mesh.start_deg,
+            sweep_deg=360.0 if mesh.sweep_deg >= FULL_TURN else mesh.sweep_deg,
+            **common,
+        )
+    if isinstance(mesh, BlockMesh):
+        return shapes.block(mesh.corner, mesh.size, mesh.divisions, **common)
+    radii = (mesh.centre, mesh.inner_radius, mesh.outer_radius)
+    if isinstance(mesh, PadMesh):
+        return shapes.pad(*radii, mesh.start_deg, mesh.sweep_deg, mesh.thickness, mesh.divisions, **common)
+    return shapes.disc(*radii, mesh.thickness, mesh.divisions, **common)

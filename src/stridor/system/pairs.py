@@ -1,0 +1,168 @@
+"""Contacts of a case: points on lines, surfaces on surfaces, anything on a rigid obstacle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..case import Case
+from ..case.bodies import ObstacleBody, SlidingTable
+from ..case.points import PointRef
+from ..case.schema import Contact as ContactCase
+from ..contact.curve import Curve
+from ..contact.interface import Contact, Rows, pair
+from ..contact.master import MasterSurface
+from ..contact.obstacles import Cylinder, Flat
+from ..contact.pairing import pair_surface
+from ..contact.surfaces import SurfaceContact
+from ..errors import CaseError
+from ..mesh.boundary import require_boundary
+from ..mesh.facets import nodal_areas, nodal_normals
+from ..typing import Array
+from .supports import boundary_nodes, master_surface
+from .view import View, point_position
+
+
+def is_point_on_line(case: Case, contact: ContactCase) -> bool:
+    """Whether a contact is that of one point on a beam's line."""
+    return contact.master in case.beams and isinstance(case.place(contact.slave), PointRef)
+
+
+def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Contact:
+    """A point on the C1 line of a beam. Raises CaseError where the point faces no part of it."""
+    master = view.bodies[contact.master]
+    at = case.point(contact.slave)
+    position = point_position(case, view.bodies, at)
+    slave = view.point_rows(case, contact.slave)
+    built = pair(
+        name,
+        slave=Rows(slave.free[:2], slave.lift[:2]),
+        slave_position=position,
+        master=view.node_rows(master),
+        master_positions=master.points,
+        side=case.side(name),
+        stiffness=np.inf if contact.stiffness == "rigid" else float(contact.stiffness),
+        law=contact.friction.law_object(),
+        sliding=contact.sliding,
+    )
+    if built is None:
+        raise CaseError(
+            f"contacts.{name}.slave",
+            contact.slave,
+            f"the point ({position[0]:g}, {position[1]:g}) m lies beyond the ends of {contact.master}; "
+            "move a body so that the slave faces the master line",
+        )
+    return built
+
+
+def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> SurfaceContact:
+    """Slave nodes of a boundary, or one point, on a boundary or an obstacle."""
+    where = f"contacts.{name}"
+    slave_rows, position, area, normals, is_point = _slave(case, view, where, contact)
+    master, master_rows = _master(case, view, where, contact)
+    slave_body = case.place(contact.slave).body
+    drift = _drift(case, view, slave_body, contact.master.partition(".")[0], position)
+    built = pair_surface(
+        name,
+        where=where,
+        slave=slave_rows,
+        slave_position=position,
+        area=area,
+        slave_normals=normals,
+        master=master,
+        master_rows=master_rows,
+        drift=drift,
+        stiffness_per_area=np.inf if contact.stiffness == "rigid" else float(contact.stiffness),
+        law=contact.friction.law_object(),
+        sliding=contact.sliding,
+        allowed_overlap=contact.adjust or None,
+        adjust=contact.adjust > 0,
+    )
+    if is_point:
+        # A point stands for no area: its stiffness is in N/m, and it has no pressure.
+        built = replace(built, nodes=replace(built.nodes, area=np.full(len(built.area), np.nan)))
+    return built
+
+
+def _slave(case: Case, view: View, where: str, contact: ContactCase) -> tuple[Rows, Array, Array, Array, bool]:
+    """Rows (m d, n), positions (m, d), areas (m,), outward normals (m, d) of the slave, and whether it is a point."""
+    at = case.place(contact.slave, where=f"{where}.slave")
+    body = view.bodies[at.body]
+    if isinstance(at, PointRef):
+        rows = view.point_rows(case, contact.slave)
+        d = body.dimension
+        return (
+            Rows(rows.free[:d], rows.lift[:d]),
+            point_position(case, view.bodies, at)[None, :],
+            np.ones(1),
+            np.zeros((1, d)),
+            True,
+        )
+    assert body.mesh is not None, "checked: boundaries belong to meshes"
+    require_boundary(body.mesh, at.boundary, f"{where}.slave")
+    facets = body.mesh.boundaries.get(at.boundary)
+    if facets is None:
+        raise CaseError(f"{where}.slave", contact.slave, "is a set of nodes; a slave surface needs facets")
+    nodes = boundary_nodes(body, at, f"{where}.slave")
+    thickness = getattr(case.bodies[at.body], "thickness", 1.0)
+    area = nodal_areas(body.points, facets, thickness=thickness if body.dimension == 2 else 1.0)[nodes]
+    normals = nodal_normals(body.points, facets)[nodes]
+    return view.node_rows(body, nodes), body.points[nodes], area, normals, False
+
+
+def _master(case: Case, view: View, where: str, contact: ContactCase) -> tuple[MasterSurface, Rows]:
+    owner, _, boundary = contact.master.partition(".")
+    table = case.bodies[owner]
+    if isinstance(table, ObstacleBody):
+        empty = Rows(view.pick(np.zeros(0, dtype=np.int64)).free, np.zeros((0, len(view.motion.names))))
+        return _obstacle(table), empty
+    body = view.bodies[owner]
+    if body.beam is not None:
+        # The line of a beam: outward is the side on which the slave lies, the right of the order of the nodes.
+        order = np.arange(len(body.points))
+        if case.side(where.partition(".")[2]) > 0:
+            order = order[::-1]
+        lines = np.stack([np.arange(len(order) - 1), np.arange(1, len(order))], axis=1)
+        return Curve.from_facets(body.points[order], {"line": lines}, where=f"{where}.master"), view.node_rows(
+            body, order
+        )
+    assert body.mesh is not None, "checked: boundaries belong to meshes"
+    surface, nodes = master_surface(body.mesh, boundary, f"{where}.master")
+    return surface, view.node_rows(body, nodes)
+
+
+def _obstacle(table: ObstacleBody) -> MasterSurface:
+    if table.shape == "flat":
+        assert table.normal is not None, "checked: a flat has a normal"
+        return Flat(np.array(table.point), np.array(table.normal))
+    assert table.radius is not None, "checked: a cylinder has a radius"
+    axis = None if table.axis is None else np.array(table.axis)
+    return Cylinder(np.array(table.point), table.radius, axis, inside=table.inside)
+
+
+def _drift(case: Case, view: View, slave: str, master: str, position: Array) -> Array:
+    """Velocity (m, d, p) [m/s] of the slave's material against the master's, for each prescribed motion."""
+    drift = np.zeros((*position.shape, len(view.motion.names)))
+    for name, sign in ((slave, 1.0), (master, -1.0)):
+        sliding = getattr(case.bodies[name], "sliding", None)
+        if sliding is not None:
+            drift[:, :, view.motion.names.index(name)] += sign * material_velocity(sliding, position)
+    return drift
+
+
+def material_velocity(sliding: SlidingTable, position: Array) -> Array:
+    """Velocity (m, d) [m/s] of material that slides through its mesh at positions (m, d) [m]."""
+    d = position.shape[1]
+    velocity = np.zeros_like(position)
+    if sliding.velocity is not None:
+        velocity += np.array(sliding.velocity)
+    if sliding.spin:
+        centre = np.zeros(d) if sliding.centre is None else np.array(sliding.centre)
+        arm = position - centre
+        if d == 2:
+            velocity += sliding.spin * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+        else:
+            axis = np.array(sliding.axis) / np.linalg.norm(sliding.axis)
+            velocity += sliding.spin * np.cross(axis, arm)
+    return velocity

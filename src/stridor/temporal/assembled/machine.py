@@ -1,0 +1,219 @@
+"""A system of assembled matrices made ready to march: arrays of the compiled loop, and the state that it moves on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...contact.nodes import ContactNodes
+from ...contact.surfaces import SurfaceContact
+from ...errors import AnalysisError, CaseError
+from ...system import System
+from ...typing import Array, IntArray, Sparse
+from ..beta2 import Scheme
+from ..schedule import Schedule
+from ..stage import FIRST_OPEN, FIRST_STICK, STATISTICS
+from .damping import SplitDamping, split_damping
+from .loop import COUNTERS, LOOP_WORKS, STEPS_DONE, Forcing, LoopState, Record, run_steps
+from .node_stage import NodeScratch, NodeState
+from .node_table import NodeTable, node_table
+from .products import DASHPOTS, WITH_STIFFNESS, Fields, Structure, stored_energies
+from .storage import Layout, lay_out_freedoms, parts, upper_blocks
+
+OFFSET_STEPS = 100  # in which the gap that a renewal of the rows made fades
+
+
+@dataclass
+class Machine:
+    """Arrays and state. surfaces follow the sliding; nodes are the contacts as they are paired now."""
+
+    system: System
+    scheme: Scheme
+    layout: Layout
+    structure: Structure
+    fields: Fields
+    constant: Forcing  # without loads and increments by step
+    state: LoopState
+    nodes: ContactNodes
+    surfaces: tuple[SurfaceContact, ...]
+    table: NodeTable
+    contacts: NodeState
+    scratch: NodeScratch
+
+    @property
+    def done(self) -> int:
+        """Steps done."""
+        return int(self.state.counters[STEPS_DONE])
+
+    @property
+    def gain(self) -> Array:
+        """Displacement of each place over one step by a unit force [m/N]."""
+        return self.structure.numbers[2] * self.structure.kick
+
+    @property
+    def displacement(self) -> Array:
+        """u (n,) [m] of the freedoms."""
+        return self.fields.u[self.layout.place]
+
+    def set_nodes(self, nodes: ContactNodes) -> None:
+        """Take contact nodes as they are paired now; forces, status and offsets are kept."""
+        self.nodes = nodes
+        self.table = node_table(nodes, self.layout, self.gain)
+        self.scratch = _scratch(self.table)
+        self.contacts = self.contacts._replace(q=self.fields.q[self.table.place])
+
+    def show(self) -> None:
+        """Bring what the stiffness sees up to u and q."""
+        if self.structure.flags[0]:
+            self.fields.shown[:] = self.fields.u + self.structure.factor * self.fields.q
+        self.contacts.q[:] = self.fields.q[self.table.place]
+
+    def mark_start(self) -> None:
+        """Take the energies stored at the start as those that works are counted from."""
+        self.state.reference[0] = stored_energies(self.structure, self.fields)[1]
+        cubic = self.system.cubic
+        if cubic is not None:
+            length = cubic.rows.free @ self.displacement + cubic.rows.lift @ self.state.motion[0]
+            self.state.works[-1] = 0.25 * float(np.sum(cubic.coefficient * length**4))
+
+    def run(self, steps: int, schedule: Schedule, record: Record) -> tuple[int, int]:
+        """March up to ``steps`` steps; what was done and why it ended (codes of the loop)."""
+        forcing = self.constant._replace(
+            loads=schedule.load_factors(self.done, steps), increments=schedule.motion_increments(self.done, steps)
+        )
+        return run_steps(
+            steps, self.structure, self.fields, forcing, self.table, self.contacts, self.scratch, self.state, record
+        )
+
+
+def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Machine:
+    """Pack a system with the given contact nodes. Raises CaseError for a mass that is not diagonal, AnalysisError for
+    a freedom without mass or a friction law without a compiled form."""
+    mass = diagonal_mass(system)
+    damping = split_damping(system)
+    layout = lay_out_freedoms(system)
+    structure = _structure(system, scheme, layout, mass, damping)
+    u = np.zeros(layout.size)
+    fields = Fields(
+        u=u,
+        q=np.zeros(layout.size),
+        shown=np.zeros(layout.size) if structure.flags[0] else u,
+        push=np.zeros(layout.size),
+        y=np.zeros((2, layout.size)),
+    )
+    motions, loads = len(system.motion.names), len(system.loads)
+    statistics = np.zeros((len(nodes.names), STATISTICS))
+    statistics[:, [FIRST_STICK, FIRST_OPEN]] = -1.0
+    state = LoopState(
+        works=np.zeros(LOOP_WORKS),
+        statistics=statistics,
+        counters=np.zeros(COUNTERS, dtype=np.int64),
+        motion=np.zeros((2, motions)),
+        coefficients=np.zeros(loads + 2 * motions),
+        base=np.zeros(layout.size),
+        reference=np.array([0.0, 1.0 - 1.0 / OFFSET_STEPS]),
+    )
+    table = node_table(nodes, layout, structure.numbers[2] * structure.kick)
+    contacts = NodeState(
+        force=np.zeros((nodes.count, nodes.directions + 1)),
+        status=np.zeros(nodes.count, dtype=np.int64),
+        offset=np.zeros(nodes.count),
+        q=np.zeros(len(table.place)),
+    )
+    forcing = _forcing(system, layout)
+    return Machine(
+        system, scheme, layout, structure, fields, forcing, state, nodes, system.surfaces, table, contacts,
+        _scratch(table),
+    )  # fmt: skip
+
+
+def diagonal_mass(system: System) -> Array:
+    """The diagonal (n,) [kg] of a lumped mass. Raises CaseError where it is not lumped, AnalysisError where one is
+    zero."""
+    mass = system.mass.diagonal()
+    off = sp.csr_array(system.mass - sp.diags_array(mass))
+    if off.nnz and np.abs(off.data).max() > 1e-14 * np.abs(mass).max():
+        raise CaseError(
+            "bodies",
+            None,
+            "the temporal approach on assembled matrices needs a diagonal mass in every body; "
+            'write mass = "lumped" for beams and solids',
+        )
+    if not np.all(mass > 0.0):
+        raise AnalysisError("the mass matrix is not positive definite: a freedom has stiffness but no mass")
+    return mass
+
+
+def _structure(system: System, scheme: Scheme, layout: Layout, mass: Array, damping: SplitDamping) -> Structure:
+    step, beta2 = scheme.step, scheme.beta2
+    effective = mass + beta2 * step * damping.diagonal
+    stiffness = upper_blocks(system.stiffness, layout)
+    folded = damping.lagged and damping.factor is not None
+    second = damping.lagged and not folded
+    rest = upper_blocks(damping.rest if second else sp.csr_array(damping.rest.shape), layout)
+    wanted = WITH_STIFFNESS if damping.lagged else DASHPOTS if np.any(damping.diagonal) else 0
+    return Structure(
+        stiffness=stiffness,
+        rest=rest,
+        keep=layout.spread(1.0 - step * damping.diagonal / effective),
+        kick=layout.spread(step / effective),
+        factor=layout.spread(damping.factor) if folded and damping.factor is not None else np.zeros(0),
+        mass=layout.spread(mass),
+        damping=layout.spread(damping.diagonal),
+        parts=parts([stiffness, rest] if second else [stiffness], layout.size),
+        flags=np.array([folded, second, wanted], dtype=np.int64),
+        numbers=np.array([step, beta2, step * (0.5 + beta2), step * (beta2 - 0.5)]),
+    )
+
+
+def csr_arrays(matrix: Sparse) -> tuple[IntArray, IntArray, Array]:
+    """Pointers, columns and values of csr rows, as compiled code takes them."""
+    rows = sp.csr_array(matrix)
+    return rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data.astype(float)
+
+
+def _forcing(system: System, layout: Layout) -> Forcing:
+    motion, p = system.motion, len(system.motion.names)
+    vectors = np.array(list(system.loads.values())).reshape(-1, system.size)
+    damping = np.array(motion.damping, dtype=float)
+    # A rigid motion is not resisted by damping within a body: what is left of that is rounding.
+    scale = float(np.abs(system.damping).max() or 0.0) * float(np.abs(motion.lift).max(initial=0.0))
+    damping[np.abs(damping) <= 1e-13 * scale] = 0.0
+    cubic = system.cubic
+    rows = sp.csr_array((0, system.size)) if cubic is None else cubic.rows.free
+    load_ptr, load_col, load_val = csr_arrays(layout.rows(sp.csr_array(vectors)))
+    cubic_ptr, cubic_col, cubic_val = csr_arrays(layout.rows(rows))
+    return Forcing(
+        loads=np.zeros((0, len(vectors))),
+        increments=np.zeros((0, p)),
+        load_ptr=load_ptr,
+        load_col=load_col,
+        load_val=load_val,
+        load_lift=vectors @ motion.lift,
+        mass=layout.spread(np.ascontiguousarray(motion.mass.T)),
+        damping=layout.spread(np.ascontiguousarray(damping.T)),
+        mass_own=np.ascontiguousarray(motion.mass_own, dtype=float),
+        damping_own=np.ascontiguousarray(motion.damping_own, dtype=float),
+        stiffness_own=np.ascontiguousarray(motion.stiffness_own, dtype=float),
+        cubic_ptr=cubic_ptr,
+        cubic_col=cubic_col,
+        cubic_val=cubic_val,
+        cubic_lift=np.zeros((0, p)) if cubic is None else np.ascontiguousarray(cubic.rows.lift, dtype=float),
+        cubic=np.zeros(0) if cubic is None else np.array(cubic.coefficient, dtype=float),
+    )
+
+
+def _scratch(table: NodeTable) -> NodeScratch:
+    places, nodes, t = len(table.place), len(table.gap), table.along.shape[1]
+    return NodeScratch(
+        u=np.zeros(places),
+        q=np.zeros(places),
+        correction=np.zeros(places),
+        gap=np.zeros(nodes),
+        slip=np.zeros((nodes, t)),
+        chosen=np.zeros(nodes, dtype=np.int64),
+        marked=np.zeros(nodes, dtype=np.int64),
+        speed=np.zeros((nodes, t)),
+    )

@@ -1,0 +1,237 @@
+"""Contact forces of one step over many nodes, compiled: Gauss–Seidel on forward-increment multipliers.
+
+With the free motion at hand, only nodes that would close, or that carried force in the step before, take part. Each
+is solved exactly with the latest forces of the others; what forces change is kept as a correction of the places that
+contacts touch, so that G A Gᵀ is never formed. When the sweeps have settled, the nodes left out are looked at again,
+and those that the forces have closed join in. A compliant layer stretches the gap equation: gap + compliance·N is what
+is zero where N is not.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from numba import njit
+
+from ...contact import multipliers
+from ...typing import Array, IntArray
+from .disc import solve_disc
+from .node_table import NodeTable
+
+_OPEN, _STICK, _SLIP = multipliers.OPEN, multipliers.STICK, multipliers.SLIP
+_solve_contact = njit(cache=True)(multipliers.solve_contact)
+
+SWEEP_LIMIT = 1000
+SWEEP_TOLERANCE = 1e-11
+
+
+class NodeState(NamedTuple):
+    """What contacts carry from step to step: force (m, d) at the step before [N], status (m,), offset (m,) [m] of the
+    gap after a renewal of the rows, and q (l,) [m/s] of the places they touch, at t_n."""
+
+    force: Array
+    status: IntArray
+    offset: Array
+    q: Array
+
+
+class NodeScratch(NamedTuple):
+    """Work space: u, q (l,) at t_{n+1}, correction (l,) of u by forces; gap (m,), slip (m, d−1) [m] free of forces;
+    chosen (m,): nodes that take part, marked (m,); speed (m, d−1) [m/s] of slip at t_n."""
+
+    u: Array
+    q: Array
+    correction: Array
+    gap: Array
+    slip: Array
+    chosen: IntArray
+    marked: IntArray
+    speed: Array
+
+
+@njit(cache=True)
+def _push(i: int, change: Array, table: NodeTable, correction: Array) -> None:  # pragma: no cover - compiled
+    """Forces (d,) on node i into the correction."""
+    for p in range(table.ptr[i], table.ptr[i + 1]):
+        c = table.col[p]
+        total = 0.0
+        for j in range(change.shape[0]):
+            total += table.row[p, j] * change[j]
+        correction[c] += table.gain[c] * total
+
+
+@njit(cache=True)
+def _take_in(
+    i: int, count: int, increments: Array, ratio: Array, table: NodeTable, state: NodeState, work: NodeScratch
+) -> int:  # pragma: no cover - compiled
+    """Node i takes part: its free slip; the number of nodes that do. ratio: d = ratio[0] q_{n+1} − ratio[1] q_n."""
+    for j in range(1, table.row.shape[1]):
+        slip = 0.0
+        for p in range(table.ptr[i], table.ptr[i + 1]):
+            c = table.col[p]
+            slip += table.row[p, j] * (ratio[0] * work.q[c] - ratio[1] * state.q[c])
+        for m in range(increments.shape[0]):
+            slip += table.lift[i, j, m] * increments[m]
+        work.slip[i, j - 1] = slip
+    work.chosen[count] = i
+    work.marked[i] = 1
+    return count + 1
+
+
+@njit(cache=True)
+def _relax(
+    i: int, step: float, was: int, new: Array, table: NodeTable, state: NodeState, work: NodeScratch
+) -> int:  # pragma: no cover - compiled
+    """Forces (d,) of node i with those of all others as they are into new; its status."""
+    d = table.row.shape[1]
+    block, force = table.block[i], state.force[i]
+    gap = work.gap[i] - block[0, 0] * force[0]
+    s1 = work.slip[i, 0] - block[1, 0] * force[0]
+    s2 = 0.0
+    for j in range(1, d):
+        gap -= block[0, j] * force[j]
+        s1 -= block[1, j] * force[j]
+    if d == 3:
+        s2 = work.slip[i, 1] - block[2, 0] * force[0] - block[2, 1] * force[1] - block[2, 2] * force[2]
+    for p in range(table.ptr[i], table.ptr[i + 1]):
+        moved = work.correction[table.col[p]]
+        gap += table.row[p, 0] * moved
+        s1 += table.row[p, 1] * moved
+        if d == 3:
+            s2 += table.row[p, 2] * moved
+    law = table.friction[table.owner[i]]
+    w_nn = block[0, 0] + table.compliance[i]
+    if d == 2:
+        new[0], new[1], status = _solve_contact(
+            gap, s1, w_nn, block[0, 1], block[1, 1], law[0], law[1], law[2], was == _STICK, step
+        )
+        return status
+    new[0], new[1], new[2], status = solve_disc(
+        gap,
+        s1,
+        s2,
+        (w_nn, block[0, 1], block[0, 2], block[1, 1], block[1, 2], block[2, 2]),
+        (law[0], law[1], law[2]),
+        was == _STICK,
+        step,
+    )
+    return status
+
+
+@njit(cache=True)
+def _sweeps(
+    count: int, limit: int, step: float, status: IntArray, table: NodeTable, state: NodeState, work: NodeScratch
+) -> int:  # pragma: no cover - compiled
+    """Sweep over the nodes that take part until forces settle; sweeps done, limit + 1 where they did not."""
+    d = table.row.shape[1]
+    new, change = state.force[0].copy(), state.force[0].copy()
+    for sweep in range(1, limit + 1):
+        largest = worst = 0.0
+        for n in range(count):
+            i = work.chosen[n]
+            status[i] = _relax(i, step, state.status[i], new, table, state, work)
+            size = 0.0
+            for j in range(d):
+                change[j] = new[j] - state.force[i, j]
+                size += abs(change[j])
+                state.force[i, j] = new[j]
+            worst = max(worst, size)
+            largest = max(largest, new[0])
+            if size != 0.0:
+                _push(i, change, table, work.correction)
+        if count == 1 or worst <= SWEEP_TOLERANCE * largest:
+            return sweep
+    return limit + 1
+
+
+@njit(cache=True)
+def solve_nodes(
+    step: float, ratio: Array, x: Array, increments: Array, table: NodeTable, state: NodeState, work: NodeScratch,
+    status: IntArray,
+) -> tuple[int, int]:  # pragma: no cover - compiled
+    """Forces at t_n into state.force from work.u and work.q, the free motion, which then follow them.
+
+    x (p,) supports at t_{n+1}, increments (p,) over the step. Returns how many nodes took part (work.chosen) and the
+    sweeps done, more than SWEEP_LIMIT where they did not settle. status (m,) is that of the step; state.status stays
+    that of the step before.
+    """
+    m = table.gap.shape[0]
+    count = 0
+    for i in range(m):
+        gap = table.gap[i] + state.offset[i]
+        for p in range(table.ptr[i], table.ptr[i + 1]):
+            gap += table.row[p, 0] * work.u[table.col[p]]
+        for j in range(x.shape[0]):
+            gap += table.lift[i, 0, j] * x[j]
+        work.gap[i] = gap
+        work.marked[i] = 0
+        status[i] = _OPEN
+        if gap < 0.0 or state.force[i, 0] > 0.0:
+            count = _take_in(i, count, increments, ratio, table, state, work)
+    if count == 0:
+        return 0, 0
+    work.correction[:] = 0.0
+    if count == 1:
+        state.force[work.chosen[0]] = 0.0
+    for n in range(count):
+        i = work.chosen[n]
+        if state.force[i, 0] > 0.0:
+            _push(i, state.force[i], table, work.correction)
+    done = 0
+    while True:
+        done += _sweeps(count, SWEEP_LIMIT, step, status, table, state, work)
+        before = count
+        for i in range(m):
+            if work.marked[i] == 0:
+                gap = work.gap[i]
+                for p in range(table.ptr[i], table.ptr[i + 1]):
+                    gap += table.row[p, 0] * work.correction[table.col[p]]
+                if gap < 0.0:
+                    count = _take_in(i, count, increments, ratio, table, state, work)
+        if count == before or done > SWEEP_LIMIT:
+            break
+    for c in range(work.u.shape[0]):
+        work.u[c] += work.correction[c]
+        work.q[c] += work.correction[c] / ratio[0]
+    return count, done
+
+
+@njit(cache=True)
+def contact_power(
+    count: int, beta2: float, velocity: Array, table: NodeTable, state: NodeState, work: NodeScratch
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Powers N·(gap velocity) and T·(slip velocity) [W] at t_n; velocity (p,) of the supports. Fills work.speed."""
+    normal = friction = 0.0
+    for n in range(count):
+        i = work.chosen[n]
+        for j in range(table.row.shape[1]):
+            v = 0.0
+            for p in range(table.ptr[i], table.ptr[i + 1]):
+                c = table.col[p]
+                v += table.row[p, j] * ((1.0 - beta2) * state.q[c] + beta2 * work.q[c])
+            for m in range(velocity.shape[0]):
+                v += table.lift[i, j, m] * velocity[m]
+            if j == 0:
+                normal += state.force[i, 0] * v
+            else:
+                friction += state.force[i, j] * v
+                work.speed[i, j - 1] = v
+    return normal, friction
+
+
+@njit(cache=True)
+def slip_over_step(i: int, ratio: Array, increments: Array, table: NodeTable, state: NodeState, work: NodeScratch) -> (
+    float
+):  # pragma: no cover - compiled
+    """Magnitude [m] of the slip of node i over the step."""
+    total = 0.0
+    for j in range(1, table.row.shape[1]):
+        slip = 0.0
+        for p in range(table.ptr[i], table.ptr[i + 1]):
+            c = table.col[p]
+            slip += table.row[p, j] * (ratio[0] * work.q[c] - ratio[1] * state.q[c])
+        for m in range(increments.shape[0]):
+            slip += table.lift[i, j, m] * increments[m]
+        total += slip * slip
+    return math.sqrt(total)

@@ -1,0 +1,86 @@
+"""Contact nodes packed for the compiled loop: rows on the few freedoms that contacts touch, and one-step compliances."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...contact.nodes import ContactNodes
+from ...typing import Array, BoolArray, IntArray
+from ..operators import friction_numbers
+from .storage import Layout
+
+
+class NodeTable(NamedTuple):
+    """m nodes, d directions (normal, then tangents), l places that any of them touches, c contacts, p motions.
+
+    place (l,) among all places, gain (l,) [m/N] = displacement over the step by a unit force. Node i has entries
+    ptr[i] … ptr[i+1]: col into place and row (entries, d). lift (m, d, p), gap (m,) [m], compliance (m,) [m/N],
+    block (m, d, d) [m/N] its own part of G A Gᵀ. owner (m,), friction (c, 3), along (m, d−1) the direction in which a
+    contact's tangential motion is told, weight (m,) for means without force.
+    """
+
+    place: IntArray
+    gain: Array
+    ptr: IntArray
+    col: IntArray
+    row: Array
+    lift: Array
+    gap: Array
+    compliance: Array
+    block: Array
+    owner: IntArray
+    friction: Array
+    along: Array
+    weight: Array
+
+
+def node_table(nodes: ContactNodes, layout: Layout, gain: Array) -> NodeTable:
+    """Pack nodes; gain (b·w,) [m/N] is the displacement of a place over one step by a unit force on it."""
+    m, t = nodes.count, nodes.directions
+    d = t + 1
+    normal, tangent = sp.coo_array(layout.rows(nodes.normal)), sp.coo_array(layout.rows(nodes.tangent))
+    node = np.concatenate([normal.row, tangent.row // t]).astype(np.int64)
+    direction = np.concatenate([np.zeros(normal.nnz, dtype=np.int64), 1 + tangent.row % t])
+    value = np.concatenate([normal.data, tangent.data])
+    place, local = np.unique(np.concatenate([normal.col, tangent.col]), return_inverse=True)
+    key, entry = np.unique(node * max(len(place), 1) + local, return_inverse=True)
+    row = np.zeros((len(key), d))
+    np.add.at(row, (entry, direction), value)
+    owner, col = key // max(len(place), 1), key % max(len(place), 1)
+    block = np.zeros((m, d, d))
+    own_gain = gain[place]
+    np.add.at(block, owner, own_gain[col][:, None, None] * row[:, :, None] * row[:, None, :])
+    p = nodes.normal_lift.shape[1]
+    lift = np.zeros((m, d, p))
+    lift[:, 0] = nodes.normal_lift
+    lift[:, 1:] = nodes.tangent_lift.reshape(m, t, p)
+    return NodeTable(
+        place=place.astype(np.int64),
+        gain=own_gain,
+        ptr=np.searchsorted(owner, np.arange(m + 1)).astype(np.int64),
+        col=col.astype(np.int64),
+        row=row,
+        lift=lift,
+        gap=np.array(nodes.gap, dtype=float),
+        compliance=np.array(nodes.compliance, dtype=float),
+        block=block,
+        owner=np.array(nodes.owner, dtype=np.int64),
+        friction=np.array([friction_numbers(law) for law in nodes.laws]).reshape(-1, 3),
+        along=sliding_directions(nodes),
+        weight=np.where(np.isnan(nodes.area), 1.0, nodes.area),
+    )
+
+
+def sliding_directions(nodes: ContactNodes) -> Array:
+    """Unit directions (m, d−1) along the tangents in which a contact's slip is told: that in which the supports slide
+    it, the first tangent where they do not and for point contacts."""
+    along = np.zeros((nodes.count, nodes.directions))
+    along[:, 0] = 1.0
+    slip = nodes.slip_velocity(np.ones(nodes.normal_lift.shape[1]))
+    speed = np.linalg.norm(slip, axis=1)
+    slides: BoolArray = (speed > 1e-12 * speed.max(initial=1e-300)) & ~np.isnan(nodes.area)
+    along[slides] = slip[slides] / speed[slides][:, None]
+    return along

@@ -1,0 +1,178 @@
+"""Buffers of records, and the trajectory that they become."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...typing import Array
+from ..beta2 import StepLimit
+from ..layout import ENERGY_RECORD
+from ..node_history import NodeHistory
+from ..schedule import Schedule
+from ..settings import Settings
+from ..stage import (
+    DAMPING,
+    EXTERNAL,
+    FIRST_OPEN,
+    FIRST_STICK,
+    FRICTION,
+    MAX_NORMAL,
+    MAX_SPEED,
+    MAX_TANGENTIAL,
+    NORMAL,
+    OPEN_STEPS,
+    REC_GAP,
+    REC_NORMAL,
+    REC_SLIP,
+    REC_STATUS,
+    REC_TANGENTIAL,
+    SLIP_STEPS,
+    STICK_STEPS,
+    SUPPORT,
+)
+from ..trajectory import ContactStatistics, PhaseResult, Trajectory
+from .loop import KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED, Record
+from .machine import Machine, csr_arrays
+
+NODE_HISTORY_BYTES = 500e6
+CONTACT_COLUMNS = 5
+WORK_COLUMNS = {
+    "damping": DAMPING,
+    "friction": FRICTION,
+    "contact": NORMAL,
+    "external": EXTERNAL,
+    "support": SUPPORT,
+}
+
+
+def buffers(machine: Machine, schedule: Schedule, settings: Settings) -> Record:
+    """Room for all records from the present step on."""
+    every = settings.record_every
+    count = max((schedule.steps - 1) // every - (machine.done - 1) // every, 0)
+    system, nodes = machine.system, machine.nodes
+    d, p = system.dimension, len(system.motion.names)
+    per_record = nodes.count * (16 * (nodes.directions + 1) + 1)
+    nodes_every = max(1, int(np.ceil(count * per_record / NODE_HISTORY_BYTES))) if nodes.count else 0
+    kept = count // nodes_every + 1 if nodes_every else 0
+    rows = [sp.csr_array(system.points[name].free[:d]) for name in settings.watch]
+    lift = [np.asarray(system.points[name].lift)[:d].reshape(d, p) for name in settings.watch]
+    watch = sp.vstack([sp.csr_array((0, system.size)), *rows])
+    watch_ptr, watch_col, watch_val = csr_arrays(machine.layout.rows(watch))
+    return Record(
+        every=every,
+        nodes_every=nodes_every,
+        contacts=np.zeros((count, len(nodes.names), CONTACT_COLUMNS)),
+        watch=np.zeros((count, watch.shape[0], 3)),
+        energies=np.zeros((count, ENERGY_RECORD)),
+        nodes=np.zeros((kept, nodes.count, 2 * (nodes.directions + 1))),
+        node_status=np.zeros((kept, nodes.count), dtype=np.int8),
+        watch_ptr=watch_ptr,
+        watch_col=watch_col,
+        watch_val=watch_val,
+        watch_lift=np.vstack([np.zeros((0, p)), *lift]),
+    )
+
+
+def phase_result(machine: Machine, name: str, first: int, last: int) -> PhaseResult:
+    """Statistics of the contacts over the steps first … last − 1."""
+    dt = machine.scheme.step
+    contacts: dict[str, ContactStatistics] = {}
+    for contact, row in zip(machine.nodes.names, machine.state.statistics, strict=True):
+        total = max(row[STICK_STEPS] + row[SLIP_STEPS] + row[OPEN_STEPS], 1.0)
+        contacts[contact] = ContactStatistics(
+            stick_fraction=float(row[STICK_STEPS] / total),
+            slip_fraction=float(row[SLIP_STEPS] / total),
+            separation_fraction=float(row[OPEN_STEPS] / total),
+            max_normal_force=float(row[MAX_NORMAL]),
+            max_tangential_force=float(row[MAX_TANGENTIAL]),
+            max_slip_speed=float(row[MAX_SPEED]),
+            first_stick=float(row[FIRST_STICK] * dt) if row[FIRST_STICK] >= 0 else None,
+            first_separation=float(row[FIRST_OPEN] * dt) if row[FIRST_OPEN] >= 0 else None,
+        )
+    return PhaseResult(name, first * dt, last * dt, contacts)
+
+
+def clear_statistics(machine: Machine) -> None:
+    """Begin another phase."""
+    machine.state.statistics[:] = 0.0
+    machine.state.statistics[:, [FIRST_STICK, FIRST_OPEN]] = -1.0
+
+
+def _node_history(machine: Machine, record: Record, start: int, kept: int) -> NodeHistory | None:
+    """Histories of the nodes, where there are any; start: number of the first record, kept: of them."""
+    nodes = machine.nodes
+    if not nodes.count:
+        return None
+    number = np.arange(start, start + kept)
+    number = number[number % record.nodes_every == 0]
+    values = record.nodes[: len(number)]
+    t = nodes.directions
+    assert len(number) == int(machine.state.counters[NODES_KEPT]), "every node record has its time"
+    return NodeHistory(
+        names=nodes.names,
+        owner=nodes.owner,
+        position=nodes.position,
+        area=nodes.area,
+        tangents=nodes.tangents,
+        time=number * record.every * machine.scheme.step,
+        normal_force=values[:, :, 0],
+        tangential_force=values[:, :, 1 : 1 + t],
+        slip_velocity=values[:, :, 1 + t : 1 + 2 * t],
+        gap=values[:, :, 1 + 2 * t],
+        status=record.node_status[: len(number)],
+    )
+
+
+def trajectory(
+    machine: Machine,
+    schedule: Schedule,
+    settings: Settings,
+    limit: StepLimit,
+    record: Record,
+    *,
+    first_step: int,
+    phases: tuple[PhaseResult, ...],
+    interrupted: bool,
+    wall_seconds: float,
+    reason: str,
+    state: dict[str, Array],
+) -> Trajectory:
+    """What has been computed so far; first_step: where this run began."""
+    counters, every = machine.state.counters, settings.record_every
+    kept = int(counters[KEPT])
+    start = -(-first_step // every)
+    contacts, energies = record.contacts[:kept], record.energies[:kept]
+    shaped = record.watch[:kept].reshape(kept, len(settings.watch), machine.system.dimension, 3)
+    return Trajectory(
+        time=(start + np.arange(kept)) * every * machine.scheme.step,
+        contact_names=machine.nodes.names,
+        normal_force=contacts[:, :, REC_NORMAL],
+        tangential_force=contacts[:, :, REC_TANGENTIAL],
+        slip_speed=contacts[:, :, REC_SLIP],
+        gap=contacts[:, :, REC_GAP],
+        status=contacts[:, :, REC_STATUS].astype(np.int64),
+        watch_names=settings.watch,
+        displacement=shaped[..., 0],
+        velocity=shaped[..., 1],
+        acceleration=shaped[..., 2],
+        kinetic=energies[:, 0],
+        elastic=energies[:, 1],
+        works={name: energies[:, 2 + column] for name, column in WORK_COLUMNS.items()},
+        phases=phases,
+        step=machine.scheme.step,
+        beta2=machine.scheme.beta2,
+        record_every=every,
+        steps=machine.done,
+        planned_steps=schedule.steps,
+        path="assembled",
+        path_reason=reason,
+        step_limit=limit.step,
+        limiting_body=limit.body,
+        most_sweeps=int(counters[MOST_SWEEPS]),
+        unconverged_steps=int(counters[UNCONVERGED]),
+        interrupted=interrupted,
+        wall_seconds=wall_seconds,
+        nodes=_node_history(machine, record, start, kept),
+        state=state,
+    )

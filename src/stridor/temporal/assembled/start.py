@@ -1,0 +1,159 @@
+"""Where a run on assembled matrices starts: at rest, in motion, in steady sliding, or from a saved state."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...contact.nodes import ContactNodes
+from ...errors import CaseError
+from ...system import System
+from ...typing import Array
+from ..node_history import NodeHistory
+from ..schedule import Schedule
+from ..settings import Settings
+from ..start import Disturbance, joined
+from ..trajectory import Trajectory
+from .loop import STEPS_DONE
+from .machine import Machine
+from .node_table import sliding_directions
+
+# What moves on from step to step, by the part of the machine that holds it.
+SAVED = {
+    "fields": ("u", "q", "shown", "push"),
+    "state": ("works", "statistics", "counters", "motion", "coefficients", "base", "reference"),
+    "contacts": ("force", "status", "offset"),
+}
+
+
+def begin(
+    machine: Machine,
+    schedule: Schedule,
+    settings: Settings,
+    mu: float | None,
+    disturbance: Disturbance | None,
+) -> None:
+    """Put a machine into its initial state.
+
+    At rest: the bodies where and as fast as the system has them. Raises CaseError for a ramp out of steady sliding
+    and what `steady_sliding_nodes` raises.
+    """
+    system = machine.system
+    u, v, a = np.zeros(system.size), np.zeros(system.size), np.zeros(system.size)
+    if settings.initial == "steady-sliding":
+        u, v = _steady(machine, schedule, settings, mu)
+    else:
+        if system.initial_displacement is not None:
+            u = u + system.initial_displacement
+        if system.initial_velocity is not None:
+            v = v + system.initial_velocity
+        # Loads that are there at t = 0 act as at rest: half a step early, which nothing later feels.
+        a = -(system.stiffness @ u + system.damping @ v) / system.mass.diagonal()
+    if disturbance is not None:
+        u, v, a = u + disturbance[0], v + disturbance[1], a + disturbance[2]
+    # q_0 = v_0 − β2 Δt a_0 starts the scheme without a jump (docs/theory-temporal.md).
+    place = machine.layout.place
+    machine.fields.u[place] = u
+    machine.fields.q[place] = v - machine.scheme.beta2 * machine.scheme.step * a
+    machine.show()
+    machine.mark_start()
+
+
+def _steady(machine: Machine, schedule: Schedule, settings: Settings, mu: float | None) -> tuple[Array, Array]:
+    """Displacement and velocity (n,) of steady sliding, with the perturbation of the slip speed."""
+    from ...sliding.surfaces import steady_sliding_nodes
+
+    system, stretch = machine.system, schedule.stretches[0]
+    if stretch.ramp_steps:
+        raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
+    steady = steady_sliding_nodes(
+        system,
+        mu=mu,
+        load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
+        motion_factors=stretch.velocities_after,
+    )
+    machine.state.motion[1] = stretch.velocities_after
+    machine.contacts.force[:, 0] = np.where(steady.active, steady.normal_force, 0.0)
+    machine.contacts.status[:] = np.where(steady.active, 2, 0)
+    velocity = np.zeros(system.size)
+    if settings.perturbation:
+        for contact in range(len(machine.nodes.names)):
+            velocity += settings.perturbation * _slip_impulse(system, machine.nodes, contact)
+    return np.asarray(steady.displacement), velocity
+
+
+def _slip_impulse(system: System, nodes: ContactNodes, contact: int) -> Array:
+    """Velocity (n,) that equal impulses on the nodes of a contact along its sliding give, mean slip speed one."""
+    mine = nodes.select(nodes.owner == contact)
+    along = mine.along(sliding_directions(mine))
+    answer = (along.T @ np.ones(mine.count)) / system.mass.diagonal()
+    mean = float(np.mean(along @ answer))
+    return answer / mean if mean > 0.0 else answer
+
+
+def saved_state(machine: Machine, settings: Settings, renewal: tuple[int, Array]) -> dict[str, Array]:
+    """Everything a restart needs, as arrays. renewal: the step of the next renewal of the rows and the displacement
+    (n + p,) they were last found at."""
+    saved = {
+        f"{part}_{name}": np.array(getattr(getattr(machine, part), name)) for part, names in SAVED.items() for name in names
+    }
+    saved["settings"] = np.array([machine.scheme.step, machine.scheme.beta2, float(settings.record_every)])
+    saved["model"] = _model_numbers(machine.system)
+    saved["renewal"], saved["renewed_at"] = np.array([renewal[0]]), renewal[1].copy()
+    return saved
+
+
+def _model_numbers(system: System) -> Array:
+    """A few numbers by which two models differ: freedoms, contacts, traces of M, C and K."""
+    traces = [float(matrix.trace()) for matrix in (system.mass, system.damping, system.stiffness)]
+    return np.array([float(system.size), float(len(system.contacts) + len(system.surfaces)), *traces])
+
+
+def check_restart(machine: Machine, restart: Trajectory, settings: Settings, *, join: bool) -> None:
+    """Raise CaseError where a saved state belongs to another model, scheme or record."""
+    given, own = restart.state.get("settings"), np.array([machine.scheme.step, machine.scheme.beta2])
+    if given is None or restart.path != "assembled" or not np.array_equal(given[:2], own):
+        raise CaseError(
+            "restart",
+            f"step {restart.step:g} s, beta2 {restart.beta2:g}, path {restart.path}",
+            f"a state of the same scheme: step {own[0]:g} s, beta2 {own[1]:g}, path assembled",
+        )
+    same = np.allclose(restart.state.get("model", np.zeros(5)), _model_numbers(machine.system), rtol=1e-9, atol=0)
+    shapes = [
+        restart.state.get(f"{part}_{name}", np.zeros(0)).shape == getattr(getattr(machine, part), name).shape
+        for part, names in SAVED.items()
+        for name in names
+    ]
+    if not same or not all(shapes):
+        raise CaseError("restart", "model", "a state of the same model: this one has other freedoms or contacts")
+    if join and (restart.record_every != settings.record_every or restart.watch_names != settings.watch):
+        raise CaseError(
+            "restart",
+            f"a record every {restart.record_every} steps of {', '.join(restart.watch_names) or 'no points'}",
+            f"the same records as before (here every {settings.record_every} steps of "
+            f"{', '.join(settings.watch) or 'no points'}), or join=False",
+        )
+
+
+def restore(machine: Machine, restart: Trajectory) -> None:
+    """Go on from a saved state that `check_restart` has accepted."""
+    for part, names in SAVED.items():
+        for name in names:
+            getattr(getattr(machine, part), name)[:] = restart.state[f"{part}_{name}"]
+    machine.contacts.q[:] = machine.fields.q[machine.table.place]
+    machine.state.counters[STEPS_DONE + 3 :] = 0
+
+
+def joined_runs(before: Trajectory, after: Trajectory) -> Trajectory:
+    """Records of a restarted run, those of its nodes too, behind those of the run it went on from."""
+    together = joined(before, after)
+    if before.nodes is None or after.nodes is None:
+        return together
+    names = ("time", "normal_force", "tangential_force", "slip_velocity", "gap", "status")
+    parts: dict[str, Any] = {
+        name: np.concatenate([getattr(before.nodes, name), getattr(after.nodes, name)]) for name in names
+    }
+    nodes: NodeHistory = replace(after.nodes, **parts)
+    return replace(together, nodes=nodes)

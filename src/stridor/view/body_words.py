@@ -1,0 +1,110 @@
+"""Bodies and contacts of a case in words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..case import Case
+from ..case.bodies import (
+    AnnulusMesh,
+    AnyBody,
+    BeamBody,
+    BlockMesh,
+    DiscMesh,
+    MassBody,
+    ObstacleBody,
+    PadMesh,
+    RectangleMesh,
+    SlidingTable,
+    SolidBody,
+)
+from ..case.schema import Contact
+from .tables import Row, Table, significant
+
+
+def body_words(case: Case, name: str, body: AnyBody) -> str:
+    """One sentence about a body."""
+    if isinstance(body, MassBody):
+        return f"{name}: a point mass of {body.mass:g} kg."
+    if isinstance(body, ObstacleBody):
+        return f"{name}: a rigid {body.shape}{_sliding_words(body.sliding)}."
+    if isinstance(body, SolidBody):
+        source = f"the mesh file {Path(body.file).name}" if body.file else f"a {body.mesh.shape}" if body.mesh else ""
+        made = "" if body.material is None else f", {_material_words(case, body.material)}"
+        return f"{name}: a solid ({body.model}), {source}{made}, {body.mass} mass{_sliding_words(body.sliding)}."
+    x, y = body.direction
+    return (
+        f"{name}: a beam of {_material_words(case, body.material)}, {1e3 * body.length_m:g} × {1e3 * body.width:g} × "
+        f"{1e3 * body.thickness:g} mm, from ({1e3 * body.start[0]:g}, {1e3 * body.start[1]:g}) mm at "
+        f"{np.degrees(np.arctan2(y, x)):.4g}° to the x axis; {body.elements} elements, {body.mass} mass."
+    )
+
+
+def _material_words(case: Case, name: str) -> str:
+    material = case.materials[name]
+    return f"{material.young_modulus / 1e9:g} GPa and {material.density:g} kg/m³"
+
+
+def _sliding_words(sliding: SlidingTable | None) -> str:
+    if sliding is None:
+        return ""
+    parts = [] if sliding.velocity is None else [f"at ({', '.join(f'{v:g}' for v in sliding.velocity)}) m/s"]
+    parts += [f"turning at {sliding.spin:g} rad/s"] if sliding.spin else []
+    return ", whose material slides through it " + " and ".join(parts or ["not"])
+
+
+def contact_words(name: str, contact: Contact, *, on_line: bool) -> str:
+    """One sentence about a contact; on_line: of a point on a beam, whose stiffness only the modes take."""
+    friction = contact.friction.model_dump()
+    law = friction.pop("law")
+    settings = ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in friction.items())
+    unit = "N/m" if on_line else "N/m (of a point) or N/m³ (per area)"
+    where = " in the modal approach" if on_line else ""
+    stiffness = "rigid" if contact.stiffness == "rigid" else (
+        f"with a stiffness of {significant(contact.stiffness)} {unit}"
+    )
+    return (
+        f"{name}: {contact.slave} slides on {contact.master} ({contact.sliding} sliding), {stiffness}{where}; "
+        f"friction law {law}, {settings}."
+    )
+
+
+def bodies_table(case: Case) -> Table:
+    """What the bodies are made of, one column each."""
+    bodies = list(case.bodies.items())
+    lines = (
+        ("type", [body.type for _, body in bodies]),
+        ("size [m]", [_size(body) for _, body in bodies]),
+        ("Young's modulus [GPa]", [_of_material(case, body, "young_modulus", 1e-9) for _, body in bodies]),
+        ("density [kg/m³]", [_of_material(case, body, "density", 1.0) for _, body in bodies]),
+        ("damping α₁ (mass) [1/s]", [_damping(body, "mass") for _, body in bodies]),
+        ("damping α₂ (stiffness) [s]", [_damping(body, "stiffness") for _, body in bodies]),
+        ("elements", [str(body.elements) if isinstance(body, BeamBody) else "" for _, body in bodies]),
+        ("mass matrix", [f"{b.mass:g} kg" if isinstance(b, MassBody) else getattr(b, "mass", "") for _, b in bodies]),
+    )
+    rows = tuple(Row((name, *values)) for name, values in lines if any(values))
+    return Table("bodies", "Bodies", ("", *(name for name, _ in bodies)), rows, frozenset({0}))
+
+
+def _size(body: AnyBody) -> str:
+    if isinstance(body, BeamBody):
+        return f"{body.length_m:g} × {body.width:g} × {body.thickness:g}"
+    if isinstance(body, SolidBody) and body.mesh is not None:
+        mesh = body.mesh
+        if isinstance(mesh, RectangleMesh | BlockMesh):
+            return " × ".join(f"{edge:g}" for edge in mesh.size)
+        if isinstance(mesh, AnnulusMesh | DiscMesh | PadMesh):
+            return f"r {mesh.inner_radius:g} … {mesh.outer_radius:g}"
+    return ""
+
+
+def _of_material(case: Case, body: AnyBody, name: str, factor: float) -> str:
+    material = getattr(body, "material", None)
+    return "" if material is None else f"{getattr(case.materials[material], name) * factor:g}"
+
+
+def _damping(body: AnyBody, name: str) -> str:
+    damping = getattr(body, "damping", None)
+    return "" if damping is None else significant(getattr(damping, name))

@@ -1,0 +1,321 @@
+"""Figures of a contact over many nodes: where and when it sticks, slips and opens, and where friction feeds a mode."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.tri import TriAnalyzer, Triangulation
+from scipy.spatial import cKDTree
+
+from ..errors import CaseError
+from ..temporal.node_history import NodeHistory
+from ..temporal.trajectory import STATUS
+from ..typing import Array, IntArray
+from .interface_places import Places, arc_length, places_along, seen_from_normal
+from .style import BLUE, GREY, INK, VERMILION, largest, legend_above, panel, styled, zero_line
+
+Quantity = Literal["pressure", "status", "slip", "gap"]
+QUANTITIES = ("pressure", "status", "slip", "gap")
+MAP_COLOURS = {"separation": VERMILION, "stick": BLUE, "slip": "#EFE6C4"}  # strong enough to be seen as thin stripes
+ROWS = 1500  # of a space–time picture, at most
+SEPARATION, STICK, SLIP = range(3)
+
+
+@styled
+def contact_map(
+    history: NodeHistory,
+    contact: str | None = None,
+    *,
+    quantity: Quantity = "pressure",
+    along: Array | tuple[float, ...] | None = None,
+    about: Array | tuple[float, ...] | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    ax: Axes | None = None,
+) -> Figure:
+    """Space–time picture of a contact: position along the interface across, time from ``start`` to ``end`` [s] upwards.
+
+    ``contact``: its name, otherwise the first. ``quantity``: "pressure" [MPa] (normal force [N] for point contacts),
+    "status", "slip" (velocity along the first tangent [m/s], signed) or "gap" [µm]. In space the nodes fall in columns
+    by their position: along the direction of sliding, unless ``along`` gives another direction or ``about`` a point to
+    take the angle about; a column shows its mean pressure, mean slip, mean gap and most frequent status.
+
+    Where there are more than 1500 records a row stands for several: mean pressure and slip, largest gap, and of the
+    statuses the one that is rarest in the picture, so that no short event is hidden.
+    Raises CaseError for names, quantities and times that do not exist.
+    """
+    if quantity not in QUANTITIES:
+        raise CaseError("quantity", quantity, f"unknown; known: {', '.join(QUANTITIES)}")
+    name, nodes = chosen_nodes(history, contact)
+    records = chosen_records(history.time, start, end)
+    places = places_along(
+        history.position[nodes],
+        history.tangents[nodes],
+        along=None if along is None else np.asarray(along, dtype=float),
+        about=None if about is None else np.asarray(about, dtype=float),
+    )
+    time, values = map_values(history, nodes, records, places, quantity)
+    figure, ax = panel(ax, 4.2)
+    sides = _time_edges(1e3 * time, 1e3 * history.time[records][[0, -1]])
+    if quantity == "status":
+        _status_map(ax, places, sides, values)
+    else:
+        area = bool(np.all(np.isfinite(history.area[nodes])))
+        _value_map(figure, ax, places, sides, values, quantity, area=area)
+    ax.set(xlabel=places.label, ylabel="time [ms]")
+    _headed(ax, f"contact {name}: {quantity}", above_legend=quantity == "status")
+    ax.grid(False)
+    return figure
+
+
+@styled
+def contact_snapshot(
+    history: NodeHistory, at: float, contact: str | None = None, *, ax: Axes | None = None
+) -> Figure:
+    """Pressure and status of a contact at the record nearest to time ``at`` [s].
+
+    In space the contact as seen along its normal, in the plane pressure over the position along the contact. Point
+    contacts show their normal force. Raises CaseError for a contact that does not exist or a time outside the run.
+    """
+    name, nodes = chosen_nodes(history, contact)
+    first, last = float(history.time[0]), float(history.time[-1])
+    if not first - 1e-12 <= at <= last + 1e-12:
+        raise CaseError("at", at, f"a time of this history: {first:g} to {last:g} s")
+    record = int(np.argmin(np.abs(history.time - at)))
+    values, label = _pressure_or_force(history, nodes, slice(record, record + 1))
+    status = history.status[record, nodes]
+    figure, ax = panel(ax, 4.0)
+    position, tangents = history.position[nodes], history.tangents[nodes]
+    if position.shape[1] == 2:
+        _along_line(ax, 1e3 * arc_length(position, tangents), values[0], status)
+        ax.set(xlabel="position along the contact [mm]", ylabel=label)
+        zero_line(ax)
+    else:
+        x, y = (1e3 * c for c in seen_from_normal(position, tangents))
+        shown = _patch(ax, x, y, values[0])
+        figure.colorbar(shown, ax=ax, pad=0.02, shrink=0.85, label=label)
+        _status_markers(ax, x, y, status)
+        ax.set(xlabel="along the first tangent [mm]", ylabel="along the second tangent [mm]")
+        ax.set_aspect("equal", adjustable="box")
+        ax.grid(False)
+    legend_above(ax)
+    _headed(ax, f"contact {name} at {1e3 * float(history.time[record]):.6g} ms")
+    return figure
+
+
+@styled
+def interface_energy(
+    position: Array,
+    energy: Array,
+    *,
+    tangents: Array | None = None,
+    quantity: str = "friction energy per cycle",
+    ax: Axes | None = None,
+) -> Figure:
+    """Energy (m,) [J] that friction brings in at contact nodes at position (m, d) [m]: where the squeal is made.
+
+    Positive energies feed the motion (red), negative ones are taken from it (blue). In the plane a stem over the
+    position along the contact, in space the nodes as seen along the normal. ``tangents`` (m, d−1, d) orient both;
+    ``quantity`` is what the energy is called. Raises CaseError where the shapes do not fit.
+    """
+    position, energy = np.asarray(position, dtype=float), np.asarray(energy, dtype=float)
+    if position.ndim != 2 or position.shape[1] not in (2, 3) or energy.shape != position.shape[:1]:
+        given = f"energy of shape {energy.shape} at positions of shape {position.shape}"
+        raise CaseError("energy", given, "one energy (m,) for each position (m, 2) or (m, 3)")
+    power, prefix = _prefix(energy)
+    energy, label = energy / power, f"{quantity} [{prefix}J]"
+    figure, ax = panel(ax, 3.6)
+    colours = [VERMILION if e > 0 else BLUE for e in energy]
+    if position.shape[1] == 2:
+        x = 1e3 * arc_length(position, tangents)
+        ax.vlines(x, 0.0, energy, colors=colours, linewidth=1.6, zorder=2)
+        ax.scatter(x, energy, c=colours, s=16, zorder=3)
+        zero_line(ax)
+        ax.set(xlabel="position along the contact [mm]", ylabel=label)
+    else:
+        x, y = (1e3 * c for c in seen_from_normal(position, tangents))
+        size = largest(energy)
+        area = 12.0 + 90.0 * np.abs(np.nan_to_num(energy)) / size
+        dots = ax.scatter(x, y, c=energy, s=area, cmap="RdBu_r", vmin=-size, vmax=size, edgecolors=GREY, linewidths=0.4)
+        figure.colorbar(dots, ax=ax, pad=0.02, shrink=0.85, label=label)
+        ax.set(xlabel="along the first tangent [mm]", ylabel="along the second tangent [mm]")
+        ax.set_aspect("equal", adjustable="box")
+        ax.margins(0.08)
+        ax.grid(False)
+    handles = [
+        Line2D([], [], color=c, marker="o", ms=4.5, linestyle="none", label=text)
+        for c, text in ((VERMILION, "feeds the motion"), (BLUE, "takes from it"))
+    ]
+    legend_above(ax, handles)
+    _headed(ax, f"{quantity}: {float(np.nansum(energy)):+.3g} {prefix}J in total")
+    return figure
+
+
+def _headed(ax: Axes, title: str, *, above_legend: bool = True) -> None:
+    """A title at the left, above the legend that stands above the frame."""
+    ax.set_title(title, pad=22.0 if above_legend else None)
+
+
+def _prefix(values: Array) -> tuple[float, str]:
+    """Power of a thousand that brings the largest value to 1 to 1000, and its letter."""
+    letters = ("p", "n", "µ", "m", "", "k", "M", "G")
+    exponent = int(np.floor(np.log10(largest(values)) / 3 + 1e-9))
+    place = int(np.clip(exponent + 4, 0, len(letters) - 1))
+    return 1000.0 ** (place - 4), letters[place]
+
+
+def chosen_nodes(history: NodeHistory, contact: str | None) -> tuple[str, IntArray]:
+    """A contact's name and its nodes (m,), the first contact for None. Raises CaseError for an unknown or empty one."""
+    known = ", ".join(history.names) or "none"
+    if not history.names:
+        raise CaseError("history", None, "holds no contact, so there is nothing to show")
+    name = history.names[0] if contact is None else contact
+    if name not in history.names:
+        raise CaseError("contact", contact, f"no such contact; known: {known}")
+    nodes = np.flatnonzero(history.owner == history.names.index(name))
+    if not len(nodes):
+        raise CaseError("contact", name, "has no nodes")
+    return name, nodes
+
+
+def chosen_records(time: Array, start: float | None, end: float | None) -> slice:
+    """Records from start to end [s], both included. Raises CaseError where there are none."""
+    first = 0 if start is None else int(np.searchsorted(time, start - 1e-12))
+    last = len(time) if end is None else int(np.searchsorted(time, end + 1e-12, side="right"))
+    if last <= first:
+        run = f"{float(time[0]):g} to {float(time[-1]):g} s" if len(time) else "empty"
+        raise CaseError("start, end", f"{start} to {end}", f"no record lies there; the history is {run}")
+    return slice(first, last)
+
+
+def map_values(
+    history: NodeHistory, nodes: IntArray, records: slice, places: Places, quantity: Quantity
+) -> tuple[Array, Array]:
+    """Time (rows,) [s] where rows of the picture begin, and what they show (rows, columns); NaN where there is none."""
+    count = len(history.time[records])
+    size = -(-count // ROWS)
+    begin = np.arange(0, count, size)
+    if quantity == "status":
+        return history.time[records][begin], _status_rows(history.status[records, nodes], places, begin)
+    if quantity == "pressure":
+        rows = _pressure_columns(history, nodes, records, places)
+    else:
+        field = history.gap if quantity == "gap" else history.slip_velocity[:, :, 0]
+        members = np.bincount(places.column, minlength=places.count)
+        rows = _summed(field[records, nodes], places) / members * (1e6 if quantity == "gap" else 1.0)
+    if quantity == "gap":
+        return history.time[records][begin], np.maximum.reduceat(rows, begin, axis=0)
+    total = np.add.reduceat(rows, begin, axis=0)
+    return history.time[records][begin], total / np.diff(np.append(begin, count))[:, None]
+
+
+def _summed(values: Array, places: Places) -> Array:
+    """Sums (r, columns) of values (r, m) of nodes."""
+    total = np.zeros((len(values), places.count))
+    np.add.at(total.T, places.column, values.T)
+    return total
+
+
+def _pressure_columns(history: NodeHistory, nodes: IntArray, records: slice, places: Places) -> Array:
+    """Force over area (r, columns) [MPa], which nodes without area cannot spoil; for point contacts force [N]."""
+    force = _summed(history.normal_force[records, nodes], places)
+    area = history.area[nodes]
+    if not np.all(np.isfinite(area)):
+        return force
+    whole = np.bincount(places.column, weights=area, minlength=places.count)
+    return np.where(whole > 0, 1e-6 * force / np.where(whole > 0, whole, 1.0), np.nan)
+
+
+def _status_rows(status: IntArray, places: Places, begin: IntArray) -> Array:
+    """Status (rows, columns): in a column the most frequent, in a row the rarest of the picture that occurs."""
+    votes = np.stack([_summed((status == s).astype(float), places) for s in range(3)])
+    column = np.argmax(votes, axis=0)
+    rarest = np.argsort([np.count_nonzero(column == s) for s in range(3)], kind="stable")
+    rank = np.empty(3, dtype=np.int64)
+    rank[rarest] = np.arange(3)
+    return rarest[np.minimum.reduceat(rank[column], begin, axis=0)].astype(float)
+
+
+def _pressure_or_force(history: NodeHistory, nodes: IntArray, records: slice) -> tuple[Array, str]:
+    """Pressure (r, m) [MPa] of nodes, or normal force [N] where they have no area, with its label."""
+    force, area = history.normal_force[records, nodes], history.area[nodes]
+    if not np.all(np.isfinite(area)):
+        return force, "normal force [N]"
+    return np.where(area > 0, 1e-6 * force / np.where(area > 0, area, 1.0), np.nan), "pressure [MPa]"
+
+
+def _time_edges(time: Array, span: Array) -> Array:
+    """Edges (rows + 1,) of rows that begin at time (rows,), the last one as long as the one before."""
+    last = time[-1] - time[-2] if len(time) > 1 else float(span[1] - span[0]) or 1.0
+    return np.append(time, time[-1] + last)
+
+
+def _status_map(ax: Axes, places: Places, sides: Array, values: Array) -> None:
+    colours = [MAP_COLOURS[name] for name in STATUS]
+    look: Any = {"cmap": ListedColormap(colours), "norm": BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3)}
+    ax.pcolormesh(places.edges, sides, values, rasterized=True, **look)
+    legend_above(ax, [Patch(facecolor=c, edgecolor=GREY, label=n) for n, c in zip(STATUS, colours, strict=True)])
+
+
+def _value_map(
+    figure: Figure, ax: Axes, places: Places, sides: Array, values: Array, quantity: Quantity, *, area: bool
+) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    if not np.isfinite(low):
+        low, high = 0.0, 1.0
+    look: dict[str, Any] = {"cmap": "cividis", "vmin": min(low, 0.0), "vmax": high if high > min(low, 0.0) else 1.0}
+    label = "pressure [MPa]" if area else "normal force [N]"
+    if quantity == "gap":
+        label = "gap [µm]"
+    elif quantity == "slip":
+        size = largest(values)
+        label, look = "slip velocity [m/s]", {"cmap": "RdBu_r", "vmin": -size, "vmax": size}
+    shown = ax.pcolormesh(places.edges, sides, values, rasterized=True, **look)
+    figure.colorbar(shown, ax=ax, pad=0.01, label=label)
+
+
+def _along_line(ax: Axes, x: Array, values: Array, status: IntArray) -> None:
+    order = np.argsort(x, kind="stable")
+    ax.plot(x[order], values[order], color=GREY, linewidth=1.2, zorder=2)
+    _status_markers(ax, x, values, status)
+
+
+def _patch(ax: Axes, x: Array, y: Array, values: Array) -> Any:
+    """Values as smooth colours between nodes, holes and bays of the patch left open; as dots where nodes are few."""
+    good = np.isfinite(values)
+    top = float(values[good].max(initial=0.0)) or 1.0
+    look: Any = {"cmap": "cividis", "vmin": 0.0, "vmax": top}
+    if good.sum() >= 4 and min(np.ptp(x[good]), np.ptp(y[good])) > 1e-6 * max(np.ptp(x), np.ptp(y)):
+        points = np.column_stack([x[good], y[good]])
+        triangles = Triangulation(*points.T)
+        # Sides much longer than nodes are apart there bridge a hole or a bay, and so do flat triangles at a border.
+        apart = cKDTree(points).query(points, k=min(5, len(points)))[0][:, -1]
+        corners = points[triangles.triangles]
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        triangles.set_mask(sides.max(axis=1) > 3.0 * apart[triangles.triangles].max(axis=1))
+        triangles.set_mask(TriAnalyzer(triangles).get_flat_tri_mask(0.05))
+        return ax.tripcolor(triangles, values[good], shading="gouraud", rasterized=True, **look)
+    return ax.scatter(x, y, c=values, s=60, zorder=2, **look)
+
+
+def _status_markers(ax: Axes, x: Array, y: Array, status: IntArray) -> None:
+    """A mark for each node: small dot for slip, square for stick, open ring for separation."""
+    size = float(np.clip(4000.0 / max(len(x), 1), 9.0, 36.0))
+    look: dict[int, dict[str, Any]] = {
+        SLIP: {"marker": ".", "c": MAP_COLOURS["slip"], "edgecolors": INK, "linewidths": 0.4, "s": size},
+        STICK: {"marker": "s", "c": MAP_COLOURS["stick"], "edgecolors": "white", "linewidths": 0.5, "s": size},
+        SEPARATION: {"marker": "o", "facecolors": "white", "edgecolors": VERMILION, "linewidths": 1.2, "s": size},
+    }
+    for code in (SLIP, STICK, SEPARATION):
+        chosen = status == code
+        if np.any(chosen):
+            ax.scatter(x[chosen], y[chosen], zorder=4, label=STATUS[code], **look[code])

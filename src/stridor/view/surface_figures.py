@@ -1,0 +1,100 @@
+"""Figures of a report that only solids and contact over surfaces have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from . import plots
+from .figures import ReportFigure
+from .inputs import ReportInputs
+from .tables import Row, Table, number, significant
+
+
+def shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
+    """The mode that grows fastest, and where friction feeds it."""
+    system, shape = inputs.system, inputs.unstable_shape
+    if system is None or shape is None or inputs.shape_vector is None or not system.solids:
+        return
+    growth = shape.growth_rate or 0.0
+    said = f"grows with {growth:.4g} 1/s" if growth > 0 else f"decays with {-growth:.4g} 1/s, the slowest"
+    if any(solid.cells.keys() - {"vertex"} for solid in system.solids):
+        yield ReportFigure(
+            "mode",
+            f"The mode at {shape.frequency_hz:.1f} Hz",
+            f"At the friction of the case this mode {said}. Drawn at the instant of largest motion, exaggerated, "
+            "coloured by the displacement.",
+            f"Deformed meshes in the mode at {shape.frequency_hz:.0f} Hz.",
+            plots.solid_mode_shape(
+                system, inputs.shape_vector, frequency_hz=shape.frequency_hz, growth_rate=growth
+            ),
+        )
+    nodes = system.contact_nodes()
+    if inputs.friction_energy is not None and nodes.count > 1:
+        yield ReportFigure(
+            "friction-energy",
+            "Where the squeal is made",
+            "Energy that friction feeds into this mode at each slave node in one cycle (red) or takes from it (blue), "
+            "relative to the energy of the mode.",
+            "Map of the energy that friction feeds in over the contact.",
+            plots.interface_energy(
+                nodes.position,
+                inputs.friction_energy,
+                tangents=nodes.tangents,
+                quantity="energy fed in per cycle / energy of the mode",
+            ),
+        )
+
+
+def contact_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
+    """Pressure and status along the interface over time."""
+    history = None if inputs.trajectory is None else inputs.trajectory.nodes
+    if history is None or len(history.time) < 2:
+        return
+    for k, name in enumerate(history.names):
+        if np.count_nonzero(history.owner == k) < 2:
+            continue
+        yield ReportFigure(
+            f"pressure-{name}",
+            f"Contact pressure of {name} over time",
+            "Position along the interface across, time upwards; in space, nodes at the same place along it are one.",
+            f"Space-time picture of the contact pressure of {name}.",
+            plots.contact_map(history, name, quantity="pressure"),
+        )
+        yield ReportFigure(
+            f"status-{name}",
+            f"Separation, stick and slip of {name} over time",
+            "The same for the status of the nodes: waves of stick and separation run through the interface as "
+            "slanted bands.",
+            f"Space-time picture of stick, slip and separation of {name}.",
+            plots.contact_map(history, name, quantity="status"),
+        )
+
+
+def surface_table(inputs: ReportInputs) -> Table | None:
+    """Resultants of every contact in steady sliding."""
+    steady = inputs.surface_steady
+    if steady is None or not steady.resultants:
+        return None
+    rows = [
+        Row(
+            (
+                name,
+                ", ".join(significant(float(f)) for f in found.force),
+                ", ".join(significant(float(m)) for m in np.atleast_1d(found.moment)),
+                "" if not np.isfinite(found.area) else significant(found.area),
+                "" if not np.isfinite(found.largest_pressure) else number(found.largest_pressure / 1e6, 3),
+            )
+        )
+        for name, found in steady.resultants.items()
+    ]
+    heads = (
+        "contact",
+        "force on the slave [N]",
+        "moment about the origin [N m]",
+        "area [m²]",
+        "largest pressure [MPa]",
+    )
+    caption = f"The equilibrium of every freedom is solved to {steady.residual:.1e} of the largest force."
+    return Table("steady-surfaces", "Steady sliding", heads, tuple(rows), frozenset({0, 1, 2}), caption)

@@ -1,0 +1,292 @@
+"""Contact in space on assembled matrices: Coulomb's disc node by node, blocks on planes, and surfaces that slide far."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.integrate
+import scipy.sparse as sp
+
+from marching import one_phase
+from stridor.contact.interface import Rows
+from stridor.contact.obstacles import Flat
+from stridor.contact.pairing import pair_surface
+from stridor.errors import AnalysisError
+from stridor.laws import Coulomb, StaticKinetic, Weakening
+from stridor.system import System
+from stridor.system.model import PrescribedMotion
+from stridor.temporal.assembled import simulate_assembled
+from stridor.temporal.assembled.disc import solve_disc
+from stridor.temporal.energy import energy_balance
+from stridor.temporal.settings import Settings
+
+pytestmark = pytest.mark.verification
+
+OPEN, STICK, SLIP = 0, 1, 2
+GRAVITY = 9.81
+
+
+def floor(system, *, positions, freedoms, normal=(0.0, 0.0, 1.0), drift=None, law=None, gap=0.0, stiffness=np.inf):
+    """The system with slave nodes at positions (m, 3), whose x, y, z are freedoms (m, 3), above a plane."""
+    positions, freedoms = np.asarray(positions, dtype=float), np.asarray(freedoms)
+    m, p = len(positions), len(system.motion.names)
+    rows = sp.csr_array((np.ones(3 * m), (np.arange(3 * m), freedoms.ravel())), shape=(3 * m, system.size))
+    normal = np.asarray(normal, dtype=float)
+    contact = pair_surface(
+        "floor", where="contacts.floor", slave=Rows(rows, np.zeros((3 * m, p))), slave_position=positions,
+        slave_normals=np.zeros((m, 3)), area=np.full(m, 1e-4), master=Flat(-gap * normal, normal),
+        master_rows=Rows(sp.csr_array((0, system.size)), np.zeros((0, p))),
+        drift=np.zeros((m, 3, p)) if drift is None else np.asarray(drift, dtype=float),
+        stiffness_per_area=stiffness, law=law or Coulomb(0.3),
+    )  # fmt: skip
+    point = {"mass": Rows(rows[:3], np.zeros((3, p)))}
+    return replace(system, surfaces=(contact,), points=point, dimension=3)
+
+
+def masses(count=1, *, mass=2.0, stiffness=None, gravity=(0.0, 0.0, -GRAVITY)) -> System:
+    """Free masses in space, on springs if asked for, under gravity."""
+    size = 3 * count
+    k = np.zeros((size, size)) if stiffness is None else np.asarray(stiffness, dtype=float)
+    weight = np.tile(mass * np.asarray(gravity), count)
+    return System(mass * np.eye(size), np.zeros((size, size)), k, (), {"weight": weight}, dimension=3)
+
+
+def run(system, duration, **settings):
+    return simulate_assembled(system, one_phase(duration), Settings(**{"record_every": 1, "watch": ("mass",), **settings}))
+
+
+@pytest.mark.parametrize("law", [(0.3, 0.3, 0.0), (0.3, 0.5, 0.0), (0.2, 0.6, 0.7), (2.0, 2.0, 0.0)])
+@pytest.mark.parametrize("sticking", [False, True])
+def test_one_node_obeys_the_laws(law, sticking):
+    """Random problems, strongly coupled: Signorini, the disc, friction against the slip, the speed law; exactly."""
+    rng = np.random.default_rng(7)
+    seen = np.zeros(3, dtype=int)
+    for _ in range(4000):
+        root = rng.standard_normal((3, 3)) * 10 ** rng.uniform(-1, 1, 3)
+        w = root @ root.T + 1e-6 * np.eye(3)
+        g, s = rng.standard_normal() - 0.5, rng.standard_normal(2) * 10 ** rng.uniform(-2, 2)
+        numbers = (w[0, 0], w[0, 1], w[0, 2], w[1, 1], w[1, 2], w[2, 2])
+        n, t1, t2, status = solve_disc(g, s[0], s[1], numbers, law, sticking, 1.0)
+        seen[status] += 1
+        force = np.array([n, t1, t2])
+        gap, *slip = np.array([g, *s]) + w @ force
+        slip, t = np.array(slip), force[1:]
+        scale = np.abs(g) + np.abs(s).max() + (np.abs(w) @ np.abs(force)).max()
+        assert n >= 0
+        if status == OPEN:
+            assert g >= 0
+            assert not np.any(force)
+            continue
+        assert abs(gap) <= 1e-9 * scale
+        speed = np.linalg.norm(slip)
+        if status == STICK:
+            assert speed <= 1e-9 * scale
+            limit = law[1] if sticking or law[2] else law[0]
+            assert np.linalg.norm(t) <= limit * n * (1 + 1e-12)
+        else:
+            mu = law[0] + ((law[1] - law[0]) * math.exp(-speed / law[2]) if law[2] else 0.0)
+            assert np.linalg.norm(t) == pytest.approx(mu * n, rel=1e-6, abs=1e-9 * np.abs(force).max())
+            assert np.abs(t * speed + mu * n * slip).max() <= 1e-7 * scale * max(mu * n, 1e-300)
+    assert np.all(seen[[OPEN, SLIP]] > 50)
+    assert seen[STICK] > 20
+
+
+def test_a_node_that_cannot_move_sideways_still_rubs():
+    """Held along both tangents on a moving floor: full friction against the slip."""
+    n, t1, t2, status = solve_disc(-1.0, 3.0, 4.0, (0.5, 0.0, 0.0, 0.0, 0.0, 0.0), (0.3, 0.3, 0.0), False, 1.0)
+    assert status == SLIP
+    assert (n, t1, t2) == pytest.approx((2.0, -0.36, -0.48), rel=1e-9)
+
+
+def test_oblique_block_stops_straight():
+    """A block of four feet on springs, thrown obliquely: stops after v²/2μg on a straight line, t = v/μg."""
+    speed, mu, direction = 1.5, 0.3, np.array([math.cos(0.7), math.sin(0.7)])
+    corners = np.array([[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0.1, 0.1, 0]])
+    # Stiff springs along the edges and diagonals keep the feet together in the plane.
+    k = np.zeros((12, 12))
+    for i in range(4):
+        for j in range(i):
+            along = (corners[i] - corners[j]) / np.linalg.norm(corners[i] - corners[j])
+            b = np.zeros(12)
+            b[3 * i : 3 * i + 3], b[3 * j : 3 * j + 3] = along, -along
+            k += 1e5 * np.outer(b, b)
+    system = masses(4, stiffness=k)
+    system = floor(system, positions=corners, freedoms=np.arange(12).reshape(4, 3), law=Coulomb(mu))
+    velocity = np.tile([*(speed * direction), 0.0], 4)
+    result = run(replace(system, initial_velocity=velocity), 0.7, step=1e-4)
+    stop = speed**2 / (2 * mu * GRAVITY)
+    assert result.displacement[-1, 0, :2] == pytest.approx(stop * direction, rel=2e-3)
+    assert np.abs(result.displacement[:, 0, :2] @ [-direction[1], direction[0]]).max() < 1e-9
+    first = result.time[np.flatnonzero(result.status[:, 0] == STICK)[0]]
+    assert first == pytest.approx(speed / mu / GRAVITY, rel=2e-3)
+    assert result.status[-1, 0] == STICK
+    assert result.normal_force[5:, 0] == pytest.approx(8 * GRAVITY, rel=1e-9)
+    assert energy_balance(result).error < 1e-9
+    assert result.works["friction"][-1] == pytest.approx(0.5 * 8 * speed**2, rel=1e-3)
+    assert result.nodes is not None
+    assert result.nodes.tangential_force.shape == (len(result.time), 4, 2)
+    pull = np.linalg.norm(result.nodes.tangential_force, axis=2)
+    assert np.all(pull <= mu * result.nodes.normal_force * (1 + 1e-9) + 1e-12)
+
+
+@pytest.mark.parametrize(("slope", "stays"), [(0.99, True), (1.01, False)])
+def test_incline_at_the_angle_of_friction(slope, stays):
+    """Below tan α = μ a mass stays, above it slides off with g (sin α − μ cos α), in any direction of the slope."""
+    mu, turn = 0.4, 0.5
+    alpha = math.atan(mu * slope)
+    normal = np.array([math.sin(alpha) * math.cos(turn), math.sin(alpha) * math.sin(turn), math.cos(alpha)])
+    system = floor(masses(), positions=[[0.0, 0.0, 0.0]], freedoms=[[0, 1, 2]], normal=normal, law=Coulomb(mu))
+    result = run(system, 1.0, step=1e-3)
+    moved = np.linalg.norm(result.displacement[-1, 0])
+    if stays:
+        # The first step begins half a step early and slides for it.
+        assert moved < 1e-6
+        assert np.all(result.status[2:] == STICK)
+    else:
+        pull = GRAVITY * (math.sin(alpha) - mu * math.cos(alpha))
+        assert moved == pytest.approx(0.5 * pull * result.time[-1] ** 2, rel=5e-3)
+        down = result.displacement[-1, 0] / moved
+        assert down == pytest.approx(
+            [math.cos(alpha) * math.cos(turn), math.cos(alpha) * math.sin(turn), -math.sin(alpha)], abs=1e-9
+        )
+
+
+def test_static_coefficient_in_space():
+    """μs holds what μk would not; once it slides, it slides by μk."""
+    alpha = math.atan(0.35)
+    normal = np.array([math.sin(alpha), 0.0, math.cos(alpha)])
+    still = floor(masses(), positions=[[0.0, 0, 0]], freedoms=[[0, 1, 2]], normal=normal, law=StaticKinetic(0.3, 0.4))
+    pushed = replace(still, initial_velocity=1e-3 * np.array([0.0, 1.0, 0.0]))
+    rested = simulate_assembled(still, one_phase(0.5), Settings(step=1e-3, record_every=1, initial="rest"))
+    assert rested.nodes is not None
+    result = run(pushed, 1.0, step=1e-3)
+    pull = GRAVITY * (math.sin(alpha) - 0.3 * math.cos(alpha))
+    assert np.linalg.norm(result.displacement[-1, 0]) == pytest.approx(0.5 * pull, rel=1e-2)
+
+
+@pytest.mark.parametrize("law", [Coulomb(0.2), Weakening(0.15, 0.3, 0.5)])
+def test_mass_on_two_springs_in_the_plane(law):
+    """Two unequal springs and Coulomb's disc: the curved path and the rates of an ODE solver."""
+    kx, ky, mass = 300.0, 500.0, 2.0
+    system = floor(
+        masses(stiffness=np.diag([kx, ky, 0.0])), positions=[[0.0, 0, 0]], freedoms=[[0, 1, 2]], law=law
+    )
+    v0 = np.array([1.0, 2.0])
+    result = run(replace(system, initial_velocity=np.array([*v0, 0.0])), 0.35, step=2e-5, record_every=50)
+
+    def rate(_, state):
+        v = state[2:]
+        speed = np.linalg.norm(v)
+        friction = law.sliding(speed) * GRAVITY * v / speed
+        return [*v, -kx / mass * state[0] - friction[0], -ky / mass * state[1] - friction[1]]
+
+    answer = scipy.integrate.solve_ivp(
+        rate, (0, 0.35), [0, 0, *v0], t_eval=result.time, rtol=1e-10, atol=1e-12, method="DOP853"
+    )
+    assert np.all(result.status[2:] == SLIP)
+    assert np.abs(result.displacement[:, 0, :2] - answer.y[:2].T).max() < 1e-4 * np.abs(answer.y[:2]).max()
+    assert np.abs(result.velocity[:, 0, :2] - answer.y[2:].T).max() < 5e-4 * np.abs(answer.y[2:]).max()
+    assert energy_balance(result).error < 1e-9
+
+
+def test_friction_follows_a_moving_floor():
+    """A floor that moves obliquely takes a free mass along at μg until it has the floor's speed."""
+    motion = PrescribedMotion(
+        ("belt",), np.zeros((3, 1)), np.zeros((3, 1)), np.zeros((3, 1)), np.zeros((1, 1)), np.zeros((1, 1)),
+        np.zeros((1, 1)),
+    )  # fmt: skip
+    belt = np.array([0.6, 0.8, 0.0])
+    system = floor(
+        replace(masses(), motion=motion), positions=[[0.0, 0, 0]], freedoms=[[0, 1, 2]],
+        drift=-belt.reshape(1, 3, 1), law=Coulomb(0.25),
+    )  # fmt: skip
+    result = run(system, 0.6, step=1e-4)
+    caught = 1.0 / (0.25 * GRAVITY)
+    sliding = (result.time > 0.01) & (result.time < 0.98 * caught)
+    expected = 0.25 * GRAVITY * result.time[sliding, None] * belt
+    assert np.abs(result.velocity[sliding, 0] - expected).max() < 1e-3
+    assert result.velocity[-1, 0] == pytest.approx(belt, abs=1e-9)
+    # Told along the direction in which the belt slides the mass: slip of the slave is against the belt.
+    assert result.tangential_force[sliding, 0] == pytest.approx(-0.25 * 2 * GRAVITY, rel=1e-6)
+    assert result.slip_speed[sliding, 0] == pytest.approx(1 - 0.25 * GRAVITY * result.time[sliding], abs=2e-3)
+
+
+def test_compliant_layer_in_space():
+    """A pressed layer of stiffness k per area gives by F/(k A) under each node."""
+    system = floor(
+        masses(2), positions=[[0.0, 0, 0], [0.1, 0, 0]], freedoms=np.arange(6).reshape(2, 3), stiffness=1e8
+    )
+    damped = replace(system, damping=sp.csr_array(200.0 * np.eye(6)))
+    result = run(damped, 0.5, step=1e-4, record_every=10)
+    assert result.displacement[-1, 0, 2] == pytest.approx(-2 * GRAVITY / (1e8 * 1e-4), rel=1e-6)
+    assert result.gap[-1, 0] < 0
+
+
+def finite(system):
+    return replace(system, surfaces=tuple(replace(s, sliding="finite") for s in system.surfaces))
+
+
+def test_finite_sliding_on_a_plane_is_small_sliding():
+    """On a plane nothing turns: renewed rows change nothing."""
+    system = floor(masses(2), positions=[[0.0, 0, 0], [0.1, 0, 0]], freedoms=np.arange(6).reshape(2, 3))
+    system = replace(system, initial_velocity=np.array([1.0, 0.5, 0, 0.3, -1.0, 0.0]))
+    small, large = (run(s, 0.4, step=1e-3) for s in (system, finite(system)))
+    assert np.abs(small.displacement - large.displacement).max() < 1e-12
+    assert np.abs(small.normal_force - large.normal_force).max() < 1e-9
+
+
+def test_finite_sliding_round_a_cylinder():
+    """Without friction a mass in a gutter swings as a pendulum of the gutter's radius, far beyond small angles."""
+    from stridor.contact.obstacles import Cylinder
+
+    radius, angle = 0.5, 1.2
+    start = radius * np.array([math.sin(angle), 0.0, -math.cos(angle)])
+    system = masses()
+    rows = Rows(sp.csr_array(np.eye(3)), np.zeros((3, 0)))
+    contact = pair_surface(
+        "gutter", where="contacts.gutter", slave=rows, slave_position=start[None], slave_normals=np.zeros((1, 3)),
+        area=np.array([1e-4]), master=Cylinder(np.zeros(3), radius, np.array([0.0, 1.0, 0.0]), inside=True),
+        master_rows=Rows(sp.csr_array((0, 3)), np.zeros((0, 0))), drift=np.zeros((1, 3, 0)),
+        stiffness_per_area=np.inf, law=Coulomb(0.0), sliding="finite",
+    )  # fmt: skip
+    system = replace(system, surfaces=(contact,), points={"mass": rows})
+    settings = Settings(step=1e-3, record_every=2, watch=("mass",))
+    saved = []
+    result = simulate_assembled(system, one_phase(1.5), settings, checkpoint=saved.append, checkpoint_seconds=0.0)
+    position = start + result.displacement[:, 0]
+    assert np.abs(np.linalg.norm(position, axis=1) - radius).max() < 1e-4 * radius
+    angles = np.arctan2(position[:, 0], -position[:, 2])
+    answer = scipy.integrate.solve_ivp(
+        lambda _, y: [y[1], -GRAVITY / radius * math.sin(y[0])], (0, 1.5), [angle, 0.0], t_eval=result.time, rtol=1e-9
+    )
+    assert np.abs(angles - answer.y[0]).max() < 5e-3
+    # Cut within and gone on with: rows, offsets and all.
+    part = saved[len(saved) // 2]
+    assert 0 < part.steps < result.steps
+    again = simulate_assembled(system, one_phase(1.5), settings, restart=part)
+    assert np.array_equal(again.normal_force, result.normal_force)
+    assert np.array_equal(again.displacement, result.displacement)
+
+
+def test_leaving_the_master_ends_the_run(monkeypatch):
+    """A node beyond an edge: what, where, when, what to do, and the motion up to there."""
+    from stridor.temporal.assembled import renewal
+
+    system = finite(floor(masses(), positions=[[0.0, 0, 0]], freedoms=[[0, 1, 2]], law=Coulomb(0.0)))
+    system = replace(system, initial_velocity=np.array([1.0, 0.0, 0.0]))
+    inner = renewal.found_again
+
+    def with_an_edge(surface, slave, master):
+        new, _ = inner(surface, slave, master)
+        return new, np.flatnonzero(slave[:, 0] > 0.1)
+
+    monkeypatch.setattr(renewal, "found_again", with_an_edge)
+    with pytest.raises(AnalysisError, match=r"contact floor: the slave node at \(0, 0, 0\) left .* t = 0.1") as caught:
+        run(system, 1.0, step=1e-3)
+    assert "make the master larger" in str(caught.value)
+    left = caught.value.trajectory
+    assert left.interrupted
+    assert left.time[-1] == pytest.approx(0.1, rel=0.02)
