@@ -57,7 +57,7 @@ def grid(cells: tuple[int, int, int], length: tuple[float, float, float], **mate
     """A block with a corner at the origin."""
     nx, ny, nz = (c + 1 for c in cells)
     number = np.arange(nx * ny * nz).reshape(nz, ny, nx)
-    places = [np.linspace(0, l, c + 1) for l, c in zip(length, cells, strict=True)]
+    places = [np.linspace(0, edge, c + 1) for edge, c in zip(length, cells, strict=True)]
     z, y, x = np.meshgrid(places[2], places[1], places[0], indexing="ij")
     points = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
     corner = [number[c : c + nz - 1, b : b + ny - 1, a : a + nx - 1].ravel() for c in (0, 1) for b in (0, 1) for a in (0, 1)]

@@ -25,9 +25,7 @@ def element_stiffness(size: float, young_modulus: float, poisson_ratio: float) -
     stiffness = np.zeros((24, 24))
     for point in corners / np.sqrt(3.0):
         terms = 1 + corners * point
-        slopes = np.stack(
-            [corners[:, k] * np.delete(terms, k, axis=1).prod(axis=1) / 8 * (2 / size) for k in range(3)]
-        )
+        slopes = np.stack([corners[:, k] * np.delete(terms, k, axis=1).prod(axis=1) / 8 * (2 / size) for k in range(3)])
         strain = np.zeros((6, 24))
         for k in range(3):
             strain[k, k::3] = slopes[k]

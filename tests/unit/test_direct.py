@@ -109,7 +109,9 @@ def test_singular_matrices_are_found(solver, symmetric):
     """A free structure, one of two bodies free, a constraint given twice, a row of zeros."""
     free = plate(held=False)
     both = sp.csr_array(sp.block_diag([plate(), free]))
-    twice = sp.csr_array(sp.block_array([[plate(), sp.csr_array(np.eye(108)[:, [3, 3]])], [sp.csr_array(np.eye(108)[[3, 3]]), None]]))
+    twice = sp.csr_array(
+        sp.block_array([[plate(), sp.csr_array(np.eye(108)[:, [3, 3]])], [sp.csr_array(np.eye(108)[[3, 3]]), None]])
+    )
     for matrix in (free, both, twice, sp.csr_array(np.diag([1.0, 0.0, 2.0])), sp.csr_array((4, 4))):
         with pytest.raises(direct.SingularMatrix, match="the matrix is singular"):
             direct.factorise(matrix, symmetric=symmetric, solver=solver)
@@ -163,14 +165,18 @@ def test_the_solver_is_chosen_by_argument_then_variable(monkeypatch):
     monkeypatch.setenv("STRIDOR_SOLVER", "superlu")
     assert direct.factorise(plate()).solver == "superlu"
     monkeypatch.setenv("STRIDOR_SOLVER", "umfpack")
-    with pytest.raises(CaseError, match=r"environment variable STRIDOR_SOLVER: 'umfpack' – no such solver; installed: .*superlu"):
+    with pytest.raises(
+        CaseError, match=r"environment variable STRIDOR_SOLVER: 'umfpack' – no such solver; installed: .*superlu"
+    ):
         direct.factorise(plate())
     assert direct.factorise(plate(), solver="superlu").solver == "superlu"
 
 
 def test_a_missing_package_says_how_to_install_it(monkeypatch):
     found = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name in ("mumps", "pypardiso") else found(name, *a))
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *a: None if name in ("mumps", "pypardiso") else found(name, *a)
+    )
     monkeypatch.delenv("STRIDOR_SOLVER", raising=False)
     assert direct.available() == ("superlu",)
     assert direct.factorise(plate()).solver == "superlu"

@@ -644,6 +644,9 @@ def test_energy_shows_where_the_motion_is_fed():
     assert red.tolist() == [True, False, True, False, True]
     assert ax.get_ylabel() == "friction energy per cycle [µJ]"
     assert ax.get_title(loc="left") == "friction energy per cycle: +4 µJ in total"
+    bare = interface_energy(position, energy, tangents=tangents, quantity="share", unit="").axes[0]
+    assert bare.get_ylabel() == "share"
+    assert bare.get_title(loc="left") == "share: +4e-06 in total"
     place, along, _ = ring(np.linspace(-0.3, 0.3, 5))
     dots = interface_energy(place, np.linspace(-2e-3, 1e-3, 10), tangents=along).axes[0].collections[0]
     drawn(dots.figure)

@@ -253,20 +253,20 @@ def test_finite_sliding_round_a_cylinder():
         stiffness_per_area=np.inf, law=Coulomb(0.0), sliding="finite",
     )  # fmt: skip
     system = replace(system, surfaces=(contact,), points={"mass": rows})
-    settings = Settings(step=1e-3, record_every=2, watch=("mass",))
+    settings = Settings(step=5e-4, record_every=2, watch=("mass",))
     saved = []
-    result = simulate_assembled(system, one_phase(1.5), settings, checkpoint=saved.append, checkpoint_seconds=0.0)
+    result = simulate_assembled(system, one_phase(1.0), settings, checkpoint=saved.append, checkpoint_seconds=0.0)
     position = start + result.displacement[:, 0]
-    assert np.abs(np.linalg.norm(position, axis=1) - radius).max() < 1e-4 * radius
+    assert np.abs(np.linalg.norm(position, axis=1) - radius).max() < 5e-4 * radius
     angles = np.arctan2(position[:, 0], -position[:, 2])
     answer = scipy.integrate.solve_ivp(
-        lambda _, y: [y[1], -GRAVITY / radius * math.sin(y[0])], (0, 1.5), [angle, 0.0], t_eval=result.time, rtol=1e-9
+        lambda _, y: [y[1], -GRAVITY / radius * math.sin(y[0])], (0, 1.0), [angle, 0.0], t_eval=result.time, rtol=1e-9
     )
     assert np.abs(angles - answer.y[0]).max() < 5e-3
     # Cut within and gone on with: rows, offsets and all.
     part = saved[len(saved) // 2]
     assert 0 < part.steps < result.steps
-    again = simulate_assembled(system, one_phase(1.5), settings, restart=part)
+    again = simulate_assembled(system, one_phase(1.0), settings, restart=part)
     assert np.array_equal(again.normal_force, result.normal_force)
     assert np.array_equal(again.displacement, result.displacement)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,13 +20,14 @@ from stridor.contact.surfaces import SurfaceContact, operators
 from stridor.errors import AnalysisError
 from stridor.laws import Coulomb, Weakening
 from stridor.sliding import friction_damping_matrix, steady_sliding, steady_sliding_nodes, touching
+from stridor.sliding.resultants import resultants
 from stridor.system import System, build_system
 from stridor.system.model import CubicSprings, PrescribedMotion, Solid
 
 pytestmark = pytest.mark.verification
 
 solvers = pytest.mark.parametrize("solver", direct.available())
-YOUNG, POISSON = 2e9, 0.3
+YOUNG = 2e9
 
 
 def on_a_flat(slave, position, area, drift, *, gap=0.0, stiffness=math.inf, law=None, name="flat"):
@@ -46,7 +48,18 @@ def on_a_flat(slave, position, area, drift, *, gap=0.0, stiffness=math.inf, law=
         stiffness_per_area=stiffness, law=law, location=location,
     )  # fmt: skip
     return SurfaceContact(
-        name, rows, position, area, None, empty, drift, stiffness, law, "small", location, nodes  # type: ignore[arg-type]
+        name,
+        rows,
+        position,
+        area,
+        None,
+        empty,
+        drift,
+        stiffness,
+        law,
+        "small",
+        location,
+        nodes,  # type: ignore[arg-type]
     )
 
 
@@ -55,30 +68,36 @@ def moving(size):
     return PrescribedMotion(("belt",), column, column, column, one, one, one)
 
 
-def block(counts, lengths, *, drift, held=(0, 1), pressure=1e5, young=YOUNG, poisson=POISSON, gap=None, **contact):
-    """An elastic block centred over the origin, its top pressed and held in the directions `held`."""
+@cache
+def elastic(counts, lengths, poisson):
+    """Mesh, basis, stiffness, load of a unit pull at the top and areas at the bottom of a block."""
     d = len(counts)
     axes = [np.linspace(-a / 2, a / 2, c + 1) for c, a in zip(counts[:-1], lengths[:-1], strict=True)]
     axes.append(np.linspace(0.0, lengths[-1], counts[-1] + 1))
     mesh = (skfem.MeshQuad if d == 2 else skfem.MeshHex).init_tensor(*axes)
     element = skfem.ElementVector(skfem.ElementQuad1() if d == 2 else skfem.ElementHex1())
     basis = skfem.Basis(mesh, element)
-    stiffness = linear_elasticity(*lame_parameters(young, poisson)).assemble(basis)
-    height = lengths[-1]
+    stiffness = sp.csr_array(linear_elasticity(*lame_parameters(YOUNG, poisson)).assemble(basis))
 
     @skfem.LinearForm
     def one(v, w):
         return v[d - 1]
 
-    top = mesh.facets_satisfying(lambda x: np.isclose(x[-1], height))
+    top = mesh.facets_satisfying(lambda x: np.isclose(x[-1], lengths[-1]))
     bottom = mesh.facets_satisfying(lambda x: np.isclose(x[-1], 0.0))
-    load = -pressure * one.assemble(skfem.FacetBasis(mesh, element, facets=top))
-    areas = one.assemble(skfem.FacetBasis(mesh, element, facets=bottom))
-    place = basis.doflocs
+    pull, areas = (one.assemble(skfem.FacetBasis(mesh, element, facets=f)) for f in (top, bottom))
+    return mesh, basis, stiffness, pull, areas
+
+
+def block(counts, lengths, *, drift, held=(0, 1), pressure=1e5, poisson=0.3, gap=None, **contact):
+    """An elastic block centred over the origin, its top pressed and held in the directions `held`."""
+    d = len(counts)
+    mesh, basis, stiffness, pull, areas = elastic(counts, lengths, poisson)
+    load, place = -pressure * pull, basis.doflocs
     component = np.zeros(basis.N, dtype=int)
     for k in range(d):
         component[basis.nodal_dofs[k]] = k
-    fixed = np.isclose(place[-1], height) & np.isin(component, [k for k in held if k < d - 1])
+    fixed = np.isclose(place[-1], lengths[-1]) & np.isin(component, [k for k in held if k < d - 1])
     free = np.flatnonzero(~fixed)
     pick = sp.csr_array(sp.eye_array(basis.N).tocsr()[:, free])
     touched = np.flatnonzero(np.isclose(mesh.p[-1], 0.0))
@@ -86,13 +105,11 @@ def block(counts, lengths, *, drift, held=(0, 1), pressure=1e5, young=YOUNG, poi
     slave = pick[basis.nodal_dofs[:, touched].T.ravel()]
     velocity = drift(position) if callable(drift) else np.tile(drift, (len(position), 1))
     start = 0.0 if gap is None else gap(position)
-    surface = on_a_flat(
-        slave, position, areas[basis.nodal_dofs[d - 1, touched]], velocity, gap=start, **contact
-    )
+    surface = on_a_flat(slave, position, areas[basis.nodal_dofs[d - 1, touched]], velocity, gap=start, **contact)
     n = len(free)
     rows = Rows(sp.csr_array(pick[basis.nodal_dofs.T.ravel()]), np.zeros((basis.N, 1)))
     body = Solid("block", mesh.p.T, {}, rows, np.arange(n))
-    stiffness = sp.csr_array(sp.csr_array(stiffness)[free][:, free])
+    stiffness = sp.csr_array(stiffness[free][:, free])
     return System(
         sp.csr_array(sp.eye_array(n)), sp.csr_array((n, n)), stiffness, (), {"press": load[free]}, moving(n),
         surfaces=(surface,), dimension=d, solids=(body,),
@@ -180,6 +197,23 @@ def test_friction_on_a_block_shifts_its_pressure_to_the_leading_edge(direction):
     assert answer.residual < 1e-13
 
 
+@pytest.mark.parametrize("d", [2, 3])
+def test_moments_are_about_the_origin(d):
+    """A force moved by a has the moment a × F more."""
+    system = block(
+        (4, 3) if d == 2 else (4, 3, 2), (0.1, 0.06, 0.05)[3 - d :], drift=np.array([0.1, -0.05, 0.0])[3 - d :]
+    )
+    answer = steady_sliding_nodes(system)
+    nodes, shift = system.contact_nodes(), np.array([0.3, -0.2, 0.7])[:d]
+    moved = replace(nodes, position=nodes.position + shift)
+    total, elsewhere = (
+        resultants(n, answer.normal_force, answer.friction_force, answer.active)["flat"] for n in (nodes, moved)
+    )
+    padded = [np.append(v, np.zeros(3 - d)) for v in (shift, total.force)]
+    extra = np.cross(*padded)
+    assert np.allclose(elsewhere.moment - total.moment, extra[2] if d == 2 else extra, rtol=1e-10)
+
+
 @solvers
 def test_friction_in_space_opposes_the_slip_of_every_node(solver):
     direction = np.array([0.6, -0.8, 0.0])
@@ -197,9 +231,10 @@ def test_a_spinning_block_is_held_back_by_mu_times_pressure_times_radius():
     side, mu, spin = 0.1, 0.01, 3.0
 
     def drift(x):
-        return spin * np.stack([-x[:, 1], x[:, 0], 0 * x[:, 0]], axis=1)
+        # The middle is off by rounding: its direction of slip is noise, and no friction may come of it.
+        return spin * np.stack([-x[:, 1], x[:, 0] + 1e-14, 0 * x[:, 0]], axis=1)
 
-    system = block((12, 12, 2), (side, side, 0.05), drift=drift, poisson=0.0)
+    system = block((10, 10, 2), (side, side, 0.05), drift=drift, poisson=0.0)
     answer = steady_sliding_nodes(system, mu=mu)
     nodes = system.contact_nodes()
     centre = int(np.argmin(np.linalg.norm(nodes.position, axis=1)))
@@ -209,7 +244,7 @@ def test_a_spinning_block_is_held_back_by_mu_times_pressure_times_radius():
     radius = np.linalg.norm(nodes.position, axis=1)
     assert total.moment[2] == pytest.approx(-mu * float(answer.normal_force @ radius), rel=1e-10)
     even = mu * 1e5 * side**3 * (math.sqrt(2) + math.log(1 + math.sqrt(2))) / 6
-    assert total.moment[2] == pytest.approx(-even, rel=5e-3)
+    assert total.moment[2] == pytest.approx(-even, rel=1e-2)  # 10 × 10 cells, error of order h²
     assert np.allclose(total.force[:2], 0.0, atol=1e-9 * total.force[2])
 
 
@@ -299,7 +334,7 @@ def test_a_cylinder_on_a_half_plane_presses_as_hertz_says(solver):
 def test_a_convex_block_settles_with_friction(stiffness, solver):
     """Gaps that grow outward in space: complementarity at every node, and forces that balance the load."""
     system = block(
-        (12, 12, 4), (0.1, 0.1, 0.04), drift=np.array([0.05, 0.02, 0.0]), stiffness=stiffness,
+        (10, 10, 3), (0.1, 0.1, 0.04), drift=np.array([0.05, 0.02, 0.0]), stiffness=stiffness,
         gap=lambda x: (x[:, 0] ** 2 + x[:, 1] ** 2) / 2 / 100.0, pressure=1e6,
     )  # fmt: skip
     answer = steady_sliding_nodes(system, solver=solver)
@@ -314,6 +349,22 @@ def test_a_convex_block_settles_with_friction(stiffness, solver):
     assert answer.balance.force_error < 1e-9
     assert answer.iterations < 12
     assert touching(system, answer).count == answer.active.sum()
+    # Begun from its own answer it is settled; begun from nothing, which does not hold the block, it gets there too.
+    again = steady_sliding_nodes(system, guess=answer.active, solver=solver)
+    assert again.iterations == 1
+    assert np.array_equal(again.normal_force, answer.normal_force)
+    anew = steady_sliding_nodes(system, guess=np.zeros(nodes.count, dtype=bool), solver=solver)
+    assert np.array_equal(anew.active, answer.active)
+
+
+def test_sets_that_would_go_in_circles_settle_all_the_same():
+    """Newton's method on gap = M N − 1 with this M (Murty's) returns to its start for ever; N = 1/3 is the answer."""
+    coupling = np.array([[1.0, 0.0, 2.0], [2.0, 1.0, 0.0], [0.0, 2.0, 1.0]])
+    one = np.eye(3)
+    system = by_hand(one, 0 * one, one, one, coupling.T - one, math.inf, slip=-1.0, loads={"f": -np.ones(3)})
+    for guess in ([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 0, 0]):
+        answer = steady_sliding_nodes(system, mu=1.0, guess=np.array(guess, dtype=bool))
+        assert np.allclose(answer.normal_force, 1 / 3)
 
 
 def test_springs_beyond_the_linear_carry_their_share():
@@ -337,7 +388,12 @@ def test_springs_beyond_the_linear_carry_their_share():
 def test_damping_of_friction_is_the_derivative_of_the_friction_force():
     """−∂F/∂ẇ by finite differences of −μ(|w|) N w/|w| at every node, in space, with a weakening law."""
     law = Weakening(0.2, 0.5, 0.03)
-    system = block((3, 3, 2), (0.1, 0.1, 0.04), drift=lambda x: np.stack([0.05 + x[:, 1], 0.02 - x[:, 0], 0 * x[:, 0]], axis=1), law=law)
+    system = block(
+        (3, 3, 2),
+        (0.1, 0.1, 0.04),
+        drift=lambda x: np.stack([0.05 + x[:, 1], 0.02 - x[:, 0], 0 * x[:, 0]], axis=1),
+        law=law,
+    )
     for mu in (None, 0.4):
         steady = steady_sliding_nodes(system, mu=mu)
         matrix = friction_damping_matrix(system, steady)
@@ -355,6 +411,15 @@ def test_damping_of_friction_is_the_derivative_of_the_friction_force():
         slope = (force(step * motion) - force(-step * motion)) / (2 * step)
         assert np.allclose(matrix @ motion, -slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max())
         assert abs(matrix - matrix.T).max() < 1e-12 * abs(matrix).max()
+
+
+def test_a_structure_without_contacts_only_deforms():
+    system = System(np.eye(2), np.zeros((2, 2)), 2 * np.eye(2), (), {"P": np.array([1.0, -3.0])})
+    answer = steady_sliding_nodes(system)
+    assert np.allclose(answer.displacement, [0.5, -1.5])
+    assert answer.normal_force.shape == (0,)
+    assert touching(system, answer).count == 0
+    assert friction_damping_matrix(system, answer).nnz == 0
 
 
 def test_what_has_no_answer_says_why():

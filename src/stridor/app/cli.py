@@ -141,6 +141,70 @@ def check(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False,
 
 
 @app.command()
+def steady(
+    case: CaseFile,
+    mu: Annotated[
+        float | None,
+        typer.Option("--mu", min=0.0, help="Friction coefficient of every contact [default: the case's]."),
+    ] = None,
+    set_: Set = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Steady sliding: which nodes touch, resultants of each contact, pressure as pictures and ParaView files."""
+    from ..study.analyses import steady_sliding
+    from .output import print_json, say
+    from .pictures import steady_document, write_steady
+
+    loaded = _load(case, set_, quiet=quiet)
+    found = steady_sliding(loaded, mu)
+    files = write_steady(loaded, found, _folder(case, out))
+    for path in files:
+        say(f"written: {path}", quiet=quiet)
+    document = steady_document(found) | {"files": [str(f) for f in files]}
+    if json:
+        print_json(document)
+        return
+    from .show import show_steady
+
+    show_steady(document)
+
+
+@app.command()
+def shapes(
+    case: CaseFile,
+    mu: Annotated[
+        float | None,
+        typer.Option("--mu", min=0.0, help="Friction coefficient of every contact [default: the case's]."),
+    ] = None,
+    branch: Annotated[
+        list[int] | None,
+        typer.Option("--branch", metavar="NUMBER", help="Mode by its number. Repeatable [default: the unstable ones]."),
+    ] = None,
+    gif: Annotated[bool, typer.Option("--gif", help="Also an animated GIF of each.")] = False,
+    set_: Set = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Shapes of modes: picture, animated page, ParaView file, and where friction feeds them."""
+    from .output import print_json, say, table
+    from .pictures import write_shapes
+
+    loaded = _load(case, set_, quiet=quiet)
+    documents = write_shapes(loaded, _folder(case, out), mu=mu, branches=branch or None, gif=gif)
+    for document in documents:
+        for path in document["files"]:
+            say(f"written: {path}", quiet=quiet)
+    if json:
+        print_json({"modes": documents})
+        return
+    rows = [[str(d["branch"]), f"{d['frequency_hz']:.2f}", f"{d['growth_rate']:.3f}"] for d in documents]
+    table("shapes", ["branch", "frequency [Hz]", "growth [1/s]"], rows)
+
+
+@app.command()
 def modes(
     case: CaseFile,
     mu: Annotated[

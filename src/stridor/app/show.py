@@ -36,6 +36,30 @@ def show_run(summary: dict[str, Any]) -> None:
     )
 
 
+def show_steady(document: dict[str, Any]) -> None:
+    """Resultants of every contact, and how well they are solved for."""
+
+    def numbers(values: list[float]) -> str:
+        return ", ".join(f"{v:.6g}" for v in values)
+
+    rows = [
+        [
+            name,
+            numbers(c["force"]),
+            numbers(c["moment"]),
+            "–" if c["area"] != c["area"] else f"{c['area']:.4g}",
+            "–" if c["largest_pressure"] != c["largest_pressure"] else f"{c['largest_pressure']:.4g}",
+        ]
+        for name, c in document["contacts"].items()
+    ]
+    columns = ["contact", "force on the slave [N]", "moment [N m]", "area [m²]", "largest pressure [Pa]"]
+    table("steady sliding", columns, rows)
+    stdout.print(
+        f"{document['touching_nodes']} of {document['nodes']} slave nodes touch; every freedom is in equilibrium to "
+        f"{document['residual']:.1e} of the largest force"
+    )
+
+
 def show_agreement(document: dict[str, Any]) -> None:
     """Both approaches side by side, critical friction, verdict."""
 

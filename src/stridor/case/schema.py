@@ -158,7 +158,7 @@ class Tie(Table):
     slave: str = Field(description='a boundary, "body.boundary", the one that follows (the finer mesh)')
     master: str = Field(description='a boundary, "body.boundary", the one that leads')
     tolerance: NotNegative | None = Field(
-        default=None, description="a number >= 0 [m], the largest distance between them (left out: 1 % of an element)"
+        default=None, description="a number >= 0 [m], the largest distance between them (left out: 5 % of an element)"
     )
 
 

@@ -164,9 +164,7 @@ class Factor:
         return float(left.max() / ((self._sizes @ np.abs(motion)) / self._largest).max())
 
 
-def factorise(
-    matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, solver: str | None = None
-) -> Factor:
+def factorise(matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, solver: str | None = None) -> Factor:
     """Factorise a sparse matrix (n, n), real or complex.
 
     symmetric: A = Aᵀ (not conjugated), which halves the work. saddle: [[K, Bᵀ], [B, −C]] with K positive

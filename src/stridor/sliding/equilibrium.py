@@ -111,18 +111,21 @@ class Equilibrium:
         return answer[:n], normal
 
 
-def settle(equilibrium: Equilibrium, *, limit: int = 60) -> tuple[State, int]:
+def settle(equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: int = 60) -> tuple[State, int]:
     """Find the touching nodes: N ≥ 0 where they touch, gap ≥ 0 where they do not. Also returns the steps taken.
 
-    All nodes touch at first. Each step lets go of those that pull and takes in those that penetrate, which is
-    Newton's method on the complementarity and settles in a few steps. Where it returns to a set it has seen, it goes
-    on more carefully: first letting go only, then half of the worst offenders, then one. Where letting go frees the
-    structure, fewer are let go. Raises direct.SingularMatrix, or AnalysisError where nothing settles.
+    At first the nodes of guess (m,) touch, without one, or where these do not hold the structure, all. Each step lets
+    go of those that pull and takes in those that penetrate, which is Newton's method on the complementarity and
+    settles in a few steps. Where it returns to a set it has seen, it goes on more carefully: first letting go only,
+    then half of the worst offenders, then the first in the list alone, which is certain to end where the contact
+    problem has one solution (Murty 1974). Where letting go frees the structure, fewer are let go. Raises
+    direct.SingularMatrix, or AnalysisError where nothing settles.
     """
     nodes = equilibrium.nodes
     # A node that no freedom moves along its normal (held, over an obstacle) can neither press nor give way.
     movable = np.diff(nodes.normal.indptr) > 0
-    active: BoolArray = movable.copy()
+    load = float(np.abs(equilibrium.force).max(initial=0.0))
+    active: BoolArray = movable if guess is None else movable & guess
     last: State | None = None
     seen: set[bytes] = set()
     care = 0
@@ -131,6 +134,9 @@ def settle(equilibrium: Equilibrium, *, limit: int = 60) -> tuple[State, int]:
             state = equilibrium.solve(active, None if last is None else last.displacement)
         except direct.SingularMatrix:
             freed = np.flatnonzero(last.active & ~active) if last is not None else np.zeros(0, dtype=np.int64)
+            if last is None and not np.array_equal(active, movable):
+                active = movable
+                continue
             if last is None or len(freed) < 2:
                 raise
             back = freed[np.argsort(last.normal_force[freed])][len(freed) // 2 :]
@@ -138,7 +144,7 @@ def settle(equilibrium: Equilibrium, *, limit: int = 60) -> tuple[State, int]:
             active[back] = True
             care = max(care, 2)
             continue
-        pulled, closing = offenders(state, movable)
+        pulled, closing = offenders(state, movable, load)
         if not len(pulled) and not len(closing):
             return state, step
         last = state
@@ -154,10 +160,11 @@ def settle(equilibrium: Equilibrium, *, limit: int = 60) -> tuple[State, int]:
     )
 
 
-def offenders(state: State, movable: BoolArray) -> tuple[IntArray, IntArray]:
-    """Touching nodes that pull and open nodes that penetrate, beyond rounding, the worst first."""
+def offenders(state: State, movable: BoolArray, load: float) -> tuple[IntArray, IntArray]:
+    """Touching nodes that pull and open nodes that penetrate, beyond rounding of forces as large as load [N]; the
+    worst come first."""
     force, gap = state.normal_force, state.gap
-    least_force = 1e-12 * float(np.abs(force).max(initial=0.0))
+    least_force = 1e-12 * max(float(np.abs(force).max(initial=0.0)), load)
     least_gap = 1e-12 * float(np.abs(gap).max(initial=0.0))
     pulled = np.flatnonzero(state.active & (force < -least_force))
     closing = np.flatnonzero(~state.active & movable & (gap < -least_gap))
@@ -166,10 +173,13 @@ def offenders(state: State, movable: BoolArray) -> tuple[IntArray, IntArray]:
 
 def changed(active: BoolArray, pulled: IntArray, closing: IntArray, care: int) -> BoolArray:
     """The next set of touching nodes, the more careful the fewer change."""
-    if care >= 1 and len(pulled):
+    if care >= 3:
+        first = min(*pulled, *closing, len(active))
+        pulled, closing = pulled[pulled == first], closing[closing == first]
+    elif care >= 1 and len(pulled):
         closing = closing[:0]
-    if care >= 2:
-        few = (max(len(pulled), len(closing)) + 1) // 2 if care == 2 else 1
+    if care == 2:
+        few = (max(len(pulled), len(closing)) + 1) // 2
         pulled, closing = pulled[:few], closing[:few]
     following = active.copy()
     following[pulled] = False

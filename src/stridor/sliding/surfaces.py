@@ -63,12 +63,14 @@ def steady_sliding_nodes(
     mu: float | None = None,
     load_factors: Mapping[str, float] | None = None,
     motion_factors: Array | None = None,
+    guess: BoolArray | None = None,
     solver: str | None = None,
 ) -> SurfaceSliding:
     """Solve the steady sliding equilibrium of every contact, over points and over surfaces.
 
     mu replaces the friction coefficient of every contact; load_factors default to one for every load,
-    motion_factors (p,) to one for every support; solver is that of `direct.factorise`.
+    motion_factors (p,) to one for every support. guess (m,): nodes that are likely to touch, as `active` of a
+    solution at another coefficient, which saves most of the steps. solver is that of `direct.factorise`.
     Raises AnalysisError where a contact does not slide or would change its gap, where no contact carries load, and
     where the structure is not held.
     """
@@ -86,7 +88,7 @@ def steady_sliding_nodes(
     force = _external_force(system, load_factors) - system.motion.damping @ factors
     equilibrium = Equilibrium(system, nodes, push, force, symmetric=not np.any(rubbing), solver=solver)
     try:
-        state, iterations = settle(equilibrium)
+        state, iterations = settle(equilibrium, guess)
     except SingularMatrix as error:
         raise AnalysisError(_loose(system, nodes, error.motion)) from error
     residual = equilibrium.residual(state)
@@ -97,10 +99,12 @@ def steady_sliding_nodes(
             f"no contact carries load in steady sliding (contacts: {', '.join(nodes.names)}): the loads pull the "
             "bodies apart, or friction lifts them off at this coefficient; check the direction of the loads"
         )
-    friction = rubbing * state.normal_force[:, None]
+    # What pulls by rounding does not pull.
+    normal = np.maximum(state.normal_force, 0.0)
+    friction = rubbing * normal[:, None]
     return SurfaceSliding(
         displacement=state.displacement,
-        normal_force=state.normal_force,
+        normal_force=normal,
         friction_force=friction,
         slip_velocity=slip,
         sense=sense,
@@ -109,7 +113,7 @@ def steady_sliding_nodes(
         gap=state.gap,
         residual=residual,
         iterations=iterations,
-        resultants=resultants(nodes, state.normal_force, friction, state.active),
+        resultants=resultants(nodes, normal, friction, state.active),
         balance=balance(system, force, push.T @ state.normal_force),
     )
 
@@ -183,8 +187,8 @@ def _loose(system: System, nodes: ContactNodes, motion: Array | None) -> str:
         most = float(np.abs(motion[n:]).max())
         if float(np.abs(motion[:n]).max(initial=0.0)) < 1e-6 * most:
             return (
-                f"steady sliding: rigid contact presses on the same freedoms twice (contacts: {', '.join(nodes.names)}), "
-                "so that its forces cannot be told apart; give the contact a stiffness"
+                "steady sliding: rigid contact presses on the same freedoms twice (contacts: "
+                f"{', '.join(nodes.names)}), so that its forces cannot be told apart; give the contact a stiffness"
             )
     who = "the structure" if motion is None else _moved_most(system, np.abs(motion[:n]))
     return (

@@ -226,7 +226,7 @@ def _squealing(
     if modes.right is None or not len(vibrating):
         return None, None, None
     fastest = int(vibrating[np.argmax(modes.growth_rate[0][vibrating])])
-    energy = friction_energy(system, modes, 0, fastest) if system.contact_nodes().count else None
+    energy = friction_energy(system, modes, 0, fastest).per_cycle if system.contact_nodes().count else None
     return modes.right[0, fastest], complex(modes.eigenvalues[0, fastest]), energy
 
 

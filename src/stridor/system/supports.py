@@ -72,18 +72,16 @@ def _held_nodes(body: BuiltBody, at: PointRef | BoundaryRef, where: str) -> IntA
 
 
 def master_surface(mesh: Mesh, boundary: str, where: str) -> tuple[Curve | FacetSurface, IntArray]:
-    """A boundary as a surface to slide or be bonded on, and the mesh nodes (k,) behind its own numbering."""
+    """A boundary as a surface to slide or be bonded on, and the mesh nodes (k,) in the order of its own numbering."""
     require_boundary(mesh, boundary, where)
     facets = mesh.boundaries.get(boundary, {})
     if not any(kind in FACET_KINDS for kind in facets):
         raise CaseError(where, boundary, "is a set of nodes; contact and ties need facets: a surface or a boundary")
-    nodes = mesh.boundary_nodes(boundary)
-    local = np.full(len(mesh.points), -1)
-    local[nodes] = np.arange(len(nodes))
-    numbered = {kind: local[f] for kind, f in facets.items()}
     if mesh.dimension == 2:
-        return Curve.from_facets(mesh.points[nodes], numbered, where=where), nodes
-    return FacetSurface.from_facets(mesh.points[nodes], numbered, where=where), nodes
+        curve = Curve.from_facets(mesh.points, facets, where=where)
+        return curve, curve.nodes
+    surface = FacetSurface.from_facets(mesh.points, facets, where=where)
+    return surface, surface.nodes
 
 
 def tie_matrix(case: Case, bodies: dict[str, BuiltBody], total: int, held: set[int]) -> tuple[Sparse, IntArray] | None:
@@ -103,7 +101,7 @@ def tie_matrix(case: Case, bodies: dict[str, BuiltBody], total: int, held: set[i
         nodes = boundary_nodes(slave, slave_at, f"{where}.slave")
         assert master.mesh is not None, "checked: boundaries belong to meshes"
         surface, master_nodes = master_surface(master.mesh, master_at.boundary, f"{where}.master")
-        tolerance = tie.tolerance if tie.tolerance is not None else 0.01 * _edge(master.points[master_nodes])
+        tolerance = tie.tolerance if tie.tolerance is not None else 0.05 * _edge(master.points[master_nodes])
         bond = Bond(
             where,
             tie_weights(slave.points[nodes], surface, where=where, tolerance=tolerance),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..typing import Array, IntArray
+from ..typing import Array, BoolArray, IntArray
 from .skin import distinct, facet_edges, normals
 
 LAMP = np.array([-0.35, 0.45, 0.82]) / np.linalg.norm([-0.35, 0.45, 0.82])  # right, up, towards the eye
@@ -77,29 +77,19 @@ def _brightness(seen: Array, facets: IntArray) -> Array:
 
 def _fill(image: Array, depth: Array, width: int, height: int, triangles: Array, colours: Array) -> None:
     """Draw triangles (t, 3, 3) with colours (t, 3, 3) at their corners into image and depth buffer."""
-    # Samples lie in the middle of pixels: column c is at c + 1/2.
-    first = np.maximum(np.ceil(triangles[:, :, :2].min(axis=1) - 0.5), 0).astype(int)
-    last = np.floor(triangles[:, :, :2].max(axis=1) - 0.5).astype(int)
-    size = np.minimum(last, [width - 1, height - 1]) - first + 1
-    count = np.where((size > 0).all(axis=1), size.prod(axis=1), 0)
     (ax, ay), (bx, by), (cx, cy) = (triangles[:, k, :2].T for k in range(3))
     twice = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    count[np.abs(twice) < 1e-9] = 0
-    order = np.flatnonzero(count)
-    part = np.cumsum(count[order]) // CANDIDATES
-    for piece in np.split(order, np.flatnonzero(np.diff(part)) + 1):
-        owner = np.repeat(piece, count[piece])
-        within = np.arange(len(owner)) - np.repeat(np.cumsum(count[piece]) - count[piece], count[piece])
-        column = first[owner, 0] + within % size[owner, 0]
-        row = first[owner, 1] + within // size[owner, 0]
-        x, y = column + 0.5, row + 0.5
+    triangle, row, first, count = _spans(triangles, np.abs(twice) > 1e-9, width, height)
+    part = np.cumsum(count) // CANDIDATES
+    for piece in np.split(np.arange(len(count)), np.flatnonzero(np.diff(part)) + 1):
+        span, within = _counted(count[piece])
+        span = piece[span]
+        owner, column = triangle[span], first[span] + within
+        x, y, pixel = column + 0.5, row[span] + 0.5, row[span] * width + column
         # Barycentric weights are linear over the plane, so each is three numbers per triangle.
-        u = (bx * cy - by * cx)[owner] + (by - cy)[owner] * x + (cx - bx)[owner] * y
-        v = (cx * ay - cy * ax)[owner] + (cy - ay)[owner] * x + (ax - cx)[owner] * y
-        u, v = u / twice[owner], v / twice[owner]
-        inside = np.flatnonzero((u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9))
-        owner, pixel = owner[inside], row[inside] * width + column[inside]
-        weight = np.stack([u[inside], v[inside], 1.0 - u[inside] - v[inside]])
+        u = ((bx * cy - by * cx)[owner] + (by - cy)[owner] * x + (cx - bx)[owner] * y) / twice[owner]
+        v = ((cx * ay - cy * ax)[owner] + (cy - ay)[owner] * x + (ax - cx)[owner] * y) / twice[owner]
+        weight = np.stack([u, v, 1.0 - u - v])
         near = sum(weight[k] * triangles[owner, k, 2] for k in range(3))
         np.maximum.at(depth, pixel, near)
         wins = np.flatnonzero(near == depth[pixel])
@@ -108,13 +98,46 @@ def _fill(image: Array, depth: Array, width: int, height: int, triangles: Array,
         image[pixel, 3] = 1.0
 
 
+def _spans(
+    triangles: Array, drawn: BoolArray, width: int, height: int
+) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Rows of pixels inside triangles (t, 3, 3): the triangle, the row, its first column and how many, each (s,).
+
+    Samples lie in the middle of pixels: column c is at c + 1/2.
+    """
+    low = np.maximum(np.ceil(triangles[:, :, 1].min(axis=1) - 0.5), 0).astype(int)
+    high = np.minimum(np.floor(triangles[:, :, 1].max(axis=1) - 0.5), height - 1).astype(int)
+    owner, within = _counted(np.where(drawn, np.maximum(high - low + 1, 0), 0))
+    row = low[owner] + within
+    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
+    for k in range(3):
+        px, py = triangles[owner, k, :2].T
+        qx, qy = triangles[owner, (k + 1) % 3, :2].T
+        rise = qy - py
+        along = (row + 0.5 - py) / np.where(rise == 0, 1.0, rise)
+        met = (rise != 0) & (along >= 0) & (along <= 1)
+        at = px + along * (qx - px)
+        left, right = np.where(met, np.minimum(left, at), left), np.where(met, np.maximum(right, at), right)
+    first = np.ceil(np.clip(left, 0, width) - 0.5 - 1e-9).astype(int)
+    first = np.maximum(first, 0)
+    last = np.floor(np.clip(right, -1, width) - 0.5 + 1e-9).astype(int)
+    count = np.minimum(last, width - 1) - first + 1
+    some = np.flatnonzero(count > 0)
+    return owner[some], row[some], first[some], count[some]
+
+
+def _counted(counts: IntArray) -> tuple[IntArray, IntArray]:
+    """0 repeated counts[0] times, 1 counts[1] times and so on, and the number of each among its likes."""
+    owner = np.repeat(np.arange(len(counts)), counts)
+    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
 def _edges(image: Array, depth: Array, width: int, height: int, place: Array, facets: IntArray) -> None:
     """Darken what is under the edges of facets that can be seen."""
     pairs = distinct(facet_edges(facets))[0]
     start, along = place[pairs[:, 0]], place[pairs[:, 1]] - place[pairs[:, 0]]
     steps = np.ceil(np.abs(along[:, :2]).max(axis=1, initial=0.0)).astype(int) + 1
-    owner = np.repeat(np.arange(len(pairs)), steps)
-    within = np.arange(len(owner)) - np.repeat(np.cumsum(steps) - steps, steps)
+    owner, within = _counted(steps)
     at = start[owner] + along[owner] * (within / np.maximum(steps[owner] - 1, 1))[:, None]
     column, row = np.floor(at[:, 0]).astype(int), np.floor(at[:, 1]).astype(int)
     held = (column >= 0) & (column < width) & (row >= 0) & (row < height)

@@ -117,20 +117,22 @@ def interface_energy(
     *,
     tangents: Array | None = None,
     quantity: str = "friction energy per cycle",
+    unit: str = "J",
     ax: Axes | None = None,
 ) -> Figure:
-    """Energy (m,) [J] that friction brings in at contact nodes at position (m, d) [m]: where the squeal is made.
+    """Energy (m,) that friction brings in at contact nodes at position (m, d) [m]: where the squeal is made.
 
     Positive energies feed the motion (red), negative ones are taken from it (blue). In the plane a stem over the
     position along the contact, in space the nodes as seen along the normal. ``tangents`` (m, d−1, d) orient both;
-    ``quantity`` is what the energy is called. Raises CaseError where the shapes do not fit.
+    ``quantity`` is what the energy is called, ``unit`` its unit, "" for energies relative to another.
+    Raises CaseError where the shapes do not fit.
     """
     position, energy = np.asarray(position, dtype=float), np.asarray(energy, dtype=float)
     if position.ndim != 2 or position.shape[1] not in (2, 3) or energy.shape != position.shape[:1]:
         given = f"energy of shape {energy.shape} at positions of shape {position.shape}"
         raise CaseError("energy", given, "one energy (m,) for each position (m, 2) or (m, 3)")
-    power, prefix = _prefix(energy)
-    energy, label = energy / power, f"{quantity} [{prefix}J]"
+    power, prefix = _prefix(energy) if unit else (1.0, "")
+    energy, label = energy / power, f"{quantity} [{prefix}{unit}]" if unit else quantity
     figure, ax = panel(ax, 3.6)
     colours = [VERMILION if e > 0 else BLUE for e in energy]
     if position.shape[1] == 2:
@@ -154,7 +156,7 @@ def interface_energy(
         for c, text in ((VERMILION, "feeds the motion"), (BLUE, "takes from it"))
     ]
     legend_above(ax, handles)
-    _headed(ax, f"{quantity}: {float(np.nansum(energy)):+.3g} {prefix}J in total")
+    _headed(ax, f"{quantity}: {float(np.nansum(energy)):+.3g} {prefix}{unit}".rstrip() + " in total")
     return figure
 
 

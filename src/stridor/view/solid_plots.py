@@ -115,7 +115,9 @@ def draw_frame(
     ax.plot([], [], color=GREY, linestyle=":", linewidth=1.2, label="at rest")
     legend_above(ax)
     shown = ScalarMappable(Normalize(0.0, 1.0), colours)
-    bar = figure.colorbar(shown, ax=ax, shrink=0.8, pad=0.02, label="|u| / largest amplitude")
+    bar = figure.colorbar(
+        shown, ax=ax, shrink=0.8, pad=0.02, panchor=False, anchor=(0.0, 0.5), label="|u| / largest amplitude"
+    )
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     if title:
         # Above the legend, which stands above the frame.
@@ -158,7 +160,9 @@ def _axes(ax: Axes | None, shown: Array) -> tuple[Figure, Axes]:
         return root_figure(ax), ax
     wide, high = np.ptp(shown[:, :2], axis=0)
     figure = new_figure(float(np.clip((WIDTH - 1.2) * high / max(wide, 1e-12) + 0.9, 2.2, 6.0)))
-    return figure, figure.subplots()
+    ax = figure.subplots()
+    ax.set_anchor("W")  # title and legend of a slender model need the room at its right
+    return figure, ax
 
 
 def _picture(ax: Axes, skin: Skin, seen: Array, colours: Array, reach: Array, pixels: int = PIXELS) -> None:

@@ -43,6 +43,7 @@ def shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
                 inputs.friction_energy,
                 tangents=nodes.tangents,
                 quantity="energy fed in per cycle / energy of the mode",
+                unit="",
             ),
         )
 

@@ -52,7 +52,7 @@ def direct_modes(
 def _undamped(problem: ContactProblem, mu: float, omega: float, count: int) -> tuple[ComplexArray, ...]:
     """λ (k,), u (n, k), p (m, k) by Arnoldi on [M u; 0] ↦ A(jω)⁻¹, whose eigenvalues are −1/(λ² + ω²)."""
     n = problem.size
-    factor = factorise(_augmented(problem, 1j * omega, mu).real, saddle=True)
+    factor = factorise(_augmented(problem, 1j * omega, mu).real, saddle=True, solver=problem.solver)
 
     def whole(u: ComplexArray) -> ComplexArray:
         return factor.solve(np.concatenate([times(problem.mass, u), np.zeros((problem.nodes, u.shape[1]))]))
@@ -65,7 +65,7 @@ def _undamped(problem: ContactProblem, mu: float, omega: float, count: int) -> t
 def _damped(problem: ContactProblem, mu: float, omega: float, count: int) -> tuple[ComplexArray, ...]:
     """The same of the quadratic problem: with λ = jω + 1/θ, θ²A(jω) + θ(C + 2jωM) + M on [θu, u]."""
     n = problem.size
-    factor = factorise(_augmented(problem, 1j * omega, mu), saddle=True)
+    factor = factorise(_augmented(problem, 1j * omega, mu), saddle=True, solver=problem.solver)
     extras = problem.at(mu)
     damping = problem.damping
     if extras.weakening is not None:

@@ -69,6 +69,14 @@ class Follower:
         self.state = State(found, followed[order])
         self._step = longest
 
+    @classmethod
+    def resumed(cls, reduced: Reduced, state: State) -> Follower:
+        """A follower that goes on from a state followed before, and watches nothing."""
+        follower = cls.__new__(cls)
+        follower.reduced, follower.state = reduced, state
+        follower.longest, follower.watch, follower._step = np.inf, None, np.inf
+        return follower
+
     def advance(self, mu: float) -> State:
         """Follow to ``mu``, not below the present one."""
         while self.state.mu < mu:

@@ -14,7 +14,7 @@ from ..complex_modes import ComplexModes, undamped
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import Band, converge, left_vectors, projected
+from .refine import Band, left_vectors, projected, settle
 from .steady import Options
 
 SAMPLES = 5
@@ -49,8 +49,7 @@ def complex_modes_assembled(
     band = Band(count, None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz)
     reduced = projected(problem, band)
     top = float(values.max())
-    converge(reduced, samples(top), left=vectors)
-    converge(reduced, values, left=vectors)
+    settle(reduced, [*samples(top), *values], left=vectors)
     return _followed(reduced, values, band, damped=damped, vectors=vectors)
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from ...errors import AnalysisError
 from ...system import System
 from ...typing import Array, ComplexArray, IntArray, Sparse
 from .steady import Options, Steadiness, steadiness, touching_nodes
@@ -40,7 +39,8 @@ class ContactProblem:
 
     normal N (m, n), slide S (m, n): relative displacement slave − master along the normal and against the slip;
     compliance c (m,) [m/N], 0 for rigid contact. touching (m,) are the places of the nodes among all the system's.
-    extras gives what steady sliding at a μ adds, None where nothing does. damped: whether anything works on velocities.
+    damped: whether anything works on
+    velocities. extras gives what steady sliding at a μ adds, None where nothing does. solver: that of `direct.factorise`.
     """
 
     mass: Sparse
@@ -53,6 +53,7 @@ class ContactProblem:
     open_contacts: tuple[str, ...]
     damped: bool
     extras: Callable[[float], Extras] | None = None
+    solver: str | None = None
 
     @property
     def size(self) -> int:
@@ -84,7 +85,7 @@ class ContactProblem:
         return result
 
     def left_backward_error(self, lam: ComplexArray, y: ComplexArray, q: ComplexArray, mu: float) -> Array:
-        """The same of left vectors: yᵀ(λ²M + λC + K) − qᵀN = 0 and yᵀ(N + μS)ᵀ + qᵀc = 0."""
+        """The same of left vectors: (λ²M + λC + K)ᵀ y − Nᵀ q = 0 and (N + μS) y + c q = 0."""
         result = np.zeros(len(lam))
         for start in range(0, len(lam), CHUNK):
             part = slice(start, start + CHUNK)
@@ -151,20 +152,12 @@ def tiny(values: Array) -> Array:
 def problem_of(system: System, mu: float | None, options: Options, *, damped: bool) -> ContactProblem:
     """The problem of the nodes that touch in steady sliding at ``mu`` (None: at the laws' own coefficients).
 
-    Raises AnalysisError where a touching node does not slide, or a law with a slope has no load to press it.
+    Raises AnalysisError where there is no steady sliding, or where the options need loads that are not there.
     """
     nodes = system.contact_nodes()
-    steady = touching_nodes(system, nodes, mu)
+    steady = touching_nodes(system, nodes, mu, options.solver)
     touching = np.flatnonzero(steady.active)
     chosen = nodes.select(touching)
-    speed = np.linalg.norm(steady.slip_velocity[touching], axis=1)
-    still = touching[speed == 0.0]
-    if len(still):
-        names = sorted({nodes.names[k] for k in nodes.owner[still]})
-        raise AnalysisError(
-            f"contact {', '.join(names)} does not slide at {len(still)} of its nodes: no support moves one of its "
-            "bodies along the tangent; give a support a velocity"
-        )
     closed = {nodes.names[k] for k in nodes.owner[touching]}
     with_state = steadiness(system, nodes, touching, options)
     has_damping = bool(system.damping.nnz and np.abs(system.damping.data).max() > 0)
@@ -173,12 +166,13 @@ def problem_of(system: System, mu: float | None, options: Options, *, damped: bo
         damping=system.damping if has_damping else sp.csr_array(system.damping.shape),
         stiffness=system.stiffness,
         normal=chosen.normal,
-        slide=chosen.along(-steady.slip_velocity[touching] / tiny(speed)[:, None]),
+        slide=chosen.along(steady.sense[touching]),
         compliance=chosen.compliance,
         touching=touching,
         open_contacts=tuple(name for name in nodes.names if name not in closed),
         damped=has_damping or with_state.damps,
         extras=None if with_state.neutral else _extras(with_state),
+        solver=options.solver,
     )
 
 
@@ -193,7 +187,3 @@ def _extras(state: Steadiness) -> Callable[[float], Extras]:
 
     return at
 
-
-def without_friction(problem: ContactProblem) -> ContactProblem:
-    """The same contacts at μ = 0 without what steady sliding adds."""
-    return replace(problem, extras=None)

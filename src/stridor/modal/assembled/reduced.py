@@ -20,7 +20,9 @@ import scipy.linalg as sl
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
 from .problem import ContactProblem, Extras
-from .shifted import Pair, Shifted, orthonormal
+from .shifted import Pair, Shifted, orthonormal, real_columns
+
+KEPT = 1e-10  # of the strongest direction of the vectors kept
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,10 @@ class Reduced:
     """A basis and the problem projected on it, both of which grow.
 
     pairs: trial vectors with contact forces; forces P̂ (m, f): forces of rigid contacts of their own; lifts (n, f) their
-    test vectors. solves counts right sides solved for.
+    test vectors. solves counts right sides solved for; compressed is the number of unknowns after the last `compress`.
     """
+
+    compressed: int
 
     def __init__(self, problem: ContactProblem, shifted: Shifted, modes: Pair, frequency: float) -> None:
         self.problem = problem
@@ -61,7 +65,10 @@ class Reduced:
         self._slide = np.zeros((problem.nodes, 0))
         self._known: dict[float, Eigenpairs] = {}
         self._extra: dict[float, tuple[Array, Array]] = {}
+        self._lift_scale = 1.0
+        self._kept: list[tuple[Array, Array]] = []
         self.add(modes)
+        self._modes = self.compressed = self.pairs.count
 
     @property
     def count(self) -> int:
@@ -109,6 +116,34 @@ class Reduced:
             self._project()
         return grown + self.count - before
 
+    def keep(self, right: ComplexArray) -> None:
+        """Remember right vectors (r, k) that are exact, for `compress`."""
+        own = self.pairs.count
+        vectors = right / np.linalg.norm(right[:own], axis=0)
+        columns = real_columns(vectors)
+        self._kept.append((columns[:own], columns[own:]))
+
+    def compress(self) -> None:
+        """Reduce the basis to the frictionless modes and the span of the vectors kept, which stay exact."""
+        own, first = self.pairs.count, self._modes
+        shapes = np.hstack([_padded(u, own) for u, _ in self._kept])
+        forces = np.hstack([_padded(p, self.forces.shape[1]) for _, p in self._kept])
+        turn = np.zeros((own, own))
+        turn[:first, :first] = np.eye(first)
+        beyond = _span(shapes[first:])
+        turn[first:, first : first + beyond.shape[1]] = beyond
+        turn = turn[:, : first + beyond.shape[1]]
+        force_turn = _span(forces)
+        self.pairs = self.pairs.turned(turn)
+        self.forces, self.lifts = self.forces @ force_turn, self.lifts @ force_turn
+        self._products = [
+            (turn.T @ square @ turn, force_turn.T @ across @ turn) if len(square) else (square, across)
+            for square, across in self._products
+        ]
+        self._kept = [(turn.T @ shapes, force_turn.T @ forces)]
+        self.compressed = self.count
+        self._project()
+
     def _add_forces(self, candidates: Array) -> None:
         """Take forces (m, k) on rigid contacts in as far as they are new, each with its lift."""
         block = np.zeros_like(candidates)
@@ -128,7 +163,10 @@ class Reduced:
         new = sl.qr(new, mode="economic")[0]
         self.solves += new.shape[1]
         lift, _ = self.shifted.solve(np.zeros((self.problem.size, new.shape[1])), new)
-        lift /= np.sqrt(np.maximum(np.einsum("ij,ij->j", lift, self.problem.mass @ lift), 1e-300))
+        if not self.forces.shape[1]:
+            # One factor for all of them, so that combinations of forces have the same combinations as lifts.
+            self._lift_scale = 1.0 / (float(np.sqrt(np.sum(lift * (self.problem.mass @ lift)))) or 1.0)
+        lift *= self._lift_scale
         self.forces = np.hstack([self.forces, new * self._force_scale])
         self.lifts = np.hstack([self.lifts, lift])
 
@@ -245,6 +283,19 @@ def _grown(known: tuple[Array, Array], matrix: Sparse, u: Array, lifts: Array) -
     across[:, r0:] = lifts.T @ new
     across[f0:, :r0] = (matrix @ lifts[:, f0:]).T @ u[:, :r0]
     return square, across
+
+
+def _padded(block: Array, rows: int) -> Array:
+    """The block with rows of zeros added below."""
+    return np.vstack([block, np.zeros((rows - len(block), block.shape[1]))])
+
+
+def _span(block: Array) -> Array:
+    """Orthonormal columns that span those of ``block`` but for KEPT of its largest."""
+    if not block.size:
+        return np.zeros((len(block), 0))
+    left, size, _ = sl.svd(block, full_matrices=False)
+    return left[:, size > KEPT * max(float(size[0]), 1e-300)]
 
 
 def combined(basis: Array, weights: ComplexArray) -> ComplexArray:

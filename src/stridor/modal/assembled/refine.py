@@ -7,19 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
+import scipy.sparse as sp
 
+from ...direct import factorise
 from ...errors import AnalysisError
-from ...typing import Array, ComplexArray, IntArray
+from ...typing import Array, ComplexArray, IntArray, Sparse
 from .problem import ContactProblem, times, tiny
 from .reduced import Eigenpairs, Reduced
-from .shifted import Shifted, frictionless_modes, real_columns, shift_for
+from .shifted import Shifted, frictionless_modes, modes_below, real_columns, shift_for
 
-TOLERANCE = 1e-10  # backward error at which an eigenpair counts as found
+TOLERANCE = 2e-9  # backward error at which an eigenpair counts as found
 ACCURACY = 1e-7  # and its residual against the inertia forces
 BELIEVED = 1e-8  # backward error above which the answer is refused
 SWEEPS = 40
 WIDEST = 64  # right sides of one enrichment
 WEAKEST = 1e-3  # of the strongest direction: residuals below it wait for the next sweep
+COUNTED = 20_000  # freedoms up to which the number of frictionless modes is checked, by one more factorisation
+GROWN = 1.4  # a basis this much larger than when it was last reduced is reduced again
 MARGIN = 1.1  # modes up to this much above the band are made exact
 GUARD = 1.5  # and frictionless ones up to this much above take part
 
@@ -52,12 +56,29 @@ def projected(problem: ContactProblem, band: Band) -> Reduced:
     shifted = Shifted(problem, shift_for(problem, band.frequency))
     squares, modes = frictionless_modes(shifted, band.enough)
     top = band.top(squares)
+    if problem.size <= COUNTED:
+        _require_all(problem, squares, top)
     reduced = Reduced(problem, shifted, modes, top)
     near = squares <= (MARGIN * top) ** 2
     if problem.nodes and near.any():
         forces = problem.slide.T @ modes.p[:, near]
         reduced.enrich(principal(problem, forces))
     return reduced
+
+
+def _require_all(problem: ContactProblem, squares: Array, top: float) -> None:
+    """Raise AnalysisError where block Lanczos has missed a mode: their number is known without finding them."""
+    above = np.flatnonzero(squares > top**2)
+    if len(above) < 2:
+        return
+    # Between the two modes that are furthest apart, so that rounding does not decide which side they are on.
+    k = int(above[np.argmax(np.diff(squares[above]))])
+    number = modes_below(problem, float(squares[k] + squares[k + 1]) / 2)
+    if number is not None and number != k + 1:
+        raise AnalysisError(
+            f"{number} frictionless modes lie below {np.sqrt(squares[k]) / (2 * np.pi):.6g} Hz but {k + 1} were found; "
+            "change max_frequency_hz or the number of modes slightly"
+        )
 
 
 def wanted(reduced: Reduced, found: Eigenpairs) -> IntArray:
@@ -79,6 +100,8 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
             worst[mu], force, opening = unbalanced(reduced, mu, tolerance, left=left)
             if not force.shape[1] and not opening.shape[1]:
                 pending.remove(mu)
+                found = reduced.eigenpairs(mu)
+                reduced.keep(found.right[:, wanted(reduced, found)])
                 continue
             force = principal(reduced.problem, force)
             grown = reduced.enrich_left(force, opening) if left else reduced.enrich(force)
@@ -90,6 +113,14 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
             f"the modes at μ = {stuck[0]:g} do not settle: a backward error of {worst[stuck[0]]:.1e} is left; ask for "
             "fewer modes or smaller friction coefficients"
         )
+
+
+def settle(reduced: Reduced, frictions: Iterable[float], *, left: bool = False) -> None:
+    """`converge` at one μ after the other, the basis reduced to what it has found whenever it has grown large."""
+    for mu in dict.fromkeys(float(mu) for mu in frictions):
+        converge(reduced, [mu], left=left)
+        if not left and reduced.count > GROWN * reduced.compressed:
+            reduced.compress()
 
 
 def unbalanced(
@@ -142,12 +173,10 @@ def left_vectors(
     return y, q
 
 
-def fitted(rows: ContactProblem | object, rest: ComplexArray) -> ComplexArray:
+def fitted(rows: Sparse, rest: ComplexArray) -> ComplexArray:
     """Forces (m, k) on rows (m, n) that come closest to ``rest`` (n, k): least squares by the normal equations."""
-    from ...direct import factorise
-
-    matrix = rows @ rows.T  # type: ignore[operator]
-    return factorise(matrix, symmetric=True).solve(times(rows, rest))
+    with factorise(sp.csr_array(rows @ rows.T), symmetric=True) as factor:
+        return factor.solve(times(rows, rest))
 
 
 def principal(problem: ContactProblem, forces: Array) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from ...direct import factorise
+from ...direct import Factor, factorise
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray
 from .problem import ContactProblem
@@ -59,13 +59,7 @@ class Shifted:
     def __init__(self, problem: ContactProblem, shift: float) -> None:
         self.problem = problem
         self.shift = shift
-        stiffness = sp.csr_array(problem.stiffness + shift * problem.mass)
-        self._scale = float(np.abs(stiffness.diagonal()).mean()) or 1.0
-        if problem.nodes:
-            normal = sp.csr_array(-self._scale * problem.normal)
-            corner = sp.diags_array(-(self._scale**2) * problem.compliance, format="csr")
-            stiffness = sp.block_array([[stiffness, normal.T], [normal, corner]], format="csr")
-        self._factor = factorise(stiffness, symmetric=True, saddle=problem.nodes > 0)
+        self._factor, self._scale = _factorised(problem, shift)
 
     def solve(self, force: Any, opening: Any = None) -> tuple[Any, Any]:
         """u (n, k), p (m, k) with (K + sM) u − Nᵀp = force (n, k) and N u + c p = opening (m, k), zero by default."""
@@ -76,6 +70,26 @@ class Shifted:
             right[n:] = -self._scale * opening
         answer = self._factor.solve(right)
         return answer[:n], self._scale * answer[n:]
+
+
+def _factorised(problem: ContactProblem, shift: float) -> tuple[Factor, float]:
+    """Factors of A₀, and the scale of its multipliers."""
+    matrix = sp.csr_array(problem.stiffness + shift * problem.mass)
+    scale = float(np.abs(matrix.diagonal()).mean()) or 1.0
+    if problem.nodes:
+        normal = sp.csr_array(-scale * problem.normal)
+        corner = sp.diags_array(-(scale**2) * problem.compliance, format="csr")
+        matrix = sp.block_array([[matrix, normal.T], [normal, corner]], format="csr")
+    return factorise(matrix, symmetric=True, saddle=problem.nodes > 0, solver=problem.solver), scale
+
+
+def modes_below(problem: ContactProblem, square: float) -> int | None:
+    """How many frictionless modes have ω² below ``square`` [1/s²], by the signs of pivots (Sylvester's law of inertia).
+
+    None where the solver does not tell them.
+    """
+    with _factorised(problem, -square)[0] as factor:
+        return None if factor.inertia is None else factor.inertia - problem.nodes
 
 
 def shift_for(problem: ContactProblem, frequency: float | None) -> float:

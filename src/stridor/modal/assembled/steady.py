@@ -8,7 +8,8 @@ import numpy as np
 
 from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError
-from ...sliding import full_motion
+from ...sliding import friction_damping_matrix, full_motion, steady_sliding_nodes
+from ...sliding.surfaces import STILL
 from ...system import System
 from ...typing import Array, BoolArray, IntArray, Sparse
 
@@ -18,29 +19,41 @@ class Options:
     """Which effects of the steady state count beside the friction law's slope, which always does.
 
     friction_damping: vibration across the slip turns the friction force by δẇ/|v|, which damps (space only).
-    prestress: the geometric stiffness that the steady stresses make.
+    prestress: the geometric stiffness that the steady stresses make. solver: that of `direct.factorise`.
     """
 
     friction_damping: bool = False
     prestress: bool = False
+    solver: str | None = None
 
 
 @dataclass(frozen=True)
 class Touching:
-    """Nodes in contact: active (m,), and the velocity (m, d−1) [m/s] at which each slips along its tangents."""
+    """Nodes in contact: active (m,), and sense (m, d−1), the unit vector against the slip, zero at the centre of a spin."""
 
     active: BoolArray
-    slip_velocity: Array
+    sense: Array
 
 
-def touching_nodes(system: System, nodes: ContactNodes, mu: float | None) -> Touching:
-    """The nodes that carry load in steady sliding at ``mu``; all of them where the system has no loads."""
-    if not system.loads or not nodes.count:
-        return Touching(np.ones(nodes.count, dtype=bool), nodes.slip_velocity(full_motion(system)))
-    from ...sliding.surfaces import steady_sliding_nodes
+def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver: str | None) -> Touching:
+    """The nodes that carry load in steady sliding at ``mu``; all of them where the system has no loads.
 
-    steady = steady_sliding_nodes(system, mu=mu)
-    return Touching(np.asarray(steady.active), np.asarray(steady.slip_velocity))
+    Raises AnalysisError where there is no steady sliding.
+    """
+    if system.loads and nodes.count:
+        steady = steady_sliding_nodes(system, mu=mu, solver=solver)
+        return Touching(steady.active, steady.sense)
+    slip = nodes.slip_velocity(full_motion(system))
+    speed = np.linalg.norm(slip, axis=1)
+    slides = speed > STILL * float(speed.max(initial=0.0))
+    still = [name for k, name in enumerate(nodes.names) if not np.any(slides[nodes.owner == k])]
+    if still:
+        raise AnalysisError(
+            f"contact {', '.join(still)} does not slide: no support moves one of its bodies along the tangent; "
+            "give a support a velocity"
+        )
+    sense = np.where(slides[:, None], -slip / np.where(slides, speed, 1.0)[:, None], 0.0)
+    return Touching(np.ones(nodes.count, dtype=bool), sense)
 
 
 @dataclass(frozen=True)
@@ -53,6 +66,7 @@ class Steadiness:
     sloped: bool
     friction_damping: bool
     prestress: bool
+    solver: str | None
 
     @property
     def neutral(self) -> bool:
@@ -66,16 +80,16 @@ class Steadiness:
 
     def terms(self, mu: float) -> tuple[Array | None, Sparse | None, Sparse | None]:
         """Weakening d (m,) [N s/m], damping (n, n) and stiffness (n, n) at ``mu``, None where there is none."""
-        from ...sliding.surfaces import friction_damping_matrix, steady_sliding_nodes
-
-        steady = steady_sliding_nodes(self.system, mu=mu)
-        weakening = None
-        if self.sloped and mu:
-            speeds = np.linalg.norm(steady.slip_velocity, axis=1)[self.touching]
+        steady = steady_sliding_nodes(self.system, mu=mu, solver=self.solver)
+        weakening = damping = None
+        if self.friction_damping and mu:
+            # It holds the law's slope too.
+            damping = friction_damping_matrix(self.system, steady)
+        elif self.sloped and mu:
+            speeds = steady.slip_speed[self.touching]
             laws = [self.nodes.laws[k] for k in self.nodes.owner[self.touching]]
             slopes = [law.scaled(mu, float(v)).slope(float(v)) for law, v in zip(laws, speeds, strict=True)]
-            weakening = np.asarray(steady.normal_force)[self.touching] * np.array(slopes)
-        damping = friction_damping_matrix(self.system, steady) if self.friction_damping and mu else None
+            weakening = steady.normal_force[self.touching] * np.array(slopes)
         stiffness = None
         if self.prestress and self.system.stress_stiffness is not None:
             stiffness = self.system.stress_stiffness(steady.displacement)
@@ -92,4 +106,4 @@ def steadiness(system: System, nodes: ContactNodes, touching: IntArray, options:
     if (sloped or across or prestress) and not system.loads:
         what = "a friction law with a slope" if sloped else "friction damping" if across else "prestress"
         raise AnalysisError(f"{what} needs the normal force: give the case a load that presses the bodies")
-    return Steadiness(system, nodes, touching, sloped, across, prestress)
+    return Steadiness(system, nodes, touching, sloped, across, prestress, options.solver)

@@ -8,8 +8,8 @@ Sticking: both vanish. Slipping: T = −μN δ/|δ|. With κ = μN/|δ|, the dra
 
     (I + κ W) δ = s + w N,       N(κ) = (−g + κ wᵀB s)/(w_nn − κ wᵀB w),    B = (I + κ W)⁻¹.
 
-In the axes of W these are scalars, and one equation F(κ) = |T| − μN = 0 is left. κ = 0 is frictionless and F < 0 as g < 0;
-κ → ∞ is sticking, where F > 0 if sticking has been refused: a root always lies between, whatever μ and the speed law.
+In the axes of W these are scalars, and one equation F(κ) = |T| − μN = 0 is left. κ = 0 is frictionless and F < 0, as
+g < 0; κ → ∞ is sticking, where F > 0 if it has been refused: a root always lies between, whatever μ and the speed law.
 With κ = κ0 t/(1 − t), κ0 = 2/tr W, F is linear in t for a round W and no coupling, so Newton's method in t ∈ (0, 1),
 kept in its bracket, needs few steps.
 """

@@ -8,9 +8,10 @@ It leaves the unit circle through z = −1: d = −2u, Δt q = u/β2, hence, wit
 
     ω²Δt² + rΔt/β2 = (2/β2) (1 + (β2 − 1/2) Δt c).
 
-For β2 = 1/2 that is ω²Δt² + 2rΔt = 4; with r = βω² = 2ζω the known Δt = (2/ω)(√(1 + ζ²) − ζ). The other way out, |det| > 1
-with det = 1 − (β2 − 1/2)ω²Δt² − rΔt for c = 0, comes later for β2 in [1/2, 1]. Diagonal damping can only raise the
-limit and is left out. For matrices every mode of the scheme obeys the scalar equation with its Rayleigh quotients, so
+For β2 = 1/2 that is ω²Δt² + 2rΔt = 4; with r = βω² = 2ζω the known Δt = (2/ω)(√(1 + ζ²) − ζ). The other way out,
+|det| > 1 with det = 1 − (β2 − 1/2)ω²Δt² − rΔt for c = 0, comes later for β2 in [1/2, 1]. Diagonal damping can only
+raise the limit and is left out. For matrices every mode of the scheme obeys the scalar equation with its Rayleigh
+quotients, so
 
     largest eigenvalue of (K + C_r/(β2Δt), M)  ≤  2/(β2Δt²)
 
@@ -75,7 +76,7 @@ def _part_limit(stiffness: Sparse, lagged: Sparse, beta2: float) -> tuple[float,
         return np.inf, 0.0, mode.vector
     if lagged.nnz and mode.value <= 0.0:
         mode = _largest(lagged, None)
-    step = np.inf
+    step, square = np.inf, 0.0
     for _ in range(ROUNDS):
         x = mode.vector
         square = float(x @ (stiffness @ x)) * mode.margin**2

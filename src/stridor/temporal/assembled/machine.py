@@ -16,10 +16,12 @@ from ..beta2 import Scheme
 from ..schedule import Schedule
 from ..stage import FIRST_OPEN, FIRST_STICK, STATISTICS
 from .damping import SplitDamping, split_damping
-from .loop import COUNTERS, LOOP_WORKS, STEPS_DONE, Forcing, LoopState, Record, run_steps
+from .forcing import COUNTERS, LOOP_WORKS, STEPS_DONE, Forcing, LoopState, StepWork
+from .loop import run_steps
 from .node_stage import NodeScratch, NodeState
 from .node_table import NodeTable, node_table
 from .products import DASHPOTS, WITH_STIFFNESS, Fields, Structure, stored_energies
+from .recording import Record
 from .storage import Layout, lay_out_freedoms, parts, upper_blocks
 
 OFFSET_STEPS = 100  # in which the gap that a renewal of the rows made fades
@@ -83,9 +85,9 @@ class Machine:
         forcing = self.constant._replace(
             loads=schedule.load_factors(self.done, steps), increments=schedule.motion_increments(self.done, steps)
         )
-        return run_steps(
-            steps, self.structure, self.fields, forcing, self.table, self.contacts, self.scratch, self.state, record
-        )
+        work = _step_work(forcing, self.table, self.state, record)
+        structure, fields, table, nodes = self.structure, self.fields, self.table, self.contacts
+        return run_steps(steps, structure, fields, forcing, table, nodes, self.scratch, self.state, work, record)
 
 
 def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Machine:
@@ -216,4 +218,23 @@ def _scratch(table: NodeTable) -> NodeScratch:
         chosen=np.zeros(nodes, dtype=np.int64),
         marked=np.zeros(nodes, dtype=np.int64),
         speed=np.zeros((nodes, t)),
+        force=np.zeros((2, t + 1)),
+    )
+
+
+def _step_work(forcing: Forcing, table: NodeTable, state: LoopState, record: Record) -> StepWork:
+    p, springs = forcing.increments.shape[1], len(forcing.cubic)
+    return StepWork(
+        after=np.zeros(p),
+        place=np.zeros(p),
+        velocity=np.zeros(p),
+        sent=np.zeros(p),
+        coupling=np.zeros((2, p)),
+        spring=np.zeros(springs),
+        spring_rate=np.zeros(springs),
+        load_rate=np.zeros(forcing.loads.shape[1]),
+        sums=np.zeros((len(state.statistics), 5)),
+        status=np.zeros(len(table.gap), dtype=np.int64),
+        watched=np.zeros((len(record.watch_lift), 2)),
+        power=np.zeros(16),
     )

@@ -108,6 +108,7 @@ class _Run:
         self.distances = node_distances(machine.system) if self.finite else np.zeros(0)
         # Finite sliding finds its rows at the first step.
         self.renewal = 0 if self.finite else schedule.steps
+        self.interval = 1
         self.renewed_at = np.zeros(machine.system.size + len(machine.system.motion.names))
         if restart is not None:
             self._resume(restart)
@@ -124,7 +125,7 @@ class _Run:
             self.machine.state.motion[0] = self.renewed_at[n:]
             surfaces, nodes, _ = renew(self.machine, self.machine.surfaces)
             take_over(self.machine, surfaces, nodes)
-            self.renewal = int(restart.state["renewal"][0])
+            self.renewal, self.interval = (int(v) for v in restart.state["renewal"])
         restore(self.machine, restart)
 
     def march(self, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float) -> Trajectory:
@@ -186,7 +187,8 @@ class _Run:
                 "or make the master larger"
             )
         take_over(machine, surfaces, nodes)
-        self.renewal = machine.done + steps_to_renewal(machine, self.distances)
+        self.interval = steps_to_renewal(machine, self.distances, self.interval)
+        self.renewal = machine.done + self.interval
         self.renewed_at[:] = np.concatenate([machine.displacement, machine.state.motion[0]])
 
     def _stop(self, message: str) -> NoReturn:
@@ -195,7 +197,7 @@ class _Run:
         raise error
 
     def _state(self) -> dict[str, Array]:
-        return saved_state(self.machine, self.settings, (self.renewal, self.renewed_at))
+        return saved_state(self.machine, self.settings, (self.renewal, self.interval, self.renewed_at))
 
     def _trajectory(self, *, interrupted: bool) -> Trajectory:
         machine = self.machine

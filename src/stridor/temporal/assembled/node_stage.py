@@ -38,7 +38,7 @@ class NodeState(NamedTuple):
 
 class NodeScratch(NamedTuple):
     """Work space: u, q (l,) at t_{n+1}, correction (l,) of u by forces; gap (m,), slip (m, d−1) [m] free of forces;
-    chosen (m,): nodes that take part, marked (m,); speed (m, d−1) [m/s] of slip at t_n."""
+    chosen (m,): nodes that take part, marked (m,); speed (m, d−1) [m/s] of slip at t_n; force (2, d) of one node."""
 
     u: Array
     q: Array
@@ -48,6 +48,7 @@ class NodeScratch(NamedTuple):
     chosen: IntArray
     marked: IntArray
     speed: Array
+    force: Array
 
 
 @njit(cache=True)
@@ -81,7 +82,7 @@ def _take_in(
 
 @njit(cache=True)
 def _relax(
-    i: int, step: float, was: int, new: Array, table: NodeTable, state: NodeState, work: NodeScratch
+    i: int, step: float, new: Array, table: NodeTable, state: NodeState, work: NodeScratch
 ) -> int:  # pragma: no cover - compiled
     """Forces (d,) of node i with those of all others as they are into new; its status."""
     d = table.row.shape[1]
@@ -104,7 +105,7 @@ def _relax(
     w_nn = block[0, 0] + table.compliance[i]
     if d == 2:
         new[0], new[1], status = _solve_contact(
-            gap, s1, w_nn, block[0, 1], block[1, 1], law[0], law[1], law[2], was == _STICK, step
+            gap, s1, w_nn, block[0, 1], block[1, 1], law[0], law[1], law[2], state.status[i] == _STICK, step
         )
         return status
     new[0], new[1], new[2], status = solve_disc(
@@ -113,7 +114,7 @@ def _relax(
         s2,
         (w_nn, block[0, 1], block[0, 2], block[1, 1], block[1, 2], block[2, 2]),
         (law[0], law[1], law[2]),
-        was == _STICK,
+        state.status[i] == _STICK,
         step,
     )
     return status
@@ -125,12 +126,12 @@ def _sweeps(
 ) -> int:  # pragma: no cover - compiled
     """Sweep over the nodes that take part until forces settle; sweeps done, limit + 1 where they did not."""
     d = table.row.shape[1]
-    new, change = state.force[0].copy(), state.force[0].copy()
+    new, change = work.force[0], work.force[1]
     for sweep in range(1, limit + 1):
         largest = worst = 0.0
         for n in range(count):
             i = work.chosen[n]
-            status[i] = _relax(i, step, state.status[i], new, table, state, work)
+            status[i] = _relax(i, step, new, table, state, work)
             size = 0.0
             for j in range(d):
                 change[j] = new[j] - state.force[i, j]
@@ -171,9 +172,11 @@ def solve_nodes(
             count = _take_in(i, count, increments, ratio, table, state, work)
     if count == 0:
         return 0, 0
-    work.correction[:] = 0.0
+    for c in range(work.correction.shape[0]):
+        work.correction[c] = 0.0
     if count == 1:
-        state.force[work.chosen[0]] = 0.0
+        for j in range(table.row.shape[1]):
+            state.force[work.chosen[0], j] = 0.0
     for n in range(count):
         i = work.chosen[n]
         if state.force[i, 0] > 0.0:

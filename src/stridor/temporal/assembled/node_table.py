@@ -1,4 +1,4 @@
-"""Contact nodes packed for the compiled loop: rows on the few freedoms that contacts touch, and one-step compliances."""
+"""Contact nodes packed for the compiled loop: rows on the few freedoms that contacts touch, and their compliances."""
 
 from __future__ import annotations
 

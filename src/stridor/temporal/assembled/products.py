@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit, prange
+from numba import get_num_threads, njit, prange
 
 from ...typing import Array, IntArray
 from ..layout import FAST
@@ -18,6 +18,11 @@ from .storage import Blocks
 
 DASHPOTS, WITH_STIFFNESS = 1, 2  # works wanted: of C_d alone, or of all that the structure resists with
 CHUNK = 48  # block rows whose products and vectors stay in the first cache together
+
+# A cached parallel function that another cached one calls is loaded without numba's threads, and jumps to nowhere;
+# asking for their number starts them.
+get_num_threads()
+
 
 
 class Fields(NamedTuple):

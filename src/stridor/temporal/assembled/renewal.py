@@ -20,7 +20,7 @@ from ...typing import Array, IntArray
 from .machine import Machine
 
 SLIDE = 1e-3  # of the distance between nodes
-MOST_STEPS = 200  # speeds change meanwhile
+MOST_STEPS = 200
 
 
 def slides_finitely(system: System) -> bool:
@@ -93,14 +93,15 @@ def node_distances(system: System) -> Array:
     return np.array(found)
 
 
-def steps_to_renewal(machine: Machine, distances: Array) -> int:
-    """Steps until a node of a finitely sliding surface has slid far enough at its present speed."""
+def steps_to_renewal(machine: Machine, distances: Array, last: int) -> int:
+    """Steps until a node of a finitely sliding surface has slid far enough at its present speed; at most twice as many
+    as the ``last`` time, for what starts from rest does not stay at its speed."""
     nodes = machine.nodes
     q = machine.fields.q[machine.layout.place]
     slip = (nodes.tangent @ q + nodes.tangent_lift @ machine.state.motion[1]).reshape(nodes.count, -1)
     speed = np.linalg.norm(slip, axis=1)
     points = len(machine.system.contacts)
-    steps = MOST_STEPS
+    steps = min(2 * last, MOST_STEPS)
     for k, surface in enumerate(machine.system.surfaces):
         if surface.sliding == "finite":
             fastest = float(speed[nodes.owner == points + k].max(initial=0.0))

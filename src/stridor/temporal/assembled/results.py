@@ -32,8 +32,9 @@ from ..stage import (
     SUPPORT,
 )
 from ..trajectory import ContactStatistics, PhaseResult, Trajectory
-from .loop import KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED, Record
+from .forcing import KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED
 from .machine import Machine, csr_arrays
+from .recording import Record
 
 NODE_HISTORY_BYTES = 500e6
 CONTACT_COLUMNS = 5

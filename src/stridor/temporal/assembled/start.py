@@ -16,7 +16,7 @@ from ..schedule import Schedule
 from ..settings import Settings
 from ..start import Disturbance, joined
 from ..trajectory import Trajectory
-from .loop import STEPS_DONE
+from .forcing import STEPS_DONE
 from .machine import Machine
 from .node_table import sliding_directions
 
@@ -93,15 +93,16 @@ def _slip_impulse(system: System, nodes: ContactNodes, contact: int) -> Array:
     return answer / mean if mean > 0.0 else answer
 
 
-def saved_state(machine: Machine, settings: Settings, renewal: tuple[int, Array]) -> dict[str, Array]:
-    """Everything a restart needs, as arrays. renewal: the step of the next renewal of the rows and the displacement
-    (n + p,) they were last found at."""
-    saved = {
-        f"{part}_{name}": np.array(getattr(getattr(machine, part), name)) for part, names in SAVED.items() for name in names
-    }
+def saved_state(machine: Machine, settings: Settings, renewal: tuple[int, int, Array]) -> dict[str, Array]:
+    """Everything a restart needs, as arrays. renewal: the step of the next renewal of the rows, the steps since the
+    last one, and the displacement (n + p,) the rows were found at."""
+    saved: dict[str, Array] = {}
+    for part, names in SAVED.items():
+        for name in names:
+            saved[f"{part}_{name}"] = np.array(getattr(getattr(machine, part), name))
     saved["settings"] = np.array([machine.scheme.step, machine.scheme.beta2, float(settings.record_every)])
     saved["model"] = _model_numbers(machine.system)
-    saved["renewal"], saved["renewed_at"] = np.array([renewal[0]]), renewal[1].copy()
+    saved["renewal"], saved["renewed_at"] = np.array(renewal[:2]), renewal[2].copy()
     return saved
 
 

@@ -1,0 +1,169 @@
+"""Pictures and files of shapes: what `stridor shapes` and `stridor steady` write."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..case import Case
+from ..errors import CaseError
+from ..io.atomic import replacing, write_text
+from ..io.vtk import write_vtk
+from ..modal.complex_modes import ComplexModes
+from ..sliding.surfaces import SurfaceSliding
+from ..study import analyses
+from ..system import System, build_system
+from ..temporal.node_history import NodeHistory
+from ..typing import Array, IntArray
+
+
+def write_shapes(
+    case: Case, folder: Path, *, mu: float | None = None, branches: Sequence[int] | None = None, gif: bool = False
+) -> list[dict[str, Any]]:
+    """PNG, animated page and VTK file of modes (default: all unstable ones, else the one that decays slowest).
+
+    Returns a document for each: branch, frequency, growth and the files. Raises CaseError for branches that are not
+    in the list of modes.
+    """
+    system = build_system(case)
+    modes = analyses.modes(
+        case, mu, max_frequency_hz=case.modal.max_frequency_hz, vectors=True
+    )
+    chosen = _chosen(modes, branches)
+    documents: list[dict[str, Any]] = []
+    for column in chosen:
+        documents.append(_write_one(system, modes, int(column), folder, gif=gif))
+    return documents
+
+
+def _chosen(modes: ComplexModes, branches: Sequence[int] | None) -> IntArray:
+    if branches is not None:
+        known = [int(b) for b in modes.branch]
+        for branch in branches:
+            if branch not in known:
+                raise CaseError("--branch", branch, f"one of the modes up to modal.max_frequency_hz: 1 to {max(known)}")
+        return np.array([known.index(b) for b in branches])
+    unstable = np.flatnonzero(modes.unstable[0])
+    if len(unstable):
+        return unstable[np.argsort(modes.growth_rate[0][unstable])[::-1]]
+    vibrating = np.flatnonzero(modes.frequency_hz[0] > 0)
+    if not len(vibrating):
+        return np.zeros(0, dtype=np.int64)
+    return vibrating[[int(np.argmax(modes.growth_rate[0][vibrating]))]]
+
+
+def _write_one(system: System, modes: ComplexModes, column: int, folder: Path, *, gif: bool) -> dict[str, Any]:
+    from ..view.animation import animation_gif, animation_html
+    from ..view.solid_plots import mode_shape
+
+    assert modes.right is not None, "asked for with vectors"
+    vector = modes.right[0, column]
+    branch, frequency = int(modes.branch[column]), float(modes.frequency_hz[0, column])
+    growth = float(modes.growth_rate[0, column])
+    stem = f"mode-{branch}-{frequency:.0f}Hz"
+    words = {"frequency_hz": frequency, "growth_rate": growth}
+    figure = mode_shape(system, vector, **words)
+    files = [folder / f"{stem}.png", folder / f"{stem}.html"]
+    with replacing(files[0]) as temporary:
+        figure.savefig(temporary, dpi=180)
+    write_text(files[1], animation_html(system, vector, **words))
+    if gif:
+        files.append(folder / f"{stem}.gif")
+        with replacing(files[-1]) as temporary:
+            temporary.write_bytes(animation_gif(system, vector, **words))
+    energy = _energy(system, modes, column)
+    if energy is not None and len(energy) > 1:
+        files.append(_energy_picture(system, energy, folder / f"{stem}-friction-energy.png"))
+    files += write_vtk(
+        system,
+        folder / f"{stem}.vtu",
+        vectors={"displacement": vector},
+        contact_data=None if energy is None else {"friction_energy": energy},
+    )
+    return {"branch": branch, **words, "files": [str(f) for f in files]}
+
+
+def _energy(system: System, modes: ComplexModes, column: int) -> Array | None:
+    """Friction energy by slave node; only assembled systems know it."""
+    if not system.assembled or not system.contact_nodes().count:
+        return None
+    from ..modal.assembled import friction_energy
+
+    return friction_energy(system, modes, 0, column).per_cycle
+
+
+def _energy_picture(system: System, energy: Array, path: Path) -> Path:
+    from ..view.field_plots import interface_energy
+
+    nodes = system.contact_nodes()
+    figure = interface_energy(
+        nodes.position,
+        energy,
+        tangents=nodes.tangents,
+        quantity="energy fed in per cycle / energy of the mode",
+        unit="",
+    )
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=180)
+    return path
+
+
+def write_steady(case: Case, steady: SurfaceSliding, folder: Path) -> list[Path]:
+    """Pressure of each contact as PNG, and displacement and pressure as VTK files."""
+    from ..view.field_plots import contact_snapshot
+
+    system = build_system(case)
+    nodes = system.contact_nodes()
+    history = NodeHistory(
+        names=nodes.names,
+        owner=nodes.owner,
+        position=nodes.position,
+        area=nodes.area,
+        tangents=nodes.tangents,
+        time=np.zeros(1),
+        normal_force=steady.normal_force[None],
+        tangential_force=steady.friction_force[None],
+        slip_velocity=steady.slip_velocity[None],
+        gap=steady.gap[None],
+        status=np.where(steady.active, 2, 0)[None],
+    )
+    files: list[Path] = []
+    for k, name in enumerate(nodes.names):
+        if np.count_nonzero(nodes.owner == k) < 2:
+            continue
+        path = folder / f"steady-{name}.png"
+        figure = contact_snapshot(history, 0.0, name)
+        with replacing(path) as temporary:
+            figure.savefig(temporary, dpi=180)
+        files.append(path)
+    contact = {"normal_force": steady.normal_force, "active": steady.active.astype(np.int64), "gap": steady.gap}
+    if not np.isnan(nodes.area).any():
+        contact["pressure"] = steady.normal_force / nodes.area
+    files += write_vtk(
+        system, folder / "steady.vtu", vectors={"displacement": steady.displacement}, contact_data=contact
+    )
+    return files
+
+
+def steady_document(steady: SurfaceSliding) -> dict[str, Any]:
+    """What `stridor steady --json` prints."""
+    return {
+        "contacts": {
+            name: {
+                "force": [float(f) for f in found.force],
+                "moment": np.atleast_1d(found.moment).astype(float).tolist(),
+                "area": float(found.area),
+                "largest_pressure": float(found.largest_pressure),
+            }
+            for name, found in steady.resultants.items()
+        },
+        "touching_nodes": int(steady.active.sum()),
+        "nodes": len(steady.active),
+        "residual": steady.residual,
+        "force_error": float(steady.balance.force_error),
+        "moment_error": float(steady.balance.moment_error),
+        "iterations": steady.iterations,
+    }

@@ -1,0 +1,281 @@
+"""Onsets of instability of systems with many contact nodes, solved.
+
+Branches of the projected problem are followed over the range, every passage into or out of instability is enclosed and
+solved for there; then the basis is enriched with what the onset leaves unbalanced in the sparse problem, and it is solved
+again, until nothing is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ...errors import CaseError
+from ...system import System
+from ...threads import one_thread_if_small
+from ...typing import ComplexArray
+from ..complex_modes import UNSTABLE_RELATIVE, undamped
+from ..onsets import Onset, Onsets
+from .follow import Follower, State, halves
+from .modes import samples
+from .passages import Passage, crossings, meetings
+from .problem import problem_of
+from .reduced import Reduced
+from .refine import BELIEVED, Band, projected, settle
+from .steady import Options
+
+SAMPLES = 9
+ROUNDS = 6
+ONSET_TOLERANCE = 1e-10  # backward error at which an onset counts as found
+NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
+
+
+@one_thread_if_small
+def onsets_assembled(
+    system: System,
+    friction_range: tuple[float, float] = (0.0, 1.0),
+    *,
+    max_frequency_hz: float = 40e3,
+    damped: bool = True,
+    options: Options | None = None,
+) -> Onsets:
+    """Every critical μ in ``friction_range`` with a frequency up to ``max_frequency_hz``, as `onsets` gives them.
+
+    Raises CaseError for an empty range or no frequency, AnalysisError where the modes do not settle.
+    """
+    low, high = (float(v) for v in friction_range)
+    if not (0 <= low < high and np.isfinite(high)):
+        raise CaseError("friction_range", friction_range, "two numbers 0 ≤ a < b")
+    if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
+        raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
+    if not damped:
+        system = undamped(system)
+    problem = problem_of(system, None, options or Options(), damped=damped)
+    if not problem.nodes:
+        return Onsets((), (low, high), max_frequency_hz, damped, problem.open_contacts)
+    # Modes that start above the band may meet inside it.
+    reduced = projected(problem, Band(1, 2 * np.pi * max_frequency_hz * 1.1))
+    settle(reduced, samples(high, SAMPLES))
+    found: list[Onset] = []
+    for passage in _passages(reduced, high):
+        onset = _located(reduced, passage)
+        if onset is not None and low <= onset.mu <= high and onset.frequency_hz <= max_frequency_hz:
+            found.append(onset)
+    ordered = tuple(sorted(_distinct(found), key=lambda o: o.mu))
+    return Onsets(ordered, (low, high), max_frequency_hz, damped, problem.open_contacts)
+
+
+def _passages(reduced: Reduced, high: float) -> list[Passage]:
+    """Enclosed changes of stability up to μ = ``high``."""
+    passages: list[Passage] = []
+
+    def watch(old: State, new: State) -> None:
+        passages.extend(crossings(old, new) if reduced.problem.damped else meetings(reduced, old, new))
+
+    Follower(reduced, longest=high / 30, watch=watch).advance(high)
+    return passages
+
+
+def _distinct(found: list[Onset]) -> list[Onset]:
+    """Each onset once: both modes that meet report it."""
+    kept: list[Onset] = []
+    for onset in found:
+        if not any(
+            abs(onset.mu - k.mu) <= 1e-7 * max(k.mu, 1e-9)
+            and abs(onset.frequency_hz - k.frequency_hz) <= 1e-7 * max(k.frequency_hz, 1.0)
+            and onset.stabilising == k.stabilising
+            for k in kept
+        ):
+            kept.append(onset)
+    return kept
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """An onset of the projected problem: μ, λ on the axis, and how the instability opens."""
+
+    mu: float
+    lam: complex
+    square_root: float | None
+    slope: float | None = None
+    exceptional: complex | None = None
+
+
+def _located(reduced: Reduced, passage: Passage) -> Onset | None:
+    """The onset of a passage, the basis enriched until it satisfies the sparse problem; None where it was none."""
+    problem = reduced.problem
+    solve = {"crossing": _crossing, "meeting": _meeting, "divergence": _divergence}[passage.kind]
+    best: tuple[float, _Solved] | None = None
+    for _ in range(ROUNDS):
+        solved = solve(reduced, passage)
+        if solved is None:
+            break
+        lam = np.array([solved.lam])
+        u, p = reduced.expand(reduced.null_vector(solved.lam, solved.mu)[:, None])
+        error = float(problem.backward_error(lam, u, p, solved.mu)[0])
+        if best is None or error < best[0]:
+            best = error, solved
+        if error <= ONSET_TOLERANCE:
+            break
+        rest = problem.residual(lam, u, p, solved.mu)
+        parts = [rest.real, rest.imag] if rest.dtype.kind == "c" else [rest]
+        force = np.hstack(parts)
+        if not reduced.enrich(force[:, np.linalg.norm(force, axis=0) > 0]):
+            break
+    if best is None or best[0] > BELIEVED:
+        return None
+    return _onset(reduced, passage, best[1], best[0])
+
+
+def _onset(reduced: Reduced, passage: Passage, solved: _Solved, error: float) -> Onset:
+    still = abs(solved.lam) <= NEAR_AXIS * reduced.frequency
+    stabilising = passage.stabilising if solved.slope is None else solved.slope < 0
+    partner = passage.branch if still else passage.partner
+    first, second = sorted((passage.branch + 1, partner + 1))
+    return Onset(
+        mu=solved.mu,
+        frequency_hz=abs(solved.lam.imag) / (2 * np.pi),
+        kind="divergence" if still else "flutter",
+        damped=reduced.problem.damped,
+        stabilising=stabilising,
+        branches=(first, second),
+        residual=error,
+        square_root_coefficient=solved.square_root,
+        growth_slope=solved.slope,
+        exceptional_mu=solved.exceptional,
+    )
+
+
+def _root(call: Callable[[float], float], low: float, high: float) -> float | None:
+    """A zero of ``call`` between two μ; None where its sign does not change (any more)."""
+    at_low, at_high = call(low), call(high)
+    if at_low == 0.0 or at_high == 0.0:
+        return low if at_low == 0.0 else high
+    if at_low * at_high > 0 or not np.isfinite(at_low * at_high):
+        return None
+    return float(brentq(call, low, high, xtol=1e-14 * max(high, 1e-3), rtol=1e-14, maxiter=60))
+
+
+def pair_near(coordinate: ComplexArray, place: complex) -> tuple[complex, complex]:
+    """Mean and squared half difference of the two eigenvalues nearest to a place."""
+    near = np.argsort(np.abs(coordinate - place))[:2]
+    return halves(*coordinate[near])
+
+
+def _meeting(reduced: Reduced, passage: Passage) -> _Solved | None:
+    """Where two undamped modes meet: their squared half difference passes through zero, with a finite slope."""
+    width = passage.high - passage.low
+
+    def guess(mu: float) -> complex:
+        part = (mu - passage.low) / width
+        return (1 - part) * passage.means[0] + part * passage.means[1]
+
+    def square(mu: float) -> float:
+        return float(pair_near(reduced.eigenpairs(mu).coordinate, guess(mu))[1].real)
+
+    mu = _root(square, passage.low, passage.high)
+    if mu is None:
+        return None
+    mean, _ = pair_near(reduced.eigenpairs(mu).coordinate, guess(mu))
+    if not mean.real < 0:
+        return None
+    step = min(1e-4 * max(mu, 1e-3), 0.25 * width)
+    slope = (square(mu + step) - square(mu - step)) / (2 * step)
+    omega = float(np.sqrt(-mean.real))
+    return _Solved(mu, 1j * omega, float(np.sqrt(abs(slope)) / (2 * omega)))
+
+
+def _divergence(reduced: Reduced, passage: Passage) -> _Solved | None:
+    """Where λ² of an undamped mode passes through zero."""
+
+    def square(mu: float) -> float:
+        coordinate = reduced.eigenpairs(mu).coordinate
+        still = coordinate[np.abs(coordinate.imag) <= UNSTABLE_RELATIVE * reduced.frequency**2]
+        return float(still[np.argmin(np.abs(still))].real) if len(still) else float("nan")
+
+    mu = _root(square, passage.low, passage.high)
+    if mu is None:
+        return None
+    step = min(1e-4 * max(mu, 1e-3), 0.25 * (passage.high - passage.low))
+    slope = (square(mu + step) - square(mu - step)) / (2 * step)
+    return _Solved(mu, 0j, float(np.sqrt(abs(slope))))
+
+
+def _crossing(reduced: Reduced, passage: Passage) -> _Solved | None:
+    """Where the growth rate of a damped mode passes through zero."""
+    start = _again(reduced, passage)
+    if start is None:
+        return None
+
+    def at(mu: float) -> State:
+        follower = Follower.resumed(reduced, start)
+        return follower.advance(mu)
+
+    mu = _root(lambda m: float(at(m).values[passage.branch].real), passage.low, passage.high)
+    if mu is None:
+        return None
+    state = at(mu)
+    lam = 1j * float(state.values[passage.branch].imag)
+    slope = float(state.tangents[passage.branch].real)
+    if abs(lam) <= NEAR_AXIS * reduced.frequency:
+        return _Solved(mu, 0j, None, slope)
+    near = exceptional_point(reduced, lam, mu)
+    if near is None:
+        return _Solved(mu, lam, None, slope)
+    return _Solved(mu, lam, near[1], slope, near[0])
+
+
+def _again(reduced: Reduced, passage: Passage) -> State | None:
+    """The state before a passage with the basis as it is now."""
+    found = reduced.eigenpairs(passage.low)
+    if passage.old.found is found:
+        return passage.old
+    distance = np.abs(passage.old.coordinate[:, None] - found.coordinate)
+    place = np.argmin(distance, axis=1)
+    near = distance[passage.branch, place[passage.branch]] <= 1e-3 * np.abs(passage.old.coordinate[passage.branch])
+    return State(found, place) if near else None
+
+
+def exceptional_point(reduced: Reduced, lam: complex, mu: float) -> tuple[complex, float] | None:
+    """The complex μ beside an onset at which two modes meet, and κ of λ ≈ λ_c ± κ √(μ − μ_c), by the secant method.
+
+    None where it is further away than half the onset's μ.
+    """
+    centre: complex = lam
+
+    def square(at: complex) -> complex:
+        nonlocal centre
+        values = reduced.solve(complex(at))[0]
+        values = values[values.imag > 0]
+        if len(values) < 2:
+            return complex("nan")
+        # The mode of the onset and its neighbour, then whichever pair is about their mean.
+        centre, found = pair_near(values, centre)
+        return found
+
+    reach = 0.5 * max(mu, 1e-3)
+    before, now = complex(mu), complex(mu * (1 + 1e-4) + 1e-7)
+    square_before, square_now = square(before), square(now)
+    for _ in range(20):
+        if square_now == square_before:
+            break
+        slope = (square_now - square_before) / (now - before)
+        change = -square_now / slope
+        if not np.isfinite(change) or abs(now + change - mu) > reach:
+            return None
+        before, square_before = now, square_now
+        now = now + change
+        square_now = square(now)
+        if abs(change) <= 1e-11 * max(mu, 1e-3):
+            break
+    else:
+        return None
+    step = 1e-4 * max(abs(now), 1e-3)
+    slope = (square(now + step) - square(now - step)) / (2 * step)
+    root = np.sqrt(slope)
+    return (now, float(max(abs(root.real), abs(root.imag)))) if np.isfinite(root) else None
+
+

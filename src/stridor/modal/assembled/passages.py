@@ -1,0 +1,154 @@
+"""Changes of stability between two neighbouring states of followed branches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from .follow import State, halves
+from .reduced import Reduced
+
+COMPLEX = 1e-9  # imaginary part of λ² over the band's that is more than rounding
+TOUCHING = 0.05  # squared half differences that come down to this part of their ends are looked at closely
+PROBES = 4
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A change of stability between two μ, low < high: of a branch and its partner, counted from 0.
+
+    kind: "meeting" of two undamped modes, undamped "divergence", or "crossing" of the axis with damping. means: the mean
+    of the two meeting coordinates at both ends. old: the state at or before ``low``.
+    """
+
+    kind: Literal["meeting", "divergence", "crossing"]
+    low: float
+    high: float
+    branch: int
+    partner: int
+    stabilising: bool
+    means: tuple[complex, complex]
+    old: State
+
+
+def crossings(old: State, new: State) -> list[Passage]:
+    """Zeros of the growth rates between two states, by the cubic through rates and slopes at both ends: it sees a mode
+    that grows and decays again in between."""
+    step = new.mu - old.mu
+    found: list[Passage] = []
+    for i in range(len(old.place)):
+        start, end = float(old.values[i].real), float(new.values[i].real)
+        slopes = step * float(old.tangents[i].real), step * float(new.tangents[i].real)
+        scale = max(abs(old.values[i]), 1e-300)
+        if max(abs(start), abs(end)) <= 1e-12 * scale:
+            continue
+        marks = [0.0, *_turns(start, end, *slopes), 1.0]
+        rates = [_cubic(start, end, *slopes, mark) for mark in marks]
+        for a, b, first, second in zip(marks, marks[1:], rates, rates[1:], strict=False):
+            if first * second < 0:
+                low, high = old.mu + a * step, old.mu + b * step
+                partner = _neighbour(new, i)
+                found.append(Passage("crossing", low, high, i, partner, first > 0, (0j, 0j), old))
+    return found
+
+
+def _turns(start: float, end: float, first: float, second: float) -> list[float]:
+    """Where in (0, 1) the cubic through values and slopes turns; nowhere beside a meeting, where slopes explode."""
+    if max(abs(first), abs(second)) > 20 * abs(end - start) and start * end < 0:
+        return []
+    c3 = 2 * start - 2 * end + first + second
+    c2 = -3 * start + 3 * end - 2 * first - second
+    roots = np.roots([3 * c3, 2 * c2, first]) if np.all(np.isfinite([c3, c2])) else np.zeros(0)
+    return sorted(float(r.real) for r in roots if abs(r.imag) < 1e-12 and 0 < r.real < 1)
+
+
+def _cubic(start: float, end: float, first: float, second: float, at: float) -> float:
+    c3 = 2 * start - 2 * end + first + second
+    c2 = -3 * start + 3 * end - 2 * first - second
+    return start + at * (first + at * (c2 + at * c3)) if 0 < at < 1 else (end if at else start)
+
+
+def _neighbour(state: State, i: int) -> int:
+    """The branch nearest to branch i; itself where its own conjugate is nearer."""
+    distance = np.abs(state.values - state.values[i])
+    distance[i] = 2 * abs(state.values[i].imag)
+    return int(np.argmin(distance))
+
+
+def meetings(reduced: Reduced, old: State, new: State) -> list[Passage]:
+    """Undamped modes that meet or part, or diverge, between two states."""
+    floor = COMPLEX * reduced.frequency**2
+    found: list[Passage] = []
+    was, now = np.abs(old.coordinate.imag) > floor, np.abs(new.coordinate.imag) > floor
+    for i in np.flatnonzero(was != now):
+        split = new if now[i] else old
+        distance = np.abs(split.coordinate - split.coordinate[i].conj())
+        distance[i] = np.inf
+        j = int(np.argmin(distance))
+        if i < j or was[j] == now[j]:
+            means = halves(old.coordinate[i], old.coordinate[j])[0], halves(new.coordinate[i], new.coordinate[j])[0]
+            found.append(Passage("meeting", old.mu, new.mu, int(i), j, bool(was[i]), means, old))
+    real = ~was & ~now
+    beyond_old, beyond_new = old.coordinate.real > floor, new.coordinate.real > floor
+    for i in np.flatnonzero(real & (beyond_old != beyond_new)):
+        found.append(Passage("divergence", old.mu, new.mu, int(i), int(i), bool(beyond_old[i]), (0j, 0j), old))
+    return found + _bubbles(reduced, old, new, np.flatnonzero(real).tolist())
+
+
+def _bubbles(reduced: Reduced, old: State, new: State, real: list[int]) -> list[Passage]:
+    """Pairs that meet and part again between two states: where the cubic of their squared half difference comes near
+    zero, it is looked at again there."""
+    found: list[Passage] = []
+    ordered = sorted(real, key=lambda i: float(old.coordinate[i].real))
+    neighbours = list(zip(ordered, ordered[1:], strict=False))
+    later = sorted(real, key=lambda i: float(new.coordinate[i].real))
+    neighbours += [pair for pair in zip(later, later[1:], strict=False) if pair not in neighbours and pair[::-1] not in neighbours]
+    for i, j in neighbours:
+        lowest = _lowest(reduced, old, new, i, j)
+        if lowest is not None:
+            mu, mean = lowest
+            means = halves(old.coordinate[i], old.coordinate[j])[0], halves(new.coordinate[i], new.coordinate[j])[0]
+            found.append(Passage("meeting", old.mu, mu, min(i, j), max(i, j), False, (means[0], mean), old))
+            found.append(Passage("meeting", mu, new.mu, min(i, j), max(i, j), True, (mean, means[1]), old))
+    return found
+
+
+def _lowest(reduced: Reduced, old: State, new: State, i: int, j: int) -> tuple[float, complex] | None:
+    """μ and mean at which the real modes i and j are a complex pair; None where none is found."""
+    low, high = _ends(old, i, j), _ends(new, i, j)
+    mu_low, mu_high = old.mu, new.mu
+    for _ in range(PROBES):
+        step = mu_high - mu_low
+        turns = _turns(low[1], high[1], step * low[2], step * high[2])
+        at = min(turns, key=lambda t: _cubic(low[1], high[1], step * low[2], step * high[2], t), default=None)
+        if at is None:
+            return None
+        if _cubic(low[1], high[1], step * low[2], step * high[2], at) > TOUCHING * min(low[1], high[1]):
+            return None
+        mu = mu_low + at * step
+        found = reduced.eigenpairs(mu)
+        guess = (1 - at) * low[0] + at * high[0]
+        near = np.argsort(np.abs(found.coordinate - guess))[:2]
+        mean, square = halves(*found.coordinate[near])
+        if square.real < -((COMPLEX * reduced.frequency**2) ** 2):
+            return mu, mean
+        slopes = found.tangents[near]
+        change = float(((found.coordinate[near[0]] - found.coordinate[near[1]]) * (slopes[0] - slopes[1]) / 2).real)
+        middle = float(mean.real), float(square.real), change
+        if not np.isfinite(change) or square.real <= 1e-14 * abs(mean) ** 2:
+            return None
+        if change > 0:
+            mu_high, high = mu, middle
+        else:
+            mu_low, low = mu, middle
+    return None
+
+
+def _ends(state: State, i: int, j: int) -> tuple[float, float, float]:
+    """Mean, squared half difference and its slope over μ of two real branches."""
+    mean, square = halves(state.coordinate[i], state.coordinate[j])
+    slopes = state.tangents[[i, j]]
+    change = (state.coordinate[i] - state.coordinate[j]) * (slopes[0] - slopes[1]) / 2
+    return float(mean.real), float(square.real), float(change.real)
