@@ -119,6 +119,23 @@ def test_storage_changes_nothing(width, threads, monkeypatch):
         assert energy_balance(result).error < 1e-12
 
 
+def test_threads_change_no_digit(monkeypatch):
+    """Two parts at once or one after the other: the same numbers."""
+    from stridor.temporal.assembled.machine import Machine
+
+    monkeypatch.setattr(storage, "THREADED_FREEDOMS", 0)
+    system = chain(300, stiffness_damping=0.02)
+    start = (np.linspace(0, 1, 300) ** 3, 1.0, 0.0)
+    results = []
+    for two in (False, True):
+        monkeypatch.setattr(
+            Machine, "use_threads", lambda self, two, fixed=two: self.structure.flags.__setitem__(3, fixed)
+        )
+        results.append(run(system, 50.0, start=start, step=0.8, watch=("end",)))
+    assert np.array_equal(results[0].displacement, results[1].displacement)
+    assert np.array_equal(results[0].works["damping"], results[1].works["damping"])
+
+
 def literal(system, dt, steps, start):
     """u (steps, n) by M a + C_d (q_n + q_{n+1})/2 + C_r q_n + K u = 0 with dense matrices, C_d the diagonal part."""
     m, c, k = (x.toarray() for x in (system.mass, system.damping, system.stiffness))

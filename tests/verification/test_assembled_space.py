@@ -214,6 +214,29 @@ def test_friction_follows_a_moving_floor():
     assert result.slip_speed[sliding, 0] == pytest.approx(1 - 0.25 * GRAVITY * result.time[sliding], abs=2e-3)
 
 
+@pytest.mark.parametrize("stiffness", [np.inf, 1e9])
+def test_steady_sliding_is_an_equilibrium_in_time(stiffness):
+    """Started in steady sliding two masses on springs stay where they are, with friction μN; perturbed they swing."""
+    belt = np.array([0.6, 0.8, 0.0])
+    column, one = np.zeros((6, 1)), np.zeros((1, 1))
+    system = masses(2, stiffness=np.diag([3e3, 5e3, 0.0] * 2))
+    system = floor(
+        replace(system, motion=PrescribedMotion(("belt",), column, column, column, one, one, one)),
+        positions=[[0.0, 0, 0], [0.1, 0, 0]], freedoms=np.arange(6).reshape(2, 3), law=Coulomb(0.25),
+        drift=np.tile(-belt.reshape(1, 3, 1), (2, 1, 1)), stiffness=stiffness,
+    )  # fmt: skip
+    result = run(system, 0.2, step=1e-4, initial="steady-sliding")
+    weight = 2 * GRAVITY
+    rest = [0.25 * weight * 0.6 / 3e3, 0.25 * weight * 0.8 / 5e3, -weight / (stiffness * 1e-4)]
+    assert np.abs(result.displacement[:, 0] - rest).max() < 1e-12
+    assert result.normal_force == pytest.approx(2 * weight, rel=1e-8)
+    assert result.tangential_force == pytest.approx(-0.25 * 2 * weight, rel=1e-8)
+    assert np.all(result.status == SLIP)
+    shaken = run(system, 0.2, step=1e-4, initial="steady-sliding", perturbation=0.01)
+    assert shaken.slip_speed[0, 0] == pytest.approx(1.01, rel=1e-3)
+    assert 1e-5 < np.ptp(shaken.displacement[:, 0, 0]) < 1e-3
+
+
 def test_compliant_layer_in_space():
     """A pressed layer of stiffness k per area gives by F/(k A) under each node."""
     system = floor(

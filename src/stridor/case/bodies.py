@@ -122,9 +122,9 @@ class BeamBody(Table):
         return RectangularSection(self.width, self.thickness)
 
 
-_MESH_CELLS = (
-    '"triangle", "triangle6", "quad", "quad8", "quad9" in the plane, "tetra", "tetra10", "hexahedron", '
-    '"hexahedron20", "hexahedron27" in space: the kind of the elements'
+_PLANE_CELLS = '"triangle", "triangle6", "quad", "quad8" or "quad9", the kind of the elements of a shape in the plane'
+_SOLID_CELLS = (
+    '"tetra", "tetra10", "hexahedron", "hexahedron20" or "hexahedron27", the kind of the elements of a shape in space'
 )
 _DIVISIONS = "whole numbers >= 1, one for each edge: how many elements along it"
 _EDGE = "a number > 0 [m], the element size, instead of divisions"
@@ -148,7 +148,7 @@ class RectangleMesh(MeshTable):
     corner: Vector = Field(description="[x, y], two numbers [m]: the lower left corner")
     size: tuple[Positive, Positive] = Field(description="[length along x, height along y], two numbers > 0 [m]")
     angle_deg: Number = Field(default=0.0, description="a number [degrees], turned about the corner")
-    cells: PlaneCells = Field(default="quad8", description=_MESH_CELLS)
+    cells: PlaneCells = Field(default="quad8", description=_PLANE_CELLS)
 
 
 class QuadrilateralMesh(MeshTable):
@@ -158,7 +158,7 @@ class QuadrilateralMesh(MeshTable):
     corners: tuple[Vector, Vector, Vector, Vector] = Field(
         description="four points [x, y] [m], the corners counter-clockwise from the lower left"
     )
-    cells: PlaneCells = Field(default="quad8", description=_MESH_CELLS)
+    cells: PlaneCells = Field(default="quad8", description=_PLANE_CELLS)
 
 
 class AnnulusMesh(MeshTable):
@@ -170,7 +170,7 @@ class AnnulusMesh(MeshTable):
     outer_radius: Positive = Field(description="a number > inner_radius [m], the outer radius")
     start_deg: Number = Field(default=0.0, description="a number [degrees], where a sector starts")
     sweep_deg: Positive = Field(default=360.0, description="a number > 0, at most 360 [degrees]: how far it reaches")
-    cells: PlaneCells = Field(default="quad8", description=_MESH_CELLS)
+    cells: PlaneCells = Field(default="quad8", description=_PLANE_CELLS)
 
 
 class BlockMesh(MeshTable):
@@ -179,7 +179,7 @@ class BlockMesh(MeshTable):
     shape: Literal["block"]
     corner: Space = Field(description="[x, y, z], three numbers [m]: the corner with the least coordinates")
     size: tuple[Positive, Positive, Positive] = Field(description="three numbers > 0 [m], along x, y, z")
-    cells: SolidCells = Field(default="hexahedron20", description=_MESH_CELLS)
+    cells: SolidCells = Field(default="hexahedron20", description=_SOLID_CELLS)
 
 
 class DiscMesh(MeshTable):
@@ -192,7 +192,7 @@ class DiscMesh(MeshTable):
     inner_radius: Positive = Field(description="a number > 0 [m], the inner radius")
     outer_radius: Positive = Field(description="a number > inner_radius [m], the outer radius")
     thickness: Positive = Field(description="a number > 0 [m], the thickness along z")
-    cells: SolidCells = Field(default="hexahedron20", description=_MESH_CELLS)
+    cells: SolidCells = Field(default="hexahedron20", description=_SOLID_CELLS)
 
 
 class PadMesh(MeshTable):
@@ -207,7 +207,7 @@ class PadMesh(MeshTable):
     start_deg: Number = Field(description="a number [degrees], where the sector starts, from +x to +y")
     sweep_deg: Positive = Field(description="a number > 0, below 360 [degrees]: how far it reaches")
     thickness: Positive = Field(description="a number > 0 [m], the thickness along z")
-    cells: SolidCells = Field(default="hexahedron20", description=_MESH_CELLS)
+    cells: SolidCells = Field(default="hexahedron20", description=_SOLID_CELLS)
 
 
 BuiltInMesh = Annotated[

@@ -6,16 +6,26 @@ import math
 from collections.abc import Iterator, Mapping
 
 from ..errors import Problem
-from .bodies import AnnulusMesh, AnyBody, BeamBody, BuiltInMesh, DiscMesh, ObstacleBody, PadMesh, SolidBody
-from .points import FULL_TURN
+from .bodies import (
+    AnnulusMesh,
+    AnyBody,
+    BeamBody,
+    BuiltInMesh,
+    DiscMesh,
+    ObstacleBody,
+    PadMesh,
+    SlidingTable,
+    SolidBody,
+)
+from .points import FULL_TURN, boundary_names
 
 _EDGES = {
-    "rectangle": "2 (along x, along y)",
-    "quadrilateral": "2 (along bottom and top, along left and right)",
-    "annulus": "2 (radial, circumferential)",
-    "block": "3 (along x, y, z)",
-    "disc": "3 (radial, circumferential, axial)",
-    "pad": "3 (radial, circumferential, axial)",
+    "rectangle": (2, "along x, along y"),
+    "quadrilateral": (2, "along bottom and top, along left and right"),
+    "annulus": (2, "radial, circumferential"),
+    "block": (3, "along x, along y, along z"),
+    "disc": (3, "radial, circumferential, axial"),
+    "pad": (3, "radial, circumferential, axial"),
 }
 
 
@@ -40,6 +50,13 @@ def body_problems(bodies: Mapping[str, AnyBody]) -> Iterator[Problem]:
         for key, vector in _vectors(body):
             if len(vector) != body.dimension:
                 yield Problem(f"{where}.{key}", vector, f"must have {body.dimension} numbers, one for each direction")
+        sliding = getattr(body, "sliding", None)
+        if sliding is not None:
+            yield from _sliding_problems(f"{where}.sliding", sliding, body.dimension)
+        if isinstance(body, SolidBody):
+            yield from _hidden_boundaries(where, body)
+    if bodies and all(isinstance(body, ObstacleBody) for body in bodies.values()):
+        yield Problem("bodies", None, "only obstacles, which are rigid; a case needs a beam, a solid or a mass as well")
     plane = [name for name, body in bodies.items() if body.dimension == 2]
     space = [name for name, body in bodies.items() if body.dimension == 3]
     if plane and space:
@@ -48,6 +65,25 @@ def body_problems(bodies: Mapping[str, AnyBody]) -> Iterator[Problem]:
             "model all of them in 2 or all in 3 dimensions"
         )
         yield Problem("bodies", None, accepted)
+
+
+def _hidden_boundaries(where: str, body: SolidBody) -> Iterator[Problem]:
+    """Points under the name of a boundary: a reference to it would take one node for the whole side."""
+    for name in boundary_names(body):
+        if name in body.points:
+            yield Problem(f"{where}.points.{name}", body.points[name], "a boundary has this name; choose another name")
+
+
+def _sliding_problems(where: str, sliding: SlidingTable, dimension: int) -> Iterator[Problem]:
+    if sliding.velocity is None and "spin" not in sliding.model_fields_set:
+        given = ", ".join(sliding.model_fields_set)
+        accepted = f"must have velocity = [x, y] [m/s] or spin [rad/s]{f', not only {given}' if given else ''}"
+        yield Problem(where, None, accepted)
+    if not any(sliding.axis):
+        yield Problem(f"{where}.axis", sliding.axis, "must not be zero")
+    elif dimension == 2 and (any(sliding.axis[:2]) or sliding.axis[2] < 0):
+        accepted = "in the plane the axis is z; leave it out, and give a negative spin to turn clockwise"
+        yield Problem(f"{where}.axis", sliding.axis, accepted)
 
 
 def _vectors(body: AnyBody) -> Iterator[tuple[str, tuple[float, ...]]]:
@@ -94,8 +130,8 @@ def _beam_points(name: str, body: BeamBody) -> Iterator[Problem]:
 
 def _solid_shape(where: str, body: SolidBody) -> Iterator[Problem]:
     if (body.mesh is None) == (body.file is None):
-        given = None if body.mesh is None else "both"
-        yield Problem(where, given, "needs either mesh = { shape = …, … } or file = \"….msh\", not both")
+        both = "" if body.mesh is None else ", not both"
+        yield Problem(where, None, f'must have either mesh = {{ shape = …, … }} or file = "….msh"{both}')
         return
     if body.mesh is None:
         return
@@ -117,8 +153,9 @@ def _mesh_problems(where: str, mesh: BuiltInMesh) -> Iterator[Problem]:
     if (mesh.divisions is None) == (mesh.element_size is None):
         given = None if mesh.divisions is None else mesh.divisions
         yield Problem(f"{where}.divisions", given, "give either divisions or element_size [m]")
-    elif mesh.divisions is not None and len(mesh.divisions) != int(_EDGES[mesh.shape][0]):
-        yield Problem(f"{where}.divisions", mesh.divisions, f"must have {_EDGES[mesh.shape]} numbers")
+    elif mesh.divisions is not None and len(mesh.divisions) != _EDGES[mesh.shape][0]:
+        count, names = _EDGES[mesh.shape]
+        yield Problem(f"{where}.divisions", mesh.divisions, f"must have {count} numbers: {names}")
     if isinstance(mesh, AnnulusMesh | DiscMesh | PadMesh) and mesh.inner_radius >= mesh.outer_radius:
         yield Problem(f"{where}.inner_radius", mesh.inner_radius, f"must be below outer_radius, {mesh.outer_radius:g}")
     if isinstance(mesh, AnnulusMesh) and mesh.sweep_deg > 360.0:
@@ -135,8 +172,8 @@ def _obstacle_shape(where: str, body: ObstacleBody) -> Iterator[Problem]:
             yield Problem(f"{where}.normal", None, "missing – give [x, y] or [x, y, z], from the flat to the bodies")
         elif not any(body.normal):
             yield Problem(f"{where}.normal", body.normal, "must not be zero")
-        for key in ("radius", "axis"):
-            if (value := getattr(body, key)) is not None:
+        for key in ("radius", "axis", "inside"):
+            if value := getattr(body, key):
                 yield Problem(f"{where}.{key}", value, 'not used by "flat"')
         return
     if body.radius is None:

@@ -183,12 +183,18 @@ def _load_problems(parts: Parts) -> Iterator[Problem]:
 
 
 def _contact_problems(parts: Parts) -> Iterator[Problem]:
+    pairs: dict[frozenset[str], str] = {}
     for name, contact in parts.contacts.items():
         where = f"contacts.{name}"
         friction = contact.friction
         if not isinstance(friction, CoulombTable) and friction.static_coefficient < friction.coefficient:
             accepted = f"must be at least the coefficient, {friction.coefficient:.9g}"
             yield Problem(f"{where}.friction.static_coefficient", friction.static_coefficient, accepted)
+        pair = frozenset((contact.slave, contact.master))
+        if pair in pairs:
+            yield Problem(f"{where}.slave", contact.slave, f"slides on {contact.master} in contacts.{pairs[pair]} already")
+            continue
+        pairs[pair] = name
         slave = yield from _place(parts, contact.slave, f"{where}.slave")
         owner, _, boundary = contact.master.partition(".")
         master = parts.bodies.get(owner)
@@ -208,14 +214,16 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
             else:
                 yield from _place(parts, contact.master, f"{where}.master", boundary=True)
         elif boundary:
-            kind = "beam" if isinstance(master, BeamBody) else "obstacle"
-            yield Problem(f"{where}.master", contact.master, f'a {kind} is a master as a whole; write "{owner}"')
+            kind = "a beam" if isinstance(master, BeamBody) else "an obstacle"
+            yield Problem(f"{where}.master", contact.master, f'{kind} is a master as a whole; write "{owner}"')
         elif isinstance(master, BeamBody):
             if master.elements < _LEAST_MASTER_ELEMENTS:
                 accepted = f"a master needs at least 3 elements; {owner} has {master.elements}"
                 yield Problem(f"{where}.master", contact.master, accepted)
             if isinstance(slave, PointRef):
                 yield from _pairing_problems(parts, where, contact, slave, master)
+            elif slave is not None and contact.side is None:
+                yield Problem(f"{where}.side", None, f'missing – give "left" or "right" of {contact.master}')
         if contact.side is not None and not isinstance(master, BeamBody):
             accepted = "only a beam has sides; a boundary and an obstacle know theirs"
             yield Problem(f"{where}.side", contact.side, accepted)
@@ -253,6 +261,10 @@ def _tie_problems(parts: Parts) -> Iterator[Problem]:
         master = yield from _place(parts, tie.master, f"{where}.master", boundary=True)
         if slave is not None and master is not None and slave.body == master.body:
             yield Problem(f"{where}.master", tie.master, "must belong to another body than the slave's")
+        for other, contact in parts.contacts.items():
+            if {contact.slave, contact.master} == {tie.slave, tie.master}:
+                accepted = f"what is bonded cannot slide on it in contacts.{other} as well; remove one of them"
+                yield Problem(f"{where}.slave", tie.slave, accepted)
 
 
 def _link_problems(parts: Parts) -> Iterator[Problem]:
@@ -271,6 +283,9 @@ def _link_problems(parts: Parts) -> Iterator[Problem]:
         if second != GROUND:
             other = yield from _point(parts, second, f"{where}.between.1")
         if point is None:
+            continue
+        if point == other:
+            yield Problem(f"{where}.between", link.between, "both ends are the same point")
             continue
         dimension = parts.bodies[point.body].dimension
         if link.direction is None and (second == GROUND or (other is not None and _same(parts, point, other))):

@@ -10,9 +10,11 @@ NAME_RULE = "a letter, then letters, digits, _ or -"
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
 Label = Annotated[str, Field(min_length=1)]
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+# Beyond it, squares and products of values of a case leave the range of numbers.
+MOST = 1e100
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MOST, le=MOST)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=MOST)]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=MOST)]
 Truth = Annotated[bool, Field(strict=True)]
 Vector = tuple[Number, Number]
 PlaneOrSpace = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Union, cast, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from ..errors import Problem
+from .fields import MOST
 from .points import choice, did_you_mean, nearest
 from .schema import NAME_RULE
 
@@ -149,6 +150,14 @@ def _hint(place: _Place) -> str:
         return did_you_mean(nearest(given, _words(place.annotation)))
     if number and isinstance(given, float) and not math.isfinite(given):
         return "; it must be finite"
+    if number and isinstance(given, float) and abs(given) > MOST:
+        return f"; at most {MOST:g} can be computed with"
+    if number and isinstance(given, list | tuple):
+        items = [item for item in cast("Sequence[object]", given) if isinstance(item, float)]
+        if not all(math.isfinite(item) for item in items):
+            return "; all of them must be finite"
+        if any(abs(item) > MOST for item in items):
+            return f"; at most {MOST:g} can be computed with"
     if "whole number" in place.description and isinstance(given, float) and given.is_integer():
         return "; write it without a decimal point"
     return ""
@@ -166,7 +175,9 @@ def _plain(annotation: Any) -> Any:
 def _alternatives(annotation: Any) -> tuple[Any, ...]:
     annotation = _plain(annotation)
     if get_origin(annotation) in (Union, types.UnionType):
-        return tuple(_plain(option) for option in get_args(annotation) if option is not type(None))
+        options = [option for option in get_args(annotation) if option is not type(None)]
+        # A union may hold another one, as that of tables told apart by a key, or nothing.
+        return tuple(inner for option in options for inner in _alternatives(option))
     return (annotation,)
 
 

@@ -84,7 +84,7 @@ class Case(Table):
     @property
     def warnings(self) -> list[str]:
         """One line for each value that is allowed but probably not meant (units, digits)."""
-        return list(oddities(self.materials, self.bodies, self.contacts))
+        return list(oddities(self.materials, self.bodies, self.contacts, self.springs))
 
     @property
     def text(self) -> str:

@@ -7,13 +7,16 @@ from collections.abc import Iterator, Mapping
 from .bodies import AnyBody, BeamBody, MassBody, SolidBody
 from .checks import signed_distance
 from .points import PointRef, parse_place
-from .schema import Contact, MaterialTable
+from .schema import Contact, MaterialTable, Spring
 
 _SLENDER = 5.0  # length / thickness below which Euler–Bernoulli beams are off by percents
 
 
 def oddities(
-    materials: Mapping[str, MaterialTable], bodies: Mapping[str, AnyBody], contacts: Mapping[str, Contact]
+    materials: Mapping[str, MaterialTable],
+    bodies: Mapping[str, AnyBody],
+    contacts: Mapping[str, Contact],
+    springs: Mapping[str, Spring] | None = None,
 ) -> Iterator[str]:
     """One line for each value that is probably not meant."""
     for name, material in materials.items():
@@ -26,7 +29,11 @@ def oddities(
             yield from _outside(f"bodies.{name}.mass", body.mass, 1e-9, 1e6, "kg")
         elif isinstance(body, SolidBody):
             yield from _outside(f"bodies.{name}.thickness", body.thickness, 1e-8, 1e3, "m")
+    yield from _idle_sliding(bodies, contacts)
+    yield from _springs(springs or {})
     for name, contact in contacts.items():
+        if contact.stiffness != "rigid":
+            yield from _outside(f"contacts.{name}.stiffness", contact.stiffness, 1.0, 1e20, "N/m, N/m³ per area")
         coefficient = contact.friction.coefficient
         if coefficient > 2:
             yield f"contacts.{name}.friction.coefficient: {coefficient:.6g} is unusually high"
@@ -46,6 +53,22 @@ def _beam(name: str, body: BeamBody) -> Iterator[str]:
     if body.length_m < _SLENDER * body.thickness:
         ratio = body.length_m / body.thickness
         yield f"bodies.{name}: only {ratio:.3g} times as long as thick; shear matters, and is neglected"
+
+
+def _idle_sliding(bodies: Mapping[str, AnyBody], contacts: Mapping[str, Contact]) -> Iterator[str]:
+    """Material that slides through its mesh where nothing touches it."""
+    touched = {place.partition(".")[0] for c in contacts.values() for place in (c.slave, c.master)}
+    for name, body in bodies.items():
+        if getattr(body, "sliding", None) is not None and name not in touched:
+            yield f"bodies.{name}.sliding: no contact touches {name}, so that it has no effect"
+
+
+def _springs(springs: Mapping[str, Spring]) -> Iterator[str]:
+    for name, spring in springs.items():
+        if spring.stiffness < 0:
+            yield f"springs.{name}.stiffness: {spring.stiffness:.6g} N/m is negative: it drives its ends apart"
+        elif not (spring.stiffness or spring.cubic or spring.damping):
+            yield f"springs.{name}: no stiffness, no cubic part and no damping, so that it has no effect"
 
 
 def _outside(where: str, value: float, least: float, most: float, unit: str) -> Iterator[str]:

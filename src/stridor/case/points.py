@@ -43,19 +43,24 @@ Place = PointRef | BoundaryRef
 
 def parse_point(reference: str, bodies: Mapping[str, AnyBody], where: str = "point") -> PointRef:
     """The point that a reference names. Raises CaseError at `where` if there is no such point."""
-    place = parse_place(reference, bodies, where)
+    place = parse_place(reference, bodies, where, boundary=False)
     if isinstance(place, PointRef):
         return place
     body = bodies[place.body]
-    known = [f"{place.body}.{name}" for name in getattr(body, "points", ())]
+    points = list(getattr(body, "points", ()))
+    known = [f"{place.body}.{name}" for name in points]
     have = f"{place.body} has: {', '.join(known)}" if known else f"give one in bodies.{place.body}.points"
-    raise CaseError(where, reference, f"no such point; {have}")
+    if isinstance(body, SolidBody) and place.boundary in boundary_names(body):
+        raise CaseError(where, reference, f"a boundary, where a point is wanted; {have}")
+    raise CaseError(where, reference, f"no such point{did_you_mean(nearest(place.boundary, points))}; {have}")
 
 
-def parse_place(reference: str, bodies: Mapping[str, AnyBody], where: str = "at") -> Place:
+def parse_place(
+    reference: str, bodies: Mapping[str, AnyBody], where: str = "at", *, boundary: bool = True
+) -> Place:
     """The point or the boundary that a reference names. Raises CaseError at `where` if there is none.
 
-    Whether the mesh of a file has the boundary shows when it is read.
+    Whether the mesh of a file has the boundary shows when it is read. boundary False: messages do not offer one.
     """
     head, at, distance = reference.partition("@")
     point = ""
@@ -64,14 +69,18 @@ def parse_place(reference: str, bodies: Mapping[str, AnyBody], where: str = "at"
     body = bodies.get(head)
     if isinstance(body, MassBody) and not at and point in ("", MASS_POINT):
         return PointRef(head, 0.0, body.position)
-    if not head or not (distance if at else point):
-        first = next(iter(bodies), "beam1")
-        example = f"{first}.{_first_point(bodies.get(first))}"
-        raise CaseError(where, reference, f'must be a point, "body.point" or "body@distance", such as {example}')
-    if body is None:
-        raise CaseError(where, reference, no_such("body", head, bodies))
     if isinstance(body, ObstacleBody):
         raise CaseError(where, reference, "an obstacle has no points or boundaries; only a contact's master is one")
+    if not head or not (distance if at else point):
+        first = head if body is not None else next(iter(bodies), "beam1")
+        example = f"{first}.{_first_point(bodies.get(first), boundary=boundary)}"
+        if boundary and any(isinstance(b, SolidBody) for b in bodies.values()):
+            accepted = f'must be a point, "body.point", or a boundary, "body.boundary", such as {example}'
+        else:
+            accepted = f'must be a point, "body.point" or "body@distance", such as {example}'
+        raise CaseError(where, reference, accepted)
+    if body is None:
+        raise CaseError(where, reference, no_such("body", head, bodies))
     if isinstance(body, MassBody):
         raise CaseError(where, reference, f'a mass is one point; write "{head}"')
     if isinstance(body, SolidBody):
@@ -83,9 +92,10 @@ def parse_place(reference: str, bodies: Mapping[str, AnyBody], where: str = "at"
     return PointRef(head, body.point_distance(point))
 
 
-def _first_point(body: AnyBody | None) -> str:
+def _first_point(body: AnyBody | None, *, boundary: bool) -> str:
     if isinstance(body, SolidBody):
-        return next(iter([*body.points, *boundary_names(body)]), "boundary")
+        names = [*boundary_names(body), *body.points] if boundary else [*body.points]
+        return next(iter(names), "boundary" if boundary else "point")
     return MASS_POINT if isinstance(body, MassBody) else "start"
 
 

@@ -123,7 +123,8 @@ def onsets(
 ) -> Onsets:
     """Every critical μ in ``friction_range`` with a frequency up to ``max_frequency_hz``.
 
-    friction_damping, prestress and solver as in `complex_modes`. Raises CaseError for an empty range and AnalysisError where branches cannot be followed.
+    friction_damping, prestress and solver as in `complex_modes`. Raises CaseError for an empty range and AnalysisError
+    where branches cannot be followed.
     """
     low, high = (float(v) for v in friction_range)
     if not (0 <= low < high and np.isfinite(high)):

@@ -15,7 +15,7 @@ from ..direct import factorise
 from ..system import System, build_system
 from ..system.model import Line, Solid
 from ..system.uncoupled import uncoupled_modes
-from ..typing import Array
+from ..typing import Array, Sparse
 
 DENSE = 1500  # freedoms up to which all modes are computed
 MOST = 40  # modes of a larger body
@@ -82,19 +82,14 @@ def _of_freedoms(system: System, body: Line | Solid, limit: float) -> BodyModes:
     mass = sp.csr_array(system.mass[part][:, part])
     stiffness = sp.csr_array(system.stiffness[part][:, part])
     if len(part) <= DENSE:
-        squares = sl.eigh(stiffness.toarray(), mass.toarray(), eigvals_only=True)
+        _, vectors = sl.eigh(stiffness.toarray(), mass.toarray())
     else:
         # A shift below zero, as a free body has rigid modes at zero.
         shift = -((2 * np.pi * max(limit, 1.0) / 20) ** 2)
         factor = factorise(sp.csr_array(stiffness - shift * mass), symmetric=True)
         inverse = spl.LinearOperator(stiffness.shape, matvec=factor.solve, dtype=float)
-        squares = spl.eigsh(
-            stiffness, MOST, mass, sigma=shift, OPinv=inverse, return_eigenvectors=False, tol=1e-10
-        )
-    # What is left of a rigid motion is rounding of stiffness entries that cancel.
-    faint = 1e-9 * float(np.abs(stiffness.diagonal() / mass.diagonal()).max(initial=0.0))
-    squares = np.sort(np.where(np.abs(squares) < faint, 0.0, squares))
-    frequency = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+        _, vectors = spl.eigsh(stiffness, MOST, mass, sigma=shift, OPinv=inverse, tol=1e-10)
+    frequency = np.sqrt(np.maximum(np.sort(_quotients(stiffness, mass, vectors)), 0.0)) / (2 * np.pi)
     inside = frequency[frequency <= limit]
     names = ["rigid" if f == 0.0 else "" for f in inside]
     elastic = 0
@@ -103,3 +98,12 @@ def _of_freedoms(system: System, body: Line | Solid, limit: float) -> BodyModes:
             elastic += 1
             names[k] = f"E{elastic}"
     return BodyModes(inside, tuple(names))
+
+
+def _quotients(stiffness: Sparse, mass: Sparse, vectors: Array) -> Array:
+    """ω² (k,) [rad²/s²] of vectors (n, k) by Rayleigh's quotient, zero where it is what rounding leaves of entries
+    that cancel: a threshold taken from the highest frequencies would take slow modes of fine meshes for rigid ones."""
+    masses = np.einsum("ij,ij->j", vectors, mass @ vectors)
+    squares = np.einsum("ij,ij->j", vectors, stiffness @ vectors) / masses
+    rounding = np.einsum("ij,ij->j", np.abs(vectors), abs(stiffness) @ np.abs(vectors)) / masses
+    return np.where(np.abs(squares) < 100 * np.finfo(float).eps * rounding, 0.0, squares)

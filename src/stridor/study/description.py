@@ -13,15 +13,18 @@ from ..case.schema import Load
 from ..errors import AnalysisError
 from ..fe.solid import wave_speeds
 from ..mesh.model import Mesh
-from ..mesh.quality import edge_lengths
+from ..mesh.quality import edge_lengths, pieces
 from ..sliding import steady_sliding
 from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
+from ..system.meshes import load_mesh
 from ..temporal.beta2 import step_limit
 from .settings import settings_of
 
 LEAST_PER_WAVE = 4.0  # elements per shear wavelength below which a frequency is not resolved
 MOST_PER_WAVE = 1e5  # above it, lengths are hardly in metres
+MANY_PER_WAVE, SMALL_BODY = 1e3, 2e-3  # nor are they above this in a body smaller than this [m]
+MOST_THROUGH = 0.2  # of a sliding velocity through a surface: facets on a curve make little of it
 
 @dataclass(frozen=True)
 class Description:
@@ -106,6 +109,10 @@ def describe(case: Case) -> Description:
             warnings.append(f"contact {contact.name}: the bodies overlap by {-contact.gap:g} m; simulate refuses that")
         elif contact.gap > 1e-9:
             lines.append(f"contact {contact.name} is open by {contact.gap:g} m at the start")
+    for surface in system.surfaces:
+        least = float(surface.nodes.gap.min(initial=np.inf))
+        if least > 1e-9 * max(1.0, float(np.ptp(surface.slave_position, axis=0).max())):
+            lines.append(f"contact {surface.name} is open by {least:.3g} m or more at the start")
     if (system.contacts or system.surfaces) and not any(np.any(v) for v in system.loads.values()):
         warnings.append(
             "no load presses the bodies together: modes take the contacts as closed, a run would not keep them so"
@@ -209,31 +216,71 @@ def balance_words(steady: SurfaceSliding) -> str:
 
 
 def mesh_warnings(case: Case, system: System) -> list[str]:
-    """Meshes too coarse for the highest frequency asked for, and points that were moved to a node."""
+    """What of the meshes is probably not meant: too coarse or too fine for the frequencies asked for (wrong units of
+    length), several pieces, points off their body, material that slides out of its surface, overlaps passed over."""
     found: list[str] = []
-    limit = case.modal.max_frequency_hz
     for solid in system.solids:
         body = case.bodies[solid.name]
-        if not isinstance(body, SolidBody) or body.material is None:
+        if not isinstance(body, SolidBody):
             continue
-        material = case.materials[body.material].law_object()
-        slow = wave_speeds(material, body.model)[1]
-        largest = edge_lengths(Mesh(solid.points, solid.cells))[1]
-        size = float(np.ptp(solid.points, axis=0).max())
-        per_wave = slow / limit / largest
-        if per_wave < LEAST_PER_WAVE:
+        where, mesh = f"bodies.{solid.name}", Mesh(solid.points, solid.cells)
+        largest = edge_lengths(mesh)[1]
+        found += _resolution_warnings(case, where, body, mesh, largest)
+        count = pieces(mesh)
+        if count > 1:
             found.append(
-                f"bodies.{solid.name}: {per_wave:.2g} elements per shear wavelength ({slow / limit:.3g} m) at "
-                f"modal.max_frequency_hz = {limit:g} Hz, the longest edge is {largest:.3g} m; refine the mesh, lower "
-                "the frequency, or check the unit of length"
-            )
-        elif per_wave > MOST_PER_WAVE or not 1e-6 < size < 1e3:
-            found.append(
-                f"bodies.{solid.name}: {size:.3g} m in extent, {per_wave:.2g} elements per shear wavelength at "
-                f"modal.max_frequency_hz = {limit:g} Hz; are the lengths in metres (scale = 0.001 for millimetres)?"
+                f"{where}: {count} pieces that share no node; a tie, a spring or a support must hold each of them, or "
+                "merge the nodes where they should be one"
             )
         for point, position in body.points.items():
             off = float(np.min(np.linalg.norm(solid.points - np.array(position), axis=1)))
             if off > 0.5 * largest:
-                found.append(f"bodies.{solid.name}.points.{point}: the nearest node is {off:.3g} m away")
+                found.append(f"{where}.points.{point}: the nearest node is {off:.3g} m away")
+    return found + _surface_warnings(case, system)
+
+
+def _resolution_warnings(case: Case, where: str, body: SolidBody, mesh: Mesh, largest: float) -> list[str]:
+    """Elements per shear wavelength at the highest frequency, largest being the longest edge [m]."""
+    limit = case.modal.max_frequency_hz
+    if body.material is not None:
+        material = case.materials[body.material].law_object()
+    else:
+        material = load_mesh(where.partition(".")[2], body).material[0]
+        if material is None:
+            return []
+    slow = wave_speeds(material, body.model)[1]
+    extent = float(np.ptp(mesh.points, axis=0).max())
+    per_wave = slow / limit / largest
+    lead = f"{where}: {extent:.3g} m in extent, {per_wave:.2g} elements per shear wavelength ({slow / limit:.3g} m) at "
+    if per_wave < LEAST_PER_WAVE:
+        return [
+            f"{lead}modal.max_frequency_hz = {limit:g} Hz, the longest edge is {largest:.3g} m; refine the mesh, lower "
+            "the frequency, or check the unit of length"
+        ]
+    tiny = extent < SMALL_BODY and per_wave > MANY_PER_WAVE
+    if tiny or per_wave > MOST_PER_WAVE or not 1e-6 < extent < 1e3:
+        how = "" if body.mesh is not None else " (scale = 0.001 for millimetres)"
+        return [f"{lead}modal.max_frequency_hz = {limit:g} Hz; are the lengths in metres{how}?"]
+    return []
+
+
+def _surface_warnings(case: Case, system: System) -> list[str]:
+    """Surfaces that material would slide through, and overlaps that a large adjust passes over."""
+    found: list[str] = []
+    for surface in system.surfaces:
+        drift = surface.drift.sum(axis=2) if surface.drift.shape[2] else np.zeros_like(surface.slave_position)
+        through = float(np.abs(np.sum(drift * surface.nodes.normals, axis=1)).max(initial=0.0))
+        fastest = float(np.linalg.norm(drift, axis=1).max(initial=0.0))
+        if through > MOST_THROUGH * fastest:
+            found.append(
+                f"contacts.{surface.name}: sliding moves material through the surface at {through:.3g} m/s of "
+                f"{fastest:.3g} m/s, and only what is along it counts; check velocity, axis and centre of sliding"
+            )
+        adjust = case.contacts[surface.name].adjust
+        spread = float(np.ptp(surface.slave_position, axis=0).max())
+        if spread > 0.0 and adjust > 0.1 * spread:
+            found.append(
+                f"contacts.{surface.name}.adjust: {adjust:g} m moves slave nodes by up to as much, and the slave is "
+                f"{spread:.3g} m in extent; it is meant for the small misfit of meshes"
+            )
     return found

@@ -17,8 +17,11 @@ from ..laws import Material
 from ..mesh.model import Mesh
 from ..typing import Array, IntArray, Sparse
 from .meshes import LoadedMesh, load_mesh
+from .size import refuse_too_many, refuse_too_many_read
 
 AXES = ("x", "y", "z")
+# Squares and ratios of masses and stiffnesses stay numbers between these.
+_LEAST, _MOST = 1e-100, 1e100
 
 
 @dataclass(frozen=True)
@@ -59,17 +62,20 @@ class BuiltBody:
 
 def build_bodies(case: Case) -> dict[str, BuiltBody]:
     """Every body that deforms or moves, in the order of the case. Raises CaseError for meshes that will not do."""
+    refuse_too_many(case)
     bodies: dict[str, BuiltBody] = {}
     offset = 0
     for name, body in case.bodies.items():
-        if isinstance(body, BeamBody):
-            built = _beam(case, name, body, offset)
-        elif isinstance(body, SolidBody):
-            built = _solid(case, name, body, offset)
-        elif isinstance(body, MassBody):
-            built = _mass(name, body, offset)
-        else:
-            continue
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):  # told of below, as numbers out of range
+            if isinstance(body, BeamBody):
+                built = _beam(case, name, body, offset)
+            elif isinstance(body, SolidBody):
+                built = _solid(case, name, body, offset)
+            elif isinstance(body, MassBody):
+                built = _mass(name, body, offset)
+            else:
+                continue
+            _refuse_extreme(built)
         bodies[name] = built
         offset += built.size
     return bodies
@@ -93,6 +99,8 @@ def _beam(case: Case, name: str, body: BeamBody, offset: int) -> BuiltBody:
 
 def _solid(case: Case, name: str, body: SolidBody, offset: int) -> BuiltBody:
     loaded: LoadedMesh = load_mesh(name, body)
+    if body.mesh is None:
+        refuse_too_many_read(f"bodies.{name}", body.file, loaded.mesh.points.size, offset)
     material = _material(case, name, body, loaded)
     matrices = assemble_solid(
         loaded.mesh, material, model=body.model, thickness=body.thickness, lumped=body.mass == "lumped"
@@ -131,6 +139,23 @@ def _mass(name: str, body: MassBody, offset: int) -> BuiltBody:
     d = body.dimension
     empty = sp.csr_array((d, d))
     return BuiltBody(name, offset, d, np.array([body.position]), sp.csr_array(body.mass * np.eye(d)), empty, empty)
+
+
+def _refuse_extreme(built: BuiltBody) -> None:
+    """Raises CaseError for matrices whose products no double holds: lengths or moduli that are not meant."""
+    mass, stiffness, damping = (
+        float(np.abs(m.data).max(initial=0.0)) for m in (built.mass, built.stiffness, built.damping)
+    )
+    least = float(built.mass.diagonal().min())
+    sound = least > _LEAST and mass < _MOST and damping < _MOST
+    if built.stiffness.nnz:
+        sound = sound and _LEAST < stiffness < _MOST
+    if not sound:
+        accepted = (
+            f"its mass, stiffness or damping has entries outside {_LEAST:g} … {_MOST:g}, beyond what can be computed "
+            "with; check the units of its lengths, its material and its damping"
+        )
+        raise CaseError(f"bodies.{built.name}", None, accepted)
 
 
 def is_obstacle(case: Case, name: str) -> bool:

@@ -34,7 +34,7 @@ def build_system(case: Case) -> System:
     tied = tie_matrix(case, bodies, total, held)
     tie, followers = (None, np.zeros(0, dtype=np.int64)) if tied is None else tied
     structure = _structure(bodies, links, tie)
-    free, motion = constrain(structure, constraints, dropped=followers)
+    free, motion = constrain(structure, constraints, followers, _translations(bodies, total))
     motion = _with_sliding(case, motion)
     view = View(bodies, total, free, motion, constraints, tie)
     points = {at: view.point_rows(case, at) for at in _references(case)}
@@ -88,6 +88,17 @@ def _structure(bodies: Mapping[str, BuiltBody], links: Links, tie: Sparse | None
         mass = tied_mass(mass, tie)
         damping, stiffness = tie.T @ damping @ tie, tie.T @ stiffness @ tie
     return Structure(sp.csr_array(mass), sp.csr_array(damping), sp.csr_array(stiffness))
+
+
+def _translations(bodies: Mapping[str, BuiltBody], total: int) -> Array:
+    """What all freedoms (N, d) do as everything moves by one along each axis."""
+    dimension = max((body.dimension for body in bodies.values()), default=2)
+    unit = np.zeros((total, dimension))
+    for body in bodies.values():
+        freedoms = body.displacements(np.arange(len(body.points)))
+        for axis in range(body.dimension):
+            unit[freedoms[:, axis], axis] = 1.0
+    return unit
 
 
 def _with_sliding(case: Case, motion: PrescribedMotion) -> PrescribedMotion:

@@ -27,6 +27,9 @@ from ..mesh.files import read_mesh
 from ..mesh.model import Mesh
 from ..mesh.quality import check_mesh
 
+# Products of lengths, moduli and densities stay numbers between these [m].
+_LEAST_EXTENT, _MOST_EXTENT = 1e-20, 1e20
+
 
 @dataclass(frozen=True)
 class LoadedMesh:
@@ -73,8 +76,21 @@ def load_mesh(name: str, body: SolidBody) -> LoadedMesh:
             f"the mesh has {loaded.mesh.dimension} dimensions; take "
             + ('"3d"' if loaded.mesh.dimension == 3 else '"plane stress" or "plane strain"'),
         )
+    _refuse_absurd(loaded.mesh, where, body)
     check_mesh(loaded.mesh, where)
     return loaded
+
+
+def _refuse_absurd(mesh: Mesh, where: str, body: SolidBody) -> None:
+    """Lengths whose squares and cubes no double holds, and points that hide a boundary of the file."""
+    extent = float(np.ptp(mesh.points, axis=0).max(initial=0.0))
+    if len(mesh.points) and not _LEAST_EXTENT < extent < _MOST_EXTENT:
+        accepted = f"{extent:.3g} m in extent; must be between {_LEAST_EXTENT:g} and {_MOST_EXTENT:g} m"
+        raise CaseError(f"{where}.mesh" if body.mesh is not None else f"{where}.file", body.file, accepted)
+    for point in body.points:
+        if point in mesh.boundaries:
+            accepted = f"{mesh.source} has a boundary of this name; choose another name"
+            raise CaseError(f"{where}.points.{point}", body.points[point], accepted)
 
 
 def _from_file(where: str, body: SolidBody) -> LoadedMesh:

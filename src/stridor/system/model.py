@@ -198,11 +198,15 @@ class Constraint:
 
 
 def constrain(
-    structure: Structure, constraints: list[Constraint], dropped: IntArray | None = None
+    structure: Structure,
+    constraints: list[Constraint],
+    dropped: IntArray | None = None,
+    translations: Array | None = None,
 ) -> tuple[IntArray, PrescribedMotion]:
     """Free freedoms (n,) and the prescribed motions of a structure held by ``constraints``.
 
-    dropped: freedoms that follow others and are no unknowns of their own.
+    dropped: freedoms that follow others and are no unknowns of their own. translations (N, d): what all freedoms do as
+    everything moves along each axis by one; where a support carries a body along so, no rounding bends it.
     """
     total = structure.mass.shape[0]
     held = np.zeros(total, dtype=bool)
@@ -214,10 +218,13 @@ def constrain(
     moving = [c for c in constraints if c.moves]
     if not moving:
         return free, PrescribedMotion.none(len(free))
-    selection = np.zeros((total, len(moving)))
+    selection, rigid = np.zeros((total, len(moving))), np.zeros((total, len(moving)))
     for column, c in enumerate(moving):
         selection[list(c.freedoms), column] = c.velocity
-    lift = _static_lift(structure, free, selection)
+        if translations is not None:
+            velocity = np.linalg.lstsq(translations[list(c.freedoms)], np.array(c.velocity), rcond=None)[0]
+            rigid[:, column] = translations @ velocity
+    lift = _static_lift(structure, free, selection, rigid)
     whole = selection.copy()
     whole[free] = lift
 
@@ -256,21 +263,27 @@ def _answer(block: Sparse, load: Array) -> Array:
         return np.linalg.lstsq(dense, load, rcond=1e-12)[0]
 
 
-def _static_lift(structure: Structure, free: IntArray, selection: Array) -> Array:
-    """L with K_ff L = −K_fp: the static answer, of least norm where the structure is free to move."""
+def _static_lift(structure: Structure, free: IntArray, selection: Array, rigid: Array) -> Array:
+    """L with K_ff L = −K_fp: the static answer, of least norm where the structure is free to move.
+
+    rigid (N, p): translations that may be it. Where one balances to rounding it is taken, as a solve would only add
+    rounding times the condition of K, which for slender solids is enough to open and close a gap.
+    """
     stiffness = sp.csr_array(structure.stiffness)
     load = -(stiffness @ selection)[free]
     inner = sp.csr_array(stiffness[free][:, free])
     lift = np.zeros_like(load)
     for part in connected_components(inner):
-        if not np.any(load[part]):
-            continue
-        block = sp.csr_array(inner[part][:, part])
-        answer = _answer(block, load[part])
-        if np.linalg.norm(block @ answer - load[part]) > 1e-6 * np.linalg.norm(load[part]):
-            raise AnalysisError(
-                "a moving support cannot be followed statically: its motion loads a mechanism that "
-                "nothing holds; fix more freedoms of that body"
-            )
-        lift[part] = answer
+        block, right, answer = sp.csr_array(inner[part][:, part]), load[part], rigid[free[part]]
+        loaded = np.any(right, axis=0)
+        unbalanced = np.abs(block @ answer - right).max(axis=0)
+        bent = np.flatnonzero(loaded & (unbalanced > 1e-12 * np.abs(right).max(axis=0)))
+        if len(bent):
+            answer[:, bent] = _answer(block, right[:, bent])
+            if np.linalg.norm(block @ answer[:, bent] - right[:, bent]) > 1e-6 * np.linalg.norm(right[:, bent]):
+                raise AnalysisError(
+                    "a moving support cannot be followed statically: its motion loads a mechanism that "
+                    "nothing holds; fix more freedoms of that body"
+                )
+        lift[part] = np.where(loaded, answer, 0.0)
     return lift

@@ -51,9 +51,10 @@ def constraints_of(case: Case, bodies: dict[str, BuiltBody]) -> list[Constraint]
                     freedoms.append(freedom)
                     velocity.append(speed)
                 elif held != speed:
+                    node = body.points[(freedom - body.offset) // body.stride]
                     accepted = (
-                        f"{direction} of a node shared with supports.{other} gets two velocities, {held:g} and "
-                        f"{speed:g} m/s; let one of them hold it"
+                        f"{direction} of the node at ({', '.join(f'{x:.6g}' for x in node)}) m, shared with "
+                        f"supports.{other}, gets two velocities, {held:g} and {speed:g} m/s; let one of them hold it"
                     )
                     raise CaseError(f"{where}.fixed", support.fixed, accepted)
         found.append(Constraint(name, tuple(freedoms), tuple(velocity)))
@@ -124,6 +125,12 @@ def _free_of_supports(bond: Bond, held: set[int]) -> Bond:
     leading = is_held(leaders) | (bond.tie.weights == 0.0)[:, :, None]
     conflict = np.any(is_held(bond.slave) & ~leading.all(axis=1), axis=1)
     keep = ~conflict
+    if len(keep) and not keep.any():
+        accepted = (
+            f"bonds nothing: supports hold all of its {len(keep)} slave nodes, and a held node cannot follow as well; "
+            "exchange slave and master, or support the master's body instead"
+        )
+        raise CaseError(bond.where, None, accepted)
     tie = Tie(bond.tie.nodes[keep], bond.tie.weights[keep], bond.tie.point[keep], bond.tie.distance[keep])
     return Bond(bond.where, tie, bond.slave[keep], bond.master)
 

@@ -1,8 +1,8 @@
 """Onsets of instability of systems with many contact nodes, solved.
 
 Branches of the projected problem are followed over the range, every passage into or out of instability is enclosed and
-solved for there; then the basis is enriched with what the onset leaves unbalanced in the sparse problem, and it is solved
-again, until nothing is left.
+solved for there; then the basis is enriched with what the onset leaves unbalanced in the sparse problem, and it is
+solved again, until nothing is left.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ from .passages import Passage, crossings, meetings
 from .problem import problem_of
 from .reduced import Reduced
 from .refine import BELIEVED, Band, projected, settle
+from .shifted import real_columns
 from .steady import Options
 
 SAMPLES = 9
 ROUNDS = 6
-ONSET_TOLERANCE = 1e-10  # backward error at which an onset counts as found
+ONSET_TOLERANCE = 1e-12  # backward error at which an onset counts as found
 NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
 
 
@@ -53,7 +54,9 @@ def onsets_assembled(
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     if not damped:
         system = undamped(system)
-    problem = problem_of(system, None, options or Options(), damped=damped)
+    problem = problem_of(
+        system, None, options or Options(), damped=damped, frictions=np.linspace(0.0, high, 50)
+    )
     if not problem.nodes:
         return Onsets((), (low, high), max_frequency_hz, damped, problem.open_contacts)
     # Modes that start above the band may meet inside it.
@@ -121,9 +124,7 @@ def _located(reduced: Reduced, passage: Passage) -> Onset | None:
         if error <= ONSET_TOLERANCE:
             break
         rest = problem.residual(lam, u, p, solved.mu)
-        parts = [rest.real, rest.imag] if rest.dtype.kind == "c" else [rest]
-        force = np.hstack(parts)
-        if not reduced.enrich(force[:, np.linalg.norm(force, axis=0) > 0]):
+        if not reduced.enrich(real_columns(rest)):
             break
     if best is None or best[0] > BELIEVED:
         return None
@@ -277,5 +278,3 @@ def exceptional_point(reduced: Reduced, lam: complex, mu: float) -> tuple[comple
     slope = (square(now + step) - square(now - step)) / (2 * step)
     root = np.sqrt(slope)
     return (now, float(max(abs(root.real), abs(root.imag)))) if np.isfinite(root) else None
-
-

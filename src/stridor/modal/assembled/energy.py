@@ -20,8 +20,8 @@ from .steady import Options
 class FrictionEnergy:
     """Mean power over a cycle for unit energy (kinetic and elastic) of a mode λ.
 
-    power (m,) [1/s] that friction feeds in at each of the system's contact nodes, positive where it drives the mode, zero
-    at open ones; damping [1/s] that the structure takes out. power.sum() − damping = 2 Re λ.
+    power (m,) [1/s] that friction feeds in at each of the system's contact nodes, positive where it drives the mode,
+    zero at open ones; damping [1/s] that the structure takes out. power.sum() − damping = 2 Re λ.
     """
 
     eigenvalue: complex
@@ -41,7 +41,8 @@ def friction_energy(
 
     A node's power is ½ Re(conj(λ w) F) with its slip w and friction force F, from the equations of motion multiplied by
     the velocity: 4E Re λ + |λ|²uᴴCu = 2 Σ power, E the mean kinetic and elastic energy, the contacts' included.
-    modes must have been found with the same system and options, and with vectors. Raises CaseError where they have none.
+    modes must have been found with the same system and options, and with vectors. Raises CaseError where they have
+    none, or where the mode does not oscillate.
     """
     if modes.right is None:
         raise CaseError("modes", "without vectors", "ask for the modes with vectors=True")
@@ -84,5 +85,3 @@ def contact_forces(problem: ContactProblem, lam: complex, u: ComplexArray, mu: f
     with factorise(sp.csr_array(push @ push.T), symmetric=True) as factor:
         p[~soft] = factor.solve(times(push, rest))
     return p
-
-

@@ -1,8 +1,8 @@
 """Branches of the projected problem followed over μ.
 
 All eigenpairs are known at every μ, so following is matching: each branch to the eigenvalue its tangent predicts, the
-shapes agreeing. Where two meet, their tangents say nothing; they are matched as a pair by their mean a and the square b of
-half their difference, which are smooth in μ where the two are not.
+shapes agreeing. Where two meet, their tangents say nothing; they are matched as a pair by their mean a and the square
+b of half their difference, which are smooth in μ where the two are not.
 """
 
 from __future__ import annotations
@@ -55,11 +55,17 @@ class State:
 class Follower:
     """Follows branches, numbered by frequency at μ = 0, towards larger μ in steps up to ``longest``.
 
-    watch, where given, is called with each accepted pair of neighbouring states.
+    watch, where given, is called with each accepted pair of neighbouring states. Only the first ``named`` branches (all
+    by default) must be beyond doubt at every step.
     """
 
     def __init__(
-        self, reduced: Reduced, *, longest: float = 0.05, watch: Callable[[State, State], None] | None = None
+        self,
+        reduced: Reduced,
+        *,
+        longest: float = 0.05,
+        named: int | None = None,
+        watch: Callable[[State, State], None] | None = None,
     ) -> None:
         self.reduced = reduced
         self.longest, self.watch = longest, watch
@@ -67,6 +73,7 @@ class Follower:
         followed = np.flatnonzero(np.abs(found.values) <= FOLLOWED * reduced.frequency)
         order = np.lexsort((np.abs(found.values[followed]), np.abs(found.values[followed].imag)))
         self.state = State(found, followed[order])
+        self.named = len(order) if named is None else named
         self._step = longest
 
     @classmethod
@@ -74,6 +81,7 @@ class Follower:
         """A follower that goes on from a state followed before, and watches nothing."""
         follower = cls.__new__(cls)
         follower.reduced, follower.state = reduced, state
+        follower.named = len(state.place)
         follower.longest, follower.watch, follower._step = np.inf, None, np.inf
         return follower
 
@@ -81,9 +89,11 @@ class Follower:
         """Follow to ``mu``, not below the present one."""
         while self.state.mu < mu:
             left = mu - self.state.mu
-            step = min(self._step, self.longest, left)
+            step = min(self._step, self.longest)
+            # No sliver is left over for rounding to make.
+            step = left if left <= 1.01 * step else step
             found = self.reduced.eigenpairs(mu if step == left else self.state.mu + step)
-            place = matched(self.reduced, self.state, found, surely=step > SMALLEST_STEP)
+            place = matched(self.reduced, self.state, found, self.named, surely=step > SMALLEST_STEP)
             if place is None:
                 self._step = step / 4
                 continue
@@ -95,8 +105,9 @@ class Follower:
         return self.state
 
 
-def matched(reduced: Reduced, old: State, found: Eigenpairs, *, surely: bool = True) -> IntArray | None:
-    """Places (b,) among ``found`` of the branches of ``old``; None where that is not clear and ``surely`` is asked."""
+def matched(reduced: Reduced, old: State, found: Eigenpairs, named: int, *, surely: bool = True) -> IntArray | None:
+    """Places (b,) among ``found`` of the branches of ``old``; None where that is not clear for the first ``named`` of
+    them and ``surely`` is asked."""
     step = found.mu - old.mu
     moved = step * old.tangents
     reach = 0.5 * np.maximum(np.abs(old.coordinate), 1e-3 * np.abs(old.coordinate).max(initial=0.0))
@@ -112,15 +123,14 @@ def matched(reduced: Reduced, old: State, found: Eigenpairs, *, surely: bool = T
     if not surely:
         return place
     clear = _clear(reduced, old, found, place, distance)
-    for i in np.flatnonzero(~clear):
+    for i in np.flatnonzero(~clear[:named]):
         if clear[i]:
             continue
         pair = _as_pair(old, found, int(i), place, clear)
         if pair is None:
             return None
-        (j, first, second) = pair
-        place[i], place[j] = first, second
-        clear[[i, j]] = True
+        j, place[i], place[j] = pair
+        clear[i] = clear[j] = True
     return place if len(np.unique(place)) == len(place) else None
 
 
@@ -138,9 +148,7 @@ def _clear(reduced: Reduced, old: State, found: Eigenpairs, place: IntArray, dis
     return ((mine <= CLEAR * others.min(axis=1, initial=np.inf)) & (alike >= ALIKE)) | (same & (mine <= rounding))
 
 
-def _as_pair(
-    old: State, found: Eigenpairs, i: int, place: IntArray, clear: BoolArray
-) -> tuple[int, int, int] | None:
+def _as_pair(old: State, found: Eigenpairs, i: int, place: IntArray, clear: BoolArray) -> tuple[int, int, int] | None:
     """Branch i matched together with its nearest: (j, place of i, place of j), None where they are no pair."""
     gap = np.abs(old.coordinate - old.coordinate[i])
     gap[i] = np.inf

@@ -45,7 +45,7 @@ def complex_modes_assembled(
     if not damped:
         system = undamped(system)
     single = float(values.max()) if len(values) == 1 else None
-    problem = problem_of(system, single, options or Options(), damped=damped)
+    problem = problem_of(system, single, options or Options(), damped=damped, frictions=values)
     band = Band(count, None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz)
     reduced = projected(problem, band)
     top = float(values.max())
@@ -63,6 +63,7 @@ def _followed(reduced: Reduced, values: Array, band: Band, *, damped: bool, vect
         branches = np.arange(min(band.count, len(start.place)))
     else:
         branches = np.flatnonzero(start.values.imag <= band.frequency * (1 + 1e-12))
+    follower.named = len(branches)
     shape = (len(values), len(branches))
     eigenvalues, residual = np.zeros(shape, dtype=complex), np.zeros(shape)
     right, left = np.zeros((2, *shape, problem.size if vectors else 0), dtype=complex)
@@ -96,9 +97,7 @@ def checked_friction(mu: float | Sequence[float] | Array) -> Array:
 
 
 def samples(top: float, count: int = SAMPLES) -> Array:
-    """Friction coefficients (k,) from ``top`` down to 0, closer at the ends, where polynomials are interpolated best."""
+    """Friction coefficients (k,) from ``top`` down to 0, closer at the ends, as polynomials are interpolated best."""
     if top == 0.0:
         return np.zeros(1)
     return top * (1 + np.cos(np.linspace(0, np.pi, count))) / 2
-
-

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -19,8 +20,8 @@ PROBES = 4
 class Passage:
     """A change of stability between two μ, low < high: of a branch and its partner, counted from 0.
 
-    kind: "meeting" of two undamped modes, undamped "divergence", or "crossing" of the axis with damping. means: the mean
-    of the two meeting coordinates at both ends. old: the state at or before ``low``.
+    kind: "meeting" of two undamped modes, undamped "divergence", or "crossing" of the axis with damping. means: the
+    mean of the two meeting coordinates at both ends. old: the state at or before ``low``.
     """
 
     kind: Literal["meeting", "divergence", "crossing"]
@@ -46,7 +47,7 @@ def crossings(old: State, new: State) -> list[Passage]:
             continue
         marks = [0.0, *_turns(start, end, *slopes), 1.0]
         rates = [_cubic(start, end, *slopes, mark) for mark in marks]
-        for a, b, first, second in zip(marks, marks[1:], rates, rates[1:], strict=False):
+        for (a, b), (first, second) in zip(pairwise(marks), pairwise(rates), strict=True):
             if first * second < 0:
                 low, high = old.mu + a * step, old.mu + b * step
                 partner = _neighbour(new, i)
@@ -102,9 +103,10 @@ def _bubbles(reduced: Reduced, old: State, new: State, real: list[int]) -> list[
     zero, it is looked at again there."""
     found: list[Passage] = []
     ordered = sorted(real, key=lambda i: float(old.coordinate[i].real))
-    neighbours = list(zip(ordered, ordered[1:], strict=False))
+    neighbours = list(pairwise(ordered))
     later = sorted(real, key=lambda i: float(new.coordinate[i].real))
-    neighbours += [pair for pair in zip(later, later[1:], strict=False) if pair not in neighbours and pair[::-1] not in neighbours]
+    known = {frozenset(pair) for pair in neighbours}
+    neighbours += [pair for pair in pairwise(later) if frozenset(pair) not in known]
     for i, j in neighbours:
         lowest = _lowest(reduced, old, new, i, j)
         if lowest is not None:

@@ -15,10 +15,14 @@ from .steady import Options, Steadiness, steadiness, touching_nodes
 
 CHUNK = 64  # columns worked on at a time
 
+CHEAP = 4000  # freedoms below which an equilibrium costs next to nothing
+MOST_EQUILIBRIA = 6
+NEGLIGIBLE = 1e-4  # of the largest displacement: gaps that open less than this are not judged more closely
+
 
 @dataclass(frozen=True)
 class Extras:
-    """What steady sliding at one μ adds: weakening d (m,) = N dμ/d|v| [N s/m] on slip, damping (n, n), stiffness (n, n)."""
+    """What steady sliding at one μ adds: weakening d (m,) = N dμ/d|v| [N s/m] on slip, damping and stiffness (n, n)."""
 
     weakening: Array | None = None
     damping: Sparse | None = None
@@ -39,8 +43,8 @@ class ContactProblem:
 
     normal N (m, n), slide S (m, n): relative displacement slave − master along the normal and against the slip;
     compliance c (m,) [m/N], 0 for rigid contact. touching (m,) are the places of the nodes among all the system's.
-    damped: whether anything works on
-    velocities. extras gives what steady sliding at a μ adds, None where nothing does. solver: that of `direct.factorise`.
+    damped: whether anything works on velocities. extras gives what steady sliding at a μ adds, None where nothing does.
+    solver: that of `direct.factorise`.
     """
 
     mass: Sparse
@@ -134,6 +138,8 @@ class ContactProblem:
         rows = sp.csr_array(self.normal + mu * self.slide) if left else self.normal
         closure = np.abs(times(rows, u) + self.compliance[:, None] * p).max(axis=0)
         reach = (abs(rows) @ size + self.compliance[:, None] * force).max(axis=0)
+        # A mode that hardly opens gaps at all (in the plane of the interface) leaves nothing but rounding there.
+        reach = np.maximum(reach, NEGLIGIBLE * size.max(axis=0))
         return np.maximum(error, closure / tiny(reach))
 
 
@@ -149,10 +155,14 @@ def tiny(values: Array) -> Array:
     return np.maximum(values, 1e-300)
 
 
-def problem_of(system: System, mu: float | None, options: Options, *, damped: bool) -> ContactProblem:
+def problem_of(
+    system: System, mu: float | None, options: Options, *, damped: bool, frictions: Array | None = None
+) -> ContactProblem:
     """The problem of the nodes that touch in steady sliding at ``mu`` (None: at the laws' own coefficients).
 
-    Raises AnalysisError where there is no steady sliding, or where the options need loads that are not there.
+    frictions (k,): the friction coefficients that will be asked for; of large systems what the steady state adds is
+    then solved for at some of them and interpolated between (`_grid`). Raises AnalysisError where there is no steady
+    sliding, or where the options need loads that are not there.
     """
     nodes = system.contact_nodes()
     steady = touching_nodes(system, nodes, mu, options.solver)
@@ -171,19 +181,47 @@ def problem_of(system: System, mu: float | None, options: Options, *, damped: bo
         touching=touching,
         open_contacts=tuple(name for name in nodes.names if name not in closed),
         damped=has_damping or with_state.damps,
-        extras=None if with_state.neutral else _extras(with_state),
+        extras=None if with_state.neutral else _extras(with_state, _grid(system, frictions)),
         solver=options.solver,
     )
 
 
-def _extras(state: Steadiness) -> Callable[[float], Extras]:
-    """What each μ adds, kept for the μ asked for before: each costs an equilibrium."""
+def _grid(system: System, frictions: Array | None) -> Array | None:
+    """Where equilibria are solved: at 0 and the few friction coefficients asked for, or at Chebyshev points of their
+    range, where polynomials are interpolated best. None, everywhere, where an equilibrium costs next to nothing."""
+    if frictions is None or system.size < CHEAP or not float(np.max(frictions)):
+        return None
+    values = np.unique(np.append(frictions, 0.0))
+    if len(values) <= MOST_EQUILIBRIA:
+        return values
+    return float(values[-1]) * (1 - np.cos(np.linspace(0, np.pi, MOST_EQUILIBRIA))) / 2
+
+
+def _extras(state: Steadiness, grid: Array | None) -> Callable[[float], Extras]:
+    """What each μ adds, kept for the μ asked for before: each costs an equilibrium or an interpolation."""
     known: dict[float, Extras] = {}
 
     def at(mu: float) -> Extras:
         if mu not in known:
-            known[mu] = NOTHING if mu == 0.0 and not state.prestress else Extras(*state.terms(mu))
+            if mu == 0.0 and not state.prestress:
+                known[mu] = NOTHING
+            elif grid is None or mu in grid or not grid[0] <= mu <= grid[-1]:
+                known[mu] = Extras(*state.terms(mu))
+            else:
+                known[mu] = _between([at(float(g)) for g in grid], _lagrange(grid, mu))
         return known[mu]
 
     return at
 
+
+def _lagrange(grid: Array, mu: float) -> Array:
+    """Weights (k,) of the polynomial through values at grid (k,)."""
+    return np.array([np.prod([(mu - b) / (a - b) for b in grid if b != a]) for a in grid])
+
+
+def _between(terms: list[Extras], weights: Array) -> Extras:
+    def total(name: str) -> Any:
+        present = [w * getattr(t, name) for w, t in zip(weights, terms, strict=True) if getattr(t, name) is not None]
+        return sum(present[1:], start=present[0]) if present else None
+
+    return Extras(total("weakening"), total("damping"), total("stiffness"))

@@ -1,18 +1,19 @@
 """The projected problem: small dense matrices that stand for the sparse ones, and their eigenpairs at any μ.
 
-Trial vectors are pairs (u, p) that respect the contacts, N u + c p = 0. Where contact is rigid, u says nothing about p, and
-forces p̂ of their own are added (u = 0), each with a test vector ℓ that lifts it, N ℓ = p̂. Tested with [U, ℓ],
+Trial vectors are pairs (u, p) that respect the contacts, N u + c p = 0. Where contact is rigid, u says nothing about
+p, and forces p̂ of their own are added (u = 0), each with a test vector ℓ that lifts it, N ℓ = p̂. Tested with [U, ℓ],
 
     Wᵀ(λ²M + λC + K) U z − (N W)ᵀ p − μ (S W)ᵀ p = 0,    p = P z + P̂ a .
 
-The rows of ℓ determine a from z, with λ² and λ: that is how inertia and damping get into the contact force. At μ = 0 the rows
-of U hold a symmetric problem alone, (λ²UᵀMU + λUᵀCU + UᵀKU + PᵀcP) z = 0, with frequencies from above as in any
-conforming method: no spurious modes.
+The rows of ℓ determine a from z, with λ² and λ: that is how inertia and damping get into the contact force. At μ = 0
+the rows of U hold a symmetric problem alone, (λ²UᵀMU + λUᵀCU + UᵀKU + PᵀcP) z = 0, with frequencies from above as in
+any conforming method: no spurious modes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
@@ -22,6 +23,7 @@ from ...typing import Array, ComplexArray, Sparse
 from .problem import ContactProblem, Extras
 from .shifted import Pair, Shifted, orthonormal, real_columns
 
+REACH = 1.8  # eigenpairs up to this much above the band are looked at
 KEPT = 1e-10  # of the strongest direction of the vectors kept
 
 
@@ -60,8 +62,9 @@ class Reduced:
         self.solves = 0
         self._rigid = np.flatnonzero(problem.compliance == 0.0)
         self._force_scale = float(np.linalg.norm(modes.p, axis=0).max(initial=0.0)) or 1.0
-        self._matrices: tuple[Array, Array, Array, Array] = (np.zeros((0, 0)),) * 4
-        self._products = [(np.zeros((0, 0)), np.zeros((0, 0)))] * 3
+        empty: Array = np.zeros((0, 0))
+        self._matrices = (empty, empty, empty, empty)
+        self._products: list[tuple[Array, Array]] = [(empty, empty)] * 3
         self._slide = np.zeros((problem.nodes, 0))
         self._known: dict[float, Eigenpairs] = {}
         self._extra: dict[float, tuple[Array, Array]] = {}
@@ -119,8 +122,7 @@ class Reduced:
     def keep(self, right: ComplexArray) -> None:
         """Remember right vectors (r, k) that are exact, for `compress`."""
         own = self.pairs.count
-        vectors = right / np.linalg.norm(right[:own], axis=0)
-        columns = real_columns(vectors)
+        columns = real_columns(right / np.linalg.norm(right[:own], axis=0))
         self._kept.append((columns[:own], columns[own:]))
 
     def compress(self) -> None:
@@ -190,7 +192,7 @@ class Reduced:
         self._known.clear()
         self._extra.clear()
 
-    def matrices(self, mu: complex) -> tuple[Array, Array, Array]:
+    def matrices(self, mu: complex) -> tuple[Array, Array, Any]:
         """M, C and K (r, r) at μ, friction and what steady sliding adds included; complex where μ is."""
         mass, damping, stiffness, friction = self._matrices
         if self.problem.extras is None:
@@ -214,7 +216,7 @@ class Reduced:
 
     # -- eigenpairs ---------------------------------------------------------------------------------------------------
     def eigenpairs(self, mu: float) -> Eigenpairs:
-        """All eigenpairs at ``mu`` with |λ| up to three times the frequency of interest."""
+        """All eigenpairs at ``mu`` with |λ| up to REACH times the frequency of interest."""
         if mu not in self._known:
             coordinate, right, left = self.solve(mu)
             values = coordinate if self.problem.damped else upper_root(coordinate)
@@ -223,16 +225,12 @@ class Reduced:
         return self._known[mu]
 
     def solve(self, mu: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Coordinates x (k,), right and left vectors (r, k) at a real or complex μ, |λ| up to three times the band."""
-        mass, damping, stiffness = self.matrices(mu)
-        x, right, left = (_quadratic if self.problem.damped else _linear)(mass, damping, stiffness, self.frequency)
-        size = np.abs(x) if self.problem.damped else np.sqrt(np.abs(x))
-        chosen = np.isfinite(size) & (size <= 3.0 * self.frequency)
-        if self.problem.damped and not isinstance(mu, complex):
-            chosen &= x.imag >= 0.0
-        chosen = np.flatnonzero(chosen)
-        chosen = chosen[np.lexsort((x[chosen].real, size[chosen]))]
-        return x[chosen], right[:, chosen], left[:, chosen]
+        """Coordinates x (k,), right and left vectors (r, k) at a real or complex μ, |λ| up to REACH times the band."""
+        x, right, left = (_quadratic if self.problem.damped else _linear)(
+            *self.matrices(mu), self.frequency, upper=self.problem.damped and not isinstance(mu, complex)
+        )
+        order = np.lexsort((x.real, np.abs(x)))
+        return x[order], right[:, order], left[:, order]
 
     def tangents(
         self, mu: float, coordinate: ComplexArray, values: ComplexArray, right: ComplexArray, left: ComplexArray
@@ -253,8 +251,10 @@ class Reduced:
         """The vector (r,) that P(λ, μ) all but takes to zero, for λ that may be double."""
         mass, damping, stiffness = self.matrices(mu)
         matrix = lam**2 * mass + lam * damping + stiffness
-        rows = np.maximum(np.abs(matrix).max(axis=1), 1e-300)
-        columns = np.maximum(np.abs(matrix / rows[:, None]).max(axis=0), 1e-300)
+        # Balanced by what the entries are made of: a row may itself be all but zero here.
+        size = np.abs(self._matrices[2]) + mu * np.abs(self._matrices[3]) + self.frequency**2 * np.abs(mass)
+        rows = np.maximum(size.max(axis=1), 1e-300)
+        columns = np.maximum((size / rows[:, None]).max(axis=0), 1e-300)
         return sl.svd(matrix / rows[:, None] / columns)[2][-1].conj() / columns
 
     def expand(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -298,7 +298,7 @@ def _span(block: Array) -> Array:
     return left[:, size > KEPT * max(float(size[0]), 1e-300)]
 
 
-def combined(basis: Array, weights: ComplexArray) -> ComplexArray:
+def combined(basis: Array, weights: Any) -> Any:
     """basis @ weights in real arithmetic; real where the weights are."""
     if weights.dtype.kind != "c" or not np.any(weights.imag):
         return basis @ np.ascontiguousarray(weights.real)
@@ -307,22 +307,28 @@ def combined(basis: Array, weights: ComplexArray) -> ComplexArray:
 
 def upper_root(squares: ComplexArray) -> ComplexArray:
     """λ (k,) of λ² with Im λ ≥ 0, and Re λ ≥ 0 where it is real."""
-    root = np.sqrt(squares.astype(complex))
+    root: ComplexArray = np.sqrt(squares + 0j)
     return np.where((root.imag < 0) | ((root.imag == 0) & (root.real < 0)), -root, root)
 
 
-def _linear(mass: Array, damping: Array, stiffness: Array, frequency: float) -> tuple[ComplexArray, ...]:
+def _linear(
+    mass: Array, damping: Array, stiffness: Array, frequency: float, *, upper: bool
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """x = λ² and right and left vectors of (xM + K) z = 0, shifted and inverted at x = frequency²."""
     shift = frequency**2
     factor = _factor(stiffness + shift * mass)
     theta, left, right = sl.eig(sl.lu_solve(factor, shift * mass), left=True, right=True)
     with np.errstate(all="ignore"):
         x = shift - shift / theta
-    return x, right, sl.lu_solve(factor, left.conj(), trans=1)
+        chosen = np.flatnonzero(np.isfinite(x) & (np.abs(x) <= (REACH * frequency) ** 2))
+    return x[chosen], right[:, chosen], sl.lu_solve(factor, left[:, chosen].conj(), trans=1)
 
 
-def _quadratic(mass: Array, damping: Array, stiffness: Array, frequency: float) -> tuple[ComplexArray, ...]:
-    """x = λ and right and left vectors of (x²M + xC + K) z = 0, shifted and inverted at x = frequency."""
+def _quadratic(
+    mass: Array, damping: Array, stiffness: Array, frequency: float, *, upper: bool
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """x = λ and right and left vectors of (x²M + xC + K) z = 0, shifted and inverted at x = frequency; ``upper`` leaves
+    out the lower half plane."""
     mass, damping = frequency**2 * mass, frequency * damping
     r = len(mass)
     factor = _factor(mass + damping + stiffness)
@@ -333,9 +339,9 @@ def _quadratic(mass: Array, damping: Array, stiffness: Array, frequency: float) 
     theta, left, right = sl.eig(companion, left=True, right=True)
     with np.errstate(all="ignore"):
         x = frequency * (1 + 1 / theta)
-    chosen = np.abs(theta) > 1e-3
-    top, bottom = right[:r, chosen], right[r:, chosen]
-    z = np.where(np.abs(theta[chosen]) > 1, top, bottom)
+        chosen = np.isfinite(x) & (np.abs(x) <= REACH * frequency)
+    chosen = np.flatnonzero(chosen & (x.imag >= 0) if upper else chosen)
+    z = np.where(np.abs(theta[chosen]) > 1, right[:r, chosen], right[r:, chosen])
     return x[chosen], z, sl.lu_solve(factor, left[:r, chosen].conj(), trans=1)
 
 
@@ -344,5 +350,5 @@ def _factor(matrix: Array) -> tuple[Array, Array]:
         raise AnalysisError("the projected contact problem is not finite; check the model's units and stiffnesses")
     factor = sl.lu_factor(matrix)
     if np.abs(np.diag(factor[0])).min(initial=np.inf) == 0.0:
-        raise AnalysisError("the projected contact problem is singular: the same contact is given twice, or friction jams")
+        raise AnalysisError("the projected contact problem is singular: a contact is given twice, or friction jams")
     return factor

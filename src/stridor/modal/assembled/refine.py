@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from ...direct import factorise
 from ...errors import AnalysisError
-from ...typing import Array, ComplexArray, IntArray, Sparse
+from ...typing import Array, BoolArray, ComplexArray, IntArray, Sparse
 from .problem import ContactProblem, times, tiny
 from .reduced import Eigenpairs, Reduced
 from .shifted import Shifted, frictionless_modes, modes_below, real_columns, shift_for
@@ -123,9 +123,7 @@ def settle(reduced: Reduced, frictions: Iterable[float], *, left: bool = False) 
             reduced.compress()
 
 
-def unbalanced(
-    reduced: Reduced, mu: float, tolerance: float, *, left: bool = False
-) -> tuple[float, Array, Array]:
+def unbalanced(reduced: Reduced, mu: float, tolerance: float, *, left: bool = False) -> tuple[float, Array, Array]:
     """Largest backward error at ``mu``, and what the band's eigenpairs that are not exact leave unbalanced: forces
     (n, k) against their inertia forces, and for left vectors the slips (m, l) that must open the gaps."""
     problem = reduced.problem
@@ -136,7 +134,7 @@ def unbalanced(
     error = problem.backward_error(lam, u, p, mu)
     rest = problem.residual(lam, u, p, mu)
     forces = [_relative(reduced, rest, lam, u, error > tolerance)]
-    openings = [np.zeros((problem.nodes, 0))]
+    openings: list[Array] = [np.zeros((problem.nodes, 0))]
     if left:
         y, q = left_vectors(reduced, lam, found.left[:, chosen], mu)
         left_error = problem.left_backward_error(lam, y, q, mu)
@@ -147,7 +145,7 @@ def unbalanced(
     return float(error.max(initial=0.0)), np.hstack(forces), np.hstack(openings)
 
 
-def _relative(reduced: Reduced, rest: ComplexArray, lam: ComplexArray, u: ComplexArray, inexact: Array) -> Array:
+def _relative(reduced: Reduced, rest: ComplexArray, lam: ComplexArray, u: ComplexArray, inexact: BoolArray) -> Array:
     """Residuals (n, k) over the pairs' inertia forces, of those that are inexact or large against them."""
     weight = lumped(reduced.problem)[:, None]
     inertia = (np.abs(lam) ** 2 + reduced.shifted.shift) * np.linalg.norm(np.sqrt(weight) * u, axis=0)
@@ -156,9 +154,7 @@ def _relative(reduced: Reduced, rest: ComplexArray, lam: ComplexArray, u: Comple
     return real_columns(rest[:, chosen] / tiny(inertia[chosen]))
 
 
-def left_vectors(
-    reduced: Reduced, lam: ComplexArray, w: ComplexArray, mu: float
-) -> tuple[ComplexArray, ComplexArray]:
+def left_vectors(reduced: Reduced, lam: ComplexArray, w: ComplexArray, mu: float) -> tuple[ComplexArray, ComplexArray]:
     """y (n, k) of unit norm and q (m, k) of left vectors: −(N + μS) y / c, where rigid what fits the equations best."""
     problem = reduced.problem
     y = reduced.expand_left(w)

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from ...direct import Factor, factorise
 from ...errors import AnalysisError
-from ...typing import Array, ComplexArray
+from ...typing import Array
 from .problem import ContactProblem
 
 BLOCK = 24  # right sides solved for at once while modes are sought
@@ -152,10 +152,8 @@ def _polished(shifted: Shifted, shapes: Array) -> tuple[Array, Pair]:
     return squares, Pair(u, p).turned(turn)
 
 
-def orthonormal(
-    problem: ContactProblem, basis: Pair, block: Pair, *, smallest: float = 1e-8
-) -> tuple[Pair, Array]:
-    """What pairs ``block`` (k) add to the M-orthonormal pairs ``basis``, and the weights (a, k) with which they hold it.
+def orthonormal(problem: ContactProblem, basis: Pair, block: Pair, *, smallest: float = 1e-8) -> tuple[Pair, Array]:
+    """What pairs ``block`` (k) add to the M-orthonormal pairs ``basis``, and the weights (a, k) of it in them.
 
     Contact forces are transformed as their shapes are. Directions that leave less than ``smallest`` of their column's
     length, which is all that distinguishes them from rounding, are left out.
@@ -185,7 +183,7 @@ def orthonormal(
     return new, new.u.T @ (mass @ block.u)
 
 
-def real_columns(block: ComplexArray | Array) -> Array:
+def real_columns(block: Any) -> Array:
     """Real and imaginary parts side by side, the imaginary ones only where there are any."""
     if block.dtype.kind != "c":
         return np.asarray(block)

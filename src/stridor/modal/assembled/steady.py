@@ -29,7 +29,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Touching:
-    """Nodes in contact: active (m,), and sense (m, d−1), the unit vector against the slip, zero at the centre of a spin."""
+    """Nodes in contact: active (m,), and sense (m, d−1), the unit vector against the slip, zero where there is none."""
 
     active: BoolArray
     sense: Array

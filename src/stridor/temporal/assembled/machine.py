@@ -59,6 +59,15 @@ class Machine:
         """u (n,) [m] of the freedoms."""
         return self.fields.u[self.layout.place]
 
+    @property
+    def threaded(self) -> bool:
+        """Whether the structure is large enough for two threads."""
+        return int(self.structure.parts[0]) < self.layout.blocks
+
+    def use_threads(self, *, two: bool) -> None:
+        """Run the two parts of the structure at once or one after the other, which changes no number."""
+        self.structure.flags[3] = two
+
     def set_nodes(self, nodes: ContactNodes) -> None:
         """Take contact nodes as they are paired now; forces, status and offsets are kept."""
         self.nodes = nodes
@@ -165,7 +174,7 @@ def _structure(system: System, scheme: Scheme, layout: Layout, mass: Array, damp
         mass=layout.spread(mass),
         damping=layout.spread(damping.diagonal),
         parts=parts([stiffness, rest] if second else [stiffness], layout.size),
-        flags=np.array([folded, second, wanted], dtype=np.int64),
+        flags=np.array([folded, second, wanted, True], dtype=np.int64),
         numbers=np.array([step, beta2, step * (0.5 + beta2), step * (beta2 - 0.5)]),
     )
 
@@ -214,6 +223,7 @@ def _scratch(table: NodeTable) -> NodeScratch:
         q=np.zeros(places),
         correction=np.zeros(places),
         gap=np.zeros(nodes),
+        earlier=np.zeros(nodes),
         slip=np.zeros((nodes, t)),
         chosen=np.zeros(nodes, dtype=np.int64),
         marked=np.zeros(nodes, dtype=np.int64),

@@ -22,13 +22,12 @@ from ..trajectory import PhaseResult, Trajectory
 from .limit import step_limit_assembled
 from .loop import NOT_FINITE
 from .machine import Machine, assembled_machine, diagonal_mass
+from .pace import Pace
 from .renewal import node_distances, renew, slides_finitely, steps_to_renewal, take_over
 from .results import buffers, clear_statistics, phase_result, trajectory
 from .start import begin, check_restart, joined_runs, restore, saved_state
 
-FIRST_CHUNK = 20
-CHUNK_SECONDS = 1.0
-LONGEST_CHUNK = 20_000
+TOLD_SECONDS = 0.5
 Progress = Callable[[int, int], None]
 Checkpoint = Callable[[Trajectory], None]
 
@@ -133,22 +132,21 @@ class _Run:
         started = last_saved = last_told = clock.perf_counter()
         machine, schedule = self.machine, self.schedule
         interrupted = False
-        chunk = FIRST_CHUNK
+        pace = Pace(machine.threaded)
         try:
             while machine.done < schedule.steps:
                 if self.finite and machine.done >= self.renewal:
                     self._renew()
-                size = min(chunk, schedule.stretch_at(machine.done).last - machine.done)
+                size = min(pace.begin(), schedule.stretch_at(machine.done).last - machine.done)
                 if self.finite:
                     size = min(size, self.renewal - machine.done)
+                machine.use_threads(two=pace.two)
                 before = clock.perf_counter()
                 self._advance(size)
                 now = clock.perf_counter()
                 self.wall = now - started
-                # About a second, growing with care: the first chunk may have compiled.
-                affordable = int(CHUNK_SECONDS * size / max(now - before, 1e-9))
-                chunk = max(1, min(4 * chunk, affordable, LONGEST_CHUNK))
-                if progress is not None and (now - last_told > CHUNK_SECONDS / 2 or machine.done == schedule.steps):
+                pace.end(size, now - before)
+                if progress is not None and (now - last_told > TOLD_SECONDS or machine.done == schedule.steps):
                     progress(machine.done, schedule.steps)
                     last_told = now
                 if checkpoint is not None and now - last_saved > every_seconds:

@@ -3,8 +3,11 @@
 With the free motion at hand, only nodes that would close, or that carried force in the step before, take part. Each
 is solved exactly with the latest forces of the others; what forces change is kept as a correction of the places that
 contacts touch, so that G A Gᵀ is never formed. When the sweeps have settled, the nodes left out are looked at again,
-and those that the forces have closed join in. A compliant layer stretches the gap equation: gap + compliance·N is what
-is zero where N is not.
+and those that the forces have closed join in.
+
+A compliant layer stretches the gap equation. Its force at t_n belongs to the gap at t_n; with g_{n+1} instead it would
+lag by a step and damp like a dashpot of Δt/compliance. The mean of g_{n+1} and g_{n−1} is centred, so that (g_{n+1} +
+g_{n−1})/2 + compliance·N is what is zero where N is not: second order, stable for any stiffness, and no damping.
 """
 
 from __future__ import annotations
@@ -38,12 +41,14 @@ class NodeState(NamedTuple):
 
 class NodeScratch(NamedTuple):
     """Work space: u, q (l,) at t_{n+1}, correction (l,) of u by forces; gap (m,), slip (m, d−1) [m] free of forces;
+    earlier (m,) [m]: gap at t_{n−1} of compliant nodes, zero of rigid ones;
     chosen (m,): nodes that take part, marked (m,); speed (m, d−1) [m/s] of slip at t_n; force (2, d) of one node."""
 
     u: Array
     q: Array
     correction: Array
     gap: Array
+    earlier: Array
     slip: Array
     chosen: IntArray
     marked: IntArray
@@ -87,7 +92,7 @@ def _relax(
     """Forces (d,) of node i with those of all others as they are into new; its status."""
     d = table.row.shape[1]
     block, force = table.block[i], state.force[i]
-    gap = work.gap[i] - block[0, 0] * force[0]
+    gap = work.gap[i] + work.earlier[i] - block[0, 0] * force[0]
     s1 = work.slip[i, 0] - block[1, 0] * force[0]
     s2 = 0.0
     for j in range(1, d):
@@ -102,7 +107,7 @@ def _relax(
         if d == 3:
             s2 += table.row[p, 2] * moved
     law = table.friction[table.owner[i]]
-    w_nn = block[0, 0] + table.compliance[i]
+    w_nn = block[0, 0] + 2.0 * table.compliance[i]
     if d == 2:
         new[0], new[1], status = _solve_contact(
             gap, s1, w_nn, block[0, 1], block[1, 1], law[0], law[1], law[2], state.status[i] == _STICK, step
@@ -147,6 +152,19 @@ def _sweeps(
 
 
 @njit(cache=True)
+def _gap_before(
+    i: int, gap: float, step: float, ratio: Array, increments: Array, table: NodeTable, state: NodeState, work: NodeScratch
+) -> float:  # pragma: no cover - compiled
+    """Gap [m] of node i at t_{n−1}, from its free one at t_{n+1}, the free increment and q_n."""
+    for p in range(table.ptr[i], table.ptr[i + 1]):
+        c = table.col[p]
+        gap -= table.row[p, 0] * (ratio[0] * work.q[c] - ratio[1] * state.q[c] + step * state.q[c])
+    for m in range(increments.shape[0]):
+        gap -= 2.0 * table.lift[i, 0, m] * increments[m]
+    return gap
+
+
+@njit(cache=True)
 def solve_nodes(
     step: float, ratio: Array, x: Array, increments: Array, table: NodeTable, state: NodeState, work: NodeScratch,
     status: IntArray,
@@ -166,9 +184,12 @@ def solve_nodes(
         for j in range(x.shape[0]):
             gap += table.lift[i, 0, j] * x[j]
         work.gap[i] = gap
+        work.earlier[i] = 0.0
+        if table.compliance[i] > 0.0:
+            work.earlier[i] = _gap_before(i, gap, step, ratio, increments, table, state, work)
         work.marked[i] = 0
         status[i] = _OPEN
-        if gap < 0.0 or state.force[i, 0] > 0.0:
+        if gap + work.earlier[i] < 0.0 or state.force[i, 0] > 0.0:
             count = _take_in(i, count, increments, ratio, table, state, work)
     if count == 0:
         return 0, 0
@@ -187,7 +208,7 @@ def solve_nodes(
         before = count
         for i in range(m):
             if work.marked[i] == 0:
-                gap = work.gap[i]
+                gap = work.gap[i] + work.earlier[i]
                 for p in range(table.ptr[i], table.ptr[i + 1]):
                     gap += table.row[p, 0] * work.correction[table.col[p]]
                 if gap < 0.0:

@@ -38,8 +38,8 @@ class Fields(NamedTuple):
 
 class Structure(NamedTuple):
     """The scheme on places: K, what else of C is not proportional (empty: none), keep = 1 − Δt C_d/(M + β2ΔtC_d) of q,
-    kick = Δt/(M + β2ΔtC_d), factor b, mass, damping C_d; parts for the threads; flags (3,): b used, second product
-    used, works wanted (0, DASHPOTS, WITH_STIFFNESS); numbers (4,): Δt, β2, Δt(1/2 + β2), Δt(β2 − 1/2)."""
+    kick = Δt/(M + β2ΔtC_d), factor b, mass, damping C_d; parts for the threads; flags (4,): b used, second product
+    used, works wanted (0, DASHPOTS, WITH_STIFFNESS), two threads; numbers (4,): Δt, β2, Δt(1/2 + β2), Δt(β2 − 1/2)."""
 
     stiffness: Blocks
     rest: Blocks
@@ -200,10 +200,14 @@ def advance(a: Structure, f: Fields, power: Array) -> float:  # pragma: no cover
     cut, reach = a.parts[0], a.parts[1]
     if cut == blocks:
         return _part(a, f, f.y[0], 0, blocks, 0)
-    _two_parts(
-        a.stiffness.ptr, a.stiffness.col, a.stiffness.val, a.rest.ptr, a.rest.col, a.rest.val, a.keep, a.kick, a.factor,
-        a.mass, a.damping, a.parts, a.flags, a.numbers, f.u, f.q, f.shown, f.push, f.y, power,
-    )  # fmt: skip
+    if a.flags[3]:
+        _two_parts(
+            a.stiffness.ptr, a.stiffness.col, a.stiffness.val, a.rest.ptr, a.rest.col, a.rest.val, a.keep, a.kick,
+            a.factor, a.mass, a.damping, a.parts, a.flags, a.numbers, f.u, f.q, f.shown, f.push, f.y, power,
+        )  # fmt: skip
+    else:
+        power[0] = _part(a, f, f.y[0], 0, cut, 0)
+        power[8] = _part(a, f, f.y[1], cut, blocks, reach)
     width = f.u.shape[0] // blocks
     first, second = f.y[0], f.y[1]
     for i in range(cut * width, reach * width):

@@ -76,6 +76,7 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings, mu: float 
     )
     machine.state.motion[1] = stretch.velocities_after
     machine.contacts.force[:, 0] = np.where(steady.active, steady.normal_force, 0.0)
+    machine.contacts.force[:, 1:] = steady.friction_force
     machine.contacts.status[:] = np.where(steady.active, 2, 0)
     velocity = np.zeros(system.size)
     if settings.perturbation:
