@@ -74,15 +74,16 @@ def modes_of(system: System, part: np.ndarray, count: int) -> tuple[np.ndarray, 
     return squares[order], shapes[:, order]
 
 
-def component(system: System, name: str) -> np.ndarray:
-    """The freedoms that the one of a name belongs to."""
-    return next(p for p in system.components if any(system.dof_names[i] == name for i in p))
+def component(system: System, freedom: int) -> np.ndarray:
+    """The freedoms that one is coupled with, contact aside."""
+    return next(p for p in system.components if freedom in p)
 
 
 def with_frequencies_of(system: System, source: System) -> System:
     """The beams with their shapes, and the frequencies that the solids have without contact, up to 40 kHz."""
-    pin = modes_of(source, component(source, "pin node 0 x"), 9)[0]
-    beam = modes_of(source, component(source, "beam node 12 x"), 13)[0]
+    pin, beam = (
+        modes_of(source, component(source, source.solids[k].freedoms[0]), count)[0] for k, count in ((0, 9), (2, 13))
+    )
     speed = math.sqrt(200e9 / 7800.0)
     rods = [(2 * np.pi * (2 * k + 1) * speed / 0.6) ** 2 for k in range(3)]
     traction = [int(np.argmin(np.abs(beam - square))) for square in rods]
@@ -93,7 +94,7 @@ def with_frequencies_of(system: System, source: System) -> System:
     }
     stiffness = system.stiffness.toarray()
     for name, squares in own.items():
-        part = component(system, name)
+        part = component(system, system.dof_names.index(name))
         before, shapes = modes_of(system, part, len(squares))
         change = np.where(before > 1.0, squares - before, 0.0)
         weighted = system.mass[part][:, part] @ shapes

@@ -32,7 +32,7 @@ SAMPLES = 16  # per period of the fastest of them
 def modes_as_in_time(system: System, mu: float, max_frequency_hz: float) -> ComplexModes:
     """Modes with right vectors, of the very model that the time loop marches."""
     return complex_modes(
-        system, mu, max_frequency_hz=max_frequency_hz, vectors=True, friction_damping=system.dimension == 3
+        system, mu, max_frequency_hz=max_frequency_hz, vectors="right", friction_damping=system.dimension == 3
     )
 
 

@@ -29,9 +29,7 @@ def write_shapes(
     in the list of modes.
     """
     system = build_system(case)
-    modes = analyses.modes(
-        case, mu, max_frequency_hz=case.modal.max_frequency_hz, vectors=True
-    )
+    modes = analyses.modes(case, mu, max_frequency_hz=case.modal.max_frequency_hz, vectors="right")
     chosen = _chosen(modes, branches)
     documents: list[dict[str, Any]] = []
     for column in chosen:
@@ -64,16 +62,15 @@ def _write_one(system: System, modes: ComplexModes, column: int, folder: Path, *
     branch, frequency = int(modes.branch[column]), float(modes.frequency_hz[0, column])
     growth = float(modes.growth_rate[0, column])
     stem = f"mode-{branch}-{frequency:.0f}Hz"
-    words = {"frequency_hz": frequency, "growth_rate": growth}
-    figure = mode_shape(system, vector, **words)
+    figure = mode_shape(system, vector, frequency_hz=frequency, growth_rate=growth)
     files = [folder / f"{stem}.png", folder / f"{stem}.html"]
     with replacing(files[0]) as temporary:
         figure.savefig(temporary, dpi=180)
-    write_text(files[1], animation_html(system, vector, **words))
+    write_text(files[1], animation_html(system, vector, frequency_hz=frequency, growth_rate=growth))
     if gif:
         files.append(folder / f"{stem}.gif")
         with replacing(files[-1]) as temporary:
-            temporary.write_bytes(animation_gif(system, vector, **words))
+            temporary.write_bytes(animation_gif(system, vector, frequency_hz=frequency, growth_rate=growth))
     energy = _energy(system, modes, column)
     if energy is not None and len(energy) > 1:
         files.append(_energy_picture(system, energy, folder / f"{stem}-friction-energy.png"))
@@ -83,7 +80,7 @@ def _write_one(system: System, modes: ComplexModes, column: int, folder: Path, *
         vectors={"displacement": vector},
         contact_data=None if energy is None else {"friction_energy": energy},
     )
-    return {"branch": branch, **words, "files": [str(f) for f in files]}
+    return {"branch": branch, "frequency_hz": frequency, "growth_rate": growth, "files": [str(f) for f in files]}
 
 
 def _energy(system: System, modes: ComplexModes, column: int) -> Array | None:

@@ -192,7 +192,8 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
             yield Problem(f"{where}.friction.static_coefficient", friction.static_coefficient, accepted)
         pair = frozenset((contact.slave, contact.master))
         if pair in pairs:
-            yield Problem(f"{where}.slave", contact.slave, f"slides on {contact.master} in contacts.{pairs[pair]} already")
+            accepted = f"slides on {contact.master} in contacts.{pairs[pair]} already"
+            yield Problem(f"{where}.slave", contact.slave, accepted)
             continue
         pairs[pair] = name
         slave = yield from _place(parts, contact.slave, f"{where}.slave")

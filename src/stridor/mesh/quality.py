@@ -161,6 +161,23 @@ def _cell_problems(mesh: Mesh, where: str) -> list[Problem]:
     if degenerate:
         text = f"{degenerate} of {mesh.cell_count} cells are degenerate (zero Jacobian: flat, or nodes at one place)"
         problems.append(Problem(where, None, f"{text}; {_first(*first['degenerate'])}"))
+    return [*problems, *_duplicate_problems(mesh, where)]
+
+
+def _duplicate_problems(mesh: Mesh, where: str) -> list[Problem]:
+    """Cells of the same nodes as another one: their mass and stiffness would count twice."""
+    # Sums of random numbers of the nodes, whatever their order: equal by chance once in 2⁶⁴.
+    mark = np.random.default_rng(0).integers(0, 2**63, len(mesh.points), dtype=np.uint64)
+    problems: list[Problem] = []
+    for kind, block in mesh.cells.items():
+        sums = mark[block].sum(axis=1, dtype=np.uint64)
+        order = np.argsort(sums, kind="stable")
+        again = order[1:][sums[order[1:]] == sums[order[:-1]]]
+        if len(again):
+            cell = int(again.min())
+            place = mesh.points[block[cell, : KINDS[kind].corners]].mean(axis=0)
+            text = f"{len(again)} of {mesh.cell_count} cells have the nodes of another cell"
+            problems.append(Problem(where, None, f"{text}; {_first(kind, cell, place)}; take them out of the file"))
     return problems
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -123,7 +123,7 @@ def complex_modes(
     count: int = 20,
     max_frequency_hz: float | None = None,
     damped: bool = True,
-    vectors: bool = False,
+    vectors: bool | Literal["right"] = False,
     friction_damping: bool = False,
     prestress: bool = False,
     solver: str | None = None,
@@ -131,10 +131,10 @@ def complex_modes(
     """Modes at the friction coefficients ``mu``, branches followed from μ = 0.
 
     count: how many branches, lowest frequencies at μ = 0 first; max_frequency_hz instead takes all
-    that start below it. vectors keeps left and right ones. Large systems and contacts over surfaces are solved on
-    the assembled matrices (`modal.assembled`); friction_damping (across the direction of sliding), prestress and
-    the direct solver matter there only. Raises AnalysisError where contacts do
-    not slide, have no equilibrium, or branches cannot be told apart.
+    that start below it. vectors keeps left and right ones, "right" those alone where that saves time. Large
+    systems and contacts over surfaces are solved on the assembled matrices (`modal.assembled`); friction_damping
+    (across the direction of sliding), prestress and the direct solver matter there only. Raises AnalysisError where
+    contacts do not slide, have no equilibrium, or branches cannot be told apart.
     """
     values = np.atleast_1d(np.asarray(mu, dtype=float))
     if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)) or np.any(values < 0):

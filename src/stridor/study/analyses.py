@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def modes(
     count: int | None = None,
     max_frequency_hz: float | None = None,
     damped: bool | None = None,
-    vectors: bool = False,
+    vectors: bool | Literal["right"] = False,
 ) -> ComplexModes:
     """Complex modes at one or many friction coefficients (default: the case's own).
 

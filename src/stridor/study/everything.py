@@ -170,7 +170,7 @@ def _large(
     own = (
         None
         if mu is None
-        else clock("modes", lambda: analyses.modes(case, mu, max_frequency_hz=limit, vectors=True))
+        else clock("modes", lambda: analyses.modes(case, mu, max_frequency_hz=limit, vectors="right"))
     )
     vector, mode, energy = (None, None, None) if own is None else _squealing(system, own)
     run = clock("simulate", lambda: analyses.simulate(case, progress=progress))

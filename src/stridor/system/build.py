@@ -12,6 +12,7 @@ from ..case.bodies import MassBody, SolidBody
 from ..case.points import BoundaryRef
 from ..case.schema import Load
 from ..contact.interface import Rows
+from ..errors import CaseError
 from ..fe.solid import stress_stiffness
 from ..mesh.boundary import require_boundary
 from ..mesh.facets import facet_areas, pressure_load, traction_load
@@ -35,6 +36,8 @@ def build_system(case: Case) -> System:
     tie, followers = (None, np.zeros(0, dtype=np.int64)) if tied is None else tied
     structure = _structure(bodies, links, tie)
     free, motion = constrain(structure, constraints, followers, _translations(bodies, total))
+    if not len(free):
+        raise CaseError("supports", None, "hold every degree of freedom of the case; leave some of them free")
     motion = _with_sliding(case, motion)
     view = View(bodies, total, free, motion, constraints, tie)
     points = {at: view.point_rows(case, at) for at in _references(case)}
@@ -150,8 +153,7 @@ def _load(case: Case, view: View, name: str, load: Load) -> Array:
         force[: len(load.force)] = load.force
         return rows.T @ force
     assert body.mesh is not None, "checked: boundaries belong to meshes"
-    require_boundary(body.mesh, at.boundary, f"loads.{name}.at")
-    facets = body.mesh.boundaries[at.boundary]
+    facets = require_boundary(body.mesh, at.boundary, f"loads.{name}.at")
     thickness = getattr(case.bodies[at.body], "thickness", 1.0) if body.dimension == 2 else 1.0
     nodal = load.pressure * pressure_load(body.points, facets, thickness=thickness)
     if any(load.force):

@@ -29,6 +29,7 @@ from ..mesh.quality import check_mesh
 
 # Products of lengths, moduli and densities stay numbers between these [m].
 _LEAST_EXTENT, _MOST_EXTENT = 1e-20, 1e20
+_FARTHEST = 1e8  # from the origin, over the extent: half of the digits of a place are left for shape and strain
 
 
 @dataclass(frozen=True)
@@ -82,11 +83,18 @@ def load_mesh(name: str, body: SolidBody) -> LoadedMesh:
 
 
 def _refuse_absurd(mesh: Mesh, where: str, body: SolidBody) -> None:
-    """Lengths whose squares and cubes no double holds, and points that hide a boundary of the file."""
+    """Lengths whose cubes no double holds, places beyond rounding, and points that hide a boundary of the file."""
     extent = float(np.ptp(mesh.points, axis=0).max(initial=0.0))
     if len(mesh.points) and not _LEAST_EXTENT < extent < _MOST_EXTENT:
         accepted = f"{extent:.3g} m in extent; must be between {_LEAST_EXTENT:g} and {_MOST_EXTENT:g} m"
         raise CaseError(f"{where}.mesh" if body.mesh is not None else f"{where}.file", body.file, accepted)
+    away = float(np.abs(mesh.points).max(initial=0.0))
+    if away > _FARTHEST * extent:
+        accepted = (
+            f"lies {away:.3g} m from the origin, with an extent of {extent:.3g} m: rounding would bend it; move the "
+            "bodies of the case nearer to the origin"
+        )
+        raise CaseError(where, None, accepted)
     for point in body.points:
         if point in mesh.boundaries:
             accepted = f"{mesh.source} has a boundary of this name; choose another name"

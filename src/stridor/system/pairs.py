@@ -20,7 +20,7 @@ from ..errors import CaseError
 from ..mesh.boundary import require_boundary
 from ..mesh.facets import nodal_areas, nodal_normals
 from ..typing import Array
-from .supports import boundary_nodes, master_surface
+from .supports import master_surface
 from .view import View, point_position
 
 
@@ -100,11 +100,8 @@ def _slave(case: Case, view: View, where: str, contact: ContactCase) -> tuple[Ro
             True,
         )
     assert body.mesh is not None, "checked: boundaries belong to meshes"
-    require_boundary(body.mesh, at.boundary, f"{where}.slave")
-    facets = body.mesh.boundaries.get(at.boundary)
-    if facets is None:
-        raise CaseError(f"{where}.slave", contact.slave, "is a set of nodes; a slave surface needs facets")
-    nodes = boundary_nodes(body, at, f"{where}.slave")
+    facets = require_boundary(body.mesh, at.boundary, f"{where}.slave")
+    nodes = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
     thickness = getattr(case.bodies[at.body], "thickness", 1.0)
     area = nodal_areas(body.points, facets, thickness=thickness if body.dimension == 2 else 1.0)[nodes]
     normals = nodal_normals(body.points, facets)[nodes]

@@ -13,7 +13,7 @@ from ..contact.ties import Bond, Tie, tie_transformation
 from ..contact.ties import tie as tie_weights
 from ..errors import CaseError
 from ..mesh.boundary import require_boundary
-from ..mesh.model import FACET_KINDS, Mesh
+from ..mesh.model import Mesh
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody
 from .model import Constraint
@@ -74,10 +74,7 @@ def _held_nodes(body: BuiltBody, at: PointRef | BoundaryRef, where: str) -> IntA
 
 def master_surface(mesh: Mesh, boundary: str, where: str) -> tuple[Curve | FacetSurface, IntArray]:
     """A boundary as a surface to slide or be bonded on, and the mesh nodes (k,) in the order of its own numbering."""
-    require_boundary(mesh, boundary, where)
-    facets = mesh.boundaries.get(boundary, {})
-    if not any(kind in FACET_KINDS for kind in facets):
-        raise CaseError(where, boundary, "is a set of nodes; contact and ties need facets: a surface or a boundary")
+    facets = require_boundary(mesh, boundary, where)
     if mesh.dimension == 2:
         curve = Curve.from_facets(mesh.points, facets, where=where)
         return curve, curve.nodes

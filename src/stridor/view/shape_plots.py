@@ -9,6 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..case import Case
+from ..case.bodies import BeamBody
+from ..case.points import PointRef
 from ..system import System
 from ..typing import Array, ComplexArray
 from .style import COLOURS, GREEN, GREY, INK, PURPLE, VERMILION, legend_above, new_figure, panel, root_figure, styled
@@ -139,7 +141,9 @@ def _draw_shape(ax: Axes, system: System, motion: Mapping[str, ComplexArray], *,
 
 def _draw_case(ax: Axes, case: Case, reach: float) -> None:
     for support in case.supports.values():
-        at = 1e3 * _place(case, support.at)
+        at = _place(case, support.at)
+        if at is None:
+            continue
         ax.plot(*at, "s", mfc="white", mec=INK, ms=8, mew=1.4, zorder=4)
         held = ", ".join({"rotation": "φ"}.get(d, d) for d in support.fixed)
         ax.annotate(
@@ -157,11 +161,13 @@ def _draw_case(ax: Axes, case: Case, reach: float) -> None:
             side = beside if beside[1] >= 0 else -beside
             _arrow(ax, at + side, speed, 0.16 * reach, GREEN, f"{np.hypot(*speed):g} m/s", away=False)
     for load in case.loads.values():
-        if any(load.force):
-            at = 1e3 * _place(case, load.at)
-            _arrow(ax, at, np.array(load.force), 0.16 * reach, VERMILION, f"{np.hypot(*load.force):g} N", away=True)
+        at = _place(case, load.at)
+        if any(load.force) and at is not None:
+            _arrow(ax, at, np.array(load.force), 0.16 * reach, VERMILION, f"{np.linalg.norm(load.force):g} N", away=True)
     for watched in case.temporal.watch:
-        at = 1e3 * _place(case, watched)
+        at = _place(case, watched)
+        if at is None:
+            continue
         ax.plot(*at, "o", mfc="white", mec=PURPLE, ms=4.5, mew=1.2, zorder=5)
     if case.temporal.watch:
         ax.plot([], [], "o", mfc="white", mec=PURPLE, ms=4.5, mew=1.2, label="watched points")
@@ -189,9 +195,14 @@ def _arrow(ax: Axes, at: Array, along: Array, length: float, colour: str, text: 
     ax.plot(end[0], end[1], alpha=0)  # counts for the limits of the axes
 
 
-def _place(case: Case, reference: str) -> Array:
-    point = case.point(reference)
-    return np.array(case.bodies[point.body].coordinates(point.distance))
+def _place(case: Case, reference: str) -> Array | None:
+    """Coordinates (2,) [mm] of a point; None for a boundary, which is not one place."""
+    point = case.place(reference)
+    if not isinstance(point, PointRef):
+        return None
+    body = case.bodies[point.body]
+    place = body.coordinates(point.distance) if isinstance(body, BeamBody) else point.coordinates
+    return None if place is None else 1e3 * np.array(place)
 
 
 def _mark_contacts(ax: Axes, system: System, *, named: bool) -> None:

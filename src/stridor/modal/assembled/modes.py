@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
@@ -28,14 +29,15 @@ def complex_modes_assembled(
     count: int = 20,
     max_frequency_hz: float | None = None,
     damped: bool = True,
-    vectors: bool = False,
+    vectors: bool | Literal["right"] = False,
     options: Options | None = None,
 ) -> ComplexModes:
     """Modes at the friction coefficients ``mu``, branches followed from μ = 0, as `complex_modes` gives them.
 
     count: how many branches, lowest frequencies at μ = 0 first; max_frequency_hz instead takes all that start below it.
-    vectors keeps left and right ones, n numbers for each. Raises CaseError for friction coefficients or counts that are
-    none, AnalysisError where contacts do not slide, have no equilibrium, or the modes do not settle.
+    vectors keeps left and right ones, "right" those alone, n numbers for each. Raises CaseError for friction
+    coefficients or counts that are none, AnalysisError where contacts do not slide, have no equilibrium, or the modes
+    do not settle.
     """
     values = checked_friction(mu)
     if count < 1:
@@ -49,11 +51,13 @@ def complex_modes_assembled(
     band = Band(count, None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz)
     reduced = projected(problem, band)
     top = float(values.max())
-    settle(reduced, [*samples(top), *values], left=vectors)
+    settle(reduced, [*samples(top), *values], left=vectors is True)
     return _followed(reduced, values, band, damped=damped, vectors=vectors)
 
 
-def _followed(reduced: Reduced, values: Array, band: Band, *, damped: bool, vectors: bool) -> ComplexModes:
+def _followed(
+    reduced: Reduced, values: Array, band: Band, *, damped: bool, vectors: bool | Literal["right"]
+) -> ComplexModes:
     """The branches of the band at all μ, judged in the sparse problem."""
     problem = reduced.problem
     longest = max(float(values.max()) / 10, 1e-3)
@@ -75,6 +79,7 @@ def _followed(reduced: Reduced, values: Array, band: Band, *, damped: bool, vect
         eigenvalues[k], residual[k] = lam, problem.backward_error(lam, u, p, mu)
         if vectors:
             right[k] = u.T
+        if vectors is True:
             left[k] = left_vectors(reduced, lam, state.found.left[:, place], mu)[0].T
     return ComplexModes(
         mu=values,
@@ -83,7 +88,7 @@ def _followed(reduced: Reduced, values: Array, band: Band, *, damped: bool, vect
         residual=residual,
         damped=damped,
         right=right if vectors else None,
-        left=left if vectors else None,
+        left=left if vectors is True else None,
         open_contacts=problem.open_contacts,
     )
 

@@ -216,7 +216,7 @@ def _extras(state: Steadiness, grid: Array | None) -> Callable[[float], Extras]:
 
 def _lagrange(grid: Array, mu: float) -> Array:
     """Weights (k,) of the polynomial through values at grid (k,)."""
-    return np.array([np.prod([(mu - b) / (a - b) for b in grid if b != a]) for a in grid])
+    return np.array([float(np.prod([(mu - b) / (a - b) for b in grid if b != a])) for a in grid], dtype=float)
 
 
 def _between(terms: list[Extras], weights: Array) -> Extras:

@@ -153,7 +153,14 @@ def _sweeps(
 
 @njit(cache=True)
 def _gap_before(
-    i: int, gap: float, step: float, ratio: Array, increments: Array, table: NodeTable, state: NodeState, work: NodeScratch
+    i: int,
+    gap: float,
+    step: float,
+    ratio: Array,
+    increments: Array,
+    table: NodeTable,
+    state: NodeState,
+    work: NodeScratch,
 ) -> float:  # pragma: no cover - compiled
     """Gap [m] of node i at t_{n−1}, from its free one at t_{n+1}, the free increment and q_n."""
     for p in range(table.ptr[i], table.ptr[i + 1]):
