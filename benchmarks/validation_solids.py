@@ -102,6 +102,23 @@ def impacts() -> None:
         row(f"{name}, mean force", force, run.normal_force[during, 0].mean(), "N")
 
 
+def evenness() -> None:
+    """Two blocks under even pressure with meshes that do not match."""
+    print("\n| elements above and below | contact | least nodal pressure | largest |")
+    print("|---|---|---|---|")
+    for cells, upper, lower, stiffness in (
+        ("quad", 10, 10, "rigid"),
+        ("quad", 10, 9, "rigid"),
+        ("quad", 20, 9, "rigid"),
+        ("quad8", 10, 10, "rigid"),
+        ("quad8", 10, 9, "rigid"),
+        ("quad8", 10, 9, 1e12),
+    ):
+        least, largest = cases.unevenness(cases.case(cases.two_blocks(cells, upper, lower, stiffness)))
+        contact = stiffness if isinstance(stiffness, str) else f"{stiffness:g} N/m³"
+        print(f"| {cells}, {upper} and {lower} | {contact} | {least:.3f} | {largest:.3f} |")
+
+
 def numbers(system: System, *, damped: bool) -> str:
     """Onsets below 10 kHz: of the traction mode, of the squeal, of the pair near 3.6 kHz."""
     found = bench.onsets_of(system, damped=damped)
@@ -173,6 +190,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         contact(Path(folder), fine=fine)
     impacts()
+    evenness()
     refinement(fine=fine)
     causes(fine=fine)
 

@@ -349,6 +349,46 @@ max_frequency_hz = 12e3
 """
 
 
+def two_blocks(cells: str, upper: int, lower: int, stiffness: float | str = "rigid") -> str:
+    """Two equal blocks of plane strain, 1 m × 0.5 m, under 1 MPa, with so many elements along their contact."""
+
+    def block(name: str, bottom: float, along: int) -> str:
+        return f"""
+[bodies.{name}]
+type = "solid"
+material = "steel"
+model = "plane strain"
+mesh = {{ shape = "rectangle", corner = [0.0, {bottom}], size = [1.0, 0.5], divisions = [{along}, 5], cells = "{cells}" }}
+[supports.{name}]
+at = "{name}.left"
+fixed = ["x"]
+"""
+
+    return f"""
+title = "two blocks under even pressure"
+materials.steel = {{ young_modulus = 210e9, density = 7800.0, poisson_ratio = 0.3 }}
+{block("upper", 0.0, upper)}
+{block("lower", -0.5, lower)}
+[supports.base]
+at = "lower.bottom"
+fixed = ["y"]
+[loads.press]
+at = "upper.top"
+pressure = 1e6
+[contacts.joint]
+slave = "upper.bottom"
+master = "lower.top"
+stiffness = {f'"{stiffness}"' if isinstance(stiffness, str) else stiffness}
+friction = {{ law = "coulomb", coefficient = 0.0 }}
+"""
+
+
+def unevenness(model: Case) -> tuple[float, float]:
+    """Least and largest nodal pressure of two blocks over the 1 MPa that presses them."""
+    pressure = steady_sliding(model).normal_force / build_system(model).contact_nodes().area
+    return float(pressure.min() / 1e6), float(pressure.max() / 1e6)
+
+
 def ring(divisions: tuple[int, int], mu: float = 0.3, cells: str = "quad8") -> str:
     """A ring pressed on a turning shaft by pressure from outside, and held by two springs that make a couple."""
     return f"""

@@ -728,7 +728,7 @@ def test_no_template():
     with pytest.raises(CaseError) as caught:
         template_text("two-beam")
     assert str(caught.value) == (
-        "template: 'two-beam' – no such template; did you mean 'two-beams'? there are: two-beams"
+        "template: 'two-beam' – no such template; did you mean 'two-beams'? there are: pad-on-disc, two-beams"
     )
 
 

@@ -28,6 +28,8 @@ from solid_cases import (
     plate,
     ring,
     slider,
+    two_blocks,
+    unevenness,
 )
 
 pytestmark = pytest.mark.validation
@@ -135,6 +137,21 @@ def test_cylinder_on_a_block_by_penalty(tmp_path):
         assert found[:2] == pytest.approx(HERTZ, rel=0.01)
         away.append(np.abs(found / rigid - 1)[:2])
     assert np.all(away[1] < 0.12 * away[0])
+
+
+@pytest.mark.parametrize("cells", ["quad", "quad8"])
+def test_two_blocks_under_even_pressure(cells):
+    # even where meshes match; else nearly so with linear elements, while quadratic ones share out their forces badly
+    assert unevenness(case(two_blocks(cells, 10, 10))) == pytest.approx((1.0, 1.0), rel=1e-8)
+    model = case(two_blocks(cells, 10, 9))
+    assert st.steady_sliding(model).resultants["joint"].force == pytest.approx([0.0, 1e6], rel=1e-9, abs=1e-3)
+    least, largest = unevenness(model)
+    if cells == "quad":
+        assert least > 0.99
+        assert largest < 1.02
+    else:
+        assert least > 0.7
+        assert largest < 1.6
 
 
 def test_ring_on_a_shaft():

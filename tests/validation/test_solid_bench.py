@@ -210,6 +210,16 @@ def test_the_frequencies_are_what_moves_the_squeal():
     assert same.mu == pytest.approx(found.mu, rel=0.01)
 
 
+def test_the_pair_near_16_kilohertz_is_beyond_beams_without_shear():
+    plain, swapped, found = (
+        next(o for o in onsets_of(system, highest=17e3) if o.frequency_hz > 16e3)
+        for system in (beams(), with_thickness(with_frequencies_of(beams(), solids())), solids())
+    )
+    assert found.mu > 2 * plain.mu
+    assert swapped.mu == pytest.approx(found.mu, rel=0.03)
+    assert swapped.frequency_hz == pytest.approx(found.frequency_hz, rel=1e-3)
+
+
 def test_friction_on_the_surface_is_what_moves_the_onset_at_3_6_khz():
     swapped = with_frequencies_of(beams(), solids())
     low = {

@@ -125,10 +125,13 @@ def new(
 def check(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False) -> None:
     """Validate a case and print the model in words: bodies, contacts, time step against its limit."""
     from ..study.analyses import describe
-    from .output import print_json, stdout
+    from .output import print_json, say, stdout
 
     loaded = _load(case, set_, quiet=quiet)
     description = describe(loaded)
+    for warning in description.warnings:
+        if warning not in loaded.warnings:  # those are said already
+            say(f"warning: {warning}", quiet=quiet)
     if out is not None:
         from ..io.atomic import write_text
 

@@ -17,6 +17,7 @@ from .bodies import (
     SlidingTable,
     SolidBody,
 )
+from .fields import is_zero
 from .points import FULL_TURN, boundary_names
 
 _EDGES = {
@@ -79,7 +80,7 @@ def _sliding_problems(where: str, sliding: SlidingTable, dimension: int) -> Iter
         given = ", ".join(sliding.model_fields_set)
         accepted = f"must have velocity = [x, y] [m/s] or spin [rad/s]{f', not only {given}' if given else ''}"
         yield Problem(where, None, accepted)
-    if not any(sliding.axis):
+    if is_zero(sliding.axis):
         yield Problem(f"{where}.axis", sliding.axis, "must not be zero")
     elif dimension == 2 and (any(sliding.axis[:2]) or sliding.axis[2] < 0):
         accepted = "in the plane the axis is z; leave it out, and give a negative spin to turn clockwise"
@@ -170,7 +171,7 @@ def _obstacle_shape(where: str, body: ObstacleBody) -> Iterator[Problem]:
     if body.shape == "flat":
         if body.normal is None:
             yield Problem(f"{where}.normal", None, "missing – give [x, y] or [x, y, z], from the flat to the bodies")
-        elif not any(body.normal):
+        elif is_zero(body.normal):
             yield Problem(f"{where}.normal", body.normal, "must not be zero")
         for key in ("radius", "axis", "inside"):
             if value := getattr(body, key):
@@ -180,7 +181,7 @@ def _obstacle_shape(where: str, body: ObstacleBody) -> Iterator[Problem]:
         yield Problem(f"{where}.radius", None, "missing – give a number > 0 [m], the radius of the cylinder")
     if body.normal is not None:
         yield Problem(f"{where}.normal", body.normal, 'not used by "cylinder"')
-    if body.dimension == 3 and (body.axis is None or not any(body.axis)):
+    if body.dimension == 3 and (body.axis is None or is_zero(body.axis)):
         yield Problem(f"{where}.axis", body.axis, "missing – give [x, y, z], the axis of the cylinder, not zero")
     if body.dimension == 2 and body.axis is not None:
         yield Problem(f"{where}.axis", body.axis, "not used in the plane")

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from ..errors import CaseError, Problem
 from .bodies import AnyBody, BeamBody, MassBody, SolidBody
 from .body_checks import body_problems, shape_problems
+from .fields import is_zero
 from .points import BoundaryRef, Place, PointRef, no_such, parse_place, parse_point
 from .schema import (
     DEFAULT_PHASES,
@@ -295,7 +296,7 @@ def _link_problems(parts: Parts) -> Iterator[Problem]:
         elif link.direction is not None:
             if len(link.direction) != dimension:
                 yield Problem(f"{where}.direction", link.direction, f"must have {dimension} numbers")
-            elif not any(link.direction):
+            elif is_zero(link.direction):
                 yield Problem(f"{where}.direction", link.direction, "must not be zero")
 
 

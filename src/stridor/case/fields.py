@@ -28,6 +28,11 @@ POINT = 'a point, "body.point" or "body@distance"'
 PLACE = 'a point, "body.point" or "body@distance", or a boundary, "body.boundary"'
 
 
+def is_zero(vector: tuple[float, ...]) -> bool:
+    """Whether a vector is too short to give a direction: squares of its components would underflow."""
+    return max(map(abs, vector)) < 1.0 / MOST
+
+
 class Table(BaseModel):
     """A table of the case file: frozen, and without keys it does not know."""
 

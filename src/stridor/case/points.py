@@ -84,7 +84,7 @@ def parse_place(
     if isinstance(body, MassBody):
         raise CaseError(where, reference, f'a mass is one point; write "{head}"')
     if isinstance(body, SolidBody):
-        return _of_solid(reference, head, body, point, where)
+        return _of_solid(reference, head, body, point, where, boundary=boundary)
     if at:
         return PointRef(head, _distance(reference, distance, head, body, where))
     if point not in body.point_names:
@@ -99,13 +99,13 @@ def _first_point(body: AnyBody | None, *, boundary: bool) -> str:
     return MASS_POINT if isinstance(body, MassBody) else "start"
 
 
-def _of_solid(reference: str, name: str, body: SolidBody, point: str, where: str) -> Place:
+def _of_solid(reference: str, name: str, body: SolidBody, point: str, where: str, *, boundary: bool) -> Place:
     if not point:
         raise CaseError(where, reference, f'a solid has no axis; name a point in bodies.{name}.points')
     if point in body.points:
         return PointRef(name, 0.0, body.points[point])
     known = boundary_names(body)
-    if body.mesh is not None and point not in known:
+    if body.mesh is not None and point not in known and boundary:
         raise CaseError(
             where, reference, f"no such point or boundary{choice(point, [*body.points, *known], f'{name} has')}"
         )

@@ -179,7 +179,7 @@ def _never_touching(position: Array, location: Location, opposed: BoolArray, rea
     among = np.flatnonzero(over) if over.any() else np.arange(len(position))
     nearest = int(among[np.argmin(distance[among])])
     lead = (
-        f"the bodies never touch: the nearest node of the slave is {distance[nearest]:.3g} m from the master, "
+        f"the bodies do not face each other: the nearest node of the slave is {distance[nearest]:.3g} m from the master, "
         f"at {_coordinates(position[nearest])}"
     )
     if over.any():

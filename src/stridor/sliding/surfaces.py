@@ -209,6 +209,7 @@ def _require_held(system: System, nodes: ContactNodes, state: State, residual: f
     """A mechanism that rounding keeps from being singular shows in displacements beyond any structure's size."""
     extents = [float(np.ptp(line.coordinates, axis=0).max()) for line in system.lines]
     extents += [float(np.ptp(solid.points, axis=0).max()) for solid in system.solids]
-    limit = 1e6 * max(extents) if extents else 1e12
+    # Point masses alone have no size.
+    limit = 1e6 * max(extents) if max(extents, default=0.0) > 0 else 1e12
     if residual > 1e-8 or float(np.abs(state.displacement).max(initial=0.0)) > limit:
         raise AnalysisError(_loose(system, nodes, state.displacement))

@@ -99,7 +99,7 @@ def _beam(case: Case, name: str, body: BeamBody, offset: int) -> BuiltBody:
 
 def _solid(case: Case, name: str, body: SolidBody, offset: int) -> BuiltBody:
     loaded: LoadedMesh = load_mesh(name, body)
-    if body.mesh is None:
+    if body.file is not None:
         refuse_too_many_read(f"bodies.{name}", body.file, loaded.mesh.points.size, offset)
     material = _material(case, name, body, loaded)
     matrices = assemble_solid(

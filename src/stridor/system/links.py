@@ -47,7 +47,7 @@ def _row(case: Case, bodies: dict[str, BuiltBody], total: int, where: str, link:
     positions = [point_position(case, bodies, end) for end in ends]
     given = link.direction
     # Points of solids are their nearest nodes: two points may be one node, or two nodes at one place.
-    if len(ends) == 2 and np.array_equal(positions[0], positions[1]):
+    if len(ends) == 2 and np.linalg.norm(positions[0] - positions[1]) <= 1e-12 * np.abs(positions).max():
         at = ", ".join(f"{x:.6g}" for x in positions[0])
         if ends[0].body == ends[1].body:
             accepted = f"both ends are the mesh node at ({at}) m; refine the mesh or move one of the points"
@@ -56,6 +56,7 @@ def _row(case: Case, bodies: dict[str, BuiltBody], total: int, where: str, link:
             accepted = f"missing – both ends are mesh nodes at ({at}) m, which gives no line; give direction = [x, y]"
             raise CaseError(f"{where}.direction", None, accepted)
     direction = positions[0] - positions[1] if given is None else np.array(given, dtype=float)
+    direction = direction / np.abs(direction).max()  # so that squares do not underflow
     direction = direction / np.linalg.norm(direction)
     row = np.zeros(total)
     for sign, end in zip((1.0, -1.0), ends, strict=False):

@@ -25,6 +25,7 @@ from ..mesh import shapes
 from ..mesh.abaqus import AbaqusModel, read_abaqus
 from ..mesh.files import read_mesh
 from ..mesh.model import Mesh
+from ..mesh.paths import shown_path
 from ..mesh.quality import check_mesh
 
 # Products of lengths, moduli and densities stay numbers between these [m].
@@ -87,7 +88,9 @@ def _refuse_absurd(mesh: Mesh, where: str, body: SolidBody) -> None:
     extent = float(np.ptp(mesh.points, axis=0).max(initial=0.0))
     if len(mesh.points) and not _LEAST_EXTENT < extent < _MOST_EXTENT:
         accepted = f"{extent:.3g} m in extent; must be between {_LEAST_EXTENT:g} and {_MOST_EXTENT:g} m"
-        raise CaseError(f"{where}.mesh" if body.mesh is not None else f"{where}.file", body.file, accepted)
+        if body.file is not None:
+            raise CaseError(f"{where}.file", shown_path(Path(body.file)), accepted)
+        raise CaseError(f"{where}.mesh", None, accepted)
     away = float(np.abs(mesh.points).max(initial=0.0))
     if away > _FARTHEST * extent:
         accepted = (

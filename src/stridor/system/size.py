@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 from ..case import Case
 from ..case.bodies import AnnulusMesh, BlockMesh, BuiltInMesh, QuadrilateralMesh, RectangleMesh, SolidBody
 from ..case.points import FULL_TURN
 from ..errors import CaseError
+from ..mesh.paths import shown_path
 
 MOST_FREEDOMS = 5_000_000
 _ENTRY_BYTES = 12  # a double and an index
@@ -44,7 +46,7 @@ def refuse_too_many(case: Case) -> None:
     assert isinstance(body, SolidBody), "only solids are counted"
     assert body.mesh is not None, "only built-in meshes are counted"
     key = "element_size" if body.mesh.divisions is None else "divisions"
-    who = "" if sizes[largest] > 0.99 * total else f" of {_million(total)} in all bodies"
+    who = "" if sizes[largest] >= 0.99 * total else f" of {_million(total)} in all bodies"
     alone = f"about {memory / 1e9:.2g} GB" if memory < 1e18 else "more than any machine has"
     raise CaseError(
         f"bodies.{largest}.mesh.{key}",
@@ -55,14 +57,14 @@ def refuse_too_many(case: Case) -> None:
     )
 
 
-def refuse_too_many_read(where: str, file: str | None, own: int, before: int) -> None:
+def refuse_too_many_read(where: str, file: str, own: int, before: int) -> None:
     """Raises CaseError where the freedoms of a mesh from a file, with those before it, are too many."""
     if own + before > MOST_FREEDOMS:
         accepted = (
             f"has {_million(own)} degrees of freedom, {_million(own + before)} with the bodies before it; at most "
             f"{_million(MOST_FREEDOMS)} can be computed with: take a coarser mesh"
         )
-        raise CaseError(f"{where}.file", file, accepted)
+        raise CaseError(f"{where}.file", shown_path(Path(file)), accepted)
 
 
 def matrix_bytes(freedoms: float, cells: str, dimension: int) -> float:

@@ -163,7 +163,8 @@ def _draw_case(ax: Axes, case: Case, reach: float) -> None:
     for load in case.loads.values():
         at = _place(case, load.at)
         if any(load.force) and at is not None:
-            _arrow(ax, at, np.array(load.force), 0.16 * reach, VERMILION, f"{np.linalg.norm(load.force):g} N", away=True)
+            size = f"{np.linalg.norm(load.force):g} N"
+            _arrow(ax, at, np.array(load.force), 0.16 * reach, VERMILION, size, away=True)
     for watched in case.temporal.watch:
         at = _place(case, watched)
         if at is None:

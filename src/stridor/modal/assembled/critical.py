@@ -8,7 +8,7 @@ solved again, until nothing is left.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -20,6 +20,7 @@ from ...typing import ComplexArray
 from ..complex_modes import UNSTABLE_RELATIVE, undamped
 from ..onsets import Onset, Onsets
 from .follow import Follower, State, halves
+from .local import Surroundings, axis_crossing
 from .modes import samples
 from .passages import Passage, crossings, meetings
 from .problem import problem_of
@@ -54,9 +55,7 @@ def onsets_assembled(
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     if not damped:
         system = undamped(system)
-    problem = problem_of(
-        system, None, options or Options(), damped=damped, frictions=np.linspace(0.0, high, 50)
-    )
+    problem = problem_of(system, None, options or Options(), damped=damped, frictions=np.linspace(0.0, high, 50))
     if not problem.nodes:
         return Onsets((), (low, high), max_frequency_hz, damped, problem.open_contacts)
     # Modes that start above the band may meet inside it.
@@ -112,8 +111,10 @@ def _located(reduced: Reduced, passage: Passage) -> Onset | None:
     problem = reduced.problem
     solve = {"crossing": _crossing, "meeting": _meeting, "divergence": _divergence}[passage.kind]
     best: tuple[float, _Solved] | None = None
+    solved: _Solved | None = None
     for _ in range(ROUNDS):
-        solved = solve(reduced, passage)
+        again = None if solved is None or passage.kind != "crossing" else _crossing_again(reduced, passage, solved)
+        solved = solve(reduced, passage) if again is None else again
         if solved is None:
             break
         lam = np.array([solved.lam])
@@ -128,7 +129,12 @@ def _located(reduced: Reduced, passage: Passage) -> Onset | None:
             break
     if best is None or best[0] > BELIEVED:
         return None
-    return _onset(reduced, passage, best[1], best[0])
+    error, solved = best
+    if passage.kind == "crossing" and abs(solved.lam) > NEAR_AXIS * reduced.frequency:
+        near = exceptional_point(reduced, solved.lam, solved.mu)
+        if near is not None:
+            solved = replace(solved, square_root=near[1], exceptional=near[0])
+    return _onset(reduced, passage, solved, error)
 
 
 def _onset(reduced: Reduced, passage: Passage, solved: _Solved, error: float) -> Onset:
@@ -157,7 +163,10 @@ def _root(call: Callable[[float], float], low: float, high: float) -> float | No
         return low if at_low == 0.0 else high
     if at_low * at_high > 0 or not np.isfinite(at_low * at_high):
         return None
-    return float(brentq(call, low, high, xtol=1e-14 * max(high, 1e-3), rtol=1e-14, maxiter=60))
+    try:
+        return float(brentq(call, low, high, xtol=1e-14 * max(high, 1e-3), rtol=1e-14, maxiter=200))
+    except RuntimeError:  # a jump, not a zero: two modes have changed places
+        return None
 
 
 def pair_near(coordinate: ComplexArray, place: complex) -> tuple[complex, complex]:
@@ -211,22 +220,64 @@ def _crossing(reduced: Reduced, passage: Passage) -> _Solved | None:
     if start is None:
         return None
 
+    quick = _quick_crossing(reduced, passage, start)
+    if quick is None:
+        found = _slow_crossing(reduced, passage, start)
+        if found is None:
+            return None
+        quick = found
+    mu, lam, slope = quick
+    still = abs(lam) <= NEAR_AXIS * reduced.frequency
+    return _Solved(mu, 0j if still else lam, None, slope)
+
+
+def _crossing_again(reduced: Reduced, passage: Passage, solved: _Solved) -> _Solved | None:
+    """The same crossing with the basis as it is now, from where it was; None where it has gone."""
+    right, left = reduced.null_vectors(solved.lam, solved.mu)
+    found = axis_crossing(reduced, solved.mu, solved.lam, right, left, passage.low, passage.high)
+    if found is None or (found[2] < 0) != passage.stabilising:
+        return None
+    mu, lam, slope = found
+    return _Solved(mu, 0j if abs(lam) <= NEAR_AXIS * reduced.frequency else 1j * lam.imag, None, slope)
+
+
+def _quick_crossing(reduced: Reduced, passage: Passage, start: State) -> tuple[float, complex, float] | None:
+    """μ, λ on the axis and the growth's slope, following this one mode only; None where that does not settle inside."""
+    place = int(start.place[passage.branch])
+    lam, tangent = complex(start.found.values[place]), complex(start.found.tangents[place])
+    with np.errstate(all="ignore"):
+        ahead = -lam.real / tangent.real
+    width = passage.high - passage.low
+    ahead = float(np.clip(ahead, 0.0, width)) if np.isfinite(ahead) else 0.5 * width
+    found = axis_crossing(
+        reduced,
+        start.mu + ahead,
+        lam + tangent * ahead,
+        start.found.right[:, place],
+        start.found.left[:, place],
+        passage.low,
+        passage.high,
+    )
+    if found is None:
+        return None
+    mu, lam, slope = found
+    slack = 0.05 * width
+    if not passage.low - slack <= mu <= passage.high + slack or (slope < 0) != passage.stabilising:
+        return None
+    return mu, 1j * lam.imag, slope
+
+
+def _slow_crossing(reduced: Reduced, passage: Passage, start: State) -> tuple[float, complex, float] | None:
+    """The same by bisection on all branches."""
+
     def at(mu: float) -> State:
-        follower = Follower.resumed(reduced, start)
-        return follower.advance(mu)
+        return Follower.resumed(reduced, start).advance(mu)
 
     mu = _root(lambda m: float(at(m).values[passage.branch].real), passage.low, passage.high)
     if mu is None:
         return None
     state = at(mu)
-    lam = 1j * float(state.values[passage.branch].imag)
-    slope = float(state.tangents[passage.branch].real)
-    if abs(lam) <= NEAR_AXIS * reduced.frequency:
-        return _Solved(mu, 0j, None, slope)
-    near = exceptional_point(reduced, lam, mu)
-    if near is None:
-        return _Solved(mu, lam, None, slope)
-    return _Solved(mu, lam, near[1], slope, near[0])
+    return mu, 1j * float(state.values[passage.branch].imag), float(state.tangents[passage.branch].real)
 
 
 def _again(reduced: Reduced, passage: Passage) -> State | None:
@@ -246,10 +297,11 @@ def exceptional_point(reduced: Reduced, lam: complex, mu: float) -> tuple[comple
     None where it is further away than half the onset's μ.
     """
     centre: complex = lam
+    surroundings = Surroundings(reduced, lam, np.array([0.9 * mu, 1.1 * mu + 1e-6]))
 
     def square(at: complex) -> complex:
         nonlocal centre
-        values = reduced.solve(complex(at))[0]
+        values = surroundings.values(complex(at))
         values = values[values.imag > 0]
         if len(values) < 2:
             return complex("nan")

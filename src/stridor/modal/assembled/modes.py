@@ -15,10 +15,10 @@ from ..complex_modes import ComplexModes, undamped
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import Band, left_vectors, projected, settle
+from .refine import BELIEVED, Band, left_vectors, projected, settle
 from .steady import Options
 
-SAMPLES = 5
+SAMPLES = 7
 
 
 @one_thread_if_small
@@ -51,7 +51,8 @@ def complex_modes_assembled(
     band = Band(count, None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz)
     reduced = projected(problem, band)
     top = float(values.max())
-    settle(reduced, [*samples(top), *values], left=vectors is True)
+    settle(reduced, samples(top), left=vectors is True)
+    settle(reduced, values, tolerance=BELIEVED, left=vectors is True)
     return _followed(reduced, values, band, damped=damped, vectors=vectors)
 
 

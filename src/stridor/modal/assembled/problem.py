@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from .steady import Options, Steadiness, steadiness, touching_nodes
 
 CHUNK = 64  # columns worked on at a time
 
-CHEAP = 4000  # freedoms below which an equilibrium costs next to nothing
+CHEAP = 600  # freedoms below which an equilibrium costs next to nothing
 MOST_EQUILIBRIA = 6
 NEGLIGIBLE = 1e-4  # of the largest displacement: gaps that open less than this are not judged more closely
 
@@ -73,19 +74,28 @@ class ContactProblem:
         """What steady sliding at ``mu`` adds; nothing at μ = 0, where no friction force is there to vary."""
         return NOTHING if self.extras is None else self.extras(mu)
 
+    @cached_property
+    def _sizes(self) -> tuple[Sparse, Sparse, Sparse, Sparse, Sparse]:
+        """|M|, |C|, |K|, |N|, |S|."""
+        return abs(self.mass), abs(self.damping), abs(self.stiffness), abs(self.normal), abs(self.slide)
+
     def residual(self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float) -> ComplexArray:
         """(λ²M + λC + K) u − (N + μS)ᵀ p (n, k) for λ (k,), u (n, k), p (m, k); real where everything is."""
         return self._terms(lam, u, p, mu)
 
-    def backward_error(self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float) -> Array:
+    def backward_error(
+        self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float, *, rest: ComplexArray | None = None
+    ) -> Array:
         """Componentwise backward errors (k,), contact forces kept as unknowns and their equations judged alike.
 
-        ‖P(λ)x‖∞ / ‖|P|(|λ|) |x|‖∞ of the equations of motion, and of the contacts' own, whichever is larger.
+        ‖P(λ)x‖∞ / ‖|P|(|λ|) |x|‖∞ of the equations of motion, and of the contacts' own, whichever is larger. rest
+        (n, k) is what the pairs leave of the equations of motion, where it is known.
         """
         result = np.zeros(len(lam))
         for start in range(0, len(lam), CHUNK):
             part = slice(start, start + CHUNK)
-            result[part] = self._judged(lam[part], u[:, part], p[:, part], mu, left=False)
+            known = None if rest is None else rest[:, part]
+            result[part] = self._judged(lam[part], u[:, part], p[:, part], mu, left=False, rest=known)
         return result
 
     def left_backward_error(self, lam: ComplexArray, y: ComplexArray, q: ComplexArray, mu: float) -> Array:
@@ -109,30 +119,46 @@ class ContactProblem:
         def flip(matrix: Sparse) -> Sparse:
             return matrix.T if left else matrix
 
-        total = (lam**2) * times(self.mass, u) + times(self.stiffness, u) - times(self.normal.T, p)
+        square: Any = lam**2
+        if not np.any(square.imag):
+            square = square.real
+        total = square * times(self.mass, u) + times(self.stiffness, u) - times(self.normal.T, p)
         if mu and not left:
-            total -= mu * times(self.slide.T, p)
+            total = total - mu * times(self.slide.T, p)
         if self.damping.nnz:
-            total += lam * times(self.damping, u)
+            total = total + lam * times(self.damping, u)
         if extras.weakening is not None:
-            total += lam * times(self.slide.T, extras.weakening[:, None] * times(self.slide, u))
+            total = total + lam * times(self.slide.T, extras.weakening[:, None] * times(self.slide, u))
         if extras.damping is not None:
-            total += lam * times(flip(extras.damping), u)
+            total = total + lam * times(flip(extras.damping), u)
         if extras.stiffness is not None:
-            total += times(flip(extras.stiffness), u)
+            total = total + times(flip(extras.stiffness), u)
         return total
 
-    def _judged(self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float, *, left: bool) -> Array:
+    def _judged(
+        self,
+        lam: ComplexArray,
+        u: ComplexArray,
+        p: ComplexArray,
+        mu: float,
+        *,
+        left: bool,
+        rest: ComplexArray | None = None,
+    ) -> Array:
         extras = self.at(mu)
         size, force, rate = np.abs(u), np.abs(p), np.abs(lam)
-        scale = rate**2 * (abs(self.mass) @ size) + rate * (abs(self.damping) @ size) + abs(self.stiffness) @ size
-        scale += abs(self.normal).T @ force
+        mass, damping, stiffness, normal, slide = self._sizes
+        scale = rate**2 * (mass @ size) + stiffness @ size + normal.T @ force
+        if damping.nnz:
+            scale += rate * (damping @ size)
         if not left:
-            scale += mu * (abs(self.slide).T @ force)
+            scale += mu * (slide.T @ force)
         for matrix, factor in ((extras.damping, rate), (extras.stiffness, 1.0)):
             if matrix is not None:
                 scale += factor * (abs(matrix.T if left else matrix) @ size)
-        error = np.abs(self._terms(lam, u, p, mu, left=left)).max(axis=0) / tiny(scale.max(axis=0))
+        if rest is None:
+            rest = self._terms(lam, u, p, mu, left=left)
+        error = np.abs(rest).max(axis=0) / tiny(scale.max(axis=0))
         if not self.nodes:
             return error
         rows = sp.csr_array(self.normal + mu * self.slide) if left else self.normal

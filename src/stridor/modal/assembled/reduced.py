@@ -237,25 +237,30 @@ class Reduced:
     ) -> ComplexArray:
         """dx/dμ (k,) = −wᵀ P_μ z / wᵀ P_x z."""
         mass, damping, _ = self.matrices(mu)
-        change = self._matrices[3] @ right
+        change = combined(self._matrices[3], right)
         if self.problem.extras is not None and mu:
             # Steady forces change little with μ, the laws' slopes are proportional to it.
             change = change + values * (self._extra[mu][0] / mu @ right)
-        by_x = mass @ right
+        by_x = combined(mass, right)
         if self.problem.damped:
-            by_x = 2 * coordinate * by_x + damping @ right
+            by_x = 2 * coordinate * by_x + combined(damping, right)
         with np.errstate(all="ignore"):
             return -np.einsum("ij,ij->j", left, change) / np.einsum("ij,ij->j", left, by_x)
 
     def null_vector(self, lam: complex, mu: float) -> ComplexArray:
         """The vector (r,) that P(λ, μ) all but takes to zero, for λ that may be double."""
+        return self.null_vectors(lam, mu)[0]
+
+    def null_vectors(self, lam: complex, mu: float) -> tuple[ComplexArray, ComplexArray]:
+        """The vectors z and y (r,) that make P(λ, μ) z and yᵀP(λ, μ) all but zero."""
         mass, damping, stiffness = self.matrices(mu)
         matrix = lam**2 * mass + lam * damping + stiffness
         # Balanced by what the entries are made of: a row may itself be all but zero here.
         size = np.abs(self._matrices[2]) + mu * np.abs(self._matrices[3]) + self.frequency**2 * np.abs(mass)
         rows = np.maximum(size.max(axis=1), 1e-300)
         columns = np.maximum((size / rows[:, None]).max(axis=0), 1e-300)
-        return sl.svd(matrix / rows[:, None] / columns)[2][-1].conj() / columns
+        u, _, v = sl.svd(matrix / rows[:, None] / columns)
+        return v[-1].conj() / columns, u[:, -1].conj() / rows
 
     def expand(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """u (n, k) of unit norm and p (m, k) of right vectors z (r, k)."""
@@ -321,7 +326,7 @@ def _linear(
     with np.errstate(all="ignore"):
         x = shift - shift / theta
         chosen = np.flatnonzero(np.isfinite(x) & (np.abs(x) <= (REACH * frequency) ** 2))
-    return x[chosen], right[:, chosen], sl.lu_solve(factor, left[:, chosen].conj(), trans=1)
+    return x[chosen], right[:, chosen], _transposed_solve(factor, left[:, chosen].conj())
 
 
 def _quadratic(
@@ -342,7 +347,14 @@ def _quadratic(
         chosen = np.isfinite(x) & (np.abs(x) <= REACH * frequency)
     chosen = np.flatnonzero(chosen & (x.imag >= 0) if upper else chosen)
     z = np.where(np.abs(theta[chosen]) > 1, right[:r, chosen], right[r:, chosen])
-    return x[chosen], z, sl.lu_solve(factor, left[:r, chosen].conj(), trans=1)
+    return x[chosen], z, _transposed_solve(factor, left[:r, chosen].conj())
+
+
+def _transposed_solve(factor: tuple[Any, Any], right: Any) -> Any:
+    """A⁻ᵀ right; for a real matrix and complex right sides in real arithmetic."""
+    if factor[0].dtype.kind == "c" or right.dtype.kind != "c":
+        return sl.lu_solve(factor, right, trans=1)
+    return sl.lu_solve(factor, right.real, trans=1) + 1j * sl.lu_solve(factor, right.imag, trans=1)
 
 
 def _factor(matrix: Array) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from .reduced import Eigenpairs, Reduced
 from .shifted import Shifted, frictionless_modes, modes_below, real_columns, shift_for
 
 TOLERANCE = 2e-9  # backward error at which an eigenpair counts as found
-ACCURACY = 1e-7  # and its residual against the inertia forces
+LARGEST_REST = 1e-4  # and what it may leave of the lumped inertia forces
 BELIEVED = 1e-8  # backward error above which the answer is refused
 SWEEPS = 40
 WIDEST = 64  # right sides of one enrichment
@@ -115,10 +115,10 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
         )
 
 
-def settle(reduced: Reduced, frictions: Iterable[float], *, left: bool = False) -> None:
+def settle(reduced: Reduced, frictions: Iterable[float], *, tolerance: float = TOLERANCE, left: bool = False) -> None:
     """`converge` at one μ after the other, the basis reduced to what it has found whenever it has grown large."""
     for mu in dict.fromkeys(float(mu) for mu in frictions):
-        converge(reduced, [mu], left=left)
+        converge(reduced, [mu], tolerance=tolerance, left=left)
         if not left and reduced.count > GROWN * reduced.compressed:
             reduced.compress()
 
@@ -131,8 +131,8 @@ def unbalanced(reduced: Reduced, mu: float, tolerance: float, *, left: bool = Fa
     chosen = wanted(reduced, found)
     lam = found.values[chosen]
     u, p = reduced.expand(found.right[:, chosen])
-    error = problem.backward_error(lam, u, p, mu)
     rest = problem.residual(lam, u, p, mu)
+    error = problem.backward_error(lam, u, p, mu, rest=rest)
     forces = [_relative(reduced, rest, lam, u, error > tolerance)]
     openings: list[Array] = [np.zeros((problem.nodes, 0))]
     if left:
@@ -150,7 +150,7 @@ def _relative(reduced: Reduced, rest: ComplexArray, lam: ComplexArray, u: Comple
     weight = lumped(reduced.problem)[:, None]
     inertia = (np.abs(lam) ** 2 + reduced.shifted.shift) * np.linalg.norm(np.sqrt(weight) * u, axis=0)
     size = np.linalg.norm(rest / np.sqrt(weight), axis=0) / tiny(inertia)
-    chosen = inexact | (size > ACCURACY * 1e3)
+    chosen = inexact | (size > LARGEST_REST)
     return real_columns(rest[:, chosen] / tiny(inertia[chosen]))
 
 
