@@ -62,7 +62,7 @@ def test_new_lists_templates(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert (
         done.stderr
-        == "stridor: template: 'three-beams' – no such template; did you mean 'two-beams'? there are: two-beams\n"
+        == "stridor: template: 'three-beams' – no such template; did you mean 'two-beams'? there are: pad-on-disc, two-beams\n"
     )
 
 

@@ -179,8 +179,8 @@ def _never_touching(position: Array, location: Location, opposed: BoolArray, rea
     among = np.flatnonzero(over) if over.any() else np.arange(len(position))
     nearest = int(among[np.argmin(distance[among])])
     lead = (
-        f"the bodies do not face each other: the nearest node of the slave is {distance[nearest]:.3g} m from the master, "
-        f"at {_coordinates(position[nearest])}"
+        f"the bodies do not face each other: the nearest node of the slave is {distance[nearest]:.3g} m from the "
+        f"master, at {_coordinates(position[nearest])}"
     )
     if over.any():
         return f"{lead}, beyond the reach of {reach:.3g} m; move a body or set a longer reach"

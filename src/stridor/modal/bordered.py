@@ -12,10 +12,14 @@ SIAM 2000, chapter 3).
 
 from __future__ import annotations
 
+import contextlib
+from typing import Any
+
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
+from ..errors import AnalysisError
 from ..typing import Array, ComplexArray, IntArray, Sparse
 from .backward_error import common_pattern
 from .coupling import Coupling
@@ -79,8 +83,7 @@ class Bordered:
 
     def _null_vectors(self, lam: complex, mu: float) -> tuple[ComplexArray, ComplexArray]:
         """Left and right vectors that P(λ, μ) all but takes to zero, by inverse iteration."""
-        # A hair off, so that an exact root can be factorised too.
-        solver = spl.splu(self.problem(lam * (1 + 1e-12), mu * (1 + 1e-12)))
+        solver = self._beside(lam, mu)
         rng = np.random.default_rng(0)
         left, right = rng.standard_normal((2, self.size + self.coupling.contacts)).astype(complex)
         for _ in range(NULL_STEPS):
@@ -88,6 +91,14 @@ class Bordered:
             left = solver.solve(solver.solve(left), trans="H")
             right, left = right / np.linalg.norm(right), left / np.linalg.norm(left)
         return left, right
+
+    def _beside(self, lam: complex, mu: float) -> Any:
+        """P factorised a hair off (λ, μ), so that an exact root can be factorised too."""
+        for hair in (1e-12, 3e-12, 1e-11, 1e-10):
+            # Rounding may hit a pivot of exactly zero even there.
+            with contextlib.suppress(RuntimeError):
+                return spl.splu(self.problem(lam * (1 + hair), mu * (1 + hair)))
+        raise AnalysisError("the coupled problem is singular at every friction coefficient nearby")
 
     def derivatives(self, lam: complex, mu: complex) -> tuple[complex, complex, complex, complex, complex]:
         """f, f_λ, f_μ, f_λλ, f_λμ."""

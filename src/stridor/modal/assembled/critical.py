@@ -292,41 +292,56 @@ def _again(reduced: Reduced, passage: Passage) -> State | None:
 
 
 def exceptional_point(reduced: Reduced, lam: complex, mu: float) -> tuple[complex, float] | None:
-    """The complex μ beside an onset at which two modes meet, and κ of λ ≈ λ_c ± κ √(μ − μ_c), by the secant method.
+    """The complex μ beside an onset at which two modes meet, and κ of λ ≈ λ_c ± κ √(μ − μ_c).
 
-    None where it is further away than half the onset's μ.
+    Sought with the modes nearby, then with all of them. None where it is further away than half the onset's μ.
     """
-    centre: complex = lam
-    surroundings = Surroundings(reduced, lam, np.array([0.9 * mu, 1.1 * mu + 1e-6]))
+    reach = 0.5 * max(mu, 1e-3)
+    rough = _zero(_halves_of(Surroundings(reduced, lam, mu).values, lam), mu, complex(mu), reach, 1e-8)
+    if rough is None:
+        return None
+    square = _halves_of(lambda at: reduced.solve(at)[0], lam)
+    exact = _zero(square, mu, rough, reach, 1e-10)
+    if exact is None:
+        return None
+    step = 1e-4 * max(abs(exact), 1e-3)
+    slope = (square(exact + step) - square(exact - step)) / (2 * step)
+    root = np.sqrt(slope)
+    return (exact, float(max(abs(root.real), abs(root.imag)))) if np.isfinite(root) else None
+
+
+def _halves_of(values: Callable[[complex], ComplexArray], lam: complex) -> Callable[[complex], complex]:
+    """Squared half difference of the mode of the onset and its neighbour at a complex μ, then of whichever pair is
+    about their mean."""
+    centre = lam
 
     def square(at: complex) -> complex:
         nonlocal centre
-        values = surroundings.values(complex(at))
-        values = values[values.imag > 0]
-        if len(values) < 2:
+        found = values(complex(at))
+        found = found[found.imag > 0]
+        if len(found) < 2:
             return complex("nan")
-        # The mode of the onset and its neighbour, then whichever pair is about their mean.
-        centre, found = pair_near(values, centre)
-        return found
+        centre, half = pair_near(found, centre)
+        return half
 
-    reach = 0.5 * max(mu, 1e-3)
-    before, now = complex(mu), complex(mu * (1 + 1e-4) + 1e-7)
-    square_before, square_now = square(before), square(now)
+    return square
+
+
+def _zero(
+    call: Callable[[complex], complex], mu: float, start: complex, reach: float, tolerance: float
+) -> complex | None:
+    """A complex zero near ``start`` by the secant method; None where it strays from μ by more than ``reach``."""
+    before, now = start, start * (1 + 1e-4) + 1e-7
+    at_before, at_now = call(before), call(now)
     for _ in range(20):
-        if square_now == square_before:
-            break
-        slope = (square_now - square_before) / (now - before)
-        change = -square_now / slope
+        if at_now == at_before:
+            return now
+        change = -at_now * (now - before) / (at_now - at_before)
         if not np.isfinite(change) or abs(now + change - mu) > reach:
             return None
-        before, square_before = now, square_now
+        before, at_before = now, at_now
         now = now + change
-        square_now = square(now)
-        if abs(change) <= 1e-11 * max(mu, 1e-3):
-            break
-    else:
-        return None
-    step = 1e-4 * max(abs(now), 1e-3)
-    slope = (square(now + step) - square(now - step)) / (2 * step)
-    root = np.sqrt(slope)
-    return (now, float(max(abs(root.real), abs(root.imag)))) if np.isfinite(root) else None
+        if abs(change) <= tolerance * max(mu, 1e-3):
+            return now
+        at_now = call(now)
+    return None

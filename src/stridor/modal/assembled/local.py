@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sl
 
-from ...typing import Array, ComplexArray
+from ...typing import ComplexArray
 from .reduced import Reduced
 
-NEIGHBOURS = 12  # eigenvectors at each end that span the surroundings of an eigenvalue
+NEIGHBOURS = 12  # eigenvectors that span the surroundings of an eigenvalue
 STEPS = 12
 
 
@@ -73,27 +73,18 @@ def _slope(reduced: Reduced, mu: float, lam: complex, right: ComplexArray, left:
 
 
 class Surroundings:
-    """The projected problem on the eigenvectors nearest to one λ at a few μ: right and left ones, so that eigenvalues
-    nearby are accurate to second order in the distance from those μ."""
+    """The projected problem on the eigenvectors nearest to one λ at one μ, right and left: exact there, and what these
+    modes do to each other as μ changes is in it."""
 
-    def __init__(self, reduced: Reduced, lam: complex, frictions: Array) -> None:
-        right: list[ComplexArray] = []
-        left: list[ComplexArray] = []
-        for mu in frictions:
-            found = reduced.eigenpairs(float(mu))
-            near = np.argsort(np.abs(found.values - lam))[:NEIGHBOURS]
-            right.append(found.right[:, near])
-            left.append(found.left[:, near])
+    def __init__(self, reduced: Reduced, lam: complex, mu: float) -> None:
+        found = reduced.eigenpairs(mu)
+        near = np.argsort(np.abs(found.values - lam))[:NEIGHBOURS]
         self.reduced = reduced
-        own, tests = (_basis(np.hstack(part)) for part in (right, left))
-        count = min(own.shape[1], tests.shape[1])
-        self.right, self.left = own[:, :count], tests[:, :count]
+        self.right, self.left = (v[:, near] / np.linalg.norm(v[:, near], axis=0) for v in (found.right, found.left))
 
     def values(self, mu: complex) -> ComplexArray:
         """Eigenvalues (2q,) [1/s] at a real or complex μ."""
-        mass, damping, stiffness = (
-            self.left.T @ (np.asarray(m) @ self.right) for m in self.reduced.matrices(mu)
-        )
+        mass, damping, stiffness = (self.left.T @ (np.asarray(m) @ self.right) for m in self.reduced.matrices(mu))
         # Scaled by a typical frequency so that the companion is balanced.
         unit = self.reduced.frequency
         size = len(mass)
@@ -102,10 +93,3 @@ class Surroundings:
         with np.errstate(all="ignore"):
             found = np.asarray(sl.eigvals(first, second)) * unit
         return found[np.isfinite(found)]
-
-
-def _basis(vectors: ComplexArray) -> ComplexArray:
-    """Orthonormal columns that span the vectors."""
-    columns = vectors / np.maximum(np.linalg.norm(vectors, axis=0), 1e-300)
-    u, s, _ = sl.svd(columns, full_matrices=False)
-    return u[:, s > 1e-11 * s[0]]
