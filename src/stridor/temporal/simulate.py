@@ -94,6 +94,7 @@ def simulate(
             checkpoint=checkpoint,
             checkpoint_seconds=checkpoint_seconds,
             restart=restart,
+            join=join,
             disturbance=disturbance,
         )
     if mu is not None:
