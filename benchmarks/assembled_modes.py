@@ -1,11 +1,11 @@
 """Complex modes of an elastic pad on an elastic block, many contact nodes: projection against one solve for each μ.
 
-python benchmarks/assembled_modes.py [cells along the pad, 27 for about 50 000 freedoms]
+python benchmarks/assembled_modes.py [--short] [--along CELLS]   (27 cells along the pad: about 50 000 freedoms)
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -132,16 +132,21 @@ def pad_on_block(along: int, *, compliance: float = 0.0, damping: tuple[float, f
 
 
 def main() -> None:
-    system = pad_on_block(int(sys.argv[1]) if len(sys.argv) > 1 else 27)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--short", action="store_true", help="a small model, for CI")
+    parser.add_argument("--along", type=int, default=27, help="cells along the pad")
+    chosen = parser.parse_args()
+    system = pad_on_block(8 if chosen.short else chosen.along)
+    count, frictions = (12, 9) if chosen.short else (50, 41)
     print(f"{system.size} freedoms, {system.contact_nodes().count} contact nodes")
     for damped in (False, True):
         start = time.perf_counter()
-        modes = complex_modes_assembled(system, np.linspace(0.0, 1.0, 41), count=50, damped=damped)
+        modes = complex_modes_assembled(system, np.linspace(0.0, 1.0, frictions), count=count, damped=damped)
         spent = time.perf_counter() - start
         top = float(modes.frequency_hz.max())
         print(
-            f"damped {damped}: 50 modes up to {top:.0f} Hz at 41 friction coefficients in {spent:.1f} s, worst "
-            f"backward error {modes.residual.max():.1e}, largest growth {modes.growth_rate.max():.6g} 1/s"
+            f"damped {damped}: {count} modes up to {top:.0f} Hz at {frictions} friction coefficients in {spent:.1f} s, "
+            f"worst backward error {modes.residual.max():.1e}, largest growth {modes.growth_rate.max():.6g} 1/s"
         )
         start = time.perf_counter()
         found = onsets_assembled(system, (0.0, 1.0), max_frequency_hz=top, damped=damped)
