@@ -100,7 +100,7 @@ def _energy_picture(system: System, energy: Array, path: Path) -> Path:
         nodes.position,
         energy,
         tangents=nodes.tangents,
-        quantity="energy fed in per cycle / energy of the mode",
+        quantity="energy per cycle / that of the mode",
         unit="",
     )
     with replacing(path) as temporary:

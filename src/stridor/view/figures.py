@@ -320,7 +320,7 @@ def _shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             f"Velocity shape of the bodies at {operating.frequency_hz:.0f} Hz from the run in time.",
             plots.mode_shape(system, operating.shape, velocity=True),
         )
-    if mode is not None:
+    if mode is not None and system.lines:
         growth = f", growth rate {mode.growth_rate:.0f} 1/s" if mode.growth_rate is not None else ""
         yield ReportFigure(
             "unstable-mode",

@@ -42,7 +42,7 @@ def shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
                 nodes.position,
                 inputs.friction_energy,
                 tangents=nodes.tangents,
-                quantity="energy fed in per cycle / energy of the mode",
+                quantity="energy per cycle / that of the mode",
                 unit="",
             ),
         )

@@ -1,0 +1,108 @@
+"""Every analysis of a small case of solids, from case file to report, as `stridor run` does it; the other verbs."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import stridor as st
+
+BLOCK = """
+title = "a block on a moving slider"
+materials.steel = { young_modulus = 200e9, density = 7800.0, poisson_ratio = 0.3 }
+materials.pad = { young_modulus = 2e9, density = 2000.0, poisson_ratio = 0.3 }
+[bodies.slider]
+type = "solid"
+model = "plane strain"
+material = "steel"
+mesh = { shape = "rectangle", corner = [-0.05, -0.01], size = [0.1, 0.01], divisions = [10, 2], cells = "quad" }
+damping = { mass = 20.0, stiffness = 1e-8 }
+sliding = { velocity = [1.0, 0.0] }
+[bodies.block]
+type = "solid"
+model = "plane strain"
+material = "pad"
+mesh = { shape = "rectangle", corner = [-0.01, 0.0], size = [0.02, 0.02], divisions = [5, 5], cells = "quad" }
+damping = { mass = 20.0, stiffness = 1e-8 }
+points = { crown = [0.0, 0.02] }
+[supports.ground]
+at = "slider.bottom"
+fixed = ["x", "y"]
+[supports.holder]
+at = "block.top"
+fixed = ["x"]
+[loads.press]
+at = "block.top"
+pressure = 1e5
+[contacts.face]
+slave = "block.bottom"
+master = "slider.top"
+stiffness = 1e12
+friction = { law = "coulomb", coefficient = 0.4 }
+[[phases]]
+name = "slide"
+duration = 5e-4
+[modal]
+friction_range = [0.0, 0.6]
+max_frequency_hz = 15e3
+sweep_points = 3
+[temporal]
+initial = "steady-sliding"
+perturbation = 1e-3
+watch = ["block.crown"]
+[comparison]
+critical = false
+"""
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("solids") / "block.toml"
+    path.write_text(BLOCK, encoding="utf-8")
+    return path
+
+
+def stridor(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "stridor.app.cli", *words],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+    )
+
+
+def test_everything_ends_in_a_report(case: Path):
+    outcome = st.run(st.load(case), case.parent / "out")
+    page = outcome.report.read_text(encoding="utf-8")
+    for name in ("mesh", "mode", "friction-energy", "pressure-face", "status-face"):
+        assert f'id="figure-{name}"' in page, name
+        assert (outcome.report.parent / "figures" / f"{name}.png").stat().st_size > 5000
+    assert outcome.everything.agreement is not None
+    assert outcome.everything.agreement.verdict.startswith("agree")
+    assert outcome.everything.summary.energy.error < 1e-9
+    again = st.load_trajectory(outcome.report.parent / "simulate.nc")
+    assert again.nodes is not None
+    assert (again.nodes.normal_force == outcome.everything.run.nodes.normal_force).all()
+
+
+def test_steady_and_shapes_write_pictures_and_files(case: Path):
+    done = stridor("steady", case.name, "--json", cwd=case.parent)
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    # 0.02 m × 1 m × 1e5 Pa, and 0.4 of it along the slider.
+    assert document["contacts"]["face"]["force"] == pytest.approx([800.0, 2000.0], rel=1e-6)
+    done = stridor("shapes", case.name, "--branch", "1", "--gif", "--json", cwd=case.parent)
+    assert done.returncode == 0, done.stderr
+    files = [case.parent / f for f in json.loads(done.stdout)["modes"][0]["files"]]
+    assert {f.suffix for f in files} == {".png", ".html", ".gif", ".vtu"}
+    assert all(f.stat().st_size > 500 for f in files)
+    done = stridor("shapes", case.name, "--branch", "999", cwd=case.parent)
+    assert done.returncode == 2
+    assert "--branch: 999" in done.stderr
