@@ -106,3 +106,17 @@ def test_steady_and_shapes_write_pictures_and_files(case: Path):
     done = stridor("shapes", case.name, "--branch", "999", cwd=case.parent)
     assert done.returncode == 2
     assert "--branch: 999" in done.stderr
+
+
+def test_a_slider_that_really_moves_carries_the_block_over_its_elements():
+    text = BLOCK.replace("sliding = { velocity = [1.0, 0.0] }\n", "")
+    text = text.replace('fixed = ["x", "y"]', 'fixed = ["x", "y"]\nvelocity = { x = 2.0 }')
+    text = text.replace("friction = {", 'sliding = "finite"\nfriction = {')
+    text = text.replace("duration = 5e-4", "duration = 2e-3").replace("perturbation = 1e-3\n", "")
+    case = st.loads(text)
+    run = st.simulate(case)
+    # 4 mm on: the pressure on the slider has moved with the block, its resultant is the load as before.
+    assert run.normal_force[:, 0] == pytest.approx(2000.0, rel=0.02)
+    assert run.slip_speed[:, 0] == pytest.approx(run.slip_speed[0, 0], rel=0.05)
+    assert run.unconverged_steps == 0
+    assert st.summarise(case, run).energy.error < 1e-9
