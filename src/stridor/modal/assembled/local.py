@@ -91,5 +91,5 @@ class Surroundings:
         first = np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -unit * damping]])
         second = sl.block_diag(np.eye(size), unit**2 * mass)
         with np.errstate(all="ignore"):
-            found = np.asarray(sl.eigvals(first, second), dtype=complex) * unit
+            found: ComplexArray = sl.eigvals(first, second) * unit
         return found[np.isfinite(found)]
