@@ -156,7 +156,7 @@ def settle(equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: i
             active = changed(state.active, pulled, closing, care)
     raise AnalysisError(
         f"steady sliding: the set of touching nodes does not settle in {limit} steps; "
-        "lower the friction coefficient, or give the contact a finite stiffness"
+        "turn loads that pull, lower the friction coefficient, or give the contact a finite stiffness"
     )
 
 
