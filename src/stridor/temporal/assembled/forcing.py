@@ -18,8 +18,8 @@ COUNTERS = 5
 
 class Forcing(NamedTuple):
     """Factors of loads (k, l) and increments of supports (k, p) by step; loads as csr rows on places with their lift
-    (l, p); mass and damping couplings (p, size) and own matrices (p, p) of the supports; cubic springs as csr rows
-    with lift (s, p) and coefficient (s,)."""
+    (l, p); mass and damping couplings (p, k) of the supports with the places near (k,), and their own matrices (p, p);
+    cubic springs as csr rows with lift (s, p) and coefficient (s,)."""
 
     loads: Array
     increments: Array
@@ -27,6 +27,7 @@ class Forcing(NamedTuple):
     load_col: IntArray
     load_val: Array
     load_lift: Array
+    near: IntArray
     mass: Array
     damping: Array
     mass_own: Array
@@ -110,10 +111,10 @@ def _set_push(k: int, step: float, beta2: float, g: Forcing, state: LoopState, a
     # Loops, as whole-array expressions take seconds to compile.
     base = state.base
     for i in range(base.shape[0]):
-        total = 0.0
+        base[i] = 0.0
+    for e in range(g.near.shape[0]):
         for p in range(motions):
-            total += kept[loads + p] * g.mass[p, i] + kept[loads + motions + p] * g.damping[p, i]
-        base[i] = total
+            base[g.near[e]] += kept[loads + p] * g.mass[p, e] + kept[loads + motions + p] * g.damping[p, e]
     for j in range(loads):
         if kept[j] != 0.0:
             for e in range(g.load_ptr[j], g.load_ptr[j + 1]):
@@ -155,9 +156,9 @@ def begin_step(k: int, a: Structure, f: Fields, g: Forcing, state: LoopState, w:
         w.place[p] = state.motion[0, p] + g.increments[k, p]
         w.sent[p] = w.coupling[0, p] = w.coupling[1, p] = 0.0
         if w.velocity[p] != 0.0 or w.after[p] != 0.0:
-            for i in range(f.q.shape[0]):
-                w.coupling[0, p] += g.mass[p, i] * f.q[i]
-                w.coupling[1, p] += g.damping[p, i] * f.q[i]
+            for e in range(g.near.shape[0]):
+                w.coupling[0, p] += g.mass[p, e] * f.q[g.near[e]]
+                w.coupling[1, p] += g.damping[p, e] * f.q[g.near[e]]
 
 
 @njit(cache=True)
@@ -197,9 +198,9 @@ def _support_works(
         if velocity == 0.0 and after[p] == 0.0:
             continue
         inertia = drag = 0.0
-        for i in range(f.q.shape[0]):
-            inertia += g.mass[p, i] * f.q[i]
-            drag += g.damping[p, i] * f.q[i]
+        for e in range(g.near.shape[0]):
+            inertia += g.mass[p, e] * f.q[g.near[e]]
+            drag += g.damping[p, e] * f.q[g.near[e]]
         drag = (1.0 - beta2) * before[1, p] + beta2 * drag
         reaction = (inertia - before[0, p]) / step + drag - contact[p]
         damped = 2.0 * drag

@@ -22,7 +22,7 @@ from .node_stage import NodeScratch, NodeState
 from .node_table import NodeTable, node_table
 from .products import DASHPOTS, WITH_STIFFNESS, Fields, Structure, stored_energies
 from .recording import Record
-from .storage import Layout, lay_out_freedoms, parts, upper_blocks
+from .storage import Layout, aligned_zeros, lay_out_freedoms, parts, upper_blocks
 
 OFFSET_STEPS = 100  # in which the gap that a renewal of the rows made fades
 
@@ -106,13 +106,13 @@ def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Ma
     damping = split_damping(system)
     layout = lay_out_freedoms(system)
     structure = _structure(system, scheme, layout, mass, damping)
-    u = np.zeros(layout.size)
+    u = aligned_zeros((layout.size,))
     fields = Fields(
         u=u,
-        q=np.zeros(layout.size),
-        shown=np.zeros(layout.size) if structure.flags[0] else u,
-        push=np.zeros(layout.size),
-        y=np.zeros((2, layout.size)),
+        q=aligned_zeros((layout.size,)),
+        shown=aligned_zeros((layout.size,)) if structure.flags[0] else u,
+        push=aligned_zeros((layout.size,)),
+        y=aligned_zeros((2, layout.size)),
     )
     motions, loads = len(system.motion.names), len(system.loads)
     statistics = np.zeros((len(nodes.names), STATISTICS))
@@ -123,7 +123,7 @@ def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Ma
         counters=np.zeros(COUNTERS, dtype=np.int64),
         motion=np.zeros((2, motions)),
         coefficients=np.zeros(loads + 2 * motions),
-        base=np.zeros(layout.size),
+        base=aligned_zeros((layout.size,)),
         reference=np.array([0.0, 1.0 - 1.0 / OFFSET_STEPS]),
     )
     table = node_table(nodes, layout, structure.numbers[2] * structure.kick)
@@ -192,6 +192,8 @@ def _forcing(system: System, layout: Layout) -> Forcing:
     # A rigid motion is not resisted by damping within a body: what is left of that is rounding.
     scale = float(np.abs(system.damping).max() or 0.0) * float(np.abs(motion.lift).max(initial=0.0))
     damping[np.abs(damping) <= 1e-13 * scale] = 0.0
+    # Few freedoms next to a support: a whole vector at each step would cost as much as the structure.
+    near = np.flatnonzero(np.any(motion.mass != 0.0, axis=1) | np.any(damping != 0.0, axis=1))
     cubic = system.cubic
     rows = sp.csr_array((0, system.size)) if cubic is None else cubic.rows.free
     load_ptr, load_col, load_val = csr_arrays(layout.rows(sp.csr_array(vectors)))
@@ -203,8 +205,9 @@ def _forcing(system: System, layout: Layout) -> Forcing:
         load_col=load_col,
         load_val=load_val,
         load_lift=vectors @ motion.lift,
-        mass=layout.spread(np.ascontiguousarray(motion.mass.T)),
-        damping=layout.spread(np.ascontiguousarray(damping.T)),
+        near=layout.place[near],
+        mass=np.ascontiguousarray(motion.mass[near].T, dtype=float),
+        damping=np.ascontiguousarray(damping[near].T),
         mass_own=np.ascontiguousarray(motion.mass_own, dtype=float),
         damping_own=np.ascontiguousarray(motion.damping_own, dtype=float),
         stiffness_own=np.ascontiguousarray(motion.stiffness_own, dtype=float),

@@ -14,6 +14,7 @@ from numba import get_num_threads, njit, prange
 
 from ...typing import Array, IntArray
 from ..layout import FAST
+from .lanes import rows2, rows3
 from .storage import Blocks
 
 DASHPOTS, WITH_STIFFNESS = 1, 2  # works wanted: of C_d alone, or of all that the structure resists with
@@ -54,54 +55,6 @@ class Structure(NamedTuple):
 
 
 @njit(cache=True, fastmath=FAST)
-def _rows3(m: Blocks, x: Array, y: Array, lo: int, hi: int) -> None:  # pragma: no cover - compiled
-    ptr, col, val = m.ptr, m.col, m.val
-    for i in range(lo, hi):
-        a = 3 * i
-        x0, x1, x2 = x[a], x[a + 1], x[a + 2]
-        p = ptr[i]
-        s0 = val[p, 0] * x0 + val[p, 1] * x1 + val[p, 2] * x2
-        s1 = val[p, 3] * x0 + val[p, 4] * x1 + val[p, 5] * x2
-        s2 = val[p, 6] * x0 + val[p, 7] * x1 + val[p, 8] * x2
-        for p in range(ptr[i] + 1, ptr[i + 1]):
-            c = 3 * col[p]
-            z0, z1, z2 = x[c], x[c + 1], x[c + 2]
-            v0, v1, v2 = val[p, 0], val[p, 1], val[p, 2]
-            v3, v4, v5 = val[p, 3], val[p, 4], val[p, 5]
-            v6, v7, v8 = val[p, 6], val[p, 7], val[p, 8]
-            s0 += v0 * z0 + v1 * z1 + v2 * z2
-            s1 += v3 * z0 + v4 * z1 + v5 * z2
-            s2 += v6 * z0 + v7 * z1 + v8 * z2
-            y[c] += v0 * x0 + v3 * x1 + v6 * x2
-            y[c + 1] += v1 * x0 + v4 * x1 + v7 * x2
-            y[c + 2] += v2 * x0 + v5 * x1 + v8 * x2
-        y[a] += s0
-        y[a + 1] += s1
-        y[a + 2] += s2
-
-
-@njit(cache=True, fastmath=FAST)
-def _rows2(m: Blocks, x: Array, y: Array, lo: int, hi: int) -> None:  # pragma: no cover - compiled
-    ptr, col, val = m.ptr, m.col, m.val
-    for i in range(lo, hi):
-        a = 2 * i
-        x0, x1 = x[a], x[a + 1]
-        p = ptr[i]
-        s0 = val[p, 0] * x0 + val[p, 1] * x1
-        s1 = val[p, 2] * x0 + val[p, 3] * x1
-        for p in range(ptr[i] + 1, ptr[i + 1]):
-            c = 2 * col[p]
-            z0, z1 = x[c], x[c + 1]
-            v0, v1, v2, v3 = val[p, 0], val[p, 1], val[p, 2], val[p, 3]
-            s0 += v0 * z0 + v1 * z1
-            s1 += v2 * z0 + v3 * z1
-            y[c] += v0 * x0 + v2 * x1
-            y[c + 1] += v1 * x0 + v3 * x1
-        y[a] += s0
-        y[a + 1] += s1
-
-
-@njit(cache=True, fastmath=FAST)
 def _rows1(m: Blocks, x: Array, y: Array, lo: int, hi: int) -> None:  # pragma: no cover - compiled
     ptr, col, val = m.ptr, m.col, m.val
     for i in range(lo, hi):
@@ -120,9 +73,9 @@ def add_rows(m: Blocks, x: Array, y: Array, lo: int, hi: int) -> None:  # pragma
     """Add to y what the block rows lo … hi − 1 give in the product of a symmetric matrix with x."""
     width = m.val.shape[1]
     if width == 9:
-        _rows3(m, x, y, lo, hi)
+        rows3(m.ptr, m.col, m.val, x, y, lo, hi)
     elif width == 4:
-        _rows2(m, x, y, lo, hi)
+        rows2(m.ptr, m.col, m.val, x, y, lo, hi)
     else:
         _rows1(m, x, y, lo, hi)
 

@@ -60,8 +60,8 @@ def energies(a: Structure, f: Fields, g: Forcing, state: LoopState, row: Array) 
     for p in range(x.shape[0]):
         if rate[p] != 0.0:
             total = 0.0
-            for i in range(f.q.shape[0]):
-                total += g.mass[p, i] * f.q[i]
+            for e in range(g.near.shape[0]):
+                total += g.mass[p, e] * f.q[g.near[e]]
             kinetic += rate[p] * total
         for o in range(x.shape[0]):
             kinetic += 0.5 * rate[p] * g.mass_own[p, o] * rate[o]

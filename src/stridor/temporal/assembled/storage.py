@@ -2,8 +2,8 @@
 
 The step is bound by memory: what counts is bytes per freedom. Only the upper triangle is kept, in square blocks of one,
 two or three freedoms, so that one index serves up to nine numbers. On a hex8 mesh of 107 811 freedoms (2 cores) a
-product took 1.15 ms in 3×3 upper blocks on two threads (1.8 ms on one), 4.7 ms as full scalar CSR of SciPy and 4.5 ms
-as upper scalar CSR: scalar rows read more indices and gather number by number.
+step took 0.9 to 1.1 ms in 3×3 upper blocks on two threads (`lanes`), a product 4.7 ms as full scalar CSR of SciPy and
+4.5 ms as upper scalar CSR: scalar rows read more indices and gather number by number.
 
 Freedoms are grouped into blocks node by node as far as the bodies tell their nodes, the rest in order of their
 numbers. A node that a support holds in part fills its block with places that have no stiffness: they stay at zero.
@@ -19,41 +19,58 @@ import scipy.sparse as sp
 
 from ...system import System
 from ...typing import Array, IntArray, Sparse
+from .lanes import LANES
 
 THREADED_FREEDOMS = 20_000
 LARGEST_BLOCK = 3
+LINE = 8  # numbers to a line of the cache
 
 
 class Blocks(NamedTuple):
     """Upper triangle in blocks: row pointers (b + 1,), block columns (z,) ascending, the diagonal first and always
-    there, values (z, w²) row by row."""
+    there, values (z + 1, w²) row by row, the last row zero: whole registers are read (`lanes`)."""
 
     ptr: IntArray
     col: IntArray
     val: Array
 
 
+def aligned_zeros(shape: tuple[int, ...]) -> Array:
+    """Zeros that begin where a line of the cache does: registers that straddle two lines cost a third of the speed."""
+    size = int(np.prod(shape))
+    room = np.empty(size + LINE)
+    room[:] = 0.0
+    first = -room.ctypes.data // room.itemsize % LINE
+    return room[first : first + size].reshape(shape)
+
+
 @dataclass(frozen=True)
 class Layout:
-    """Where the freedoms lie: block width w, number of blocks b, place (n,) of each freedom among the b·w places."""
+    """Where the freedoms lie: block width w, number of blocks b, place (n,) of each freedom; from one block to the next
+    there are LANES[w] places."""
 
     width: int
     blocks: int
     place: IntArray
 
     @property
+    def stride(self) -> int:
+        """Places from one block to the next, w or what fills a vector register."""
+        return LANES[self.width]
+
+    @property
     def size(self) -> int:
-        """Number of places b·w, those without a freedom included."""
-        return self.width * self.blocks
+        """Number of places, those without a freedom included."""
+        return self.stride * self.blocks
 
     def spread(self, values: Array) -> Array:
-        """Values (…, n) of freedoms on all places (…, b·w), zero where there is none."""
-        out = np.zeros((*values.shape[:-1], self.size))
+        """Values (…, n) of freedoms on all places (…, size), zero where there is none."""
+        out = aligned_zeros((*values.shape[:-1], self.size))
         out[..., self.place] = values
         return out
 
     def rows(self, matrix: Sparse) -> Sparse:
-        """Rows (r, n) on freedoms as rows (r, b·w) csr on places."""
+        """Rows (r, n) on freedoms as rows (r, size) csr on places."""
         coo = sp.coo_array(matrix)
         return sp.csr_array((coo.data, (coo.row, self.place[coo.col])), shape=(matrix.shape[0], self.size))
 
@@ -68,7 +85,7 @@ def lay_out_freedoms(system: System) -> Layout:
     order = sp.csgraph.reverse_cuthill_mckee(graph, symmetric_mode=True)
     rank = np.empty(count, dtype=np.int64)
     rank[order] = np.arange(count)
-    return Layout(width, count, rank[group] * width + inside)
+    return Layout(width, count, rank[group] * LANES[width] + inside)
 
 
 def _groups(system: System, pattern: Sparse) -> tuple[IntArray, IntArray, int]:
@@ -111,14 +128,15 @@ def upper_blocks(matrix: Sparse, layout: Layout) -> Blocks:
     """A symmetric matrix (n, n) on the places of a layout."""
     coo = sp.coo_array(matrix)
     w, b = layout.width, layout.blocks
+    step = layout.stride
     row, column = layout.place[coo.row], layout.place[coo.col]
-    keep = row // w <= column // w
+    keep = row // step <= column // step
     row, column, value = row[keep], column[keep], coo.data[keep]
     # The diagonal blocks always: their place is known without looking.
     every = np.arange(b) * (b + 1)
-    key, index = np.unique(np.concatenate([every, row // w * b + column // w]), return_inverse=True)
-    val = np.zeros((len(key), w * w))
-    np.add.at(val, (index[b:], row % w * w + column % w), value)
+    key, index = np.unique(np.concatenate([every, row // step * b + column // step]), return_inverse=True)
+    val = aligned_zeros((len(key) + 1, w * w))
+    np.add.at(val, (index[b:], row % step * w + column % step), value)
     ptr = np.concatenate([[0], np.cumsum(np.bincount(key // b, minlength=b))])
     return Blocks(ptr.astype(np.int64), (key % b).astype(np.int32), val)
 
