@@ -47,6 +47,11 @@ def main() -> None:
     started = time.perf_counter()
     sweep = st.modes(case, np.linspace(0.0, 0.6, 13), max_frequency_hz=limit)
     print(f"modes at 13 μ: {time.perf_counter() - started:.1f} s, residual ≤ {sweep.residual.max():.1e}")
+    started = time.perf_counter()
+    found = st.onsets(case).onsets
+    print(f"{len(found)} onsets: {time.perf_counter() - started:.1f} s, residual ≤ {max(o.residual for o in found):.1e}")
+    for onset in found:
+        print(f"  μ = {onset.mu:.6f} at {onset.frequency_hz:.2f} Hz")
 
 
 if __name__ == "__main__":

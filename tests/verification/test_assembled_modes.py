@@ -21,6 +21,10 @@ from stridor.modal.assembled import (
     friction_energy,
     onsets_assembled,
 )
+from stridor.modal.assembled.follow import State
+from stridor.modal.assembled.passages import crossings
+from stridor.modal.assembled.problem import Varying
+from stridor.modal.assembled.reduced import Eigenpairs
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.onsets import onsets
 from stridor.sliding import friction_damping_matrix, steady_sliding_nodes
@@ -364,3 +368,31 @@ def test_what_is_refused():
         complex_modes_assembled(still, 0.1)
     with pytest.raises(CaseError, match="vectors=True"):
         friction_energy(system, complex_modes_assembled(system, 0.1, count=2), 0, 0)
+
+
+def test_a_branch_that_starts_undamped_is_stable_until_it_grows():
+    """At μ = 0 its rate is rounding of either sign: no onset where friction damps it, one where friction drives it."""
+
+    def passages(start: float, slope: float):
+        def state(mu: float) -> State:
+            values = np.array([start + slope * mu + 1000j, -5.0 + 2000j])
+            zero = np.zeros((2, 2), dtype=complex)
+            found = Eigenpairs(mu, values, values, zero, zero, np.array([slope, 0.0], dtype=complex), 2)
+            return State(found, np.arange(2))
+
+        return crossings(state(0.0), state(0.1))
+
+    for rounding in (-1e-12, 0.0, 1e-12):
+        assert passages(rounding, -30.0) == []
+        (found,) = passages(rounding, 30.0)
+        assert (found.kind, found.stabilising) == ("crossing", False)
+
+
+def test_terms_between_equilibria_are_interpolated_with_their_slopes():
+    varying = Varying(None, 0.6 * (1 - np.cos(np.linspace(0, np.pi, 6))) / 2)
+    for mu in (0.0, 0.2, 0.6, 0.31 + 0.02j):
+        for power in range(6):
+            assert varying.weights(mu) @ varying.grid**power == pytest.approx(mu**power, rel=1e-12, abs=1e-14)
+            if isinstance(mu, float):
+                slope = power * mu ** max(power - 1, 0)
+                assert varying.slopes(mu) @ varying.grid**power == pytest.approx(slope, rel=1e-11, abs=1e-13)

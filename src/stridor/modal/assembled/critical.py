@@ -20,7 +20,7 @@ from ...typing import ComplexArray
 from ..complex_modes import UNSTABLE_RELATIVE, undamped
 from ..onsets import Onset, Onsets
 from .follow import Follower, State, halves
-from .local import Surroundings, axis_crossing
+from .local import Surroundings, axis_crossing, double_eigenvalue
 from .modes import samples
 from .passages import Passage, crossings, meetings
 from .problem import problem_of
@@ -32,6 +32,7 @@ from .steady import Options
 SAMPLES = 9
 ROUNDS = 6
 ONSET_TOLERANCE = 1e-12  # backward error at which an onset counts as found
+CLEARLY_ABOVE = 1.02
 NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
 
 
@@ -63,8 +64,10 @@ def onsets_assembled(
     settle(reduced, samples(high, SAMPLES))
     found: list[Onset] = []
     for passage in _passages(reduced, high):
-        onset = _located(reduced, passage)
-        if onset is not None and low <= onset.mu <= high and onset.frequency_hz <= max_frequency_hz:
+        if _is_above(passage, 2 * np.pi * max_frequency_hz * CLEARLY_ABOVE):
+            continue
+        onset = _located(reduced, passage, (low, high), max_frequency_hz)
+        if onset is not None:
             found.append(onset)
     ordered = tuple(sorted(_distinct(found), key=lambda o: o.mu))
     return Onsets(ordered, (low, high), max_frequency_hz, damped, problem.open_contacts)
@@ -79,6 +82,15 @@ def _passages(reduced: Reduced, high: float) -> list[Passage]:
 
     Follower(reduced, longest=high / 30, watch=watch).advance(high)
     return passages
+
+
+def _is_above(passage: Passage, frequency: float) -> bool:
+    """Whether a crossing lies beyond a frequency [1/s] at both ends."""
+    if passage.kind != "crossing":
+        return False
+    lam, tangent = passage.old.values[passage.branch], passage.old.tangents[passage.branch]
+    ahead = lam + tangent * (passage.high - passage.old.mu)
+    return bool(lam.imag > frequency and not ahead.imag < frequency)
 
 
 def _distinct(found: list[Onset]) -> list[Onset]:
@@ -106,8 +118,11 @@ class _Solved:
     exceptional: complex | None = None
 
 
-def _located(reduced: Reduced, passage: Passage) -> Onset | None:
-    """The onset of a passage, the basis enriched until it satisfies the sparse problem; None where it was none."""
+def _located(
+    reduced: Reduced, passage: Passage, wanted: tuple[float, float], max_frequency_hz: float
+) -> Onset | None:
+    """The onset of a passage, the basis enriched until it satisfies the sparse problem; None where it was none or lies
+    outside what is wanted."""
     problem = reduced.problem
     solve = {"crossing": _crossing, "meeting": _meeting, "divergence": _divergence}[passage.kind]
     best: tuple[float, _Solved] | None = None
@@ -115,7 +130,7 @@ def _located(reduced: Reduced, passage: Passage) -> Onset | None:
     for _ in range(ROUNDS):
         again = None if solved is None or passage.kind != "crossing" else _crossing_again(reduced, passage, solved)
         solved = solve(reduced, passage) if again is None else again
-        if solved is None:
+        if solved is None or not _is_wanted(solved, wanted, 1.001 * max_frequency_hz, slack=1e-3):
             break
         lam = np.array([solved.lam])
         u, p = reduced.expand(reduced.null_vector(solved.lam, solved.mu)[:, None])
@@ -130,11 +145,20 @@ def _located(reduced: Reduced, passage: Passage) -> Onset | None:
     if best is None or best[0] > BELIEVED:
         return None
     error, solved = best
+    if not _is_wanted(solved, wanted, max_frequency_hz):
+        return None
     if passage.kind == "crossing" and abs(solved.lam) > NEAR_AXIS * reduced.frequency:
-        near = exceptional_point(reduced, solved.lam, solved.mu)
+        near = exceptional_point(reduced, passage.old, solved.lam, solved.mu)
         if near is not None:
             solved = replace(solved, square_root=near[1], exceptional=near[0])
     return _onset(reduced, passage, solved, error)
+
+
+def _is_wanted(solved: _Solved, wanted: tuple[float, float], max_frequency_hz: float, slack: float = 0.0) -> bool:
+    """Whether an onset is in the range of μ, a little beyond it where slack is given, and below the frequency."""
+    low, high = wanted
+    beyond = slack * (high - low)
+    return low - beyond <= solved.mu <= high + beyond and abs(solved.lam.imag) <= 2 * np.pi * max_frequency_hz
 
 
 def _onset(reduced: Reduced, passage: Passage, solved: _Solved, error: float) -> Onset:
@@ -178,6 +202,9 @@ def pair_near(coordinate: ComplexArray, place: complex) -> tuple[complex, comple
 def _meeting(reduced: Reduced, passage: Passage) -> _Solved | None:
     """Where two undamped modes meet: their squared half difference passes through zero, with a finite slope."""
     width = passage.high - passage.low
+    quick = _quick_meeting(reduced, passage)
+    if quick is not None:
+        return quick
 
     def guess(mu: float) -> complex:
         part = (mu - passage.low) / width
@@ -198,6 +225,28 @@ def _meeting(reduced: Reduced, passage: Passage) -> _Solved | None:
     return _Solved(mu, 1j * omega, float(np.sqrt(abs(slope)) / (2 * omega)))
 
 
+def _quick_meeting(reduced: Reduced, passage: Passage) -> _Solved | None:
+    """The same by Newton from the middle of the passage; None where that does not settle inside it."""
+    mean = (passage.means[0] + passage.means[1]) / 2
+    if not mean.real < 0:
+        return None
+    found = double_eigenvalue(reduced, (passage.low + passage.high) / 2, 1j * np.sqrt(-mean.real))
+    if found is None:
+        return None
+    mu, lam, square = found
+    slack = 1e-6 * (passage.high - passage.low)
+    inside = passage.low - slack <= mu.real <= passage.high + slack
+    # Frequencies at the ends bound where the pair can be: elsewhere it is another one's meeting.
+    squares = sorted(m.real for m in passage.means)
+    margin = 1e-3 * abs(mean) + 2 * (squares[1] - squares[0])
+    near = squares[0] - margin <= (lam**2).real <= squares[1] + margin
+    on_axis = abs(mu.imag) <= 1e-9 * abs(mu) and abs(lam.real) <= 1e-9 * abs(lam)
+    opens = -square.real if passage.stabilising else square.real
+    if not (inside and near and on_axis and opens > 0):
+        return None
+    return _Solved(float(mu.real), 1j * abs(lam.imag), float(np.sqrt(opens)))
+
+
 def _divergence(reduced: Reduced, passage: Passage) -> _Solved | None:
     """Where λ² of an undamped mode passes through zero."""
 
@@ -216,17 +265,13 @@ def _divergence(reduced: Reduced, passage: Passage) -> _Solved | None:
 
 def _crossing(reduced: Reduced, passage: Passage) -> _Solved | None:
     """Where the growth rate of a damped mode passes through zero."""
-    start = _again(reduced, passage)
-    if start is None:
+    found = _quick_crossing(reduced, passage)
+    if found is None:
+        start = _again(reduced, passage)
+        found = None if start is None else _slow_crossing(reduced, passage, start)
+    if found is None:
         return None
-
-    quick = _quick_crossing(reduced, passage, start)
-    if quick is None:
-        found = _slow_crossing(reduced, passage, start)
-        if found is None:
-            return None
-        quick = found
-    mu, lam, slope = quick
+    mu, lam, slope = found
     still = abs(lam) <= NEAR_AXIS * reduced.frequency
     return _Solved(mu, 0j if still else lam, None, slope)
 
@@ -241,9 +286,11 @@ def _crossing_again(reduced: Reduced, passage: Passage, solved: _Solved) -> _Sol
     return _Solved(mu, 0j if abs(lam) <= NEAR_AXIS * reduced.frequency else 1j * lam.imag, None, slope)
 
 
-def _quick_crossing(reduced: Reduced, passage: Passage, start: State) -> tuple[float, complex, float] | None:
+def _quick_crossing(reduced: Reduced, passage: Passage) -> tuple[float, complex, float] | None:
     """μ, λ on the axis and the growth's slope, following this one mode only; None where that does not settle inside."""
+    start = passage.old
     place = int(start.place[passage.branch])
+    right, left = (reduced.padded(start.found, v[:, [place]])[:, 0] for v in (start.found.right, start.found.left))
     lam, tangent = complex(start.found.values[place]), complex(start.found.tangents[place])
     with np.errstate(all="ignore"):
         ahead = -lam.real / tangent.real
@@ -253,8 +300,8 @@ def _quick_crossing(reduced: Reduced, passage: Passage, start: State) -> tuple[f
         reduced,
         start.mu + ahead,
         lam + tangent * ahead,
-        start.found.right[:, place],
-        start.found.left[:, place],
+        right,
+        left,
         passage.low,
         passage.high,
     )
@@ -291,40 +338,38 @@ def _again(reduced: Reduced, passage: Passage) -> State | None:
     return State(found, place) if near else None
 
 
-def exceptional_point(reduced: Reduced, lam: complex, mu: float) -> tuple[complex, float] | None:
+def exceptional_point(reduced: Reduced, state: State, lam: complex, mu: float) -> tuple[complex, float] | None:
     """The complex μ beside an onset at which two modes meet, and κ of λ ≈ λ_c ± κ √(μ − μ_c).
 
-    Sought with the modes nearby, then with all of them. None where it is further away than half the onset's μ.
+    Sought with the modes nearby at a state before it, then solved for. None where it is further away than half the
+    onset's μ.
     """
     reach = 0.5 * max(mu, 1e-3)
-    rough = _zero(_halves_of(Surroundings(reduced, lam, mu).values, lam), mu, complex(mu), reach, 1e-8)
+    near = _Halves(Surroundings(reduced, state.found, lam).values, lam)
+    rough = _zero(near.square, mu, complex(mu), reach, 1e-8)
     if rough is None:
         return None
-    square = _halves_of(lambda at: reduced.solve(at)[0], lam)
-    exact = _zero(square, mu, rough, reach, 1e-10)
-    if exact is None:
+    found = double_eigenvalue(reduced, rough, near.centre)
+    if found is None or abs(found[0] - mu) > reach or abs(found[1] - lam) > 0.5 * abs(lam):
         return None
-    step = 1e-4 * max(abs(exact), 1e-3)
-    slope = (square(exact + step) - square(exact - step)) / (2 * step)
-    root = np.sqrt(slope)
-    return (exact, float(max(abs(root.real), abs(root.imag)))) if np.isfinite(root) else None
+    root = np.sqrt(found[2])
+    return (found[0], float(max(abs(root.real), abs(root.imag)))) if np.isfinite(root) else None
 
 
-def _halves_of(values: Callable[[complex], ComplexArray], lam: complex) -> Callable[[complex], complex]:
-    """Squared half difference of the mode of the onset and its neighbour at a complex μ, then of whichever pair is
-    about their mean."""
-    centre = lam
+class _Halves:
+    """Squared half difference of the mode of an onset and its neighbour at a complex μ, then of whichever pair is about
+    their mean, which ``centre`` keeps."""
 
-    def square(at: complex) -> complex:
-        nonlocal centre
-        found = values(complex(at))
+    def __init__(self, values: Callable[[complex], ComplexArray], lam: complex) -> None:
+        self._values, self.centre = values, lam
+
+    def square(self, at: complex) -> complex:
+        found = self._values(complex(at))
         found = found[found.imag > 0]
         if len(found) < 2:
             return complex("nan")
-        centre, half = pair_near(found, centre)
+        self.centre, half = pair_near(found, self.centre)
         return half
-
-    return square
 
 
 def _zero(

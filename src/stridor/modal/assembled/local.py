@@ -6,7 +6,7 @@ import numpy as np
 import scipy.linalg as sl
 
 from ...typing import ComplexArray
-from .reduced import Reduced
+from .reduced import Eigenpairs, Reduced
 
 NEIGHBOURS = 12  # eigenvectors that span the surroundings of an eigenvalue
 STEPS = 12
@@ -17,7 +17,7 @@ def refined(
 ) -> tuple[complex, ComplexArray, ComplexArray] | None:
     """The eigenvalue near λ at μ with right and left vectors (r,), from those nearby: two-sided inverse iteration,
     whose Rayleigh functional converges cubically. None where it does not settle."""
-    mass, damping, stiffness = (np.asarray(m) for m in reduced.matrices(mu))
+    mass, damping, stiffness = reduced.matrices(mu)
     z, y = right / np.linalg.norm(right), left / np.linalg.norm(left)
     for _ in range(STEPS):
         matrix = lam**2 * mass + lam * damping + stiffness
@@ -62,25 +62,24 @@ def axis_crossing(
 
 def _slope(reduced: Reduced, mu: float, lam: complex, right: ComplexArray, left: ComplexArray) -> complex:
     """dλ/dμ of a simple eigenvalue."""
-    step = 1e-5 * max(mu, 1e-3)
-    low, high = (
-        lam * (np.asarray(damping) @ right) + np.asarray(stiffness) @ right
-        for _, damping, stiffness in (reduced.matrices(max(mu - step, 0.0)), reduced.matrices(mu + step))
-    )
+    by_damping, by_stiffness = reduced.slopes(mu)
     mass, damping, _ = reduced.matrices(mu)
-    by_lambda = 2 * lam * (np.asarray(mass) @ right) + np.asarray(damping) @ right
-    return complex(-(left @ (high - low)) / (mu + step - max(mu - step, 0.0)) / (left @ by_lambda))
+    change = lam * (by_damping @ right) + by_stiffness @ right
+    by_lambda = 2 * lam * (mass @ right) + damping @ right
+    return complex(-(left @ change) / (left @ by_lambda))
 
 
 class Surroundings:
-    """The projected problem on the eigenvectors nearest to one λ at one μ, right and left: exact there, and what these
-    modes do to each other as μ changes is in it."""
+    """The projected problem on the eigenvectors nearest to one λ at one μ, right and left (r, q): exact there, and what
+    these modes do to each other as μ changes is in it."""
 
-    def __init__(self, reduced: Reduced, lam: complex, mu: float) -> None:
-        found = reduced.eigenpairs(mu)
+    def __init__(self, reduced: Reduced, found: Eigenpairs, lam: complex) -> None:
         near = np.argsort(np.abs(found.values - lam))[:NEIGHBOURS]
         self.reduced = reduced
-        self.right, self.left = (v[:, near] / np.linalg.norm(v[:, near], axis=0) for v in (found.right, found.left))
+        self.right, self.left = (
+            v / np.linalg.norm(v, axis=0)
+            for v in (reduced.padded(found, found.right[:, near]), reduced.padded(found, found.left[:, near]))
+        )
 
     def values(self, mu: complex) -> ComplexArray:
         """Eigenvalues (2q,) [1/s] at a real or complex μ."""
@@ -93,3 +92,63 @@ class Surroundings:
         with np.errstate(all="ignore"):
             found: ComplexArray = sl.eigvals(first, second) * unit
         return found[np.isfinite(found)]
+
+
+def double_eigenvalue(reduced: Reduced, mu: complex, lam: complex) -> tuple[complex, complex, complex] | None:
+    """Complex μ at which two eigenvalues meet near λ, λ there and the square κ² of λ ≈ λ_c ± κ √(μ − μ_c), by Newton;
+    None where it does not settle.
+
+    The bordered matrix [[P, b], [cᵀ, 0]] stays regular where P has one null vector. With x, y and g solving
+
+        P x + b g = 0, cᵀx = 1,      Pᵀy + c g = 0, bᵀy = 1
+
+    g(λ, μ) is zero at eigenvalues and simple at simple ones, ∂g = −yᵀ ∂P x: two meet where g = g_λ = 0, and there
+    κ² = −2 g_μ / g_λλ (Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, SIAM 2000, ch. 3).
+    """
+    mu, lam = complex(mu), complex(lam)
+    row, column = reduced.null_vectors(lam, mu)
+    b, c = column.conj() / np.linalg.norm(column), row.conj() / np.linalg.norm(row)
+
+    def at(mu: complex, lam: complex) -> tuple[complex, complex, complex]:
+        """g, g_λ and g_μ."""
+        mass, damping, stiffness = reduced.matrices(mu)
+        by_damping, by_stiffness = _complex_slopes(reduced, mu)
+        size = len(mass)
+        # Rows of one size: the problem's own are scaled by what P is made of.
+        scale = 1.0 / max(float(np.abs(stiffness).max()), 1e-300)
+        whole = np.zeros((size + 1, size + 1), dtype=complex)
+        whole[:size, :size] = scale * (lam**2 * mass + lam * damping + stiffness)
+        whole[:size, size], whole[size, :size] = b, c
+        factor = sl.lu_factor(whole, check_finite=False)
+        unit = np.zeros(size + 1, dtype=complex)
+        unit[size] = 1.0
+        x, y = (sl.lu_solve(factor, unit, trans=t, check_finite=False) for t in (0, 1))
+        z, w = x[:size], y[:size]
+        by_lam = -scale * (w @ (2 * lam * (mass @ z) + damping @ z))
+        return complex(x[size]), complex(by_lam), complex(-scale * (w @ (lam * (by_damping @ z) + by_stiffness @ z)))
+
+    with np.errstate(all="ignore"):
+        for _ in range(2 * STEPS):
+            try:
+                g, g_lam, g_mu = at(mu, lam)
+                small_lam, small_mu = 1e-6 * abs(lam), 1e-6 * max(abs(mu), 1e-3)
+                twice = (at(mu, lam + small_lam)[1] - at(mu, lam - small_lam)[1]) / (2 * small_lam)
+                mixed = (at(mu + small_mu, lam)[1] - at(mu - small_mu, lam)[1]) / (2 * small_mu)
+            except (sl.LinAlgError, ValueError):
+                return None
+            determinant = g_lam * mixed - g_mu * twice
+            change_lam = -(g * mixed - g_mu * g_lam) / determinant
+            change_mu = -(g_lam * g_lam - twice * g) / determinant
+            if not np.isfinite(change_lam + change_mu):
+                return None
+            lam, mu = lam + change_lam, mu + change_mu
+            if abs(change_mu) <= 1e-10 * max(abs(mu), 1e-3) and abs(change_lam) <= 1e-8 * abs(lam):
+                return mu, lam, -2 * g_mu / twice
+    return None
+
+
+def _complex_slopes(reduced: Reduced, mu: complex) -> tuple[ComplexArray, ComplexArray]:
+    """dC/dμ and dK/dμ at a complex μ."""
+    step = 1e-6 * max(abs(mu), 1e-3)
+    low, high = reduced.matrices(complex(mu - step)), reduced.matrices(complex(mu + step))
+    return (high[1] - low[1]) / (2 * step), (high[2] - low[2]) / (2 * step)

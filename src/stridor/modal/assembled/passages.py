@@ -14,6 +14,7 @@ from .reduced import Reduced
 COMPLEX = 1e-9  # imaginary part of λ² over the band's that is more than rounding
 TOUCHING = 0.05  # squared half differences that come down to this part of their ends are looked at closely
 PROBES = 4
+STILL = 1e-12  # growth rate over |λ| that is rounding
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,11 @@ def crossings(old: State, new: State) -> list[Passage]:
         start, end = float(old.values[i].real), float(new.values[i].real)
         slopes = step * float(old.tangents[i].real), step * float(new.tangents[i].real)
         scale = max(abs(old.values[i]), 1e-300)
-        if max(abs(start), abs(end)) <= 1e-12 * scale:
+        if max(abs(start), abs(end)) <= STILL * scale:
             continue
+        if abs(start) <= STILL * scale:
+            # Undamped where the branch begins: stable up to there, whichever sign rounding has given it.
+            start = -STILL * scale
         marks = [0.0, *_turns(start, end, *slopes), 1.0]
         rates = [_cubic(start, end, *slopes, mark) for mark in marks]
         for (a, b), (first, second) in zip(pairwise(marks), pairwise(rates), strict=True):

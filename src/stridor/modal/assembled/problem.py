@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -57,7 +56,7 @@ class ContactProblem:
     touching: IntArray
     open_contacts: tuple[str, ...]
     damped: bool
-    extras: Callable[[float], Extras] | None = None
+    extras: Varying | None = None
     solver: str | None = None
 
     @property
@@ -207,7 +206,7 @@ def problem_of(
         touching=touching,
         open_contacts=tuple(name for name in nodes.names if name not in closed),
         damped=has_damping or with_state.damps,
-        extras=None if with_state.neutral else _extras(with_state, _grid(system, frictions)),
+        extras=None if with_state.neutral else Varying(with_state, _grid(system, frictions)),
         solver=options.solver,
     )
 
@@ -223,26 +222,48 @@ def _grid(system: System, frictions: Array | None) -> Array | None:
     return float(values[-1]) * (1 - np.cos(np.linspace(0, np.pi, MOST_EQUILIBRIA))) / 2
 
 
-def _extras(state: Steadiness, grid: Array | None) -> Callable[[float], Extras]:
-    """What each μ adds, kept for the μ asked for before: each costs an equilibrium or an interpolation."""
-    known: dict[float, Extras] = {}
+class Varying:
+    """What each μ adds: exact where equilibria are solved, interpolated between; kept for the μ asked for before.
 
-    def at(mu: float) -> Extras:
-        if mu not in known:
-            if mu == 0.0 and not state.prestress:
-                known[mu] = NOTHING
-            elif grid is None or mu in grid or not grid[0] <= mu <= grid[-1]:
-                known[mu] = Extras(*state.terms(mu))
-            else:
-                known[mu] = _between([at(float(g)) for g in grid], _lagrange(grid, mu))
-        return known[mu]
+    grid (k,): where equilibria are solved, None for everywhere.
+    """
 
-    return at
+    def __init__(self, state: Steadiness, grid: Array | None) -> None:
+        self._state, self.grid = state, grid
+        self._known: dict[float, Extras] = {}
 
+    def __call__(self, mu: float) -> Extras:
+        """The terms at ``mu``."""
+        if mu == 0.0 and not self._state.prestress:
+            return NOTHING
+        if mu in self._known:
+            return self._known[mu]
+        if self.within(mu):
+            assert self.grid is not None, "within it"
+            if mu not in self.grid:
+                return _between([self(float(g)) for g in self.grid], self.weights(mu))
+        return self._known.setdefault(mu, Extras(*self._state.terms(mu)))
 
-def _lagrange(grid: Array, mu: float) -> Array:
-    """Weights (k,) of the polynomial through values at grid (k,)."""
-    return np.array([float(np.prod([(mu - b) / (a - b) for b in grid if b != a])) for a in grid], dtype=float)
+    def within(self, mu: complex) -> bool:
+        """Whether ``mu`` is interpolated, at complex values as well."""
+        return self.grid is not None and bool(self.grid[0] <= mu.real <= self.grid[-1])
+
+    def weights(self, mu: complex) -> Any:
+        """Weights (k,) of the terms on the grid, Lagrange's polynomials."""
+        assert self.grid is not None, "asked for within the grid only"
+        grid = self.grid
+        return np.array([np.prod([(mu - b) / (a - b) for b in grid if b != a]) for a in grid])
+
+    def slopes(self, mu: float) -> Array:
+        """Derivatives (k,) of the weights over μ."""
+        assert self.grid is not None, "asked for within the grid only"
+        grid = self.grid
+        result = np.zeros(len(grid))
+        for i, a in enumerate(grid):
+            others = [b for b in grid if b != a]
+            parts = [np.prod([mu - b for b in others if b != left]) for left in others]
+            result[i] = np.sum(parts) / np.prod([a - b for b in others])
+        return result
 
 
 def _between(terms: list[Extras], weights: Array) -> Extras:

@@ -17,13 +17,15 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
+import scipy.sparse as sp
 
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
-from .problem import ContactProblem, Extras
+from .problem import ContactProblem, Extras, Varying
 from .shifted import Pair, Shifted, orthonormal, real_columns
 
 REACH = 1.8  # eigenpairs up to this much above the band are looked at
+FEW = 3  # friction coefficients asked of a basis one by one before all of the grid's terms are projected
 KEPT = 1e-10  # of the strongest direction of the vectors kept
 
 
@@ -32,7 +34,7 @@ class Eigenpairs:
     """Eigenpairs of the projected problem at one μ, one of each conjugate pair of λ.
 
     coordinate x (k,): λ² without damping, else λ. values λ (k,) with Im λ ≥ 0. right (r, k) and left (r, k) vectors,
-    wᵀ P(λ) z = 0, tangents dx/dμ (k,).
+    wᵀ P(λ) z = 0, tangents dx/dμ (k,). own: how many of the r belong to pairs, the rest to forces.
     """
 
     mu: float
@@ -41,6 +43,7 @@ class Eigenpairs:
     right: ComplexArray
     left: ComplexArray
     tangents: ComplexArray
+    own: int
 
 
 class Reduced:
@@ -68,6 +71,7 @@ class Reduced:
         self._slide = np.zeros((problem.nodes, 0))
         self._known: dict[float, Eigenpairs] = {}
         self._extra: dict[float, tuple[Array, Array]] = {}
+        self._grid: list[tuple[Array, Array]] | None = None
         self._lift_scale = 1.0
         self._kept: list[tuple[Array, Array]] = []
         self.add(modes)
@@ -191,16 +195,48 @@ class Reduced:
         self._matrices = (mass, damping, stiffness - normal.T @ force, -self._slide.T @ force)
         self._known.clear()
         self._extra.clear()
+        self._grid = None
 
-    def matrices(self, mu: complex) -> tuple[Array, Array, Any]:
+    def matrices(self, mu: complex) -> tuple[Array, Any, Any]:
         """M, C and K (r, r) at μ, friction and what steady sliding adds included; complex where μ is."""
         mass, damping, stiffness, friction = self._matrices
-        if self.problem.extras is None:
+        extras = self.problem.extras
+        if extras is None:
             return mass, damping, stiffness + mu * friction
-        if float(mu.real) not in self._extra:
-            self._extra[float(mu.real)] = self._projected(self.problem.at(float(mu.real)))
-        more_damping, more_stiffness = self._extra[float(mu.real)]
+        more_damping, more_stiffness = self._steady(extras, mu)
         return mass, damping + more_damping, stiffness + mu * friction + more_stiffness
+
+    def slopes(self, mu: float) -> tuple[Array, Array]:
+        """dC/dμ and dK/dμ (r, r)."""
+        friction, extras = self._matrices[3], self.problem.extras
+        if extras is None:
+            return np.zeros_like(friction), friction
+        if extras.within(mu):
+            damping, stiffness = _weighed(self._on_grid(extras), extras.slopes(mu))
+        else:
+            low, high = max(mu - 1e-5 * max(mu, 1e-3), 0.0), mu + 1e-5 * max(mu, 1e-3)
+            before, after = self._steady(extras, low), self._steady(extras, high)
+            damping, stiffness = ((b - a) / (high - low) for a, b in zip(before, after, strict=True))
+        return damping, friction + stiffness
+
+    def _steady(self, extras: Varying, mu: complex) -> tuple[Array, Array]:
+        """Damping and stiffness (r, r) that steady sliding adds; outside its grid those of the real part of μ."""
+        real = float(mu.real)
+        if extras.within(mu):
+            if isinstance(mu, complex):
+                return _weighed(self._on_grid(extras), extras.weights(mu))
+            if self._grid is not None or len(self._extra) >= FEW:
+                return _weighed(self._on_grid(extras), extras.weights(real))
+        if real not in self._extra:
+            self._extra[real] = self._projected(extras(real))
+        return self._extra[real]
+
+    def _on_grid(self, extras: Varying) -> list[tuple[Array, Array]]:
+        """The terms at the grid's μ, projected once for each basis."""
+        if self._grid is None:
+            assert extras.grid is not None, "asked for within the grid only"
+            self._grid = [self._projected(extras(float(g))) for g in extras.grid]
+        return self._grid
 
     def _projected(self, extras: Extras) -> tuple[Array, Array]:
         own = self.pairs.count
@@ -209,9 +245,9 @@ class Reduced:
         if extras.weakening is not None:
             damping[:, :own] += self._slide.T @ (extras.weakening[:, None] * self._slide[:, :own])
         if extras.damping is not None:
-            damping[:, :own] += tests.T @ (extras.damping @ self.pairs.u)
+            damping[:, :own] += _sandwiched(tests, extras.damping, self.pairs.u)
         if extras.stiffness is not None:
-            stiffness[:, :own] += tests.T @ (extras.stiffness @ self.pairs.u)
+            stiffness[:, :own] += _sandwiched(tests, extras.stiffness, self.pairs.u)
         return damping, stiffness
 
     # -- eigenpairs ---------------------------------------------------------------------------------------------------
@@ -221,8 +257,15 @@ class Reduced:
             coordinate, right, left = self.solve(mu)
             values = coordinate if self.problem.damped else upper_root(coordinate)
             tangents = self.tangents(mu, coordinate, values, right, left)
-            self._known[mu] = Eigenpairs(mu, coordinate, values, right, left, tangents)
+            self._known[mu] = Eigenpairs(mu, coordinate, values, right, left, tangents, self.pairs.count)
         return self._known[mu]
+
+    def padded(self, found: Eigenpairs, vectors: ComplexArray) -> ComplexArray:
+        """Vectors (r, k) of pairs found before the basis grew, on the basis as it is now."""
+        own = found.own
+        return np.vstack(
+            [_padded(vectors[:own], self.pairs.count), _padded(vectors[own:], self.forces.shape[1])], dtype=complex
+        )
 
     def solve(self, mu: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Coordinates x (k,), right and left vectors (r, k) at a real or complex μ, |λ| up to REACH times the band."""
@@ -237,10 +280,10 @@ class Reduced:
     ) -> ComplexArray:
         """dx/dμ (k,) = −wᵀ P_μ z / wᵀ P_x z."""
         mass, damping, _ = self.matrices(mu)
-        change = combined(self._matrices[3], right)
-        if self.problem.extras is not None and mu:
-            # Steady forces change little with μ, the laws' slopes are proportional to it.
-            change = change + values * (self._extra[mu][0] / mu @ right)
+        by_damping, by_stiffness = self.slopes(mu)
+        change = combined(by_stiffness, right)
+        if self.problem.extras is not None:
+            change = change + values * combined(by_damping, right)
         by_x = combined(mass, right)
         if self.problem.damped:
             by_x = 2 * coordinate * by_x + combined(damping, right)
@@ -251,12 +294,12 @@ class Reduced:
         """The vector (r,) that P(λ, μ) all but takes to zero, for λ that may be double."""
         return self.null_vectors(lam, mu)[0]
 
-    def null_vectors(self, lam: complex, mu: float) -> tuple[ComplexArray, ComplexArray]:
+    def null_vectors(self, lam: complex, mu: complex) -> tuple[ComplexArray, ComplexArray]:
         """The vectors z and y (r,) that make P(λ, μ) z and yᵀP(λ, μ) all but zero."""
         mass, damping, stiffness = self.matrices(mu)
         matrix = lam**2 * mass + lam * damping + stiffness
         # Balanced by what the entries are made of: a row may itself be all but zero here.
-        size = np.abs(self._matrices[2]) + mu * np.abs(self._matrices[3]) + self.frequency**2 * np.abs(mass)
+        size = np.abs(self._matrices[2]) + abs(mu) * np.abs(self._matrices[3]) + self.frequency**2 * np.abs(mass)
         rows = np.maximum(size.max(axis=1), 1e-300)
         columns = np.maximum((size / rows[:, None]).max(axis=0), 1e-300)
         u, _, v = sl.svd(matrix / rows[:, None] / columns)
@@ -290,7 +333,20 @@ def _grown(known: tuple[Array, Array], matrix: Sparse, u: Array, lifts: Array) -
     return square, across
 
 
-def _padded(block: Array, rows: int) -> Array:
+def _sandwiched(tests: Array, matrix: Sparse, u: Array) -> Array:
+    """tests^T A u of a matrix that is zero but for a few rows."""
+    csr = sp.csr_array(matrix)
+    rows = np.flatnonzero(np.diff(csr.indptr))
+    return tests[rows].T @ (csr[rows] @ u)
+
+
+def _weighed(terms: list[tuple[Array, Array]], weights: Any) -> tuple[Any, Any]:
+    """Sums over the grid with weights (k,)."""
+    damping = sum((w * d for w, (d, _) in zip(weights, terms, strict=True)), start=0.0)
+    return damping, sum((w * k for w, (_, k) in zip(weights, terms, strict=True)), start=0.0)
+
+
+def _padded(block: Any, rows: int) -> Any:
     """The block with rows of zeros added below."""
     return np.vstack([block, np.zeros((rows - len(block), block.shape[1]))])
 
