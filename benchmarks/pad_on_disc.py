@@ -49,7 +49,8 @@ def main() -> None:
     print(f"modes at 13 μ: {time.perf_counter() - started:.1f} s, residual ≤ {sweep.residual.max():.1e}")
     started = time.perf_counter()
     found = st.onsets(case).onsets
-    print(f"{len(found)} onsets: {time.perf_counter() - started:.1f} s, residual ≤ {max(o.residual for o in found):.1e}")
+    seconds, residual = time.perf_counter() - started, max(o.residual for o in found)
+    print(f"{len(found)} onsets: {seconds:.1f} s, residual ≤ {residual:.1e}")
     for onset in found:
         print(f"  μ = {onset.mu:.6f} at {onset.frequency_hz:.2f} Hz")
 
