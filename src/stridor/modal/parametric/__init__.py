@@ -1,0 +1,22 @@
+"""Problems with parameters, reduced once and solved in milliseconds everywhere in their box."""
+
+from .contacts import contact_parameters
+from .full import FullModes, verified
+from .model import ReducedModel, ReducedModes
+from .offline import reduce
+from .onsets import ParametricOnset, onsets_along
+from .problem import Parameter, ParametricProblem, Term
+
+__all__ = [
+    "FullModes",
+    "Parameter",
+    "ParametricOnset",
+    "ParametricProblem",
+    "ReducedModel",
+    "ReducedModes",
+    "Term",
+    "contact_parameters",
+    "onsets_along",
+    "reduce",
+    "verified",
+]

@@ -1,0 +1,133 @@
+"""Eigenpairs of small dense quadratic problems."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+
+from ...errors import AnalysisError
+from ...typing import Array, ComplexArray
+
+NEAR = 1.6  # modes up to this much above the band are solved for together
+SMALL = 1e-13
+
+
+@dataclass(frozen=True)
+class DenseModes:
+    """λ (k,) with Im λ ≥ 0 ascending, right and left vectors (r, k) of unit length, yᵀP(λ) = 0."""
+
+    values: ComplexArray
+    right: ComplexArray
+    left: ComplexArray
+
+
+def dense_modes(mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float) -> DenseModes:
+    """Eigenpairs of (λ²M + λD + K) z = 0 with |λ| ≤ reach · frequency [1/s]; real λ of either sign are among them.
+
+    Raises AnalysisError where the matrices are singular or not finite.
+    """
+    with np.errstate(all="ignore"):
+        try:
+            found = _by_undamped(mass, damping, stiffness, frequency, reach)
+            if found is None:
+                found = _by_companion(mass, damping, stiffness, frequency, reach)
+        except (ValueError, sl.LinAlgError) as error:
+            raise AnalysisError("the reduced problem is singular or not finite; check the parameters") from error
+    order = np.lexsort((found.values.real, found.values.imag))
+    right, left = found.right[:, order], found.left[:, order]
+    return DenseModes(
+        found.values[order], right / np.linalg.norm(right, axis=0), left / np.linalg.norm(left, axis=0)
+    )
+
+
+def _by_companion(mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float) -> DenseModes:
+    """Through the companion matrix, inverted at λ = frequency."""
+    scaled_mass, scaled_damping = frequency**2 * mass, frequency * damping
+    r = len(mass)
+    factor = sl.lu_factor(scaled_mass + scaled_damping + stiffness)
+    companion = np.zeros((2 * r, 2 * r))
+    companion[:r, :r] = -sl.lu_solve(factor, scaled_damping + 2 * scaled_mass)
+    companion[:r, r:] = -sl.lu_solve(factor, scaled_mass)
+    companion[r:, :r] = np.eye(r)
+    theta, left, right = sl.eig(companion, left=True, right=True)
+    x = frequency * (1 + 1 / theta)
+    chosen = np.flatnonzero(np.isfinite(x) & (np.abs(x) <= reach * frequency) & (x.imag >= 0))
+    z = np.where(np.abs(theta[chosen]) > 1, right[:r, chosen], right[r:, chosen])
+    y = left[:r, chosen].conj()
+    y = sl.lu_solve(factor, y.real, trans=1) + 1j * sl.lu_solve(factor, y.imag, trans=1)
+    return DenseModes(x[chosen], z, y)
+
+
+def _by_undamped(mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float) -> DenseModes | None:
+    """Through the modes without damping, at an eighth of the cost: those nearby solved for with damping, the others'
+    answer to it added, λ by the two-sided Rayleigh functional. None where damping is too strong for that, or λ real.
+
+    What is left on both sides bounds the error, whose product is kept below SMALL of λ.
+    """
+    shift = frequency**2
+    factor = sl.lu_factor(stiffness + shift * mass)
+    theta, left, right = sl.eig(sl.lu_solve(factor, shift * mass), left=True, right=True)
+    left = left.conj()
+    left = sl.lu_solve(factor, left.real, trans=1) + 1j * sl.lu_solve(factor, left.imag, trans=1)
+    squares = shift - shift / theta
+    finite = np.isfinite(squares)
+    near = finite & (np.abs(squares) <= (NEAR * reach * frequency) ** 2)
+    far = np.flatnonzero(finite & ~near)
+    mine = np.flatnonzero(near)
+    if not len(mine):
+        return None
+    inner_right, inner_left = _real_span(right[:, mine], squares[mine]), _real_span(left[:, mine], squares[mine])
+    inner_mass, inner_damping, inner_stiffness = (
+        inner_left.T @ (matrix @ inner_right) for matrix in (mass, damping, stiffness)
+    )
+    inner = _by_companion(inner_mass, inner_damping, inner_stiffness, frequency, reach)
+    lam = inner.values
+    if not len(lam) or np.any(lam.imag <= 1e-3 * frequency):
+        return None
+    z, w = inner_right @ inner.right, inner_left @ inner.left
+    z, w = z / np.linalg.norm(z, axis=0), w / np.linalg.norm(w, axis=0)
+    # Answer of the modes further away: (λ²M + K)⁻¹ is a sum over modes.
+    weight = np.einsum("ij,ij->j", left[:, far], mass @ right[:, far])
+    for _ in range(2):
+        inverse = 1.0 / ((lam**2 - squares[far, None]) * weight[:, None])
+        z = z - right[:, far] @ (inverse * (left[:, far].T @ _rest(lam, z, mass, damping, stiffness)))
+        w = w - left[:, far] @ (inverse * (right[:, far].T @ _rest(lam, w, mass.T, damping.T, stiffness.T)))
+        lam = _functional(lam, z, w, mass, damping, stiffness)
+    ends = [np.linalg.norm(_rest(lam, z, mass, damping, stiffness), axis=0),
+            np.linalg.norm(_rest(lam, w, mass.T, damping.T, stiffness.T), axis=0)]  # fmt: skip
+    slope = np.einsum("ij,ij->j", w, 2 * lam * (mass @ z) + damping @ z)
+    if not np.all(ends[0] * ends[1] <= SMALL * np.abs(lam * slope)) or np.any(np.abs(lam) > reach * frequency * 1.001):
+        return None
+    return DenseModes(lam, z, w)
+
+
+def _rest(lam: ComplexArray, z: ComplexArray, mass: Array, damping: Array, stiffness: Array) -> ComplexArray:
+    return lam**2 * (mass @ z) + lam * (damping @ z) + stiffness @ z
+
+
+def _functional(
+    lam: ComplexArray, z: ComplexArray, w: ComplexArray, mass: Array, damping: Array, stiffness: Array
+) -> ComplexArray:
+    """λ (k,) that makes wᵀP(λ)z zero, by Newton from the one before."""
+    a, b, c = (np.einsum("ij,ij->j", w, matrix @ z) for matrix in (mass, damping, stiffness))
+    for _ in range(3):
+        lam = lam - (a * lam**2 + b * lam + c) / (2 * a * lam + b)
+    return lam
+
+
+def _real_span(vectors: ComplexArray, squares: ComplexArray) -> Array:
+    """Real vectors that span eigenvectors of a real problem: of conjugate pairs the real and the imaginary part."""
+    columns = [vectors[:, squares.imag == 0].real]
+    upper = vectors[:, squares.imag > 0]
+    columns += [upper.real, upper.imag]
+    return np.hstack(columns)
+
+
+def assembled(projected: Array, factors: Array, powers: Array) -> tuple[Array, Array, Array]:
+    """M, D and K (r, r) from projected terms (t, r, r)."""
+    total = np.zeros((3, *projected.shape[1:]))
+    for part, factor, power in zip(projected, factors, powers, strict=True):
+        total[2 - power] += factor * part
+    return total[0], total[1], total[2]

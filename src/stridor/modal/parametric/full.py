@@ -1,0 +1,87 @@
+"""Eigenpairs of the full problem next to those of the reduced one: one factorisation for each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...direct import factorise
+from ...errors import AnalysisError
+from ...typing import Array, ComplexArray
+from ..quadratic.problem import Quadratic
+from .basis import times
+from .model import ReducedModel
+
+STEPS = 20
+SETTLED = 1e-14
+OFF = 1e-6  # of λ: how far beside it is factorised, so that the matrix is not singular
+BELIEVED = 1e-10
+
+
+@dataclass(frozen=True)
+class FullModes:
+    """Eigenvalues λ (k,) [1/s] of the full problem with right and left vectors (n, k) of unit length and the larger of
+    both sides' componentwise backward errors residual (k,); shift (k,): what the reduced ones were off, relative."""
+
+    values: ComplexArray
+    right: ComplexArray
+    left: ComplexArray
+    residual: Array
+    shift: Array
+
+
+def verified(
+    model: ReducedModel, values: Mapping[str, float] | Sequence[float], *, which: str = "unstable",
+    solver: str | None = None,
+) -> FullModes:  # fmt: skip
+    """The modes of the full problem at a point of the box, from the reduced ones: the "unstable" or "all".
+
+    Costs one factorisation for each. Raises AnalysisError where one does not settle, or settles on another mode.
+    """
+    modes = model.modes(values)
+    chosen = np.flatnonzero(modes.unstable) if which == "unstable" else np.arange(len(modes.values))
+    problem = model.problem.at(modes.point)
+    right, left = model.expand(modes)[:, chosen], model.expand(modes, left=True)[:, chosen]
+    found = [refined(problem, complex(modes.values[c]), right[:, k], left[:, k], solver) for k, c in enumerate(chosen)]
+    n = problem.size
+    lam = np.array([f[0] for f in found], dtype=complex)
+    x = np.array([f[1] for f in found], dtype=complex).reshape(len(found), n).T
+    y = np.array([f[2] for f in found], dtype=complex).reshape(len(found), n).T
+    residual = np.maximum(problem.backward_error(lam, x), problem.transposed.backward_error(lam, y))
+    if np.any(residual > BELIEVED):
+        raise AnalysisError(f"a mode of the full problem does not settle: a backward error of {residual.max():.1e}")
+    return FullModes(lam, x, y, residual, np.abs(lam - modes.values[chosen]) / np.abs(lam))
+
+
+def refined(
+    problem: Quadratic, lam: complex, right: ComplexArray, left: ComplexArray, solver: str | None = None
+) -> tuple[complex, ComplexArray, ComplexArray]:
+    """λ and right and left vectors (n,) next to those given, by two-sided inverse iteration with one factorisation.
+
+    Raises AnalysisError where it does not settle.
+    """
+    x, y = right / np.linalg.norm(right), left / np.linalg.norm(left)
+    change = complex("inf")
+    with factorise(problem.at(lam * (1 + OFF)), solver=solver) as factor:
+        for _ in range(STEPS):
+            x = factor.solve(_slope(problem, lam, x), refine=False)
+            y = factor.solve(_slope(problem.transposed, lam, y), transpose=True, refine=False)
+            x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
+            rest = problem.residual(np.array([lam]), x[:, None])[:, 0]
+            change = complex((y @ rest) / (y @ _slope(problem, lam, x)))
+            if not np.isfinite(change):
+                break
+            lam -= change
+            if abs(change) <= SETTLED * abs(lam):
+                return lam, x, y
+    if abs(change) <= 1e-12 * abs(lam):
+        return lam, x, y
+    raise AnalysisError(f"the mode near λ = {lam:.6g} 1/s does not settle in the full problem")
+
+
+def _slope(problem: Quadratic, lam: complex, x: ComplexArray) -> ComplexArray:
+    """P'(λ)x (n,)."""
+    result: ComplexArray = 2 * lam * times(problem.mass, x) + times(problem.damping, x)
+    return result

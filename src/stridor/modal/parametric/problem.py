@@ -1,0 +1,118 @@
+"""Quadratic problems whose matrices are sums of fixed ones with factors that depend on parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...errors import CaseError
+from ...typing import Array, Sparse
+from ..quadratic.problem import Quadratic
+
+Role = Literal["mass", "damping", "stiffness"]
+POWERS: Mapping[Role, int] = {"mass": 2, "damping": 1, "stiffness": 0}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that varies: its range, low < high, and the value where nothing else is said."""
+
+    name: str
+    low: float
+    high: float
+    value: float
+
+    def __post_init__(self) -> None:
+        inside = np.isfinite([self.low, self.high, self.value]).all() and self.low < self.high
+        if not (inside and self.low <= self.value <= self.high):
+            given = f"{self.low:g} … {self.high:g}, {self.value:g}"
+            raise CaseError(f"box.{self.name}", given, "a range of two numbers low < high with the value inside")
+
+
+@dataclass(frozen=True)
+class Term:
+    """A matrix (n, n) csr and its factor at values of the parameters, in the mass, damping or stiffness.
+
+    symmetric: Aᵀ = A; stored once here so that nobody has to find out again.
+    """
+
+    matrix: Sparse
+    role: Role
+    factor: Callable[[Mapping[str, float]], float]
+    symmetric: bool = False
+
+
+def constant(_: Mapping[str, float]) -> float:
+    """The factor of a matrix that no parameter changes."""
+    return 1.0
+
+
+@dataclass(frozen=True)
+class ParametricProblem:
+    """λ²M(p) + λD(p) + K(p) with every matrix a sum of terms."""
+
+    terms: tuple[Term, ...]
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of freedoms n."""
+        return int(self.terms[0].matrix.shape[0])
+
+    @property
+    def reference(self) -> dict[str, float]:
+        """The parameters' own values."""
+        return {p.name: p.value for p in self.parameters}
+
+    @property
+    def damped(self) -> bool:
+        """Whether anything works on velocities."""
+        return any(t.role == "damping" and t.matrix.nnz for t in self.terms)
+
+    def point(self, values: Mapping[str, float] | Sequence[float]) -> dict[str, float]:
+        """Values of all parameters, those not given at their own. Raises CaseError for unknown names and no numbers."""
+        names = [p.name for p in self.parameters]
+        given = dict(zip(names, values, strict=True)) if not isinstance(values, Mapping) else dict(values)
+        for name, value in given.items():
+            if name not in names:
+                raise CaseError("values", name, f"no such parameter; there are: {', '.join(names)}")
+            if not np.isfinite(value):
+                raise CaseError(f"values.{name}", value, "a finite number")
+        return {**self.reference, **{k: float(v) for k, v in given.items()}}
+
+    def inside(self, values: Mapping[str, float]) -> bool:
+        """Whether values lie in the box, its border included."""
+        slack = {p.name: 1e-12 * (p.high - p.low) for p in self.parameters}
+        return all(p.low - slack[p.name] <= values[p.name] <= p.high + slack[p.name] for p in self.parameters)
+
+    def factors(self, values: Mapping[str, float]) -> Array:
+        """Factors (t,) of the terms."""
+        return np.array([t.factor(values) for t in self.terms], dtype=float)
+
+    def at(self, values: Mapping[str, float] | Sequence[float]) -> Quadratic:
+        """The problem at values of the parameters."""
+        values = self.point(values)
+        total = {role: sp.csr_array((self.size, self.size)) for role in POWERS}
+        for term, factor in zip(self.terms, self.factors(values), strict=True):
+            if factor:
+                total[term.role] = total[term.role] + factor * term.matrix
+        return Quadratic(*(sp.csr_array(total[role]) for role in ("mass", "damping", "stiffness")))
+
+    @cached_property
+    def powers(self) -> Array:
+        """Exponents (t,) of λ: 2 for mass, 1 for damping, 0 for stiffness."""
+        return np.array([POWERS[t.role] for t in self.terms])
+
+    def corners(self, counts: Sequence[int]) -> list[dict[str, float]]:
+        """A grid over the box, ``counts`` points along each parameter, closer at the ends (Chebyshev–Lobatto)."""
+        axes: list[Array] = []
+        for p, count in zip(self.parameters, counts, strict=True):
+            place = (1 - np.cos(np.linspace(0, np.pi, count))) / 2 if count > 1 else np.array([0.5])
+            axes.append(p.low + (p.high - p.low) * place)
+        grid = np.stack([g.ravel() for g in np.meshgrid(*axes, indexing="ij")], axis=1)
+        return [self.point([float(v) for v in row]) for row in grid]

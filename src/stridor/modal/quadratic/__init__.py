@@ -1,0 +1,8 @@
+"""Quadratic eigenvalue problems of sparse matrices that need have no structure at all."""
+
+from .count import undamped_count
+from .find import Completeness, Spectrum, find_modes
+from .problem import Quadratic
+from .region import Disc, Region
+
+__all__ = ["Completeness", "Disc", "Quadratic", "Region", "Spectrum", "find_modes", "undamped_count"]

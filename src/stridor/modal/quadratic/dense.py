@@ -1,0 +1,42 @@
+"""All eigenpairs of small problems, by QZ on the scaled companion form."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as sl
+
+from ...errors import AnalysisError
+from ...typing import ComplexArray
+from .problem import Quadratic
+
+SMALL = 1e-13  # of the matrices: α and β below it at once are those of a pencil that is singular for every λ
+
+
+def all_modes(problem: Quadratic) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Finite λ (k,) [1/s], right and left vectors (n, k) of unit norm.
+
+    Scaled as Fan, Lin and Van Dooren (2004) do: λ = γμ with γ² = ‖K‖/‖M‖, and all by 2/(‖K‖ + γ‖D‖). Raises
+    AnalysisError where det P(λ) is zero for every λ.
+    """
+    m, d, k = (np.asarray(a.toarray(), dtype=float) for a in (problem.mass, problem.damping, problem.stiffness))
+    sizes = [float(np.linalg.norm(a, 2)) for a in (m, d, k)]
+    gamma = float(np.sqrt(sizes[2] / sizes[0])) if sizes[0] > 0 and sizes[2] > 0 else 1.0
+    delta = 2 / max(sizes[2] + gamma * sizes[1], gamma**2 * sizes[0], 1e-300)
+    m, d, k = gamma**2 * delta * m, gamma * delta * d, delta * k
+    n = problem.size
+    one, none = np.eye(n), np.zeros((n, n))
+    left_side, right_side = np.block([[-d, -k], [one, none]]), np.block([[m, none], [none, one]])
+    (alpha, beta), left, right = sl.eig(left_side, right_side, left=True, homogeneous_eigvals=True)
+    if (np.hypot(np.abs(alpha), np.abs(beta)) < SMALL).any():
+        raise AnalysisError("the quadratic problem is singular for every λ: some motion has no mass, damping or spring")
+    finite = np.abs(beta) > SMALL * np.abs(alpha)
+    mu = alpha[finite] / beta[finite]
+    upper = np.abs(mu) >= 1
+    x = np.where(upper, right[:n, finite], right[n:, finite])
+    y = left[:n, finite].conj()
+    return gamma * mu, unit(x), unit(y)
+
+
+def unit(x: ComplexArray) -> ComplexArray:
+    """Columns of unit norm."""
+    return x / np.maximum(np.linalg.norm(x, axis=0), 1e-300)

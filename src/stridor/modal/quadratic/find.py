@@ -1,0 +1,396 @@
+"""Every eigenvalue of a large sparse quadratic problem in a region, with as few factorisations as may be."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...direct import Factor, SingularMatrix, factorise
+from ...errors import AnalysisError
+from ...typing import Array, BoolArray, ComplexArray
+from .count import undamped_count, unknown
+from .dense import all_modes
+from .krylov import Krylov
+from .polish import ALIKE, SPREAD, biorthogonal, inverse_iteration, merged, pairs, snapped, tuned
+from .problem import Quadratic
+from .region import BORDER, MARGIN, PAD, Disc, Region, cells, remaining, uncovered
+from .search import BLOCK, Found, Search, TooClose
+
+DENSE = 60  # freedoms up to which all eigenvalues are found at once
+COUNTED = 1500  # and up to which the argument principle counts them unasked: it takes about a hundred determinants
+BASIS_BYTES = 1.5e9  # of the Krylov basis of one shift
+FEWEST, LARGEST = 160, 500  # vectors it may hold at most, whatever their length
+SHIFTS = 60  # factorisations at most
+MOVES = 5  # tries to find a shift beside an eigenvalue it has hit
+POLISHED = 12  # eigenpairs that may need factors of their own
+ROUNDS = 2  # times that missing eigenvalues are looked for
+
+
+@dataclass(frozen=True)
+class Completeness:
+    """What speaks for no eigenvalue in the region being missed, as data and in one sentence.
+
+    searched: the region, bounded. discs: where all Ritz values have converged; covered: whether together they cover it.
+    looks: second looks from independent random blocks, the left vectors' own search being one; later: eigenvalues that
+    only these brought. counted: eigenvalues of both half planes within a contour around the region by the argument
+    principle, None where that was not afforded or did not settle; missing: how many of them were not found, negative
+    where too many were. undamped: frequencies of the undamped symmetric part in the band, a hint only, if asked for.
+    """
+
+    complete: bool
+    sentence: str
+    searched: Region
+    discs: tuple[Disc, ...] = ()
+    covered: bool = True
+    looks: int = 0
+    later: int = 0
+    counted: int | None = None
+    missing: int | None = None
+    undamped: int | None = None
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Eigenvalues (k,) [1/s] sorted by imaginary, then real part; of conjugate pairs the one with Im λ ≥ 0.
+
+    right (n, k): P(λ)x = 0; left (n, k): yᵀP(λ) = 0, transposed and not conjugated; both of unit norm. residual and
+    left_residual (k,): componentwise backward errors. factorisations, solves (single right sides), seconds and
+    memory_bytes (of the factors held at one time) tell what it cost.
+    """
+
+    values: ComplexArray
+    right: ComplexArray
+    left: ComplexArray | None
+    residual: Array
+    left_residual: Array | None
+    completeness: Completeness
+    factorisations: int
+    solves: int
+    seconds: float
+    memory_bytes: int
+
+
+def find_modes(
+    problem: Quadratic, region: Region, *, left: bool = False, tolerance: float = 1e-10, solver: str | None = None,
+    guess: Any = None, count: bool | None = None, hint: bool = False,
+) -> Spectrum:  # fmt: skip
+    """All eigenvalues of λ²M + λD + K in ``region``, with right and, if asked for, left vectors.
+
+    tolerance: backward error of every pair. guess (n, k): shapes of a neighbouring problem to start from; they decide
+    nothing, and save little. count: whether the argument principle is to count; by default up to 1500 freedoms.
+    hint: count undamped modes too, at two more factorisations. Raises AnalysisError where P(λ) is singular for every λ,
+    the region holds too many eigenvalues, or some do not reach the tolerance.
+    """
+    started = time.perf_counter()
+    run = _Run(problem, region.bounded(), left, tolerance, solver, guess)
+    run.counting = problem.size <= COUNTED if count is None else count
+    if problem.size <= DENSE:
+        sides, evidence = run.dense()
+    else:
+        sides, evidence = run.sparse()
+    values, right, y = run.chosen(sides)
+    order = np.lexsort((values.real, values.imag))
+    values, right, y = values[order], right[:, order], None if y is None else y[:, order]
+    undamped = undamped_count(problem, region, solver=solver) if hint else None
+    run.factorisations += 2 * hint
+    return Spectrum(
+        values, right, y, problem.backward_error(values, right),
+        None if y is None else problem.transposed.backward_error(values, y), evidence(undamped),
+        run.factorisations, run.solves, time.perf_counter() - started, run.memory,
+    )  # fmt: skip
+
+
+@dataclass
+class _Site:
+    """One shift: its factors and the searches that use them."""
+
+    factor: Factor
+    searches: list[Search]
+
+    @property
+    def disc(self) -> Disc:
+        """The smaller one, where right and left vectors have got differently far."""
+        return min((s.disc for s in self.searches), key=_radius)
+
+
+@dataclass
+class _Run:
+    """The state of one call."""
+
+    problem: Quadratic
+    region: Region
+    left: bool
+    tolerance: float
+    solver: str | None
+    guess: Any
+    counting: bool = False
+    factorisations: int = 0
+    solves: int = 0
+    memory: int = 0
+    sites: list[_Site] = field(default_factory=list)
+    alive: int = 0
+
+    @property
+    def padded(self) -> Region:
+        """The region and a little around it, in which eigenvectors are kept."""
+        return self.region.grown(PAD * max(self.region.height, self.region.width))
+
+    def keep(self, values: ComplexArray) -> BoolArray:
+        """Eigenvalues whose vectors are wanted."""
+        return self.padded.contains(values)
+
+    def dense(self) -> tuple[list[Found], Callable[[int | None], Completeness]]:
+        """Everything, by QZ."""
+        lam, x, y = all_modes(self.problem)
+        inside = self.keep(lam)
+        lam, x, y = lam[inside], x[:, inside], y[:, inside]
+        sides = [Found(lam, x, self.problem.backward_error(lam, x))]
+        if self.left:
+            sides.append(Found(lam, y, self.problem.transposed.backward_error(lam, y)))
+
+        def evidence(undamped: int | None) -> Completeness:
+            text = f"Complete: QZ computes all eigenvalues of {self.problem.size} freedoms at once."
+            return Completeness(True, text + self._cut(), self.region, undamped=undamped)
+
+        return sides, evidence
+
+    def sparse(self) -> tuple[list[Found], Callable[[int | None], Completeness]]:
+        """Disc by disc, and the check that none is missing."""
+        self._cover()
+        sides = self._sides()
+        missing, rounds = self._missing(sides[0]), 0
+        while missing is not None and missing > 0 and rounds < ROUNDS:
+            for site in self.sites:
+                for search in site.searches:
+                    search.look(2 * BLOCK, 4 + 2 * rounds)
+            if rounds:
+                # The same shifts have not shown it twice: another place.
+                for cell in cells(self.padded):
+                    self._visit(cell, cell.shift() + 0.2 * (0.3 + 1j) * min(cell.width, cell.height))
+            sides = self._sides()
+            missing, rounds = self._missing(sides[0]), rounds + 1
+        self._count_solves()
+        discs = tuple(site.disc for site in self.sites)
+        covered = not uncovered(self.region, list(discs))
+        searches = [s for site in self.sites for s in site.searches]
+        looks = sum(s.looks for s in searches) + (len(self.sites) if self.left else 0)
+        later = sum(s.later for s in searches)
+        counted = None if missing is None else missing + self._enclosed(sides[0])
+
+        def evidence(undamped: int | None) -> Completeness:
+            complete = covered and missing in (None, 0)
+            text = self._sentence(discs, covered, later, counted, missing)
+            return Completeness(
+                complete, text, self.region, discs, covered, looks, later, counted, missing, undamped
+            )  # fmt: skip
+
+        for site in self.sites:
+            site.factor.free()
+        return sides, evidence
+
+    def chosen(self, sides: list[Found]) -> tuple[ComplexArray, ComplexArray, ComplexArray | None]:
+        """What is reported: inside the region, each with its left vector, all to the tolerance."""
+        scale = self.padded.scale
+        found = self._selected(sides[0], scale)
+        found = self._settled(found, self.problem, "right")
+        if not self.left:
+            return found.values, found.shapes, None
+        other = self._with_partners(found, sides[1])
+        # Left vectors are those of the very eigenvalues reported.
+        transposed = self.problem.transposed
+        error = transposed.backward_error(found.values, other)
+        for place in np.flatnonzero(error > 0.1 * self.tolerance):
+            lam = complex(found.values[place])
+            near = max(float(np.abs(sides[1].values - lam).min(initial=np.inf)), SPREAD * scale)
+            other[:, place] = tuned(transposed, lam, sides[1], near)
+        error = transposed.backward_error(found.values, other)
+        y = self._settled(Found(found.values, other, error), transposed, "left").shapes
+        turned = biorthogonal(self.problem, found.values, found.shapes, y, scale)
+        worse = self.problem.transposed.backward_error(found.values, turned) > self.tolerance
+        return found.values, found.shapes, np.where(worse, y, turned)
+
+    def _cover(self) -> None:
+        """Shifts until discs cover the padded region."""
+        pending = cells(self.padded)
+        while pending:
+            cell = pending.pop(0)
+            if not uncovered(cell, [site.disc for site in self.sites]):
+                continue
+            if len(self.sites) >= SHIFTS:
+                raise AnalysisError(
+                    f"{len(self.sites)} factorisations do not get through the region; ask for a narrower one"
+                )
+            site = self._visit(cell, cell.shift())
+            if not site.disc.covers(cell):
+                pending = remaining(cell, [s.disc for s in self.sites]) + pending
+
+    def _visit(self, cell: Region, shift: complex) -> _Site:
+        """One factorisation, and all it gives."""
+        problem, rng = self.problem, np.random.default_rng(3)
+        for _ in range(MOVES):
+            radius = MARGIN * cell.farthest(shift)
+            try:
+                factor = factorise(problem.at(complex(shift)), solver=self.solver)
+            except SingularMatrix:
+                self.factorisations += 1
+                shift += 0.03 * radius * complex(*rng.standard_normal(2))
+                continue
+            self.factorisations += 1
+            try:
+                site = self._searched(factor, shift, radius)
+            except (TooClose, SingularMatrix):
+                factor.free()
+                shift += 0.03 * radius * complex(*rng.standard_normal(2))
+                continue
+            self.sites.append(site)
+            self.alive += factor.memory_bytes
+            self.memory = max(self.memory, self.alive)
+            if not self.counting:
+                # Nothing will be asked of it again: without its factors and vectors there is room for the next.
+                factor.free()
+                self.alive -= factor.memory_bytes
+                for search in site.searches:
+                    self.solves += search.krylov.solves
+                    search.release()
+            return site
+        raise AnalysisError(
+            f"P(λ) is singular at λ = {shift:.6g} 1/s and everywhere near it; does some motion lack mass and stiffness?"
+        )
+
+    def _searched(self, factor: Factor, shift: complex, radius: float) -> _Site:
+        def forward(right: ComplexArray) -> ComplexArray:
+            return factor.solve(right, refine=False)
+
+        def transposed(right: ComplexArray) -> ComplexArray:
+            return factor.solve(right, transpose=True, refine=False)
+
+        n = self.problem.size
+        most = min(max(int(BASIS_BYTES / (16 * n)), FEWEST), LARGEST, 2 * n)
+        searches: list[Search] = []
+        sides = [(self.problem, forward)] + ([(self.problem.transposed, transposed)] if self.left else [])
+        for problem, solve in sides:
+            search = Search(problem, Krylov(problem, solve, shift, radius), self.keep, most, self.tolerance)
+            search.seed += 100 * len(searches)
+            search.run(None if self.guess is None or searches else np.asarray(self.guess))
+            searches.append(search)
+        if not self.left:
+            searches[0].look()
+        elif not _agree(searches, SPREAD * self.padded.scale):
+            for search in searches:
+                search.look()
+        return _Site(factor, searches)
+
+    def _sides(self) -> list[Found]:
+        """Right and left pairs of all discs together."""
+        scale = self.padded.scale
+        return [
+            merged([_collected(site.searches[side]) for site in self.sites], scale) for side in range(1 + self.left)
+        ]
+
+    def _missing(self, found: Found) -> int | None:
+        if not self.counting:
+            return None
+        guards = [s.guards for site in self.sites for s in site.searches[:1]]
+        others = np.concatenate([*guards, np.zeros(0, dtype=complex)])
+        # Those in the lower half plane are known as well, and of no interest inside.
+        others = np.concatenate([others, found.values.conj()])
+        others = others[~self.padded.contains(others, slack=1e-3)]
+        inner = self.region.grown(BORDER * self.region.scale)
+        return unknown(self.problem, inner, self.padded, np.concatenate([found.values, others]))
+
+    def _enclosed(self, found: Found) -> int:
+        return int(self.padded.contains(found.values).sum())
+
+    def _count_solves(self) -> None:
+        if self.counting:
+            self.solves += sum(s.krylov.solves for site in self.sites for s in site.searches)
+
+    def _selected(self, found: Found, scale: float) -> Found:
+        values = snapped(found.values, scale)
+        inside = np.flatnonzero(self.region.contains(values) & (values.imag >= 0))
+        x = found.shapes[:, inside]
+        return Found(values[inside], x, self.problem.backward_error(values[inside], x))
+
+    def _settled(self, found: Found, problem: Quadratic, which: str) -> Found:
+        """With those that miss the tolerance improved one by one."""
+        bad = np.flatnonzero(~(found.error <= self.tolerance))
+        values, shapes, error = found.values.copy(), found.shapes.copy(), found.error.copy()
+        for place in bad[:POLISHED]:
+            lam, x, left = inverse_iteration(
+                problem, complex(values[place]), shapes[:, place], tolerance=self.tolerance, solver=self.solver
+            )
+            self.factorisations += 1
+            if left < error[place] and (which == "right" or abs(lam - values[place]) <= ALIKE * self.padded.scale):
+                values[place], shapes[:, place], error[place] = lam, x[:, 0], left
+        bad = np.flatnonzero(~(error <= self.tolerance))
+        if len(bad):
+            shown = ", ".join(f"{v:.6g}" for v in values[bad[:3]])
+            raise AnalysisError(
+                f"{len(bad)} {which} eigenvectors do not reach a backward error of {self.tolerance:g}: "
+                f"λ = {shown} 1/s, the worst leaves {error[bad].max():.1e}"
+            )
+        return Found(values, shapes, error)
+
+    def _with_partners(self, found: Found, left: Found) -> ComplexArray:
+        """Left vectors (n, k) of the right pairs; one that the left search lacks by inverse iteration."""
+        y = np.zeros_like(found.shapes)
+        ours, theirs = pairs(found.values, left.values, 1e-4 * self.padded.scale)
+        y[:, ours] = left.shapes[:, theirs]
+        for place in np.setdiff1d(np.arange(len(found.values)), ours):
+            self.factorisations += 1
+            y[:, place] = inverse_iteration(
+                self.problem.transposed,
+                complex(found.values[place]),
+                None,
+                tolerance=self.tolerance,
+                solver=self.solver,
+            )[1][:, 0]
+        return y
+
+    def _sentence(
+        self, discs: tuple[Disc, ...], covered: bool, later: int, counted: int | None, missing: int | None
+    ) -> str:
+        number = f"{len(discs)} disc{'s' if len(discs) > 1 else ''}"
+        cut = self._cut()
+        if missing is not None and missing != 0:
+            what = f"{missing} more than were found" if missing > 0 else f"{-missing} fewer than were found"
+            return f"INCOMPLETE: the argument principle counts {counted} eigenvalues around the region, {what}.{cut}"
+        if not covered:
+            return f"INCOMPLETE: {number} in which all have converged do not cover the region.{cut}"
+        second = "the search for left vectors" if self.left else "a second look from another random block"
+        brought = f"{second} brought {later} more and then no other" if later else f"{second} brought no other"
+        if missing == 0:
+            return (
+                f"Complete: all eigenvalues in {number} that cover the region have converged, {brought}, and the "
+                f"argument principle counts the same {counted} around the region.{cut}"
+            )
+        return (
+            f"Complete as far as can be told without a count: all eigenvalues in {number} that cover the region have "
+            f"converged, and {brought}.{cut}"
+        )
+
+    def _cut(self) -> str:
+        return f" Growth rates above {self.region.re_max:.6g} 1/s were not searched."
+
+
+def _collected(search: Search) -> Found:
+    """What a search contributes: only what is in its disc."""
+    return search.found
+
+
+def _agree(searches: list[Search], near: float) -> bool:
+    """Whether right and left searches hold the same eigenvalues, those close to the edge of the smaller disc aside."""
+    radius = min(s.disc.radius for s in searches)
+    inside: list[ComplexArray] = []
+    for s in searches:
+        away = np.abs(s.found.values - s.disc.centre)
+        inside.append(s.found.values[away <= (1 - 1e-6) * radius])
+    return len(inside[0]) == len(inside[1]) == len(pairs(inside[0], inside[1], near)[0])
+
+
+def _radius(disc: Disc) -> float:
+    return disc.radius

@@ -1,0 +1,136 @@
+"""Single eigenpairs improved, sets of them merged, and left vectors assigned to right ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.optimize as so
+
+from ...direct import SingularMatrix, factorise
+from ...typing import Array, ComplexArray, IntArray
+from .dense import unit
+from .problem import Quadratic
+from .search import Found, start
+
+ALIKE = 1e-9  # of the scale: eigenvalues closer than this are one, or copies of one
+SPREAD = 1e-5  # how far rounding spreads copies of a defective one
+PARALLEL = 1e-6  # 1 − |xᴴx'| of what is the same shape
+STEPS = 5
+
+
+def inverse_iteration(
+    problem: Quadratic, lam: complex, x: ComplexArray | None, *, tolerance: float, solver: str | None
+) -> tuple[complex, ComplexArray, float]:
+    """λ, x (n, 1) and backward error after inverse iteration from (λ, x), or from an arbitrary x, with its own factors.
+
+    The shift stays beside λ, so that P is regular there: P(σ)v = P'(λ)x is solved, and λ becomes σ − xᴴx/xᴴv.
+    """
+    shift = lam + 1e-7 * (abs(lam) or 1.0) * (1 + 1j)
+    while True:
+        try:
+            factor = factorise(problem.at(complex(shift)), solver=solver)
+            break
+        except SingularMatrix:
+            shift = lam + 2 * (shift - lam)
+    with factor:
+        held = unit(start(problem.size, 1, 7)) if x is None else unit(x.reshape(-1, 1))
+        best = (lam, held, float(problem.backward_error(np.array([lam]), held)[0]))
+        value = lam
+        for _ in range(STEPS):
+            slope = 2 * value * (problem.mass @ held) + problem.damping @ held
+            answer = factor.solve(slope)
+            along = complex((held.conj().T @ answer)[0, 0])
+            value = shift - 1 / along if along != 0 else value
+            held = unit(answer)
+            error = float(problem.backward_error(np.array([value]), held)[0])
+            if error < best[2]:
+                best = (value, held, error)
+            if best[2] <= 0.1 * tolerance:
+                break
+    return best
+
+
+def merged(parts: list[Found], scale: float) -> Found:
+    """Sets of several discs as one: what two of them hold is kept once, from where its backward error is smaller."""
+    result = parts[0]
+    for part in parts[1:]:
+        ours, theirs = pairs(result.values, part.values, SPREAD * scale)
+        away = np.abs(result.values[ours] - part.values[theirs])
+        along = np.abs(np.einsum("ij,ij->j", result.shapes[:, ours].conj(), part.shapes[:, theirs]))
+        same = (away <= ALIKE * scale) | ((away <= SPREAD * scale) & (along > 1 - PARALLEL))
+        ours, theirs = ours[same], theirs[same]
+        values, shapes, error = result.values.copy(), result.shapes.copy(), result.error.copy()
+        better = part.error[theirs] < error[ours]
+        values[ours[better]] = part.values[theirs[better]]
+        shapes[:, ours[better]] = part.shapes[:, theirs[better]]
+        error[ours[better]] = part.error[theirs[better]]
+        new = np.setdiff1d(np.arange(len(part.values)), theirs)
+        result = Found(
+            np.concatenate([values, part.values[new]]), np.hstack([shapes, part.shapes[:, new]]),
+            np.concatenate([error, part.error[new]]),
+        )  # fmt: skip
+    return result
+
+
+def pairs(a: ComplexArray, b: ComplexArray, near: float = np.inf) -> tuple[IntArray, IntArray]:
+    """Places in a and in b of pairs no farther apart than ``near``, as many as there can be and then the closest."""
+    if not len(a) or not len(b):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    away = np.abs(a[:, None] - b[None, :])
+    # What is too far costs more than all others together, so that it never displaces a pair that belongs together.
+    far = away > near
+    rows, columns = so.linear_sum_assignment(np.where(far, (near if np.isfinite(near) else 0.0) * (len(a) + 1), away))
+    kept = ~far[rows, columns]
+    return np.asarray(rows)[kept], np.asarray(columns)[kept]
+
+
+def biorthogonal(problem: Quadratic, lam: ComplexArray, x: ComplexArray, y: ComplexArray, scale: float) -> ComplexArray:
+    """y (n, k) of unit norm, within each multiple eigenvalue turned until yᵢᵀ((λᵢ+λⱼ)M + D)xⱼ = 0 for i ≠ j.
+
+    Between different eigenvalues that holds by itself; a defective one has no such basis and is left as it is.
+    """
+    result = y.copy()
+    for group in groups(lam, ALIKE * scale):
+        if len(group) < 2:
+            continue
+        there = lam[group]
+        product = problem.mass @ x[:, group]
+        gram = y[:, group].T @ (problem.damping @ x[:, group]) + (there[:, None] + there) * (y[:, group].T @ product)
+        size = np.abs(y[:, group]).T @ (abs(problem.damping) @ np.abs(x[:, group]))
+        size = size + 2 * np.abs(there) * (np.abs(y[:, group]).T @ (abs(problem.mass) @ np.abs(x[:, group])))
+        if sl.svdvals(gram)[-1] > 1e-6 * size.max():
+            result[:, group] = unit(y[:, group] @ np.linalg.inv(gram).T)
+    return result
+
+
+def tuned(problem: Quadratic, lam: complex, found: Found, near: float) -> ComplexArray:
+    """x (n,) that comes nearest to P(λ)x = 0 among combinations of found vectors with eigenvalues ``near`` λ.
+
+    Copies of a defective eigenvalue spread, and differently in two searches; their vectors span the same.
+    """
+    basis = np.linalg.qr(found.shapes[:, np.abs(found.values - lam) <= near])[0]
+    rest = problem.residual(np.full(basis.shape[1], lam), basis)
+    return basis @ sl.svd(rest, full_matrices=False)[2][-1].conj()
+
+
+def groups(lam: ComplexArray, near: float) -> list[IntArray]:
+    """Places of eigenvalues that chains of distances below ``near`` join."""
+    label = np.arange(len(lam))
+    for i, j in np.argwhere(np.triu(np.abs(lam[:, None] - lam[None, :]) <= near, 1)):
+        label[label == label[j]] = label[i]
+    return [np.flatnonzero(label == k) for k in np.unique(label)]
+
+
+def snapped(lam: ComplexArray, scale: float) -> ComplexArray:
+    """λ without imaginary part where that is rounding: eigenvalues of real matrices with no conjugate are real."""
+    result = lam.copy()
+    result[np.abs(lam.imag) <= 1e-12 * scale] = result[np.abs(lam.imag) <= 1e-12 * scale].real
+    unsure = np.flatnonzero((result.imag != 0) & (np.abs(result.imag) <= SPREAD * scale))
+    up, down = unsure[result[unsure].imag > 0], unsure[result[unsure].imag < 0]
+    ours, theirs = pairs(result[up], result[down].conj())
+    away: Array = np.abs(result[up[ours]] - result[down[theirs]].conj())
+    paired = away <= np.maximum(0.5 * np.abs(result[up[ours]].imag), ALIKE * scale)
+    alone = np.setdiff1d(unsure, np.concatenate([up[ours[paired]], down[theirs[paired]]]))
+    near = alone[np.abs(result[alone].imag) <= ALIKE * scale]
+    result[near] = result[near].real
+    return result

@@ -1,0 +1,64 @@
+"""P(λ) = λ²M + λD + K of sparse real matrices, its residuals and backward errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...typing import Array, ComplexArray, Sparse
+
+CHUNK = 64  # columns worked on at a time
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """(λ²M + λD + K) x = 0 with real csr matrices (n, n), of which none needs symmetry or full rank."""
+
+    mass: Sparse
+    damping: Sparse
+    stiffness: Sparse
+
+    @property
+    def size(self) -> int:
+        """Number of freedoms n."""
+        return int(self.mass.shape[0])
+
+    @cached_property
+    def transposed(self) -> Quadratic:
+        """The problem whose right vectors are the left ones of this."""
+        return Quadratic(*(sp.csr_array(m.T) for m in (self.mass, self.damping, self.stiffness)))
+
+    @cached_property
+    def _sizes(self) -> tuple[Sparse, Sparse, Sparse]:
+        return abs(self.mass), abs(self.damping), abs(self.stiffness)
+
+    def at(self, lam: complex) -> Sparse:
+        """P(λ), complex unless λ is real."""
+        return sp.csr_array(lam**2 * self.mass + lam * self.damping + self.stiffness)
+
+    def residual(self, lam: ComplexArray, x: ComplexArray) -> ComplexArray:
+        """P(λ)x (n, k) of λ (k,) and x (n, k)."""
+        return lam**2 * _times(self.mass, x) + lam * _times(self.damping, x) + _times(self.stiffness, x)
+
+    def backward_error(self, lam: ComplexArray, x: ComplexArray) -> Array:
+        """‖P(λ)x‖∞ / ‖(|λ|²|M| + |λ||D| + |K|)|x|‖∞ (k,)."""
+        result = np.zeros(len(lam))
+        mass, damping, stiffness = self._sizes
+        for start in range(0, len(lam), CHUNK):
+            part = slice(start, start + CHUNK)
+            size, rate = np.abs(x[:, part]), np.abs(lam[part])
+            scale = rate**2 * (mass @ size) + rate * (damping @ size) + stiffness @ size
+            rest = np.abs(self.residual(lam[part], x[:, part])).max(axis=0)
+            result[part] = rest / np.maximum(scale.max(axis=0), 1e-300)
+        return result
+
+
+def _times(matrix: Sparse, block: Any) -> Any:
+    """matrix @ block of a real matrix, in real arithmetic."""
+    if block.dtype.kind != "c":
+        return matrix @ block
+    return matrix @ np.ascontiguousarray(block.real) + 1j * (matrix @ np.ascontiguousarray(block.imag))

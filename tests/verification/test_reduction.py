@@ -1,0 +1,230 @@
+"""Certified reduction against dense eigenproblems of the full matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+import scipy.linalg as sl
+import scipy.sparse as sp
+
+from solid_cases import bench_as_solids, case
+from stridor.errors import AnalysisError, CaseError
+from stridor.modal.complex_modes import complex_modes
+from stridor.modal.parametric import Parameter, ParametricProblem, Term, contact_parameters, reduce
+from stridor.modal.parametric.basis import residual
+from stridor.modal.parametric.dense import _by_companion, dense_modes
+from stridor.modal.parametric.full import verified
+from stridor.modal.parametric.onsets import onsets_along
+from stridor.system import build_system
+
+pytestmark = pytest.mark.verification
+
+
+def grid(n: int) -> sp.csr_array:
+    """Stiffness of an n × n net of unit springs, held at its rim."""
+    line = sp.diags_array([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
+    return sp.csr_array(sp.kron(line, sp.eye_array(n)) + sp.kron(sp.eye_array(n), line))
+
+
+def rotor(n: int = 10) -> ParametricProblem:
+    """Two nets side by side in u and v, with gyroscopic, circulatory and low-rank damping terms in Ω, μ."""
+    rng = np.random.default_rng(3)
+    size = n * n
+    net = grid(n)
+    mass = sp.csr_array(sp.kron(sp.eye_array(2), sp.diags_array(1 + 0.3 * rng.random(size))))
+    stiffness = sp.csr_array(sp.block_diag([net, 1.07 * net]))
+    turn = sp.csr_array(sp.kron(np.array([[0.0, -1.0], [1.0, 0.0]]), sp.diags_array(rng.random(size))))
+    few = sp.csr_array(sp.random_array((2 * size, 3), density=0.1, rng=rng))
+    patch = np.zeros(size)
+    patch[: 2 * n] = 0.05
+    follow = sp.csr_array(sp.kron(np.array([[0.0, 1.0], [0.0, 0.0]]), sp.diags_array(patch)))
+
+    def omega(p: Mapping[str, float]) -> float:
+        return p["Omega"]
+
+    def inverse(p: Mapping[str, float]) -> float:
+        return 1.0 / p["Omega"]
+
+    return ParametricProblem(
+        (
+            Term(mass, "mass", lambda _: 1.0, symmetric=True),
+            Term(stiffness, "stiffness", lambda _: 1.0, symmetric=True),
+            Term(0.002 * stiffness, "damping", lambda _: 1.0, symmetric=True),
+            Term(0.05 * turn, "damping", omega),
+            Term(sp.csr_array(0.02 * few @ few.T), "damping", inverse, symmetric=True),
+            Term(-0.001 * mass, "stiffness", lambda p: p["Omega"] ** 2, symmetric=True),
+            Term(follow, "stiffness", lambda p: p["mu"]),
+        ),
+        (Parameter("Omega", 0.5, 3.0, 1.0), Parameter("mu", 0.0, 0.6, 0.3)),
+    )
+
+
+def eigenvalues(problem: ParametricProblem, values: Mapping[str, float]) -> np.ndarray:
+    """All λ of the full problem with Im λ ≥ 0, dense."""
+    full = problem.at(values)
+    mass, damping, stiffness = (m.toarray() for m in (full.mass, full.damping, full.stiffness))
+    # Inverted, so that rounding is relative to the low frequencies; in units in which they are of the order of one.
+    unit = np.sqrt(np.median(np.diag(stiffness)) / np.median(np.diag(mass)))
+    zero, one = np.zeros_like(mass), np.eye(len(mass))
+    companion = np.block([[-unit * damping, -(unit**2) * mass], [one, zero]])
+    companion[: len(mass)] = np.linalg.solve(stiffness, companion[: len(mass)])
+    found = unit / sl.eigvals(companion)
+    return found[found.imag >= 0]
+
+
+FREQUENCY_HZ = 0.17
+
+
+@pytest.fixture(scope="module")
+def model():
+    return reduce(rotor(), FREQUENCY_HZ, bound=1e-8)
+
+
+def random_points(problem: ParametricProblem, count: int, seed: int) -> list[dict[str, float]]:
+    rng = np.random.default_rng(seed)
+    return [{p.name: rng.uniform(p.low, p.high) for p in problem.parameters} for _ in range(count)]
+
+
+def test_every_mode_in_the_band_everywhere_in_the_box(model):
+    problem = model.problem
+    corners = problem.corners([2, 2])
+    for point in [*corners, *random_points(problem, 4, 1)]:
+        exact = eigenvalues(problem, point)
+        exact = exact[np.abs(exact) < 0.999 * model.frequency]
+        found = model.modes(point)
+        away = np.abs(exact[:, None] - found.values).min(axis=1) / np.abs(exact)
+        assert len(found.values) >= len(exact) > 15
+        assert away.max() < 1e-8
+        # and nothing that is none
+        assert np.abs(found.values[:, None] - eigenvalues(problem, point)).min(axis=1).max() < 1e-7 * model.frequency
+        assert found.inside
+    assert model.size < 100
+
+
+def test_estimates_cover_errors_without_being_empty(model):
+    ratios = []
+    for point in random_points(model.problem, 3, 2):
+        found = model.modes(point)
+        exact = eigenvalues(model.problem, point)
+        away = np.abs(found.values[:, None] - exact).min(axis=1) / np.abs(found.values)
+        assert np.all(away <= found.error + 1e-12)
+        ratios.append(np.median(found.error / np.maximum(away, 1e-14)))
+    assert np.median(ratios) < 1e4
+
+
+def test_sketched_residuals_are_those_of_the_full_problem(model):
+    problem, (point,) = model.problem, random_points(model.problem, 1, 3)
+    found = model.modes(point)
+    full = problem.at(point)
+    reference = problem.at(problem.reference)
+    symmetric = (reference.stiffness + reference.stiffness.T) / 2
+    scale = 1 / np.sqrt((symmetric + (0.3 * model.frequency) ** 2 * reference.mass).diagonal())
+    lengths = []
+    for side, vectors in ((full, found.right), (full.transposed, found.left)):
+        lengths.append(np.linalg.norm(scale[:, None] * side.residual(found.values, model.vectors @ vectors), axis=0))
+    assert found.residual == pytest.approx(np.maximum(*lengths), rel=0.35)
+
+
+def test_the_full_problem_confirms_what_the_reduced_one_says(model):
+    point = {"Omega": 2.2, "mu": 0.55}
+    confirmed = verified(model, point, which="all")
+    assert confirmed.residual.max() < 1e-12
+    assert confirmed.shift.max() < 1e-8
+    exact = eigenvalues(model.problem, point)
+    assert np.abs(confirmed.values[:, None] - exact).min(axis=1).max() < 1e-11 * model.frequency
+    full = model.problem.at(point)
+    left = full.transposed.residual(confirmed.values, confirmed.left)
+    assert np.abs(left).max() < 1e-10
+
+
+def test_contact_stiffness_and_friction_of_a_meshed_case():
+    # Not symmetric about its middle, so that the sign of friction matters.
+    system = build_system(case(bench_as_solids(across=(1, 1), along=(6, 12))))
+    problem = contact_parameters(system, (0.0, 0.6), (0.5, 2.0), touching_at=0.3)
+    limit = 9000.0
+    model = reduce(problem, limit)
+    modes = complex_modes(system, 0.3, max_frequency_hz=limit)
+    found = model.modes({"mu": 0.3, "contact_stiffness": 1.0})
+    away = np.abs(modes.eigenvalues[0][:, None] - found.values).min(axis=1) / np.abs(modes.eigenvalues[0])
+    assert away[np.abs(modes.eigenvalues[0]) < 0.99 * model.frequency].max() < 1e-7
+    for point in ([0.55, 0.6], [0.05, 1.9]):
+        exact = eigenvalues(problem, problem.point(point))
+        exact = exact[(np.abs(exact) < 0.99 * model.frequency)]
+        values = model.modes(point).values
+        assert np.abs(exact[:, None] - values).min(axis=1).max() < 1e-8 * model.frequency
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-3, 0.1, 3.0])
+def test_dense_modes_with_any_damping(damping):
+    rng = np.random.default_rng(5)
+    n = 40
+    a = rng.standard_normal((3, n, n))
+    mass = np.eye(n) + 0.1 * a[0] @ a[0].T / n
+    stiffness = np.diag(np.linspace(1, 60, n) ** 2) + 2.0 * a[1]
+    matrices = mass, damping * (a[2] @ a[2].T / n + 0.3 * a[0]), stiffness
+    found, reference = dense_modes(*matrices, 30.0, 1.0), _by_companion(*matrices, 30.0, 1.0)
+    assert len(found.values) == len(reference.values)
+    assert np.abs(found.values[:, None] - reference.values).min(axis=1).max() < 1e-10 * 30
+    for lam, z, y in zip(found.values, found.right.T, found.left.T, strict=True):
+        whole = lam**2 * matrices[0] + lam * matrices[1] + matrices[2]
+        assert max(np.linalg.norm(whole @ z), np.linalg.norm(y @ whole)) < 1e-5 * np.linalg.norm(whole)
+
+
+def test_left_residuals_are_those_of_the_transposed_problem():
+    problem = rotor(4)
+    point = problem.point({"Omega": 2.0, "mu": 0.5})
+    lam, x = np.array([0.3 + 0.7j]), np.random.default_rng(1).standard_normal((32, 1)) + 0j
+    full = problem.at(point)
+    for left, side in ((False, full), (True, full.transposed)):
+        found = residual(problem, problem.factors(point), lam, x, left=left)
+        assert found == pytest.approx(side.residual(lam, x), rel=1e-12)
+
+
+def test_onsets_along_any_parameter_are_those_of_the_full_problem(model):
+    for name, fixed in (("mu", {"Omega": 0.8}), ("Omega", {"mu": 0.5})):
+        found = onsets_along(model, name, fixed)
+        assert found
+        (own,) = (p for p in model.problem.parameters if p.name == name)
+        growing = []
+        for value in np.linspace(own.low, own.high, 41):
+            exact = eigenvalues(model.problem, {**fixed, name: value})
+            growing.append(int(np.sum((exact.real > 1e-9) & (np.abs(exact) < model.frequency))))
+        # Between two points of the grid as many modes turn unstable as onsets say.
+        for low, high, before, after in zip(
+            np.linspace(own.low, own.high, 41)[:-1], np.linspace(own.low, own.high, 41)[1:], growing[:-1], growing[1:],
+            strict=True,
+        ):  # fmt: skip
+            inside = [o for o in found if low < o.value <= high]
+            assert sum(-1 if o.stabilising else 1 for o in inside) == after - before
+        for onset in found:
+            assert onset.residual < 1e-12
+            assert onset.value == pytest.approx(onset.reduced_value, rel=1e-6)
+            exact = eigenvalues(model.problem, onset.point)
+            k = int(np.argmin(np.abs(exact - 2j * np.pi * onset.frequency_hz)))
+            assert abs(exact[k].real) < 1e-9
+            step = 1e-5 * (own.high - own.low)
+            ends = [eigenvalues(model.problem, {**onset.point, name: onset.value + s * step}) for s in (-1, 1)]
+            rates = [e[np.argmin(np.abs(e - exact[k]))].real for e in ends]
+            assert onset.growth_slope == pytest.approx((rates[1] - rates[0]) / (2 * step), rel=1e-4)
+    with pytest.raises(CaseError, match=r"parameter: 'speed' – no such parameter; there are: Omega, mu"):
+        onsets_along(model, "speed")
+
+
+def test_what_is_refused(model):
+    problem = model.problem
+    with pytest.raises(CaseError, match=r"values: 'speed' – no such parameter; there are: Omega, mu$"):
+        model.modes({"speed": 1.0})
+    with pytest.raises(CaseError, match=r"values\.mu: nan – a finite number"):
+        model.modes({"mu": float("nan")})
+    with pytest.raises(CaseError, match="max_frequency_hz"):
+        reduce(problem, 0.0)
+    with pytest.raises(CaseError, match="bound"):
+        reduce(problem, 0.1, bound=0.0)
+    with pytest.raises(CaseError, match=r"box\.Omega: '3 … 1, 2' – a range"):
+        Parameter("Omega", 3.0, 1.0, 2.0)
+    empty = ParametricProblem((Term(grid(3), "stiffness", lambda _: 1.0, symmetric=True),), problem.parameters)
+    with pytest.raises(AnalysisError, match="no symmetric mass"):
+        reduce(empty, 0.1)
+    assert not model.modes({"Omega": 4.0}).inside
