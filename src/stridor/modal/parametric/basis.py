@@ -14,6 +14,10 @@ from .problem import ParametricProblem
 START = 200
 
 
+class Indefinite(Exception):
+    """The metric is not positive definite."""
+
+
 class Basis:
     """V (n, r), orthonormal in the symmetric positive definite ``metric`` (n, n), and VᵀA_jV (t, r, r) of all terms."""
 
@@ -43,14 +47,19 @@ class Basis:
 
     def add(self, block: Array, smallest: float) -> int:
         """Take in what ``block`` (n, k) adds but for directions that leave less than ``smallest`` of a unit vector;
-        returns how many vectors that made."""
-        length = np.sqrt(np.maximum(np.einsum("ij,ij->j", block, self.metric @ block), 0.0))
+        returns how many vectors that made. Raises Indefinite where the metric shows that it is."""
+        square = np.einsum("ij,ij->j", block, self.metric @ block)
+        if np.any(square < 0):
+            raise Indefinite
+        length = np.sqrt(square)
         new = block[:, length > 0] / length[length > 0]
         new = new - self.vectors @ (self._image.T @ new)
         if not new.shape[1]:
             return 0
         gram = new.T @ (self.metric @ new)
         squares, turn = sl.eigh((gram + gram.T) / 2)
+        if squares[0] < -1e-8 * max(squares[-1], smallest**2):
+            raise Indefinite
         keep = squares > smallest**2
         if not keep.any():
             return 0

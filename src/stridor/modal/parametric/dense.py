@@ -10,8 +10,9 @@ import scipy.linalg as sl
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray
 
-NEAR = 1.6  # modes up to this much above the band are solved for together
+NEAR = (1.6, 4.0)  # modes up to this much above the band are solved for together: first try, second try
 SMALL = 1e-13
+ANSWERS = 6
 
 
 @dataclass(frozen=True)
@@ -72,8 +73,22 @@ def _by_undamped(mass: Array, damping: Array, stiffness: Array, frequency: float
     left = left.conj()
     left = sl.lu_solve(factor, left.real, trans=1) + 1j * sl.lu_solve(factor, left.imag, trans=1)
     squares = shift - shift / theta
+    for near in NEAR:
+        found = _with_damping((mass, damping, stiffness), squares, right, left, frequency, reach, near)
+        if found is not None:
+            return found
+    return None
+
+
+def _with_damping(
+    matrices: tuple[Array, Array, Array], squares: ComplexArray, right: ComplexArray, left: ComplexArray,
+    frequency: float, reach: float, nearby: float,
+) -> DenseModes | None:  # fmt: skip
+    """The damped modes from all the undamped ones, of which those up to ``nearby`` times the band are solved together;
+    None where the others' answer does not settle."""
+    mass, damping, stiffness = matrices
     finite = np.isfinite(squares)
-    near = finite & (np.abs(squares) <= (NEAR * reach * frequency) ** 2)
+    near = finite & (np.abs(squares) <= (nearby * reach * frequency) ** 2)
     far = np.flatnonzero(finite & ~near)
     mine = np.flatnonzero(near)
     if not len(mine):
@@ -90,17 +105,21 @@ def _by_undamped(mass: Array, damping: Array, stiffness: Array, frequency: float
     z, w = z / np.linalg.norm(z, axis=0), w / np.linalg.norm(w, axis=0)
     # Answer of the modes further away: (λ²M + K)⁻¹ is a sum over modes.
     weight = np.einsum("ij,ij->j", left[:, far], mass @ right[:, far])
-    for _ in range(2):
+    for _ in range(ANSWERS):
         inverse = 1.0 / ((lam**2 - squares[far, None]) * weight[:, None])
         z = z - right[:, far] @ (inverse * (left[:, far].T @ _rest(lam, z, mass, damping, stiffness)))
         w = w - left[:, far] @ (inverse * (right[:, far].T @ _rest(lam, w, mass.T, damping.T, stiffness.T)))
         lam = _functional(lam, z, w, mass, damping, stiffness)
-    ends = [np.linalg.norm(_rest(lam, z, mass, damping, stiffness), axis=0),
-            np.linalg.norm(_rest(lam, w, mass.T, damping.T, stiffness.T), axis=0)]  # fmt: skip
-    slope = np.einsum("ij,ij->j", w, 2 * lam * (mass @ z) + damping @ z)
-    if not np.all(ends[0] * ends[1] <= SMALL * np.abs(lam * slope)) or np.any(np.abs(lam) > reach * frequency * 1.001):
+        ends = [
+            np.linalg.norm(_rest(lam, v, *side), axis=0)
+            for v, side in ((z, (mass, damping, stiffness)), (w, (mass.T, damping.T, stiffness.T)))
+        ]
+        slope = np.einsum("ij,ij->j", w, 2 * lam * (mass @ z) + damping @ z)
+        if np.all(ends[0] * ends[1] <= SMALL * np.abs(lam * slope)):
+            break
+    else:
         return None
-    return DenseModes(lam, z, w)
+    return None if np.any(np.abs(lam) > reach * frequency * 1.001) else DenseModes(lam, z, w)
 
 
 def _rest(lam: ComplexArray, z: ComplexArray, mass: Array, damping: Array, stiffness: Array) -> ComplexArray:

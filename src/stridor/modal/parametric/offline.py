@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
@@ -21,7 +22,7 @@ from ...direct import Factor, factorise
 from ...errors import AnalysisError, CaseError
 from ...threads import one_thread_if_small
 from ...typing import Array, ComplexArray, IntArray, Sparse
-from .basis import Basis, expanded, real_and_imaginary, residual
+from .basis import Basis, Indefinite, expanded, real_and_imaginary, residual
 from .dense import DenseModes, assembled, dense_modes
 from .model import ReducedModel, product_over_slope, sketched
 from .problem import ParametricProblem
@@ -33,6 +34,7 @@ SHIFT = 0.3  # √s over the band
 WEAKEST = 1e-3  # of the strongest direction of a block of residuals: what waits for another point
 LEFT_OUT = 1e-2  # of a unit vector: new directions smaller than this are not worth a column
 SKETCH, NONZEROS = 300, 4  # rows of the random embedding, entries in each of its columns
+PASSED = 0.3  # of the bound: what an estimate at a point of the grid may be
 SAFETY = 10.0
 MOST_POINTS = 40
 
@@ -73,21 +75,30 @@ def reduce(
     frequency = 2 * np.pi * max_frequency_hz
     work = _Work()
     mass, stiffness = _symmetric_parts(problem)
-    metric = sp.csr_array(stiffness + (SHIFT * frequency) ** 2 * mass)
-    with factorise(metric, symmetric=True, solver=solver) as factor:
+    operator = sp.csr_array(stiffness + (SHIFT * frequency) ** 2 * mass)
+    scale = 1.0 / np.sqrt(np.abs(operator.diagonal()))
+    default = tuple(5 if len(problem.parameters) == 1 else 3 for _ in problem.parameters)
+    points = problem.corners(counts or default)
+    with factorise(operator, symmetric=True, solver=solver) as factor:
         work.lap("factorisation")
-        basis = Basis(problem, metric)
-        basis.add(_krylov(factor, mass, stiffness, frequency, work), 1e-6)
+        start = _krylov(factor, mass, stiffness, frequency, work)
         work.lap("real modes")
-        _first_answers(basis, factor, frequency, work)
-        work.lap("first answers")
-        default = tuple(5 if len(problem.parameters) == 1 else 3 for _ in problem.parameters)
-        points = problem.corners(counts or default)
-        scale = 1.0 / np.sqrt(metric.diagonal())
-        _enrich(basis, factor, points, scale, frequency, bound, work)
-        work.lap("enrichment")
-    model = _cut(basis, points, scale, frequency, bound, work)
-    return model
+        # Lengths are energies; where friction in the symmetric part makes some negative, the diagonal's.
+        metrics = [operator, sp.csr_array(sp.diags_array(scale**-2))]
+        for metric in metrics[1:] if factor.inertia else metrics:
+            basis = Basis(problem, metric)
+            try:
+                basis.add(start, 1e-6)
+                _first_answers(basis, factor, frequency, work)
+                work.lap("first answers")
+                _enrich(basis, factor, points, scale, frequency, bound, work)
+                work.lap("enrichment")
+                break
+            except Indefinite:
+                continue
+        else:
+            raise AnalysisError("the mass or the stiffness has no positive diagonal to measure by")
+    return _cut(basis, points, scale, frequency, bound, work)
 
 
 def _symmetric_parts(problem: ParametricProblem) -> tuple[Sparse, Sparse]:
@@ -181,37 +192,34 @@ def _enrich(
     basis: Basis, factor: Factor, points: list[dict[str, float]], scale: Array, frequency: float, bound: float,
     work: _Work,
 ) -> None:  # fmt: skip
-    """Answers to the residuals of the point with the largest ones, until none is worth it."""
+    """Answers to the residuals of one point after the other, the outer ones first, until every mode at every point
+    passes the bound."""
     problem = basis.problem
-    # Both sides' product is the error of an eigenvalue.
-    enough = np.sqrt(0.3 * bound)
     pending = _outer_first(points)
-    passed: set[int] = set()
     for _ in range(MOST_POINTS):
         if not pending:
             return
         place = pending.pop(0)
-        factors, found = _modes(basis, points[place], frequency)
-        rests: list[Array] = []
-        largest: list[float] = []
+        factors = problem.factors(points[place])
+        matrices = assembled(basis.projected, factors, problem.powers)
+        found = dense_modes(*matrices, frequency, MARGIN)
+        rests: list[Any] = []
         for left, vectors in ((False, found.right), (True, found.left)):
             rest = residual(problem, factors, found.values, expanded(basis.vectors, vectors), left=left)
-            rest = rest * scale[:, None]
-            size = np.linalg.norm(rest, axis=0)
-            largest.append(float(size.max(initial=0.0)))
-            rests.append(real_and_imaginary(rest[:, size > 0.1 * enough]))
-        if largest[0] * largest[1] <= enough**2:
-            passed.add(place)
+            rests.append(rest * scale[:, None])
+        right_size, left_size = (np.linalg.norm(rest, axis=0) for rest in rests)
+        error = product_over_slope(matrices, found, right_size, left_size)
+        if not np.any(error > PASSED * bound):
             continue
-        passed.clear()
-        rest = np.hstack(rests)
-        gram = rest.T @ rest
-        squares, turn = sl.eigh(gram)
-        keep = squares > max(WEAKEST**2 * squares[-1], (0.1 * enough) ** 2)
+        # Modes far below the bound leave nothing that another point will not ask for.
+        chosen = error > 0.01 * bound
+        rest = np.hstack([real_and_imaginary(r[:, chosen]) for r in rests])
+        squares, turn = sl.eigh(rest.T @ rest)
+        keep = squares > max(WEAKEST**2 * squares[-1], 1e-300)
         force = (rest @ (turn[:, keep] / np.sqrt(squares[keep]))) / scale[:, None]
-        grown = basis.add(factor.solve(force, refine=False), LEFT_OUT)
+        answer = factor.solve(force, refine=False)
         work.solves += force.shape[1]
-        if grown:
+        if basis.add(answer, LEFT_OUT) or basis.add(answer, 1e-3 * LEFT_OUT):
             pending.append(place)
     raise AnalysisError(
         f"the reduced model does not settle over the box after {MOST_POINTS} points; ask for a smaller box, a lower "
@@ -293,7 +301,8 @@ def _constant(
     problem: ParametricProblem, projected: Array, sketches: tuple[Array, Array], between: list[dict[str, float]],
     exact: list[ComplexArray], frequency: float,
 ) -> float:  # fmt: skip
-    """The factor of the error estimate: the largest found, kept SAFETY times larger."""
+    """The factor of the error estimate: the largest found, kept SAFETY times larger, at least 1 as the inverse of a
+    matrix scaled by its diagonal has it."""
     ratio = 0.0
     for point, values in zip(between, exact, strict=True):
         factors = problem.factors(point)
@@ -306,4 +315,4 @@ def _constant(
         estimate = product_over_slope(matrices, found, right, left)
         away = np.abs(found.values[:, None] - values).min(axis=1, initial=np.inf) / np.abs(found.values)
         ratio = max(ratio, float(np.max(away / np.maximum(estimate, 1e-300), initial=0.0)))
-    return SAFETY * max(ratio, 1e-3)
+    return max(SAFETY * ratio, 1.0)

@@ -1,0 +1,191 @@
+"""Reduced models against full solves: the pad on the disc over friction and contact stiffness, and a synthetic brake.
+
+python benchmarks/reduction.py [--short]   (--short: coarse pad, few points, for CI)
+
+Columns as in table 2 of Gräbner, Mehrmann, Quraishi, Schröder and von Wagner (ZAMM 96(12), 2016): time to make the
+model, time for one value of the parameters, largest relative error of the eigenvalues in the band. Their brake is not
+public; the problem here has terms of the same kinds (gyroscopic, circulatory, low-rank damping with 1/Ω) and size.
+Modal truncation takes the lowest real modes, POD the singular vectors of full solutions at a few Ω; both as one would
+write them first, the companion matrix by LAPACK.
+"""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+import scipy.sparse.linalg as ssl
+
+import stridor as st
+from _common import machine, options
+from stridor.case import template_text
+from stridor.direct import factorise
+from stridor.modal.parametric import Parameter, ParametricProblem, Term, contact_parameters, reduce, verified
+from stridor.modal.quadratic import Region, find_modes
+
+COARSE = {
+    "bodies.disc.mesh.divisions": [6, 48, 2],
+    "bodies.lining.mesh.divisions": [6, 12, 2],
+    "bodies.plate.mesh.divisions": [5, 10, 1],
+}
+MIDDLE = {
+    "bodies.disc.mesh.divisions": [6, 60, 2],
+    "bodies.lining.mesh.divisions": [6, 14, 2],
+    "bodies.plate.mesh.divisions": [5, 12, 1],
+}
+
+
+def timed(call: Callable[[], object]) -> tuple[float, object]:
+    started = time.perf_counter()
+    answer = call()
+    return time.perf_counter() - started, answer
+
+
+def memory() -> str:
+    return f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6:.2f} GB so far"
+
+
+def pad(short: bool) -> None:
+    case = st.loads(template_text("pad-on-disc"))
+    system = st.build_system(case.with_(COARSE) if short else case)
+    limit = case.modal.max_frequency_hz
+    problem = contact_parameters(system, (0.0, 0.6), (0.5, 2.0))
+    print(f"pad on disc, {problem.size} freedoms, μ 0 to 0.6, contact stiffness × 0.5 to 2, {limit:g} Hz ({machine()})")
+    middle = problem.at(problem.reference)
+    shift = 1j * np.pi * limit
+    factor_s, factor = timed(lambda: factorise(middle.at(shift)))
+    print(f"  factorisation at a shift, complex    {factor_s:8.2f} s, {factor.memory_bytes / 1e9:.2f} GB")
+    factor.free()
+    offline, model = timed(lambda: reduce(problem, limit))
+    print(f"  reduced model, {model.size} unknowns        {offline:8.2f} s = {offline / factor_s:.1f} factorisations, "
+          f"{model.solves} solves, {memory()}")  # fmt: skip
+    print("    " + ", ".join(f"{part} {seconds:.1f}" for part, seconds in model.seconds.items()))
+    full_s, found = timed(lambda: find_modes(middle, Region.band(1.0, limit, above=-500.0)))
+    print(f"  full solve of all {len(found.values)} modes         {full_s:8.2f} s, {memory()}")
+    rng = np.random.default_rng(11)
+    points = [{p.name: rng.uniform(p.low, p.high) for p in problem.parameters} for _ in range(5 if short else 20)]
+    times = [timed(lambda point=point: model.modes(point))[0] for point in points for _ in range(3)]
+    print(f"  one point                            {1e3 * np.median(times):8.1f} ms (longest {1e3 * max(times):.1f})")
+    worst, number, estimate = 0.0, 0, 0.0
+    for point in points:
+        exact = verified(model, point)
+        worst, number = max([worst, *exact.shift]), number + len(exact.values)
+        modes = model.modes(point)
+        estimate = max([estimate, *modes.error[modes.unstable]])
+    print(f"  {number} unstable modes at {len(points)} points: relative error ≤ {worst:.1e}, estimated ≤ {estimate:.1e}")
+
+
+def brake(short: bool) -> ParametricProblem:
+    """A disc and pad with gyroscopic, centrifugal, circulatory and low-rank damping terms in Ω."""
+    case = st.loads(template_text("pad-on-disc")).with_(COARSE if short else MIDDLE)
+    contact = contact_parameters(st.build_system(case), (0.0, 0.6), (0.5, 2.0))
+    values = contact.point({"mu": 0.35})
+    middle = contact.at(values)
+    n = contact.size
+    symmetric = (middle.stiffness + middle.stiffness.T) / 2
+    diagonal = middle.mass.diagonal()
+    # Neighbouring freedoms as the two directions in the plane: skew, as the Coriolis force is.
+    pairs = np.arange(0, n - 1, 3)
+    size = np.sqrt(diagonal[pairs] * diagonal[pairs + 1])
+    turn = sp.coo_array((np.r_[-size, size], (np.r_[pairs, pairs + 1], np.r_[pairs + 1, pairs])), shape=(n, n))
+    rng = np.random.default_rng(7)
+    few = sp.random_array((n, 8), density=0.01, rng=rng)
+    low_rank = sp.csr_array(few @ few.T)
+    low_rank = low_rank * (200.0 * diagonal.mean() / abs(low_rank).max())
+
+    def omega(p: Mapping[str, float]) -> float:
+        return p["Omega"]
+
+    terms = (
+        Term(middle.mass, "mass", lambda _: 1.0, symmetric=True),
+        Term(middle.damping, "damping", lambda _: 1.0, symmetric=True),
+        Term(sp.csr_array(2 * turn), "damping", omega),
+        Term(low_rank, "damping", lambda p: 50.0 / p["Omega"], symmetric=True),
+        Term(sp.csr_array(symmetric), "stiffness", lambda _: 1.0, symmetric=True),
+        Term(sp.csr_array(middle.stiffness - symmetric), "stiffness", lambda _: 1.0),
+        Term(sp.csr_array(-sp.diags_array(diagonal)), "stiffness", lambda p: p["Omega"] ** 2, symmetric=True),
+    )
+    return ParametricProblem(terms, (Parameter("Omega", 5.0, 500.0, 100.0),))
+
+
+def projected_modes(problem: ParametricProblem, basis: np.ndarray, point: Mapping[str, float]) -> np.ndarray:
+    """λ of the Galerkin projection on real columns, by the companion matrix."""
+    full = problem.at(point)
+    mass, damping, stiffness = (basis.T @ (m @ basis) for m in (full.mass, full.damping, full.stiffness))
+    unit, r = 1e4, basis.shape[1]
+    companion = np.zeros((2 * r, 2 * r))
+    companion[:r] = -np.linalg.solve(unit**2 * mass, np.hstack([unit * damping, stiffness]))
+    companion[r:, :r] = np.eye(r)
+    return unit * sl.eigvals(companion)
+
+
+def errors(found: np.ndarray, exact: np.ndarray) -> float:
+    return float((np.abs(exact[:, None] - found).min(axis=1) / np.abs(exact)).max())
+
+
+def table(short: bool) -> None:
+    problem, limit = brake(short), 7000.0
+    print(f"synthetic brake, {problem.size} freedoms, Ω 5 to 500 1/s, {limit:g} Hz ({machine()})")
+    points = [problem.point({"Omega": w}) for w in (7.0, 31.0, 180.0, 420.0)]
+    region = Region.band(1.0, limit, above=-500.0)
+    full_s, exact = [], []
+    for point in points:
+        seconds, found = timed(lambda point=point: find_modes(problem.at(point), region))
+        full_s.append(seconds)
+        exact.append(found.values)
+    print(f"  full solve                     {np.median(full_s):8.2f} s each, {len(exact[0])} modes, {memory()}")
+    middle = problem.at(problem.reference)
+    symmetric = sp.csr_array((middle.stiffness + middle.stiffness.T) / 2)
+    # A basis from the symmetric parts at the middle of the range.
+    count = 100 if short else 300
+
+    def real_modes() -> np.ndarray:
+        with factorise(sp.csr_array(symmetric + 1e6 * middle.mass), symmetric=True) as factor:
+            inverse = ssl.LinearOperator(symmetric.shape, matvec=factor.solve)
+            return ssl.eigsh(symmetric, k=count, M=middle.mass, sigma=-1e6, OPinv=inverse)[1]
+
+    seconds, basis = timed(real_modes)
+    show(f"modal truncation, d = {count}", seconds, problem, basis, points, exact)
+
+    def pod() -> np.ndarray:
+        shots = []
+        for omega in (5.0, 60.0, 250.0, 500.0):
+            found = find_modes(problem.at({"Omega": omega}), region)
+            shots += [found.right.real, found.right.imag]
+        return np.linalg.svd(np.hstack(shots), full_matrices=False)[0][:, :75]
+
+    seconds, basis = timed(pod)
+    show("POD, d = 75", seconds, problem, basis, points, exact)
+    seconds, model = timed(lambda: reduce(problem, limit))
+    each, worst = [], 0.0
+    for point, values in zip(points, exact, strict=True):
+        each.append(timed(lambda point=point: model.modes(point))[0])
+        worst = max(worst, errors(model.modes(point).values, values[np.abs(values) < 0.9999 * model.frequency]))
+    name = f"ours, d = {model.size}"
+    print(f"  {name:30s} {seconds:8.2f} s + {np.median(each):.4f} s each, error ≤ {worst:.1e}, {memory()}")
+
+
+def show(
+    name: str, seconds: float, problem: ParametricProblem, basis: np.ndarray, points: list[dict[str, float]],
+    exact: list[np.ndarray],
+) -> None:  # fmt: skip
+    each, worst = [], 0.0
+    for point, values in zip(points, exact, strict=True):
+        one, found = timed(lambda point=point: projected_modes(problem, basis, point))
+        each.append(one)
+        worst = max(worst, errors(found, values))
+    print(f"  {name:30s} {seconds:8.2f} s + {np.median(each):.4f} s each, error ≤ {worst:.1e}, {memory()}")
+
+
+def main() -> None:
+    short = options(__doc__ or "").short
+    table(short)
+    pad(short)
+
+
+if __name__ == "__main__":
+    main()
