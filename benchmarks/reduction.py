@@ -76,7 +76,7 @@ def pad(short: bool) -> None:
         worst, number = max([worst, *exact.shift]), number + len(exact.values)
         modes = model.modes(point)
         estimate = max([estimate, *modes.error[modes.unstable]])
-    print(f"  {number} unstable modes at {len(points)} points: relative error ≤ {worst:.1e}, estimated ≤ {estimate:.1e}")
+    print(f"  {number} unstable modes at {len(points)} points: error ≤ {worst:.1e} of λ, estimated ≤ {estimate:.1e}")
 
 
 def brake(short: bool) -> ParametricProblem:

@@ -35,6 +35,10 @@ if TYPE_CHECKING:
         steady_sliding,
         summarise,
     )
+    from .study.countermeasures import rank_countermeasures
+    from .study.damping_map import damping_map
+    from .study.reduced import reduced_model
+    from .study.sensitivities import sensitivities
     from .system import System, build_system
 
 _HOMES = {
@@ -43,6 +47,7 @@ _HOMES = {
     "body_modes": ".study.analyses",
     "build_system": ".system",
     "compare": ".study.analyses",
+    "damping_map": ".study.damping_map",
     "describe": ".study.analyses",
     "friction_curve": ".study.analyses",
     "load": ".case",
@@ -52,8 +57,11 @@ _HOMES = {
     "onsets": ".study.analyses",
     "open_dataset": ".io.datasets",
     "plot": ".view",
+    "rank_countermeasures": ".study.countermeasures",
+    "reduced_model": ".study.reduced",
     "run": ".app.pipeline",
     "save": ".io.datasets",
+    "sensitivities": ".study.sensitivities",
     "simulate": ".study.analyses",
     "steady_sliding": ".study.analyses",
     "summarise": ".study.analyses",
@@ -70,6 +78,7 @@ __all__ = [
     "body_modes",
     "build_system",
     "compare",
+    "damping_map",
     "describe",
     "friction_curve",
     "load",
@@ -79,8 +88,11 @@ __all__ = [
     "onsets",
     "open_dataset",
     "plot",
+    "rank_countermeasures",
+    "reduced_model",
     "run",
     "save",
+    "sensitivities",
     "simulate",
     "steady_sliding",
     "summarise",

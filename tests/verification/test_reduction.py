@@ -17,6 +17,7 @@ from stridor.modal.parametric.basis import residual
 from stridor.modal.parametric.dense import _by_companion, dense_modes
 from stridor.modal.parametric.full import verified
 from stridor.modal.parametric.onsets import onsets_along
+from stridor.study.reduced import parametric_problem, reduced_model
 from stridor.system import build_system
 
 pytestmark = pytest.mark.verification
@@ -228,3 +229,47 @@ def test_what_is_refused(model):
     with pytest.raises(AnalysisError, match="no symmetric mass"):
         reduce(empty, 0.1)
     assert not model.modes({"Omega": 4.0}).inside
+
+
+def test_numbers_of_a_case_span_a_box():
+    """Contact, moduli (linear), thickness out of the plane (linear) and damping (a product) of a case, at random."""
+    bench = case(bench_as_solids(across=(1, 1), along=(6, 12)))
+    body, material = next((n, b.material) for n, b in bench.bodies.items() if getattr(b, "thickness", None))
+    low = bench.materials[material].young_modulus
+    box = {
+        "mu": (0.0, 0.3),
+        f"materials.{material}.young_modulus": (0.9 * low, 1.1 * low),
+        f"bodies.{body}.damping.stiffness": (0.0, 2e-8),
+    }
+    problem = parametric_problem(bench, box)
+    rng = np.random.default_rng(4)
+    for _ in range(2):
+        point = {p.name: rng.uniform(p.low, p.high) for p in problem.parameters}
+        varied = build_system(bench.with_({k: v for k, v in point.items() if k != "mu"}))
+        full = problem.at(point)
+        assert abs(full.mass - varied.mass).max() < 1e-12 * abs(varied.mass).max()
+        assert abs(full.damping - varied.damping).max() < 1e-10 * abs(varied.damping).max()
+        modes = complex_modes(varied, point["mu"], max_frequency_hz=9e3)
+        exact = eigenvalues(problem, point)
+        found = modes.eigenvalues[0]
+        assert np.all(np.abs(found[:, None] - exact).min(axis=1) < 1e-6 * np.abs(found))
+    reduced = reduced_model(bench, {"mu": (0.0, 0.3)}, max_frequency_hz=9e3)
+    exact = eigenvalues(reduced.problem, {"mu": 0.21})
+    found = reduced.modes({"mu": 0.21}).values
+    assert np.abs(found[:, None] - exact).min(axis=1).max() < 1e-7 * reduced.frequency
+
+
+def test_what_a_case_refuses():
+    bench = case(bench_as_solids(across=(1, 1), along=(6, 12)))
+    name = next(iter(bench.contacts))
+    rigid = bench.with_({f"contacts.{name}.stiffness": "rigid"})
+    for given, box, message in (
+        (bench, {}, "box: missing – give at least one range"),
+        (bench, {"mu": (0.3, 0.1)}, r"box.mu: .* – a range of two numbers low < high"),
+        (bench, {"mu": (-0.1, 0.1)}, r"box.mu: .* – friction coefficients are ≥ 0"),
+        (bench, {"contact_stiffness": (0.0, 1.0)}, r"factors of the contact stiffness are > 0"),
+        (bench, {"materials.stel.density": (1.0, 2.0)}, r"materials.stel"),
+        (rigid, {"mu": (0.0, 0.1)}, r"rigid contact has no stiffness to vary"),
+    ):
+        with pytest.raises(CaseError, match=message):
+            reduced_model(given, box)

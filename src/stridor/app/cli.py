@@ -5,15 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from ..errors import CaseError, StridorError
-
-if TYPE_CHECKING:
-    from ..case import Case
-    from ..io.datasets import Result
+from . import explore
+from .arguments import CaseFile, Json, Out, Quiet, Set, Undamped, folder, keep, load_case, numbers, pair
 
 app = typer.Typer(
     name="stridor",
@@ -23,73 +21,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-
-CaseFile = Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML).", show_default=False)]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Change a value of the case, e.g. contacts.A.friction.coefficient=0.3. Repeatable.",
-    ),
-]
-Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results [default: CASE.out].")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else there.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="No log and no progress on stderr.")]
-Undamped = Annotated[bool, typer.Option("--undamped", help="Leave structural damping out.")]
-
-
-def _load(path: Path, overrides: list[str] | None, *, quiet: bool) -> Case:
-    from ..case import load
-
-    case = load(path, overrides or ())
-    from .output import say
-
-    for warning in case.warnings:
-        say(f"warning: {warning}", quiet=quiet)
-    return case
-
-
-def _folder(path: Path, out: Path | None) -> Path:
-    return out if out is not None else path.with_suffix(".out")
-
-
-def _keep(result: Result, path: Path, *, quiet: bool) -> None:
-    from ..io.datasets import save
-    from .output import say
-
-    save(result, path)
-    say(f"written: {path}", quiet=quiet)
-
-
-def numbers(text: str, name: str) -> list[float]:
-    """Numbers from "0.1", "0.1,0.2" or "start:stop:count". Raises CaseError."""
-    accepted = "a number, numbers with commas, or start:stop:count, each number ≥ 0"
-    try:
-        if ":" in text:
-            start, stop, count = text.split(":")
-            amount = int(count)
-            if amount < 1 or amount > 1_000_000:
-                raise ValueError
-            low, high = float(start), float(stop)
-            step = (high - low) / max(amount - 1, 1)
-            values = [low + k * step for k in range(amount)]
-        else:
-            values = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise CaseError(name, text, accepted) from None
-    if not all(0 <= v < float("inf") for v in values):
-        raise CaseError(name, text, accepted)
-    return values
-
-
-def _pair(text: str, name: str) -> tuple[float, float]:
-    parts = text.split(":")
-    try:
-        low, high = (float(p) for p in parts)
-    except ValueError:
-        raise CaseError(name, text, "two numbers, low:high") from None
-    return low, high
 
 
 @app.command()
@@ -127,7 +58,7 @@ def check(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False,
     from ..study.analyses import describe
     from .output import print_json, say, stdout
 
-    loaded = _load(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet)
     description = describe(loaded)
     for warning in description.warnings:
         if warning not in loaded.warnings:  # those are said already
@@ -140,6 +71,25 @@ def check(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False,
         print_json(description.to_json())
         return
     for line in description.lines:
+        stdout.print(line, markup=False)
+
+
+@app.command()
+def matrices(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False) -> None:
+    """What the imported matrices of a case are like: symmetry, definiteness, units, friction terms that got lost."""
+    from ..study.matrix_reports import matrix_reports
+    from .output import print_json, stdout
+
+    found = matrix_reports(load_case(case, set_, quiet=quiet))
+    text = [line for name, report in found.items() for line in (f"{name}:", *(f"  {x}" for x in report.lines()))]
+    if out is not None:
+        from ..io.atomic import write_text
+
+        write_text(out / "matrices.txt", "\n".join(text) + "\n")
+    if json:
+        print_json({name: {"text": r.lines(), "warnings": list(r.matrices.warnings)} for name, r in found.items()})
+        return
+    for line in text:
         stdout.print(line, markup=False)
 
 
@@ -160,9 +110,9 @@ def steady(
     from .output import print_json, say
     from .pictures import steady_document, write_steady
 
-    loaded = _load(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet)
     found = steady_sliding(loaded, mu)
-    files = write_steady(loaded, found, _folder(case, out))
+    files = write_steady(loaded, found, folder(case, out))
     for path in files:
         say(f"written: {path}", quiet=quiet)
     document = steady_document(found) | {"files": [str(f) for f in files]}
@@ -195,8 +145,8 @@ def shapes(
     from .output import print_json, say, table
     from .pictures import write_shapes
 
-    loaded = _load(case, set_, quiet=quiet)
-    documents = write_shapes(loaded, _folder(case, out), mu=mu, branches=branch or None, gif=gif)
+    loaded = load_case(case, set_, quiet=quiet)
+    documents = write_shapes(loaded, folder(case, out), mu=mu, branches=branch or None, gif=gif)
     for document in documents:
         for path in document["files"]:
             say(f"written: {path}", quiet=quiet)
@@ -225,12 +175,12 @@ def modes(
 ) -> None:
     """Complex modes at one or many friction coefficients, branches followed from μ = 0."""
     from ..study import analyses
-    from .output import print_json, table
+    from .output import print_json, stdout, table
 
-    loaded = _load(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet)
     values = None if mu is None else numbers(mu, "--mu")
     result = analyses.modes(loaded, values, count=count, damped=False if undamped else None)
-    _keep(result, _folder(case, out) / "modes.nc", quiet=quiet)
+    keep(result, folder(case, out) / "modes.nc", quiet=quiet)
     if json:
         print_json(result.to_json())
         return
@@ -252,6 +202,8 @@ def modes(
                 ["branch", "frequency [Hz]", "growth [1/s]", "damping [%]", "", "residual"],
                 rows,
             )
+    for m, sentence in zip(result.mu, result.completeness, strict=bool(result.completeness)):
+        stdout.print(f"{f'μ = {m:g}: ' if len(result.mu) > 1 else ''}{sentence}", markup=False)
     if len(result.mu) > 5:
         from .output import say
 
@@ -284,10 +236,10 @@ def onsets(
     from ..study import analyses
     from .output import print_json, stdout, table
 
-    loaded = _load(case, set_, quiet=quiet)
-    chosen = None if friction_range is None else _pair(friction_range, "--range")
+    loaded = load_case(case, set_, quiet=quiet)
+    chosen = None if friction_range is None else pair(friction_range, "--range")
     result = analyses.onsets(loaded, chosen, max_frequency_hz=max_frequency, damped=False if undamped else None)
-    _keep(result, _folder(case, out) / "onsets.nc", quiet=quiet)
+    keep(result, folder(case, out) / "onsets.nc", quiet=quiet)
     if json:
         print_json(result.to_json())
         return
@@ -344,8 +296,8 @@ def simulate(
     from ..study import analyses
     from .output import print_json, progress_bar, say
 
-    loaded = _load(case, set_, quiet=quiet)
-    path = _folder(case, out) / "simulate.nc"
+    loaded = load_case(case, set_, quiet=quiet)
+    path = folder(case, out) / "simulate.nc"
     if restart is not None and not restart.exists():
         raise CaseError("--restart", str(restart), "no such file")
     before = None if restart is None else load_trajectory(restart)
@@ -364,7 +316,7 @@ def simulate(
             save(part, path)
             say(f"written up to there: {path}", quiet=quiet)
         raise
-    _keep(run, path, quiet=quiet)
+    keep(run, path, quiet=quiet)
     summary = analyses.summarise(loaded, run)
     if run.interrupted:
         say(
@@ -405,10 +357,10 @@ def compare(
     from ..study import analyses
     from .output import print_json, say
 
-    loaded = _load(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet)
     values = None if mu is None else numbers(mu, "--mu")
     result = analyses.compare(loaded, values, critical=critical, progress=lambda text: say(text, quiet=quiet))
-    _keep(result, _folder(case, out) / "compare.nc", quiet=quiet)
+    keep(result, folder(case, out) / "compare.nc", quiet=quiet)
     if json:
         print_json(result.to_json())
         return
@@ -423,9 +375,9 @@ def run(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, q
     from .output import print_json, progress_bar, say, stdout
     from .pipeline import run as run_all
 
-    loaded = _load(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet)
     with progress_bar("simulate", quiet=quiet) as progress:
-        outcome = run_all(loaded, _folder(case, out), progress=progress, log=lambda text: say(text, quiet=quiet))
+        outcome = run_all(loaded, folder(case, out), progress=progress, log=lambda text: say(text, quiet=quiet))
     if json:
         print_json(outcome.to_json())
     else:
@@ -433,6 +385,9 @@ def run(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, q
         stdout.print(f"report: {outcome.report}", markup=False)
     if outcome.interrupted:
         raise typer.Exit(130)
+
+
+explore.register(app)
 
 
 @app.callback(invoke_without_command=True)

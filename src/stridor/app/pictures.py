@@ -28,7 +28,7 @@ def write_shapes(
     Returns a document for each: branch, frequency, growth and the files. Raises CaseError for branches that are not
     in the list of modes.
     """
-    system = build_system(case)
+    system = build_system(case, mu)
     modes = analyses.modes(case, mu, max_frequency_hz=case.modal.max_frequency_hz, vectors="right")
     chosen = _chosen(modes, branches)
     documents: list[dict[str, Any]] = []

@@ -1,4 +1,4 @@
-"""The tables [bodies.NAME]: beams, meshed solids, point masses and rigid obstacles."""
+"""The tables [bodies.NAME]: beams, meshed solids, matrices of other programs, point masses and rigid obstacles."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from .fields import (
     Counts,
     Label,
     Name,
+    NodeNumber,
     NotNegative,
     Number,
     PlaneOrSpace,
@@ -43,7 +44,7 @@ class DampingTable(Table):
 class BeamBody(Table):
     """[bodies.NAME] of type "beam": straight, uniform, Euler–Bernoulli with traction, in the x–y plane."""
 
-    type: Literal["beam"] = Field(description='"beam", "solid", "mass" or "obstacle", the type of the body')
+    type: Literal["beam"] = Field(description='"beam", "solid", "matrices", "mass" or "obstacle", the type of the body')
     material: str = Field(description="the NAME of a [materials.NAME]")
     start: Vector = Field(description="[x, y], two numbers [m]: where the beam starts")
     angle_deg: Number | None = Field(
@@ -279,6 +280,57 @@ class SolidBody(Table):
         return 3 if self.model == "3d" else 2
 
 
+class MatrixTerm(Table):
+    """One matrix of a file, times a factor."""
+
+    file: Label = Field(description="the path of a matrix file (.mtx, .mat, .pch, .op4, …)")
+    name: Label | None = Field(default=None, description="the name of the matrix in the file, where it holds several")
+    role: Literal["mass", "damping", "stiffness"] | None = Field(
+        default=None, description='"mass", "damping" or "stiffness", what the matrix is (left out: as the file says)'
+    )
+    factor: Number | Label = Field(
+        default=1.0, description='a number, or an expression of [parameters] and mu such as "Omega**2 - 1"'
+    )
+
+
+class MatrixBody(Table):
+    """[bodies.NAME] of type "matrices": mass, damping and stiffness matrices that another program has written.
+
+    Terms of one role add up. The files, or ``labels``, say to which node and direction a freedom belongs.
+    """
+
+    type: Literal["matrices"]
+    terms: tuple[MatrixTerm, ...] = Field(
+        description="a list of tables { file, name, role, factor }, at least one"
+    )
+    labels: Label | None = Field(
+        default=None,
+        description='the path of a text file with a line "node direction" for each freedom, where the matrices\' files '
+        "do not name them",
+    )
+    mesh: Label | None = Field(
+        default=None, description="the path of an Abaqus file (.inp) with the nodes that the freedoms belong to"
+    )
+    group: Label | None = Field(
+        default=None, description="the name of a group of elements of the mesh: only these are drawn and touched"
+    )
+    dimension: Literal[2, 3] = Field(default=3, description="2 or 3, whether it moves in the plane or in space")
+    thickness: Positive = Field(default=1.0, description="a number > 0 [m], the thickness of a plane body")
+    scale: Positive = Field(
+        default=1.0,
+        description="a number > 0 [m], the unit of length of matrices and mesh (0.001: mm, N, s, masses in tonnes)",
+    )
+    translation: PlaneOrSpace | None = Field(
+        default=None, description="[x, y] or [x, y, z], numbers [m]: moves the mesh"
+    )
+    sliding: SlidingTable | None = Field(default=None, description=_SLIDING)
+    points: Mapping[Name, NodeNumber | PlaneOrSpace] = Field(
+        default_factory=dict[str, int | tuple[float, ...]],
+        description="a table of named points, each a node's number, or [x, y] or [x, y, z], numbers [m]: the mesh node "
+        "nearest is taken",
+    )
+
+
 class MassBody(Table):
     """[bodies.NAME] of type "mass": a point mass that moves in the plane or in space."""
 
@@ -316,6 +368,6 @@ class ObstacleBody(Table):
         return len(self.point)
 
 
-Body = Annotated[BeamBody | SolidBody | MassBody | ObstacleBody, Field(discriminator="type")]
-AnyBody = BeamBody | SolidBody | MassBody | ObstacleBody
+Body = Annotated[BeamBody | SolidBody | MatrixBody | MassBody | ObstacleBody, Field(discriminator="type")]
+AnyBody = BeamBody | SolidBody | MatrixBody | MassBody | ObstacleBody
 MASS_POINT = "centre"

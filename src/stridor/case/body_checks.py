@@ -12,6 +12,7 @@ from .bodies import (
     BeamBody,
     BuiltInMesh,
     DiscMesh,
+    MatrixBody,
     ObstacleBody,
     PadMesh,
     SlidingTable,
@@ -91,9 +92,10 @@ def _vectors(body: AnyBody) -> Iterator[tuple[str, tuple[float, ...]]]:
     for key in ("initial_velocity", "initial_displacement", "translation", "normal"):
         if (vector := getattr(body, key, None)) is not None:
             yield key, vector
-    if isinstance(body, SolidBody):
+    if isinstance(body, SolidBody | MatrixBody):
         for point, position in body.points.items():
-            yield f"points.{point}", position
+            if not isinstance(position, int):
+                yield f"points.{point}", position
     sliding = getattr(body, "sliding", None)
     if sliding is not None:
         for key in ("velocity", "centre"):

@@ -11,9 +11,10 @@ from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from ..errors import CaseError, Problem
-from .bodies import AnyBody, BeamBody, MassBody, SolidBody
+from .bodies import AnyBody, BeamBody, MassBody, MatrixBody, SolidBody
 from .body_checks import body_problems, shape_problems
 from .fields import is_zero
+from .matrix_checks import matrix_problems
 from .points import BoundaryRef, Place, PointRef, no_such, parse_place, parse_point
 from .schema import (
     DEFAULT_PHASES,
@@ -24,6 +25,7 @@ from .schema import (
     Load,
     MaterialTable,
     Modal,
+    Parameter,
     Phase,
     Reference,
     Spring,
@@ -45,6 +47,7 @@ class Parts:
     Names are (table, name); a whole broken table is (table, "*").
     """
 
+    parameters: Mapping[str, Parameter] = field(default_factory=dict[str, Parameter])
     materials: Mapping[str, MaterialTable] = field(default_factory=dict[str, MaterialTable])
     bodies: Mapping[str, AnyBody] = field(default_factory=dict[str, AnyBody])
     supports: Mapping[str, Support] = field(default_factory=dict[str, Support])
@@ -80,6 +83,7 @@ def problems_between(parts: Parts) -> list[Problem]:
         *shapes,
         *_material_problems(parts),
         *body_problems(parts.bodies),
+        *matrix_problems(parts.bodies, parts.parameters, parts.names("parameters"), parts.contacts),
         *_support_problems(parts),
         *_load_problems(parts),
         *_contact_problems(parts),
@@ -198,6 +202,10 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
             continue
         pairs[pair] = name
         slave = yield from _place(parts, contact.slave, f"{where}.slave")
+        if slave is not None and _is_placeless(parts.bodies[slave.body]):
+            accepted = f"{slave.body} has no mesh to say where its nodes are; give bodies.{slave.body}.mesh"
+            yield Problem(f"{where}.slave", contact.slave, accepted)
+            continue
         owner, _, boundary = contact.master.partition(".")
         master = parts.bodies.get(owner)
         if master is None:
@@ -209,7 +217,7 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
             continue
         if isinstance(master, MassBody):
             yield Problem(f"{where}.master", contact.master, "a point mass has no surface to slide on")
-        elif isinstance(master, SolidBody):
+        elif isinstance(master, SolidBody | MatrixBody):
             if not boundary:
                 accepted = f'must be a boundary of it, such as "{owner}.top"'
                 yield Problem(f"{where}.master", contact.master, accepted)
@@ -236,8 +244,7 @@ def _pairing_problems(
 ) -> Iterator[Problem]:
     body = parts.bodies[slave.body]
     position = body.coordinates(slave.distance) if isinstance(body, BeamBody) else slave.coordinates
-    assert position is not None
-    if len(position) != 2:
+    if position is None or len(position) != 2:  # None: a node whose place shows when the mesh is read
         return
     along, _ = signed_distance(master, *position)
     if not -1e-9 <= along / master.length_m <= 1 + 1e-9:
@@ -290,7 +297,11 @@ def _link_problems(parts: Parts) -> Iterator[Problem]:
             yield Problem(f"{where}.between", link.between, "both ends are the same point")
             continue
         dimension = parts.bodies[point.body].dimension
-        if link.direction is None and (second == GROUND or (other is not None and _same(parts, point, other))):
+        placeless = [p.body for p in (point, other) if p is not None and _is_placeless(parts.bodies[p.body])]
+        if link.direction is None and placeless:
+            accepted = f"missing – {placeless[0]} has no mesh to give a line to act along; give direction = [x, y]"
+            yield Problem(f"{where}.direction", None, accepted)
+        elif link.direction is None and (second == GROUND or (other is not None and _same(parts, point, other))):
             accepted = "missing – its ends give no line to act along; give direction = [x, y]"
             yield Problem(f"{where}.direction", None, accepted)
         elif link.direction is not None:
@@ -300,7 +311,14 @@ def _link_problems(parts: Parts) -> Iterator[Problem]:
                 yield Problem(f"{where}.direction", link.direction, "must not be zero")
 
 
+def _is_placeless(body: AnyBody) -> bool:
+    """Whether nothing says where its nodes are."""
+    return isinstance(body, MatrixBody) and body.mesh is None
+
+
 def _same(parts: Parts, first: PointRef, second: PointRef) -> bool:
+    if first.node or second.node:
+        return False  # known once the mesh is read
     ends = [position_of(parts.bodies[p.body], p) for p in (first, second)]
     return math.dist(*ends) == 0.0 if len(ends[0]) == len(ends[1]) else False
 

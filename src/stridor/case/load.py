@@ -55,16 +55,37 @@ def loads(
     problems = override(data, overrides)
     if problems:
         raise CaseError.many(problems)
+    _spell_out(data)
     _resolve_files(data, folder or Path.cwd())
     return Case.checked(data)
 
 
+def _spell_out(data: dict[str, Any]) -> None:
+    """[matrices], or a list [[matrices]] of its terms, as the body called matrices that it stands for."""
+    if "matrices" not in data:
+        return
+    short = data.pop("matrices")
+    bodies = data.setdefault("bodies", {})
+    if not isinstance(short, dict | list):
+        raise CaseError("matrices", short, "must be a table with a list of terms, or that list, [[matrices]]")
+    if not isinstance(bodies, dict) or "matrices" in bodies:
+        accepted = "stands for [bodies.matrices], which the case has as well; remove one of them"
+        raise CaseError("matrices", None, accepted)
+    table: Any = short if isinstance(short, dict) else {"terms": short}
+    bodies["matrices"] = {"type": "matrices", **table}
+
+
 def _resolve_files(data: dict[str, Any], folder: Path) -> None:
-    """Paths of mesh files made absolute, so that a case means the same wherever it is saved."""
+    """Paths of files made absolute, so that a case means the same wherever it is saved."""
     bodies = data.get("bodies")
     for body in bodies.values() if isinstance(bodies, dict) else ():
-        if isinstance(body, dict) and isinstance(body.get("file"), str) and body["file"]:
-            body["file"] = str(folder / body["file"])
+        if isinstance(body, dict):
+            terms = body.get("terms")
+            tables: list[Any] = [body, *(terms if isinstance(terms, list) else [])]
+            for table in tables:
+                for key in ("file", "labels", "mesh"):
+                    if isinstance(table, dict) and isinstance(table.get(key), str) and table[key]:
+                        table[key] = str(folder / table[key])
 
 
 def templates() -> list[str]:

@@ -8,9 +8,11 @@ from typing import Annotated, Any, cast
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError, model_validator
 
 from ..errors import CaseError, Problem
-from .bodies import BeamBody
+from .bodies import BeamBody, MatrixBody
 from .checks import Parts, problems_between, slave_side
+from .expression import parse_expression
 from .fields import Name
+from .matrix_checks import MU
 from .messages import problems_of
 from .oddities import oddities
 from .overrides import apply, split_path
@@ -25,6 +27,7 @@ from .schema import (
     Load,
     MaterialTable,
     Modal,
+    Parameter,
     Phase,
     Phases,
     Reference,
@@ -44,6 +47,9 @@ class Case(Table):
     """
 
     title: str = Field(default="", description="a text")
+    parameters: Mapping[Name, Parameter] = Field(
+        default_factory=dict[str, Parameter], description="tables [parameters.NAME]"
+    )
     materials: Mapping[Name, MaterialTable] = Field(
         default_factory=dict[str, MaterialTable], description="tables [materials.NAME]"
     )
@@ -129,6 +135,35 @@ class Case(Table):
         """Names of what moves with a prescribed velocity: supports, then bodies that slide through their mesh."""
         supports = [name for name, support in self.supports.items() if support.velocity]
         return supports + [name for name, body in self.bodies.items() if getattr(body, "sliding", None) is not None]
+
+    @property
+    def imported(self) -> dict[str, MatrixBody]:
+        """The bodies that are matrices of other programs."""
+        return {name: body for name, body in self.bodies.items() if isinstance(body, MatrixBody)}
+
+    @property
+    def factor_names(self) -> set[str]:
+        """Names that the factors of matrices use: of parameters, and mu."""
+        names = tuple((*self.parameters, MU))
+        texts = [t.factor for b in self.imported.values() for t in b.terms if isinstance(t.factor, str)]
+        return {name for text in texts for name in parse_expression(text, names).names}
+
+    def factor_values(self, mu: float | None = None) -> dict[str, float]:
+        """Values of the names in factors of matrices: the parameters', and mu, the friction coefficient.
+
+        mu is that given, else the parameter of that name, else that of all contacts. Raises CaseError where mu is used
+        and contacts differ.
+        """
+        values = {name: parameter.value for name, parameter in self.parameters.items()}
+        own = {contact.friction.coefficient for contact in self.contacts.values()} or {0.0}
+        if mu is not None:
+            values[MU] = float(mu)
+        elif MU not in values and len(own) == 1:
+            values[MU] = own.pop()
+        elif MU not in values and MU in self.factor_names:
+            accepted = "factors of matrices use it, and the contacts have different ones: name it (--mu 0.3)"
+            raise CaseError(MU, None, accepted)
+        return values
 
     @property
     def beams(self) -> dict[str, BeamBody]:

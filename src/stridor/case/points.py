@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from ..errors import CaseError
-from .bodies import MASS_POINT, AnyBody, BeamBody, MassBody, ObstacleBody, SolidBody
+from .bodies import MASS_POINT, AnyBody, BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBody
 
 _ROUNDING = 1e-12
 FULL_TURN = 360.0 * (1 - 1e-9)
@@ -23,11 +23,13 @@ BOUNDARIES = {
 
 @dataclass(frozen=True)
 class PointRef:
-    """A point of a body: on a beam its distance [m] from the start along the axis, else its coordinates [m]."""
+    """A point of a body: on a beam its distance [m] from the start along the axis, else its coordinates [m], or the
+    number of a node of another program."""
 
     body: str
     distance: float
     coordinates: tuple[float, ...] | None = None
+    node: int | None = None
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ def parse_place(
     if not head or not (distance if at else point):
         first = head if body is not None else next(iter(bodies), "beam1")
         example = f"{first}.{_first_point(bodies.get(first), boundary=boundary)}"
-        if boundary and any(isinstance(b, SolidBody) for b in bodies.values()):
+        if boundary and any(isinstance(b, SolidBody | MatrixBody) for b in bodies.values()):
             accepted = f'must be a point, "body.point", or a boundary, "body.boundary", such as {example}'
         else:
             accepted = f'must be a point, "body.point" or "body@distance", such as {example}'
@@ -85,6 +87,8 @@ def parse_place(
         raise CaseError(where, reference, f'a mass is one point; write "{head}"')
     if isinstance(body, SolidBody):
         return _of_solid(reference, head, body, point, where, boundary=boundary)
+    if isinstance(body, MatrixBody):
+        return _of_matrices(reference, head, body, point, where)
     if at:
         return PointRef(head, _distance(reference, distance, head, body, where))
     if point not in body.point_names:
@@ -96,6 +100,8 @@ def _first_point(body: AnyBody | None, *, boundary: bool) -> str:
     if isinstance(body, SolidBody):
         names = [*boundary_names(body), *body.points] if boundary else [*body.points]
         return next(iter(names), "boundary" if boundary else "point")
+    if isinstance(body, MatrixBody):
+        return next(iter(body.points), "boundary" if boundary and body.mesh is not None else "point")
     return MASS_POINT if isinstance(body, MassBody) else "start"
 
 
@@ -109,6 +115,18 @@ def _of_solid(reference: str, name: str, body: SolidBody, point: str, where: str
         raise CaseError(
             where, reference, f"no such point or boundary{choice(point, [*body.points, *known], f'{name} has')}"
         )
+    return BoundaryRef(name, point)
+
+
+def _of_matrices(reference: str, name: str, body: MatrixBody, point: str, where: str) -> Place:
+    if point in body.points:
+        at = body.points[point]
+        return PointRef(name, 0.0, None, at) if isinstance(at, int) else PointRef(name, 0.0, at)
+    if not point:
+        raise CaseError(where, reference, f"a body of matrices has no axis; name a node in bodies.{name}.points")
+    if body.mesh is None:
+        known = choice(point, [f"{name}.{p}" for p in body.points], f"{name} has")
+        raise CaseError(where, reference, f"no such point{known}; boundaries need its mesh: give bodies.{name}.mesh")
     return BoundaryRef(name, point)
 
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 
 from ..laws import Coulomb, FrictionLaw, Material, StaticKinetic, Weakening
-from .bodies import BeamBody, Body, DampingTable, MassBody, ObstacleBody, SlidingTable, SolidBody
+from .bodies import BeamBody, Body, DampingTable, MassBody, MatrixBody, ObstacleBody, SlidingTable, SolidBody
 from .fields import (
     NAME_RULE,
     PLACE,
@@ -35,6 +35,7 @@ __all__ = [
     "Body",
     "DampingTable",
     "MassBody",
+    "MatrixBody",
     "ObstacleBody",
     "SlidingTable",
     "SolidBody",
@@ -54,6 +55,15 @@ class MaterialTable(Table):
     def law_object(self) -> Material:
         """The material as the elements take it."""
         return Material(self.young_modulus, self.density, self.poisson_ratio)
+
+
+class Parameter(Table):
+    """[parameters.NAME]: a named number for the factors of matrices."""
+
+    value: Number = Field(description="a number, the value of the parameter")
+    range: tuple[Number, Number] | None = Field(
+        default=None, description="[a, b] with a < b, where the parameter may be varied"
+    )
 
 
 class Support(Table):
@@ -333,6 +343,7 @@ class Reference(Table):
 
 
 ENTRIES: Mapping[str, Any] = {
+    "parameters": Parameter,
     "materials": MaterialTable,
     "bodies": Body,
     "supports": Support,
@@ -344,6 +355,7 @@ ENTRIES: Mapping[str, Any] = {
 }
 """Tables of named tables, and what each of their entries is."""
 SINGULAR = {
+    "parameters": "parameter",
     "materials": "material",
     "bodies": "body",
     "supports": "support",

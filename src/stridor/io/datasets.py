@@ -153,6 +153,8 @@ def _modes(result: ComplexModes) -> Any:
             variables[name] = _split((*pairs, "freedom"), vectors, {"units": "1"})
     coords = {"mu": ("mu", result.mu, {"units": "1"}), "branch": ("branch", result.branch)}
     data = _dataset("modes", variables, coords, result)
+    if result.completeness:
+        data.attrs["completeness"] = json.dumps(result.completeness)
     data.attrs["damped"] = int(result.damped)
     return data
 

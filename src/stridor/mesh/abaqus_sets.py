@@ -85,7 +85,8 @@ class Collector:
                 every = np.array(sorted(self._element_index[b].values()), dtype=np.int64)
                 if len(every) and name not in {r.upper() for r in regions}:
                     regions[self._bodies[b].name] = self._by_kind(every)
-        return Contents(self._points, self._cells, regions, facets, node_sets, accepted=ACCEPTED_TYPES)
+        numbers = np.array([n for nodes in self._node_index for n in nodes], dtype=np.int64)
+        return Contents(self._points, self._cells, regions, facets, node_sets, ACCEPTED_TYPES, numbers)
 
     def shown_name(self, table: str, body: int, name: str) -> str:
         """What a set or surface of a body is called in the mesh."""

@@ -23,7 +23,8 @@ _FLAT = 1e-9
 class Contents:
     """What a file holds. points (k, 2 or 3); cells by kind, also by kinds that cannot be computed with, but no facets;
     regions: name → cells as indices into cells[kind]; facets: name → facets by kind, in any orientation; node_sets:
-    name → nodes. accepted: cells that can be computed with, in the words of the file's format.
+    name → nodes. accepted: cells that can be computed with, in the words of the file's format. numbers (k,): what the
+    file calls its points.
     """
 
     points: Array
@@ -32,6 +33,7 @@ class Contents:
     facets: Mapping[str, Blocks] = field(default_factory=dict)
     node_sets: Mapping[str, IntArray] = field(default_factory=dict)
     accepted: str = ", ".join((*PLANE_KINDS, *SOLID_KINDS))
+    numbers: IntArray | None = None
 
 
 def gather(contents: Contents, *, source: str, where: str, group: str | None = None, scale: float = 1.0) -> Mesh:
@@ -77,7 +79,8 @@ def gather(contents: Contents, *, source: str, where: str, group: str | None = N
         elif matched.outer:
             boundaries[name] = matched.outer
     regions = _regions(contents, chosen)
-    return Mesh(points=points, cells=mine, boundaries=boundaries, node_sets=node_sets, regions=regions, source=source)
+    numbers = None if contents.numbers is None else contents.numbers[used]
+    return Mesh(points, mine, boundaries, node_sets, regions, source, numbers)
 
 
 def _chosen(contents: Contents, where: str, group: str | None, source: str) -> dict[str, IntArray]:

@@ -28,7 +28,8 @@ class Mesh:
     boundaries: name → facets by kind (f, nodes), ordered so that their normal points out of the body: in the plane
     the body lies on the left of a line from its first to its second node (outward is right), in space the corners
     turn counter-clockwise seen from outside. node_sets: name → nodes (s,), sorted. regions: name → cells by kind as
-    indices into `cells[kind]`. source says where the mesh came from, for messages.
+    indices into `cells[kind]`. source says where the mesh came from, for messages. numbers (k,): what the file calls
+    the points, None where it numbers none.
     """
 
     points: Array
@@ -37,6 +38,7 @@ class Mesh:
     node_sets: Mapping[str, IntArray] = field(default_factory=dict)
     regions: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
     source: str = ""
+    numbers: IntArray | None = None
 
     @property
     def dimension(self) -> int:

@@ -33,7 +33,9 @@ class ComplexModes:
     eigenvalues λ (k, b) [1/s]: growth rate + j angular frequency. branch (b,) numbers the modes from
     1 by frequency at μ = 0. residual (k, b): componentwise backward error in the assembled matrices.
     right, left (k, b, n) unit vectors where asked for, else None. damped: whether C was used.
-    open_contacts: contacts that carry no load in steady sliding and so take no part.
+    open_contacts: contacts that carry no load in steady sliding and so take no part. completeness: of matrices without
+    structure, for each μ what speaks for no mode of the band being missed; there branches are not followed from one μ
+    to the next, and where fewer modes are found the rest is NaN.
     """
 
     mu: Array
@@ -44,6 +46,7 @@ class ComplexModes:
     right: ComplexArray | None = None
     left: ComplexArray | None = None
     open_contacts: tuple[str, ...] = ()
+    completeness: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -87,6 +90,7 @@ class ComplexModes:
                         "branch": int(self.branch[b]),
                     }
                     for b in order
+                    if np.isfinite(self.eigenvalues[k, b])
                 ]
             )
         return {
@@ -94,6 +98,7 @@ class ComplexModes:
             "modes": rows,
             "damped": self.damped,
             "open_contacts": list(self.open_contacts),
+            **({"completeness": list(self.completeness)} if self.completeness else {}),
         }
 
 

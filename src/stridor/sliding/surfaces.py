@@ -86,7 +86,8 @@ def steady_sliding_nodes(
     rubbing = coefficient[:, None] * sense
     push = sp.csr_array(nodes.normal + nodes.along(rubbing)) if np.any(rubbing) else nodes.normal
     force = _external_force(system, load_factors) - system.motion.damping @ factors
-    equilibrium = Equilibrium(system, nodes, push, force, symmetric=not np.any(rubbing), solver=solver)
+    symmetric = not np.any(rubbing) and not system.general
+    equilibrium = Equilibrium(system, nodes, push, force, symmetric=symmetric, solver=solver)
     try:
         state, iterations = settle(equilibrium, guess)
     except SingularMatrix as error:

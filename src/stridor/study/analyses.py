@@ -12,7 +12,8 @@ import numpy as np
 from ..agreement import Agreement, dominant_response, linear_part
 from ..agreement import compare as compare_system
 from ..case import Case
-from ..errors import CaseError, Problem
+from ..case.matrix_checks import MU
+from ..errors import AnalysisError, CaseError, Problem
 from ..modal.complex_modes import ComplexModes, complex_modes
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
@@ -48,6 +49,7 @@ __all__ = [
     "settings_of",
     "simulate",
     "steady_sliding",
+    "structured",
     "summarise",
 ]
 
@@ -70,20 +72,60 @@ def modes(
     Raises CaseError for a bad μ, AnalysisError where the steady sliding state does not exist.
     """
     started = time.perf_counter()
-    system = build_system(case)
     values = _own_friction(case) if mu is None else mu
     damped = case.modal.damped if damped is None else damped
-    result = complex_modes(
-        system,
-        values,
-        count=case.modal.modes if count is None else count,
-        max_frequency_hz=max_frequency_hz,
-        damped=damped,
-        vectors=vectors,
-        **_modal_options(case),
-    )
+    count = case.modal.modes if count is None else count
+    system = None if _varies_with_friction(case) else build_system(case)
+    if system is None or system.general:
+        from ..modal.assembled import Options
+        from ..modal.general import general_modes
+
+        def system_at(mu: float) -> System:
+            return build_system(case, mu) if system is None else system
+
+        result = general_modes(
+            system_at,
+            values,
+            count=count if max_frequency_hz is None else None,
+            max_frequency_hz=max_frequency_hz or case.modal.max_frequency_hz,
+            damped=damped,
+            vectors=vectors,
+            options=Options(**_modal_options(case)),
+        )
+    else:
+        result = complex_modes(
+            system,
+            values,
+            count=count,
+            max_frequency_hz=max_frequency_hz,
+            damped=damped,
+            vectors=vectors,
+            **_modal_options(case),
+        )
     seconds = time.perf_counter() - started
     return replace(result, provenance=provenance(case, "modes", seconds, damped=damped))
+
+
+def _varies_with_friction(case: Case) -> bool:
+    """Whether factors of imported matrices depend on the friction coefficient."""
+    return MU in case.factor_names
+
+
+def structured(case: Case, what: str, mu: float | None = None) -> System:
+    """The system of a case whose matrices are as ``what`` needs them. Raises AnalysisError for others."""
+    if _varies_with_friction(case) and what in ("onsets", "compare", "run"):
+        raise AnalysisError(
+            f"{what}: factors of the imported matrices depend on mu, which only `stridor modes --mu` follows so far; "
+            "take it at several values"
+        )
+    system = build_system(case, mu)
+    if system.general:
+        raise AnalysisError(
+            f"{what} needs symmetric matrices and a positive definite mass, and {system.general}; what works for these "
+            "is `stridor modes` (with --mu 0.1,0.2 or --set parameters.NAME.value=… for other values) and "
+            "`stridor steady`"
+        )
+    return system
 
 
 def _modal_options(case: Case) -> dict[str, Any]:
@@ -101,11 +143,18 @@ def steady_sliding(case: Case, mu: float | None = None) -> SurfaceSliding:
 
     mu replaces the friction coefficient of every contact. Raises AnalysisError where there is none.
     """
-    return steady_sliding_nodes(build_system(case), mu=mu)
+    return steady_sliding_nodes(build_system(case, mu), mu=mu)
 
 
 def own_friction(case: Case) -> float | None:
-    """The coefficient of all contacts at their slip speeds in steady sliding; None where they differ."""
+    """The coefficient of all contacts at their slip speeds in steady sliding; None where they differ.
+
+    Where the case has a parameter mu, and so no contacts, it is that.
+    """
+    if MU in case.parameters:
+        return case.parameters[MU].value
+    if not case.contacts:
+        return 0.0
     system = build_system(case)
     nodes = system.contact_nodes()
     speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
@@ -139,7 +188,7 @@ def onsets(
 ) -> Onsets:
     """Every critical friction coefficient in range (defaults from the case's [modal])."""
     started = time.perf_counter()
-    system = build_system(case)
+    system = structured(case, "onsets")
     result = solve_onsets(
         system,
         case.modal.friction_range if friction_range is None else friction_range,
@@ -160,7 +209,7 @@ def simulate(
 ) -> Trajectory:
     """The temporal approach through the phases of the case; mu scales every contact's friction law."""
     started = time.perf_counter()
-    system = build_system(case)
+    system = structured(case, "simulate", mu)
     _check_extent(case, system)
     result = march(
         system,
@@ -233,8 +282,8 @@ def compare(
     """Both approaches at each μ (default comparison.mu, else the case's own) and by their critical μ."""
     started = time.perf_counter()
     settings = case.comparison
+    system = structured(case, "compare")
     chosen = list(mus if mus is not None else settings.mu) or [_own_friction(case)]
-    system = build_system(case)
     result = compare_system(
         system,
         phases_of(case),

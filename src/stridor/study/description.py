@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..case import Case
-from ..case.bodies import BeamBody, MassBody, ObstacleBody, SolidBody
+from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBody
 from ..case.schema import Load
 from ..errors import AnalysisError
 from ..fe.solid import wave_speeds
@@ -19,6 +20,7 @@ from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
 from ..system.meshes import load_mesh
 from ..temporal.beta2 import step_limit
+from .matrix_reports import matrix_reports
 from .settings import settings_of
 
 LEAST_PER_WAVE = 4.0  # elements per shear wavelength below which a frequency is not resolved
@@ -41,17 +43,7 @@ class Description:
 
 def describe(case: Case) -> Description:
     """Build the model, find its steady sliding and its step limit, and say it in words."""
-    from ..temporal.settings import choose_path, choose_step
-
     system = build_system(case)
-    settings = settings_of(case)
-    limit = step_limit(system, settings.beta2)
-    step = choose_step(limit, settings)
-    if system.assembled:
-        path, reason = "assembled", "sparse matrices, every slave node a contact"
-    else:
-        _, reason = choose_path(system, settings)
-        path = "modal" if reason.startswith("complete") else "nodal"
     lines = [f"{case.title or 'case'}: {len(case.bodies)} bodies, {system.size} free degrees of freedom"]
     lines += [_body_words(case, system, name) for name in case.bodies]
     for name, support in case.supports.items():
@@ -73,13 +65,9 @@ def describe(case: Case) -> Description:
         "bodies": {body.name: len(body.freedoms) for body in (*system.lines, *system.solids)},
         "degrees_of_freedom": system.size,
         "contacts": {},
-        "step": step,
-        "step_limit": limit.step,
-        "limiting_body": limit.body,
-        "path": path,
-        "steps": sum(round(p.duration / step) for p in case.phases),
     }
-    if system.assembled:
+    lines += [f"  parameter {name} = {parameter.value:g}" for name, parameter in case.parameters.items()]
+    if system.assembled or system.general:
         lines += _surface_lines(case, system, data)
     elif system.contacts and system.loads:
         steady = steady_sliding(system)
@@ -98,12 +86,11 @@ def describe(case: Case) -> Description:
                 "touches": bool(steady.active[k]),
                 "gap": contact.gap,
             }
-    lines.append(
-        f"time step {step:.4g} s, {100 * step / limit.step:.0f} % of the stability limit {limit.step:.4g} s "
-        f"(set by {limit.body}); {data['steps']} steps"
-    )
-    lines.append(f"time loop: {path} path ({reason})")
-    warnings = [*case.warnings, *mesh_warnings(case, system)]
+    if system.general:
+        lines.append(f"{system.general}: `stridor modes` takes any matrices, onsets and the time loop do not")
+    else:
+        lines += _time_lines(case, system, data)
+    warnings = [*case.warnings, *mesh_warnings(case, system), *imported_warnings(case, system)]
     for contact in system.contacts:
         if contact.gap < -1e-9:
             warnings.append(f"contact {contact.name}: the bodies overlap by {-contact.gap:g} m; simulate refuses that")
@@ -120,6 +107,27 @@ def describe(case: Case) -> Description:
     return Description(tuple(lines), data, tuple(warnings))
 
 
+def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
+    """The time step against its limit, and how the time loop will go; added to the data."""
+    from ..temporal.settings import choose_path, choose_step
+
+    settings = settings_of(case)
+    limit = step_limit(system, settings.beta2)
+    step = choose_step(limit, settings)
+    if system.assembled:
+        path, reason = "assembled", "sparse matrices, every slave node a contact"
+    else:
+        _, reason = choose_path(system, settings)
+        path = "modal" if reason.startswith("complete") else "nodal"
+    steps = sum(round(p.duration / step) for p in case.phases)
+    data |= {"step": step, "step_limit": limit.step, "limiting_body": limit.body, "path": path, "steps": steps}
+    return [
+        f"time step {step:.4g} s, {100 * step / limit.step:.0f} % of the stability limit {limit.step:.4g} s "
+        f"(set by {limit.body}); {steps} steps",
+        f"time loop: {path} path ({reason})",
+    ]
+
+
 def _body_words(case: Case, system: System, name: str) -> str:
     body = case.bodies[name]
     count = next((len(b.freedoms) for b in (*system.lines, *system.solids) if b.name == name), 0)
@@ -133,6 +141,8 @@ def _body_words(case: Case, system: System, name: str) -> str:
     if isinstance(body, ObstacleBody):
         radius = "" if body.radius is None else f", radius {body.radius:g} m"
         return f"  {name}: rigid {body.shape} at {_vector(body.point)} m{radius}{_sliding_words(body)}"
+    if isinstance(body, MatrixBody):
+        return _matrix_words(name, body, system)
     solid = next(b for b in system.solids if b.name == name)
     kinds = ", ".join(f"{len(cells)} {kind}" for kind, cells in solid.cells.items())
     source = body.file if body.mesh is None else body.mesh.shape
@@ -142,7 +152,36 @@ def _body_words(case: Case, system: System, name: str) -> str:
     )
 
 
-def _sliding_words(body: SolidBody | ObstacleBody) -> str:
+def _matrix_words(name: str, body: MatrixBody, system: System) -> str:
+    files = ", ".join(dict.fromkeys(Path(term.file).name for term in body.terms))
+    mine = [k for k, said in enumerate(system.dof_names) if said.split(" ", 1)[0] == name]
+    nodes = len({said.split(" ")[2] for said in (system.dof_names[k] for k in mine) if said.split(" ")[1] == "node"})
+    mesh = f", {nodes} nodes" + (f" of {Path(body.mesh).name}" if body.mesh else "") if nodes else ""
+    return f"  {name}: matrices ({files}){mesh}, {len(mine)} free{_sliding_words(body)}"
+
+
+def imported_warnings(case: Case, system: System) -> list[str]:
+    """Nodes of meshes that the matrices know nothing of, which count as held, also where a contact touches them; where
+    the case has no contacts of its own, friction terms that got lost on the way here."""
+    found: list[str] = []
+    if case.imported and not case.contacts:
+        for name, report in matrix_reports(case).items():
+            lost = [w for w in report.matrices.warnings if w.startswith("friction terms seem lost")]
+            found += [f"bodies.{name}: {w}" for w in lost]
+    for solid in system.solids:
+        if not isinstance(case.bodies[solid.name], MatrixBody):
+            continue
+        moves = np.diff(solid.rows.free.indptr).reshape(solid.points.shape).any(axis=1)
+        still = int(np.count_nonzero(~moves))
+        if still:
+            found.append(
+                f"bodies.{solid.name}: {still} of {len(moves)} nodes of the mesh have no freedoms and count as held; "
+                "right where the other program held them, wrong where it condensed them out"
+            )
+    return found
+
+
+def _sliding_words(body: SolidBody | MatrixBody | ObstacleBody) -> str:
     if body.sliding is None:
         return ""
     parts = [] if body.sliding.velocity is None else [f"at {_vector(body.sliding.velocity)} m/s"]

@@ -16,7 +16,7 @@ from ..modal.assembled import friction_energy
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
 from ..sliding.surfaces import SurfaceSliding
-from ..system import System, build_system
+from ..system import System
 from ..temporal.shapes import operating_shape
 from ..temporal.simulate import Progress
 from ..temporal.trajectory import Trajectory
@@ -95,7 +95,7 @@ def compute_everything(
     that nothing computed is lost by what comes after it. Raises what the analyses raise."""
     clock = _Clock(log or _silent)
     keep = keep or _keep_nothing
-    system = build_system(case)
+    system = analyses.structured(case, "run")
     if system.assembled:
         return _large(case, system, clock, progress, keep)
     description = analyses.describe(case)

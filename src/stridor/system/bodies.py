@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case import Case
-from ..case.bodies import BeamBody, MassBody, ObstacleBody, SolidBody
+from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBody
 from ..errors import CaseError
 from ..fe.assembly import assemble_beam
 from ..fe.beam import DOF_PER_NODE, BeamElement, BeamMesh
@@ -16,6 +16,7 @@ from ..fe.solid import assemble_solid
 from ..laws import Material
 from ..mesh.model import Mesh
 from ..typing import Array, IntArray, Sparse
+from .imported import load_matrices
 from .meshes import LoadedMesh, load_mesh
 from .size import refuse_too_many, refuse_too_many_read
 
@@ -27,7 +28,9 @@ _LEAST, _MOST = 1e-100, 1e100
 @dataclass(frozen=True)
 class BuiltBody:
     """A body and its matrices (size, size) csr. stride freedoms per node, of which the first ``dimension`` are
-    displacements; points (k, d) [m] are its nodes. beam or mesh is what it was built from."""
+    displacements, then freedoms of no node, called ``extra``; points (k, d) [m] are its nodes, NaN where nothing says
+    where these are. beam or mesh is what it was built from. numbers (k,): what another program calls the nodes;
+    lacking: freedoms, counted within the body, that its matrices do not have."""
 
     name: str
     offset: int
@@ -39,11 +42,19 @@ class BuiltBody:
     beam: BeamMesh | None = None
     mesh: Mesh | None = None
     material: Material | None = None
+    extra: tuple[str, ...] = ()
+    numbers: IntArray | None = None
+    lacking: IntArray | None = None
 
     @property
     def size(self) -> int:
         """Number of freedoms before supports."""
-        return self.stride * len(self.points)
+        return self.stride * len(self.points) + len(self.extra)
+
+    @property
+    def placed(self) -> bool:
+        """Whether it is known where its nodes are."""
+        return len(self.points) > 0 and not bool(np.isnan(self.points).any())
 
     @property
     def dimension(self) -> int:
@@ -57,11 +68,18 @@ class BuiltBody:
     def freedom_name(self, local: int) -> str:
         """What a freedom of the body is, in words."""
         node, direction = divmod(local, self.stride)
+        if node >= len(self.points):
+            return self.extra[local - self.stride * len(self.points)]
+        if self.numbers is not None:
+            node = int(self.numbers[node])
         return f"{self.name} node {node} {'rotation' if direction >= self.dimension else AXES[direction]}"
 
 
-def build_bodies(case: Case) -> dict[str, BuiltBody]:
-    """Every body that deforms or moves, in the order of the case. Raises CaseError for meshes that will not do."""
+def build_bodies(case: Case, mu: float | None = None) -> dict[str, BuiltBody]:
+    """Every body that deforms or moves, in the order of the case; factors of imported matrices at ``mu``.
+
+    Raises CaseError for meshes and matrices that will not do.
+    """
     refuse_too_many(case)
     bodies: dict[str, BuiltBody] = {}
     offset = 0
@@ -71,6 +89,8 @@ def build_bodies(case: Case) -> dict[str, BuiltBody]:
                 built = _beam(case, name, body, offset)
             elif isinstance(body, SolidBody):
                 built = _solid(case, name, body, offset)
+            elif isinstance(body, MatrixBody):
+                built = _imported(case, name, body, offset, mu)
             elif isinstance(body, MassBody):
                 built = _mass(name, body, offset)
             else:
@@ -135,6 +155,24 @@ def _material(case: Case, name: str, body: SolidBody, loaded: LoadedMesh) -> Mat
     return material
 
 
+def _imported(case: Case, name: str, body: MatrixBody, offset: int, mu: float | None) -> BuiltBody:
+    found = load_matrices(case, name, body, mu)
+    refuse_too_many_read(f"bodies.{name}.terms.0", body.terms[0].file, found.mass.shape[0], offset)
+    return BuiltBody(
+        name,
+        offset,
+        body.dimension,
+        found.points,
+        found.mass,
+        found.damping,
+        found.stiffness,
+        mesh=found.mesh,
+        extra=found.extra,
+        numbers=found.numbers,
+        lacking=found.lacking,
+    )
+
+
 def _mass(name: str, body: MassBody, offset: int) -> BuiltBody:
     d = body.dimension
     empty = sp.csr_array((d, d))
@@ -146,14 +184,15 @@ def _refuse_extreme(built: BuiltBody) -> None:
     mass, stiffness, damping = (
         float(np.abs(m.data).max(initial=0.0)) for m in (built.mass, built.stiffness, built.damping)
     )
-    least = float(built.mass.diagonal().min())
+    imported = built.lacking is not None
+    least = float(np.abs(built.mass.data).max(initial=0.0) if imported else built.mass.diagonal().min())
     sound = least > _LEAST and mass < _MOST and damping < _MOST
     if built.stiffness.nnz:
         sound = sound and _LEAST < stiffness < _MOST
     if not sound:
         accepted = (
             f"its mass, stiffness or damping has entries outside {_LEAST:g} … {_MOST:g}, beyond what can be computed "
-            "with; check the units of its lengths, its material and its damping"
+            f"with; check {'its matrices' if imported else 'the units of its lengths, its material and its damping'}"
         )
         raise CaseError(f"bodies.{built.name}", None, accepted)
 

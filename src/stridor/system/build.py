@@ -14,10 +14,12 @@ from ..case.schema import Load
 from ..contact.interface import Rows
 from ..errors import CaseError
 from ..fe.solid import stress_stiffness
+from ..matrices.report import definiteness
 from ..mesh.boundary import require_boundary
 from ..mesh.facets import facet_areas, pressure_load, traction_load
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody, build_bodies
+from .imported import is_symmetric
 from .links import Links, links_of
 from .model import CubicSprings, Line, PrescribedMotion, Solid, Structure, System, constrain
 from .pairs import is_point_on_line, point_contact, surface_contact
@@ -25,9 +27,12 @@ from .supports import constraints_of, tie_matrix, tied_mass
 from .view import View
 
 
-def build_system(case: Case) -> System:
-    """Assemble a case. Raises CaseError where a mesh will not do or bodies that shall touch do not."""
-    bodies = build_bodies(case)
+def build_system(case: Case, mu: float | None = None) -> System:
+    """Assemble a case; mu is that in the factors of imported matrices (None: the case's own), and nothing else.
+
+    Raises CaseError where a mesh or a matrix will not do or bodies that shall touch do not.
+    """
+    bodies = build_bodies(case, mu)
     total = sum(body.size for body in bodies.values())
     links = links_of(case, bodies, total)
     constraints = constraints_of(case, bodies)
@@ -52,12 +57,15 @@ def build_system(case: Case) -> System:
     solids = tuple(
         Solid(body.name, body.points, _cells(body), view.node_rows(body), view.freedoms_of(body))
         for body in bodies.values()
-        if body.beam is None
+        if body.beam is None and body.placed
+    )
+    mass, damping, stiffness = (
+        sp.csr_array(matrix[free][:, free]) for matrix in (structure.mass, structure.damping, structure.stiffness)
     )
     return System(
-        mass=structure.mass[free][:, free],
-        damping=structure.damping[free][:, free],
-        stiffness=structure.stiffness[free][:, free],
+        mass=mass,
+        damping=damping,
+        stiffness=stiffness,
         contacts=tuple(contacts),
         loads=loads,
         motion=motion,
@@ -75,7 +83,19 @@ def build_system(case: Case) -> System:
         initial_velocity=_initial(case, view, "initial_velocity"),
         initial_displacement=_initial(case, view, "initial_displacement"),
         stress_stiffness=_stress_stiffness(case, view),
+        general=_general(mass, damping, stiffness) if case.imported else "",
     )
+
+
+def _general(mass: Sparse, damping: Sparse, stiffness: Sparse) -> str:
+    """What of imported matrices needs the solver for matrices without structure, "" where nothing does."""
+    for matrix, what in ((mass, "mass"), (damping, "damping"), (stiffness, "stiffness")):
+        if not is_symmetric(matrix):
+            return f"the {what} matrix is not symmetric"
+    without = int(np.count_nonzero(mass.diagonal() <= 0.0))
+    if without:
+        return f"{without} freedoms have no mass" if without > 1 else "1 freedom has no mass"
+    return "" if definiteness(mass)[0] == "positive definite" else "the mass matrix is not positive definite"
 
 
 def _structure(bodies: Mapping[str, BuiltBody], links: Links, tie: Sparse | None) -> Structure:
@@ -194,7 +214,7 @@ def _dof_names(bodies: Mapping[str, BuiltBody]) -> list[str]:
 
 def _stress_stiffness(case: Case, view: View) -> Callable[[Array], Sparse] | None:
     """Geometric stiffness on the free freedoms from the stresses of a displacement, None without solids."""
-    solids = [body for body in view.bodies.values() if body.mesh is not None]
+    solids = [body for body in view.bodies.values() if body.mesh is not None and body.material is not None]
     if not solids:
         return None
     rows: dict[str, Rows] = {body.name: view.node_rows(body) for body in solids}

@@ -84,7 +84,7 @@ class PrescribedMotion:
 
 @dataclass(frozen=True)
 class System:
-    """Free freedoms only: mass, damping, stiffness (n, n) csr, symmetric, contacts not included.
+    """Free freedoms only: mass, damping, stiffness (n, n) csr, contacts not included.
 
     contacts: the sliding pairs. loads: name → force vector (n,) at factor one. motion: moving
     supports. points: name → rows (2 or 3, n) of the named points that can be watched. lines: bodies
@@ -93,7 +93,8 @@ class System:
     surfaces: contacts with many slave nodes; dimension 2 or 3; solids: meshed bodies as drawn; cubic: springs beyond
     the linear; initial_velocity (n,) [m/s] and initial_displacement (n,) [m] of bodies that start so; stress_stiffness
     gives the geometric stiffness (n, n) csr that the stresses of a displacement (n,) [m] make, None where no body
-    has any.
+    has any. general: why its matrices, imported ones, are not all symmetric with a positive definite mass, as all
+    others are; "" where they are.
     """
 
     mass: Sparse
@@ -112,6 +113,7 @@ class System:
     initial_velocity: Array | None = None
     initial_displacement: Array | None = None
     stress_stiffness: Callable[[Array], Sparse] | None = None
+    general: str = ""
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness"):
@@ -247,14 +249,17 @@ DENSE_LIFT = 3000
 
 def _answer(block: Sparse, load: Array) -> Array:
     """Least-norm answer of a semidefinite block; large ones are held by faint springs instead."""
+    symmetric = float(np.abs(sp.csr_array(block - block.T).data).max(initial=0.0)) <= 1e-12 * np.abs(block).max()
     if block.shape[0] > DENSE_LIFT:
         faint = sp.diags_array(1e-9 * block.diagonal())
-        factor = factorise(sp.csr_array(block + faint), symmetric=True)
+        factor = factorise(sp.csr_array(block + faint), symmetric=symmetric)
         answer = factor.solve(load)
         for _ in range(3):
             answer = answer + factor.solve(load - block @ answer)
         return answer
     dense = block.toarray()
+    if not symmetric:
+        return np.linalg.lstsq(dense, load, rcond=1e-12)[0]
     try:
         held = sl.cho_factor(dense)
         answer = sl.cho_solve(held, load)

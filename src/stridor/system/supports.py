@@ -42,10 +42,15 @@ def constraints_of(case: Case, bodies: dict[str, BuiltBody]) -> list[Constraint]
         nodes = _held_nodes(body, at, f"{where}.at")
         freedoms: list[int] = []
         velocity: list[float] = []
+        lacking = set() if body.lacking is None else set((body.offset + body.lacking).tolist())
+        moved = 0
         for direction in support.fixed:
             place = body.stride - 1 if direction == "rotation" else _DIRECTIONS[direction]
             speed = float(support.velocity.get(direction, 0.0))
             for freedom in (body.offset + body.stride * nodes + place).tolist():
+                if freedom in lacking:
+                    moved += bool(speed)
+                    continue
                 other, held = taken.setdefault(freedom, (name, speed))
                 if other == name:
                     freedoms.append(freedom)
@@ -57,7 +62,17 @@ def constraints_of(case: Case, bodies: dict[str, BuiltBody]) -> list[Constraint]
                         f"supports.{other}, gets two velocities, {held:g} and {speed:g} m/s; let one of them hold it"
                     )
                     raise CaseError(f"{where}.fixed", support.fixed, accepted)
+        if moved:
+            accepted = (
+                f"cannot be moved: the matrices of {at.body} lack {moved} of its freedoms, held by the program that "
+                "wrote them; write them without that support, or let the material slide (sliding)"
+            )
+            raise CaseError(f"{where}.velocity", dict(support.velocity), accepted)
         found.append(Constraint(name, tuple(freedoms), tuple(velocity)))
+    for name, body in bodies.items():
+        if body.lacking is not None and len(body.lacking):
+            freedoms = (body.offset + body.lacking).tolist()
+            found.append(Constraint(f"bodies.{name}", tuple(freedoms), (0.0,) * len(freedoms)))
     return found
 
 

@@ -69,7 +69,10 @@ class View:
 
 
 def nearest_node(body: BuiltBody, at: PointRef) -> int:
-    """The node nearest to a point of a solid."""
+    """The node nearest to a point of a solid, or that of the number."""
+    if at.node is not None:
+        assert body.numbers is not None, "only nodes of other programs are called by their numbers"
+        return int(np.flatnonzero(body.numbers == at.node)[0])
     assert at.coordinates is not None, "points of solids have coordinates"
     return int(np.argmin(np.linalg.norm(body.points - np.array(at.coordinates), axis=1)))
 

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         spectrum_plot,
     )
     from .report import write_report
+    from .sensitivity_plots import countermeasure_bars, damping_map, sensitivity_bars
 
 __all__ = [
     "BodyModes",
@@ -48,7 +49,9 @@ __all__ = [
     "contact_history",
     "contact_map",
     "contact_snapshot",
+    "countermeasure_bars",
     "damping_branches",
+    "damping_map",
     "energy_plot",
     "frequency_branches",
     "friction_curve",
@@ -62,6 +65,7 @@ __all__ = [
     "phase_portrait",
     "plots",
     "root_locus",
+    "sensitivity_bars",
     "shapes_side_by_side",
     "solid_mode_shape",
     "spectrogram_plot",
@@ -75,6 +79,9 @@ _HOME = {
     "FrictionCurve": "inputs",
     "NamedShape": "inputs",
     "ReportInputs": "inputs",
+    "countermeasure_bars": "sensitivity_plots",
+    "damping_map": "sensitivity_plots",
+    "sensitivity_bars": "sensitivity_plots",
     "write_report": "report",
 }
 

@@ -14,6 +14,7 @@ from ..case.bodies import (
     BlockMesh,
     DiscMesh,
     MassBody,
+    MatrixBody,
     ObstacleBody,
     PadMesh,
     RectangleMesh,
@@ -34,6 +35,9 @@ def body_words(case: Case, name: str, body: AnyBody) -> str:
         source = f"the mesh file {Path(body.file).name}" if body.file else f"a {body.mesh.shape}" if body.mesh else ""
         made = "" if body.material is None else f", {_material_words(case, body.material)}"
         return f"{name}: a solid ({body.model}), {source}{made}, {body.mass} mass{_sliding_words(body.sliding)}."
+    if isinstance(body, MatrixBody):
+        files = ", ".join(dict.fromkeys(Path(term.file).name for term in body.terms))
+        return f"{name}: matrices of another program ({files}){_sliding_words(body.sliding)}."
     x, y = body.direction
     return (
         f"{name}: a beam of {_material_words(case, body.material)}, {1e3 * body.length_m:g} × {1e3 * body.width:g} × "

@@ -19,9 +19,13 @@ class Indefinite(Exception):
 
 
 class Basis:
-    """V (n, r), orthonormal in the symmetric positive definite ``metric`` (n, n), and VᵀA_jV (t, r, r) of all terms."""
+    """V (n, r), orthonormal in the symmetric positive definite ``metric`` (n, n), and VᵀA_jV (t, r, r) of all terms.
 
-    def __init__(self, problem: ParametricProblem, metric: Sparse) -> None:
+    embedding (s, n) applied to A_jV and A_jᵀV gives their sketches (t, s, r): residuals are known without being
+    formed.
+    """
+
+    def __init__(self, problem: ParametricProblem, metric: Sparse, embedding: Sparse) -> None:
         self.problem, self.metric = problem, metric
         # Room for more columns than there are: growing by copies costs as much as multiplying.
         self._room = [np.zeros((problem.size, START), order="F") for _ in range(2)]
@@ -29,6 +33,12 @@ class Basis:
         self.projected = np.zeros((len(problem.terms), 0, 0))
         # Terms of few freedoms, as contact has them, are multiplied on those alone.
         self._parts: list[tuple[IntArray, IntArray, Sparse]] = [_support(t.matrix) for t in problem.terms]
+        by_column = sp.csc_array(embedding)
+        self._embeddings = [
+            tuple(sp.csr_array(by_column[:, place]) for place in (rows, columns)) for rows, columns, _ in self._parts
+        ]
+        empty = np.zeros((len(problem.terms), embedding.shape[0], 0))
+        self.right_sketch, self.left_sketch = empty, empty
 
     @property
     def count(self) -> int:
@@ -84,20 +94,24 @@ class Basis:
         self._count = r
         grown = np.zeros((len(self._parts), r, r))
         grown[:, : r - count, : r - count] = self.projected
+        right_sketch: list[Array] = []
+        left_sketch: list[Array] = []
         for j, ((rows, columns, part), term) in enumerate(zip(self._parts, self.problem.terms, strict=True)):
             whole = len(rows) == len(new)
             product = part @ (new if whole else new[columns])
             right = self.vectors.T @ product if whole else self.vectors[rows].T @ product
             grown[j, :, r - count :] = right
+            right_sketch.append(self._embeddings[j][0] @ product)
             if term.symmetric:
                 grown[j, r - count :, : r - count] = right[: r - count].T
+                left_sketch.append(right_sketch[-1])
             else:
-                grown[j, r - count :, : r - count] = (part.T @ new[rows]).T @ old[columns]
+                product = part.T @ new[rows]
+                grown[j, r - count :, : r - count] = product.T @ old[columns]
+                left_sketch.append(self._embeddings[j][1] @ product)
         self.projected = grown
-
-    def turned(self, by: Array) -> tuple[Array, Array]:
-        """Vectors and projected terms of the combinations ``by`` (r, k)."""
-        return self.vectors @ by, np.einsum("ri,jrs,sk->jik", by, self.projected, by, optimize=True)
+        self.right_sketch = np.concatenate([self.right_sketch, np.stack(right_sketch)], axis=2)
+        self.left_sketch = np.concatenate([self.left_sketch, np.stack(left_sketch)], axis=2)
 
 
 def _support(matrix: Sparse) -> tuple[IntArray, IntArray, Sparse]:

@@ -24,12 +24,49 @@ from .problem import Parameter, ParametricProblem, Term, constant
 FRICTION, STIFFNESS = "mu", "contact_stiffness"
 
 
-def _stiffness(values: Mapping[str, float]) -> float:
-    return values[STIFFNESS]
+def contact_terms(
+    system: System, *, mu: float | None, touching_at: float | None = None, options: Options | None = None
+) -> tuple[Term, ...]:
+    """Stiffness terms of the contacts with factors of "mu" and "contact_stiffness" where these are among the
+    parameters, else of ``mu`` (None: the laws' own, at which the touching nodes are found too) and 1.
+
+    touching_at: μ of the steady sliding that says which nodes touch. Raises CaseError for rigid contact, AnalysisError
+    where there is no steady sliding.
+    """
+    problem = problem_of(system, touching_at, options or Options(), damped=True)
+    if not problem.nodes:
+        return ()
+    if not np.all(problem.compliance > 0):
+        raise CaseError("contacts", None, "rigid contact has no stiffness to vary; give every contact a stiffness")
+    if problem.extras is not None:
+        raise CaseError(
+            "modal",
+            None,
+            "friction damping, prestress and friction laws with a slope are not part of reduced models yet; switch "
+            "friction_damping and prestress off and take Coulomb friction",
+        )
+    own = _own(system) if mu is None else mu
+
+    def stiffness(values: Mapping[str, float]) -> float:
+        return values.get(STIFFNESS, 1.0)
+
+    def friction(values: Mapping[str, float]) -> float:
+        return values.get(FRICTION, own) * values.get(STIFFNESS, 1.0)
+
+    rows = sp.csr_array(sp.diags_array(1.0 / problem.compliance) @ problem.normal)
+    return (
+        Term(sp.csr_array(problem.normal.T @ rows), "stiffness", stiffness, symmetric=True),
+        Term(sp.csr_array(problem.slide.T @ rows), "stiffness", friction),
+    )
 
 
-def _friction(values: Mapping[str, float]) -> float:
-    return values[FRICTION] * values[STIFFNESS]
+def _own(system: System) -> float:
+    """The friction coefficient of the case's laws. Raises CaseError where they differ."""
+    nodes = system.contact_nodes()
+    found = {round(float(law.sliding(1.0)), 15) for law in nodes.laws}
+    if len(found) > 1:
+        raise CaseError("mu", None, "the contacts have different friction coefficients; give one for all")
+    return found.pop() if found else 0.0
 
 
 def contact_parameters(
@@ -46,20 +83,27 @@ def contact_parameters(
     contact, which has no stiffness to vary, and for ranges that are none; AnalysisError where there is no steady
     sliding.
     """
-    mu = Parameter(FRICTION, *(float(v) for v in friction), value=float(np.mean(friction)))
-    low, high = (float(v) for v in stiffness)
-    if not low > 0:
-        raise CaseError(f"box.{STIFFNESS}", stiffness, "factors of the contact stiffness are > 0")
-    factor = Parameter(STIFFNESS, low, high, value=1.0 if low <= 1.0 <= high else float(np.sqrt(low * high)))
-    problem = problem_of(system, touching_at, Options(), damped=True)
-    if problem.nodes and not np.all(problem.compliance > 0):
-        raise CaseError("contacts", None, "rigid contact has no stiffness to vary; give every contact a stiffness")
-    rows = sp.csr_array(sp.diags_array(1.0 / problem.compliance) @ problem.normal)
+    mu, factor = friction_range(friction), stiffness_range(stiffness)
     terms = [
-        Term(problem.mass, "mass", constant, symmetric=True),
-        Term(problem.damping, "damping", constant, symmetric=True),
-        Term(problem.stiffness, "stiffness", constant, symmetric=True),
-        Term(sp.csr_array(problem.normal.T @ rows), "stiffness", _stiffness, symmetric=True),
-        Term(sp.csr_array(problem.slide.T @ rows), "stiffness", _friction),
+        Term(system.mass, "mass", constant, symmetric=True),
+        Term(system.damping, "damping", constant, symmetric=True),
+        Term(system.stiffness, "stiffness", constant, symmetric=True),
+        *contact_terms(system, mu=None, touching_at=touching_at),
     ]
     return ParametricProblem(tuple(t for t in terms if t.matrix.nnz), (mu, factor))
+
+
+def friction_range(between: tuple[float, float]) -> Parameter:
+    """μ as a parameter. Raises CaseError for negative ones."""
+    low, high = (float(v) for v in between)
+    if not low >= 0:
+        raise CaseError(f"box.{FRICTION}", between, "friction coefficients are ≥ 0")
+    return Parameter(FRICTION, low, high, value=(low + high) / 2)
+
+
+def stiffness_range(between: tuple[float, float]) -> Parameter:
+    """The factor of all contact stiffnesses as a parameter. Raises CaseError where it is not positive."""
+    low, high = (float(v) for v in between)
+    if not low > 0:
+        raise CaseError(f"box.{STIFFNESS}", between, "factors of the contact stiffness are > 0")
+    return Parameter(STIFFNESS, low, high, value=1.0 if low <= 1.0 <= high else float(np.sqrt(low * high)))

@@ -79,6 +79,7 @@ def reduce(
     scale = 1.0 / np.sqrt(np.abs(operator.diagonal()))
     default = tuple(5 if len(problem.parameters) == 1 else 3 for _ in problem.parameters)
     points = problem.corners(counts or default)
+    embedding = _embedding(problem.size, scale)
     with factorise(operator, symmetric=True, solver=solver) as factor:
         work.lap("factorisation")
         start = _krylov(factor, mass, stiffness, frequency, work)
@@ -86,7 +87,7 @@ def reduce(
         # Lengths are energies; where friction in the symmetric part makes some negative, the diagonal's.
         metrics = [operator, sp.csr_array(sp.diags_array(scale**-2))]
         for metric in metrics[1:] if factor.inertia else metrics:
-            basis = Basis(problem, metric)
+            basis = Basis(problem, metric, embedding)
             try:
                 basis.add(start, 1e-6)
                 _first_answers(basis, factor, frequency, work)
@@ -98,7 +99,7 @@ def reduce(
                 continue
         else:
             raise AnalysisError("the mass or the stiffness has no positive diagonal to measure by")
-    return _cut(basis, points, scale, frequency, bound, work)
+    return _cut(basis, points, frequency, bound, work)
 
 
 def _symmetric_parts(problem: ParametricProblem) -> tuple[Sparse, Sparse]:
@@ -203,17 +204,21 @@ def _enrich(
         factors = problem.factors(points[place])
         matrices = assembled(basis.projected, factors, problem.powers)
         found = dense_modes(*matrices, frequency, MARGIN)
-        rests: list[Any] = []
-        for left, vectors in ((False, found.right), (True, found.left)):
-            rest = residual(problem, factors, found.values, expanded(basis.vectors, vectors), left=left)
-            rests.append(rest * scale[:, None])
-        right_size, left_size = (np.linalg.norm(rest, axis=0) for rest in rests)
-        error = product_over_slope(matrices, found, right_size, left_size)
+        lam, powers = found.values, problem.powers
+        sizes = [
+            sketched(sketch, factors, powers, lam, vectors)
+            for sketch, vectors in ((basis.right_sketch, found.right), (basis.left_sketch, found.left))
+        ]
+        error = product_over_slope(matrices, found, *sizes)
         if not np.any(error > PASSED * bound):
             continue
         # Modes far below the bound leave nothing that another point will not ask for.
         chosen = error > 0.01 * bound
-        rest = np.hstack([real_and_imaginary(r[:, chosen]) for r in rests])
+        rests: list[Any] = []
+        for left, vectors in ((False, found.right), (True, found.left)):
+            x = expanded(basis.vectors, vectors[:, chosen])
+            rests.append(residual(problem, factors, lam[chosen], x, left=left) * scale[:, None])
+        rest = np.hstack([real_and_imaginary(r) for r in rests])
         squares, turn = sl.eigh(rest.T @ rest)
         keep = squares > max(WEAKEST**2 * squares[-1], 1e-300)
         force = (rest @ (turn[:, keep] / np.sqrt(squares[keep]))) / scale[:, None]
@@ -237,7 +242,7 @@ def _outer_first(points: list[dict[str, float]]) -> list[int]:
 
 
 def _cut(
-    basis: Basis, points: list[dict[str, float]], scale: Array, frequency: float, bound: float, work: _Work
+    basis: Basis, points: list[dict[str, float]], frequency: float, bound: float, work: _Work
 ) -> ReducedModel:
     """The basis cut down as far as eigenvalues at points between those it was made for allow."""
     problem = basis.problem
@@ -266,7 +271,7 @@ def _cut(
         cut /= 1.4
     vectors = basis.vectors @ turn
     work.lap("cut")
-    sketches = _sketches(problem, vectors, scale)
+    sketches = basis.right_sketch @ turn, basis.left_sketch @ turn
     constant = _constant(problem, projected, sketches, between, exact, frequency)
     work.lap("sketches")
     return ReducedModel(
@@ -282,19 +287,13 @@ def _between(problem: ParametricProblem, points: list[dict[str, float]]) -> list
     return [problem.point([float(v) for v in low + (high - low) * rng.random(len(low))]) for _ in range(count)]
 
 
-def _sketches(problem: ParametricProblem, vectors: Array, scale: Array) -> tuple[Array, Array]:
-    """Θ D^{-1/2} A_j V and Θ D^{-1/2} A_jᵀ V (t, s, r) with a sparse sign embedding Θ (s, n)."""
-    n, rows = problem.size, SKETCH
+def _embedding(size: int, scale: Array) -> Sparse:
+    """Θ D^{-1/2} (s, n) with a sparse sign embedding Θ: NONZEROS entries ±1/√NONZEROS in each column."""
     rng = np.random.default_rng(SEED)
-    place: IntArray = rng.integers(0, rows, size=(n, NONZEROS))
-    sign = rng.choice([-1.0, 1.0], size=(n, NONZEROS)) / np.sqrt(NONZEROS)
-    column = np.repeat(np.arange(n), NONZEROS)
-    embedding = sp.csr_array(((sign * scale[:, None]).ravel(), (place.ravel(), column)), shape=(rows, n))
-    right = np.stack([embedding @ (t.matrix @ vectors) for t in problem.terms])
-    left = np.stack(
-        [r if t.symmetric else embedding @ (t.matrix.T @ vectors) for t, r in zip(problem.terms, right, strict=True)]
-    )
-    return right, left
+    place: IntArray = rng.integers(0, SKETCH, size=(size, NONZEROS))
+    sign = rng.choice([-1.0, 1.0], size=(size, NONZEROS)) / np.sqrt(NONZEROS)
+    column = np.repeat(np.arange(size), NONZEROS)
+    return sp.csr_array(((sign * scale[:, None]).ravel(), (place.ravel(), column)), shape=(SKETCH, size))
 
 
 def _constant(

@@ -1,0 +1,360 @@
+"""What can be known of M, C and K before anything is computed with them: and what looks wrong.
+
+Definiteness, the share that is not symmetric, how many friction couplings there are, bounds of frequencies, and a guess
+of the units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+import scipy.sparse.linalg as sl
+from scipy.sparse.csgraph import connected_components, structural_rank
+
+from ..direct import factorise
+from ..direct.backends import choose
+from ..errors import AnalysisError, CaseError
+from ..typing import Array, BoolArray, IntArray, Sparse
+from .abaqus import HELD
+from .model import Labels, StoredMatrix
+
+Definiteness = Literal["zero", "positive definite", "positive semidefinite", "indefinite", "not known"]
+
+# Differences of mirrored entries below this, relative to the smaller of their rows' largest entries, are rounding.
+ROUNDING = 1e-12
+DENSE = 2000
+_SHIFT = 1e-10
+# Young's modulus times speed of sound of steel, in Pa·m/s and in MPa·mm/s: what K ω of an element is about.
+_STEEL_SI, _STEEL_MM = 1e15, 1e12
+_NAMES = {"mass": "M", "damping": "C", "stiffness": "K"}
+
+
+@dataclass(frozen=True)
+class MatrixReport:
+    """What was found; counts leave out the ``held`` freedoms, which Abaqus marks with 1e36 in the stiffness.
+
+    size: freedoms. entries, defect: by role "mass", "damping", "stiffness": number of entries other than 0, and
+    ‖A − Aᵀ‖/‖A‖ (Frobenius), 0 for a matrix that is 0. mass, damping: definiteness of the symmetric part; _negative:
+    number of its negative eigenvalues, None if not known; massless: freedoms without an entry in the mass.
+    coupling: rank of K − Kᵀ, at most that if not coupling_exact; coupled: rows that it has entries in. multipliers:
+    freedoms without mass and without stiffness of their own, but coupled. loose: freedoms with neither.
+    frequencies [Hz]: lowest and highest of single freedoms with all others held, None where none has mass and
+    stiffness; for symmetric matrices without massless freedoms the model's own reach further down and up. units: a
+    guess and its reason. free: directions 1 to 3 in which K lets the whole model move.
+    """
+
+    size: int
+    held: int
+    entries: dict[str, int]
+    defect: dict[str, float]
+    mass: Definiteness
+    mass_negative: int | None
+    massless: int
+    damping: Definiteness
+    damping_negative: int | None
+    coupling: int
+    coupling_exact: bool
+    coupled: int
+    multipliers: int
+    loose: int
+    frequencies: tuple[float, float] | None
+    units: str | None
+    free: tuple[int, ...]
+    warnings: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """The report for a reader, a statement a line; warnings last."""
+        held = f", {self.held} of them held (1e36 in K)" if self.held else ""
+        found = [f"{self.size} freedoms{held}"]
+        for role, count in self.entries.items():
+            defect = self.defect[role]
+            kind = "symmetric" if defect < ROUNDING else f"‖A − Aᵀ‖/‖A‖ = {defect:.1e}"
+            found.append(f"{_NAMES[role]} ({role}): " + (f"{count} entries, {kind}" if count else "zero"))
+        without = f", {self.massless} freedoms without mass" if self.massless else ""
+        found.append(f"M is {_shown(self.mass, self.mass_negative)}{without}")
+        if self.damping != "zero":
+            found.append(f"the symmetric part of C is {_shown(self.damping, self.damping_negative)}")
+        if self.coupling:
+            most = "" if self.coupling_exact else "at most "
+            found.append(f"K − Kᵀ has rank {most}{self.coupling}, in {self.coupled} rows")
+        if self.frequencies:
+            low, high = self.frequencies
+            found.append(f"single freedoms, all others held, vibrate at {low:.4g} to {high:.4g} Hz")
+        if self.units:
+            found.append(f"units, by guess: {self.units}")
+        return found + [f"warning: {w}" for w in self.warnings]
+
+
+def report(
+    mass: Sparse,
+    damping: Sparse | None,
+    stiffness: Sparse,
+    *,
+    labels: Labels | None = None,
+    stored: Sequence[StoredMatrix] = (),
+) -> MatrixReport:
+    """Looks through mass, damping and stiffness, each (n, n); no damping is zero damping.
+
+    labels: of the n freedoms. stored: the files the matrices are from, for what these say of themselves. Raises
+    CaseError at "matrices.ROLE" for a matrix that is not square, of another size, or has entries that are not finite.
+    """
+    size = int(stiffness.shape[0])
+    parts = {"mass": mass, "damping": damping, "stiffness": stiffness}
+    whole = {
+        role: sp.csr_array((size, size)) if given is None else sp.csr_array(given, dtype=np.float64, copy=True)
+        for role, given in parts.items()
+    }
+    for role, matrix in whole.items():
+        if matrix.shape != (size, size):
+            raise CaseError(f"matrices.{role}", None, f"has the shape {matrix.shape}; K has {(size, size)}")
+        bad = int(np.sum(~np.isfinite(matrix.data)))
+        if bad:
+            raise CaseError(f"matrices.{role}", None, f"{bad} entries are no finite numbers; all must be")
+        matrix.sum_duplicates()
+        matrix.eliminate_zeros()
+    held = held_freedoms(whole["stiffness"])
+    keep = np.setdiff1d(np.arange(size), held)
+    if len(held):
+        whole = {role: sp.csr_array(a[keep][:, keep]) for role, a in whole.items()}
+    m, c, k = whole["mass"], whole["damping"], whole["stiffness"]
+    defect = {role: _defect(a) for role, a in whole.items()}
+    empty = {role: _empty(a) for role, a in whole.items()}
+    mass_kind, mass_negative = definiteness(m)
+    damping_kind, damping_negative = definiteness(c)
+    if mass_kind == "positive definite" and empty["mass"].any():
+        mass_kind = "positive semidefinite"
+    rank, exact, coupled = _coupling(k)
+    own_m, own_k = m.diagonal(), k.diagonal()
+    multipliers = int(np.sum(empty["mass"] & (own_k == 0) & ~empty["stiffness"]))
+    frequencies = _frequencies(own_m, own_k)
+    kept = None if labels is None else Labels(np.asarray(labels.node)[keep], np.asarray(labels.direction)[keep])
+    found = MatrixReport(
+        size=size,
+        held=len(held),
+        entries={role: int(a.nnz) for role, a in whole.items()},
+        defect=defect,
+        mass=mass_kind,
+        mass_negative=mass_negative,
+        massless=int(empty["mass"].sum()),
+        damping=damping_kind,
+        damping_negative=damping_negative,
+        coupling=rank,
+        coupling_exact=exact,
+        coupled=coupled,
+        multipliers=multipliers,
+        loose=int(np.sum(empty["mass"] & empty["stiffness"])),
+        frequencies=frequencies,
+        units=_units(own_m, own_k, kept),
+        free=_free(k, kept),
+        warnings=(),
+    )
+    internal = 0 if kept is None else int(np.sum(kept.node < 0))
+    return replace(found, warnings=tuple(_warnings(found, internal, stored, c)))
+
+
+def held_freedoms(stiffness: Sparse) -> IntArray:
+    """Freedoms with 1e36 on the diagonal of K, as Abaqus writes what *BOUNDARY holds: leave them out everywhere."""
+    return np.flatnonzero(stiffness.diagonal() >= 0.999 * HELD)
+
+
+def definiteness(matrix: Sparse) -> tuple[Definiteness, int | None]:
+    """Of the symmetric part of A (n, n), without its empty rows; and how many eigenvalues are negative, if known.
+
+    Scaled to a diagonal of 1. Beyond a size of 2000 Lanczos looks for the lowest eigenvalue, which it finds fast for
+    masses; otherwise the inertia of a factorisation tells, or all eigenvalues where the solver does not tell that.
+    """
+    filled = np.flatnonzero(~_empty(matrix))
+    if not len(filled):
+        return "zero", 0
+    part = sp.csr_array(matrix[filled][:, filled])
+    part = sp.csr_array(0.5 * (part + part.T))
+    part.eliminate_zeros()
+    diagonal = part.diagonal()
+    if part.nnz == np.count_nonzero(diagonal):
+        negative = int(np.sum(diagonal < 0))
+        kind = "indefinite" if negative else "positive definite" if np.all(diagonal > 0) else "positive semidefinite"
+        return ("zero" if not part.nnz else kind), negative
+    # Rows of a pure antisymmetric part have gone; a diagonal of 0 below others makes it indefinite, too.
+    filled = np.flatnonzero(~_empty(part))
+    part = sp.csr_array(part[filled][:, filled])
+    diagonal = part.diagonal()
+    sizes = np.where(diagonal != 0, np.abs(diagonal), abs(part).max(axis=1).toarray().ravel())
+    scale = sp.diags_array(1 / np.sqrt(sizes))
+    part = sp.csr_array(scale @ part @ scale)
+    part = sp.csr_array(0.5 * (part + part.T))
+    lowest = _by_lowest(part) if part.shape[0] > DENSE else "not known"
+    if lowest == "positive definite" or _negative(part, -_SHIFT) == 0:
+        return "positive definite", 0
+    # Zero eigenvalues are on the other side now.
+    negative = _negative(part, _SHIFT)
+    if negative is None:
+        return ("indefinite" if np.any(diagonal <= 0) else lowest), None
+    return ("indefinite" if negative else "positive semidefinite"), negative
+
+
+def _negative(part: Sparse, shift: float) -> int | None:
+    """Number of eigenvalues of A + shift 1 below 0, None where nobody tells."""
+    shifted = sp.csr_array(part + shift * sp.eye_array(part.shape[0]))
+    told = None
+    # SuperLU is slow on what is large, and does not tell either.
+    if choose(None) != "superlu":
+        with suppress(AnalysisError), factorise(shifted, symmetric=True) as factor:
+            told = factor.inertia
+    if told is None and part.shape[0] <= DENSE:
+        told = int(np.sum(la.eigvalsh(shifted.toarray()) < 0))
+    return told
+
+
+def _by_lowest(part: Sparse) -> Definiteness:
+    begin = np.random.default_rng(3).standard_normal(part.shape[0])
+    try:
+        lowest = float(sl.eigsh(part, k=1, which="SA", tol=1e-3, maxiter=300, v0=begin, return_eigenvectors=False)[0])
+    except sl.ArpackError:
+        return "not known"
+    if abs(lowest) < 1e-6:
+        return "not known"
+    return "positive definite" if lowest > 0 else "indefinite"
+
+
+def _empty(matrix: Sparse) -> BoolArray:
+    """Freedoms without an entry in their row and column."""
+    rows = np.diff(matrix.indptr) > 0
+    columns = np.zeros(matrix.shape[0], dtype=bool)
+    columns[matrix.indices] = True
+    return ~(rows | columns)
+
+
+def _defect(matrix: Sparse) -> float:
+    largest = float(np.max(np.abs(matrix.data), initial=0.0))
+    if largest == 0.0:
+        return 0.0
+    skew = matrix - matrix.T
+    return float(np.linalg.norm(skew.data / largest) / np.linalg.norm(matrix.data / largest))
+
+
+def _coupling(stiffness: Sparse) -> tuple[int, bool, int]:
+    """Rank of K − Kᵀ without what is rounding, whether that is exact, and the number of its rows with entries."""
+    skew = sp.coo_array(stiffness - stiffness.T)
+    sizes = abs(stiffness)
+    largest: Array = np.maximum(sizes.max(axis=1).toarray().ravel(), sizes.max(axis=0).toarray().ravel())
+    true = np.abs(skew.data) > ROUNDING * np.minimum(largest[skew.row], largest[skew.col])
+    rows, columns, values = skew.row[true], skew.col[true], skew.data[true]
+    if not len(values):
+        return 0, True, 0
+    held = np.unique(rows)
+    small = sp.csr_array(
+        (values, (np.searchsorted(held, rows), np.searchsorted(held, columns))), shape=(len(held), len(held))
+    )
+    count, part_of = connected_components(small, directed=False)
+    members = np.bincount(part_of, minlength=count)
+    order = np.argsort(part_of, kind="stable")
+    small = sp.csr_array(small[order][:, order])
+    rank, exact, start, work = 0, True, 0, 0.0
+    for length in members:
+        block = small[start : start + length, start : start + length]
+        start += int(length)
+        work += float(length) ** 3
+        if work <= 1.1 * DENSE**3:
+            singular = la.svdvals(block.toarray())
+            rank += int(np.sum(singular > len(singular) * np.finfo(float).eps * singular[0]))
+        else:
+            exact = False
+            rank += int(structural_rank(sp.csr_matrix(block)))
+    return rank, exact, len(held)
+
+
+def _frequencies(own_m: Array, own_k: Array) -> tuple[float, float] | None:
+    """√(K/M) of single freedoms [Hz], the lowest and the highest: Rayleigh's quotients of their motions."""
+    good = (own_m > 0) & (own_k > 0)
+    if not good.any():
+        return None
+    quotient = np.sqrt(own_k[good] / own_m[good]) / (2 * np.pi)
+    return float(quotient.min()), float(quotient.max())
+
+
+def _units(own_m: Array, own_k: Array, labels: Labels | None) -> str | None:
+    """For elements of steel of any size K ω is about E times the speed of sound, which tells m from mm."""
+    good = (own_m > 0) & (own_k > 0)
+    if labels is not None:
+        good &= (labels.node > 0) & (labels.direction <= 3)
+    if not good.any():
+        return None
+    k = float(np.median(own_k[good]))
+    omega = float(np.median(np.sqrt(own_k[good] / own_m[good])))
+    decades = float(np.log10(k * omega))
+    reason = f"typical entries {k:.1e} in K, {k / omega**2:.1e} in M, √(K/M) = {omega / (2 * np.pi):.3g} Hz"
+    for name, steel in (("SI (kg, m, s, N)", _STEEL_SI), ("tonne, mm, s, N, as usual in Abaqus", _STEEL_MM)):
+        if abs(decades - np.log10(steel)) <= 1.5:
+            return f"{name}, if it is steel or the like; {reason}"
+    return f"not clear; {reason}"
+
+
+def _free(stiffness: Sparse, labels: Labels | None) -> tuple[int, ...]:
+    """Directions in which the whole model can be moved without force."""
+    if labels is None:
+        return ()
+    sizes = abs(stiffness)
+    found: list[int] = []
+    for direction in (1, 2, 3):
+        motion = ((labels.direction == direction) & (labels.node > 0)).astype(float)
+        terms = float(np.linalg.norm(sizes @ motion))
+        if terms > 0 and float(np.linalg.norm(stiffness @ motion)) < 1e-8 * terms:
+            found.append(direction)
+    return tuple(found)
+
+
+def _shown(kind: str, negative: int | None) -> str:
+    return f"{kind} ({negative} negative eigenvalues)" if kind == "indefinite" and negative else kind
+
+
+def _warnings(found: MatrixReport, internal: int, stored: Sequence[StoredMatrix], damping: Sparse) -> list[str]:
+    said: list[str] = []
+    if found.held:
+        said.append(f"{found.held} freedoms have 1e36 on the diagonal of K (Abaqus' supports); leave them out")
+    if found.loose:
+        said.append(f"{found.loose} freedoms have neither mass nor stiffness; K has no inverse")
+    if found.free:
+        axes = ", ".join("xyz"[d - 1] for d in found.free)
+        said.append(f"nothing in K resists moving the whole model along {axes}; are supports missing?")
+    if found.mass == "zero":
+        said.append("the mass is zero")
+    elif found.mass == "indefinite":
+        said.append("M is indefinite, and energies can be negative; is it the mass?")
+    if found.defect["mass"] > ROUNDING:
+        said.append(f"M is not symmetric ({found.defect['mass']:.1e}); is it the mass?")
+    said += _friction(found, internal, stored)
+    if found.damping == "indefinite":
+        count = f" ({found.damping_negative} negative eigenvalues)" if found.damping_negative else ""
+        said.append(f"the symmetric part of C is indefinite{count}: it drives some motions, as falling friction does")
+    if found.defect["damping"] > ROUNDING:
+        skew = float(np.linalg.norm(0.5 * (damping - damping.T).data))
+        share = skew / float(np.linalg.norm(damping.data))
+        said.append(f"C has a gyroscopic (antisymmetric) part, {share:.0%} of its norm; right for rotating bodies only")
+    return said
+
+
+def _friction(found: MatrixReport, internal: int, stored: Sequence[StoredMatrix]) -> list[str]:
+    """Where friction was to be expected in K and is not there."""
+    if found.coupling:
+        return []
+    of_k = [s for s in stored if s.role == "stiffness"]
+    mend = "in Abaqus, ask for *STEP, UNSYMM=YES and a sliding contact with friction before *MATRIX GENERATE"
+    if any(s.source.lower().endswith(".sti") for s in of_k):
+        mend = "CalculiX stores one half only, whatever friction does; take the matrix from another program"
+    if any(s.form == "symmetric" for s in of_k):
+        return [f"friction terms seem lost: the file holds K as one half of a symmetric matrix; {mend}"]
+    if any(s.form == "general" for s in of_k):
+        return [f"friction terms seem lost: K is stored as not symmetric, yet is, up to rounding; {mend}"]
+    if found.multipliers:
+        signs = f"{found.multipliers} freedoms look like multipliers of a contact"
+        return [f"friction terms seem lost: {signs}, yet K is symmetric; {mend}"]
+    if internal:
+        signs = f"{internal} freedoms are internal ones, as contact makes them"
+        return [f"friction terms seem lost: {signs}, yet K is symmetric; {mend}"]
+    return ["K is symmetric: without friction terms in it, no modes can couple to flutter"]

@@ -1,0 +1,410 @@
+"""How the complex modes of a case answer to its numbers: dλ/dp, and where such derivatives stop to mean anything."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from ..case import Case
+from ..case.overrides import split_path
+from ..errors import AnalysisError, CaseError
+from ..modal.assembled import Options
+from ..modal.complex_modes import ComplexModes, complex_modes, undamped
+from ..modal.derivatives import Mode, Terms, by_compliance, by_friction, hold, rate_of, solve_mode, terms_of
+from ..system import System, build_system
+from ..typing import Array, ComplexArray, IntArray
+from .analyses import own_friction
+from .provenance import provenance
+
+NEAR = 0.05  # relative change of a number within which an exceptional point is told of
+BENT = 2.0  # condition number from which two close modes are on their way to an exceptional point
+ILL = 30.0  # condition number that is worth a sentence by itself
+REPEATED = 1e-9  # of |λ|: eigenvalues nearer to each other are one
+
+Choice = Literal["unstable", "all"] | Sequence[int]
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """dλ/dp of b modes at one μ over k numbers of the case.
+
+    parameters (k,) paths, values (k,) at the case. branch (b,) as `complex_modes` numbers them; eigenvalues (b,) [1/s];
+    derivative (k, b) [1/s per unit of the number]. condition (b,): 1 for a mode of a symmetric system, beyond all
+    bounds at an exceptional point. nearest (b,) [1/s]: distance to the nearest other eigenvalue of the band.
+    exceptional (k, b): complex value of the number at which that neighbour is met, extrapolated; NaN where none is in
+    sight. |exceptional − value| is how far a first-order prediction can reach at all. residual (b,): componentwise
+    backward error of right and left pairs. warnings: sentences, where derivatives must not be trusted.
+    """
+
+    mu: float
+    parameters: tuple[str, ...]
+    values: Array
+    branch: IntArray
+    eigenvalues: ComplexArray
+    derivative: ComplexArray
+    condition: Array
+    nearest: Array
+    exceptional: ComplexArray
+    residual: Array
+    damped: bool
+    warnings: tuple[str, ...] = ()
+    open_contacts: tuple[str, ...] = ()
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def frequency_hz(self) -> Array:
+        """Im λ / 2π (b,)."""
+        return self.eigenvalues.imag / (2 * np.pi)
+
+    @property
+    def growth_rate(self) -> Array:
+        """Re λ (b,) [1/s], positive when unstable."""
+        return self.eigenvalues.real
+
+    @property
+    def growth_per_percent(self) -> Array:
+        """Change of the growth rate (k, b) [1/s] per per cent of the number; NaN where the number is zero."""
+        return self._percent[:, None] * self.derivative.real
+
+    @property
+    def frequency_per_percent_hz(self) -> Array:
+        """Change of the frequency (k, b) [Hz] per per cent of the number; NaN where the number is zero."""
+        return self._percent[:, None] * self.derivative.imag / (2 * np.pi)
+
+    @property
+    def exceptional_distance(self) -> Array:
+        """|exceptional − value| / |value| (k, b), inf where none is in sight."""
+        size = np.abs(self.values)[:, None]
+        away = np.abs(self.exceptional - self.values[:, None])
+        found = np.divide(away, size, out=np.full(away.shape, np.inf), where=size > 0)
+        return np.where(np.isnan(found), np.inf, found)
+
+    @property
+    def _percent(self) -> Array:
+        return np.where(self.values == 0.0, np.nan, 0.01 * np.abs(self.values))
+
+    def of(self, parameter: str) -> ComplexArray:
+        """dλ/dp (b,) of one number."""
+        return self.derivative[self.parameters.index(parameter)]
+
+    def to_json(self) -> dict[str, Any]:
+        """The document that `stridor sensitivities --json` prints; None stands for what does not exist."""
+        modes = [
+            {
+                "branch": int(self.branch[b]),
+                "frequency_hz": float(self.frequency_hz[b]),
+                "growth_rate": float(self.growth_rate[b]),
+                "condition": _finite(self.condition[b]),
+                "nearest": _finite(self.nearest[b]),
+                "residual": float(self.residual[b]),
+                "parameters": [
+                    {
+                        "parameter": name,
+                        "value": float(self.values[k]),
+                        "derivative": [float(self.derivative[k, b].real), float(self.derivative[k, b].imag)],
+                        "growth_per_percent": _finite(self.growth_per_percent[k, b]),
+                        "frequency_per_percent_hz": _finite(self.frequency_per_percent_hz[k, b]),
+                        "exceptional": _complex(self.exceptional[k, b]),
+                        "exceptional_distance": _finite(self.exceptional_distance[k, b]),
+                    }
+                    for k, name in enumerate(self.parameters)
+                ],
+            }
+            for b in range(len(self.branch))
+        ]
+        return {
+            "mu": self.mu,
+            "damped": self.damped,
+            "modes": modes,
+            "warnings": list(self.warnings),
+            "open_contacts": list(self.open_contacts),
+        }
+
+    def to_dataset(self) -> Any:
+        """xarray.Dataset with dimensions parameter and branch; complex numbers as real and imaginary part."""
+        import xarray as xr
+
+        both, one = ("parameter", "branch"), ("branch",)
+        table: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
+            "value": (("parameter",), self.values, {"long_name": "value of the number"}),
+            "growth_rate": (one, self.growth_rate, {"units": "1/s"}),
+            "frequency": (one, self.frequency_hz, {"units": "Hz"}),
+            "growth_derivative": (both, self.derivative.real, {"long_name": "d Re λ/dp"}),
+            "angular_frequency_derivative": (both, self.derivative.imag, {"long_name": "d Im λ/dp"}),
+            "growth_per_percent": (both, self.growth_per_percent, {"units": "1/s"}),
+            "frequency_per_percent": (both, self.frequency_per_percent_hz, {"units": "Hz"}),
+            "condition": (one, self.condition, {"long_name": "condition number of the eigenvalue"}),
+            "nearest": (one, self.nearest, {"units": "1/s", "long_name": "distance to the nearest eigenvalue"}),
+            "exceptional_real": (both, self.exceptional.real, {"long_name": "exceptional point of the number"}),
+            "exceptional_imag": (both, self.exceptional.imag, {"long_name": "exceptional point of the number"}),
+            "residual": (one, self.residual, {"long_name": "componentwise backward error"}),
+        }
+        return xr.Dataset(
+            {name: xr.Variable(dims, data, attrs) for name, (dims, data, attrs) in table.items()},
+            coords={"parameter": list(self.parameters), "branch": self.branch},
+            attrs={"analysis": "sensitivities", "mu": self.mu, "warnings": "\n".join(self.warnings)},
+        )
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _complex(value: complex) -> list[float] | None:
+    return [float(value.real), float(value.imag)] if np.isfinite(value) else None
+
+
+def sensitivities(
+    case: Case,
+    parameters: Sequence[str] = ("mu",),
+    *,
+    mu: float | None = None,
+    modes: Choice = "unstable",
+    count: int | None = None,
+    max_frequency_hz: float | None = None,
+    damped: bool | None = None,
+    steps: Mapping[str, float] | None = None,
+) -> Sensitivities:
+    """dλ/dp of complex modes over numbers of the case, each named by the path that overrides it.
+
+    "mu" is the friction coefficient of every contact, "contacts.NAME.friction.coefficient" that of one;
+    "contacts.NAME.compliance" is 1/K_c, which rigid contact has too. Every other path is a number of the case, such as
+    "materials.iron.density" or "bodies.pad.thickness". mu: the friction coefficient (default: the case's own).
+
+    modes: "unstable", "all" of the band, or numbers of branches. count, max_frequency_hz, damped: as in `modes`.
+    steps: by how much a number is changed to see what the matrices do, where a thousandth of it will not do.
+
+    The touching nodes and the directions of sliding stay as they are at the case itself: what a number does by opening
+    or closing contact is not in the derivative. Raises CaseError for paths that lead to no number, AnalysisError where
+    steady sliding does not exist. A mode without derivatives is left out, and a warning says so.
+    """
+    started = time.perf_counter()
+    linear = Linearised.of(case, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
+    values = np.array([linear.value(path) for path in parameters])
+    changes = [linear.change(path, (steps or {}).get(path)) for path in parameters]
+    columns = [b for b in linear.columns(modes) if linear.mode(b) is not None]
+    found = [linear.known(b) for b in columns]
+    derivative = _derivatives(found, changes)
+    exceptional = np.full(derivative.shape, np.nan + 0j)
+    for place, b in enumerate(columns):
+        other = linear.neighbour(b)
+        partner = None if other is None else linear.mode(other)
+        if partner is not None and min(partner.condition, found[place].condition) > BENT:
+            slopes = _derivatives([partner], changes)[:, 0]
+            exceptional[:, place] = _meeting(values, found[place], partner, derivative[:, place], slopes)
+    result = Sensitivities(
+        mu=linear.mu,
+        parameters=tuple(parameters),
+        values=values,
+        branch=linear.modes.branch[columns],
+        eigenvalues=np.array([m.eigenvalue for m in found], dtype=complex),
+        derivative=derivative,
+        condition=np.array([m.condition for m in found]),
+        nearest=np.array([linear.gap(b) for b in columns]),
+        exceptional=exceptional,
+        residual=np.array([m.residual for m in found]),
+        damped=linear.modes.damped,
+        open_contacts=linear.modes.open_contacts,
+        provenance=provenance(case, "sensitivities", time.perf_counter() - started, mu=linear.mu),
+    )
+    told = list(linear.warnings)
+    if not columns and modes == "unstable" and not told:
+        told.append(f"no mode is unstable at μ = {linear.mu:g}: name branches to see what stable ones do")
+    return replace(result, warnings=(*told, *_divergence(result)))
+
+
+def _derivatives(found: Sequence[Mode], changes: Sequence[Terms]) -> ComplexArray:
+    """dλ/dp (k, b)."""
+    table = [[mode.derivative(change) for mode in found] for change in changes]
+    return np.array(table, dtype=complex).reshape(len(changes), len(found))
+
+
+def _meeting(values: Array, mode: Mode, other: Mode, own: ComplexArray, theirs: ComplexArray) -> ComplexArray:
+    """Complex values (k,) of the numbers at which two modes meet.
+
+    b = (λ₁ − λ₂)²/4 is analytic through an exceptional point, unlike λ: its tangent is followed to zero.
+    """
+    apart, closing = mode.eigenvalue - other.eigenvalue, own - theirs
+    with np.errstate(all="ignore"):
+        found = values - apart / (2 * closing)
+    return np.where(np.isfinite(found), found, np.nan + 0j)
+
+
+def _divergence(result: Sensitivities) -> list[str]:
+    """Sentences about modes whose derivatives hold for next to no change."""
+    told: list[str] = []
+    away = result.exceptional_distance
+    for b, branch in enumerate(result.branch):
+        name = f"mode {branch} ({result.frequency_hz[b]:.1f} Hz)"
+        condition = f"condition number {result.condition[b]:.3g}"
+        near = [k for k in range(len(result.parameters)) if away[k, b] < NEAR]
+        if near:
+            where = ", ".join(
+                f"{result.parameters[k]} = {result.exceptional[k, b].real:.5g} ({100 * away[k, b]:.2g} % away)"
+                for k in near
+            )
+            told.append(
+                f"{name}, {condition}: near an exceptional point, estimated at {where}. There λ changes with the "
+                "square root of the distance and derivatives diverge; first-order predictions hold only for changes "
+                "much smaller than that distance"
+            )
+        elif result.condition[b] > ILL:
+            told.append(f"{name}, {condition}: almost a double eigenvalue; its derivatives hold for small changes only")
+    return told
+
+
+class Linearised:
+    """A case at one μ with the modes of its band, what each number does to its matrices, and the modes' vectors as
+    they are asked for."""
+
+    def __init__(self, case: Case, system: System, mu: float, modes: ComplexModes, options: Options) -> None:
+        self.case, self.system, self.mu, self.modes, self.options = case, system, mu, modes, options
+        self.eigenvalues: ComplexArray = modes.eigenvalues[0]
+        self.held = hold(system, mu, options)
+        self.terms = terms_of(system, mu, self.held, options)
+        self.warnings: list[str] = []
+        self._solved: dict[int, Mode | None] = {}
+
+    @staticmethod
+    def of(
+        case: Case,
+        mu: float | None,
+        *,
+        count: int | None = None,
+        max_frequency_hz: float | None = None,
+        damped: bool | None = None,
+    ) -> Linearised:
+        """At ``mu`` (default: the case's own friction), settings as `sensitivities` takes them."""
+        value = own_friction(case) if mu is None else float(mu)
+        if value is None:
+            raise CaseError("mu", None, "one friction coefficient for all contacts: the case gives them different ones")
+        settings = case.modal
+        options = options_of(case)
+        damped = settings.damped if damped is None else damped
+        system = build_system(case)
+        modes = complex_modes(
+            system,
+            value,
+            count=settings.modes if count is None else count,
+            max_frequency_hz=max_frequency_hz,
+            damped=damped,
+            friction_damping=options.friction_damping,
+            prestress=options.prestress,
+            solver=options.solver,
+        )
+        return Linearised(case, system if damped else undamped(system), value, modes, options)
+
+    def value(self, path: str) -> float:
+        """The number at a path. Raises CaseError where there is none."""
+        contact = _contact_of(self.case, path)
+        if path == "mu" or (contact and path.endswith(".friction.coefficient")):
+            return self.mu
+        if contact and path.endswith(".compliance"):
+            stiffness = self.case.contacts[contact].stiffness
+            return 0.0 if stiffness == "rigid" else 1.0 / stiffness
+        return number_at(self.case, path)
+
+    def change(self, path: str, step: float | None = None) -> Terms:
+        """What the number at a path does to the matrices, per unit of it."""
+        contact = _contact_of(self.case, path)
+        if path == "mu":
+            return by_friction(self.system, self.mu, self.held, self.options)
+        if contact and path.endswith(".friction.coefficient"):
+            return by_friction(self.system, self.mu, self.held, self.options, contact=contact)
+        if contact and path.endswith(".compliance"):
+            return by_compliance(self.system, self.held, contact)
+
+        def at(value: float) -> Terms:
+            return terms_of(self.built(self.case.with_({path: value})), self.mu, self.held, self.options)
+
+        try:
+            return rate_of(at, self.value(path), step)[0]
+        except CaseError as error:
+            accepted = f"a number that can be varied a little ({error.problems[0].accepted})"
+            raise CaseError(path, self.value(path), accepted) from error
+
+    def built(self, case: Case) -> System:
+        """The system of a varied case, with or without damping as this one."""
+        system = build_system(case)
+        return system if self.modes.damped else undamped(system)
+
+    def columns(self, choice: Choice) -> list[int]:
+        """Columns of the modes chosen. Raises CaseError for numbers that no branch has."""
+        if choice == "unstable":
+            return [int(b) for b in np.flatnonzero(self.modes.unstable[0])]
+        if choice == "all":
+            return list(range(len(self.eigenvalues)))
+        where = {int(number): column for column, number in enumerate(self.modes.branch)}
+        missing = [number for number in choice if number not in where]
+        if missing or isinstance(choice, str):
+            accepted = f'"unstable", "all" or numbers of branches from 1 to {len(where)}'
+            raise CaseError("modes", missing or choice, accepted)
+        return [where[number] for number in choice]
+
+    def gap(self, column: int) -> float:
+        """Distance [1/s] to the nearest other eigenvalue, the own conjugate included."""
+        lam = self.eigenvalues[column]
+        others = np.delete(self.eigenvalues, column)
+        mirrored = 2 * abs(lam.imag)
+        return float(min(np.abs(others - lam).min(initial=np.inf), mirrored if mirrored else np.inf, abs(lam)))
+
+    def neighbour(self, column: int) -> int | None:
+        """Column of the nearest other eigenvalue."""
+        distance = np.abs(self.eigenvalues - self.eigenvalues[column])
+        distance[column] = np.inf
+        return int(np.argmin(distance)) if len(distance) > 1 else None
+
+    def mode(self, column: int) -> Mode | None:
+        """A mode with its vectors; None, and a warning, where it has no derivatives."""
+        if column not in self._solved:
+            lam = complex(self.eigenvalues[column])
+            name = f"mode {self.modes.branch[column]} ({lam.imag / (2 * np.pi):.1f} Hz)"
+            try:
+                if self.gap(column) <= REPEATED * abs(lam):
+                    raise AnalysisError("two eigenvalues are equal, and derivatives belong to neither")
+                solver = self.options.solver
+                self._solved[column] = solve_mode(self.terms, lam, self.gap(column), solver=solver)
+            except AnalysisError as error:
+                self.warnings.append(f"{name} is left out: {error}")
+                self._solved[column] = None
+        return self._solved[column]
+
+    def known(self, column: int) -> Mode:
+        """A mode that is known to have derivatives."""
+        found = self.mode(column)
+        assert found is not None, "asked for after `mode` said so"
+        return found
+
+
+def options_of(case: Case) -> Options:
+    """The effects of the steady state that the case's [modal] counts."""
+    settings = case.modal
+    solver = None if settings.solver == "auto" else settings.solver
+    return Options(settings.friction_damping, settings.prestress, solver)
+
+
+def _contact_of(case: Case, path: str) -> str | None:
+    """The contact that a path is about, None for other paths."""
+    steps = split_path(path)
+    return steps[1] if len(steps) > 2 and steps[0] == "contacts" and steps[1] in case.contacts else None
+
+
+def number_at(case: Case, path: str) -> float:
+    """The number at a dotted path of a case, defaults included. Raises CaseError where there is none."""
+    node: Any = case.model_dump(mode="json", exclude_none=True)
+    for step in split_path(path):
+        if isinstance(node, list):
+            items = cast("list[Any]", node)
+            names = [cast("dict[str, Any]", item).get("name") for item in items if isinstance(item, dict)]
+            place = names.index(step) if step in names else int(step) if step.isdecimal() else -1
+            node = items[place] if 0 <= place < len(items) else None
+        else:
+            node = cast("dict[str, Any]", node).get(step) if isinstance(node, dict) else None
+    if not isinstance(node, float):
+        accepted = "the path of a number of the case that may have decimals, such as materials.steel.density"
+        raise CaseError(path, node, accepted)
+    return node

@@ -1,0 +1,158 @@
+"""Which counter-measures are found, how they are ranked, and what is said about them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from benches import paper_case
+from solid_cases import case, slider
+from stridor.case import Case, loads, template_text
+from stridor.errors import CaseError
+from stridor.study.countermeasures import Countermeasures, Measure, edge_rows, rank_countermeasures
+from stridor.study.damping_map import DampingMap, damping_map
+from stridor.study.sensitivities import sensitivities
+from stridor.system import build_system
+from stridor.view import sensitivity_plots
+from stridor.view.sensitivity_tables import countermeasure_table, sensitivity_table
+
+
+@pytest.fixture(scope="module")
+def beams() -> Case:
+    return paper_case(bodies__beam1__elements=6, bodies__beam2__elements=18)
+
+
+@pytest.fixture(scope="module")
+def ranked(beams) -> Countermeasures:
+    return rank_countermeasures(beams, mu=0.3, max_frequency_hz=20e3, percent=0.5, verify=20)
+
+
+def named(result: Countermeasures, name: str) -> Measure:
+    return next(m for m in result.measures if m.name == name)
+
+
+def test_order_is_that_of_what_a_per_cent_removes(ranked):
+    removed = [m.removed_per_percent for m in ranked.measures]
+    assert removed == sorted(removed, reverse=True)
+    assert min(removed) > 0
+    assert {m.kind for m in ranked.measures} == {"number", "added mass"}
+    # More damping always helps this bench; its material is one, so stiffness and density do the same.
+    assert named(ranked, "bodies.beam1.damping.mass").direction == 1
+    stiff, dense = (named(ranked, f"materials.steel.{n}") for n in ("young_modulus", "density"))
+    assert (stiff.direction, dense.direction) == (-1, 1)
+
+
+def test_small_changes_do_what_was_predicted(ranked):
+    for measure in ranked.measures:
+        if measure.kind == "number":
+            assert measure.verified is not None
+            assert measure.verified.removed == pytest.approx(measure.removed, rel=0.03), measure.words
+
+
+def test_the_added_mass_is_at_the_best_node(beams, ranked):
+    best = next(m for m in ranked.measures if m.kind == "added mass")
+    assert best.mass == pytest.approx(0.005 * 7800 * 0.015 * 0.003 * 0.15)
+    again = rank_countermeasures(beams, mu=0.3, max_frequency_hz=20e3, percent=0.005, verify=1, numbers=[])
+    first = again.measures[0]
+    assert first.position == best.position
+    assert first.verified is not None
+    assert first.verified.removed == pytest.approx(first.removed, rel=0.02)
+
+
+def test_a_target_of_one_mode(beams):
+    modes = sensitivities(beams, ["mu"], mu=0.3, max_frequency_hz=20e3)
+    branch = int(modes.branch[0])
+    found = rank_countermeasures(
+        beams, mu=0.3, target=branch, max_frequency_hz=20e3, verify=0, added_mass=False, watch="unstable"
+    )
+    alone = sensitivities(beams, ["materials.steel.density"], mu=0.3, max_frequency_hz=20e3)
+    density = named(found, "materials.steel.density")
+    assert density.removed_per_percent == pytest.approx(abs(alone.growth_per_percent[0, 0]))
+    with pytest.raises(CaseError, match='"sum", or an unstable branch'):
+        rank_countermeasures(beams, mu=0.3, target=1, max_frequency_hz=20e3)
+
+
+def test_nothing_to_remove(beams):
+    quiet = rank_countermeasures(beams, mu=0.0, max_frequency_hz=3e3)
+    assert quiet.measures == ()
+    assert "there is nothing to remove" in quiet.warnings[0]
+
+
+def test_chamfers_are_named_ranked_and_verified():
+    model = case(slider(space=False, stiffness=1e13))
+    found = rank_countermeasures(model, mu=0.6, count=4, numbers=[], added_mass=False, chamfers=1, verify=2)
+    assert {m.name for m in found.measures} == {"rub, leading edge, 1 row", "rub, trailing edge, 1 row"}
+    first = found.measures[0]
+    assert first.name == "rub, leading edge, 1 row"
+    assert first.verified is not None
+    assert first.verified.removed == pytest.approx(first.removed, rel=0.1)
+    assert first.words == "take 5.26 % of the contact away: rub, leading edge, 1 row"
+
+
+def test_the_leading_edge_is_where_the_other_material_comes_in():
+    """The slider's material moves to +x below the block: it enters at the block's left."""
+    nodes = build_system(case(slider(space=False))).contact_nodes()
+    sense = -np.sign(nodes.slip_velocity(np.ones(1)))
+    every = np.arange(nodes.count)
+    leading, trailing = (edge_rows(nodes, every, sense, 0, edge, 2) for edge in ("leading", "trailing"))
+    assert nodes.position[leading[0].gone, 0] == pytest.approx(nodes.position[:, 0].min())
+    assert nodes.position[trailing[0].gone, 0] == pytest.approx(nodes.position[:, 0].max())
+    assert [len(cut.gone) for cut in leading] == [1, 2]
+    # An open node out at the edge goes with the row that touches next to it.
+    inner = np.flatnonzero(nodes.position[:, 0] < nodes.position[:, 0].max() - 1e-9)
+    cut = edge_rows(nodes, inner, sense, 0, "trailing", 1)[0]
+    assert (len(cut.released), len(cut.gone)) == (1, 2)
+
+
+def test_rows_of_a_pad_on_a_turning_disc_lie_along_radii():
+    model = loads(template_text("pad-on-disc")).with_(
+        {
+            "bodies.disc.mesh.divisions": [4, 36, 1],
+            "bodies.lining.mesh.divisions": [3, 6, 1],
+            "bodies.plate.mesh.divisions": [3, 6, 1],
+        }
+    )
+    nodes = build_system(model).contact_nodes()
+    slip = nodes.slip_velocity(np.ones(1))
+    sense = -slip / np.linalg.norm(slip, axis=1, keepdims=True)
+    angle = np.degrees(np.arctan2(nodes.position[:, 1], nodes.position[:, 0]))
+    every = np.arange(nodes.count)
+    leading, trailing = (edge_rows(nodes, every, sense, 0, edge, 1)[0].gone for edge in ("leading", "trailing"))
+    # The disc turns from +x to +y and meets the pad at 65 degrees first.
+    assert angle[leading] == pytest.approx(65.0)
+    assert angle[trailing] == pytest.approx(115.0)
+    assert len(leading) == 4
+
+
+def test_documents_tables_and_figures(beams, ranked):
+    assert json.loads(json.dumps(ranked.to_json()))["measures"][0]["verified"]["unstable_hz"]
+    table = countermeasure_table(ranked)
+    assert len(table.rows) == len(ranked.measures)
+    assert table.rows[0].cells[0] == ranked.measures[0].words
+    found = sensitivities(beams, ["mu", "materials.steel.density"], mu=0.3, max_frequency_hz=20e3)
+    assert len(sensitivity_table(found).rows) == 2 * len(found.branch)
+    for figure in (sensitivity_plots.sensitivity_bars(found), sensitivity_plots.countermeasure_bars(ranked)):
+        assert figure.axes[0].patches
+
+
+def test_the_figure_of_a_map_hatches_where_damping_harms():
+    values = np.array([0.0, 1.0, 2.0])
+    mu = 0.3 + 0.1 * np.abs(values[:, None] - values[None, :])
+    slope = np.sign(values[:, None] - values[None, :] + 0.0)
+    result = DampingMap(
+        "a", "b", values, values, (0.0, 1.0), 1e3, mu, 0 * mu, slope, -slope, 0 * mu, 0.35
+    )
+    figure = sensitivity_plots.damping_map(result)
+    words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert words == ["undamped onset, 0.35", "more a lowers it", "more b lowers it"]
+    nothing = DampingMap("a", "b", values, values, (0.0, 1.0), 1e3, *np.full((5, 3, 3), np.nan), None)
+    assert sensitivity_plots.damping_map(nothing).axes
+
+
+def test_a_map_refuses_what_it_cannot_draw(beams):
+    with pytest.raises(CaseError, match="two ends or more values, rising"):
+        damping_map(beams, "bodies.beam1.damping.mass", "bodies.beam2.damping.mass", x_range=(1, 0), y_range=(0, 1))
+    with pytest.raises(CaseError, match="number of the case"):
+        damping_map(beams, "bodies.beam1.damping.mess", "bodies.beam2.damping.mass", x_range=(0, 1), y_range=(0, 1))

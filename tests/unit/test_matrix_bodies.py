@@ -1,0 +1,507 @@
+"""Matrices of other programs as bodies of a case: beside meshed ones, in contact, with factors, of any structure."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io as sio
+import scipy.sparse as sp
+
+import stridor as st
+from stridor.mesh.model import Mesh
+from stridor.system.bodies import BuiltBody, build_bodies
+
+REST = """
+materials.steel = { young_modulus = 200e9, density = 7800.0, poisson_ratio = 0.3 }
+materials.pad = { young_modulus = 2e9, density = 2000.0, poisson_ratio = 0.3 }
+[bodies.slider]
+type = "solid"
+model = "plane strain"
+material = "steel"
+mesh = { shape = "rectangle", corner = [-0.05, -0.01], size = [0.1, 0.01], divisions = [10, 2], cells = "quad" }
+damping = { mass = 20.0, stiffness = 1e-8 }
+sliding = { velocity = [1.0, 0.0] }
+[supports.ground]
+at = "slider.bottom"
+fixed = ["x", "y"]
+[supports.holder]
+at = "block.top"
+fixed = ["x"]
+[loads.press]
+at = "block.top"
+pressure = 1e5
+[contacts.face]
+slave = "block.bottom"
+master = "slider.top"
+stiffness = 1e12
+friction = { law = "coulomb", coefficient = 0.4 }
+[modal]
+max_frequency_hz = 40e3
+modes = 8
+[bodies.block]
+"""
+MESHED = REST + """
+type = "solid"
+model = "plane strain"
+material = "pad"
+mesh = { shape = "rectangle", corner = [-0.01, 0.0], size = [0.02, 0.02], divisions = [5, 5], cells = "quad" }
+damping = { mass = 20.0, stiffness = 1e-8 }
+points = { crown = [0.0, 0.02] }
+"""
+IMPORTED = REST + """
+type = "matrices"
+dimension = 2
+mesh = "block.inp"
+labels = "dof.txt"
+terms = [
+  { file = "M.mtx", role = "mass" },
+  { file = "C.mtx", role = "damping" },
+  { file = "K.mtx", role = "stiffness" },
+MORE]
+points = { crown = CROWN }
+"""
+
+
+def write_mesh(path: Path, mesh: Mesh, numbers: np.ndarray, order: np.ndarray, scale: float = 1.0) -> None:
+    """An Abaqus file of a mesh of quadrilaterals, its nodes numbered and listed as asked for."""
+    rows = ["*NODE"]
+    rows += [f"{numbers[k]}, " + ", ".join(repr(float(x / scale)) for x in mesh.points[k]) for k in order]
+    rows += ["*ELEMENT, TYPE=CPE4, ELSET=body"]
+    rows += [f"{k + 1}, " + ", ".join(str(numbers[n]) for n in cell) for k, cell in enumerate(mesh.cells["quad"])]
+    for name in mesh.boundaries:
+        inside = set(mesh.boundary_nodes(name).tolist())
+        rows.append(f"*SURFACE, NAME={name}")
+        for k, cell in enumerate(mesh.cells["quad"]):
+            rows += [f"{k + 1}, S{f + 1}" for f in range(4) if {cell[f], cell[(f + 1) % 4]} <= inside]
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+
+
+class Export:
+    """The block of the meshed case as another program might write it: nodes numbered and freedoms ordered at random."""
+
+    def __init__(self, folder: Path, *, keep: np.ndarray | None = None, scale: float = 1.0) -> None:
+        self.folder = folder
+        self.body: BuiltBody = build_bodies(st.loads(MESHED))["block"]
+        rng = np.random.default_rng(7)
+        nodes = len(self.body.points)
+        self.numbers = rng.choice(np.arange(1, 900), nodes, replace=False)
+        freedoms = rng.permutation(2 * nodes)
+        self.freedoms = freedoms if keep is None else freedoms[np.isin(freedoms, keep)]
+        for name in ("mass", "damping", "stiffness"):
+            # mm, N, s, tonnes: N/mm are a thousandth of N/m.
+            matrix = scale * getattr(self.body, name)[self.freedoms][:, self.freedoms]
+            letter = {"mass": "M", "damping": "C", "stiffness": "K"}[name]
+            sio.mmwrite(folder / f"{letter}.mtx", sp.coo_array(matrix), precision=17)
+        lines = [f"{self.numbers[f // 2]} {f % 2 + 1}" for f in self.freedoms]
+        (folder / "dof.txt").write_text("# node direction\n" + "\n".join(lines), encoding="utf-8")
+        assert self.body.mesh is not None
+        write_mesh(folder / "block.inp", self.body.mesh, self.numbers, rng.permutation(nodes), scale)
+        crown = np.linalg.norm(self.body.points - np.array([0.0, 0.02]), axis=1).argmin()
+        self.text = IMPORTED.replace("CROWN", str(self.numbers[crown]))
+
+    def case(self, more: str = "") -> st.Case:
+        return st.loads(self.text.replace("MORE", more), folder=self.folder)
+
+
+@pytest.fixture
+def export(tmp_path: Path) -> Export:
+    return Export(tmp_path)
+
+
+def assert_same_modes(one: st.Case, other: st.Case, *, rel: float = 1e-10, **options: object) -> None:
+    for mu in (0.0, 0.4):
+        first, second = (np.sort_complex(st.modes(c, mu, **options).eigenvalues[0]) for c in (one, other))
+        assert second == pytest.approx(first, rel=rel, abs=rel * np.abs(first).max())
+
+
+def test_a_body_of_matrices_touches_a_meshed_one_as_if_it_were_meshed_itself(export: Export):
+    meshed, imported = st.loads(MESHED), export.case()
+    assert_same_modes(meshed, imported)
+    ours, theirs = st.build_system(meshed), st.build_system(imported)
+    assert not theirs.general
+    watched = [np.abs(s.points["block.crown"].free.toarray()).sum() for s in (ours, theirs)]
+    assert watched[0] == watched[1] == 1.0  # x is held by the support
+    assert st.steady_sliding(imported).resultants["face"].force == pytest.approx([800.0, 2000.0])
+    assert f"block node {export.numbers[0]} y" in theirs.dof_names
+    first, second = (st.onsets(c, (0.0, 0.6), max_frequency_hz=30e3).first for c in (meshed, imported))
+    assert first is not None
+    assert second is not None
+    assert second.mu == pytest.approx(first.mu, rel=1e-9)
+
+
+def test_loads_supports_and_springs_at_nodes_by_number(export: Export):
+    changes = {
+        "loads.push": {"at": "block.crown", "force": [3.0, -5.0]},
+        "springs.s": {"between": ["block.crown", "ground"], "direction": [0.0, 1.0], "stiffness": 1e9},
+        "supports.holder.at": "block.crown",
+    }
+    meshed, imported = st.loads(MESHED).with_(changes), export.case().with_(changes)
+    assert_same_modes(meshed, imported)
+    forces = [st.build_system(c).loads["push"].sum() for c in (meshed, imported)]
+    assert forces == [-5.0, -5.0]
+
+
+def test_what_the_other_program_held_is_held(tmp_path: Path):
+    """Its matrices lack these freedoms; supports on them change nothing, and cannot move them."""
+    case = st.loads(MESHED)
+    body = build_bodies(case)["block"]
+    top = body.mesh.boundary_nodes("top")
+    export = Export(tmp_path, keep=np.setdiff1d(np.arange(2 * len(body.points)), 2 * top))
+    imported = export.case()
+    assert_same_modes(case, imported)
+    assert_same_modes(case, imported.with_({"supports.holder": None}))
+    with pytest.raises(st.CaseError, match="lack 6 of its freedoms, held by the program that wrote them"):
+        st.build_system(imported.with_({"supports.holder.velocity": {"x": 1.0}}))
+    without = Export(tmp_path, keep=np.setdiff1d(np.arange(2 * len(body.points)), [2 * top[0], 2 * top[0] + 1]))
+    warnings = st.describe(without.case()).warnings
+    assert any("1 of 36 nodes of the mesh have no freedoms and count as held" in w for w in warnings)
+
+
+def test_abaqus_holds_freedoms_by_1e36(export: Export):
+    stiffness = sp.lil_array(sio.mmread(export.folder / "K.mtx"))
+    top = export.body.mesh.boundary_nodes("top")
+    for place in np.flatnonzero(np.isin(export.freedoms, 2 * top)):
+        stiffness[place, place] = 1e36
+    sio.mmwrite(export.folder / "K.mtx", sp.coo_array(stiffness), precision=17)
+    assert_same_modes(st.loads(MESHED), export.case().with_({"supports.holder": None}))
+
+
+def test_millimetres_become_metres(tmp_path: Path):
+    export = Export(tmp_path, scale=0.001)
+    assert_same_modes(st.loads(MESHED), export.case().with_({"bodies.block.scale": 0.001}), rel=1e-9)
+
+
+def test_rotations_stay_as_they_are_where_millimetres_become_metres(tmp_path: Path):
+    """[N/mm, N; N, N mm] of a bending stiffness, and its mass in tonnes."""
+    sio.mmwrite(tmp_path / "K.mtx", sp.coo_array(np.array([[12.0, -6.0], [-6.0, 4.0]])))
+    sio.mmwrite(tmp_path / "M.mtx", sp.coo_array(np.diag([3.0, 2.0])))
+    (tmp_path / "dof.txt").write_text("7 z\n7 roty\n", encoding="utf-8")
+    text = """
+    [matrices]
+    labels = "dof.txt"
+    scale = 0.001
+    terms = [{ file = "M.mtx", role = "mass" }, { file = "K.mtx", role = "stiffness" }]
+    points = { tip = 7 }
+    """
+    case = st.loads(text, folder=tmp_path)
+    system = st.build_system(case)
+    assert system.dof_names == ("matrices node 7 z", "matrices node 7 rotation y")
+    assert system.stiffness.toarray() == pytest.approx(np.array([[12e3, -6.0], [-6.0, 4e-3]]))
+    assert system.mass.toarray() == pytest.approx(np.diag([3e3, 2e-3]))
+    assert system.points["matrices.tip"].free.toarray().tolist() == [[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]
+
+
+def test_moves_of_the_mesh_and_groups(export: Export):
+    meshed = st.loads(MESHED).with_({"bodies.block.mesh.corner": [-0.005, 0.0]})
+    assert_same_modes(meshed, export.case().with_({"bodies.block.translation": [0.005, 0.0]}))
+    assert_same_modes(st.loads(MESHED), export.case().with_({"bodies.block.group": "body"}))
+
+
+def test_freedoms_of_no_node_come_last(export: Export):
+    """A rotation and an internal freedom that hang on two displacements by springs."""
+    n = len(export.freedoms)
+    for letter in ("M", "C", "K"):
+        old = sp.coo_array(sio.mmread(export.folder / f"{letter}.mtx"))
+        extra = {"M": [0.01, 0.02], "C": [0.0, 0.0], "K": [0.0, 0.0]}[letter]
+        whole = sp.lil_array(sp.block_diag([old, sp.diags_array(extra)]))
+        if letter == "K":
+            for k in (0, 1):
+                for a, b, sign in ((k, k, 1), (n + k, n + k, 1), (k, n + k, -1), (n + k, k, -1)):
+                    whole[a, b] += sign * 1e7
+        sio.mmwrite(export.folder / f"{letter}.mtx", sp.coo_array(whole), precision=17)
+    with (export.folder / "dof.txt").open("a", encoding="utf-8") as labels:
+        labels.write(f"\n{export.numbers[3]} 6\n-1 0\n")
+    imported = export.case()
+    system = st.build_system(imported)
+    assert system.dof_names[-2:] == (f"block node {export.numbers[3]} rotation z", "block internal freedom 1")
+    masses = {
+        f"bodies.ball{k}": {"type": "mass", "mass": mass, "position": [0.05 + k, 0.05]}
+        for k, mass in ((0, 0.01), (1, 0.02))
+    }
+    # The same with point masses, each free along one direction only.
+    free = [export.freedoms[k] for k in (0, 1)]
+    rest = {
+        **masses,
+        **{f"bodies.block.points.end{k}": export.body.points[f // 2].tolist() for k, f in enumerate(free)},
+        **{f"supports.rail{k}": {"at": f"ball{k}", "fixed": ["xy"[1 - f % 2]]} for k, f in enumerate(free)},
+        **{
+            f"springs.s{k}": {
+                "between": [f"ball{k}", f"block.end{k}"],
+                "stiffness": 1e7,
+                "direction": [[1.0, 0.0], [0.0, 1.0]][f % 2],
+            }
+            for k, f in enumerate(free)
+        },
+    }
+    assert_same_modes(st.loads(MESHED).with_(rest), imported)
+
+
+def test_files_of_abaqus_name_freedoms_and_say_what_they_are(export: Export):
+    for letter, kind in (("M", "MASS2"), ("C", "DMPV1"), ("K", "STIF1")):
+        matrix = sp.coo_array(sio.mmread(export.folder / f"{letter}.mtx"))
+        names = [f"{export.numbers[f // 2]},{f % 2 + 1}" for f in export.freedoms]
+        lines = [
+            f"{names[i]}, {names[j]}, {float(x)!r}" for i, j, x in zip(matrix.row, matrix.col, matrix.data, strict=True)
+        ]
+        (export.folder / f"job_{kind}.mtx").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    files = [{"file": str(export.folder / f"job_{kind}.mtx")} for kind in ("STIF1", "MASS2", "DMPV1")]
+    case = export.case()
+    named = case.with_({"bodies.block.terms": files, "bodies.block.labels": None})
+    assert_same_modes(case, named)
+    with pytest.raises(st.CaseError, match=r"job_STIF1\.mtx names its freedoms itself; leave labels out"):
+        st.build_system(case.with_({"bodies.block.terms": files}))
+
+
+def test_unsymmetric_terms_beside_contact_are_found_by_the_general_solver(export: Export):
+    """A skew part too small to matter takes the other way to the same modes, with penalty and rigid contact."""
+    n = len(export.freedoms)
+    skew = sp.coo_array((np.array([1.0, -1.0]), ([0, 1], [1, 0])), shape=(n, n))
+    sio.mmwrite(export.folder / "S.mtx", skew, precision=17)
+    general = export.case('{ file = "S.mtx", role = "stiffness", factor = "2e-1*sqrt(4)" },')
+    system = st.build_system(general)
+    assert system.general == "the stiffness matrix is not symmetric"
+    for stiffness in (1e12, "rigid"):
+        change = {"contacts.face.stiffness": stiffness}
+        assert_same_modes(st.loads(MESHED).with_(change), general.with_(change), rel=1e-7)
+    undamped = st.modes(general, 0.0, damped=False)
+    assert np.abs(undamped.growth_rate).max() < 1e-5
+    found = st.modes(general, [0.1, 0.4], vectors=True)
+    assert len(found.completeness) == 2
+    assert all("Complete" in sentence for sentence in found.completeness)
+    assert found.residual.max() < 1e-10
+    assert found.right is not None
+    assert found.left is not None
+    for call in (st.onsets, st.simulate, st.compare):
+        with pytest.raises(st.AnalysisError, match=f"{call.__name__} needs symmetric matrices.*stridor modes"):
+            call(general)
+    assert any("not symmetric: `stridor modes` takes" in line for line in st.describe(general).lines)
+
+
+ROTOR = """
+[parameters]
+Omega = { value = 10.0, range = [0.0, 500.0] }
+[modal]
+max_frequency_hz = 200.0
+[matrices]
+terms = [
+  { file = "M.mtx", role = "mass" },
+  { file = "G.mtx", role = "damping", factor = "2*Omega" },
+  { file = "K.mtx", role = "stiffness" },
+  { file = "M.mtx", role = "stiffness", factor = "-Omega**2" },
+]
+"""
+
+
+@pytest.fixture
+def rotor(tmp_path: Path) -> Path:
+    """A mass on springs in a frame that turns at Ω: seen from there it vibrates at ω₀ ± Ω."""
+    for name, matrix in (("M", 2.0 * np.eye(2)), ("K", 2.0 * 300.0**2 * np.eye(2)), ("G", [[0.0, -2.0], [2.0, 0.0]])):
+        sio.mmwrite(tmp_path / f"{name}.mtx", sp.coo_array(np.array(matrix)))
+    (tmp_path / "rotor.toml").write_text(ROTOR, encoding="utf-8")
+    return tmp_path / "rotor.toml"
+
+
+@pytest.mark.parametrize("speed", [0.0, 10.0, 120.0, 290.0])
+def test_a_gyroscopic_rotor_whirls_as_in_closed_form(rotor: Path, speed: float):
+    case = st.load(rotor).with_({"parameters.Omega.value": speed})
+    found = st.modes(case)
+    assert found.frequency_hz[0] == pytest.approx(np.array([300.0 - speed, 300.0 + speed]) / (2 * np.pi), rel=1e-12)
+    assert np.abs(found.growth_rate).max() < 1e-9
+    assert bool(found.completeness) == (speed > 0)
+    if speed:
+        # Gyroscopic forces are no damping.
+        assert st.modes(case, damped=False).eigenvalues == pytest.approx(found.eigenvalues, rel=1e-12)
+
+
+def test_the_verbs_and_overrides(rotor: Path):
+    def stridor(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "stridor.app.cli", words[0], rotor.name, *words[1:]]
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+        return subprocess.run(command, cwd=rotor.parent, capture_output=True, text=True, timeout=300, env=environment)
+
+    done = stridor("modes", "--set", "parameters.Omega.value=100", "--json")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    frequencies = [mode["frequency_hz"] for mode in document["modes"][0]]
+    assert frequencies == pytest.approx([200 / (2 * np.pi), 400 / (2 * np.pi)])
+    assert document["completeness"][0].startswith("Modes up to 200 Hz that decay at less than 628.3 1/s. Complete: QZ")
+    done = stridor("modes", "--set", "parameters.Omga.value=100")
+    assert done.returncode == 2
+    assert done.stderr == "stridor: parameters.Omga: no such parameter; did you mean 'Omega'? the case has: Omega\n"
+    done = stridor("modes", "--set", "parameters.Omega.value=1000.0")
+    assert done.stderr == "stridor: parameters.Omega.value: 1000.0 – must be in its range, 0 to 500\n"
+    done = stridor("matrices")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("matrices:\n  2 freedoms\n")
+    assert "C has a gyroscopic (antisymmetric) part" in done.stdout
+    done = stridor("check")
+    assert done.returncode == 0, done.stderr
+    assert "parameter Omega = 10" in done.stdout
+    assert "  matrices: matrices (M.mtx, G.mtx, K.mtx), 2 free" in done.stdout
+
+
+def test_matrices_that_depend_on_the_friction_coefficient(tmp_path: Path):
+    """Two masses coupled by friction in another program: λ⁴ − … flutters beyond the μ at which frequencies meet."""
+    sio.mmwrite(tmp_path / "M.mtx", sp.coo_array(np.eye(2)))
+    sio.mmwrite(tmp_path / "K.mtx", sp.coo_array(np.diag([1.0e4, 1.2e4])))
+    sio.mmwrite(tmp_path / "F.mtx", sp.coo_array(np.array([[0.0, 1.0], [-1.0, 0.0]])))
+    text = """
+    [modal]
+    max_frequency_hz = 50.0
+    [[matrices]]
+    file = "M.mtx"
+    role = "mass"
+    [[matrices]]
+    file = "K.mtx"
+    role = "stiffness"
+    [[matrices]]
+    file = "F.mtx"
+    role = "stiffness"
+    factor = "4e3*mu"
+    """
+    case = st.loads(text, folder=tmp_path)
+    mus = [0.0, 0.2, 0.3]
+    found = st.modes(case, mus)
+    for row, mu in enumerate(mus):
+        square = np.emath.sqrt(1e6 - (4e3 * mu) ** 2)
+        expected = np.array([1j * np.emath.sqrt(1.1e4 + sign * square) for sign in (-1, 1)])
+        away = np.abs(found.eigenvalues[row][:, None] - expected)
+        assert away.min(axis=0).max() < 1e-9
+        assert away.min(axis=1).max() < 1e-9
+    assert found.unstable.any(axis=1).tolist() == [False, False, True]
+    assert st.modes(case).growth_rate == pytest.approx(0.0, abs=1e-9)  # nothing gives it a μ
+    given = case.with_({"parameters.mu": {"value": 0.3}})
+    assert st.modes(given).eigenvalues == pytest.approx(found.eigenvalues[2:], rel=1e-12)
+    with pytest.raises(st.AnalysisError, match="depend on mu, which only `stridor modes --mu` follows"):
+        st.onsets(case)
+    dataset = st.to_dataset(found)
+    assert "Complete" in dataset.attrs["completeness"]
+
+
+def test_freedoms_without_mass(tmp_path: Path):
+    """A spring in series with a massless freedom between: modes take it, the time loop says that it cannot."""
+    sio.mmwrite(tmp_path / "M.mtx", sp.coo_array(np.diag([1.0, 0.0])))
+    sio.mmwrite(tmp_path / "K.mtx", sp.coo_array(np.array([[2.0e4, -2.0e4], [-2.0e4, 4.0e4]])))
+    terms = [{"file": "M.mtx", "role": "mass"}, {"file": "K.mtx", "role": "stiffness"}]
+    (tmp_path / "c.toml").write_text(
+        "[modal]\nmax_frequency_hz = 50.0\n[matrices]\nterms = ["
+        + ", ".join("{ " + ", ".join(f'{k} = "{v}"' for k, v in t.items()) + " }" for t in terms)
+        + "]\n",
+        encoding="utf-8",
+    )
+    case = st.load(tmp_path / "c.toml")
+    assert st.modes(case).eigenvalues[0] == pytest.approx([100j], rel=1e-12, abs=1e-9)
+    with pytest.raises(st.AnalysisError, match=r"simulate needs .* and 1 freedom has no mass"):
+        st.simulate(case)
+
+
+def test_terms_of_one_role_add_up_and_the_case_says_itself_again(export: Export):
+    sio.mmwrite(export.folder / "H.mtx", 0.5 * sp.coo_array(sio.mmread(export.folder / "K.mtx")), precision=17)
+    more = '{ file = "H.mtx", role = "stiffness" }, { file = "H.mtx", role = "stiffness", factor = -1.0 },'
+    case = export.case(more)
+    assert_same_modes(export.case(), case)
+    assert st.loads(case.text) == case
+    lines = st.describe(case).lines
+    assert "  block: matrices (M.mtx, C.mtx, K.mtx, H.mtx), 36 nodes of block.inp, 66 free" in lines
+
+
+def test_everything_of_symmetric_matrices_runs_in_time_too(export: Export):
+    case = export.case().with_({"phases": [{"name": "slide", "duration": 2e-4}], "temporal.watch": ["block.crown"]})
+    meshed = st.loads(MESHED).with_({"phases": [{"name": "slide", "duration": 2e-4}], "temporal.watch": ["block.crown"]})
+    ours, theirs = st.simulate(meshed), st.simulate(case)
+    assert theirs.displacement[-1] == pytest.approx(ours.displacement[-1], rel=1e-7, abs=1e-16)
+
+
+SPACE = """
+materials.steel = { young_modulus = 200e9, density = 7800.0, poisson_ratio = 0.3 }
+materials.pad = { young_modulus = 2e9, density = 2000.0, poisson_ratio = 0.3 }
+[bodies.slider]
+type = "solid"
+model = "3d"
+material = "steel"
+mass = "consistent"
+mesh = { shape = "block", corner = [-0.02, -0.02, -0.01], size = [0.04, 0.04, 0.01], divisions = [4, 4, 1], cells = "hexahedron" }
+sliding = { velocity = [1.0, 0.2, 0.0] }
+[bodies.block]
+type = "solid"
+model = "3d"
+material = "pad"
+damping = { mass = 20.0, stiffness = 1e-8 }
+mesh = { shape = "block", corner = [-0.011, -0.011, 0.0], size = [0.022, 0.022, 0.01], divisions = [3, 3, 1], cells = "hexahedron" }
+[bodies.plate]
+type = "solid"
+model = "3d"
+material = "steel"
+mesh = { shape = "block", corner = [-0.011, -0.011, 0.01], size = [0.022, 0.022, 0.005], divisions = [2, 2, 1], cells = "hexahedron" }
+[ties.glue]
+slave = "block.top"
+master = "plate.bottom"
+[supports.ground]
+at = "slider.bottom"
+fixed = ["x", "y", "z"]
+[supports.holder]
+at = "plate.top"
+fixed = ["x", "y"]
+[loads.press]
+at = "plate.top"
+pressure = 1e5
+[contacts.face]
+slave = "block.bottom"
+master = "slider.top"
+stiffness = 1e13
+friction = { law = "coulomb", coefficient = 0.5 }
+[modal]
+modes = 8
+max_frequency_hz = 60e3
+"""  # fmt: skip
+
+
+def export_in_space(folder: Path, name: str, body: BuiltBody) -> dict[str, object]:
+    """A body of SPACE as matrices whose files name the freedoms by labels; the new table."""
+    rng = np.random.default_rng(len(name))
+    assert body.mesh is not None
+    numbers = rng.permutation(np.arange(1, len(body.points) + 1))
+    freedoms = rng.permutation(body.size)
+    for role in ("mass", "damping", "stiffness"):
+        matrix = getattr(body, role)[freedoms][:, freedoms]
+        sio.mmwrite(folder / f"{name}-{role}.mtx", sp.coo_array(matrix), precision=17)
+    labels = "\n".join(f"{numbers[f // 3]}, {'xyz'[f % 3]}" for f in freedoms)
+    (folder / f"{name}.txt").write_text(labels, encoding="utf-8")
+    rows = ["*NODE"] + [f"{numbers[k]}, " + ", ".join(repr(float(x)) for x in p) for k, p in enumerate(body.points)]
+    rows.append("*ELEMENT, TYPE=C3D8, ELSET=all")
+    cells = body.mesh.cells["hexahedron"]
+    rows += [f"{k + 1}, " + ", ".join(str(numbers[n]) for n in cell) for k, cell in enumerate(cells)]
+    faces = ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+    for side in body.mesh.boundaries:
+        inside = set(body.mesh.boundary_nodes(side).tolist())
+        rows.append(f"*SURFACE, NAME={side}")
+        for k, cell in enumerate(cells):
+            rows += [f"{k + 1}, S{f + 1}" for f, face in enumerate(faces) if {cell[n] for n in face} <= inside]
+    (folder / f"{name}.inp").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    files = [{"file": str(folder / f"{name}-{role}.mtx"), "role": role} for role in ("mass", "damping", "stiffness")]
+    return {
+        "type": "matrices",
+        "terms": files,
+        "labels": str(folder / f"{name}.txt"),
+        "mesh": str(folder / f"{name}.inp"),
+    }
+
+
+@pytest.mark.parametrize("names", [("slider",), ("plate",), ("slider", "block"), ("slider", "block", "plate")])
+def test_masters_slaves_and_bonded_bodies_in_space(tmp_path: Path, names: tuple[str, ...]):
+    meshed = st.loads(SPACE)
+    bodies = build_bodies(meshed)
+    changes: dict[str, object] = {}
+    for name in names:
+        table = export_in_space(tmp_path, name, bodies[name])
+        changes[f"bodies.{name}"] = table | ({"sliding": {"velocity": [1.0, 0.2, 0.0]}} if name == "slider" else {})
+    imported = meshed.with_(changes)
+    assert not st.build_system(imported).general
+    assert_same_modes(meshed, imported, rel=1e-9)
+    assert st.steady_sliding(imported).normal_force.sum() == pytest.approx(48.4, rel=1e-9)

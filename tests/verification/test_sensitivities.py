@@ -1,0 +1,300 @@
+"""Derivatives of eigenvalues against solving again, closed forms, and what is said where there are none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg as sl
+
+from benches import paper_case
+from solid_cases import case, slider
+from stridor.case import Case, loads
+from stridor.errors import CaseError
+from stridor.modal.complex_modes import complex_modes
+from stridor.modal.derivatives import by_release, solve_mode
+from stridor.study.analyses import modes
+from stridor.study.damping_map import damping_map
+from stridor.study.sensitivities import Linearised, number_at, sensitivities
+from stridor.system import build_system
+
+pytestmark = pytest.mark.verification
+
+# One mass, two springs, a belt: the minimal model of Hoffmann, Fischer, Allgaier and Gaul (2002) with the dashpots of
+# Hoffmann and Gaul (2003). K = [[k_x + 20, −20], [−20 + μ k_c, k_c + 20]], the sign of μ that of the belt.
+MINIMAL = """
+[bodies.m]
+type = "mass"
+mass = 1.0
+position = [0.0, 0.0]
+[bodies.belt]
+type = "obstacle"
+shape = "flat"
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+sliding = { velocity = [1.0, 0.0] }
+[springs.oblique]
+between = ["m", "ground"]
+direction = [-0.7071067811865476, 0.7071067811865476]
+stiffness = 40.0
+[springs.x]
+between = ["m", "ground"]
+direction = [1.0, 0.0]
+stiffness = 60.0
+[dashpots.x]
+between = ["m", "ground"]
+direction = [1.0, 0.0]
+damping = 0.1
+[dashpots.y]
+between = ["m", "ground"]
+direction = [0.0, 1.0]
+damping = 0.1
+[loads.weight]
+at = "m"
+force = [0.0, -10.0]
+[contacts.rub]
+slave = "m"
+master = "belt"
+stiffness = 100.0
+friction = { law = "coulomb", coefficient = 0.1 }
+[modal]
+friction_range = [0.0, 2.0]
+max_frequency_hz = 5.0
+"""
+
+
+def minimal_matrices(mu, kx=60.0, kc=100.0, cx=0.1, cy=0.1):
+    stiffness = np.array([[kx + 20.0, -20.0 + mu * kc], [-20.0, 20.0 + kc]])
+    # The belt drags the mass to +x with μ times the normal force −k_c y.
+    return np.diag([cx, cy]), stiffness
+
+
+def minimal_growth(mu, **values):
+    damping, stiffness = minimal_matrices(mu, **values)
+    state = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, -damping]])
+    return float(sl.eigvals(state).real.max())
+
+
+def bisected(cx, cy, kx=60.0, top=2.0):
+    """The lowest μ with growth, by dense eigenvalues alone."""
+    grid = np.linspace(0.0, top, 4001)
+    first = next((k for k, mu in enumerate(grid) if minimal_growth(mu, cx=cx, cy=cy, kx=kx) > 1e-12), None)
+    if first is None:
+        return np.nan
+    low, high = grid[first - 1], grid[first]
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (low, middle) if minimal_growth(middle, cx=cx, cy=cy, kx=kx) > 1e-13 else (middle, high)
+    return (low + high) / 2
+
+
+def differences(model: Case, path: str, value: float, mu: float, found, count: int, damped: bool, step=3e-4):
+    """dλ/dp (b,) of fourth order, every eigenvalue solved again."""
+
+    def at(x: float) -> np.ndarray:
+        friction = path in ("mu", "contacts.rub.friction.coefficient", "contacts.A.friction.coefficient")
+        varied, there = (model, x) if friction else (model.with_({path: x}), mu)
+        again = complex_modes(build_system(varied), there, count=count, damped=damped).eigenvalues[0]
+        return np.array([again[np.argmin(np.abs(again - lam))] for lam in found])
+
+    h = step * abs(value)
+    return (8 * (at(value + h) - at(value - h)) - (at(value + 2 * h) - at(value - 2 * h))) / (12 * h)
+
+
+def assert_derivatives(model, paths, mu, *, count, damped, tolerance, modes="unstable"):
+    result = sensitivities(model, paths, mu=mu, count=count, damped=damped, modes=modes)
+    assert len(result.branch)
+    assert result.residual.max() < 1e-12
+    for k, path in enumerate(paths):
+        numeric = differences(model, path, result.values[k], mu, result.eigenvalues, count + 2, damped)
+        # What a number hardly does cannot be seen in differences of rounded eigenvalues.
+        least = 1e-5 * np.abs(result.eigenvalues / result.values[k])
+        error = np.abs(result.derivative[k] - numeric) / np.maximum(np.abs(result.derivative[k]), least)
+        assert error.max() < tolerance, (path, error)
+    return result
+
+
+# -- against solving again --------------------------------------------------------------------------------------------
+BEAMS = ["mu", "contacts.A.friction.coefficient", "materials.steel.young_modulus", "materials.steel.density"]
+BEAMS += ["bodies.beam1.thickness", "bodies.beam1.width"]
+
+
+@pytest.mark.parametrize("stiffness", [1e9, "rigid"])
+@pytest.mark.parametrize("damped", [True, False])
+def test_two_beams(stiffness, damped):
+    model = paper_case(
+        contacts__A__stiffness=stiffness, bodies__beam1__elements=6, bodies__beam2__elements=18,
+        bodies__beam1__damping__stiffness=1e-7, bodies__beam1__damping__mass=300.0,
+    )  # fmt: skip
+    paths = BEAMS + ([] if stiffness == "rigid" else ["contacts.A.stiffness"])
+    paths += ["bodies.beam1.damping.mass", "bodies.beam1.damping.stiffness"] if damped else []
+    assert_derivatives(model, paths, 0.45, count=14, damped=damped, tolerance=2e-6)
+
+
+SOLIDS = ["mu", "materials.steel.density", "materials.steel.poisson_ratio"]
+
+
+@pytest.mark.parametrize("stiffness", [1e13, "rigid"])
+@pytest.mark.parametrize("damped", [True, False])
+def test_solids(stiffness, damped):
+    model = case(slider(space=False, stiffness=stiffness)).with_(
+        {
+            "bodies.block.damping": {"mass": 100.0, "stiffness": 1e-8},
+            "bodies.slider.damping": {"mass": 50.0, "stiffness": 3e-8},
+        }
+    )
+    paths = ["mu", "bodies.block.thickness"] if damped else [*SOLIDS, "bodies.block.thickness"]
+    paths += [] if stiffness == "rigid" else ["contacts.rub.stiffness"]
+    paths += ["bodies.slider.damping.stiffness"] if damped else []
+    assert_derivatives(model, paths, 0.6, count=4, damped=damped, tolerance=1e-6)
+
+
+def test_compliance_of_rigid_contact_is_the_limit_of_stiff_contact():
+    soft = sensitivities(case(slider(space=False, stiffness=1e18)), ["contacts.rub.stiffness"], mu=0.6, count=8)
+    rigid = sensitivities(case(slider(space=False)), ["contacts.rub.compliance"], mu=0.6, count=8)
+    # d/d(1/K) = −K² d/dK
+    np.testing.assert_allclose(rigid.derivative[0, :2], -1e36 * soft.derivative[0, :2], rtol=1e-3)
+
+
+def test_each_contact_by_itself_adds_up_to_all():
+    model = case(slider(space=False, stiffness=1e13))
+    both = sensitivities(model, ["mu", "contacts.rub.friction.coefficient"], mu=0.6, count=8, modes="all")
+    np.testing.assert_allclose(both.derivative[0], both.derivative[1], rtol=1e-12)
+
+
+# -- closed form ------------------------------------------------------------------------------------------------------
+def test_minimal_model_in_closed_form():
+    model = loads(MINIMAL)
+    mu, kx, kc = 0.42, 60.0, 100.0
+    found = sensitivities(model, ["mu", "springs.x.stiffness", "contacts.rub.stiffness"], mu=mu, damped=False)
+    assert found.eigenvalues[0].real > 0
+    lam = found.eigenvalues[0]
+    # Λ = −λ²: Λ² − (a + b) Λ + a b − 20 (20 − μ k_c) = 0 with a = k_x + 20, b = k_c + 20.
+    a, b, big = kx + 20, kc + 20, -(lam**2)
+    assert abs(big**2 - (a + b) * big + a * b - 20 * (20 - mu * kc)) < 1e-9 * abs(big) ** 2
+    by_big = 2 * big - (a + b)
+    for place, by_number in enumerate((20 * kc, -big + b, -big + a + 20 * mu)):
+        np.testing.assert_allclose(found.derivative[place, 0], -by_number / by_big / (-2 * lam), rtol=1e-9)
+    # The exceptional point is where the discriminant vanishes, (a − b)² = 80 (μ k_c − 20): μ = 0.4, linear in μ.
+    np.testing.assert_allclose(found.exceptional[0, 0], 0.4, rtol=1e-2)
+
+
+def test_close_to_an_onset_it_says_that_derivatives_diverge():
+    model = loads(MINIMAL)
+    near = sensitivities(model, ["mu"], mu=0.404, damped=False)
+    assert near.condition[0] > 5 * sensitivities(model, ["mu"], mu=0.6, damped=False).condition[0] / 3
+    np.testing.assert_allclose(near.exceptional[0, 0], 0.4, rtol=1e-4)
+    np.testing.assert_allclose(near.exceptional_distance[0, 0], 0.004 / 0.404, rtol=2e-2)
+    assert len(near.warnings) == 1
+    assert "near an exceptional point, estimated at mu = 0.4 (0.99 % away)" in near.warnings[0]
+    # λ ~ √(μ − 0.4): ten times nearer, √10 times steeper.
+    nearer = sensitivities(model, ["mu"], mu=0.4004, damped=False)
+    ratio = nearer.derivative[0, 0].real / near.derivative[0, 0].real
+    np.testing.assert_allclose(ratio, np.sqrt(10), rtol=1e-2)
+
+
+def test_right_vectors_in_place_of_left_ones_give_other_numbers():
+    """The mutation that a symmetric mind makes: it must not pass."""
+    linear = Linearised.of(case(slider(space=False, stiffness=1e13)), 0.6, count=8)
+    column = linear.columns("unstable")[0]
+    mode, change = linear.known(column), linear.change("bodies.block.thickness")
+    slope = mode.right.motion @ (2 * mode.eigenvalue * (linear.terms.mass @ mode.right.motion))
+    wrong = -change.form(mode.eigenvalue, mode.right, mode.right) / slope
+    right = mode.derivative(change)
+    assert abs(wrong - right) > 0.05 * abs(right)
+
+
+@pytest.mark.parametrize("stiffness", [1e13, "rigid"])
+def test_contact_taken_away_where_it_matters_little(stiffness):
+    linear = Linearised.of(case(slider(space=False, stiffness=stiffness)), 0.6, count=8, damped=False)
+    terms, place = linear.terms, len(linear.terms.compliance) - 1
+    kept = np.arange(place)
+    mass, stiff = terms.mass.toarray(), terms.stiffness.toarray()
+    normal, push = terms.normal.toarray()[kept], terms.push.toarray()[kept]
+    if stiffness == "rigid":
+        trial, test = sl.null_space(normal), sl.null_space(push)
+        square = sl.eigvals(test.T @ stiff @ trial, test.T @ mass @ trial)
+    else:
+        square = sl.eigvals(stiff + push.T @ (normal / terms.compliance[kept][:, None]), mass)
+    lam = np.sqrt(-square + 0j)
+    lam = np.concatenate([lam, -lam])
+    checked = 0
+    for column in linear.columns("all"):
+        mode = linear.known(column)
+        moved = by_release(terms, mode, [np.array([place])], linear.gap(column))[0]
+        if abs(moved) < 2e-3 * abs(mode.eigenvalue) and abs(moved) > 1e-7 * abs(mode.eigenvalue):
+            actual = lam[np.argmin(np.abs(lam - mode.eigenvalue - moved))] - mode.eigenvalue
+            assert abs(moved - actual) < 0.03 * abs(actual)
+            checked += 1
+    assert checked
+
+
+# -- the map of damping -----------------------------------------------------------------------------------------------
+def test_map_of_damping_is_that_of_dense_bisection():
+    model = loads(MINIMAL)
+    found = damping_map(
+        model, "dashpots.x.damping", "dashpots.y.damping", x_range=[0.05, 0.3, 1.0, 2.0], y_range=[0.05, 0.6, 1.5]
+    )
+    assert found.undamped_mu == pytest.approx(0.4, rel=1e-9)
+    for i, j in np.ndindex(found.onset_mu.shape):
+        cx, cy = found.x_values[i], found.y_values[j]
+        assert found.onset_mu[i, j] == pytest.approx(bisected(cx, cy), rel=1e-7)
+        for slope, dx, dy in ((found.slope_x, 1e-5, 0.0), (found.slope_y, 0.0, 1e-5)):
+            numeric = (bisected(cx + dx, cy + dy) - bisected(cx - dx, cy - dy)) / 2e-5
+            assert slope[i, j] == pytest.approx(numeric, rel=1e-4, abs=1e-6)
+    # Hoffmann and Gaul (2003): damping of one of the two modes alone lowers the onset, below that without damping.
+    assert found.more_x_lowers[1, 0]
+    assert not found.more_x_lowers[0, 2]
+    assert found.below_undamped[3, 0]
+    assert not found.below_undamped[3, 2]
+
+
+def test_map_has_no_slopes_where_nothing_is_damped():
+    found = damping_map(
+        loads(MINIMAL), "dashpots.x.damping", "dashpots.y.damping", x_range=[0.0, 0.1, 0.2], y_range=[0.0, 0.1, 0.2]
+    )
+    assert found.onset_mu[0, 0] == pytest.approx(0.4)
+    assert np.isnan(found.slope_x[0, 0])
+    assert np.isfinite(found.slope_x[1, 1])
+
+
+# -- what is said -----------------------------------------------------------------------------------------------------
+def test_paths_that_lead_to_no_number():
+    model = loads(MINIMAL)
+    for path in ("springs.x.between", "springs.z.stiffness", "title", "contacts.rub.friction.law"):
+        with pytest.raises(CaseError, match="number of the case"):
+            sensitivities(model, [path], mu=0.5)
+    assert number_at(model, "bodies.m.mass") == 1.0
+    with pytest.raises(CaseError, match="branches from 1 to 2"):
+        sensitivities(model, ["mu"], mu=0.5, modes=[7])
+
+
+def test_nothing_unstable_is_said():
+    quiet = sensitivities(loads(MINIMAL), ["mu"], mu=0.1)
+    assert len(quiet.branch) == 0
+    assert quiet.warnings == ("no mode is unstable at μ = 0.1: name branches to see what stable ones do",)
+    assert quiet.to_json()["modes"] == []
+
+
+def test_documents_and_datasets():
+    found = sensitivities(loads(MINIMAL), ["mu", "dashpots.x.damping"], mu=0.6)
+    data = found.to_dataset()
+    assert data["growth_derivative"].shape == (2, 1)
+    part = found.to_json()["modes"][0]["parameters"][0]
+    assert part["growth_per_percent"] == pytest.approx(0.006 * found.of("mu")[0].real)
+
+
+def test_a_number_that_starts_from_zero():
+    model = loads(MINIMAL).with_({"dashpots.x.damping": 0.0})
+    found = sensitivities(model, ["dashpots.x.damping"], mu=0.6)
+    again = [modes(model.with_({"dashpots.x.damping": d}), 0.6).eigenvalues[0] for d in (0.0, 1e-5)]
+    place = int(np.argmax(again[0].real))
+    np.testing.assert_allclose(found.derivative[0, 0], (again[1] - again[0])[place] / 1e-5, rtol=1e-4)
+    assert np.isnan(found.growth_per_percent[0, 0])
+
+
+def test_solving_for_a_mode_from_a_rough_guess():
+    linear = Linearised.of(case(slider(space=False)), 0.6, count=8, damped=False)
+    column = linear.columns("unstable")[0]
+    lam = complex(linear.eigenvalues[column])
+    again = solve_mode(linear.terms, lam * (1 + 1e-8), linear.gap(column))
+    assert abs(again.eigenvalue - lam) < 1e-9 * abs(lam)
