@@ -9,9 +9,11 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 
+from benches import paper_case
 from solid_cases import bench_as_solids, case
 from stridor.errors import AnalysisError, CaseError
 from stridor.modal.complex_modes import complex_modes
+from stridor.modal.onsets import onsets
 from stridor.modal.parametric import Parameter, ParametricProblem, Term, contact_parameters, reduce
 from stridor.modal.parametric.basis import residual
 from stridor.modal.parametric.dense import _by_companion, dense_modes
@@ -273,3 +275,16 @@ def test_what_a_case_refuses():
     ):
         with pytest.raises(CaseError, match=message):
             reduced_model(given, box)
+
+
+def test_onsets_of_the_published_bench_from_the_reduced_model():
+    """Where modes meet, growth opens like a root: all three crossings are found, as the solved ones have them."""
+    bench = paper_case()
+    reduced = reduced_model(bench, {"mu": (0.0, 0.3), "contact_stiffness": (0.5, 2.0)}, max_frequency_hz=40e3)
+    found = onsets_along(reduced, "mu")
+    solved = onsets(build_system(bench), (0.0, 0.3), max_frequency_hz=40e3).onsets
+    assert [o.value for o in found] == pytest.approx([o.mu for o in solved], rel=1e-10)
+    assert [o.frequency_hz for o in found] == pytest.approx([o.frequency_hz for o in solved], rel=1e-10)
+    assert [o.growth_slope for o in found] == pytest.approx([o.growth_slope for o in solved], rel=1e-4)
+    assert max(o.residual for o in found) < 1e-14
+    assert len(found) == 3

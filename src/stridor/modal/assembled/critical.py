@@ -108,7 +108,7 @@ def _distinct(found: list[Onset]) -> list[Onset]:
 
 
 @dataclass(frozen=True)
-class _Solved:
+class Solved:
     """An onset of the projected problem: μ, λ on the axis, and how the instability opens."""
 
     mu: float
@@ -124,9 +124,9 @@ def _located(
     """The onset of a passage, the basis enriched until it satisfies the sparse problem; None where it was none or lies
     outside what is wanted."""
     problem = reduced.problem
-    solve = {"crossing": _crossing, "meeting": _meeting, "divergence": _divergence}[passage.kind]
-    best: tuple[float, _Solved] | None = None
-    solved: _Solved | None = None
+    solve = {"crossing": crossing, "meeting": _meeting, "divergence": _divergence}[passage.kind]
+    best: tuple[float, Solved] | None = None
+    solved: Solved | None = None
     for _ in range(ROUNDS):
         again = None if solved is None or passage.kind != "crossing" else _crossing_again(reduced, passage, solved)
         solved = solve(reduced, passage) if again is None else again
@@ -154,14 +154,14 @@ def _located(
     return _onset(reduced, passage, solved, error)
 
 
-def _is_wanted(solved: _Solved, wanted: tuple[float, float], max_frequency_hz: float, slack: float = 0.0) -> bool:
+def _is_wanted(solved: Solved, wanted: tuple[float, float], max_frequency_hz: float, slack: float = 0.0) -> bool:
     """Whether an onset is in the range of μ, a little beyond it where slack is given, and below the frequency."""
     low, high = wanted
     beyond = slack * (high - low)
     return low - beyond <= solved.mu <= high + beyond and abs(solved.lam.imag) <= 2 * np.pi * max_frequency_hz
 
 
-def _onset(reduced: Reduced, passage: Passage, solved: _Solved, error: float) -> Onset:
+def _onset(reduced: Reduced, passage: Passage, solved: Solved, error: float) -> Onset:
     still = abs(solved.lam) <= NEAR_AXIS * reduced.frequency
     stabilising = passage.stabilising if solved.slope is None else solved.slope < 0
     partner = passage.branch if still else passage.partner
@@ -199,7 +199,7 @@ def pair_near(coordinate: ComplexArray, place: complex) -> tuple[complex, comple
     return halves(*coordinate[near])
 
 
-def _meeting(reduced: Reduced, passage: Passage) -> _Solved | None:
+def _meeting(reduced: Reduced, passage: Passage) -> Solved | None:
     """Where two undamped modes meet: their squared half difference passes through zero, with a finite slope."""
     width = passage.high - passage.low
     quick = _quick_meeting(reduced, passage)
@@ -222,10 +222,10 @@ def _meeting(reduced: Reduced, passage: Passage) -> _Solved | None:
     step = min(1e-4 * max(mu, 1e-3), 0.25 * width)
     slope = (square(mu + step) - square(mu - step)) / (2 * step)
     omega = float(np.sqrt(-mean.real))
-    return _Solved(mu, 1j * omega, float(np.sqrt(abs(slope)) / (2 * omega)))
+    return Solved(mu, 1j * omega, float(np.sqrt(abs(slope)) / (2 * omega)))
 
 
-def _quick_meeting(reduced: Reduced, passage: Passage) -> _Solved | None:
+def _quick_meeting(reduced: Reduced, passage: Passage) -> Solved | None:
     """The same by Newton from the middle of the passage; None where that does not settle inside it."""
     mean = (passage.means[0] + passage.means[1]) / 2
     if not mean.real < 0:
@@ -244,10 +244,10 @@ def _quick_meeting(reduced: Reduced, passage: Passage) -> _Solved | None:
     opens = -square.real if passage.stabilising else square.real
     if not (inside and near and on_axis and opens > 0):
         return None
-    return _Solved(float(mu.real), 1j * abs(lam.imag), float(np.sqrt(opens)))
+    return Solved(float(mu.real), 1j * abs(lam.imag), float(np.sqrt(opens)))
 
 
-def _divergence(reduced: Reduced, passage: Passage) -> _Solved | None:
+def _divergence(reduced: Reduced, passage: Passage) -> Solved | None:
     """Where λ² of an undamped mode passes through zero."""
 
     def square(mu: float) -> float:
@@ -260,10 +260,10 @@ def _divergence(reduced: Reduced, passage: Passage) -> _Solved | None:
         return None
     step = min(1e-4 * max(mu, 1e-3), 0.25 * (passage.high - passage.low))
     slope = (square(mu + step) - square(mu - step)) / (2 * step)
-    return _Solved(mu, 0j, float(np.sqrt(abs(slope))))
+    return Solved(mu, 0j, float(np.sqrt(abs(slope))))
 
 
-def _crossing(reduced: Reduced, passage: Passage) -> _Solved | None:
+def crossing(reduced: Reduced, passage: Passage) -> Solved | None:
     """Where the growth rate of a damped mode passes through zero."""
     found = _quick_crossing(reduced, passage)
     if found is None:
@@ -273,17 +273,17 @@ def _crossing(reduced: Reduced, passage: Passage) -> _Solved | None:
         return None
     mu, lam, slope = found
     still = abs(lam) <= NEAR_AXIS * reduced.frequency
-    return _Solved(mu, 0j if still else lam, None, slope)
+    return Solved(mu, 0j if still else lam, None, slope)
 
 
-def _crossing_again(reduced: Reduced, passage: Passage, solved: _Solved) -> _Solved | None:
+def _crossing_again(reduced: Reduced, passage: Passage, solved: Solved) -> Solved | None:
     """The same crossing with the basis as it is now, from where it was; None where it has gone."""
     right, left = reduced.null_vectors(solved.lam, solved.mu)
     found = axis_crossing(reduced, solved.mu, solved.lam, right, left, passage.low, passage.high)
     if found is None or (found[2] < 0) != passage.stabilising:
         return None
     mu, lam, slope = found
-    return _Solved(mu, 0j if abs(lam) <= NEAR_AXIS * reduced.frequency else 1j * lam.imag, None, slope)
+    return Solved(mu, 0j if abs(lam) <= NEAR_AXIS * reduced.frequency else 1j * lam.imag, None, slope)
 
 
 def _quick_crossing(reduced: Reduced, passage: Passage) -> tuple[float, complex, float] | None:

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...errors import AnalysisError, CaseError
 from ...typing import Array, ComplexArray
+from ..assembled.critical import crossing
 from ..assembled.follow import Follower, State
-from ..assembled.local import axis_crossing
 from ..assembled.passages import Passage, crossings
 from ..assembled.reduced import Reduced
 from ..assembled.shifted import Pair
@@ -140,18 +140,14 @@ def _same(one: ParametricOnset, other: ParametricOnset, length: float) -> bool:
 
 def _located(along: _Along, model: ReducedModel, passage: Passage) -> ParametricOnset | None:
     """The onset of a passage in the reduced problem; None where it was none, or above the model's frequency."""
-    place = int(passage.old.place[passage.branch])
-    right, left = passage.old.found.right[:, place], passage.old.found.left[:, place]
-    start = passage.old.values[passage.branch]
-    middle = (passage.low + passage.high) / 2
-    found = axis_crossing(along, middle, complex(start), right, left, passage.low, passage.high)
-    if found is None or abs(found[1]) > model.frequency:
+    found = crossing(along, passage)
+    if found is None or found.slope is None or abs(found.lam) > model.frequency:
         return None
-    t, lam = found[:2]
+    t, lam = found.mu, found.lam
     if not 0 <= t <= along.high - along.low:
         return None
     point = along.at(t)
-    slope, name = found[2], along.parameter
+    slope, name = found.slope, along.parameter
     return ParametricOnset(
         name, point[name], point, abs(lam.imag) / (2 * np.pi), slope, slope < 0, None, point[name]
     )
