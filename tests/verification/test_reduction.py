@@ -14,7 +14,7 @@ from solid_cases import bench_as_solids, case
 from stridor.errors import AnalysisError, CaseError
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.onsets import onsets
-from stridor.modal.parametric import Parameter, ParametricProblem, Term, contact_parameters, reduce
+from stridor.modal.parametric import Parameter, ParametricProblem, Term, contact_parameters, craig_bampton, reduce
 from stridor.modal.parametric.basis import residual
 from stridor.modal.parametric.dense import _by_companion, dense_modes
 from stridor.modal.parametric.full import verified
@@ -288,3 +288,22 @@ def test_onsets_of_the_published_bench_from_the_reduced_model():
     assert [o.growth_slope for o in found] == pytest.approx([o.growth_slope for o in solved], rel=1e-4)
     assert max(o.residual for o in found) < 1e-14
     assert len(found) == 3
+
+
+def test_craig_bampton_says_how_wrong_it_is():
+    bench = case(bench_as_solids(across=(1, 1), along=(6, 12)))
+    problem = contact_parameters(build_system(bench), (0.0, 0.3))
+    point = problem.point({"mu": 0.2, "contact_stiffness": 1.3})
+    exact = eigenvalues(problem, point)
+    errors = []
+    for beyond in (1.5, 8.0, 30.0):
+        model = craig_bampton(problem, 9e3, beyond=beyond)
+        found = model.modes(point)
+        inner = np.abs(found.values) < 0.95 * model.frequency
+        away = (np.abs(found.values[:, None] - exact).min(axis=1) / np.abs(found.values))[inner]
+        assert np.all(away <= found.error[inner] + 1e-9)
+        errors.append(away.max())
+    assert errors[0] > 5 * errors[1] > 25 * errors[2]
+    assert errors[2] < 1e-5
+    with pytest.raises(CaseError, match=r"interface: 0 – 1 to 1500 freedoms"):
+        craig_bampton(problem, 9e3, interface=np.zeros(0, dtype=int))

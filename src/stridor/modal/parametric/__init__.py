@@ -1,5 +1,6 @@
 """Problems with parameters, reduced once and solved in milliseconds everywhere in their box."""
 
+from .component import craig_bampton
 from .contacts import contact_parameters
 from .full import FullModes, verified
 from .model import ReducedModel, ReducedModes
@@ -16,6 +17,7 @@ __all__ = [
     "ReducedModes",
     "Term",
     "contact_parameters",
+    "craig_bampton",
     "onsets_along",
     "reduce",
     "verified",

@@ -35,7 +35,7 @@ WEAKEST = 1e-3  # of the strongest direction of a block of residuals: what waits
 LEFT_OUT = 1e-2  # of a unit vector: new directions smaller than this are not worth a column
 SKETCH, NONZEROS = 300, 4  # rows of the random embedding, entries in each of its columns
 PASSED = 0.3  # of the bound: what an estimate at a point of the grid may be
-SAFETY = 10.0
+SAFETY = 10.0  # the constant of error estimates over the largest one seen
 MOST_POINTS = 40
 
 
@@ -74,12 +74,12 @@ def reduce(
         raise CaseError("bound", bound, "a relative error from 1e-13 to 1")
     frequency = 2 * np.pi * max_frequency_hz
     work = _Work()
-    mass, stiffness = _symmetric_parts(problem)
+    mass, stiffness = symmetric_parts(problem)
     operator = sp.csr_array(stiffness + (SHIFT * frequency) ** 2 * mass)
     scale = 1.0 / np.sqrt(np.abs(operator.diagonal()))
     default = tuple(5 if len(problem.parameters) == 1 else 3 for _ in problem.parameters)
     points = problem.corners(counts or default)
-    embedding = _embedding(problem.size, scale)
+    embedding = embedding_of(problem.size, scale)
     with factorise(operator, symmetric=True, solver=solver) as factor:
         work.lap("factorisation")
         start = _krylov(factor, mass, stiffness, frequency, work)
@@ -102,7 +102,7 @@ def reduce(
     return _cut(basis, points, frequency, bound, work)
 
 
-def _symmetric_parts(problem: ParametricProblem) -> tuple[Sparse, Sparse]:
+def symmetric_parts(problem: ParametricProblem) -> tuple[Sparse, Sparse]:
     """Symmetric parts of M and K (n, n) at the middle of the box.
 
     Raises AnalysisError for a stiffness that has none to speak of.
@@ -252,7 +252,7 @@ def _cut(
         shots += [real_and_imaginary(found.right), real_and_imaginary(found.left)]
     left, size, _ = sl.svd(np.hstack(shots), full_matrices=False)
     work.lap("snapshots")
-    between = _between(problem, points)
+    between = points_between(problem)
     exact = [_modes(basis, point, frequency)[1].values for point in between]
     cut = 3e-4
     while True:
@@ -279,7 +279,7 @@ def _cut(
     )
 
 
-def _between(problem: ParametricProblem, points: list[dict[str, float]]) -> list[dict[str, float]]:
+def points_between(problem: ParametricProblem) -> list[dict[str, float]]:
     """As many points as a box has sides and one more, in no relation to the grid."""
     rng = np.random.default_rng(SEED)
     count = 2 * len(problem.parameters) + 1
@@ -287,7 +287,7 @@ def _between(problem: ParametricProblem, points: list[dict[str, float]]) -> list
     return [problem.point([float(v) for v in low + (high - low) * rng.random(len(low))]) for _ in range(count)]
 
 
-def _embedding(size: int, scale: Array) -> Sparse:
+def embedding_of(size: int, scale: Array) -> Sparse:
     """Θ D^{-1/2} (s, n) with a sparse sign embedding Θ: NONZEROS entries ±1/√NONZEROS in each column."""
     rng = np.random.default_rng(SEED)
     place: IntArray = rng.integers(0, SKETCH, size=(size, NONZEROS))
