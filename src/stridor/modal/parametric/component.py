@@ -16,7 +16,7 @@ import scipy.sparse.linalg as ssl
 
 from ...direct import Factor, factorise
 from ...errors import AnalysisError, CaseError
-from ...threads import one_thread_if_small
+from ...threads import one_thread
 from ...typing import Array, IntArray, Sparse
 from .basis import Basis, expanded, residual
 from .dense import assembled, dense_modes
@@ -28,7 +28,7 @@ WIDEST = 1500  # interface freedoms that can be kept
 MOST_MODES = 800
 
 
-@one_thread_if_small
+@one_thread
 def craig_bampton(
     problem: ParametricProblem,
     max_frequency_hz: float,

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...direct import factorise
 from ...errors import AnalysisError
+from ...threads import one_thread
 from ...typing import Array, ComplexArray
 from ..quadratic.problem import Quadratic
 from .basis import times
@@ -32,6 +33,7 @@ class FullModes:
     shift: Array
 
 
+@one_thread
 def verified(
     model: ReducedModel, values: Mapping[str, float] | Sequence[float], *, which: str = "unstable",
     solver: str | None = None,

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from .basis import expanded
 from .dense import DenseModes, assembled, dense_modes
@@ -80,6 +81,7 @@ class ReducedModel:
         """Number of unknowns r."""
         return int(self.projected.shape[1])
 
+    @one_thread
     def modes(self, values: Mapping[str, float] | Sequence[float]) -> ReducedModes:
         """All modes up to the promised frequency at a point of the box. Raises CaseError for unknown parameters."""
         point = self.problem.point(values)

@@ -20,7 +20,7 @@ import scipy.sparse as sp
 
 from ...direct import Factor, factorise
 from ...errors import AnalysisError, CaseError
-from ...threads import one_thread_if_small
+from ...threads import one_thread
 from ...typing import Array, ComplexArray, IntArray, Sparse
 from .basis import Basis, Indefinite, expanded, real_and_imaginary, residual
 from .dense import DenseModes, assembled, dense_modes
@@ -53,7 +53,7 @@ class _Work:
         self._last = now
 
 
-@one_thread_if_small
+@one_thread
 def reduce(
     problem: ParametricProblem,
     max_frequency_hz: float,

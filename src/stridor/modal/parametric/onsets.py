@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import AnalysisError, CaseError
+from ...threads import one_thread
 from ...typing import Array, ComplexArray
 from ..assembled.critical import crossing
 from ..assembled.follow import Follower, State
@@ -100,6 +101,7 @@ def factor_slopes(problem: ParametricProblem, point: Mapping[str, float], name: 
     return (problem.factors({**point, name: high}) - problem.factors({**point, name: low})) / (high - low)
 
 
+@one_thread
 def onsets_along(
     model: ReducedModel,
     parameter: str,

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...direct import Factor, SingularMatrix, factorise
 from ...errors import AnalysisError
+from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from .count import undamped_count, unknown
 from .dense import all_modes
@@ -74,6 +75,7 @@ class Spectrum:
     memory_bytes: int
 
 
+@one_thread
 def find_modes(
     problem: Quadratic, region: Region, *, left: bool = False, tolerance: float = 1e-10, solver: str | None = None,
     guess: Any = None, count: bool | None = None, hint: bool = False,
