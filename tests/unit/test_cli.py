@@ -361,3 +361,38 @@ def test_what_no_memory_holds_is_refused_with_numbers(folder: Path, item: str) -
     assert done.returncode == 2
     assert "GB of records" in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_reduce_solves_anywhere_in_the_box_and_confirms_onsets(folder: Path) -> None:
+    words = ["reduce", "two-beams.toml", "--box", "mu=0:0.3", "--box", "contact_stiffness=0.5:2", "--quiet"]
+    found = document(stridor(*words, "--at", "mu=0.05,0.1", "--onsets", "mu", "--json", cwd=folder))
+    assert [round(o["value"], 6) for o in found["onsets"]] == [0.076725, 0.137734, 0.167096]
+    assert [p["point"]["mu"] for p in found["modes"]] == [0.05, 0.1]
+    assert max(found["modes"][1]["growth_rate"]) == pytest.approx(637.328, abs=1e-2)
+    shown = stridor(*words, "--at", "mu=0.1", "--out", "here", cwd=folder)
+    assert "unstable" in shown.stdout
+    assert (folder / "here" / "reduced.csv").read_text().count("\n") == 19
+    for wrong, message in (
+        (["--box", "mu"], "stridor: --box: 'mu' – NAME=… such as mu=0:0.6"),
+        (["--box", "mu=0.3:0.1"], "stridor: box.mu: "),
+        (["--box", "mu=0:0.1", "--at", "nu=1"], "stridor: values: 'nu' – no such parameter; there are: mu"),
+    ):
+        refused = stridor("reduce", "two-beams.toml", *wrong, "--quiet", cwd=folder)
+        assert refused.returncode == 2
+        assert refused.stderr.startswith(message)
+
+
+def test_what_a_change_would_do(folder: Path) -> None:
+    found = document(
+        stridor(
+            "sensitivities", "two-beams.toml", "--mu", "0.1", "--parameter", "contacts.A.stiffness", "--json", "--quiet",
+            cwd=folder,
+        )
+    )  # fmt: skip
+    assert found
+    assert (folder / "two-beams.out" / "sensitivities.png").exists()
+    ranked = stridor("countermeasures", "two-beams.toml", "--mu", "0.1", "--verify", "0", "--quiet", cwd=folder)
+    assert ranked.returncode == 0, ranked.stderr
+    assert "raise materials.steel.density by 5 %" in ranked.stdout
+    calm = stridor("countermeasures", "two-beams.toml", "--mu", "0.01", "--quiet", cwd=folder)
+    assert calm.stdout == "no mode is unstable at μ = 0.01: there is nothing to remove\n"

@@ -54,7 +54,11 @@ def countermeasure_bars(result: Countermeasures, *, ax: Axes | None = None) -> F
     _names(ax, [m.words for m in measures])
     if measures:
         # Changes of a damping differ by decades from those of a mass.
-        ax.set_xscale("symlog", linthresh=measures[-1].removed_per_percent, linscale=0.5)
+        least = measures[-1].removed_per_percent
+        ax.set_xscale("symlog", linthresh=least, linscale=0.5)
+        ax.set_xlim(0.0, 1.6 * max([m.removed_per_percent for m in measures] + [v for _, v in checked]))
+        # Zero would be written into the first decade's label.
+        ax.set_xticks([t for t in ax.get_xticks() if t >= least])
     for k, measure in enumerate(measures):
         ax.text(1.01, k, significant(measure.removed_per_percent, 3), transform=ax.get_yaxis_transform(), va="center")
     ax.axvline(0.0, color=INK, linewidth=0.8)
@@ -99,7 +103,8 @@ def damping_map(result: DampingMap, *, ax: Axes | None = None) -> Figure:
             _hatched(ax, result, np.where(lowers, slope, np.maximum(slope, 0.0)).T, hatch, colour)
             handles.append(Patch(facecolor=TEAL, edgecolor=colour, hatch=hatch, label=f"more {name} lowers it"))
     ax.set(xlabel=result.x, ylabel=result.y)
-    legend_above(ax, handles, columns=2)
+    # Paths are long: one to a line, or the legend is wider than the map.
+    legend_above(ax, handles, columns=1)
     return figure
 
 
