@@ -53,7 +53,7 @@ def by_hand(problem: Quadratic, shift: complex, radius: float, count: int) -> di
                 u, w = pair.reshape(2, n, 1)
                 force = times(problem.mass, 2 * shift * radius * u + radius**2 * w)
                 force = force + radius * times(problem.damping, u)
-                return np.concatenate([-factor.solve(force[:, 0]), u[:, 0]])
+                return np.concatenate([-factor.solve(force[:, 0], refine=False), u[:, 0]])
 
             start = time.perf_counter()
             operator = spl.LinearOperator((2 * n, 2 * n), matvec=apply, dtype=complex)
