@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
+from scipy.io import mmwrite
 
 from benches import paper_case
 from solid_cases import bench_as_solids, case
+from stridor.case import load
 from stridor.errors import AnalysisError, CaseError
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.onsets import onsets
@@ -307,3 +309,25 @@ def test_craig_bampton_says_how_wrong_it_is():
     assert errors[2] < 1e-5
     with pytest.raises(CaseError, match=r"interface: 0 – 1 to 1500 freedoms"):
         craig_bampton(problem, 9e3, interface=np.zeros(0, dtype=int))
+
+
+def test_matrices_in_a_turning_frame(tmp_path):
+    """m·1, 2Ωm·[[0, −1], [1, 0]] and K − Ω²m whirl at ω₀ ± Ω, whatever K."""
+    net = sp.block_diag([grid(4), grid(4)])
+    turn = sp.kron(np.array([[0.0, -1.0], [1.0, 0.0]]), sp.eye_array(16))
+    for name, matrix in (("M", sp.eye_array(32)), ("G", turn), ("K", net)):
+        mmwrite(tmp_path / f"{name}.mtx", sp.coo_matrix(matrix))
+    path = tmp_path / "rotor.toml"
+    path.write_text(
+        "[parameters]\nOmega = { value = 0.2, range = [0.1, 0.5] }\n[modal]\nmax_frequency_hz = 0.3\n"
+        '[matrices]\nterms = [{ file = "M.mtx", role = "mass" }, { file = "K.mtx", role = "stiffness" },\n'
+        '{ file = "G.mtx", role = "damping", factor = "2*Omega" },\n'
+        '{ file = "M.mtx", role = "stiffness", factor = "-Omega**2" }]\n'
+    )
+    model = reduced_model(load(path), {"Omega": (0.1, 0.5)})
+    own = np.sqrt(np.linalg.eigvalsh(grid(4).toarray()))
+    for omega in (0.1, 0.23, 0.5):
+        whirl = np.sort(np.concatenate([own - omega, own + omega]))
+        found = np.sort(model.modes({"Omega": omega}).values.imag)
+        assert found == pytest.approx(whirl[(whirl > 0) & (whirl < model.frequency)], rel=1e-8)
+        assert len(found) > 10

@@ -107,7 +107,12 @@ def reduce(
     case: CaseFile,
     box: Annotated[
         list[str] | None,
-        typer.Option("--box", metavar="NAME=LOW:HIGH", help="A range: mu, contact_stiffness or a number's path."),
+        typer.Option(
+            "--box",
+            metavar="NAME=LOW:HIGH",
+            help="A range of mu, contact_stiffness, a parameter or a number's path. Repeatable "
+            "[default: the ranges of [parameters], else mu over modal.friction_range].",
+        ),
     ] = None,
     along: Annotated[str | None, typer.Option("--onsets", metavar="NAME", help="Solve for onsets along it.")] = None,
     at: Annotated[
@@ -127,8 +132,10 @@ def reduce(
     from .output import print_json, say, table
 
     loaded = load_case(case, set_, quiet=quiet)
-    ranges = {name: pair(text, f"--box {name}") for name, text in (_named(item, "--box") for item in box or ["mu="])}
-    if not box:
+    ranges = {name: pair(text, f"--box {name}") for name, text in (_named(item, "--box") for item in box or ())}
+    if not ranges:
+        ranges = {name: p.range for name, p in loaded.parameters.items() if p.range is not None}
+    if not ranges:
         ranges = {"mu": loaded.modal.friction_range}
     model = reduced_model(loaded, ranges, max_frequency_hz=max_frequency, bound=bound)
     say(f"{model.problem.size} freedoms reduced to {model.size} in {sum(model.seconds.values()):.2f} s", quiet=quiet)

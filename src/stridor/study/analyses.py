@@ -122,8 +122,8 @@ def structured(case: Case, what: str, mu: float | None = None) -> System:
     if system.general:
         raise AnalysisError(
             f"{what} needs symmetric matrices and a positive definite mass, and {system.general}; what works for these "
-            "is `stridor modes` (with --mu 0.1,0.2 or --set parameters.NAME.value=… for other values) and "
-            "`stridor steady`"
+            "is `stridor modes` (with --mu 0.1,0.2 or --set parameters.NAME.value=… for other values), `stridor reduce "
+            "--onsets NAME` and `stridor steady`"
         )
     return system
 

@@ -27,9 +27,9 @@ def reduced_model(
     """One factorisation's worth of work, then every mode for all values in the box in milliseconds.
 
     box: ranges by name: "mu" (of all contacts), "contact_stiffness" (a factor of all contact stiffnesses), or the path
-    of any number of the case, as in an override ("materials.lining.young_modulus", "bodies.disc.damping.stiffness",
-    "parameters.Omega.value"). max_frequency_hz: modes up to there (default: modal.max_frequency_hz). bound: relative
-    error of the eigenvalues. The nodes that touch are those of steady sliding in the case as it is.
+    of any number of the case, as in an override ("materials.lining.young_modulus", "bodies.disc.damping.stiffness"), or
+    one of [parameters] by its name. max_frequency_hz: modes up to there (default: modal.max_frequency_hz). bound:
+    relative error of the eigenvalues. The nodes that touch are those of steady sliding in the case as it is.
 
     Raises CaseError for ranges and names that are none and for rigid contact; AnalysisError where matrices depend on a
     number in no simple way, or the bound is not reached.
@@ -60,13 +60,16 @@ def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> Pa
         elif name == STIFFNESS:
             of_contacts.append(stiffness_range(between))
         else:
-            of_case.append(Parameter(name, *(float(v) for v in between), value=(between[0] + between[1]) / 2))
+            low, high = (float(v) for v in between)
+            own = case.parameters[name].value if name in case.parameters else (low + high) / 2
+            of_case.append(Parameter(name, low, high, value=own if low <= own <= high else (low + high) / 2))
     system = build_system(case)
     if of_contacts and not system.contact_nodes().count:
         raise CaseError(f"box.{of_contacts[0].name}", None, "the case has no contacts; give a range of another number")
 
     def matrices_at(values: Mapping[str, float]) -> Mapping[Role, Sparse]:
-        found = build_system(case.with_(dict(values))) if values else system
+        changes = {f"parameters.{k}.value" if k in case.parameters else k: v for k, v in values.items()}
+        found = build_system(case.with_(changes)) if values else system
         if found.size != system.size:
             raise CaseError("box", ", ".join(values), "changes the number of freedoms; give numbers that do not")
         return {"mass": found.mass, "damping": found.damping, "stiffness": found.stiffness}
