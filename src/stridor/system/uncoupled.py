@@ -115,16 +115,35 @@ def _solve_block(part: IntArray, m: Array, c: Array, k: Array) -> RealBlock | Co
     coupling = np.abs(product - np.diag(diagonal)).max()
     if coupling <= PROPORTIONAL_TOLERANCE * max(np.abs(product).max(), 1e-300):
         return RealBlock(part, vectors, stiffness, diagonal)
-    return _complex_block(part, m, c, k)
+    return _complex_block(part, vectors / np.sqrt(masses), np.maximum(stiffness, 0.0), c)
 
 
-def _complex_block(part: IntArray, m: Array, c: Array, k: Array) -> ComplexBlock:
+def _complex_block(part: IntArray, vectors: Array, squares: Array, c: Array) -> ComplexBlock:
+    """Poles and shapes from undamped modes (n, n) of unit modal mass and their ω² (n,).
+
+    Matrices of beams span so many decades that the QZ algorithm loses poles to infinity. In modal coordinates the
+    states ωq and q̇ make a matrix that is skew but for damping; what rounding in its largest entries does to the low
+    poles is taken out again by their Rayleigh functional.
+    """
     size = len(part)
-    zero = np.zeros((size, size))
-    a = np.block([[c, m], [m, zero]])
-    b = np.block([[k, zero], [zero, -m]])
-    poles, right = sl.eig(-b, a)
-    x = right[:size]
+    damping = vectors.T @ (c @ vectors)
+    omega = np.sqrt(squares)
+    scale = np.maximum(omega, 1e-3 * float(np.median(omega)) + 1e-300)  # rigid motions have ω = 0
+    states = np.zeros((2 * size, 2 * size))
+    states[:size, size:] = np.diag(scale)
+    states[size:, :size] = -np.diag(squares / scale)
+    states[size:, size:] = -damping
+    poles, right = sl.eig(states)
+    q = right[:size] / scale[:, None]
+    with np.errstate(all="ignore"):
+        for _ in range(3):
+            # qᵀP(λ)q = 0 of a symmetric problem.
+            mass, drag = np.einsum("ij,ij->j", q, q), np.einsum("ij,ij->j", q, damping @ q)
+            stiff = np.einsum("ij,i,ij->j", q, squares, q)
+            change = (poles**2 * mass + poles * drag + stiff) / (2 * poles * mass + drag)
+            # A double root has no simple functional: leave it as it is.
+            sound = np.isfinite(change) & (np.abs(change) <= 1e-3 * np.abs(poles))
+            poles = np.where(sound, poles - change, poles)
     # Symmetric pencil: the left vector is the right one; xᵀ(2λM + C)x = 1 makes residues of D⁻¹.
-    norms = np.einsum("ij,ij->j", x, m @ x) * 2 * poles + np.einsum("ij,ij->j", x, c @ x)
-    return ComplexBlock(part, x / np.sqrt(norms), poles)
+    norms = np.einsum("ij,ij->j", q, 2 * poles * q + damping @ q)
+    return ComplexBlock(part, vectors @ (q / np.sqrt(norms)), poles)
