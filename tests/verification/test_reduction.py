@@ -292,6 +292,15 @@ def test_onsets_of_the_published_bench_from_the_reduced_model():
     assert len(found) == 3
 
 
+def rounding(model, found) -> np.ndarray:
+    """What a change of every stiffness by its last digit does to λ (k,), relative: no double precision is better."""
+    full = model.problem.at(found.point)
+    x, y = model.expand(found), model.expand(found, left=True)
+    slope = np.einsum("ij,ij->j", y, 2 * found.values * (full.mass @ x) + full.damping @ x)
+    terms = np.einsum("ij,ij->j", np.abs(y), abs(full.stiffness) @ np.abs(x))
+    return np.finfo(float).eps * terms / np.abs(found.values * slope)
+
+
 def test_craig_bampton_says_how_wrong_it_is():
     bench = case(bench_as_solids(across=(1, 1), along=(6, 12)))
     problem = contact_parameters(build_system(bench), (0.0, 0.3))
@@ -303,7 +312,7 @@ def test_craig_bampton_says_how_wrong_it_is():
         found = model.modes(point)
         inner = np.abs(found.values) < 0.95 * model.frequency
         away = (np.abs(found.values[:, None] - exact).min(axis=1) / np.abs(found.values))[inner]
-        assert np.all(away <= found.error[inner] + 1e-9)
+        assert np.all(away <= (found.error + rounding(model, found))[inner])
         errors.append(away.max())
     assert errors[0] > 5 * errors[1] > 25 * errors[2]
     assert errors[2] < 1e-5

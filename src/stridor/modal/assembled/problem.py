@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from ...system import System
 from ...typing import Array, ComplexArray, IntArray, Sparse
+from ..quadratic.problem import times
 from .steady import Options, Steadiness, steadiness, touching_nodes
 
 CHUNK = 64  # columns worked on at a time
@@ -166,13 +167,6 @@ class ContactProblem:
         # A mode that hardly opens gaps at all (in the plane of the interface) leaves nothing but rounding there.
         reach = np.maximum(reach, NEGLIGIBLE * size.max(axis=0))
         return np.maximum(error, closure / tiny(reach))
-
-
-def times(matrix: Sparse, block: Any) -> Any:
-    """matrix @ block for a real sparse matrix and a real or complex block (n, k), in real arithmetic."""
-    if block.dtype.kind != "c":
-        return matrix @ block
-    return matrix @ np.ascontiguousarray(block.real) + 1j * (matrix @ np.ascontiguousarray(block.imag))
 
 
 def tiny(values: Array) -> Array:

@@ -9,6 +9,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ...typing import Array, IntArray, Sparse
+from ..quadratic.problem import times
 from .problem import ParametricProblem
 
 START = 200
@@ -123,13 +124,6 @@ def _support(matrix: Sparse) -> tuple[IntArray, IntArray, Sparse]:
         return every, every, csr
     columns = np.unique(csr.indices)
     return rows, columns, sp.csr_array(csr[rows][:, columns])
-
-
-def times(matrix: Sparse, block: Any) -> Any:
-    """matrix @ block of a real matrix, in real arithmetic."""
-    if block.dtype.kind != "c":
-        return matrix @ block
-    return matrix @ np.ascontiguousarray(block.real) + 1j * (matrix @ np.ascontiguousarray(block.imag))
 
 
 def residual(

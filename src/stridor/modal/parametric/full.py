@@ -11,8 +11,7 @@ from ...direct import factorise
 from ...errors import AnalysisError
 from ...threads import one_thread
 from ...typing import Array, ComplexArray
-from ..quadratic.problem import Quadratic
-from .basis import times
+from ..quadratic.problem import Quadratic, times
 from .model import ReducedModel
 
 STEPS = 20

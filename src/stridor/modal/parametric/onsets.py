@@ -17,7 +17,7 @@ from ..assembled.follow import Follower, State
 from ..assembled.passages import Passage, crossings
 from ..assembled.reduced import Reduced
 from ..assembled.shifted import Pair
-from .basis import times
+from ..quadratic.problem import times
 from .dense import assembled
 from .full import refined
 from .model import ReducedModel

@@ -42,7 +42,7 @@ class Quadratic:
 
     def residual(self, lam: ComplexArray, x: ComplexArray) -> ComplexArray:
         """P(λ)x (n, k) of λ (k,) and x (n, k)."""
-        return lam**2 * _times(self.mass, x) + lam * _times(self.damping, x) + _times(self.stiffness, x)
+        return lam**2 * times(self.mass, x) + lam * times(self.damping, x) + times(self.stiffness, x)
 
     def backward_error(self, lam: ComplexArray, x: ComplexArray) -> Array:
         """‖P(λ)x‖∞ / ‖(|λ|²|M| + |λ||D| + |K|)|x|‖∞ (k,)."""
@@ -57,8 +57,8 @@ class Quadratic:
         return result
 
 
-def _times(matrix: Sparse, block: Any) -> Any:
-    """matrix @ block of a real matrix, in real arithmetic."""
+def times(matrix: Sparse, block: Any) -> Any:
+    """matrix @ block for a real sparse matrix and a real or complex block (n, k), in real arithmetic."""
     if block.dtype.kind != "c":
         return matrix @ block
     return matrix @ np.ascontiguousarray(block.real) + 1j * (matrix @ np.ascontiguousarray(block.imag))

@@ -23,7 +23,7 @@ DOUBLE, INT = ir.DoubleType(), ir.IntType(64)
 DOUBLE_BYTES = 8
 BYTE = ir.IntType(8).as_pointer()
 READ_SOON = [ir.Constant(ir.IntType(32), v) for v in (0, 3, 1)]  # to be read, kept in all caches, data
-AHEAD = 1152  # numbers of the matrix fetched ahead of use: measured, 1.2 to 1.5 times as fast as without
+AHEAD = 1152  # numbers of the matrix fetched ahead of use: the fastest of 0 to 3456 that were tried on hex8 blocks
 
 
 def _rows(d: int) -> Any:
