@@ -10,8 +10,6 @@ nodes in contact and the directions of slip are those of steady sliding at one f
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -19,7 +17,8 @@ from ...errors import CaseError
 from ...system import System
 from ..assembled.problem import problem_of
 from ..assembled.steady import Options
-from .problem import Parameter, ParametricProblem, Term, constant
+from .factors import CONSTANT, Product
+from .problem import Parameter, ParametricProblem, Term
 
 FRICTION, STIFFNESS = "mu", "contact_stiffness"
 
@@ -46,13 +45,8 @@ def contact_terms(
             "friction_damping and prestress off and take Coulomb friction",
         )
     own = _own(system) if mu is None else mu
-
-    def stiffness(values: Mapping[str, float]) -> float:
-        return values.get(STIFFNESS, 1.0)
-
-    def friction(values: Mapping[str, float]) -> float:
-        return values.get(FRICTION, own) * values.get(STIFFNESS, 1.0)
-
+    stiffness = Product(((STIFFNESS, 1.0),))
+    friction = Product(((FRICTION, own), (STIFFNESS, 1.0)))
     rows = sp.csr_array(sp.diags_array(1.0 / problem.compliance) @ problem.normal)
     return (
         Term(sp.csr_array(problem.normal.T @ rows), "stiffness", stiffness, symmetric=True),
@@ -85,9 +79,9 @@ def contact_parameters(
     """
     mu, factor = friction_range(friction), stiffness_range(stiffness)
     terms = [
-        Term(system.mass, "mass", constant, symmetric=True),
-        Term(system.damping, "damping", constant, symmetric=True),
-        Term(system.stiffness, "stiffness", constant, symmetric=True),
+        Term(system.mass, "mass", CONSTANT, symmetric=True),
+        Term(system.damping, "damping", CONSTANT, symmetric=True),
+        Term(system.stiffness, "stiffness", CONSTANT, symmetric=True),
         *contact_terms(system, mu=None, touching_at=touching_at),
     ]
     return ParametricProblem(tuple(t for t in terms if t.matrix.nnz), (mu, factor))

@@ -16,7 +16,8 @@ import scipy.sparse as sp
 
 from ...errors import AnalysisError
 from ...typing import Array, Sparse
-from .problem import Parameter, Role, Term, constant
+from .factors import CONSTANT, Factor, Lagrange
+from .problem import Parameter, Role, Term
 
 MOST_POINTS = 6  # of one parameter
 EXACT = 1e-10  # of the largest entry: what interpolation may leave
@@ -44,7 +45,7 @@ def interpolated_terms(matrices_at: Matrices, parameters: tuple[Parameter, ...])
         middle = at()[role]
         grids = {p.name: grid for p in parameters if (grid := _points(at, role, p)) is not None}
         if not grids:
-            terms += _term(middle, role, constant)
+            terms += _term(middle, role, CONSTANT)
             continue
         for chosen in product(*(range(len(g)) for g in grids.values())):
             values = {name: float(grid[k]) for (name, grid), k in zip(grids.items(), chosen, strict=True)}
@@ -55,7 +56,7 @@ def interpolated_terms(matrices_at: Matrices, parameters: tuple[Parameter, ...])
     return tuple(terms)
 
 
-def _term(matrix: Sparse, role: Role, factor: Callable[[Mapping[str, float]], float]) -> list[Term]:
+def _term(matrix: Sparse, role: Role, factor: Factor) -> list[Term]:
     csr = sp.csr_array(matrix)
     if not csr.nnz or not np.any(csr.data):
         return []
@@ -81,18 +82,9 @@ def _points(at: Callable[..., Mapping[Role, Sparse]], role: Role, parameter: Par
     )
 
 
-def _weight(places: Mapping[str, tuple[Array, int]]) -> Callable[[Mapping[str, float]], float]:
+def _weight(places: Mapping[str, tuple[Array, int]]) -> Lagrange:
     """Product of Lagrange's polynomials, each one at its own point and zero at the others."""
-
-    def weight(values: Mapping[str, float]) -> float:
-        result = 1.0
-        for name, (grid, k) in places.items():
-            for j, other in enumerate(grid):
-                if j != k:
-                    result *= (values[name] - other) / (grid[k] - other)
-        return float(result)
-
-    return weight
+    return Lagrange(tuple((name, tuple(float(g) for g in grid), k) for name, (grid, k) in places.items()))
 
 
 def _away(one: Any, other: Any) -> float:

@@ -83,7 +83,7 @@ class _Along(Reduced):
 
     def _change(self, mu: float) -> tuple[Array, Array, Array]:
         problem = self._model.problem
-        slopes = factor_slopes(problem, self.at(mu), self.parameter)
+        slopes = problem.factor_slopes(self.at(mu), self.parameter)
         return assembled(self._model.projected, slopes, problem.powers)
 
 
@@ -91,14 +91,6 @@ def _applied(matrices: tuple[Array, Array, Array], lam: ComplexArray, z: Complex
     mass, damping, stiffness = matrices
     result: ComplexArray = lam**2 * (mass @ z) + lam * (damping @ z) + stiffness @ z
     return result
-
-
-def factor_slopes(problem: ParametricProblem, point: Mapping[str, float], name: str) -> Array:
-    """Derivatives (t,) of the terms' factors over one parameter, by central differences within its range."""
-    (own,) = (p for p in problem.parameters if p.name == name)
-    step = 1e-6 * (own.high - own.low)
-    low, high = max(point[name] - step, own.low), min(point[name] + step, own.high)
-    return (problem.factors({**point, name: high}) - problem.factors({**point, name: low})) / (high - low)
 
 
 @one_thread
@@ -187,7 +179,7 @@ def _full_slope(
     problem: ParametricProblem, point: Mapping[str, float], name: str, lam: complex, x: ComplexArray, y: ComplexArray
 ) -> float:
     """dRe λ/dp of the full problem, from right and left vectors (n,)."""
-    slopes = factor_slopes(problem, point, name)
+    slopes = problem.factor_slopes(point, name)
     change = sum(
         s * lam**power * (y @ times(t.matrix, x))
         for t, s, power in zip(problem.terms, slopes, problem.powers.tolist(), strict=True)

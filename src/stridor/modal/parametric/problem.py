@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from ...errors import CaseError
 from ...typing import Array, Sparse
 from ..quadratic.problem import Quadratic
+from .factors import Factor
 
 Role = Literal["mass", "damping", "stiffness"]
 POWERS: Mapping[Role, int] = {"mass": 2, "damping": 1, "stiffness": 0}
@@ -38,18 +39,14 @@ class Parameter:
 class Term:
     """A matrix (n, n) csr and its factor at values of the parameters, in the mass, damping or stiffness.
 
-    symmetric: Aᵀ = A; stored once here so that nobody has to find out again.
+    factor: any function of the parameters by name; one of `factors` has exact derivatives and can be saved. symmetric:
+    Aᵀ = A; stored once here so that nobody has to find out again.
     """
 
     matrix: Sparse
     role: Role
     factor: Callable[[Mapping[str, float]], float]
     symmetric: bool = False
-
-
-def constant(_: Mapping[str, float]) -> float:
-    """The factor of a matrix that no parameter changes."""
-    return 1.0
 
 
 @dataclass(frozen=True)
@@ -93,6 +90,19 @@ class ParametricProblem:
     def factors(self, values: Mapping[str, float]) -> Array:
         """Factors (t,) of the terms."""
         return np.array([t.factor(values) for t in self.terms], dtype=float)
+
+    def factor_slopes(self, values: Mapping[str, float], name: str) -> Array:
+        """Derivatives (t,) of the factors over one parameter; of plain functions by differences within its range."""
+        (own,) = (p for p in self.parameters if p.name == name)
+        step = 1e-6 * (own.high - own.low)
+        low, high = max(values[name] - step, own.low), min(values[name] + step, own.high)
+
+        def slope(factor: Callable[[Mapping[str, float]], float]) -> float:
+            if isinstance(factor, Factor):
+                return factor.slope(values, name)
+            return (factor({**values, name: high}) - factor({**values, name: low})) / (high - low)
+
+        return np.array([slope(t.factor) for t in self.terms], dtype=float)
 
     def at(self, values: Mapping[str, float] | Sequence[float]) -> Quadratic:
         """The problem at values of the parameters."""
