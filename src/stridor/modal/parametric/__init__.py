@@ -2,6 +2,7 @@
 
 from .component import craig_bampton
 from .contacts import contact_parameters
+from .correct import CorrectedModes, Corrector
 from .full import FullModes, verified
 from .model import ReducedModel, ReducedModes
 from .offline import reduce
@@ -9,6 +10,8 @@ from .onsets import ParametricOnset, onsets_along
 from .problem import Parameter, ParametricProblem, Term
 
 __all__ = [
+    "CorrectedModes",
+    "Corrector",
     "FullModes",
     "Parameter",
     "ParametricOnset",

@@ -17,21 +17,26 @@ ANSWERS = 6
 
 @dataclass(frozen=True)
 class DenseModes:
-    """λ (k,) with Im λ ≥ 0 ascending, right and left vectors (r, k) of unit length, yᵀP(λ) = 0."""
+    """λ (k,) with Im λ ≥ 0 ascending, right and left vectors (r, k) of unit length, yᵀP(λ) = 0. whole: whether it took
+    the whole companion matrix."""
 
     values: ComplexArray
     right: ComplexArray
     left: ComplexArray
+    whole: bool = True
 
 
-def dense_modes(mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float) -> DenseModes:
+def dense_modes(
+    mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float, *, whole: bool = False
+) -> DenseModes:
     """Eigenpairs of (λ²M + λD + K) z = 0 with |λ| ≤ reach · frequency [1/s]; real λ of either sign are among them.
 
-    Raises AnalysisError where the matrices are singular or not finite.
+    whole: take the whole companion matrix at once, where damping is known to be too strong for anything cheaper. Raises
+    AnalysisError where the matrices are singular or not finite.
     """
     with np.errstate(all="ignore"):
         try:
-            found = _by_undamped(mass, damping, stiffness, frequency, reach)
+            found = None if whole else _by_undamped(mass, damping, stiffness, frequency, reach)
             if found is None:
                 found = _by_companion(mass, damping, stiffness, frequency, reach)
         except (ValueError, sl.LinAlgError) as error:
@@ -39,7 +44,7 @@ def dense_modes(mass: Array, damping: Array, stiffness: Array, frequency: float,
     order = np.lexsort((found.values.real, found.values.imag))
     right, left = found.right[:, order], found.left[:, order]
     return DenseModes(
-        found.values[order], right / np.linalg.norm(right, axis=0), left / np.linalg.norm(left, axis=0)
+        found.values[order], right / np.linalg.norm(right, axis=0), left / np.linalg.norm(left, axis=0), found.whole
     )
 
 
@@ -119,7 +124,7 @@ def _with_damping(
             break
     else:
         return None
-    return None if np.any(np.abs(lam) > reach * frequency * 1.001) else DenseModes(lam, z, w)
+    return None if np.any(np.abs(lam) > reach * frequency * 1.001) else DenseModes(lam, z, w, whole=False)
 
 
 def _rest(lam: ComplexArray, z: ComplexArray, mass: Array, damping: Array, stiffness: Array) -> ComplexArray:

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
+
 from ...case.expression import Expression, parse_expression
+from ...typing import Array
 
 
 @runtime_checkable
@@ -121,6 +124,121 @@ class Formula:
         return {"kind": "formula", "text": self.text, "names": list(self.names), "fixed": [list(f) for f in self.fixed]}
 
 
+@dataclass(frozen=True)
+class Times:
+    """A product of factors of any kind."""
+
+    parts: tuple[Factor, ...]
+
+    def __call__(self, values: Mapping[str, float], /) -> float:
+        result = 1.0
+        for part in self.parts:
+            result *= part(values)
+        return result
+
+    def slope(self, values: Mapping[str, float], name: str) -> float:
+        """Its derivative over one parameter."""
+        total = 0.0
+        for k, part in enumerate(self.parts):
+            own = part.slope(values, name)
+            if own:
+                total += own * Times(self.parts[:k] + self.parts[k + 1 :])(values)
+        return total
+
+    def to_json(self) -> dict[str, Any]:
+        """What `factor_from_json` makes the same factor of."""
+        return {"kind": "times", "parts": [part.to_json() for part in self.parts]}
+
+
+def product_of(one: Factor, other: Factor) -> Factor:
+    """The product of two factors, as simple as it can be."""
+    if isinstance(one, Product) and isinstance(other, Product):
+        return Product(tuple(sorted(one.names + other.names)))
+    if one == CONSTANT or other == CONSTANT:
+        return other if one == CONSTANT else one
+    parts = tuple(p for f in (one, other) for p in (f.parts if isinstance(f, Times) else (f,)))
+    return Times(parts)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Points at which a function of one parameter is known, as places of polynomials in it or in its logarithm."""
+
+    name: str
+    points: tuple[float, ...]
+    logarithmic: bool = False
+
+    def weights(self, value: float) -> Array:
+        """Lagrange's polynomials (k,) at a value of the parameter (barycentric; Berrut and Trefethen, SIAM Rev. 46)."""
+        away = self._coordinate(value) - self._places
+        hit = np.flatnonzero(away == 0.0)
+        if len(hit):
+            return np.eye(len(away))[hit[0]]
+        share = self._barycentric / away
+        return share / share.sum()
+
+    def slopes(self, value: float) -> Array:
+        """Their derivatives (k,) over the parameter."""
+        x, w = self._places, self._barycentric
+        with np.errstate(divide="ignore"):
+            matrix = w[None, :] / w[:, None] / (x[:, None] - x[None, :])
+        np.fill_diagonal(matrix, 0.0)
+        np.fill_diagonal(matrix, -matrix.sum(axis=1))
+        slopes = self.weights(value) @ matrix
+        return slopes / value if self.logarithmic else slopes
+
+    def _coordinate(self, value: float) -> float:
+        with np.errstate(all="ignore"):
+            return float(np.log(value)) if self.logarithmic else value
+
+    @cached_property
+    def _places(self) -> Array:
+        return np.array([self._coordinate(p) for p in self.points])
+
+    @cached_property
+    def _barycentric(self) -> Array:
+        x = self._places
+        # In units in which products of distances neither grow nor shrink with their number.
+        unit = max(float(np.ptp(x)), 1e-300) / 4
+        apart = (x[:, None] - x[None, :]) / unit
+        np.fill_diagonal(apart, 1.0)
+        return 1.0 / apart.prod(axis=1)
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """Values on a grid of points of one or more parameters, row by row, and polynomials through them."""
+
+    axes: tuple[Axis, ...]
+    values: tuple[float, ...]
+
+    def __call__(self, values: Mapping[str, float], /) -> float:
+        return self._combined([axis.weights(values[axis.name]) for axis in self.axes])
+
+    def slope(self, values: Mapping[str, float], name: str) -> float:
+        """Its derivative over one parameter."""
+        if name not in [axis.name for axis in self.axes]:
+            return 0.0
+        return self._combined(
+            [a.slopes(values[name]) if a.name == name else a.weights(values[a.name]) for a in self.axes]
+        )
+
+    def _combined(self, weights: list[Array]) -> float:
+        table = self._table
+        for own in weights:
+            table = np.tensordot(own, table, axes=1)
+        return float(table)
+
+    @cached_property
+    def _table(self) -> Array:
+        return np.array(self.values).reshape([len(axis.points) for axis in self.axes])
+
+    def to_json(self) -> dict[str, Any]:
+        """What `factor_from_json` makes the same factor of."""
+        axes = [[axis.name, list(axis.points), axis.logarithmic] for axis in self.axes]
+        return {"kind": "tabulated", "axes": axes, "values": list(self.values)}
+
+
 def factor_from_json(document: Mapping[str, Any]) -> Factor:
     """The factor that `to_json` was asked of. Raises ValueError for what is none."""
     try:
@@ -129,6 +247,11 @@ def factor_from_json(document: Mapping[str, Any]) -> Factor:
         if document["kind"] == "formula":
             fixed = tuple((str(name), float(value)) for name, value in document["fixed"])
             return Formula(str(document["text"]), tuple(str(name) for name in document["names"]), fixed)
+        if document["kind"] == "times":
+            return Times(tuple(factor_from_json(part) for part in document["parts"]))
+        if document["kind"] == "tabulated":
+            axes = tuple(Axis(str(n), tuple(float(p) for p in grid), bool(log)) for n, grid, log in document["axes"])
+            return Tabulated(axes, tuple(float(v) for v in document["values"]))
         if document["kind"] == "lagrange":
             return Lagrange(
                 tuple((str(n), tuple(float(g) for g in grid), int(k)) for n, grid, k in document["places"])

@@ -1,13 +1,15 @@
 """Matrices that depend on parameters in whatever way, as sums of fixed ones: interpolated where they are polynomials.
 
-A modulus, a density, a damping factor enter linearly, a thickness to the third power, Ω² − 1 to the second. Matrices
-are made at Chebyshev points of every parameter that changes them, products of them where several do, and polynomials
-through them are exact once enough points are taken; whether they are is tried at points between.
+A modulus, a density, a damping factor enter linearly, a thickness to the third power. Matrices are made at Chebyshev
+points of every parameter that changes them, products of them where several do, and polynomials through them are exact
+once enough points are taken; whether they are is tried at points between. What is known to depend on parameters by a
+factor (a formula, friction) comes with that factor, and only the rest is interpolated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -16,65 +18,101 @@ import scipy.sparse as sp
 
 from ...errors import AnalysisError
 from ...typing import Array, Sparse
-from .factors import CONSTANT, Factor, Lagrange
+from .factors import CONSTANT, Factor, Lagrange, product_of
 from .problem import Parameter, Role, Term
 
 MOST_POINTS = 6  # of one parameter
 EXACT = 1e-10  # of the largest entry: what interpolation may leave
-ROLES: tuple[Role, ...] = ("mass", "damping", "stiffness")
-Matrices = Callable[[Mapping[str, float]], Mapping[Role, Sparse]]
+SYMMETRIC = 1e-13
 
 
-def interpolated_terms(matrices_at: Matrices, parameters: tuple[Parameter, ...]) -> tuple[Term, ...]:
-    """Terms whose sum is what ``matrices_at`` gives for all values of the parameters.
+@dataclass(frozen=True)
+class Piece:
+    """A part of the mass, damping or stiffness and the factor it is known to have."""
 
-    Raises AnalysisError where the dependence is no polynomial of a low degree.
+    matrix: Sparse
+    role: Role
+    factor: Factor = CONSTANT
+
+
+# Values of the parameters that are to be interpolated over → pieces by name, the same names everywhere.
+Pieces = Callable[[Mapping[str, float]], Mapping[str, Piece]]
+
+
+def interpolated_terms(pieces_at: Pieces, parameters: tuple[Parameter, ...]) -> tuple[Term, ...]:
+    """Terms whose sum is what ``pieces_at`` gives for all values of the parameters.
+
+    Raises AnalysisError where a piece is no polynomial of a low degree in them.
     """
     reference = {p.name: p.value for p in parameters}
-    cache: dict[tuple[float, ...], Mapping[Role, Sparse]] = {}
+    cache: dict[tuple[float, ...], Mapping[str, Piece]] = {}
 
-    def at(**changes: float) -> Mapping[Role, Sparse]:
+    def at(**changes: float) -> Mapping[str, Piece]:
         values = {**reference, **changes}
         key = tuple(values[p.name] for p in parameters)
         if key not in cache:
-            cache[key] = matrices_at(values)
+            cache[key] = pieces_at(values)
         return cache[key]
 
     terms: list[Term] = []
-    for role in ROLES:
-        middle = at()[role]
-        grids = {p.name: grid for p in parameters if (grid := _points(at, role, p)) is not None}
+    for name, middle in at().items():
+
+        def matrix_at(name: str = name, **changes: float) -> Sparse:
+            return at(**changes)[name].matrix
+
+        grids = {p.name: grid for p in parameters if (grid := _points(matrix_at, middle.role, p)) is not None}
         if not grids:
-            terms += _term(middle, role, CONSTANT)
+            terms += term_of(middle.matrix, middle.role, middle.factor)
             continue
+        own: list[Term] = []
         for chosen in product(*(range(len(g)) for g in grids.values())):
-            values = {name: float(grid[k]) for (name, grid), k in zip(grids.items(), chosen, strict=True)}
-            weight = _weight({name: (grid, k) for (name, grid), k in zip(grids.items(), chosen, strict=True)})
-            terms += _term(at(**values)[role], role, weight)
+            values = {n: float(grid[k]) for (n, grid), k in zip(grids.items(), chosen, strict=True)}
+            weight = _weight({n: (grid, k) for (n, grid), k in zip(grids.items(), chosen, strict=True)})
+            own += term_of(matrix_at(**values), middle.role, weight)
         between = {p.name: p.low + 0.37 * (p.high - p.low) for p in parameters}
-        _check(terms, role, between, at(**between)[role])
-    return tuple(terms)
+        _check(own, middle.role, between, matrix_at(**between))
+        terms += [Term(t.matrix, t.role, product_of(middle.factor, t.factor), t.symmetric) for t in own]  # type: ignore[arg-type]
+    return merged(terms)
 
 
-def _term(matrix: Sparse, role: Role, factor: Factor) -> list[Term]:
+def term_of(matrix: Sparse, role: Role, factor: Factor) -> list[Term]:
+    """A matrix as a term, none where it is zero."""
     csr = sp.csr_array(matrix)
     if not csr.nnz or not np.any(csr.data):
         return []
-    return [Term(csr, role, factor, symmetric=_away(csr, sp.csr_array(csr.T)) <= 1e-13)]
+    return [Term(csr, role, factor, symmetric=away(csr, sp.csr_array(csr.T)) <= SYMMETRIC)]
 
 
-def _points(at: Callable[..., Mapping[Role, Sparse]], role: Role, parameter: Parameter) -> Array | None:
+def merged(terms: Iterable[Term]) -> tuple[Term, ...]:
+    """The same sum with one term for each factor of each role."""
+    found: dict[tuple[Role, Any], list[Term]] = {}
+    for term in terms:
+        found.setdefault((term.role, term.factor), []).append(term)
+    result: list[Term] = []
+    for (role, factor), same in found.items():
+        if len(same) == 1:
+            result += same
+            continue
+        total = sp.csr_array(sum((t.matrix for t in same[1:]), start=same[0].matrix))
+        if all(t.symmetric for t in same):
+            result.append(Term(total, role, factor, symmetric=True))
+        else:
+            result += term_of(total, role, factor)
+    return tuple(result)
+
+
+def _points(at: Callable[..., Sparse], role: Role, parameter: Parameter) -> Array | None:
     """Points (k,) of a parameter that make its matrix exact, None where it does not change it."""
     name, low, high = parameter.name, parameter.low, parameter.high
     tried = low + 0.37 * (high - low)
-    if all(_away(at(**{name: low})[role], at(**{name: other})[role]) <= 1e-15 for other in (high, tried)):
+    if all(away(at(**{name: low}), at(**{name: other})) <= 1e-15 for other in (high, tried)):
         return None
     for count in range(2, MOST_POINTS + 1):
         grid = (low + high) / 2 - (high - low) / 2 * np.cos(np.pi * np.arange(count) / (count - 1))
         grid[0], grid[-1] = low, high
         weights = [_weight({name: (grid, k)})({name: tried}) for k in range(count)]
-        total = sum(w * at(**{name: float(g)})[role] for w, g in zip(weights, grid, strict=True))
-        if _away(sp.csr_array(total), at(**{name: tried})[role]) <= EXACT:
+        total = sum(w * at(**{name: float(g)}) for w, g in zip(weights, grid, strict=True))
+        if away(sp.csr_array(total), at(**{name: tried})) <= EXACT:
             return grid
     raise AnalysisError(
         f"the {role} does not depend on {name} as a polynomial of degree {MOST_POINTS - 1} or less between {low:g} and "
@@ -87,7 +125,7 @@ def _weight(places: Mapping[str, tuple[Array, int]]) -> Lagrange:
     return Lagrange(tuple((name, tuple(float(g) for g in grid), k) for name, (grid, k) in places.items()))
 
 
-def _away(one: Any, other: Any) -> float:
+def away(one: Any, other: Any) -> float:
     """Largest difference of two matrices over their largest entry."""
     size = max((float(np.abs(sp.csr_array(m).data).max(initial=0.0)) for m in (one, other)), default=0.0)
     difference = sp.csr_array(one - other)
@@ -95,7 +133,6 @@ def _away(one: Any, other: Any) -> float:
 
 
 def _check(terms: list[Term], role: Role, values: Mapping[str, float], truth: Sparse) -> None:
-    mine = [t for t in terms if t.role == role]
-    total = sum((t.factor(values) * t.matrix for t in mine), start=sp.csr_array(truth.shape))
-    if _away(total, truth) > 10 * EXACT:
+    total = sum((t.factor(values) * t.matrix for t in terms), start=sp.csr_array(truth.shape))
+    if away(total, truth) > 10 * EXACT:
         raise AnalysisError(f"the {role} is no product of polynomials in the parameters; vary fewer of them at once")

@@ -63,7 +63,8 @@ class ReducedModes:
 class ReducedModel:
     """Basis V (n, r), projected terms (t, r, r), sketches (t, s, r) of the scaled A_jV and A_jᵀV; frequency [1/s]:
     modes up to it are promised. constant: of the error estimate; bound: the relative error promised in the box;
-    seconds and solves that making it took, by part."""
+    seconds and solves that making it took, by part; whole: damping is so strong that points take the whole companion
+    matrix."""
 
     problem: ParametricProblem
     vectors: Array
@@ -75,6 +76,7 @@ class ReducedModel:
     bound: float
     seconds: Mapping[str, float]
     solves: int
+    whole: bool = False
 
     @property
     def size(self) -> int:
@@ -87,7 +89,7 @@ class ReducedModel:
         point = self.problem.point(values)
         factors, powers = self.problem.factors(point), self.problem.powers
         matrices = assembled(self.projected, factors, powers)
-        found = dense_modes(*matrices, self.frequency, REACH)
+        found = dense_modes(*matrices, self.frequency, REACH, whole=self.whole)
         residual, error = self._judged(matrices, factors, found)
         return ReducedModes(
             point, found.values, residual, error, error <= self.bound, self.problem.inside(point), found.right,

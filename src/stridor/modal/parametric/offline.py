@@ -10,7 +10,6 @@ eigenvalues stay within the bound.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -75,8 +74,7 @@ def reduce(
     frequency = 2 * np.pi * max_frequency_hz
     work = _Work()
     mass, stiffness = symmetric_parts(problem)
-    operator = sp.csr_array(stiffness + (SHIFT * frequency) ** 2 * mass)
-    scale = 1.0 / np.sqrt(np.abs(operator.diagonal()))
+    operator, scale = static_operator(mass, stiffness, frequency)
     default = tuple(5 if len(problem.parameters) == 1 else 3 for _ in problem.parameters)
     points = problem.corners(counts or default)
     embedding = embedding_of(problem.size, scale)
@@ -92,14 +90,21 @@ def reduce(
                 basis.add(start, 1e-6)
                 _first_answers(basis, factor, frequency, work)
                 work.lap("first answers")
-                _enrich(basis, factor, points, scale, frequency, bound, work)
+                passed = _enrich(basis, factor, points, scale, frequency, bound, work)
                 work.lap("enrichment")
                 break
             except Indefinite:
                 continue
         else:
             raise AnalysisError("the mass or the stiffness has no positive diagonal to measure by")
-    return _cut(basis, points, frequency, bound, work)
+    return _cut(basis, passed, frequency, bound, work)
+
+
+def static_operator(mass: Sparse, stiffness: Sparse, frequency: float) -> tuple[Sparse, Array]:
+    """A₀ = K_s + s M_s (n, n) of a band [1/s], and the lengths D^{-1/2} (n,) of its diagonal by which forces are
+    scaled."""
+    operator = sp.csr_array(stiffness + (SHIFT * frequency) ** 2 * mass)
+    return operator, 1.0 / np.sqrt(np.abs(operator.diagonal()))
 
 
 def symmetric_parts(problem: ParametricProblem) -> tuple[Sparse, Sparse]:
@@ -183,34 +188,31 @@ def _first_answers(basis: Basis, factor: Factor, frequency: float, work: _Work) 
         work.solves += force.shape[1]
 
 
-def _modes(basis: Basis, point: Mapping[str, float], frequency: float) -> tuple[Array, DenseModes]:
-    problem = basis.problem
-    factors = problem.factors(point)
-    return factors, dense_modes(*assembled(basis.projected, factors, problem.powers), frequency, MARGIN)
-
-
 def _enrich(
     basis: Basis, factor: Factor, points: list[dict[str, float]], scale: Array, frequency: float, bound: float,
     work: _Work,
-) -> None:  # fmt: skip
+) -> list[DenseModes]:  # fmt: skip
     """Answers to the residuals of one point after the other, the outer ones first, until every mode at every point
-    passes the bound."""
+    passes the bound; the modes that did, on the basis as it was then."""
     problem = basis.problem
     pending = _outer_first(points)
+    passed: list[DenseModes] = []
+    whole = False
     for _ in range(MOST_POINTS):
         if not pending:
-            return
+            return passed
         place = pending.pop(0)
         factors = problem.factors(points[place])
         matrices = assembled(basis.projected, factors, problem.powers)
-        found = dense_modes(*matrices, frequency, MARGIN)
-        lam, powers = found.values, problem.powers
+        found = dense_modes(*matrices, frequency, MARGIN, whole=whole)
+        lam, powers, whole = found.values, problem.powers, found.whole
         sizes = [
             sketched(sketch, factors, powers, lam, vectors)
             for sketch, vectors in ((basis.right_sketch, found.right), (basis.left_sketch, found.left))
         ]
         error = product_over_slope(matrices, found, *sizes)
         if not np.any(error > PASSED * bound):
+            passed.append(found)
             continue
         # Modes far below the bound leave nothing that another point will not ask for.
         chosen = error > 0.01 * bound
@@ -241,19 +243,23 @@ def _outer_first(points: list[dict[str, float]]) -> list[int]:
     return [int(i) for i in np.argsort(-away, kind="stable")]
 
 
-def _cut(
-    basis: Basis, points: list[dict[str, float]], frequency: float, bound: float, work: _Work
-) -> ReducedModel:
+def _cut(basis: Basis, passed: list[DenseModes], frequency: float, bound: float, work: _Work) -> ReducedModel:
     """The basis cut down as far as eigenvalues at points between those it was made for allow."""
     problem = basis.problem
     shots: list[Array] = []
-    for point in points:
-        _, found = _modes(basis, point, frequency)
-        shots += [real_and_imaginary(found.right), real_and_imaginary(found.left)]
+    for found in passed:
+        both = np.hstack([real_and_imaginary(found.right), real_and_imaginary(found.left)])
+        shots.append(np.vstack([both, np.zeros((basis.count - len(both), both.shape[1]))]))
     left, size, _ = sl.svd(np.hstack(shots), full_matrices=False)
-    work.lap("snapshots")
+    whole = passed[-1].whole
     between = points_between(problem)
-    exact = [_modes(basis, point, frequency)[1].values for point in between]
+    exact: list[ComplexArray] = []
+    for point in between:
+        matrices = assembled(basis.projected, problem.factors(point), problem.powers)
+        found = dense_modes(*matrices, frequency, MARGIN, whole=whole)
+        whole = found.whole
+        exact.append(found.values)
+    work.lap("points between")
     cut = 3e-4
     while True:
         turn = left[:, size > cut * size[0]]
@@ -261,7 +267,7 @@ def _cut(
         worst = 0.0
         for point, values in zip(between, exact, strict=True):
             matrices = assembled(projected, problem.factors(point), problem.powers)
-            found = dense_modes(*matrices, frequency, MARGIN).values
+            found = dense_modes(*matrices, frequency, MARGIN, whole=whole).values
             inner = values[np.abs(values) <= frequency]
             if len(inner):
                 away = np.abs(inner[:, None] - found).min(axis=1, initial=np.inf) / np.abs(inner)
@@ -272,10 +278,10 @@ def _cut(
     vectors = basis.vectors @ turn
     work.lap("cut")
     sketches = basis.right_sketch @ turn, basis.left_sketch @ turn
-    constant = _constant(problem, projected, sketches, between, exact, frequency)
+    constant = _constant(problem, projected, sketches, between, exact, frequency, whole)
     work.lap("sketches")
     return ReducedModel(
-        problem, vectors, projected, *sketches, frequency, constant, bound, dict(work.seconds), work.solves
+        problem, vectors, projected, *sketches, frequency, constant, bound, dict(work.seconds), work.solves, whole
     )
 
 
@@ -298,7 +304,7 @@ def embedding_of(size: int, scale: Array) -> Sparse:
 
 def _constant(
     problem: ParametricProblem, projected: Array, sketches: tuple[Array, Array], between: list[dict[str, float]],
-    exact: list[ComplexArray], frequency: float,
+    exact: list[ComplexArray], frequency: float, whole: bool,
 ) -> float:  # fmt: skip
     """The factor of the error estimate: the largest found, kept SAFETY times larger, at least 1 as the inverse of a
     matrix scaled by its diagonal has it."""
@@ -306,7 +312,7 @@ def _constant(
     for point, values in zip(between, exact, strict=True):
         factors = problem.factors(point)
         matrices = assembled(projected, factors, problem.powers)
-        found = dense_modes(*matrices, frequency, 1.0)
+        found = dense_modes(*matrices, frequency, 1.0, whole=whole)
         right, left = (
             sketched(s, factors, problem.powers, found.values, v)
             for s, v in zip(sketches, (found.right, found.left), strict=True)
