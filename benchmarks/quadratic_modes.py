@@ -1,6 +1,7 @@
-"""All modes of a gyroscopic, circulatory block in a band, against shift-invert written by hand with the same factors.
+"""All modes in a band, against shift-invert written by hand with the same factors: a gyroscopic, circulatory block of
+two sizes, and the pad on the disc.
 
-python benchmarks/quadratic_modes.py [--short]   (about 4 500 and 50 000 freedoms; --short: the smaller one only)
+python benchmarks/quadratic_modes.py [--short]   (about 4 500 and 50 000 freedoms; --short: the smallest only)
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
+import stridor as st
 from _common import machine, options
 from assembled_modes import grid
+from stridor.case import template_text
 from stridor.direct import factorise
+from stridor.modal.parametric import contact_parameters
 from stridor.modal.quadratic import Quadratic, Region, Spectrum, find_modes
 from stridor.modal.quadratic.krylov import times
 
@@ -66,16 +70,14 @@ def by_hand(problem: Quadratic, shift: complex, radius: float, count: int) -> di
         return {"seconds": built + spent, "solves": solves, "error": error, "values": lam, "tolerance": tolerance}
 
 
-def compare(cells: tuple[int, int, int], top_hz: float) -> None:
-    problem = block(cells)
-    region = Region.band(0.0, top_hz, above=-2000.0, below=2000.0)
+def compare(name: str, problem: Quadratic, region: Region, neighbour: Quadratic) -> None:
     found: Spectrum = find_modes(problem, region)
     disc = found.completeness.discs[0]
     print(
-        f"{problem.size} freedoms, {len(found.values)} modes up to {top_hz:g} Hz: {found.seconds:.2f} s, "
-        f"{found.factorisations} factorisations, {found.solves} solves, factors {found.memory_bytes / 1e6:.0f} MB, "
-        f"process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:.0f} MB, "
-        f"worst backward error {found.residual.max():.1e}"
+        f"{name}, {problem.size} freedoms, {len(found.values)} modes up to {region.im_max / 2 / np.pi:g} Hz: "
+        f"{found.seconds:.2f} s, {found.factorisations} factorisations, {found.solves} solves, factors "
+        f"{found.memory_bytes / 1e6:.0f} MB, process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:.0f} "
+        f"MB, worst backward error {found.residual.max():.1e}"
     )
     print(f"  {found.completeness.sentence}")
     hand = by_hand(problem, disc.centre, disc.radius, disc.count)
@@ -87,17 +89,30 @@ def compare(cells: tuple[int, int, int], top_hz: float) -> None:
     print(f"  ratio find_modes / by hand: {found.seconds / hand['seconds']:.2f}")
     both = find_modes(problem, region, left=True)
     print(f"  with left vectors {both.seconds:.2f} s, worst backward error {both.left_residual.max():.1e}")  # type: ignore[union-attr]
-    neighbour = find_modes(block(cells, spin=310.0, friction=0.052), region)
-    guessed = find_modes(problem, region, guess=neighbour.right)
+    known = find_modes(neighbour, region)
+    guessed = find_modes(problem, region, guess=known.right)
     print(f"  from the shapes of a neighbouring problem: {guessed.seconds:.2f} s, {guessed.solves} solves")
+
+
+def compare_block(cells: tuple[int, int, int], top_hz: float) -> None:
+    region = Region.band(0.0, top_hz, above=-2000.0, below=2000.0)
+    compare("block", block(cells), region, block(cells, spin=310.0, friction=0.052))
+
+
+def compare_pad() -> None:
+    case = st.loads(template_text("pad-on-disc"))
+    problem = contact_parameters(st.build_system(case), (0.0, 0.6), (0.5, 2.0))
+    region = Region.band(1.0, case.modal.max_frequency_hz, above=-500.0)
+    compare("pad on disc", problem.at(problem.reference), region, problem.at({"mu": 0.32}))
 
 
 def main() -> None:
     chosen = options(__doc__ or "")
     print(machine())
-    compare((15, 10, 8), 40e3)
+    compare_block((15, 10, 8), 40e3)
     if not chosen.short:
-        compare((35, 22, 20), 40e3)
+        compare_block((35, 22, 20), 40e3)
+        compare_pad()
 
 
 if __name__ == "__main__":

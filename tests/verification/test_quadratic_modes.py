@@ -371,7 +371,9 @@ def test_regions():
     band = Region.band(10.0, 100.0, above=-5.0)
     assert band.re_max == math.inf
     assert band.bounded().re_max == pytest.approx(200 * math.pi)
-    assert len(cells(band.bounded())) == 2
+    assert len(cells(band.bounded())) == 1
+    assert len(cells(Region.box(-400.0, 900.0, 0.0, 600.0))) == 3
+    assert len(cells(Region.box(-5.0, 900.0, 0.0, 500.0))) == 2
     assert len(cells(Region.band(10.0, 100.0, above=-5.0, below=5.0))) == 1
     for wrong in ((1, 0, 0, 1), (0, 1, 1, 0), (0, 1, 0, math.inf), (0, 0, 1, 1), (-math.inf, 0, 0, 1)):
         with pytest.raises(ValueError, match="region"):

@@ -13,7 +13,7 @@ from ...typing import BoolArray
 BORDER = 1e-9  # of the region's size: what rounding may put an eigenvalue outside by
 PAD = 0.02  # of the region's size: searched beyond its border, so that no contour need touch an eigenvalue
 STRIP = 0.25  # half width, over its height, of the part beside the imaginary axis that gets shifts of its own
-WORTH = 2.5  # such widths from which on what lies beyond is worth a factorisation
+WORTH = 1.5  # width over height of a region from which on that strip and what lies beyond it get discs of their own
 DEPTH = 8  # bisections at most in telling what discs leave uncovered, along each side
 MARGIN = 1.01  # a disc meant to cover a rectangle is this much larger than it has to be
 
@@ -98,9 +98,9 @@ class Region:
         return replace(self, im_max=at), replace(self, im_min=at)
 
     def shift(self) -> complex:
-        """Where to factorise for it: its middle, but on the imaginary axis where that runs through."""
-        real = 0.0 if self.re_min < 0 < self.re_max else (self.re_min + self.re_max) / 2
-        return complex(real, (self.im_min + self.im_max) / 2)
+        """Where to factorise for it: its middle. Beside the imaginary axis a disc holds fewer of the modes that crowd
+        there than one about a point on it that reaches as far."""
+        return complex((self.re_min + self.re_max) / 2, (self.im_min + self.im_max) / 2)
 
 
 @dataclass(frozen=True)
@@ -121,18 +121,18 @@ class Disc:
 
 
 def cells(region: Region) -> list[Region]:
-    """The rectangles that get a shift each: the strip beside the imaginary axis, where lightly damped modes crowd, and
-    what lies beyond it on either side, where few are expected and a disc costs little.
+    """The rectangles that get a shift each: one for a region that is not much wider than high, else the strip beside
+    the imaginary axis, where lightly damped modes crowd, and what lies beyond it on either side, where few are.
     """
     half = STRIP * region.height
-    if not region.re_min < 0 < region.re_max:
+    if region.width <= WORTH * region.height or not region.re_min < 0 < region.re_max:
         return [region]
-    result = [region]
-    if region.re_max > WORTH * half:
-        result = [replace(region, re_max=half), replace(region, re_min=half)]
-    if region.re_min < -WORTH * half:
-        near = result[0]
-        result = [replace(near, re_min=-half), *result[1:], replace(region, re_max=-half)]
+    strip = replace(region, re_min=max(region.re_min, -half), re_max=min(region.re_max, half))
+    result = [strip]
+    if region.re_max > half:
+        result.append(replace(region, re_min=half))
+    if region.re_min < -half:
+        result.append(replace(region, re_max=-half))
     return result
 
 
