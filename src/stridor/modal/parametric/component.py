@@ -20,8 +20,9 @@ from ...threads import one_thread
 from ...typing import Array, IntArray, Sparse
 from .basis import Basis, expanded, residual
 from .dense import assembled, dense_modes
+from .greedy import SAFETY, random_points
 from .model import ReducedModel, sketched
-from .offline import SAFETY, SHIFT, embedding_of, points_between, symmetric_parts
+from .offline import SHIFT, embedding_of, symmetric_parts
 from .problem import ParametricProblem
 
 WIDEST = 1500  # interface freedoms that can be kept
@@ -84,7 +85,7 @@ def _constant(basis: Basis, factor: Factor, frequency: float) -> float:
     error of λ but for what A₀ is not, over the product of their lengths."""
     problem = basis.problem
     ratio = 0.0
-    for point in points_between(problem):
+    for point in random_points(problem, 2 * len(problem.parameters) + 1):
         factors, powers = problem.factors(point), problem.powers
         matrices = assembled(basis.projected, factors, powers)
         found = dense_modes(*matrices, frequency, 1.0)

@@ -1,0 +1,224 @@
+"""Growing a basis until every point of a box passes, and cutting it down to what passes as well.
+
+Candidates are the points of a grid and some in no relation to it, where errors are measured. A point passes when
+residuals of all its modes say so; else the answers to them join the basis and it is asked again. The basis is cut by
+the singular values of the modes at the points that passed, as far as errors stay small where they are measured and
+error estimates stay within the bound at further points; those that fail there are enriched in turn.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sl
+
+from ...direct import Factor
+from ...errors import AnalysisError
+from ...typing import Array, ComplexArray, IntArray
+from .basis import Basis, expanded, real_and_imaginary, residual
+from .dense import DenseModes, assembled, dense_modes
+from .model import ReducedModel, product_over_slope, sketched
+from .problem import ParametricProblem
+
+SEED = 20061
+MARGIN = 1.03  # modes up to this much above the band are made exact
+WEAKEST = 1e-3  # of the strongest direction of a block of residuals: what waits for another point
+LEFT_OUT = 1e-2  # of a unit vector: new directions smaller than this are not worth a column
+PASSED = 0.3  # of the bound: what residuals at a point may say
+MEASURED = 0.2  # of the bound: what an error may be where it is measured
+WATCHFUL = 0.5  # of the bound: what an estimate may be at points that stand for all others
+SAFETY = 3.0  # the constant of error estimates over the largest one seen
+WATCHED = 6  # points for each parameter whose estimates have to stay within the bound, beside those of the grid
+FINE = 3  # parameters up to which the grid has points between the corners
+FIRST_CUT, LESS = 3e-4, 1.4  # of the largest singular value: what is cut away at first, and how it sinks
+TRIES = 3  # times a point may be asked, on average
+
+Point = Mapping[str, float]
+
+
+@dataclass
+class Work:
+    """What making a model takes, by part."""
+
+    seconds: dict[str, float] = field(default_factory=dict[str, float])
+    solves: int = 0
+    _last: float = field(default_factory=time.perf_counter)
+
+    def lap(self, part: str) -> None:
+        """Book the time since the last one."""
+        now = time.perf_counter()
+        self.seconds[part] = self.seconds.get(part, 0.0) + now - self._last
+        self._last = now
+
+
+@dataclass
+class Greedy:
+    """One basis on its way to a model. scale: D^{-1/2} (n,) of the static operator that ``factor`` holds."""
+
+    basis: Basis
+    factor: Factor
+    scale: Array
+    frequency: float
+    bound: float
+    work: Work
+    whole: bool = False  # damping is too strong for anything but whole companion matrices
+    passed: list[tuple[Point, DenseModes]] = field(default_factory=list[tuple[Point, DenseModes]])
+
+    @property
+    def problem(self) -> ParametricProblem:
+        """What is reduced."""
+        return self.basis.problem
+
+    def enrich(self, points: list[Point]) -> None:
+        """Answers to the residuals of one point after the other until every mode at every point passes. Raises
+        AnalysisError where they do not settle."""
+        pending = list(points)
+        for _ in range(TRIES * len(points)):
+            if not pending:
+                return
+            point = pending.pop(0)
+            found, error = self._asked(point)
+            if not np.any(error > PASSED * self.bound):
+                self.passed.append((point, found))
+            elif self._answered(point, found, error):
+                pending.append(point)
+        if pending:
+            raise AnalysisError(
+                "the reduced model does not settle over the box; ask for a smaller box, a lower frequency or a larger "
+                "bound"
+            )
+
+    def cut(self) -> ReducedModel:
+        """The basis as small as errors and estimates allow."""
+        sides = len(self.problem.parameters)
+        measured = random_points(self.problem, 2 * sides + 1)
+        watched = random_points(self.problem, (2 + WATCHED) * sides + 1)[len(measured) :]
+        self.enrich(measured)
+        self.work.lap("enrichment")
+        exact = [self._last(point).values for point in measured]
+        self.work.lap("points between")
+        left, size = self._span()
+        share, asked = FIRST_CUT, False
+        while True:
+            turn = left[:, size > share * size[0]]
+            model = self._model(turn)
+            constant = _constant(model, measured, exact)
+            failing: list[Point] = []
+            if constant is not None:
+                failing = [p for p in watched if np.any(constant * model.modes(p).error > WATCHFUL * self.bound)]
+                if not failing:
+                    break
+                if not asked:
+                    # Once: the modes of the points that fail join the others.
+                    asked = True
+                    self.work.lap("cut")
+                    self.enrich(failing)
+                    self.work.lap("enrichment")
+                    left, size = self._span()
+                    continue
+            if turn.shape[1] == left.shape[1]:
+                break
+            share /= LESS
+        self.work.lap("cut")
+        vectors = self.basis.vectors @ turn
+        self.work.lap("vectors")
+        return replace(
+            model, vectors=vectors, constant=constant or SAFETY, seconds=dict(self.work.seconds),
+            solves=self.work.solves,
+        )  # fmt: skip
+
+    def _last(self, point: Point) -> DenseModes:
+        """The modes at a point that passed, on the basis as it is now."""
+        known = next(found for other, found in reversed(self.passed) if other is point)
+        return known if len(known.right) == self.basis.count else self._modes(point)
+
+    def _modes(self, point: Point) -> DenseModes:
+        matrices = assembled(self.basis.projected, self.problem.factors(point), self.problem.powers)
+        found = dense_modes(*matrices, self.frequency, MARGIN, whole=self.whole)
+        self.whole = found.whole
+        return found
+
+    def _asked(self, point: Point) -> tuple[DenseModes, Array]:
+        """The modes at a point and their errors (k,) by residuals, without a constant."""
+        found = self._modes(point)
+        factors, powers = self.problem.factors(point), self.problem.powers
+        sizes = [
+            sketched(sketch, factors, powers, found.values, vectors)
+            for sketch, vectors in ((self.basis.right_sketch, found.right), (self.basis.left_sketch, found.left))
+        ]
+        matrices = assembled(self.basis.projected, factors, powers)
+        return found, product_over_slope(matrices, found, *sizes)
+
+    def _answered(self, point: Point, found: DenseModes, error: Array) -> int:
+        """How many vectors the answers to what the modes leave unbalanced add."""
+        factors = self.problem.factors(point)
+        # Modes far below the bound leave nothing that another point will not ask for.
+        chosen = error > 0.01 * self.bound
+        rests: list[Any] = []
+        for left, vectors in ((False, found.right), (True, found.left)):
+            x = expanded(self.basis.vectors, vectors[:, chosen])
+            rests.append(residual(self.problem, factors, found.values[chosen], x, left=left) * self.scale[:, None])
+        rest = np.hstack([real_and_imaginary(r) for r in rests])
+        squares, turn = sl.eigh(rest.T @ rest)
+        keep = squares > max(WEAKEST**2 * squares[-1], 1e-300)
+        force = (rest @ (turn[:, keep] / np.sqrt(squares[keep]))) / self.scale[:, None]
+        answer = self.factor.solve(force, refine=False)
+        self.work.solves += force.shape[1]
+        return self.basis.add(answer, LEFT_OUT) or self.basis.add(answer, 1e-3 * LEFT_OUT)
+
+    def _span(self) -> tuple[Array, Array]:
+        """Left singular vectors (r, s) and singular values (s,) of the modes at all points that passed."""
+        shots: list[Array] = []
+        for _, found in self.passed:
+            both = np.hstack([real_and_imaginary(found.right), real_and_imaginary(found.left)])
+            shots.append(np.vstack([both, np.zeros((self.basis.count - len(both), both.shape[1]))]))
+        left, size, _ = sl.svd(np.hstack(shots), full_matrices=False)
+        return left, size
+
+    def _model(self, turn: Array) -> ReducedModel:
+        """The model on the basis turned and cut, its vectors and constant still to come."""
+        basis = self.basis
+        projected = np.einsum("ri,jrs,sk->jik", turn, basis.projected, turn, optimize=True)
+        return ReducedModel(
+            self.problem, basis.vectors, projected, basis.right_sketch @ turn, basis.left_sketch @ turn,
+            self.frequency, 1.0, self.bound, {}, 0, self.whole,
+        )  # fmt: skip
+
+
+def _constant(model: ReducedModel, points: list[Point], exact: list[ComplexArray]) -> float | None:
+    """The factor of the error estimate: the largest found, kept SAFETY times larger, at least 1 as the inverse of a
+    matrix scaled by its diagonal has it; None where errors themselves are too large."""
+    ratio = 0.0
+    for point, values in zip(points, exact, strict=True):
+        found = model.modes(point)
+        away = np.abs(found.values[:, None] - values).min(axis=1, initial=np.inf) / np.abs(found.values)
+        # A mode at the very end of the band may be beyond it in one of the two.
+        inner = values[np.abs(values) <= (1 - model.bound) * model.frequency]
+        missed = np.abs(inner[:, None] - found.values).min(axis=1, initial=np.inf) / np.abs(inner)
+        if np.any(away > MEASURED * model.bound) or np.any(missed > MEASURED * model.bound):
+            return None
+        ratio = max(ratio, float(np.max(away / np.maximum(found.error, 1e-300), initial=0.0)))
+    return max(SAFETY * ratio, 1.0)
+
+
+def grid_points(problem: ParametricProblem, counts: tuple[int, ...] | None) -> list[Point]:
+    """Candidates on a grid, corners first, opposite ones one after the other: they are furthest from the middle, where
+    the static operator is exact. By default 5 points of a single parameter, 3 of two or three, 2 of more."""
+    sides = len(problem.parameters)
+    points = problem.corners(counts or (5 if sides == 1 else 3 if sides <= FINE else 2,) * sides)
+    table = np.array([list(p.values()) for p in points])
+    span = np.maximum(np.ptp(table, axis=0), 1e-300)
+    away = np.abs((table - table.mean(axis=0)) / span).sum(axis=1)
+    order: IntArray = np.argsort(-away, kind="stable")
+    return [points[k] for k in order]
+
+
+def random_points(problem: ParametricProblem, count: int) -> list[Point]:
+    """Points of a box in no relation to its grid, always the same."""
+    rng = np.random.default_rng(SEED)
+    low, high = (np.array([getattr(p, end) for p in problem.parameters]) for end in ("low", "high"))
+    return [problem.point([float(v) for v in low + (high - low) * rng.random(len(low))]) for _ in range(count)]
