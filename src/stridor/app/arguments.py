@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,14 +26,27 @@ Set = Annotated[
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results [default: CASE.out].")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else there.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No log and no progress on stderr.")]
+Solver = Annotated[
+    str | None,
+    typer.Option(
+        "--solver",
+        metavar="NAME",
+        help="Sparse direct solver: mumps, pardiso, superlu; slepc for all processes of mpiexec [default: the case's].",
+    ),
+]
 Undamped = Annotated[bool, typer.Option("--undamped", help="Leave structural damping out.")]
 
 
-def load_case(path: Path, overrides: list[str] | None, *, quiet: bool) -> Case:
-    """The case in a file with overrides, its warnings printed. Raises CaseError."""
+def load_case(path: Path, overrides: list[str] | None, *, quiet: bool, solver: str | None = None) -> Case:
+    """The case in a file with overrides, its warnings printed. Raises CaseError.
+
+    solver: the one for everything that the program factorises, whatever case and environment say.
+    """
     from ..case import load
 
-    case = load(path, overrides or ())
+    case = load(path, [*(overrides or ()), *([] if solver is None else [f'modal.solver="{solver}"'])])
+    if solver is not None and solver != "auto":
+        os.environ["STRIDOR_SOLVER"] = solver
     from .output import say
 
     for warning in case.warnings:

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import CaseError, StridorError
-from . import explore
-from .arguments import CaseFile, Json, Out, Quiet, Set, Undamped, folder, keep, load_case, numbers, pair
+from . import explore, launch
+from .arguments import CaseFile, Json, Out, Quiet, Set, Solver, Undamped, folder, keep, load_case, numbers, pair
 
 app = typer.Typer(
     name="stridor",
@@ -53,12 +53,19 @@ def new(
 
 
 @app.command()
-def check(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False) -> None:
+def check(
+    case: CaseFile,
+    set_: Set = None,
+    solver: Solver = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
     """Validate a case and print the model in words: bodies, contacts, time step against its limit."""
     from ..study.analyses import describe
     from .output import print_json, say, stdout
 
-    loaded = load_case(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet, solver=solver)
     description = describe(loaded)
     for warning in description.warnings:
         if warning not in loaded.warnings:  # those are said already
@@ -75,12 +82,19 @@ def check(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False,
 
 
 @app.command()
-def matrices(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False) -> None:
+def matrices(
+    case: CaseFile,
+    set_: Set = None,
+    solver: Solver = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
     """What the imported matrices of a case are like: symmetry, definiteness, units, friction terms that got lost."""
     from ..study.matrix_reports import matrix_reports
     from .output import print_json, stdout
 
-    found = matrix_reports(load_case(case, set_, quiet=quiet))
+    found = matrix_reports(load_case(case, set_, quiet=quiet, solver=solver))
     text = [line for name, report in found.items() for line in (f"{name}:", *(f"  {x}" for x in report.lines()))]
     if out is not None:
         from ..io.atomic import write_text
@@ -101,6 +115,7 @@ def steady(
         typer.Option("--mu", min=0.0, help="Friction coefficient of every contact [default: the case's]."),
     ] = None,
     set_: Set = None,
+    solver: Solver = None,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -110,7 +125,7 @@ def steady(
     from .output import print_json, say
     from .pictures import steady_document, write_steady
 
-    loaded = load_case(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet, solver=solver)
     found = steady_sliding(loaded, mu)
     files = write_steady(loaded, found, folder(case, out))
     for path in files:
@@ -137,6 +152,7 @@ def shapes(
     ] = None,
     gif: Annotated[bool, typer.Option("--gif", help="Also an animated GIF of each.")] = False,
     set_: Set = None,
+    solver: Solver = None,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -145,7 +161,7 @@ def shapes(
     from .output import print_json, say, table
     from .pictures import write_shapes
 
-    loaded = load_case(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet, solver=solver)
     documents = write_shapes(loaded, folder(case, out), mu=mu, branches=branch or None, gif=gif)
     for document in documents:
         for path in document["files"]:
@@ -169,6 +185,7 @@ def modes(
     ] = None,
     undamped: Undamped = False,
     set_: Set = None,
+    solver: Solver = None,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -177,7 +194,7 @@ def modes(
     from ..study import analyses
     from .output import print_json, stdout, table
 
-    loaded = load_case(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet, solver=solver)
     values = None if mu is None else numbers(mu, "--mu")
     result = analyses.modes(loaded, values, count=count, damped=False if undamped else None)
     keep(result, folder(case, out) / "modes.nc", quiet=quiet)
@@ -228,6 +245,7 @@ def onsets(
     ] = None,
     undamped: Undamped = False,
     set_: Set = None,
+    solver: Solver = None,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -236,7 +254,7 @@ def onsets(
     from ..study import analyses
     from .output import print_json, stdout, table
 
-    loaded = load_case(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet, solver=solver)
     chosen = None if friction_range is None else pair(friction_range, "--range")
     result = analyses.onsets(loaded, chosen, max_frequency_hz=max_frequency, damped=False if undamped else None)
     keep(result, folder(case, out) / "onsets.nc", quiet=quiet)
@@ -286,6 +304,7 @@ def simulate(
         typer.Option("--restart", metavar="FILE", help="Go on from the file of an earlier, unfinished run."),
     ] = None,
     set_: Set = None,
+    solver: Solver = None,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -296,7 +315,7 @@ def simulate(
     from ..study import analyses
     from .output import print_json, progress_bar, say
 
-    loaded = load_case(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet, solver=solver)
     path = folder(case, out) / "simulate.nc"
     if restart is not None and not restart.exists():
         raise CaseError("--restart", str(restart), "no such file")
@@ -349,6 +368,7 @@ def compare(
         ),
     ] = None,
     set_: Set = None,
+    solver: Solver = None,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -357,7 +377,7 @@ def compare(
     from ..study import analyses
     from .output import print_json, say
 
-    loaded = load_case(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet, solver=solver)
     values = None if mu is None else numbers(mu, "--mu")
     result = analyses.compare(loaded, values, critical=critical, progress=lambda text: say(text, quiet=quiet))
     keep(result, folder(case, out) / "compare.nc", quiet=quiet)
@@ -370,12 +390,19 @@ def compare(
 
 
 @app.command()
-def run(case: CaseFile, set_: Set = None, out: Out = None, json: Json = False, quiet: Quiet = False) -> None:
+def run(
+    case: CaseFile,
+    set_: Set = None,
+    solver: Solver = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
     """Everything: modes, onsets, simulate, compare, and the report."""
     from .output import print_json, progress_bar, say, stdout
     from .pipeline import run as run_all
 
-    loaded = load_case(case, set_, quiet=quiet)
+    loaded = load_case(case, set_, quiet=quiet, solver=solver)
     with progress_bar("simulate", quiet=quiet) as progress:
         outcome = run_all(loaded, folder(case, out), progress=progress, log=lambda text: say(text, quiet=quiet))
     if json:
@@ -403,7 +430,12 @@ def _top(
 
 def main() -> None:
     """Entry point: errors as plain lines, no traceback. Exit code 2: bad input, 1: no answer, 130: Ctrl-C."""
-    sys.exit(_guarded(lambda: app(standalone_mode=True)))
+
+    def program() -> None:
+        launch.meet(sys.argv[1:])
+        app(standalone_mode=True)
+
+    sys.exit(_guarded(program))
 
 
 def _guarded(call: Callable[[], Any]) -> int:

@@ -248,8 +248,8 @@ class Modal(Table):
     prestress: Truth = Field(
         default=False, description="true or false, geometric stiffness by the stresses of steady sliding (solids)"
     )
-    solver: Literal["auto", "mumps", "pardiso", "superlu"] = Field(
-        default="auto", description='"auto", "mumps", "pardiso" or "superlu", the sparse direct solver'
+    solver: Literal["auto", "mumps", "pardiso", "superlu", "slepc"] = Field(
+        default="auto", description='"auto", "mumps", "pardiso", "superlu" or "slepc", the sparse direct solver'
     )
 
 

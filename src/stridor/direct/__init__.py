@@ -3,7 +3,7 @@
 Whichever program does the work, answers are refined to a small backward error and a singular matrix is an error.
 """
 
-from .backends import available
+from .backends import available, join
 from .factor import Factor, SingularMatrix, factorise
 
-__all__ = ["Factor", "SingularMatrix", "available", "factorise"]
+__all__ = ["Factor", "SingularMatrix", "available", "factorise", "join"]

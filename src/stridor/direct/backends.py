@@ -32,20 +32,37 @@ class Breakdown(Exception):
     """A program found a pivot of zero."""
 
 
-# In the order they are tried: module that has to be importable, and how to install it.
+SLEPC_BUILD = (
+    "PETSc must be built with complex numbers, double precision and MUMPS (on Debian: apt install "
+    "libpetsc-complex-dev libslepc-complex-dev; then set PETSC_DIR and SLEPC_DIR to theirs and install petsc4py and "
+    "slepc4py of the same version)"
+)
+
+# In the order they are tried: modules that have to be importable, and how to install them.
 PACKAGES = {
     "mumps": (
-        "mumps",
+        ("mumps",),
         'pip install "stridor[mumps]" (on Debian after apt install libmumps-seq-dev gfortran pkg-config)',
     ),
-    "pardiso": ("pypardiso", 'pip install "stridor[pardiso]"'),
-    "superlu": ("scipy", "comes with SciPy"),
+    "pardiso": (("pypardiso",), 'pip install "stridor[pardiso]"'),
+    "superlu": (("scipy",), "comes with SciPy"),
+    "slepc": (("petsc4py", "mpi4py"), f'pip install "stridor[slepc]"; {SLEPC_BUILD}'),
 }
+# Taken only where it is asked for: it makes the processes of an MPI run one.
+ON_REQUEST = ("slepc",)
 
 
 def available() -> tuple[str, ...]:
-    """Names of the solvers that are installed, the preferred one first; "superlu" is always among them."""
-    return tuple(name for name, (module, _) in PACKAGES.items() if importlib.util.find_spec(module) is not None)
+    """Names of the solvers that are installed, the preferred one first; "superlu" is always among them.
+
+    "slepc" never is, as it serves only those who ask for it.
+    """
+    return tuple(name for name in PACKAGES if name not in ON_REQUEST and installed(name))
+
+
+def installed(name: str) -> bool:
+    """Are the packages of a solver there?"""
+    return all(importlib.util.find_spec(module) is not None for module in PACKAGES[name][0])
 
 
 def choose(asked: str | None) -> str:
@@ -55,21 +72,29 @@ def choose(asked: str | None) -> str:
     """
     where = "solver" if asked is not None else f"environment variable {VARIABLE}"
     name = asked if asked is not None else os.environ.get(VARIABLE) or None
-    installed = available()
     if name is None:
-        return installed[0]
+        return available()[0]
+    there = tuple(known for known in PACKAGES if installed(known))
     if name not in PACKAGES:
-        raise CaseError(where, name, f"no such solver; installed: {', '.join(installed)}")
-    if name not in installed:
-        raise CaseError(
-            where, name, f"is not installed; {PACKAGES[name][1]}, or use one that is: {', '.join(installed)}"
-        )
+        raise CaseError(where, name, f"no such solver; installed: {', '.join(there)}")
+    if name not in there:
+        raise CaseError(where, name, f"is not installed; {PACKAGES[name][1]}, or use one that is: {', '.join(there)}")
     return name
+
+
+def join() -> None:
+    """Make the processes of an MPI run one program: returns in the first; the others work for it, end with it.
+
+    For scripts that use "slepc" and do more than computing: call it first. Otherwise the others go on until the first
+    factorisation. Raises CaseError where "slepc" is not installed.
+    """
+    start(choose("slepc"))
 
 
 def start(name: str) -> Callable[[Sparse, bool, bool], Backend]:
     """The function (matrix, symmetric, saddle) → Backend of a solver; its package is imported here, not before.
 
+    Of the processes of an MPI run only the first returns with "slepc"; the others work for it until it ends, and end.
     Raises CaseError where the package is there but does not load.
     """
     try:
@@ -81,6 +106,11 @@ def start(name: str) -> Callable[[Sparse, bool, bool], Backend]:
             from .pardiso_backend import PardisoFactor
 
             return PardisoFactor
+        if name == "slepc":
+            from .slepc_backend import SlepcFactor, join
+
+            join()
+            return SlepcFactor
     except (ImportError, OSError) as error:
         raise CaseError("solver", name, f"is installed but does not load ({error}); {PACKAGES[name][1]}") from error
     from .superlu_backend import SuperluFactor

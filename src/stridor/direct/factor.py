@@ -179,13 +179,14 @@ def factorise(matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, 
 
     symmetric: A = Aᵀ (not conjugated), which halves the work. saddle: [[K, Bᵀ], [B, −C]] with K positive
     (semi)definite and rows of zeros allowed on the diagonal of C, as multipliers make them; with friction Bᵀ may be
-    another matrix. solver: "mumps", "pardiso" or "superlu"; by default the environment variable STRIDOR_SOLVER, else
-    the first that is installed.
+    another matrix. solver: "mumps", "pardiso", "superlu" or, over all processes of an MPI run, "slepc"; by default the
+    environment variable STRIDOR_SOLVER, else the first of the others that is installed.
 
     Raises SingularMatrix (an AnalysisError) for a matrix without inverse to working precision, CaseError for an
     unknown or missing solver.
     """
     name = choose(solver)
+    begin = start(name)
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         raise ValueError(f"the matrix has shape {matrix.shape}; expected a square one")
     kind = np.complex128 if matrix.dtype.kind == "c" else np.float64
@@ -201,7 +202,6 @@ def factorise(matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, 
         raise SingularMatrix(f"the matrix is singular: row {empty[0]} is empty{_of(len(empty))}", motion)
     if symmetric:
         _require_symmetry(held)
-    begin = start(name)
     try:
         factor = Factor(held, begin(held, symmetric, saddle), name, started)
         ratio, motion = factor.unresisted() if held.shape[0] else (1.0, None)
