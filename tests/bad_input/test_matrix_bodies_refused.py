@@ -181,7 +181,7 @@ FILES: list[tuple[str, Callable[[Path], object], str]] = [
     (
         "label twice",
         lambda f: (f / "dof.txt").write_text("11 1\n" * 10),
-        "bodies.brake.terms: 'M.mtx' – names a freedom twice",
+        "bodies.brake.terms: 'M.mtx' – names a freedom twice: node 11, direction 1; each must have a name of its own",
     ),
     (
         "label without node",

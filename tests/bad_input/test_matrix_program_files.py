@@ -62,7 +62,7 @@ def test_the_files_used_here_are_good(tmp_path):
 def test_what_is_no_file(tmp_path, refused):
     (tmp_path / "folder.mtx").mkdir()
     for file, words in (
-        ("folder.mtx", f"is a folder; must be a matrix file: {READ}"),
+        ("folder.mtx", "is a folder; must be a file"),
         ("none.op4", "no such file"),
         ("a\0.pch", "no such file"),
     ):
@@ -74,7 +74,9 @@ def test_what_is_no_file(tmp_path, refused):
     assert refused("a.mtx.gz", gzip.compress(b"")) == "matrices: 'a.mtx.gz' – the file is empty (0 bytes)"
     assert refused("a.sim", b"1") == f"matrices: 'a.sim' – is no matrix file by its suffix; accepted: {READ}"
     assert refused("a.op4.gz", gzip.compress(b"1")) == "matrices: 'a.op4.gz' – of packed files only .mtx.gz is read; unpack it"
-    assert refused("a.mtx.gz", b"1,1,1,1,1").startswith("matrices: 'a.mtx.gz' – cannot be read: Not a gzipped file")
+    assert refused("a.mtx.gz", b"1,1,1,1,1") == (
+        "matrices: 'a.mtx.gz' – is not packed by gzip, as its name says; give it a name without .gz"
+    )
     assert refused("a.mtx.gz", gzip.compress(ABAQUS.encode() * 100)[:-9]).startswith("matrices: 'a.mtx.gz' – cannot be read")
 
 
@@ -91,18 +93,18 @@ def test_what_is_no_file(tmp_path, refused):
         ("1,1, 1,-1, 1\n", f"a.mtx, line 1: '1,1, 1,-1, 1' – -1 is no freedom number; each line must hold: {FIVE}"),
         ("9999999999,1, 1,1, 1\n", f"a.mtx, line 1: '9999999999,1, 1,1, 1' – 9999999999 is no node; each line must hold: {FIVE}"),
         ("1 1 1.\n0 1 1.\n", "a.mtx, line 2: '0 1 1.' – 0 is no row or column number, from 1; each line must hold: row, column, value"),
-        ("1 1 1.\n2 1 1\n99999999 1 1.\n", "matrices: 'a.mtx' – claims a matrix of size 99999999, too large for a file of 27 bytes"),
+        ("1 1 1.\n2 1 1\n99999999 1 1.\n", "matrices: 'a.mtx' – claims 99999999 rows but holds only 3 entries; it must have broken off"),
         ("1 1 1 2.0\n", "a.mtx, line 1: '1 1 1 2.0' – has 4 values, as element matrices have; write the assembled matrix, without ELEMENT BY ELEMENT"),
         ("hello\n", f"a.mtx, line 1: 'hello' – each line must hold: {FIVE} (or row, column, value)"),
         ("** only\n\n", f"matrices: 'a.mtx' – holds no entries; each line must hold: {FIVE}"),
         ("** Assembled nodal loads\n*CLOAD, REAL\n2,3, 5.\n", "a.mtx, line 2: '*CLOAD, REAL' – the file holds loads, no matrix"),
         ("*USER ELEMENT, NODES=2, LINEAR\n1,2\n", "a.mtx, line 1: '*USER ELEMENT, NODES=2, LINEAR' – matrices of a substructure are not read; write them with *MATRIX GENERATE and *MATRIX OUTPUT"),
         ("1,1,1,1,1\n*STEP\n", "a.mtx, line 2: '*STEP' – only *MATRIX INPUT and comments (**) may stand between lines of a matrix"),
-        ("*MATRIX INPUT, NAME=A, TYPE=DIAGONAL\n1,1,1,1,1\n", "matrices: 'a.mtx' – TYPE=DIAGONAL is not known; accepted: SYMMETRIC, UNSYMMETRIC"),
-        ("*MATRIX INPUT, NAME=A, SCALE FACTOR=0\n1,1,1,1,1\n", "matrices: 'a.mtx' – SCALE FACTOR=0 is no finite number other than 0"),
-        ("*MATRIX INPUT, NAME=A\n1,1,1,1,1\n1,1,2,1,3\n2,1,1,1,2\n", "matrices: 'a.mtx' – TYPE=SYMMETRIC, but entries (i, j) and (j, i) differ by up to 3.3e-01 of the largest in their rows; for a matrix that is not symmetric the header must say TYPE=UNSYMMETRIC"),
-        ("*MATRIX INPUT, NAME=A\n1,1,1,1,1\n*MATRIX INPUT, NAME=B\n1,1,2,1,3\n", "matrices: 'a.mtx' – holds 2 matrices, choose one by its name: A, B"),
-        ("1,1,1,1,1.7e308\n1,1,1,1,1.7e308\n", "matrices: 'a.mtx' – entries add up to more than a double precision number can hold"),
+        ("*MATRIX INPUT, NAME=A, TYPE=DIAGONAL\n1,1,1,1,1\n", "matrices: 'a.mtx, A' – TYPE=DIAGONAL is not known; accepted: SYMMETRIC, UNSYMMETRIC"),
+        ("*MATRIX INPUT, NAME=A, SCALE FACTOR=0\n1,1,1,1,1\n", "matrices: 'a.mtx, A' – SCALE FACTOR=0 is no finite number other than 0"),
+        ("*MATRIX INPUT, NAME=A\n1,1,1,1,1\n1,1,2,1,3\n2,1,1,1,2\n", "matrices: 'a.mtx, A' – says TYPE=SYMMETRIC, but entries (i, j) and (j, i) differ by up to 3.3e-01 of the largest in their rows; for a matrix that is not symmetric it must say TYPE=UNSYMMETRIC"),
+        ("*MATRIX INPUT, NAME=A\n1,1,1,1,1\n*MATRIX INPUT, NAME=B\n1,1,2,1,3\n", "matrices: 'a.mtx' – holds several matrices; choose one by its name: A, B"),
+        ("1,1,1,1,1.7e308\n1,1,1,1,1.7e308\n", "matrices: 'a.mtx' – entries of the same place add up to more than a double precision number can hold"),
     ],
 )  # fmt: skip
 def test_abaqus(refused, text, message):
@@ -118,7 +120,9 @@ def test_abaqus_names_that_will_not_do(refused):
     assert refused("job_LOAD2.mtx", ABAQUS) == (
         "matrices: 'job_LOAD2.mtx' – holds loads, no matrix; accepted: _STIF1, _MASS1, _DMPV1.mtx"
     )
-    assert refused("a.mtx", ABAQUS, "K") == "matrices: 'K' – a.mtx holds one matrix, and that has no name; give none"
+    assert refused("a.mtx", ABAQUS, "K") == (
+        "matrices: 'a.mtx' – holds one matrix only, and it has no name; leave out the name 'K'"
+    )
     assert refused("a.mtx", bytes(range(256))).startswith("a.mtx, line 1: ")
 
 
@@ -129,8 +133,8 @@ def test_abaqus_names_that_will_not_do(refused):
         ("DMIG,,0,1,1\n", "a.pch, line 1: 'DMIG,,0,1,1' – DMIG needs a name"),
         ("DMIG,K,0,x,1\n", "a.pch, line 1: 'DMIG,K,0,x,1' – 'x' is not a form (IFO), a whole number"),
         ("DMIG,K,0,1,7\n", "a.pch, line 1: 'DMIG,K,0,1,7' – type 7 is not known; accepted: 1, 2 (real) and 3, 4 (complex)"),
-        ("DMIG,K,0,1,1\n", "matrices: 'K' – has no columns; is the file complete?"),
-        ("DMIG,K,0,9,1,,,,2\n", "matrices: 'K' – has form 9 (rectangular); accepted: 1 (square) and 6 (symmetric)"),
+        ("DMIG,K,0,1,1\n", "matrices: 'a.pch, K' – has no columns; is the file complete?"),
+        ("DMIG,K,0,9,1,,,,2\n", "matrices: 'a.pch, K' – has form 9 (rectangular); accepted: 1 (square) and 6 (symmetric)"),
         ("DMIG,K,0,1,1\nDMIG,K,0,1,1\n", "a.pch, line 2: 'DMIG,K,0,1,1' – K has a header already; each matrix must have one"),
         ("DMIG,K,1,1,,1,1,2.\n", "a.pch, line 1: 'DMIG,K,1,1,,1,1,2.' – a column of K before its header: DMIG, K, 0, IFO, TIN, TOUT"),
         ("DMIG,K,0,1,1\nDMIG,K,1,1,,2,7,2.\n", "a.pch, line 2: 'DMIG,K,1,1,,2,7,2.' – 7 is no component; must be 1 to 6, or 0 for a scalar point"),
@@ -140,7 +144,7 @@ def test_abaqus_names_that_will_not_do(refused):
         ("DMIG,K,0,1,1\nDMIG,K,1,1,,2,1\n", "a.pch, line 2: 'DMIG,K,1,1,,2,1' – '' is no finite number"),
         ("DMIG,K,0,1,1\nDMIG,K,1,1,,2,1,1.,,,,,\n", "a.pch, line 2: 'DMIG,K,1,1,,2,1,1.,,,,,' – has more than 8 fields"),
         ("DMIG*,K,0,6,1\nDMIG*,K,1,1\n", "a.pch, line 2: 'DMIG*,K,1,1' – the column has no entries; is a line missing?"),
-        ("DMIG,K,0,6,1\nDMIG,K,1,1,,2,1,3.\nDMIG,K,2,1,,1,1,2.\n", "matrices: 'K' – has form 6 (symmetric), but entries (i, j) and (j, i) differ by up to 3.3e-01 of the largest in their rows; for a matrix that is not symmetric the header must say form 1"),
+        ("DMIG,K,0,6,1\nDMIG,K,1,1,,2,1,3.\nDMIG,K,2,1,,1,1,2.\n", "matrices: 'a.pch, K' – says form 6 (symmetric), but entries (i, j) and (j, i) differ by up to 3.3e-01 of the largest in their rows; for a matrix that is not symmetric it must say form 1 (square)"),
     ],
 )  # fmt: skip
 def test_nastran_punch(refused, text, message):
@@ -151,10 +155,10 @@ def test_nastran_punch(refused, text, message):
     ("old", "new", "message"),
     [
         ("1P,3E23.16", "hello", "a.op4, line 1: '2       2       1       2KAA     hello' – must end in how numbers are written, as 5E16.9 or 1P,3E23.16"),
-        ("       2       2       1", "       2       3       1", "matrices: 'KAA' – has 3 rows and 2 columns; must be square"),
-        ("       1       2KAA", "       3       2KAA", "matrices: 'KAA' – has form 3 (diagonal); accepted: 1 (square) and 6 (symmetric)"),
+        ("       2       2       1", "       2       3       1", "matrices: 'a.op4, KAA' – is a matrix of 3 rows and 2 columns; must be square"),
+        ("       1       2KAA", "       3       2KAA", "matrices: 'a.op4, KAA' – has form 3 (diagonal); accepted: 1 (square) and 6 (symmetric)"),
         ("       1       2KAA", "       1       5KAA", "a.op4, line 1: '2       2       1       5KAA     1P,3E23.16' – type 5 is not known; accepted: 1, 2 (real) and 3, 4 (complex)"),
-        ("       2       2       1", "9999999999999999       1", "matrices: 'a.op4' – claims a matrix of size 99999999, too large for a file of 247 bytes"),
+        ("       2       2       1", "9999999999999999       1", "a.op4, line 3: '327681' – must begin a string of entries: its length and first row do not fit"),
         ("       1       0       5", "       4       0       5", "a.op4, line 2: '4       0       5' – must begin a column: its number, 1 to 3, first row, length"),
         ("      327681", "      327682", "a.op4, line 3: '327682' – leaves the matrix: it has 2 rows"),
         ("      327681", "      427682", "a.op4, line 3: '427682' – must begin a string of entries: its length and first row do not fit"),
@@ -180,7 +184,7 @@ def test_output4_text(refused, old, new, message):
         (HEADER + record(struct.pack("<3id", 1, 1, 4, 1.0)), "a.op4, byte 36: is of 20 bytes, too short for the 4 words it announces"),
         (HEADER + record(struct.pack("<3i2d", 1, 2, 4, 1.0, 2.0)), "a.op4, byte 36: leaves the matrix: it has 2 rows"),
         (HEADER + record(struct.pack("<4id", 1, 0, 3, 9 * 65536 + 1, 2.0)), "a.op4, byte 36: holds a string of entries whose length does not fit"),
-        (HEADER + record(struct.pack("<3id", 2, 1, 2, np.nan)) + BINARY[-28:], "matrices: 'KAA' – row 1, column 2 is no finite number; must be one"),
+        (HEADER + record(struct.pack("<3id", 2, 1, 2, np.nan)) + BINARY[-28:], "matrices: 'a.op4, KAA' – the value at row 1, column 2 is nan; must be a finite number"),
         (HEADER + HEADER, "a.op4, byte 36: leaves the matrix: it has 2 rows"),
     ],
 )  # fmt: skip
@@ -190,11 +194,14 @@ def test_output4_binary(refused, data, message):
 
 def test_output4_sizes_that_no_file_can_have_are_refused_before_memory_is_taken(refused):
     huge = record(struct.pack("<4i8s", 2**30, 2**30, 1, 2, b"K       "))
-    assert refused("a.op4", huge) == "matrices: 'a.op4' – claims a matrix of size 1073741824, too large for a file of 32 bytes"
+    assert refused("a.op4", huge) == "matrices: 'a.op4' – ends in the middle of a matrix, after 32 bytes"
+    assert refused("a.op4", huge + record(struct.pack("<3id", 2**30 + 1, 1, 2, 1.0))) == (
+        "matrices: 'a.op4, K' – claims 1073741824 rows but holds only 0 entries; it must have broken off"
+    )
     imaginary = record(struct.pack("<4i8s", 1, 1, 1, 4, b"K       ")) + record(struct.pack("<3i2d", 1, 1, 4, 1.0, 2.0))
     imaginary += record(struct.pack("<3id", 2, 1, 2, 1.0))
     assert refused("a.op4", imaginary) == (
-        "matrices: 'K' – is complex: 1 entries have an imaginary part; only real ones are read"
+        "matrices: 'a.op4, K' – is complex: 1 entry has an imaginary part; only real matrices are read"
     )
 
 

@@ -77,7 +77,7 @@ def test_abaqus_symmetric_with_internal_freedoms_and_supports(read):
     assert (stored.role, stored.form, stored.source) == ("stiffness", "symmetric", "beam_STIF1.mtx")
     assert stored.notes == (
         "No entry has a counterpart across the diagonal: taken as one half of a symmetric matrix and completed.",
-        "1 freedoms have 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; leave them out.",
+        "1 freedom has 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; leave them out.",
     )
 
 
@@ -129,7 +129,7 @@ def test_abaqus_what_could_be_meant_otherwise_is_noted(read):
     doubled = read("a.mtx", "1,1, 1,1, 2.\n1,1, 1,1, 3.")
     assert doubled.matrix.toarray().tolist() == [[5.0]]
     assert doubled.notes == (
-        "1 entries stand more than once in the file; they have been added up.",
+        "Added up: 1 of 2 entries stand at a place that an earlier one has taken.",
         "The last line has no line end: if the file was cut off there, its last number is wrong.",
     )
     diagonal = read("a_MASS1.mtx", "1,1, 1,1, 2.\n2,1, 2,1, 3.\n")
@@ -214,10 +214,10 @@ def test_nastran_several_matrices_and_blanks_in_numbers(read):
     assert read("a.pch", text, "maax").matrix.toarray().tolist() == GENERAL.tolist()
     assert read("a.pch", text, "KAAX").matrix.toarray().tolist() == SYMMETRIC.tolist()
     assert refused(lambda: read("a.pch", text)) == (
-        "matrices: 'a.pch' – holds 2 matrices, choose one by its name: KAAX, MAAX"
+        "matrices: 'a.pch' – holds several matrices; choose one by its name: KAAX, MAAX"
     )
     assert refused(lambda: read("a.pch", text, "PAX")) == (
-        "matrices: 'PAX' – has form 9 (rectangular); accepted: 1 (square) and 6 (symmetric)"
+        "matrices: 'a.pch, PAX' – has form 9 (rectangular); accepted: 1 (square) and 6 (symmetric)"
     )
     one = large("PAX", 9, GENERAL[:, :1], FREEDOMS) + large("MAAX", 1, GENERAL, FREEDOMS)
     assert read("a.pch", one).name == "MAAX"
@@ -232,7 +232,7 @@ def test_nastran_complex_only_without_imaginary_parts(read):
     assert stored.matrix.toarray().tolist() == [[2.5, 0.0], [1.5, 0.0]]
     assert stored.notes == ("The matrix is stored as complex numbers; all imaginary parts are 0.",)
     assert refused(lambda: read("a.pch", text.format("1.-3"))) == (
-        "matrices: 'BAAX' – is complex: 1 entries have an imaginary part; only real ones are read"
+        "matrices: 'a.pch, BAAX' – is complex: 1 entry has an imaginary part; only real matrices are read"
     )
 
 
@@ -353,11 +353,11 @@ def test_output4_symmetric_whole_or_half_and_several(read, write):
     assert stored.notes == ("The matrix is marked as symmetric and only one half is there; it has been completed.",)
     both = join.join([write("KAA", whole, form=6), write("MAA", EXACT, mode="bigmat")])
     assert read("a.op4", both, "maa").matrix.toarray().tolist() == EXACT.tolist()
-    assert refused(lambda: read("a.op4", both)) == "matrices: 'a.op4' – holds 2 matrices, choose one by its name: KAA, MAA"
-    assert refused(lambda: read("a.op4", both, "K")) == "matrices: 'K' – no such matrix in a.op4; it has: KAA, MAA"
+    assert refused(lambda: read("a.op4", both)) == "matrices: 'a.op4' – holds several matrices; choose one by its name: KAA, MAA"
+    assert refused(lambda: read("a.op4", both, "K")) == "matrices: 'a.op4' – holds no matrix named 'K'; it holds: KAA, MAA"
     assert refused(lambda: read("a.op4", write("KAA", GENERAL, form=6))) == (
-        "matrices: 'KAA' – has form 6 (symmetric), but entries (i, j) and (j, i) differ by up to 1.0e+00 of the largest in their rows; "
-        "for a matrix that is not symmetric it must be form 1"
+        "matrices: 'a.op4, KAA' – says form 6 (symmetric), but entries (i, j) and (j, i) differ by up to 1.0e+00 of the largest in their "
+        "rows; for a matrix that is not symmetric it must say form 1 (square)"
     )
 
 
@@ -414,7 +414,7 @@ def test_matrices_that_cannot_be_brought_together():
         "write all in formats with labels, or all without"
     )
     assert refused(lambda: common_labels([stored_at([[1, 0], [0, 1]], [1, 1], [2, 2])])) == (
-        "matrices: 'a' – names a freedom twice"
+        "matrices: 'a' – names a freedom twice: node 1, direction 2; each must have a name of its own"
     )
 
 

@@ -98,7 +98,7 @@ def test_contact_multipliers_without_friction_are_noticed():
     found = report(sp.csr_array(mass), None, sp.csr_array(stiffness), labels=labels)
     assert (found.multipliers, found.massless, found.mass) == (1, 1, "positive semidefinite")
     assert found.warnings == (
-        "friction terms seem lost: 1 freedoms look like multipliers of a contact, yet K is symmetric; in Abaqus, ask "
+        "friction terms seem lost: 1 freedom looks like multipliers of a contact, yet K is symmetric; in Abaqus, ask "
         "for *STEP, UNSYMM=YES and a sliding contact with friction before *MATRIX GENERATE",
     )
     stiffness[0, 4] += 0.4
@@ -117,7 +117,7 @@ def test_what_the_file_says_of_itself(form, words):
     assert "CalculiX stores one half only" in report(stiffness, None, stiffness, stored=[half]).warnings[0]
     internal = Labels(np.array([1, 2, -1]), np.array([1, 1, 1]))
     found = report(sp.csr_array(np.eye(3)), None, stiffness, labels=internal)
-    assert found.warnings[0].startswith("friction terms seem lost: 1 freedoms are internal ones, as contact makes them,")
+    assert found.warnings[0].startswith("friction terms seem lost: 1 freedom is internal, as contact makes them,")
 
 
 def test_damping_that_drives_and_turns():
@@ -126,7 +126,7 @@ def test_damping_that_drives_and_turns():
     found = report(sp.csr_array(np.eye(4)), sp.csr_array(damping), chain(4, 9.0))
     assert (found.damping, found.damping_negative) == ("indefinite", 1)
     assert found.warnings[1:] == (
-        "the symmetric part of C is indefinite (1 negative eigenvalues): it drives some motions, as falling friction does",
+        "the symmetric part of C is indefinite (1 negative eigenvalue): it drives some motions, as falling friction does",
         "C has a gyroscopic (antisymmetric) part, 88% of its norm; right for rotating bodies only",
     )
 
@@ -140,7 +140,7 @@ def test_supports_of_abaqus_are_left_out():
     assert (found.size, found.held, found.entries["stiffness"]) == (6, 1, 13)
     assert found.frequencies is not None
     assert found.frequencies[1] < 1e6
-    assert "1 freedoms have 1e36" in found.warnings[0]
+    assert "1 freedom has 1e36" in found.warnings[0]
 
 
 def test_units_of_a_steel_bar_are_guessed():
@@ -164,7 +164,7 @@ def test_free_motion_and_loose_freedoms_are_told():
     found = report(sp.csr_array(np.diag([1.0, 1, 1, 1, 0])), None, sp.csr_array(free), labels=labels)
     assert (found.free, found.loose) == ((1,), 1)
     assert found.warnings[:2] == (
-        "1 freedoms have neither mass nor stiffness; K has no inverse",
+        "1 freedom has neither mass nor stiffness; K has no inverse",
         "nothing in K resists moving the whole model along x; are supports missing?",
     )
 
@@ -173,7 +173,7 @@ def test_what_cannot_be_looked_through():
     eye = sp.csr_array(np.eye(2))
     with pytest.raises(CaseError, match=r"^matrices.mass: has the shape \(2, 2\); K has \(3, 3\)$"):
         report(eye, None, chain(3, 1.0))
-    with pytest.raises(CaseError, match=r"^matrices.stiffness: 1 entries are no finite numbers; all must be$"):
+    with pytest.raises(CaseError, match=r"^matrices.stiffness: 1 entry is no finite number; all must be$"):
         report(eye, None, sp.csr_array(np.array([[1.0, np.nan], [0.0, 1.0]])))
 
 
@@ -213,6 +213,6 @@ def test_from_files_to_the_report(tmp_path):
     found = report(mass, None, stiffness, labels=labels, stored=stored)
     assert (found.size, found.held, found.multipliers, found.coupling, found.massless) == (4, 1, 1, 2, 1)
     assert found.mass == "positive semidefinite"
-    assert found.warnings == ("1 freedoms have 1e36 on the diagonal of K (Abaqus' supports); leave them out",)
+    assert found.warnings == ("1 freedom has 1e36 on the diagonal of K (Abaqus' supports); leave them out",)
     assert labels is not None
     assert labels.node[held_freedoms(stiffness)].tolist() == [9]

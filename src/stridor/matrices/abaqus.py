@@ -6,6 +6,7 @@ FORMAT=COORDINATE by row and column. Nodes that Abaqus has made itself, for mult
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from collections.abc import Mapping
@@ -15,30 +16,20 @@ from typing import Literal, NoReturn
 
 import numpy as np
 
-from ..errors import CaseError
-from ..mesh.paths import shown_path
 from ..typing import Array, IntArray, Sparse
+from .checks import chosen_in_any_case, nameless
+from .entries import assembled, check_symmetric, mirrored, sides
 from .model import Labels, Role, StoredMatrix
-from .program_files import (
-    SAME,
-    assembled,
-    check_size,
-    choose,
-    completed,
-    contents,
-    disagreement,
-    finished,
-    printable,
-    refuse_line,
-    sides,
-)
+from .numbers import fortran_number
+from .source import Source, counted, printable, source_at, unended
 
-# What Abaqus writes on the diagonal of the stiffness where *BOUNDARY holds a freedom.
-HELD = 1e36
+# Where *BOUNDARY holds a freedom Abaqus writes 1e36 on the diagonal of the stiffness. A factor may have made that
+# smaller, but no stiffness is as large as this.
+HELD = 1e30
 _CHUNK = 1 << 23
-_KEYWORD_LINE = re.compile(rb"^[ \t]*\*.*$", re.MULTILINE)
+# A keyword's line goes on behind a comma at its end, a comment's does not.
+_KEYWORD_LINE = re.compile(rb"^[ \t]*\*(?:\*.*|(?:[^*\n][^\n]*,[ \t\r]*\n)*[^\n]*)$", re.MULTILINE)
 _KIND = re.compile(r"(?:^|_)(STIF|MASS|DMPV|DMPS|LOAD)\d*(?:_|$)")
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?")
 _TO_BLANKS = bytes.maketrans(b",\rDd", b"  EE")
 _LARGEST_NODE = 2**31 - 1
 _LARGEST_FREEDOM = 999
@@ -67,13 +58,18 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     A file of which only one half is there is completed, unless its header says TYPE=UNSYMMETRIC. Raises CaseError at
     `where`, or at "FILE, line N" for a line that is wrong.
     """
-    data = contents(path, where)
-    role = _role(path, where)
-    section = _chosen(_sections(path, data, where), name, path, where)
-    table, width = _table(path, data, section.spans)
+    source = source_at(path, where)
+    data = source.text()
+    role = _role(source)
+    section = _chosen(_sections(source, data), name, source)
+    source = source.of(section.name)
+    table, width = _table(source, data, section.spans)
     if table is None:
-        raise CaseError(where, shown_path(path), f"holds no entries; each line must hold: {_MEANING[5]}")
-    scale = _scale(section, path, where)
+        elsewhere = section.options and section.options.get("INPUT")
+        mend = f"they are in {elsewhere}: give that file" if elsewhere else f"each line must hold: {_MEANING[5]}"
+        source.refuse(f"holds no entries; {mend}")
+    with np.errstate(over="ignore"):  # found below
+        values = _scale(section, source) * table[:, -1]
     labels: Labels | None = None
     if width == 5:
         rows, columns, labels = _numbered(table)
@@ -81,55 +77,50 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     else:
         rows, columns = (table[:, k].astype(np.int64) - 1 for k in range(2))
         size = int(max(rows.max(), columns.max())) + 1
-        check_size(size, path, where, len(data))
-    matrix, repeated = assembled(rows, columns, scale * table[:, -1], size)
-    notes: list[str] = []
-    if repeated:
-        notes.append(f"{repeated} entries stand more than once in the file; they have been added up.")
-    matrix, form = _formed(matrix, section, rows, columns, path, where, notes)
-    matrix = finished(matrix, path, where)
-    held = int(np.sum(matrix.diagonal() >= 0.999 * HELD))
+    matrix, notes = assembled(source, rows, columns, values, (size, size))
+    matrix, form, more = _formed(matrix, section, rows, columns, source)
+    notes += more
+    held = int(np.sum(matrix.diagonal() >= HELD))
     if held:
-        notes.append(f"{held} freedoms have 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; leave them out.")
-    if not data.endswith(b"\n"):
-        notes.append("The last line has no line end: if the file was cut off there, its last number is wrong.")
-    return StoredMatrix(matrix, path.name, labels, role, form, section.name or None, tuple(notes))
+        many = counted(held, "freedom has", "freedoms have")
+        notes += (f"{many} 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; leave them out.",)
+    return StoredMatrix(matrix, path.name, labels, role, form, section.name or None, notes + unended(data))
 
 
-def _role(path: Path, where: str) -> Role | None:
+def _role(source: Source) -> Role | None:
     """What the name of the file says. Raises CaseError for what is no matrix of M, C or K."""
-    found = _KIND.findall(path.name.upper().split(".")[0])
+    found = _KIND.findall(source.path.name.upper().split(".")[0])
     kind = found[-1] if found else ""
     if kind == "DMPS":
-        raise CaseError(
-            where,
-            shown_path(path),
+        source.refuse(
             "is structural (hysteretic) damping, which no real matrix of velocities is; give viscous damping instead: "
             "JOB_DMPV1.mtx, or an equivalent C = structural damping matrix / ω at the frequency of interest",
         )
     if kind == "LOAD":
-        raise CaseError(where, shown_path(path), "holds loads, no matrix; accepted: _STIF1, _MASS1, _DMPV1.mtx")
+        source.refuse("holds loads, no matrix; accepted: _STIF1, _MASS1, _DMPV1.mtx")
     return _ROLES.get(kind)
 
 
-def _sections(path: Path, data: bytes, where: str) -> list[_Section]:
+def _sections(source: Source, data: bytes) -> list[_Section]:
     """What stands between keyword lines; comments (**) are left out."""
     found = [_Section()]
     start = 0
     for match in _KEYWORD_LINE.finditer(data):
         found[-1].spans.append((start, match.start()))
         start = match.end()
-        text = match.group().strip()
-        if text.startswith(b"**"):
+        text = " ".join(printable(match.group().replace(b"\n", b" ").replace(b"\r", b" ")).split())
+        if text.startswith("**"):
             continue
-        parts = [p.strip() for p in printable(text[1:]).split(",")]
-        keyword = parts[0].upper()
-        options = {k.strip().upper(): v.strip() for k, _, v in (p.partition("=") for p in parts[1:]) if k.strip()}
+        keyword, *parts = (part.strip() for part in text[1:].split(","))
+        options = {k.strip().upper(): v.strip(' "') for k, _, v in (p.partition("=") for p in parts) if k.strip()}
+        keyword = keyword.upper()
         if keyword == "MATRIX ASSEMBLE":
             continue
         number = data.count(b"\n", 0, match.start()) + 1
         if keyword not in ("MATRIX INPUT", "MATRIX") or options.get("TYPE", "").upper() in ("STIFFNESS", "MASS"):
-            _refuse_keyword(path, number, printable(text), keyword)
+            _refuse_keyword(source, number, text, keyword)
+        if not all(key[0].isalpha() for key in options):
+            source.refuse_line(number, text, "a comma at its end makes the line behind it a part of it; take it away")
         found.append(_Section(options))
     found[-1].spans.append((start, len(data)))
     if len(found) > 1 and not any(data[a:b].strip() for a, b in found[0].spans):
@@ -137,59 +128,56 @@ def _sections(path: Path, data: bytes, where: str) -> list[_Section]:
     return found
 
 
-def _refuse_keyword(path: Path, number: int, text: str, keyword: str) -> NoReturn:
+def _refuse_keyword(source: Source, number: int, text: str, keyword: str) -> NoReturn:
     if keyword == "CLOAD":
-        refuse_line(path, number, text, "the file holds loads, no matrix")
+        source.refuse_line(number, text, "the file holds loads, no matrix")
     if keyword in ("USER ELEMENT", "MATRIX"):
-        refuse_line(
-            path, number, text,
+        source.refuse_line(
+            number, text,
             "matrices of a substructure are not read; write them with *MATRIX GENERATE and *MATRIX OUTPUT",
         )
-    refuse_line(path, number, text, "only *MATRIX INPUT and comments (**) may stand between lines of a matrix")
+    source.refuse_line(number, text, "only *MATRIX INPUT and comments (**) may stand between lines of a matrix")
 
 
-def _chosen(sections: list[_Section], name: str | None, path: Path, where: str) -> _Section:
+def _chosen(sections: list[_Section], name: str | None, source: Source) -> _Section:
     names = [s.name or f"matrix {k}" for k, s in enumerate(sections, 1)]
     if len(sections) == 1 and (name is None or not sections[0].name):
-        if name is not None:
-            raise CaseError(where, name, f"{path.name} holds one matrix, and that has no name; give none")
+        nameless(source, name)
         return sections[0]
-    return sections[names.index(choose(name, names, path, where))]
+    return sections[names.index(chosen_in_any_case(source, name, names))]
 
 
-def _scale(section: _Section, path: Path, where: str) -> float:
+def _scale(section: _Section, source: Source) -> float:
     given = (section.options or {}).get("SCALE FACTOR", (section.options or {}).get("SCALEFACTOR", "1"))
-    value = float(given.upper().replace("D", "E")) if _NUMBER.fullmatch(given) else 0.0
-    if value == 0.0 or not np.isfinite(value):
-        raise CaseError(where, shown_path(path), f"SCALE FACTOR={given} is no finite number other than 0")
+    value = fortran_number(given)
+    if value == 0.0 or not math.isfinite(value):
+        source.refuse(f"SCALE FACTOR={given} is no finite number other than 0")
     return value
 
 
 def _formed(
-    matrix: Sparse, section: _Section, rows: IntArray, columns: IntArray, path: Path, where: str, notes: list[str]
-) -> tuple[Sparse, Literal["symmetric", "general"]]:
-    """The whole matrix, and whether it is "symmetric" or "general": as its header says, else as its entries show."""
+    matrix: Sparse, section: _Section, rows: IntArray, columns: IntArray, source: Source
+) -> tuple[Sparse, Literal["symmetric", "general"], tuple[str, ...]]:
+    """The whole matrix, whether it is "symmetric" or "general", and notes: as its header says, else as its entries
+    show."""
     given = None if section.options is None else section.options.get("TYPE", "SYMMETRIC").upper()
     if given not in (None, "SYMMETRIC", "UNSYMMETRIC"):
-        raise CaseError(where, shown_path(path), f"TYPE={given} is not known; accepted: SYMMETRIC, UNSYMMETRIC")
+        source.refuse(f"TYPE={given} is not known; accepted: SYMMETRIC, UNSYMMETRIC")
     both, alone = sides(matrix)
     if given == "UNSYMMETRIC" or (given is None and both):
-        return matrix, "general"
-    if given == "SYMMETRIC" and both and (worst := disagreement(matrix, stored_only=True)) > SAME:
-        raise CaseError(
-            where, shown_path(path),
-            f"TYPE=SYMMETRIC, but entries (i, j) and (j, i) differ by up to {worst:.1e} of the largest in their rows; "
-            "for a matrix that is not symmetric the header must say TYPE=UNSYMMETRIC",
-        )
+        return matrix, "general", ()
+    if given == "SYMMETRIC":
+        check_symmetric(source, matrix, stored_only=True, says="TYPE=SYMMETRIC", instead="TYPE=UNSYMMETRIC")
+    note = ""
     if given is None and alone:
-        notes.append(
+        note = (
             "No entry has a counterpart across the diagonal: taken as one half of a symmetric matrix and completed."
             if _one_triangle(rows, columns)
             else "Entries stand on both sides of the diagonal, but none has a counterpart: taken as half of a "
             "symmetric matrix and completed. If it is not symmetric, put *MATRIX INPUT, NAME=A, TYPE=UNSYMMETRIC "
             "before its lines."
         )
-    return completed(matrix), "symmetric"
+    return mirrored(matrix), "symmetric", ((note,) if note else ())
 
 
 def _one_triangle(rows: IntArray, columns: IntArray) -> bool:
@@ -218,7 +206,7 @@ def _numbered(table: Array) -> tuple[IntArray, IntArray, Labels]:
     return index[:count], index[count:], Labels(node[at], direction[at])
 
 
-def _table(path: Path, data: bytes, spans: list[tuple[int, int]]) -> tuple[Array | None, int]:
+def _table(source: Source, data: bytes, spans: list[tuple[int, int]]) -> tuple[Array | None, int]:
     """All lines (k, 5) or (k, 3), and which."""
     width = 0
     held: list[Array] = []
@@ -232,22 +220,23 @@ def _table(path: Path, data: bytes, spans: list[tuple[int, int]]) -> tuple[Array
             if not width and (line := text.lstrip()):
                 width = len(line.splitlines()[0].replace(b",", b" ").split())
                 if width not in _MEANING:
-                    _refuse_width(path, data, end - len(line), line.splitlines()[0], width)
+                    _refuse_width(source, data, end - len(line), line.splitlines()[0], width)
             if text.strip():
                 found = _fast(text, width)
-                held.append(_slow(path, data, start, text, width) if found is None else found)
+                held.append(_slow(source, data, start, text, width) if found is None else found)
             start = end
     return (np.concatenate(held) if held else None), width
 
 
-def _refuse_width(path: Path, data: bytes, at: int, line: bytes, width: int) -> NoReturn:
+def _refuse_width(source: Source, data: bytes, at: int, line: bytes, width: int) -> NoReturn:
     number = data.count(b"\n", 0, at) + 1
-    if width in (4, 6) and all(_NUMBER.fullmatch(f) for f in printable(line).replace(",", " ").split()):
-        refuse_line(
-            path, number, printable(line),
+    words = printable(line).replace(",", " ").split()
+    if width in (4, 6) and all(math.isfinite(fortran_number(word)) for word in words):
+        source.refuse_line(
+            number, line,
             f"has {width} values, as element matrices have; write the assembled matrix, without ELEMENT BY ELEMENT",
         )
-    refuse_line(path, number, printable(line), f"each line must hold: {_MEANING[5]} (or {_MEANING[3]})")
+    source.refuse_line(number, line, f"each line must hold: {_MEANING[5]} (or {_MEANING[3]})")
 
 
 def _fast(text: bytes, width: int) -> Array | None:
@@ -282,7 +271,7 @@ def _limits(width: int) -> tuple[Array, Array]:
     return low, np.array([_LARGEST_NODE, _LARGEST_FREEDOM] * 2, dtype=float)
 
 
-def _slow(path: Path, data: bytes, start: int, text: bytes, width: int) -> Array:
+def _slow(source: Source, data: bytes, start: int, text: bytes, width: int) -> Array:
     """The same, line by line, for the sake of the line that is wrong. Raises CaseError."""
     lowest, highest = _limits(width)
     table: list[list[float]] = []
@@ -292,15 +281,15 @@ def _slow(path: Path, data: bytes, start: int, text: bytes, width: int) -> Array
         if not fields:
             continue
         if len(fields) != width:
-            refuse_line(path, number, line, f"has {len(fields)} values; must have {width}: {_MEANING[width]}")
+            source.refuse_line(number, line, f"has {len(fields)} values; must have {width}: {_MEANING[width]}")
         row: list[float] = []
         for k, part in enumerate(fields):
-            value = float(part.upper().replace("D", "E")) if _NUMBER.fullmatch(part) else np.nan
-            if not np.isfinite(value):
-                refuse_line(path, number, line, f"{part!r} is no finite number")
+            value = fortran_number(part)
+            if not math.isfinite(value):
+                source.refuse_line(number, line, f"{part!r} is no finite number")
             if k < width - 1 and (value != int(value) or not lowest[k] <= value <= highest[k]):
                 what = "row or column number, from 1" if width == 3 else ("node", "freedom number")[k % 2]
-                refuse_line(path, number, line, f"{part} is no {what}; each line must hold: {_MEANING[width]}")
+                source.refuse_line(number, line, f"{part} is no {what}; each line must hold: {_MEANING[width]}")
             row.append(value)
         table.append(row)
     return np.array(table, dtype=np.float64).reshape(-1, width)

@@ -11,9 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from ..typing import IntArray
-from .market import in_text, read_numbers
+from .checks import nameless, whole_numbers
+from .entries import assembled, from_half
 from .model import Labels, Role, StoredMatrix
-from .numpy_file import Source, assembled, completed, nameless, source_at, whole_numbers
+from .numbers import whole_number
+from .source import Source, beside, quoted, source_at
+from .tables import read_numbers
 
 _ROLES: dict[str, Role] = {".sti": "stiffness", ".mas": "mass"}
 _HALF = (
@@ -30,39 +33,36 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     """
     source = source_at(path, where)
     nameless(source, name)
-    try:
-        with path.open("rb") as stream:
-            table = read_numbers(source, stream, 0, 3)
-        if not len(table):
-            source.refuse("holds no entries; each line must be: row column value")
-        row, column = (whole_numbers(source, table[:, k], ("rows", "columns")[k]) - 1 for k in range(2))
-        role = _ROLES.get(path.suffix.lower())
-        size = int(max(row.max(), column.max())) + 1
-        labels, size, notes = _labels(source, size)
-        below, above = bool(np.any(row > column)), bool(np.any(row < column))
-        if below and above:
-            matrix, more = assembled(source, row, column, table[:, 2], (size, size))
-            return StoredMatrix(matrix, path.name, labels, role, "general", notes=notes + more)
-        matrix, more = completed(source, row, column, table[:, 2], (size, size))
-        half = (_HALF,) if role != "mass" and (below or above) else ()
-        return StoredMatrix(matrix, path.name, labels, role, "symmetric", notes=notes + half + more)
-    except Exception as error:
-        source.unreadable("a matrix stored by CalculiX", error)
+    with source.stream() as stream:
+        table, notes = read_numbers(source, stream, 0, 3)
+    if not len(table):
+        source.refuse("holds no entries; each line must be: row column value")
+    row, column = (whole_numbers(source, table[:, k], ("rows", "columns")[k]) - 1 for k in range(2))
+    role = _ROLES.get(path.suffix.lower())
+    labels, size, more = _labels(source, max(1, int(max(row.max(), column.max())) + 1))
+    notes += more
+    below, above = bool(np.any(row > column)), bool(np.any(row < column))
+    if below and above:
+        matrix, more = assembled(source, row, column, table[:, 2], (size, size))
+        return StoredMatrix(matrix, path.name, labels, role, "general", notes=notes + more)
+    matrix, more = from_half(source, row, column, table[:, 2], (size, size))
+    half = (_HALF,) if role != "mass" and (below or above) else ()
+    return StoredMatrix(matrix, path.name, labels, role, "symmetric", notes=notes + half + more)
 
 
 def _labels(source: Source, size: int) -> tuple[Labels | None, int, tuple[str, ...]]:
     """Labels from the .dof file beside the matrix, how many freedoms there are, and notes; size: the largest index."""
-    beside = next((p for s in (".dof", ".DOF") if (p := source.path.with_suffix(s)).is_file()), None)
-    if beside is None:
+    names = beside(source, *(source.path.with_suffix(s).name for s in (".dof", ".DOF")))
+    if names is None:
         return None, size, ()
-    node, direction = _freedoms(Source(beside, source.where), beside.read_bytes())
+    node, direction = _freedoms(names, names.text())
     if size == 2 * len(node):
         # Of cyclic symmetry CalculiX stores the real matrix of twice the size, and each name once.
-        return None, size, (f"{beside.name} names half of the freedoms, as for cyclic symmetry; it was not used.",)
+        return None, size, (f"{names.path.name} names half of the freedoms, as for cyclic symmetry; it was not used.",)
     if size > len(node):
         source.refuse(
-            f"has an entry in row or column {size}, but {beside.name} names only {len(node)} freedoms; the two are not "
-            "of the same run"
+            f"has an entry in row or column {size}, but {names.path.name} names only {len(node)} freedoms; the two are "
+            "not of the same run"
         )
     return Labels(node, direction), len(node), ()
 
@@ -75,10 +75,11 @@ def _freedoms(source: Source, text: bytes) -> tuple[IntArray, IntArray]:
         word = line.strip()
         if not word:
             continue
-        node, _, direction = word.partition(b".")
-        if not (node.isdigit() and len(node) < 19 and len(direction) == 1 and b"0" <= direction <= b"6"):
-            shown = f"line {number + 1}: {in_text(word)}"
+        first, _, second = word.partition(b".")
+        node = whole_number(first)
+        if node is None or len(second) != 1 or second not in b"0123456":
+            shown = f"line {number + 1}: {quoted(word)}"
             source.refuse(f"{shown} must be a node and a direction from 0 to 6 with a point between, as 12.3")
-        nodes.append(int(node))
-        directions.append(int(direction))
+        nodes.append(node)
+        directions.append(int(second))
     return np.array(nodes, dtype=np.int64), np.array(directions, dtype=np.int64)

@@ -1,96 +1,20 @@
-"""Nastran OUTPUT4 files (.op4): text or binary, of either byte order, dense, sparse or sparse for large matrices.
-
-A matrix is a header and a record for each column that is not empty; a record for a column after the last ends it.
-Lengths count words, of which a double precision number takes two. In sparse records a column comes as strings of
-entries in a row. They begin with one word, 65536 (length + 1) + first row, or, for large matrices (BIGMAT, with a
-negative number of rows), with two words, length + 1 and first row.
-"""
+"""Nastran OUTPUT4 files (.op4): text or binary, of either byte order, dense, sparse or sparse for large matrices."""
 
 from __future__ import annotations
 
-import math
-import re
-import struct
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
+from typing import Any
 
-import numpy as np
-
-from ..errors import CaseError
-from ..mesh.paths import shown_path
-from ..typing import Array, IntArray, Sparse
+from ..typing import IntArray, Sparse
+from .checks import chosen_in_any_case, square
+from .entries import assembled, check_symmetric, mirrored, sides, symmetric_part
 from .model import StoredMatrix
-from .program_files import (
-    SAME,
-    assembled,
-    check_size,
-    choose,
-    completed,
-    contents,
-    disagreement,
-    finished,
-    fortran_number,
-    printable,
-    refuse_line,
-    role_of,
-    sides,
-    symmetric_part,
-)
+from .nastran import SYMMETRIC, check_form, named
+from .op4_records import Header, records
+from .source import Source, source_at
 
-_BIG = 65536
-_FORMAT = re.compile(r"(?:1P,)?(\d+)[ED](\d+)\.\d+")
+_ACCEPTED = (1, 2, SYMMETRIC)  # square ones are written as rectangular, too
 _FORMS = {3: "diagonal", 4: "lower triangle", 5: "upper triangle", 8: "identity", 9: "pseudo identity"}
-
-
-@dataclass
-class _Header:
-    """What a matrix is. numbers a line holds and characters each takes: in text files only."""
-
-    name: str
-    columns: int
-    rows: int
-    form: int
-    kind: int
-    per_line: int = 5
-    width: int = 16
-
-    @property
-    def large(self) -> bool:
-        """Whether strings begin with two words."""
-        return self.rows < 0 or self.rows >= _BIG
-
-    @property
-    def parts(self) -> int:
-        """Numbers that an entry takes."""
-        return 2 if self.kind in (3, 4) else 1
-
-
-@dataclass
-class _Entries:
-    """Runs of entries: first row and column from 0, where its numbers begin, and how many entries it has."""
-
-    rows: list[int] = field(default_factory=list)
-    columns: list[int] = field(default_factory=list)
-    starts: list[int] = field(default_factory=list)
-    counts: list[int] = field(default_factory=list)
-    dense: bool = False
-
-    def add(self, row: int, column: int, start: int, count: int) -> None:
-        self.rows.append(row)
-        self.columns.append(column)
-        self.starts.append(start)
-        self.counts.append(count)
-
-    def spread(self, step: int) -> tuple[IntArray, IntArray, IntArray]:
-        """Row, column and place of the number, of each entry (k,); step: what an entry takes there."""
-        counts = np.array(self.counts, dtype=np.int64)
-        first = np.repeat(np.cumsum(counts) - counts, counts)
-        within = np.arange(int(counts.sum()), dtype=np.int64) - first
-        rows, columns, starts = (
-            np.repeat(np.array(v, dtype=np.int64), counts) for v in (self.rows, self.columns, self.starts)
-        )
-        return rows + within, columns, starts + step * within
 
 
 def read(path: Path, name: str | None, where: str) -> StoredMatrix:
@@ -99,321 +23,45 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     A symmetric one (form 6) of which one half is there is completed. Raises CaseError at `where`, or at
     "FILE, line N" or "FILE, byte N" for what is wrong.
     """
-    data = contents(path, where)
-    start = data[:4]
-    if start in (struct.pack(o + "i", n) for o in "<>" for n in (24, 48)):
-        walker: _Text | _Binary = _Binary(path, data, where)
-    elif b"\0" in data[:80]:
-        raise CaseError(
-            where, shown_path(path), "is binary, but begins with no OUTPUT4 header (a record of 24 or 48 bytes)"
-        )
-    else:
-        walker = _Text(path, data, where)
-    headers: list[_Header] = []
-    found: tuple[_Header, Sparse, int, bool] | None = None
+    source = source_at(path, where)
+    walker = records(source, source.contents())
+    headers: list[Header] = []
+    found: tuple[Header, tuple[IntArray, IntArray, Any]] | None = None
     while (header := walker.header()) is not None:
         headers.append(header)
-        wanted = len(headers) == 1 if name is None else header.name.upper() == name.strip().upper()
-        wanted = wanted and found is None
+        wanted = found is None and (name is None or header.name.upper() == name.strip().upper())
         if wanted:
-            _check(header, where, path, len(data))
+            _check(source.of(header.name), header)
         entries = walker.columns(header)
         if wanted:
-            matrix, repeated = walker.values(header, entries)
-            found = header, matrix, repeated, entries.dense
+            found = header, walker.values(header, entries)
     if not headers:
-        raise CaseError(where, shown_path(path), "holds no matrix")
-    choose(name, [h.name for h in headers], path, where)
-    assert found is not None
-    return _stored(found[0], found[1], found[2], path, where)
+        source.refuse("holds no matrix")
+    chosen_in_any_case(source, name, [h.name for h in headers])
+    assert found is not None, "one of them was chosen"
+    return _stored(source.of(found[0].name), *found)
 
 
-def _check(header: _Header, where: str, path: Path, size: int) -> None:
-    rows = abs(header.rows)
-    form = f"{header.form} ({_FORMS[header.form]})" if header.form in _FORMS else f"{header.form}"
-    if header.form not in (1, 2, 6):
-        raise CaseError(where, header.name, f"has form {form}; accepted: 1 (square) and 6 (symmetric)")
-    if rows != header.columns:
-        raise CaseError(where, header.name, f"has {rows} rows and {header.columns} columns; must be square")
-    check_size(rows, path, where, size)
+def _check(source: Source, header: Header) -> None:
+    check_form(source, header.form, _ACCEPTED, _FORMS)
+    square(source, abs(header.rows), header.columns)
 
 
-def _stored(header: _Header, matrix: Sparse, repeated: int, path: Path, where: str) -> StoredMatrix:
-    notes: list[str] = []
-    if repeated:
-        notes.append(f"{repeated} entries stand more than once in the file; they have been added up.")
+def _stored(source: Source, header: Header, values: tuple[IntArray, IntArray, Any]) -> StoredMatrix:
+    matrix, notes = assembled(source, *values, (header.columns, header.columns))
     # Columns are written from their first entry to their last, zeros between included.
     matrix.eliminate_zeros()
-    if header.form == 6:
-        both, alone = sides(matrix)
-        if alone and not both:
-            notes.append("The matrix is marked as symmetric and only one half is there; it has been completed.")
-            matrix = completed(matrix)
-        elif (worst := disagreement(matrix, stored_only=False)) > SAME:
-            raise CaseError(
-                where, header.name,
-                f"has form 6 (symmetric), but entries (i, j) and (j, i) differ by up to {worst:.1e} of the largest "
-                "in their rows; for a matrix that is not symmetric it must be form 1",
-            )
-        else:
-            matrix = symmetric_part(matrix)
-    if header.kind in (3, 4):
-        notes.append("The matrix is stored as complex numbers; all imaginary parts are 0.")
-    return StoredMatrix(
-        finished(matrix, path, where),
-        path.name,
-        None,
-        role_of(header.name),
-        "symmetric" if header.form == 6 else "general",
-        header.name,
-        tuple(notes),
-    )
+    if header.form == SYMMETRIC:
+        matrix, more = _whole(source, matrix)
+        notes += more
+    return named(source, matrix, None, header.form, header.kind, notes)
 
 
-def _real_parts(header: _Header, real: Array, imaginary: Array | None, where: str) -> Array:
-    if imaginary is not None and (count := int(np.count_nonzero(imaginary))):
-        raise CaseError(
-            where, header.name, f"is complex: {count} entries have an imaginary part; only real ones are read"
-        )
-    return real
-
-
-def _check_kind(header: _Header) -> str | None:
-    """What is wrong with a header, in any file."""
-    if header.columns < 1 or header.rows == 0:
-        return f"has {abs(header.rows)} rows and {header.columns} columns; must have at least one of each"
-    if header.kind not in (1, 2, 3, 4):
-        return f"type {header.kind} is not known; accepted: 1, 2 (real) and 3, 4 (complex)"
-    return None
-
-
-class _Text:
-    """An OUTPUT4 file of text, taken from its beginning to its end."""
-
-    def __init__(self, path: Path, data: bytes, where: str) -> None:
-        self._path, self._where = path, where
-        self._lines = data.decode("latin-1").split("\n")
-        self._at = 0
-        self._numbers: list[float] = []
-
-    def header(self) -> _Header | None:
-        """The next matrix, None at the end."""
-        while self._at < len(self._lines) and not self._lines[self._at].strip():
-            self._at += 1
-        if self._at == len(self._lines):
-            return None
-        line = self._next()
-        columns, rows, form, kind = (self._whole(line, k) for k in range(4))
-        text = line.rstrip()
-        header = _Header(printable(text[32:40].encode("latin-1")) or "?", columns, rows, form, kind)
-        shown = text[40:].strip().upper()
-        if shown:
-            found = _FORMAT.fullmatch(shown)
-            if not found or not 1 <= int(found[1]) <= 99 or not 5 <= int(found[2]) <= 99:
-                self._refuse("must end in how numbers are written, as 5E16.9 or 1P,3E23.16")
-            header.per_line, header.width = int(found[1]), int(found[2])
-        wrong = _check_kind(header)
-        if wrong:
-            self._refuse(wrong)
-        return header
-
-    def columns(self, header: _Header) -> _Entries:
-        """All columns of the matrix whose header has just been taken."""
-        entries = _Entries()
-        self._numbers = []
-        words = 2 if header.kind in (2, 4) else 1
-        last = 0
-        while True:
-            line = self._next()
-            column, row, length = (self._whole(line, k) for k in range(3))
-            if not last < column <= header.columns + 1 or length < 0 or row < 0:
-                self._refuse(f"must begin a column: its number, {last + 1} to {header.columns + 1}, first row, length")
-            last = column
-            if column > header.columns:
-                self._at += self._at < len(self._lines)  # a number without meaning
-                return entries
-            if row:
-                entries.dense = True
-                self._run(header, entries, row, column, length)
-                continue
-            while length > 0:
-                line = self._next()
-                if header.large:
-                    size, row = self._whole(line, 0) - 1, self._whole(line, 1)
-                    length -= size + 2
-                else:
-                    code = self._whole_of(line)
-                    size, row = (code >> 16) - 1, code & 0xFFFF
-                    length -= size + 1
-                if size < 1 or size % words or length < 0:
-                    self._refuse("must begin a string of entries: its length and first row do not fit")
-                self._run(header, entries, row, column, size // words)
-
-    def values(self, header: _Header, entries: _Entries) -> tuple[Sparse, int]:
-        """The matrix, and how many entries came more than once."""
-        rows, columns, places = entries.spread(header.parts)
-        values = np.array(self._numbers)
-        imaginary = values[places + 1] if header.parts == 2 else None
-        real = _real_parts(header, values[places], imaginary, self._where)
-        return assembled(rows, columns, real, header.columns)
-
-    def _run(self, header: _Header, entries: _Entries, row: int, column: int, count: int) -> None:
-        """Entries below one another; count: of numbers."""
-        if count < 1 or count % header.parts or row < 1 or row - 1 + count // header.parts > abs(header.rows):
-            self._refuse(f"leaves the matrix: it has {abs(header.rows)} rows")
-        entries.add(row - 1, column - 1, len(self._numbers), count // header.parts)
-        width, per_line = header.width, header.per_line
-        while count > 0:
-            line = self._next()
-            here = min(count, per_line)
-            for k in range(here):
-                text = line[k * width : (k + 1) * width]
-                value = fortran_number(text)
-                if not math.isfinite(value):
-                    self._refuse(f"must hold {here} numbers of {width} characters; {text!r} is no finite number")
-                self._numbers.append(value)
-            count -= here
-
-    def _next(self) -> str:
-        last = len(self._lines) - 1
-        if self._at > last or (self._at == last and not self._lines[last].strip()):
-            raise CaseError(
-                self._where, shown_path(self._path), f"ends in the middle of a matrix, at line {len(self._lines)}"
-            )
-        self._at += 1
-        return self._lines[self._at - 1]
-
-    def _whole(self, line: str, at: int) -> int:
-        return self._whole_of(line[8 * at : 8 * at + 8])
-
-    def _whole_of(self, text: str) -> int:
-        if re.fullmatch(r"[+-]?[0-9]{1,18}", text.strip()):
-            return int(text.strip())
-        self._refuse(f"{printable(text.encode('latin-1'))!r} is no whole number; integers must fill fields of 8")
-
-    def _refuse(self, accepted: str) -> NoReturn:
-        line = self._lines[self._at - 1]
-        refuse_line(self._path, self._at, printable(line.encode("latin-1")), printable(accepted.encode("latin-1")))
-
-
-class _Binary:
-    """The same for a file of Fortran records: each between two words that say its length in bytes."""
-
-    def __init__(self, path: Path, data: bytes, where: str) -> None:
-        self._path, self._data, self._where = path, data, where
-        self._order = "<" if data[0] else ">"
-        self._at = 0
-        length = struct.unpack_from(self._order + "i", data)[0]
-        # Nastran with words of 64 bits writes all integers and reals so; marks of records stay at 32.
-        self._word = 8 if length == 48 else 4
-        self._integer = "q" if self._word == 8 else "i"
-        self._three = struct.Struct(f"{self._order}3{self._integer}")
-        self._two = struct.Struct(f"{self._order}2{self._integer}")
-        self._one = struct.Struct(f"{self._order}{self._integer}")
-
-    def header(self) -> _Header | None:
-        """The next matrix, None at the end."""
-        if self._at == len(self._data):
-            return None
-        begin, end = self._record()
-        if end - begin != 6 * self._word:
-            self._refuse(begin, f"must be a header of {6 * self._word} bytes; the record has {end - begin}")
-        numbers = struct.unpack_from(f"{self._order}4{self._integer}", self._data, begin)
-        name = printable(self._data[begin + 4 * self._word : end].replace(b"\0", b" ")) or "?"
-        header = _Header(name, numbers[0], numbers[1], numbers[2], numbers[3])
-        if wrong := _check_kind(header):
-            self._refuse(begin, wrong)
-        return header
-
-    def columns(self, header: _Header) -> _Entries:
-        """All columns of the matrix whose header has just been taken."""
-        entries = _Entries()
-        word = self._word
-        words = 2 if header.kind in (2, 4) and word == 4 else 1
-        step = words * header.parts
-        last, rows = 0, abs(header.rows)
-        while True:
-            begin, end = self._record()
-            if end - begin < 3 * word:
-                self._refuse(begin, "is too short to begin a column")
-            column, row, length = self._three.unpack_from(self._data, begin)
-            at = begin + 3 * word
-            if not last < column <= header.columns + 1:
-                self._refuse(begin, f"must begin column {last + 1} to {header.columns + 1}; it says {column}")
-            last = column
-            if column > header.columns:
-                return entries
-            if length < 0 or row < 0 or at + length * word > end:
-                self._refuse(begin, f"is of {end - begin} bytes, too short for the {length} words it announces")
-            if row:
-                entries.dense = True
-                if length % step or row - 1 + length // step > rows:
-                    self._refuse(begin, f"leaves the matrix: it has {rows} rows")
-                entries.add(row - 1, column - 1, at, length // step)
-                continue
-            stop = at + length * word
-            while at < stop:
-                if header.large:
-                    if at + 2 * word > stop:
-                        self._refuse(begin, "ends in the middle of a string of entries")
-                    size, row = self._two.unpack_from(self._data, at)
-                    size -= 1
-                    at += 2 * word
-                else:
-                    code = self._one.unpack_from(self._data, at)[0]
-                    size, row = (code >> 16) - 1, code & 0xFFFF
-                    at += word
-                if size < 1 or size % step or at + size * word > stop:
-                    self._refuse(begin, "holds a string of entries whose length does not fit")
-                if row < 1 or row - 1 + size // step > rows:
-                    self._refuse(begin, f"leaves the matrix: it has {rows} rows")
-                entries.add(row - 1, column - 1, at, size // step)
-                at += size * word
-
-    def values(self, header: _Header, entries: _Entries) -> tuple[Sparse, int]:
-        """The matrix, and how many entries came more than once."""
-        size = 8 if self._word == 8 or header.kind in (2, 4) else 4
-        kind = f"{self._order}f{size}"
-        rows, columns, places = entries.spread(size * header.parts)
-        real = self._numbers(places, kind, size)
-        imaginary = self._numbers(places + size, kind, size) if header.parts == 2 else None
-        if not (np.isfinite(real).all() and (imaginary is None or np.isfinite(imaginary).all())):
-            bad = int(np.flatnonzero(~np.isfinite(real) | (False if imaginary is None else ~np.isfinite(imaginary)))[0])
-            raise CaseError(
-                self._where, header.name,
-                f"row {rows[bad] + 1}, column {columns[bad] + 1} is no finite number; must be one",
-            )
-        return assembled(rows, columns, _real_parts(header, real, imaginary, self._where), header.columns)
-
-    def _numbers(self, places: IntArray, kind: str, size: int) -> Array:
-        """Numbers that begin at these bytes: words need not lie at multiples of their size."""
-        words = np.frombuffer(self._data, dtype=np.uint8, count=len(self._data) // 4 * 4).view(np.uint32)
-        # Every record and every word is a multiple of 4 bytes long, so is where it begins.
-        index = places // 4
-        if size == 4:
-            return words[index].view(kind).astype(np.float64)
-        pairs = np.stack([words[index], words[index + 1]], axis=1)
-        return pairs.view(kind)[:, 0].astype(np.float64)
-
-    def _record(self) -> tuple[int, int]:
-        """First byte and end of the next record's contents."""
-        data, at = self._data, self._at
-        if at + 4 > len(data):
-            self._ends()
-        length = struct.unpack_from(self._order + "i", data, at)[0]
-        if length < 0 or length % 4:
-            self._refuse(at, f"must begin a record with its length in bytes; {length} is none")
-        if at + 8 + length > len(data):
-            self._ends()
-        if struct.unpack_from(self._order + "i", data, at + 4 + length)[0] != length:
-            self._refuse(at, f"is no record: the length {length} at its beginning is not repeated at its end")
-        self._at = at + 8 + length
-        return at + 4, at + 4 + length
-
-    def _ends(self) -> NoReturn:
-        raise CaseError(
-            self._where, shown_path(self._path), f"ends in the middle of a matrix, after {len(self._data)} bytes"
-        )
-
-    def _refuse(self, at: int, accepted: str) -> NoReturn:
-        raise CaseError(f"{self._path.name}, byte {at}", None, accepted)
+def _whole(source: Source, matrix: Sparse) -> tuple[Sparse, tuple[str, ...]]:
+    """A matrix that is marked as symmetric. Raises CaseError where it is not."""
+    both, alone = sides(matrix)
+    if alone and not both:
+        note = "The matrix is marked as symmetric and only one half is there; it has been completed."
+        return mirrored(matrix), (note,)
+    check_symmetric(source, matrix, stored_only=False, says="form 6 (symmetric)", instead="form 1 (square)")
+    return symmetric_part(matrix), ()

@@ -7,7 +7,6 @@ Small fields of 8, large fields of 16 (DMIG*) and fields between commas may be m
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,29 +14,16 @@ from typing import NoReturn
 
 import numpy as np
 
-from ..errors import CaseError
-from ..mesh.paths import shown_path
-from ..typing import IntArray
+from .checks import chosen_in_any_case
+from .entries import assembled, check_symmetric, mirrored, sides
 from .model import Labels, StoredMatrix
-from .program_files import (
-    SAME,
-    assembled,
-    choose,
-    completed,
-    contents,
-    disagreement,
-    finished,
-    fortran_number,
-    printable,
-    refuse_line,
-    role_of,
-    sides,
-)
+from .nastran import LARGEST_GRID, REAL, SYMMETRIC, check_form, named
+from .numbers import fortran_number, whole_number
+from .source import Source, printable, source_at, unended
 
 _FIRST_ENTRY = 4  # name, grid and component of the column, nothing
-_WHOLE = re.compile(r"\d+")
-_LARGEST_GRID = 2**31 - 1
-_FORMS = {1: "square", 2: "rectangular", 6: "symmetric", 9: "rectangular"}
+_ACCEPTED = (1, SYMMETRIC)
+_FORMS = {2: "rectangular", 9: "rectangular"}
 
 
 @dataclass
@@ -67,8 +53,7 @@ class _Matrix:
     wanted: bool = True
     rows: list[int] = field(default_factory=list)
     columns: list[int] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-    imaginary: int = 0
+    values: list[complex] = field(default_factory=list)
 
 
 def read(path: Path, name: str | None, where: str) -> StoredMatrix:
@@ -76,63 +61,41 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
 
     Symmetric ones (IFO 6) are completed. Raises CaseError at `where`, or at "FILE, line N" for a line that is wrong.
     """
-    data = contents(path, where)
+    source = source_at(path, where)
+    data = source.text()
     matrices: dict[str, _Matrix] = {}
-    for card in _cards(path, data):
-        _take(path, card, matrices, None if name is None else name.strip().upper())
+    for card in _cards(source, data):
+        _take(source, card, matrices, None if name is None else name.strip().upper())
     if not matrices:
-        raise CaseError(where, shown_path(path), "holds no DMIG card; ask Nastran for them with EXTSEOUT(…,DMIGPCH)")
-    square = [m.name for m in matrices.values() if m.form in (1, 6)]
+        source.refuse("holds no DMIG card; ask Nastran for them with EXTSEOUT(…,DMIGPCH)")
+    square = [m.name for m in matrices.values() if m.form in _ACCEPTED]
     everything = [m.name for m in matrices.values()]
-    found = matrices[choose(name, square if name is None and square else everything, path, where).upper()]
-    if found.form not in (1, 6):
-        kind = _FORMS.get(found.form, "not known")
-        raise CaseError(
-            where, found.name, f"has form {found.form} ({kind}); accepted: 1 (square) and 6 (symmetric)"
-        )
-    if found.imaginary:
-        raise CaseError(
-            where, found.name, f"is complex: {found.imaginary} entries have an imaginary part; only real ones are read"
-        )
+    key = chosen_in_any_case(source, name, square if name is None and square else everything)
+    return _stored(source.of(key), matrices[key.upper()], unended(data))
+
+
+def _stored(source: Source, found: _Matrix, notes: tuple[str, ...]) -> StoredMatrix:
+    check_form(source, found.form, _ACCEPTED, _FORMS)
     if not found.values:
-        raise CaseError(where, found.name, "has no columns; is the file complete?")
-    return _stored(found, path, where)
-
-
-def _stored(found: _Matrix, path: Path, where: str) -> StoredMatrix:
+        source.refuse("has no columns; is the file complete?")
     keys = np.array(found.rows + found.columns, dtype=np.int64)
-    held, inverse = np.unique(keys, return_inverse=True)
-    index: IntArray = inverse
+    held, index = np.unique(keys, return_inverse=True)
     count = len(found.rows)
-    matrix, repeated = assembled(index[:count], index[count:], np.array(found.values), len(held))
-    notes: list[str] = []
-    if repeated:
-        notes.append(f"{repeated} entries stand more than once in the file; they have been added up.")
-    if found.form == 6:
-        both, alone = sides(matrix)
-        if both and (worst := disagreement(matrix, stored_only=True)) > SAME:
-            raise CaseError(
-                where, found.name,
-                f"has form 6 (symmetric), but entries (i, j) and (j, i) differ by up to {worst:.1e} of the largest "
-                "in their rows; for a matrix that is not symmetric the header must say form 1",
-            )
-        if both and alone:
-            notes.append(f"{both} entries stand on both sides of the diagonal, {alone} on one; these were mirrored.")
-        matrix = completed(matrix)
-    if found.kind in (3, 4):
-        notes.append("The matrix is stored as complex numbers; all imaginary parts are 0.")
-    return StoredMatrix(
-        finished(matrix, path, where),
-        path.name,
-        Labels(held // 8, held % 8),
-        role_of(found.name),
-        "symmetric" if found.form == 6 else "general",
-        found.name,
-        tuple(notes),
+    matrix, more = assembled(
+        source, index[:count], index[count:], np.array(found.values), (len(held), len(held))
     )
+    notes += more
+    if found.form == SYMMETRIC:
+        both, alone = sides(matrix)
+        check_symmetric(source, matrix, stored_only=True, says="form 6 (symmetric)", instead="form 1 (square)")
+        if both and alone:
+            note = f"{both} entries stand on both sides of the diagonal, {alone} on one; these were mirrored."
+            notes = (*notes, note)
+        matrix = mirrored(matrix)
+    return named(source, matrix, Labels(held // 8, held % 8), found.form, found.kind, notes)
 
 
-def _cards(path: Path, data: bytes) -> Iterator[_Card]:
+def _cards(source: Source, data: bytes) -> Iterator[_Card]:
     """DMIG cards, their continuation lines joined."""
     card: _Card | None = None
     for number, raw in enumerate(data.decode("latin-1").split("\n"), 1):
@@ -149,8 +112,8 @@ def _cards(path: Path, data: bytes) -> Iterator[_Card]:
             fields = [f.strip() for f in line.split(",")][1:]
             # A tenth field names the line that goes on.
             if len(fields) > width + 1:
-                if head.startswith("DMIG") or (card is not None and head[:1] in ("", "+", "*")):
-                    refuse_line(path, number, printable(raw.encode("latin-1")), f"has more than {width} fields")
+                if head.upper().startswith("DMIG") or (card is not None and head[:1] in ("", "+", "*")):
+                    source.refuse_line(number, raw, f"has more than {width} fields")
                 fields = fields[:width]
             fields = fields[:width]
         else:
@@ -170,70 +133,69 @@ def _cards(path: Path, data: bytes) -> Iterator[_Card]:
         yield card
 
 
-def _take(path: Path, card: _Card, matrices: dict[str, _Matrix], wanted: str | None) -> None:
-    name = printable(card.fields[0].encode("latin-1"))
+def _take(source: Source, card: _Card, matrices: dict[str, _Matrix], wanted: str | None) -> None:
+    name = printable(card.fields[0])
     if not name:
-        _refuse(path, card, 0, "DMIG needs a name")
+        _refuse(source, card, 0, "DMIG needs a name")
     if card.fields[1] == "0":
-        form, kind = (_whole(path, card, k, what) for k, what in ((2, "a form (IFO)"), (3, "a type (TIN)")))
+        form, kind = (_whole(source, card, k, what) for k, what in ((2, "a form (IFO)"), (3, "a type (TIN)")))
         if kind not in (1, 2, 3, 4):
-            _refuse(path, card, 3, f"type {kind} is not known; accepted: 1, 2 (real) and 3, 4 (complex)")
+            _refuse(source, card, 3, f"type {kind} is not known; accepted: 1, 2 (real) and 3, 4 (complex)")
         if name.upper() in matrices:
-            _refuse(path, card, 0, f"{name} has a header already; each matrix must have one")
+            _refuse(source, card, 0, f"{name} has a header already; each matrix must have one")
         others = any(m.wanted for m in matrices.values())
-        take = form in (1, 6) and (not others if wanted is None else name.upper() == wanted)
+        take = form in _ACCEPTED and (not others if wanted is None else name.upper() == wanted)
         matrices[name.upper()] = _Matrix(name, form, kind, take)
         return
     found = matrices.get(name.upper())
     if found is None:
-        _refuse(path, card, 0, f"a column of {name} before its header: DMIG, {name}, 0, IFO, TIN, TOUT")
+        _refuse(source, card, 0, f"a column of {name} before its header: DMIG, {name}, 0, IFO, TIN, TOUT")
     if found.wanted:
-        _take_column(path, card, found)
+        _take_column(source, card, found)
 
 
-def _take_column(path: Path, card: _Card, found: _Matrix) -> None:
+def _take_column(source: Source, card: _Card, found: _Matrix) -> None:
     fields = card.fields
-    column = _freedom(path, card, 1)
-    complex_kind = found.kind in (3, 4)
+    column = _freedom(source, card, 1)
     for at in range(_FIRST_ENTRY, len(fields), 4):
         if not (fields[at] or fields[at + 1] or fields[at + 2] or fields[at + 3]):
             continue
-        found.rows.append(_freedom(path, card, at))
+        found.rows.append(_freedom(source, card, at))
         found.columns.append(column)
-        found.values.append(_real(path, card, at + 2))
-        if fields[at + 3]:
-            imaginary = _real(path, card, at + 3)
-            found.imaginary += complex_kind and imaginary != 0.0
+        real, imaginary = _real(source, card, at + 2), _real(source, card, at + 3) if fields[at + 3] else 0.0
+        if imaginary and found.kind in REAL:
+            shown = f"{printable(fields[at + 3])!r} stands where an imaginary part would, but type {found.kind} is real"
+            _refuse(source, card, at + 3, f"{shown}; do the fields begin in the right columns?")
+        found.values.append(complex(real, imaginary))
     if len(fields) <= _FIRST_ENTRY:
-        _refuse(path, card, 0, "the column has no entries; is a line missing?")
+        _refuse(source, card, 0, "the column has no entries; is a line missing?")
 
 
-def _freedom(path: Path, card: _Card, at: int) -> int:
+def _freedom(source: Source, card: _Card, at: int) -> int:
     """Number of a grid or scalar point and its component as one."""
-    grid = _whole(path, card, at, "a grid or scalar point")
-    component = _whole(path, card, at + 1, "a component") if card.fields[at + 1] else 0
-    if not 0 < grid <= _LARGEST_GRID:
-        _refuse(path, card, at, f"{grid} is no grid or scalar point; they are numbered from 1")
+    grid = _whole(source, card, at, "a grid or scalar point")
+    component = _whole(source, card, at + 1, "a component") if card.fields[at + 1] else 0
+    if not 0 < grid <= LARGEST_GRID:
+        _refuse(source, card, at, f"{grid} is no grid or scalar point; they are numbered from 1")
     if component > 6:
-        _refuse(path, card, at + 1, f"{component} is no component; must be 1 to 6, or 0 for a scalar point")
+        _refuse(source, card, at + 1, f"{component} is no component; must be 1 to 6, or 0 for a scalar point")
     return 8 * grid + component
 
 
-def _whole(path: Path, card: _Card, at: int, what: str) -> int:
-    text = card.fields[at]
-    if len(text) <= 16 and _WHOLE.fullmatch(text) and text.isascii():
-        return int(text)
-    _refuse(path, card, at, f"{printable(text.encode('latin-1'))!r} is not {what}, a whole number")
+def _whole(source: Source, card: _Card, at: int, what: str) -> int:
+    value = whole_number(card.fields[at])
+    if value is None:
+        _refuse(source, card, at, f"{printable(card.fields[at])!r} is not {what}, a whole number")
+    return value
 
 
-def _real(path: Path, card: _Card, at: int) -> float:
-    text = card.fields[at]
-    value = fortran_number(text)
-    if math.isfinite(value):
-        return value
-    _refuse(path, card, at, f"{printable(text.encode('latin-1'))!r} is no finite number")
+def _real(source: Source, card: _Card, at: int) -> float:
+    value = fortran_number(card.fields[at])
+    if not math.isfinite(value):
+        _refuse(source, card, at, f"{printable(card.fields[at])!r} is no finite number")
+    return value
 
 
-def _refuse(path: Path, card: _Card, at: int, accepted: str) -> NoReturn:
+def _refuse(source: Source, card: _Card, at: int, accepted: str) -> NoReturn:
     number, text = card.line_of(at)
-    refuse_line(path, number, printable(text.encode("latin-1")), accepted)
+    source.refuse_line(number, text, accepted)

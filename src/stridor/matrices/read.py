@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import gzip
-import zlib
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
+from math import isfinite
 from pathlib import Path
 from typing import cast
 
@@ -13,9 +13,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import CaseError
-from ..mesh.paths import in_one_line, shown_path
 from ..typing import IntArray, Sparse
 from .model import Labels, StoredMatrix
+from .numbers import fortran_number
+from .source import Source, source_at
 
 _BY_SUFFIX = {
     ".npz": "numpy_file",
@@ -38,52 +39,44 @@ _READ = (
 
 
 def read_matrix(path: str | Path, name: str | None = None, *, where: str = "matrices") -> StoredMatrix:
-    """The matrix in a file of any kind that is known, by its suffix and its first bytes.
+    """The matrix in a file of any kind that is known, by its suffix and its first bytes; it stores no zeros.
 
     name: which of a file's matrices, needed where it holds several. Raises CaseError at `where`, or at
     "FILE, line N" for a line that is wrong.
     """
-    file = Path(path)
-    start = _first_bytes(file, where)
-    module = import_module(f".{_module(file, start, where)}", __package__)
-    return cast("StoredMatrix", module.read(file, name, where))
-
-
-def _first_bytes(file: Path, where: str) -> bytes:
-    """What the file begins with, unpacked. Raises CaseError where there is no file, or nothing in it."""
+    source = source_at(Path(path), where)
+    module = import_module(f".{_module(source)}", __package__)
     try:
-        if file.is_dir():
-            raise CaseError(where, shown_path(file), f"is a folder; must be a matrix file: {_READ}")
-        if not file.exists():
-            raise CaseError(where, shown_path(file), "no such file")
-        if not file.is_file():
-            raise CaseError(where, shown_path(file), "is no regular file")
-        with file.open("rb") as plain:
-            start = plain.read(512)
-        if file.suffix.lower() == ".gz" and start:
-            with gzip.open(file) as packed:
-                start = packed.read(512)
-    except (OSError, ValueError, EOFError, zlib.error) as error:  # ValueError: a name with a NUL
-        raise CaseError(where, shown_path(file), f"cannot be read: {in_one_line(error)}") from error
-    if not start:
-        raise CaseError(where, shown_path(file), "the file is empty (0 bytes)")
-    return start
+        stored = cast("StoredMatrix", module.read(source.path, name, where))
+    except Exception as error:  # what nobody has foreseen
+        source.unreadable("a matrix file", error)
+    matrix = sp.csr_array(stored.matrix, dtype=np.float64)
+    matrix.eliminate_zeros()
+    matrix.sort_indices()
+    return replace(stored, matrix=matrix)
 
 
-def _module(file: Path, start: bytes, where: str) -> str:
-    """Which module reads the file."""
-    suffix = file.suffix.lower()
-    if suffix == ".gz":
-        suffix = Path(file.stem).suffix.lower()
+def _module(source: Source) -> str:
+    """Which module reads the file. Raises CaseError where none does, or the file is empty."""
+    suffix = source.path.suffix.lower()
+    packed = suffix == ".gz"
+    if packed:
+        suffix = Path(source.path.stem).suffix.lower()
         if suffix != ".mtx":
-            raise CaseError(where, shown_path(file), "of packed files only .mtx.gz is read; unpack it")
+            source.refuse("of packed files only .mtx.gz is read; unpack it")
     if suffix == ".mtx":
-        return "market" if start.lstrip().startswith(b"%") else "abaqus"
+        return "market" if source.as_text(source.start()).lstrip().startswith(b"%") else "abaqus"
     if suffix == ".mat":
         # MATLAB's files are binary, or HDF5; Ansys calls text in Harwell-Boeing's format so, too.
-        return "matlab" if start.startswith((b"MATLAB", b"\x89HDF")) or b"\0" in start else "harwell_boeing"
+        start = source.start()
+        if start.startswith((b"MATLAB", b"\x89HDF")) or b"\0" in start:
+            return "matlab"
+        words = source.as_text(start).split(b"\n")[0].decode("latin-1").split()
+        if start.startswith(b"# Created by Octave") or (words and all(isfinite(fortran_number(w)) for w in words)):
+            source.refuse("is text, as save -ascii and Octave's save -text write it; write it with -v7 or -v7.3")
+        return "harwell_boeing"
     if suffix not in _BY_SUFFIX:
-        raise CaseError(where, shown_path(file), f"is no matrix file by its suffix; accepted: {_READ}")
+        source.refuse(f"is no matrix file by its suffix; accepted: {_READ}")
     return _BY_SUFFIX[suffix]
 
 
@@ -115,9 +108,12 @@ def common_labels(
             "known to be the same; write all in formats with labels, or all without",
         )
     keys = [_keys(labels) for _, labels in labelled]
-    for (matrix, _), own in zip(labelled, keys, strict=True):
-        if len(np.unique(own, axis=0)) < len(own):
-            raise CaseError(where, matrix.source, "names a freedom twice")
+    for (matrix, labels), own in zip(labelled, keys, strict=True):
+        _, first, count = np.unique(own, axis=0, return_index=True, return_counts=True)
+        if len(twice := first[count > 1]):
+            node, direction = labels.node[twice[0]], labels.direction[twice[0]]
+            told = f"names a freedom twice: node {node}, direction {direction}; each must have a name of its own"
+            raise CaseError(where, matrix.source, told)
     union = np.unique(np.concatenate(keys), axis=0)
     size = len(union)
     joined: list[Sparse] = []

@@ -23,6 +23,7 @@ from ..errors import AnalysisError, CaseError
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .abaqus import HELD
 from .model import Labels, StoredMatrix
+from .source import counted
 
 Definiteness = Literal["zero", "positive definite", "positive semidefinite", "indefinite", "not known"]
 
@@ -71,18 +72,19 @@ class MatrixReport:
     def lines(self) -> list[str]:
         """The report for a reader, a statement a line; warnings last."""
         held = f", {self.held} of them held (1e36 in K)" if self.held else ""
-        found = [f"{self.size} freedoms{held}"]
+        found = [f"{counted(self.size, 'freedom', 'freedoms')}{held}"]
         for role, count in self.entries.items():
             defect = self.defect[role]
             kind = "symmetric" if defect < ROUNDING else f"‖A − Aᵀ‖/‖A‖ = {defect:.1e}"
-            found.append(f"{_NAMES[role]} ({role}): " + (f"{count} entries, {kind}" if count else "zero"))
-        without = f", {self.massless} freedoms without mass" if self.massless else ""
+            filled = f"{counted(count, 'entry', 'entries')}, {kind}"
+            found.append(f"{_NAMES[role]} ({role}): {filled if count else 'zero'}")
+        without = f", {counted(self.massless, 'freedom', 'freedoms')} without mass" if self.massless else ""
         found.append(f"M is {_shown(self.mass, self.mass_negative)}{without}")
         if self.damping != "zero":
             found.append(f"the symmetric part of C is {_shown(self.damping, self.damping_negative)}")
         if self.coupling:
             most = "" if self.coupling_exact else "at most "
-            found.append(f"K − Kᵀ has rank {most}{self.coupling}, in {self.coupled} rows")
+            found.append(f"K − Kᵀ has rank {most}{self.coupling}, in {counted(self.coupled, 'row', 'rows')}")
         if self.frequencies:
             low, high = self.frequencies
             found.append(f"single freedoms, all others held, vibrate at {low:.4g} to {high:.4g} Hz")
@@ -113,9 +115,9 @@ def report(
     for role, matrix in whole.items():
         if matrix.shape != (size, size):
             raise CaseError(f"matrices.{role}", None, f"has the shape {matrix.shape}; K has {(size, size)}")
-        bad = int(np.sum(~np.isfinite(matrix.data)))
-        if bad:
-            raise CaseError(f"matrices.{role}", None, f"{bad} entries are no finite numbers; all must be")
+        if bad := int(np.sum(~np.isfinite(matrix.data))):
+            many = counted(bad, "entry is no finite number", "entries are no finite numbers")
+            raise CaseError(f"matrices.{role}", None, f"{many}; all must be")
         matrix.sum_duplicates()
         matrix.eliminate_zeros()
     held = held_freedoms(whole["stiffness"])
@@ -155,12 +157,12 @@ def report(
         warnings=(),
     )
     internal = 0 if kept is None else int(np.sum(kept.node < 0))
-    return replace(found, warnings=tuple(_warnings(found, internal, stored, c)))
+    return replace(found, warnings=tuple(_warnings(found, internal, stored, c, k)))
 
 
 def held_freedoms(stiffness: Sparse) -> IntArray:
     """Freedoms with 1e36 on the diagonal of K, as Abaqus writes what *BOUNDARY holds: leave them out everywhere."""
-    return np.flatnonzero(stiffness.diagonal() >= 0.999 * HELD)
+    return np.flatnonzero(stiffness.diagonal() >= HELD)
 
 
 def definiteness(matrix: Sparse) -> tuple[Definiteness, int | None]:
@@ -241,6 +243,8 @@ def _defect(matrix: Sparse) -> float:
 def _coupling(stiffness: Sparse) -> tuple[int, bool, int]:
     """Rank of K − Kᵀ without what is rounding, whether that is exact, and the number of its rows with entries."""
     skew = sp.coo_array(stiffness - stiffness.T)
+    if not skew.nnz:
+        return 0, True, 0
     sizes = abs(stiffness)
     largest: Array = np.maximum(sizes.max(axis=1).toarray().ravel(), sizes.max(axis=0).toarray().ravel())
     true = np.abs(skew.data) > ROUNDING * np.minimum(largest[skew.row], largest[skew.col])
@@ -274,7 +278,7 @@ def _frequencies(own_m: Array, own_k: Array) -> tuple[float, float] | None:
     good = (own_m > 0) & (own_k > 0)
     if not good.any():
         return None
-    quotient = np.sqrt(own_k[good] / own_m[good]) / (2 * np.pi)
+    quotient = np.sqrt(own_k[good]) / np.sqrt(own_m[good]) / (2 * np.pi)
     return float(quotient.min()), float(quotient.max())
 
 
@@ -286,9 +290,9 @@ def _units(own_m: Array, own_k: Array, labels: Labels | None) -> str | None:
     if not good.any():
         return None
     k = float(np.median(own_k[good]))
-    omega = float(np.median(np.sqrt(own_k[good] / own_m[good])))
-    decades = float(np.log10(k * omega))
-    reason = f"typical entries {k:.1e} in K, {k / omega**2:.1e} in M, √(K/M) = {omega / (2 * np.pi):.3g} Hz"
+    omega = float(np.median(np.sqrt(own_k[good]) / np.sqrt(own_m[good])))
+    decades = float(np.log10(k) + np.log10(omega))
+    reason = f"typical entries {k:.1e} in K, {k / omega / omega:.1e} in M, √(K/M) = {omega / (2 * np.pi):.3g} Hz"
     for name, steel in (("SI (kg, m, s, N)", _STEEL_SI), ("tonne, mm, s, N, as usual in Abaqus", _STEEL_MM)):
         if abs(decades - np.log10(steel)) <= 1.5:
             return f"{name}, if it is steel or the like; {reason}"
@@ -310,27 +314,43 @@ def _free(stiffness: Sparse, labels: Labels | None) -> tuple[int, ...]:
 
 
 def _shown(kind: str, negative: int | None) -> str:
-    return f"{kind} ({negative} negative eigenvalues)" if kind == "indefinite" and negative else kind
+    return f"{kind}{_eigenvalues(negative)}" if kind == "indefinite" else kind
 
 
-def _warnings(found: MatrixReport, internal: int, stored: Sequence[StoredMatrix], damping: Sparse) -> list[str]:
+def _eigenvalues(negative: int | None) -> str:
+    return f" ({counted(negative, 'negative eigenvalue', 'negative eigenvalues')})" if negative else ""
+
+
+def _warnings(
+    found: MatrixReport, internal: int, stored: Sequence[StoredMatrix], damping: Sparse, stiffness: Sparse
+) -> list[str]:
     said: list[str] = []
     if found.held:
-        said.append(f"{found.held} freedoms have 1e36 on the diagonal of K (Abaqus' supports); leave them out")
+        many = counted(found.held, "freedom has", "freedoms have")
+        said.append(f"{many} 1e36 on the diagonal of K (Abaqus' supports); leave them out")
+    if found.held == found.size:
+        return [*said, "all freedoms are held: nothing is left that can vibrate"]
     if found.loose:
-        said.append(f"{found.loose} freedoms have neither mass nor stiffness; K has no inverse")
+        many = counted(found.loose, "freedom has", "freedoms have")
+        said.append(f"{many} neither mass nor stiffness; K has no inverse")
     if found.free:
         axes = ", ".join("xyz"[d - 1] for d in found.free)
         said.append(f"nothing in K resists moving the whole model along {axes}; are supports missing?")
     if found.mass == "zero":
-        said.append("the mass is zero")
+        said.append("the mass is zero; without a mass nothing vibrates")
     elif found.mass == "indefinite":
         said.append("M is indefinite, and energies can be negative; is it the mass?")
     if found.defect["mass"] > ROUNDING:
         said.append(f"M is not symmetric ({found.defect['mass']:.1e}); is it the mass?")
-    said += _friction(found, internal, stored)
+    if drawn := int(np.sum(stiffness.diagonal() < 0)):
+        many = counted(drawn, "freedom has", "freedoms have")
+        said.append(f"{many} a negative entry on the diagonal of K; is the sign of every factor right?")
+    if found.entries["stiffness"]:
+        said += _friction(found, internal, stored)
+    else:
+        said.append("the stiffness is zero; is a term missing, or its factor zero?")
     if found.damping == "indefinite":
-        count = f" ({found.damping_negative} negative eigenvalues)" if found.damping_negative else ""
+        count = _eigenvalues(found.damping_negative)
         said.append(f"the symmetric part of C is indefinite{count}: it drives some motions, as falling friction does")
     if found.defect["damping"] > ROUNDING:
         skew = float(np.linalg.norm(0.5 * (damping - damping.T).data))
@@ -352,9 +372,9 @@ def _friction(found: MatrixReport, internal: int, stored: Sequence[StoredMatrix]
     if any(s.form == "general" for s in of_k):
         return [f"friction terms seem lost: K is stored as not symmetric, yet is, up to rounding; {mend}"]
     if found.multipliers:
-        signs = f"{found.multipliers} freedoms look like multipliers of a contact"
+        signs = f"{counted(found.multipliers, 'freedom looks', 'freedoms look')} like multipliers of a contact"
         return [f"friction terms seem lost: {signs}, yet K is symmetric; {mend}"]
     if internal:
-        signs = f"{internal} freedoms are internal ones, as contact makes them"
+        signs = f"{counted(internal, 'freedom is internal', 'freedoms are internal')}, as contact makes them"
         return [f"friction terms seem lost: {signs}, yet K is symmetric; {mend}"]
     return ["K is symmetric: without friction terms in it, no modes can couple to flutter"]
