@@ -11,7 +11,8 @@ from benches import paper_case
 from solid_cases import case, slider
 from stridor.case import Case, loads, template_text
 from stridor.errors import CaseError
-from stridor.study.countermeasures import Countermeasures, Measure, edge_rows, rank_countermeasures
+from stridor.study.contact_edges import edge_rows
+from stridor.study.countermeasures import Countermeasures, Measure, rank_countermeasures
 from stridor.study.damping_map import DampingMap, damping_map
 from stridor.study.sensitivities import sensitivities
 from stridor.system import build_system

@@ -1,0 +1,86 @@
+"""Counter-measures solved again with the change made: what the first order promised, and what became of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..contact.surfaces import SurfaceContact
+from ..modal.assembled import complex_modes_assembled
+from ..system import System
+from ..typing import ComplexArray
+from .contact_edges import edge_rows
+from .measure_ranking import Ranking, drawn_bodies
+from .measures import Measure, Verified, growth
+from .sensitivities import Linearised, number_at
+
+
+def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequency_hz: float | None) -> Measure:
+    """The measure with its modes solved again, steady sliding too."""
+    linear = ranking.linear
+    # The sparse path for small systems too: a mass at one node leaves their complete basis no proportional damping.
+    modes = complex_modes_assembled(
+        _changed(linear, measure),
+        linear.mu,
+        count=linear.case.modal.modes if count is None else count,
+        max_frequency_hz=max_frequency_hz,
+        damped=linear.modes.damped,
+        options=linear.options,
+    )
+    actual: ComplexArray = modes.eigenvalues[0]
+    unstable = modes.unstable[0]
+    aimed = np.flatnonzero(ranking.aimed)
+    nearest = [int(np.argmin(np.abs(actual - measure.predicted[k]))) for k in aimed]
+    if ranking.target == "sum":
+        after = growth(actual)
+        shown = int(np.argmax(actual.real))
+    else:
+        after, shown = growth(actual[nearest]), nearest[0]
+    result = Verified(
+        growth_rate=float(actual[shown].real),
+        frequency_hz=float(actual[shown].imag / (2 * np.pi)),
+        removed=growth(ranking.eigenvalues[ranking.aimed]) - after,
+        removed_sum=growth(ranking.eigenvalues) - growth(actual),
+        unstable_hz=tuple(float(v) for v in np.sort(actual[unstable].imag) / (2 * np.pi)),
+    )
+    return replace(measure, verified=result)
+
+
+def _changed(linear: Linearised, measure: Measure) -> System:
+    """The system with the change made."""
+    if measure.kind == "number":
+        value = number_at(linear.case, measure.name) if measure.name != "mu" else linear.mu
+        factor = 1 + 0.01 * measure.direction * measure.percent
+        return linear.built(linear.case.with_({measure.name: factor * value}))
+    if measure.kind == "added mass":
+        return _heavier(linear.system, measure)
+    return _chamfered(linear, measure)
+
+
+def _heavier(system: System, measure: Measure) -> System:
+    assert measure.mass is not None, "made so"
+    for body, places, d in drawn_bodies(system):
+        if body.name == measure.name:
+            node = int(np.argmin(np.linalg.norm(places - np.array(measure.position), axis=1)))
+            rows = body.rows.free[node * d : node * d + d]
+            return replace(system, mass=system.mass + measure.mass * (rows.T @ rows))
+    raise AssertionError("a body that was there")
+
+
+def _chamfered(linear: Linearised, measure: Measure) -> System:
+    system, nodes = linear.system, linear.system.contact_nodes()
+    name, edge, rows = (part.strip() for part in measure.name.rsplit(",", 2))
+    contact = nodes.names.index(name)
+    wanted = int(rows.split()[0])
+    cuts = edge_rows(nodes, linear.held.touching, linear.held.sense, contact, edge.split()[0], wanted)
+    gone = np.zeros(nodes.count, dtype=bool)
+    gone[cuts[-1].gone] = True
+    start = len(system.contacts)
+    surfaces: list[SurfaceContact] = []
+    for surface in system.surfaces:
+        stop = start + surface.nodes.count
+        # The modal approach reads a surface's nodes alone; what it was paired from stays.
+        surfaces.append(replace(surface, nodes=surface.nodes.select(~gone[start:stop])))
+        start = stop
+    return replace(system, surfaces=tuple(surfaces))

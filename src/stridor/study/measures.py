@@ -1,0 +1,119 @@
+"""Counter-measures against squeal: changes of a case, the growth they remove, and what else they do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from ..modal.complex_modes import UNSTABLE_RELATIVE
+from ..typing import BoolArray, ComplexArray, IntArray
+
+Kind = Literal["number", "added mass", "chamfer"]
+Target = int | Literal["sum"]
+
+
+@dataclass(frozen=True)
+class Verified:
+    """The modes solved again with the change made: growth_rate and frequency_hz of the target mode (of the fastest
+    growing one where the target is the sum), removed [1/s] from the target, how many modes are unstable, their
+    frequencies."""
+
+    growth_rate: float
+    frequency_hz: float
+    removed: float
+    removed_sum: float
+    unstable_hz: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One change of a case.
+
+    name: path of a number, body that gets mass, or contact that is chamfered and where. direction: +1 raise, −1 lower.
+    percent: the size of change that predictions are made for, of the number, of the body's mass, of the contact's area
+    (nodes where they have none). removed_per_percent [1/s]: growth rate of the target taken away per per cent of
+    change, removed_sum_per_percent of all unstable modes together. predicted (b,) [1/s]: eigenvalues after the change.
+    makes_unstable: branches that were stable and are predicted not to be; brings_close: those predicted to come within
+    the margin. position [m] and mass [kg] of an added mass. verified: solved again, None where it was not.
+    """
+
+    kind: Kind
+    name: str
+    direction: int
+    percent: float
+    removed_per_percent: float
+    removed_sum_per_percent: float
+    removed: float
+    predicted: ComplexArray
+    makes_unstable: tuple[int, ...]
+    brings_close: tuple[int, ...]
+    position: tuple[float, ...] | None = None
+    mass: float | None = None
+    verified: Verified | None = None
+
+    @property
+    def words(self) -> str:
+        """The change in words."""
+        if self.kind == "added mass":
+            at = ", ".join(f"{x:.4g}" for x in self.position or ())
+            return f"add {self.mass:.3g} kg to {self.name} at ({at}) m"
+        if self.kind == "chamfer":
+            return f"take {self.percent:.3g} % of the contact away: {self.name}"
+        return f"{'raise' if self.direction > 0 else 'lower'} {self.name} by {self.percent:g} %"
+
+
+@dataclass(frozen=True)
+class Countermeasures:
+    """Changes by growth removed per per cent, best first. target: number of a branch, or "sum" of all unstable ones.
+
+    branch (b,) and eigenvalues (b,) [1/s] of the modes watched, as the case is; margin: damping ratio below which a
+    stable mode is called close.
+    """
+
+    mu: float
+    target: Target
+    branch: IntArray
+    eigenvalues: ComplexArray
+    measures: tuple[Measure, ...]
+    margin: float
+    warnings: tuple[str, ...] = ()
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """The document that `stridor countermeasures --json` prints."""
+        return {
+            "mu": self.mu,
+            "target": self.target,
+            "margin": self.margin,
+            "measures": [
+                {
+                    "kind": m.kind,
+                    "name": m.name,
+                    "words": m.words,
+                    "direction": m.direction,
+                    "percent": m.percent,
+                    "removed_per_percent": m.removed_per_percent,
+                    "removed_sum_per_percent": m.removed_sum_per_percent,
+                    "removed": m.removed,
+                    "makes_unstable": list(m.makes_unstable),
+                    "brings_close": list(m.brings_close),
+                    "position": None if m.position is None else list(m.position),
+                    "mass": m.mass,
+                    "verified": None if m.verified is None else vars(m.verified).copy(),
+                }
+                for m in self.measures
+            ],
+            "warnings": list(self.warnings),
+        }
+
+
+def growing(lam: ComplexArray) -> BoolArray:
+    """Whether (b,) an eigenvalue is that of an unstable mode, beyond rounding."""
+    return lam.real > UNSTABLE_RELATIVE * np.maximum(np.abs(lam), 1.0)
+
+
+def growth(lam: ComplexArray) -> float:
+    """Σ Re λ of what grows."""
+    return float(np.maximum(lam.real, 0.0).sum())
