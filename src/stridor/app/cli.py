@@ -83,17 +83,33 @@ def check(
 
 @app.command()
 def matrices(
-    case: CaseFile,
+    case: Annotated[
+        Path, typer.Argument(metavar="CASE|FILE", help="Case file (TOML), or one matrix file.", show_default=False)
+    ],
+    name: Annotated[str | None, typer.Option("--name", help="Which matrix of a file that holds several.")] = None,
     set_: Set = None,
     solver: Solver = None,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """What the imported matrices of a case are like: symmetry, definiteness, units, friction terms that got lost."""
+    """What imported matrices are like: symmetry, definiteness, units, friction terms that got lost.
+
+    A matrix file by itself tells its size, symmetry, definiteness and the rank of what is not symmetric.
+    """
     from ..study.matrix_reports import matrix_reports
     from .output import print_json, stdout
 
+    if case.suffix.lower() != ".toml":
+        from ..matrices.read import read_matrix
+        from ..matrices.report import single_lines
+
+        lines = single_lines(read_matrix(case, name, where="FILE"))
+        if json:
+            print_json({str(case): {"text": lines}})
+        else:
+            stdout.print("\n".join([f"{case}:", *(f"  {line}" for line in lines)]), markup=False)
+        return
     found = matrix_reports(load_case(case, set_, quiet=quiet, solver=solver))
     text = [line for name, report in found.items() for line in (f"{name}:", *(f"  {x}" for x in report.lines()))]
     if out is not None:

@@ -160,6 +160,30 @@ def report(
     return replace(found, warnings=tuple(_warnings(found, internal, stored, c, k)))
 
 
+def single_lines(stored: StoredMatrix) -> list[str]:
+    """What one matrix is like by itself, whatever its role, for a reader, a statement a line."""
+    held = held_freedoms(stored.matrix)
+    keep = np.setdiff1d(np.arange(stored.matrix.shape[0]), held)
+    matrix = sp.csr_array(stored.matrix[keep][:, keep]) if len(held) else stored.matrix
+    defect = _defect(matrix)
+    said = f", {stored.role} by what the file says" if stored.role else ""
+    kind = "symmetric" if defect < ROUNDING else f"‖A − Aᵀ‖/‖A‖ = {defect:.1e}"
+    lines = [
+        f"{counted(stored.matrix.shape[0], 'freedom', 'freedoms')}{_named(stored)}{said}"
+        + (f", {len(held)} of them held (1e36)" if len(held) else ""),
+        f"{counted(int(matrix.nnz), 'entry', 'entries')}, {kind}" if matrix.nnz else "zero",
+        f"the symmetric part is {_shown(*definiteness(matrix))}",
+    ]
+    rank, exact, coupled = _coupling(matrix)
+    if rank:
+        lines.append(f"A − Aᵀ has rank {'' if exact else 'at most '}{rank}, in {counted(coupled, 'row', 'rows')}")
+    return [*lines, *(f"read: {note}" for note in stored.notes)]
+
+
+def _named(stored: StoredMatrix) -> str:
+    return f", {stored.name}" if stored.name else ""
+
+
 def held_freedoms(stiffness: Sparse) -> IntArray:
     """Freedoms with 1e36 on the diagonal of K, as Abaqus writes what *BOUNDARY holds: leave them out everywhere."""
     return np.flatnonzero(stiffness.diagonal() >= HELD)
