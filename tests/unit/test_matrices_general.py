@@ -10,7 +10,7 @@ import pytest
 from scipy import io, sparse
 
 from stridor.errors import CaseError
-from stridor.matrices import StoredMatrix, calculix, harwell_boeing, market, matlab, numpy_file
+from stridor.matrices import StoredMatrix, calculix, harwell_boeing, market, matlab, numpy_file, tables
 
 # Not symmetric, with a 0 and a small number; what most of these files are written from.
 A = np.array([[2.0, -1.0, 0.0], [3.5, 4.0, 1e-101], [0.0, -7.25, 5.0]])
@@ -83,7 +83,7 @@ def test_numbers_are_read_across_blocks(tmp_path, monkeypatch):
     big = np.random.default_rng(2).standard_normal((20, 20))
     io.mmwrite(tmp_path / "b.mtx", sparse.coo_array(big), precision=17)
     for block in (1, 7, 64):
-        monkeypatch.setattr(market, "_BLOCK", block)
+        monkeypatch.setattr(tables, "_BLOCK", block)
         check(market.read(tmp_path / "b.mtx", None, "m"), big)
 
 

@@ -273,7 +273,7 @@ def test_what_a_case_refuses():
         (bench, {"mu": (-0.1, 0.1)}, r"box.mu: .* – friction coefficients are ≥ 0"),
         (bench, {"contact_stiffness": (0.0, 1.0)}, r"factors of the contact stiffness are > 0"),
         (bench, {"materials.stel.density": (1.0, 2.0)}, r"materials.stel"),
-        (rigid, {"mu": (0.0, 0.1)}, r"rigid contact has no stiffness to vary"),
+        (rigid, {"contact_stiffness": (0.5, 2.0)}, r"rigid contact has no stiffness to vary"),
     ):
         with pytest.raises(CaseError, match=message):
             reduced_model(given, box)

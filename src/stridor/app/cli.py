@@ -280,6 +280,8 @@ def onsets(
     if not result.onsets:
         low, high = result.friction_range
         stdout.print(f"no onset for μ in {low:g} … {high:g} up to {result.max_frequency_hz:g} Hz")
+        if result.completeness:
+            stdout.print(result.completeness, markup=False)
         return
     rows = [
         [
@@ -306,6 +308,8 @@ def onsets(
     ]
     table("onsets, " + ("damped" if result.damped else "undamped"), columns, rows)
     stdout.print("κ: growth opens as κ √(μ − μ_c) without damping; slope: d growth/dμ at a damped onset")
+    if result.completeness:
+        stdout.print(result.completeness, markup=False)
 
 
 @app.command()

@@ -13,10 +13,12 @@ from ..agreement import Agreement
 from ..errors import CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
+from ..modal.parametric import ReducedModel
 from ..temporal.node_history import NodeHistory
 from ..temporal.trajectory import STATUS, ContactStatistics, PhaseResult, Trajectory
 from ..typing import ComplexArray
 from .atomic import replacing
+from .reduced_models import save_reduced
 
 Result = ComplexModes | Onsets | Trajectory | Agreement
 FORMAT = "stridor results 1"
@@ -33,8 +35,13 @@ def to_dataset(result: Result) -> Any:
     return _agreement(result)
 
 
-def save(result: Result, path: str | Path) -> Path:
-    """Write a result to ``path`` (.nc) by way of a temporary file. Raises AnalysisError on a full disk."""
+def save(result: Result | ReducedModel, path: str | Path) -> Path:
+    """Write a result to ``path`` (.nc) by way of a temporary file; a reduced model as `save_reduced` does (.npz).
+
+    Raises AnalysisError on a full disk.
+    """
+    if isinstance(result, ReducedModel):
+        return save_reduced(result, path)
     dataset = to_dataset(result)
     target = Path(path)
     with replacing(target) as temporary:
@@ -183,6 +190,8 @@ def _onsets(result: Onsets) -> Any:
     data = _dataset("onsets", variables, {}, result)
     data.attrs.update(damped=int(result.damped), max_frequency_hz=result.max_frequency_hz)
     data.attrs["friction_range"] = list(result.friction_range)
+    if result.completeness:
+        data.attrs["completeness"] = result.completeness
     return data
 
 

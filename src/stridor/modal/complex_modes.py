@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse as sp
 
-from ..errors import CaseError
+from ..errors import AnalysisError, CaseError
 from ..system import System
 from ..system.uncoupled import uncoupled_modes
 from ..threads import one_thread_if_small
@@ -34,8 +34,8 @@ class ComplexModes:
     1 by frequency at μ = 0. residual (k, b): componentwise backward error in the assembled matrices.
     right, left (k, b, n) unit vectors where asked for, else None. damped: whether C was used.
     open_contacts: contacts that carry no load in steady sliding and so take no part. completeness: of matrices without
-    structure, for each μ what speaks for no mode of the band being missed; there branches are not followed from one μ
-    to the next, and where fewer modes are found the rest is NaN.
+    structure, for each μ what speaks for no mode of the band being missed, and what the numbers are if branches could
+    not be followed; where a branch has left the band there is NaN.
     """
 
     mu: Array
@@ -144,6 +144,21 @@ def complex_modes(
     values = np.atleast_1d(np.asarray(mu, dtype=float))
     if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)) or np.any(values < 0):
         raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
+    if system.general:
+        from .assembled import Options
+        from .general import general_modes
+
+        if max_frequency_hz is None:
+            raise CaseError("max_frequency_hz", None, f"missing – {system.general}: modes are sought in a band")
+        return general_modes(
+            lambda _: system,
+            values,
+            count=None,
+            max_frequency_hz=max_frequency_hz,
+            damped=damped,
+            vectors=vectors,
+            options=Options(friction_damping=friction_damping, prestress=prestress, solver=solver),
+        )
     if system.assembled:
         from .assembled import Options, complex_modes_assembled
 
@@ -159,7 +174,10 @@ def complex_modes(
     if not damped:
         system = undamped(system)
     spectrum, coupling, open_contacts = prepare(system, mu=float(values.max()) if len(values) == 1 else None)
-    tracker = Tracker(spectrum, _limit(spectrum, count, max_frequency_hz))
+    limit = _limit(spectrum, count, max_frequency_hz)
+    if not limit > 0.0:
+        raise AnalysisError("nothing in the system oscillates: it has no stiffness at all")
+    tracker = Tracker(spectrum, limit)
     order = np.argsort(values, kind="stable")
     start = tracker.origin
     followed = np.zeros((len(values), len(start)), dtype=complex)

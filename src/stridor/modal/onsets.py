@@ -70,13 +70,17 @@ class Onset:
 
 @dataclass(frozen=True)
 class Onsets:
-    """All onsets with friction_range [a, b] and frequencies up to max_frequency_hz, by μ."""
+    """All onsets with friction_range [a, b] and frequencies up to max_frequency_hz, by μ.
+
+    completeness: of matrices without structure, what speaks for there being no others; "" of all others.
+    """
 
     onsets: tuple[Onset, ...]
     friction_range: tuple[float, float]
     max_frequency_hz: float
     damped: bool
     open_contacts: tuple[str, ...] = ()
+    completeness: str = ""
     provenance: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -92,6 +96,7 @@ class Onsets:
             "max_frequency_hz": self.max_frequency_hz,
             "damped": self.damped,
             "open_contacts": list(self.open_contacts),
+            **({"completeness": self.completeness} if self.completeness else {}),
         }
 
 
@@ -129,6 +134,17 @@ def onsets(
     low, high = (float(v) for v in friction_range)
     if not (0 <= low < high and np.isfinite(high)):
         raise CaseError("friction_range", friction_range, "two numbers 0 ≤ a < b")
+    if system.general:
+        from .assembled import Options
+        from .general import general_onsets
+
+        return general_onsets(
+            lambda _: system,
+            (low, high),
+            max_frequency_hz=max_frequency_hz,
+            damped=damped,
+            options=Options(friction_damping=friction_damping, prestress=prestress, solver=solver),
+        )
     if system.assembled:
         from .assembled import Options, onsets_assembled
 

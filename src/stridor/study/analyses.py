@@ -80,17 +80,15 @@ def modes(
         from ..modal.assembled import Options
         from ..modal.general import general_modes
 
-        def system_at(mu: float) -> System:
-            return build_system(case, mu) if system is None else system
-
         result = general_modes(
-            system_at,
+            _system_at(case, system),
             values,
             count=count if max_frequency_hz is None else None,
             max_frequency_hz=max_frequency_hz or case.modal.max_frequency_hz,
             damped=damped,
             vectors=vectors,
             options=Options(**_modal_options(case)),
+            own=own_friction(case) if case.contacts else None,
         )
     else:
         result = complex_modes(
@@ -111,19 +109,33 @@ def _varies_with_friction(case: Case) -> bool:
     return MU in case.factor_names
 
 
+def _system_at(case: Case, system: System | None) -> Callable[[float], System]:
+    """The system at a μ: always ``system`` unless that is None."""
+
+    def at(mu: float) -> System:
+        return build_system(case, mu) if system is None else system
+
+    return at
+
+
 def structured(case: Case, what: str, mu: float | None = None) -> System:
     """The system of a case whose matrices are as ``what`` needs them. Raises AnalysisError for others."""
-    if _varies_with_friction(case) and what in ("onsets", "compare", "run"):
-        raise AnalysisError(
-            f"{what}: factors of the imported matrices depend on mu, which only `stridor modes --mu` follows so far; "
-            "take it at several values"
-        )
+    works = "what works for these is `stridor modes`, `stridor onsets` and `stridor steady`"
+    if _varies_with_friction(case):
+        # Nothing gives μ: at 0 the matrices may be symmetric where they are not at any other.
+        unsaid = mu is None and MU not in case.parameters and not case.contacts
+        beyond = build_system(case, case.modal.friction_range[1]).general if unsaid else ""
+        if what in ("compare", "run") or beyond:
+            why = f", and beyond mu = 0 {beyond}" if beyond else ""
+            raise AnalysisError(
+                f"{what}: factors of imported matrices depend on mu{why}; the time loop takes constant, symmetric "
+                f"matrices only; {works}"
+            )
     system = build_system(case, mu)
     if system.general:
         raise AnalysisError(
-            f"{what} needs symmetric matrices and a positive definite mass, and {system.general}; what works for these "
-            "is `stridor modes` (with --mu 0.1,0.2 or --set parameters.NAME.value=… for other values), `stridor reduce "
-            "--onsets NAME` and `stridor steady`"
+            f"{what} needs symmetric matrices and a positive definite mass, and {system.general}; {works} (for other "
+            "parameters --set parameters.NAME.value=… or `stridor reduce --onsets NAME`)"
         )
     return system
 
@@ -188,14 +200,24 @@ def onsets(
 ) -> Onsets:
     """Every critical friction coefficient in range (defaults from the case's [modal])."""
     started = time.perf_counter()
-    system = structured(case, "onsets")
-    result = solve_onsets(
-        system,
-        case.modal.friction_range if friction_range is None else friction_range,
-        max_frequency_hz=max_frequency_hz or case.modal.max_frequency_hz,
-        damped=case.modal.damped if damped is None else damped,
-        **_modal_options(case),
-    )
+    between = case.modal.friction_range if friction_range is None else friction_range
+    limit = max_frequency_hz or case.modal.max_frequency_hz
+    damped = case.modal.damped if damped is None else damped
+    system = None if _varies_with_friction(case) else build_system(case)
+    if system is None or system.general:
+        from ..modal.assembled import Options
+        from ..modal.general import general_onsets
+
+        result = general_onsets(
+            _system_at(case, system),
+            between,
+            max_frequency_hz=limit,
+            damped=damped,
+            options=Options(**_modal_options(case)),
+            own=own_friction(case) if case.contacts else None,
+        )
+    else:
+        result = solve_onsets(system, between, max_frequency_hz=limit, damped=damped, **_modal_options(case))
     return replace(result, provenance=provenance(case, "onsets", time.perf_counter() - started))
 
 

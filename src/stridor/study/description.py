@@ -87,7 +87,7 @@ def describe(case: Case) -> Description:
                 "gap": contact.gap,
             }
     if system.general:
-        lines.append(f"{system.general}: `stridor modes` takes any matrices, onsets and the time loop do not")
+        lines.append(f"{system.general}: `stridor modes` and `stridor onsets` take any matrices, time loops do not")
     else:
         lines += _time_lines(case, system, data)
     warnings = [*case.warnings, *mesh_warnings(case, system), *imported_warnings(case, system)]

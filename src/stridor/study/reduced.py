@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..case import Case
+from ..case.expression import parse_expression
+from ..case.matrix_checks import MU
 from ..errors import CaseError
 from ..system import System, build_system
-from ..typing import Sparse
+from ..system.imported import Share
+from ..system.shares import system_shares
 
 if TYPE_CHECKING:
-    from ..modal.parametric import ParametricProblem, ReducedModel
+    from ..modal.parametric import Parameter, ReducedModel
+    from ..modal.parametric.contacts import ContactsProblem
+    from ..modal.parametric.family import Piece
     from ..modal.parametric.problem import Role
+
+REMEMBERED = 8  # systems of a case with other numbers
 
 
 def reduced_model(
@@ -26,13 +34,15 @@ def reduced_model(
 ) -> ReducedModel:
     """One factorisation's worth of work, then every mode for all values in the box in milliseconds.
 
-    box: ranges by name: "mu" (of all contacts), "contact_stiffness" (a factor of all contact stiffnesses), or the path
-    of any number of the case, as in an override ("materials.lining.young_modulus", "bodies.disc.damping.stiffness"), or
-    one of [parameters] by its name. max_frequency_hz: modes up to there (default: modal.max_frequency_hz). bound:
-    relative error of the eigenvalues. The nodes that touch are those of steady sliding in the case as it is.
+    box: ranges by name: "mu" (of all contacts, and in factors of imported matrices), "contact_stiffness" (a factor of
+    all contact stiffnesses), or the path of any number of the case, as in an override
+    ("materials.lining.young_modulus", "bodies.disc.damping.stiffness"), or one of [parameters] by its name.
+    max_frequency_hz: modes up to there (default: modal.max_frequency_hz). bound: relative error of the eigenvalues. The
+    nodes that touch are those of steady sliding in the case as it is; ``problem.notes`` of the model says where others
+    would. Rigid contact is eliminated: ``problem.displacements`` gives the system's freedoms back.
 
-    Raises CaseError for ranges and names that are none and for rigid contact; AnalysisError where matrices depend on a
-    number in no simple way, or the bound is not reached.
+    Raises CaseError for ranges and names that are none; AnalysisError where matrices depend on a number in no simple
+    way, where friction jams, or the bound is not reached.
     """
     from ..modal.parametric import reduce
 
@@ -42,44 +52,126 @@ def reduced_model(
     return reduce(problem, limit, bound=bound, solver=None if settings.solver == "auto" else settings.solver)
 
 
-def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> ParametricProblem:
+def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> ContactsProblem:
     """The matrices of a case as sums of terms in the numbers of a box, as `reduced_model` takes it."""
     from ..modal.assembled import Options
-    from ..modal.parametric import Parameter, ParametricProblem
-    from ..modal.parametric.contacts import FRICTION, STIFFNESS, contact_terms, friction_range, stiffness_range
-    from ..modal.parametric.family import interpolated_terms
+    from ..modal.parametric.contacts import FRICTION, STIFFNESS, Family, contacts_problem
+
+    parameters = _parameters(case, box)
+    numbers = _Numbers(case, box)
+    if not numbers.own.contact_nodes().count:
+        elsewhere = {*case.parameters, *case.factor_names}
+        for name in (FRICTION, STIFFNESS):
+            if name in box and name not in elsewhere:
+                raise CaseError(f"box.{name}", None, "the case has no contacts; give a range of another number")
+    exact = {FRICTION, STIFFNESS, *case.parameters}
+    settings = case.modal
+    family = Family(
+        numbers.own,
+        numbers.system,
+        numbers.structure,
+        parameters,
+        tuple(p for p in parameters if p.name not in exact),
+    )
+    solver = None if settings.solver == "auto" else settings.solver
+    return contacts_problem(family, options=Options(settings.friction_damping, settings.prestress, solver))
+
+
+def _parameters(case: Case, box: Mapping[str, tuple[float, float]]) -> tuple[Parameter, ...]:
+    """The ranges of a box as parameters. Raises CaseError for what is none."""
+    from ..modal.parametric import Parameter
+    from ..modal.parametric.contacts import FRICTION, STIFFNESS, friction_range, stiffness_range
 
     if not box:
         raise CaseError("box", None, 'missing – give at least one range, such as {"mu": (0.0, 0.6)}')
-    of_contacts, of_case = [], []
+    found: list[Parameter] = []
     for name, between in box.items():
         if len(between) != 2 or not np.all(np.isfinite(between)):
             raise CaseError(f"box.{name}", tuple(between), "a range of two numbers low < high")
-        if name == FRICTION:
-            of_contacts.append(friction_range(between))
+        low, high = (float(v) for v in between)
+        steps = name.split(".")
+        if name == STIFFNESS and name in case.parameters and case.contacts:
+            accepted = "is the stiffness of all contacts, and a parameter of the case too; rename the parameter"
+            raise CaseError(f"box.{name}", None, accepted)
+        if name in case.parameters:
+            own = case.parameters[name].value
+            found.append(Parameter(name, low, high, value=own if low <= own <= high else (low + high) / 2))
+            for end in (low, high):
+                case.with_({f"parameters.{name}.value": end})
+        elif name == FRICTION:
+            found.append(friction_range(between))
         elif name == STIFFNESS:
-            of_contacts.append(stiffness_range(between))
+            found.append(stiffness_range(between))
+        elif steps[0] == "parameters" and len(steps) == 3 and steps[1] in case.parameters:
+            raise CaseError(f"box.{name}", None, f"call it {steps[1]}")
+        elif name.endswith(".friction.coefficient") and (FRICTION in box or FRICTION in case.factor_names):
+            raise CaseError(f"box.{name}", None, "give a range of mu, the friction coefficient of all contacts")
         else:
-            low, high = (float(v) for v in between)
-            own = case.parameters[name].value if name in case.parameters else (low + high) / 2
-            of_case.append(Parameter(name, low, high, value=own if low <= own <= high else (low + high) / 2))
-    system = build_system(case)
-    if of_contacts and not system.contact_nodes().count:
-        raise CaseError(f"box.{of_contacts[0].name}", None, "the case has no contacts; give a range of another number")
-
-    def matrices_at(values: Mapping[str, float]) -> Mapping[Role, Sparse]:
-        changes = {f"parameters.{k}.value" if k in case.parameters else k: v for k, v in values.items()}
-        found = build_system(case.with_(changes)) if values else system
-        if found.size != system.size:
-            raise CaseError("box", ", ".join(values), "changes the number of freedoms; give numbers that do not")
-        return {"mass": found.mass, "damping": found.damping, "stiffness": found.stiffness}
-
-    terms = interpolated_terms(matrices_at, tuple(of_case))
-    options = Options(friction_damping=case.modal.friction_damping, prestress=case.modal.prestress)
-    contacts = contact_terms(system, mu=None, options=options) if _touches(system) else ()
-    by_name = {p.name: p for p in (*of_contacts, *of_case)}
-    return ParametricProblem((*terms, *contacts), tuple(by_name[name] for name in box))
+            found.append(Parameter(name, low, high, value=(low + high) / 2))
+    return tuple(found)
 
 
-def _touches(system: System) -> bool:
-    return bool(system.contact_nodes().count)
+class _Numbers:
+    """The systems of a case with other numbers: own is that of the case as it is."""
+
+    def __init__(self, case: Case, box: Mapping[str, tuple[float, float]]) -> None:
+        self._case, self._box = case, box
+        self.own = build_system(case)
+        # In factors of imported matrices, unless that is a parameter of its own.
+        self._friction = MU in case.factor_names and MU not in case.parameters
+        self._built: dict[tuple[tuple[str, float], ...], System] = {}
+
+    def system(self, values: Mapping[str, float]) -> System:
+        """The system at values of the box; others stay as they are in the case."""
+        mu = values.get(MU) if self._friction else None
+        changes = self._changes(values)
+        if not changes and mu is None:
+            return self.own
+        key = tuple(sorted({**changes, **({} if mu is None else {MU: mu})}.items()))
+        if key not in self._built:
+            while len(self._built) >= REMEMBERED:
+                del self._built[next(iter(self._built))]
+            self._built[key] = self._checked(build_system(self._case.with_(changes), mu))
+        return self._built[key]
+
+    def structure(self, values: Mapping[str, float]) -> Mapping[str, Piece]:
+        """The pieces of mass, damping and stiffness where others than [parameters] and friction have these values."""
+        from ..modal.parametric.family import Piece
+
+        if not self._case.imported:
+            found = self.system(values)
+            roles: tuple[Role, ...] = ("mass", "damping", "stiffness")
+            return {role: Piece(getattr(found, role), role) for role in roles}
+        varied = self._case.with_(self._changes(values))
+        pieces: dict[str, Piece] = {}
+        for k, share in enumerate(system_shares(varied)):
+            self._checked(share.matrix)
+            pieces[f"{share.role} {k}"] = self._piece(varied, share)
+        return pieces
+
+    def _piece(self, case: Case, share: Share) -> Piece:
+        """A term of an imported body with its factor; what of it is not varied is multiplied in."""
+        from ..modal.parametric.factors import Formula
+        from ..modal.parametric.family import Piece
+
+        if not isinstance(share.factor, str):
+            return Piece(sp.csr_array(share.factor * share.matrix), share.role)
+        expression = parse_expression(share.factor, (*case.parameters, MU), "factor")
+        values = case.factor_values()
+        varied = tuple(name for name in expression.names if name in self._box)
+        if not varied:
+            return Piece(sp.csr_array(expression.value(values, "factor") * share.matrix), share.role)
+        fixed = tuple((name, values[name]) for name in expression.names if name not in varied)
+        return Piece(share.matrix, share.role, Formula(share.factor, varied, fixed))
+
+    def _changes(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Overrides of the case."""
+        named = {k: f"parameters.{k}.value" for k in self._case.parameters}
+        return {named.get(k, k): v for k, v in values.items() if k in named or k not in (MU, "contact_stiffness")}
+
+    def _checked(self, found: Any) -> Any:
+        """Raises CaseError where a system or a matrix has other freedoms than those of the case."""
+        size = found.size if isinstance(found, System) else found.shape[0]
+        if size != self.own.size:
+            raise CaseError("box", ", ".join(self._box), "changes the number of freedoms; give numbers that do not")
+        return found

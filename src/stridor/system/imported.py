@@ -18,7 +18,7 @@ from ..case.bodies import MatrixBody, MatrixTerm
 from ..case.expression import parse_expression
 from ..errors import CaseError, Problem
 from ..matrices.labels import read_labels
-from ..matrices.model import Labels, StoredMatrix
+from ..matrices.model import Labels, Role, StoredMatrix
 from ..matrices.read import common_labels, read_matrix
 from ..matrices.report import held_freedoms
 from ..mesh.abaqus import read_abaqus
@@ -26,22 +26,33 @@ from ..mesh.model import Mesh
 from ..mesh.paths import check_file, shown_path
 from ..typing import Array, BoolArray, IntArray, Sparse
 
-ROLES = ("mass", "damping", "stiffness")
+ROLES: tuple[Role, ...] = ("mass", "damping", "stiffness")
 ROUNDING = 1e-12  # of the entries around it: what A − Aᵀ may hold of a matrix that is meant to be symmetric
 _DIRECTIONS = ("scalar", "x", "y", "z", "rotation x", "rotation y", "rotation z")
 _ROTATIONS = (4, 5, 6)
 
 
 @dataclass(frozen=True)
+class Share:
+    """One term of a body before its factor: its role, its matrix, and the factor, a number or an expression."""
+
+    role: Role
+    matrix: Sparse
+    factor: float | str
+
+
+@dataclass(frozen=True)
 class Terms:
     """Summed matrices (n, n) of a body by role in the order of the files' freedoms, in SI units; labels of the
-    freedoms, None where nothing names them; stored: the files, each with the role it is used in."""
+    freedoms, None where nothing names them; stored: the files, each with the role it is used in; shares: the terms that
+    were summed."""
 
     mass: Sparse
     damping: Sparse
     stiffness: Sparse
     labels: Labels | None
     stored: tuple[StoredMatrix, ...]
+    shares: tuple[Share, ...]
 
 
 @dataclass(frozen=True)
@@ -68,6 +79,41 @@ def load_matrices(case: Case, name: str, body: MatrixBody, mu: float | None = No
     Raises CaseError for files that will not do, matrices that do not fit together or into the mesh, and points that are
     none.
     """
+    return _placed(case, name, body, mu)[0]
+
+
+def load_shares(case: Case, name: str, body: MatrixBody, mu: float | None = None) -> tuple[Share, ...]:
+    """The terms (N, N) that with their factors add up to the body's matrices, wherever the factors vary.
+
+    Raises CaseError as `load_matrices`, and where a freedom has entries in no other term than those with a factor of
+    zero, so that the body lacks it.
+    """
+    found, terms, place = _placed(case, name, body, mu)
+    size = found.mass.shape[0]
+    moved = [_moved(share.matrix, place, size) for share in terms.shares]
+    present = np.ones(size, dtype=bool)
+    present[found.lacking] = False
+    held = np.zeros(size, dtype=bool)
+    held[held_freedoms(_moved(terms.stiffness, place, size))] = True
+    lost = _present(moved) & ~present & ~held
+    if lost.any():
+        accepted = (
+            f"{np.count_nonzero(lost)} freedoms have entries only in terms whose factor is zero for the values of the "
+            "case, which holds them; give [parameters] values for which it is not"
+        )
+        raise CaseError(f"bodies.{name}.terms", None, accepted)
+    keep = sp.diags_array(present.astype(float))
+    moved = [sp.csr_array(keep @ m @ keep) for m in moved]
+    for role in ROLES:
+        mine = [k for k, share in enumerate(terms.shares) if share.role == role]
+        if all(is_symmetric(moved[k]) for k in mine):
+            for k in mine:
+                moved[k] = _cleaned(moved[k])
+    return tuple(replace(share, matrix=matrix) for share, matrix in zip(terms.shares, moved, strict=True))
+
+
+def _placed(case: Case, name: str, body: MatrixBody, mu: float | None) -> tuple[Imported, Terms, IntArray]:
+    """The body, the terms it is made of, and the local freedom (n,) of each of their rows."""
     where = f"bodies.{name}"
     terms = load_terms(case, name, body, mu)
     mesh = None if body.mesh is None else _mesh(where, body)
@@ -88,7 +134,7 @@ def load_matrices(case: Case, name: str, body: MatrixBody, mu: float | None = No
     mass, damping, stiffness = (_cleaned(m) for m in matrices)
     found = Imported(mass, damping, stiffness, points, numbers, np.flatnonzero(~present), tuple(extra), mesh)
     _check_points(where, body, found, terms.labels, present)
-    return found
+    return found, terms, place
 
 
 def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None) -> Terms:
@@ -96,7 +142,7 @@ def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None)
     where = f"bodies.{name}"
     read = [_read(term, f"{where}.terms.{k}") for k, term in enumerate(body.terms)]
     pairs = enumerate(zip(body.terms, read, strict=True))
-    roles = [_role(term, found, f"{where}.terms.{k}") for k, (term, found) in pairs]
+    roles: list[Role] = [_role(term, found, f"{where}.terms.{k}") for k, (term, found) in pairs]
     if "mass" not in roles:
         raise CaseError(f"{where}.terms", None, 'none has the role "mass"; without a mass nothing vibrates')
     stored = [replace(found, role=role) for found, role in zip(read, roles, strict=True)]
@@ -104,13 +150,15 @@ def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None)
         stored = _with_labels(stored, body.labels, f"{where}.labels")
     matrices, labels = common_labels(stored, where=f"{where}.terms")
     size = matrices[0].shape[0]
+    if body.scale != 1.0:
+        matrices = [_in_metres(matrix, labels, body.scale) for matrix in matrices]
     sums = {role: sp.csr_array((size, size)) for role in ROLES}
+    shares: list[Share] = []
     for k, (term, role, matrix) in enumerate(zip(body.terms, roles, matrices, strict=True)):
         factor = _factor(case, term, mu, f"{where}.terms.{k}.factor")
         sums[role] = sp.csr_array(sums[role] + factor * matrix)
-    if body.scale != 1.0:
-        sums = {role: _in_metres(matrix, labels, body.scale) for role, matrix in sums.items()}
-    return Terms(sums["mass"], sums["damping"], sums["stiffness"], labels, tuple(stored))
+        shares.append(Share(role, matrix, term.factor))
+    return Terms(sums["mass"], sums["damping"], sums["stiffness"], labels, tuple(stored), tuple(shares))
 
 
 def is_symmetric(matrix: Sparse) -> bool:
@@ -139,7 +187,7 @@ def _read_once(path: str, name: str | None, where: str, stamp: tuple[int, int]) 
     return read_matrix(path, name, where=where)
 
 
-def _role(term: MatrixTerm, found: StoredMatrix, where: str) -> str:
+def _role(term: MatrixTerm, found: StoredMatrix, where: str) -> Role:
     if term.role is not None:
         return term.role
     if found.role is None:

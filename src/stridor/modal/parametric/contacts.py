@@ -1,90 +1,186 @@
-"""A system with contact springs as a parametric problem in friction and contact stiffness.
+"""A system with contacts as a parametric problem in friction, contact stiffness and whatever else varies.
 
-With p = −κ c⁻¹ N u the contact forces are eliminated:
+With p = −κ c⁻¹ N u the forces of contact springs are eliminated:
 
     λ²M + λC + K + κ Nᵀc⁻¹N + μκ Sᵀc⁻¹N ,
 
-N, S the rows of the gaps and of the slip, c the compliances of the case and κ a factor of all contact stiffnesses. The
-nodes in contact and the directions of slip are those of steady sliding at one friction coefficient.
+N, S the rows of the gaps and of the slip, c the compliances of the case and κ a factor of all contact stiffnesses. What
+steady sliding adds (`contacts_steady`) are further terms, and rigid contact is taken out of all of them
+(`contacts_rigid`). The nodes in contact are those of steady sliding at one friction coefficient.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from ...errors import CaseError
 from ...system import System
-from ..assembled.problem import problem_of
-from ..assembled.steady import Options
-from .factors import CONSTANT, Product
-from .problem import Parameter, ParametricProblem, Term
+from ...typing import BoolArray
+from ..assembled.steady import Options, steadiness, touching_nodes
+from .contacts_rigid import Elimination, eliminate
+from .contacts_sampling import Values
+from .contacts_steady import FRICTION, STIFFNESS, Contacts, contacts_of, steady_terms
+from .factors import Factor, Product
+from .family import Piece, away, interpolated_terms
+from .problem import Parameter, ParametricProblem
 
-FRICTION, STIFFNESS = "mu", "contact_stiffness"
+SAME = 1e-13  # rows of rigid contact, of their largest entry
 
 
-def contact_terms(
-    system: System, *, mu: float | None, touching_at: float | None = None, options: Options | None = None
-) -> tuple[Term, ...]:
-    """Stiffness terms of the contacts with factors of "mu" and "contact_stiffness" where these are among the
-    parameters, else of ``mu`` (None: the laws' own, at which the touching nodes are found too) and 1.
+@dataclass(frozen=True)
+class ContactsProblem(ParametricProblem):
+    """A parametric problem of a system with contacts.
 
-    touching_at: μ of the steady sliding that says which nodes touch. Raises CaseError for rigid contact, AnalysisError
-    where there is no steady sliding.
+    elimination: how rigid contact was taken out of it, which leaves fewer freedoms than the system has; None where
+    there is none. notes: sentences on what its user should know.
     """
-    problem = problem_of(system, touching_at, options or Options(), damped=True)
-    if not problem.nodes:
-        return ()
-    if not np.all(problem.compliance > 0):
-        raise CaseError("contacts", None, "rigid contact has no stiffness to vary; give every contact a stiffness")
-    if problem.extras is not None:
-        raise CaseError(
-            "modal",
-            None,
-            "friction damping, prestress and friction laws with a slope are not part of reduced models yet; switch "
-            "friction_damping and prestress off and take Coulomb friction",
-        )
-    own = _own(system) if mu is None else mu
-    stiffness = Product(((STIFFNESS, 1.0),))
-    friction = Product(((FRICTION, own), (STIFFNESS, 1.0)))
-    rows = sp.csr_array(sp.diags_array(1.0 / problem.compliance) @ problem.normal)
-    return (
-        Term(sp.csr_array(problem.normal.T @ rows), "stiffness", stiffness, symmetric=True),
-        Term(sp.csr_array(problem.slide.T @ rows), "stiffness", friction),
-    )
+
+    elimination: Elimination | None = None
+    notes: tuple[str, ...] = ()
+
+    def displacements(self, vectors: Any) -> Any:
+        """Right vectors (size, k) of this problem as displacements (n, k) of the system."""
+        return vectors if self.elimination is None else self.elimination.motion @ vectors
+
+    def left_displacements(self, vectors: Any, values: Mapping[str, float]) -> Any:
+        """Left vectors (size, k) at values of the parameters as left vectors (n, k) of the system."""
+        return vectors if self.elimination is None else self.elimination.tests(self.point(values)) @ vectors
 
 
-def _own(system: System) -> float:
-    """The friction coefficient of the case's laws. Raises CaseError where they differ."""
-    nodes = system.contact_nodes()
-    found = {round(float(law.sliding(1.0)), 15) for law in nodes.laws}
-    if len(found) > 1:
-        raise CaseError("mu", None, "the contacts have different friction coefficients; give one for all")
-    return found.pop() if found else 0.0
+@dataclass(frozen=True)
+class Family:
+    """Systems that depend on parameters.
+
+    own: the one whose steady sliding says which nodes touch. system_at: the system at values of the parameters.
+    structure_at: the pieces of its mass, damping and stiffness, contacts not included, for values of those parameters
+    that are to be ``interpolated`` over.
+    """
+
+    own: System
+    system_at: Callable[[Values], System]
+    structure_at: Callable[[Values], Mapping[str, Piece]]
+    parameters: tuple[Parameter, ...]
+    interpolated: tuple[Parameter, ...] = ()
+
+
+def contacts_problem(
+    family: Family, *, touching_at: float | None = None, options: Options | None = None
+) -> ContactsProblem:
+    """The problem over all parameters of a family, in its contacts too.
+
+    touching_at: μ of the steady sliding that says which nodes touch (None: the laws' own). Raises CaseError where only
+    rigid contact is there to have its stiffness varied, where contacts have different friction and μ is no parameter,
+    and where a parameter changes who can touch; AnalysisError where there is no steady sliding, where rigid contact is
+    given twice or friction jams, and where something does not depend on a parameter smoothly enough.
+    """
+    options = options or Options()
+    nodes = family.own.contact_nodes()
+    if not nodes.count:
+        return ContactsProblem(interpolated_terms(family.structure_at, family.interpolated), family.parameters)
+    touching = np.flatnonzero(touching_nodes(family.own, nodes, touching_at, options.solver).active)
+    effects = steadiness(family.own, nodes, touching, options)
+    names = [p.name for p in family.parameters]
+    rigid = nodes.compliance[touching] == 0.0
+    if STIFFNESS in names and bool(rigid.all()):
+        accepted = "every contact is rigid, and rigid contact has no stiffness to vary; give contacts a stiffness"
+        raise CaseError(f"box.{STIFFNESS}", None, accepted)
+
+    def contacts_at(values: Values) -> Contacts:
+        system = family.system_at(values)
+        if system.contact_nodes().count != nodes.count or system.size != family.own.size:
+            changed = ", ".join(p.name for p in family.interpolated)
+            raise CaseError("box", changed, "changes who is in contact; give numbers that do not")
+        return contacts_of(system, touching)
+
+    def pieces_at(values: Values) -> Mapping[str, Piece]:
+        return {**family.structure_at(values), **_springs(contacts_at(values), varied=FRICTION in names)}
+
+    elimination = _elimination(family, contacts_at, rigid) if rigid.any() else None
+    terms = interpolated_terms(pieces_at, family.interpolated)
+    notes: tuple[str, ...] = ()
+    if not effects.neutral:
+        more, notes = steady_terms(family.system_at, family.parameters, touching, effects)
+        terms = (*terms, *more)
+    if elimination is not None:
+        terms = elimination.applied(terms)
+    return ContactsProblem(terms, family.parameters, elimination, notes)
+
+
+def _springs(contacts: Contacts, *, varied: bool) -> dict[str, Piece]:
+    """Stiffness and friction of contact springs, with factors of contact stiffness and, where it is varied, of μ."""
+    soft = contacts.compliance > 0
+    if not soft.any():
+        return {}
+    rows = sp.csr_array(sp.diags_array(1.0 / contacts.compliance[soft]) @ contacts.normal[soft])
+    friction = sp.csr_array(contacts.slide[soft].T @ rows)
+    stiffness: Factor = Product(((STIFFNESS, 1.0),))
+    by_friction: Factor = Product(((STIFFNESS, 1.0), (FRICTION, 1.0)))
+    if not varied:
+        friction, by_friction = sp.csr_array(_friction_of(contacts) * friction), stiffness
+    return {
+        "contact": Piece(sp.csr_array(contacts.normal[soft].T @ rows), "stiffness", stiffness),
+        "friction": Piece(friction, "stiffness", by_friction),
+    }
+
+
+def _friction_of(contacts: Contacts) -> float:
+    """The friction coefficient of the laws. Raises CaseError where they differ."""
+    found = contacts.friction
+    if found is None:
+        raise CaseError(FRICTION, None, "the contacts have different friction coefficients; give one for all")
+    return found
+
+
+def _elimination(family: Family, contacts_at: Callable[[Values], Contacts], rigid: BoolArray) -> Elimination:
+    """Rigid contact taken out, the same for all values of the parameters. Raises CaseError where it is not the same."""
+    reference = {p.name: p.value for p in family.interpolated}
+    own = contacts_at(reference)
+    friction: Parameter | float | None = next((p for p in family.parameters if p.name == FRICTION), None)
+    friction = _friction_of(own) if friction is None else friction
+    for p in family.interpolated:
+        for value in (p.low, p.low + 0.37 * (p.high - p.low), p.high):
+            other = contacts_at({**reference, p.name: value})
+            same = np.array_equal(other.compliance == 0.0, own.compliance == 0.0)
+            for one, two in ((own.normal, other.normal), (own.slide, other.slide)):
+                same = same and away(one[rigid], two[rigid]) <= SAME
+            if not same:
+                accepted = "moves where rigid contact touches, or the direction of its slip; give numbers that do not"
+                raise CaseError(f"box.{p.name}", value, accepted)
+            if isinstance(friction, float) and abs(_friction_of(other) - friction) > SAME * max(friction, 1e-300):
+                accepted = "friction of rigid contact is varied for all contacts together, by mu"
+                raise CaseError(f"box.{p.name}", value, accepted)
+    return eliminate(own.normal[rigid], own.slide[rigid], friction)
 
 
 def contact_parameters(
     system: System,
     friction: tuple[float, float],
-    stiffness: tuple[float, float] = (0.5, 2.0),
+    stiffness: tuple[float, float] | None = (0.5, 2.0),
     *,
     touching_at: float | None = None,
-) -> ParametricProblem:
-    """The problem over ranges of μ and of the factor κ of all contact stiffnesses; its own values are the middle of
-    the range of μ and κ = 1.
+    options: Options | None = None,
+) -> ContactsProblem:
+    """The problem over ranges of μ and of the factor κ of all contact stiffnesses (None: κ = 1); its own values are the
+    middle of the range of μ and κ = 1.
 
-    touching_at: μ of the steady sliding that says which nodes touch (None: the laws' own). Raises CaseError for rigid
-    contact, which has no stiffness to vary, and for ranges that are none; AnalysisError where there is no steady
-    sliding.
+    touching_at: μ of the steady sliding that says which nodes touch (None: the laws' own). Raises CaseError for ranges
+    that are none, and for a range of κ where contact is rigid; else as `contacts_problem`.
     """
-    mu, factor = friction_range(friction), stiffness_range(stiffness)
-    terms = [
-        Term(system.mass, "mass", CONSTANT, symmetric=True),
-        Term(system.damping, "damping", CONSTANT, symmetric=True),
-        Term(system.stiffness, "stiffness", CONSTANT, symmetric=True),
-        *contact_terms(system, mu=None, touching_at=touching_at),
-    ]
-    return ParametricProblem(tuple(t for t in terms if t.matrix.nnz), (mu, factor))
+    parameters = [friction_range(friction)]
+    if stiffness is not None:
+        parameters.append(stiffness_range(stiffness))
+    pieces = {
+        "mass": Piece(system.mass, "mass"),
+        "damping": Piece(system.damping, "damping"),
+        "stiffness": Piece(system.stiffness, "stiffness"),
+    }
+    family = Family(system, lambda _: system, lambda _: pieces, tuple(parameters))
+    return contacts_problem(family, touching_at=touching_at, options=options)
 
 
 def friction_range(between: tuple[float, float]) -> Parameter:

@@ -47,7 +47,7 @@ def interpolated_terms(pieces_at: Pieces, parameters: tuple[Parameter, ...]) -> 
     reference = {p.name: p.value for p in parameters}
     cache: dict[tuple[float, ...], Mapping[str, Piece]] = {}
 
-    def at(**changes: float) -> Mapping[str, Piece]:
+    def at(changes: Mapping[str, float]) -> Mapping[str, Piece]:
         values = {**reference, **changes}
         key = tuple(values[p.name] for p in parameters)
         if key not in cache:
@@ -55,24 +55,25 @@ def interpolated_terms(pieces_at: Pieces, parameters: tuple[Parameter, ...]) -> 
         return cache[key]
 
     terms: list[Term] = []
-    for name, middle in at().items():
-
-        def matrix_at(name: str = name, **changes: float) -> Sparse:
-            return at(**changes)[name].matrix
-
-        grids = {p.name: grid for p in parameters if (grid := _points(matrix_at, middle.role, p)) is not None}
-        if not grids:
-            terms += term_of(middle.matrix, middle.role, middle.factor)
-            continue
-        own: list[Term] = []
-        for chosen in product(*(range(len(g)) for g in grids.values())):
-            values = {n: float(grid[k]) for (n, grid), k in zip(grids.items(), chosen, strict=True)}
-            weight = _weight({n: (grid, k) for (n, grid), k in zip(grids.items(), chosen, strict=True)})
-            own += term_of(matrix_at(**values), middle.role, weight)
-        between = {p.name: p.low + 0.37 * (p.high - p.low) for p in parameters}
-        _check(own, middle.role, between, matrix_at(**between))
-        terms += [Term(t.matrix, t.role, product_of(middle.factor, t.factor), t.symmetric) for t in own]  # type: ignore[arg-type]
+    for label, piece in at({}).items():
+        terms += _interpolated(piece, lambda changes, label=label: at(changes)[label].matrix, parameters)
     return merged(terms)
+
+
+def _interpolated(
+    piece: Piece, matrix_at: Callable[[Mapping[str, float]], Sparse], parameters: tuple[Parameter, ...]
+) -> list[Term]:
+    """The terms of one piece."""
+    grids = {p.name: grid for p in parameters if (grid := _points(matrix_at, piece.role, p)) is not None}
+    if not grids:
+        return term_of(piece.matrix, piece.role, piece.factor)
+    parts: list[tuple[Sparse, Lagrange]] = []
+    for chosen in product(*(range(len(g)) for g in grids.values())):
+        places = {n: (grid, k) for (n, grid), k in zip(grids.items(), chosen, strict=True)}
+        parts.append((matrix_at({n: float(grid[k]) for n, (grid, k) in places.items()}), _weight(places)))
+    between = {p.name: p.low + 0.37 * (p.high - p.low) for p in parameters}
+    _check(parts, piece.role, between, matrix_at(between))
+    return [t for matrix, weight in parts for t in term_of(matrix, piece.role, product_of(piece.factor, weight))]
 
 
 def term_of(matrix: Sparse, role: Role, factor: Factor) -> list[Term]:
@@ -101,18 +102,20 @@ def merged(terms: Iterable[Term]) -> tuple[Term, ...]:
     return tuple(result)
 
 
-def _points(at: Callable[..., Sparse], role: Role, parameter: Parameter) -> Array | None:
+def _points(
+    matrix_at: Callable[[Mapping[str, float]], Sparse], role: Role, parameter: Parameter
+) -> Array | None:
     """Points (k,) of a parameter that make its matrix exact, None where it does not change it."""
     name, low, high = parameter.name, parameter.low, parameter.high
     tried = low + 0.37 * (high - low)
-    if all(away(at(**{name: low}), at(**{name: other})) <= 1e-15 for other in (high, tried)):
+    if all(away(matrix_at({name: low}), matrix_at({name: other})) <= 1e-15 for other in (high, tried)):
         return None
     for count in range(2, MOST_POINTS + 1):
         grid = (low + high) / 2 - (high - low) / 2 * np.cos(np.pi * np.arange(count) / (count - 1))
         grid[0], grid[-1] = low, high
         weights = [_weight({name: (grid, k)})({name: tried}) for k in range(count)]
-        total = sum(w * at(**{name: float(g)}) for w, g in zip(weights, grid, strict=True))
-        if away(sp.csr_array(total), at(**{name: tried})) <= EXACT:
+        total = sum(w * matrix_at({name: float(g)}) for w, g in zip(weights, grid, strict=True))
+        if away(sp.csr_array(total), matrix_at({name: tried})) <= EXACT:
             return grid
     raise AnalysisError(
         f"the {role} does not depend on {name} as a polynomial of degree {MOST_POINTS - 1} or less between {low:g} and "
@@ -132,7 +135,7 @@ def away(one: Any, other: Any) -> float:
     return float(np.abs(difference.data).max(initial=0.0)) / size if size else 0.0
 
 
-def _check(terms: list[Term], role: Role, values: Mapping[str, float], truth: Sparse) -> None:
-    total = sum((t.factor(values) * t.matrix for t in terms), start=sp.csr_array(truth.shape))
+def _check(parts: list[tuple[Sparse, Lagrange]], role: Role, values: Mapping[str, float], truth: Sparse) -> None:
+    total = sum((weight(values) * matrix for matrix, weight in parts), start=sp.csr_array(truth.shape))
     if away(total, truth) > 10 * EXACT:
         raise AnalysisError(f"the {role} is no product of polynomials in the parameters; vary fewer of them at once")

@@ -1,0 +1,10 @@
+"""Modes and onsets of systems with matrices of any structure, as other programs export them.
+
+`family` is the problem over μ, `basis` where its eigenpairs come from, `follow` the branches over μ, `newton` the full
+problem solved for onsets, `passages` how guesses for it are found, `onsets` and `modes` the analyses.
+"""
+
+from .modes import general_modes
+from .onsets import general_onsets
+
+__all__ = ["general_modes", "general_onsets"]

@@ -1,0 +1,297 @@
+"""Eigenpairs of a family at any μ, as the branch follower sees them: on a basis, or in the whole problem.
+
+Up to 60 freedoms the basis is the unit matrix, beyond that a reduced model over the range of μ. Where none can be made
+(multipliers without a diagonal, a mass that is not symmetric, rigid contact) every μ is solved in the whole problem.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+
+from ...errors import AnalysisError
+from ...typing import Array, ComplexArray, Sparse
+from ..assembled.reduced import Eigenpairs, Reduced
+from ..assembled.shifted import Pair
+from ..parametric import ReducedModel, reduce
+from ..parametric.basis import expanded
+from ..quadratic import Region, find_modes
+from ..quadratic.problem import Quadratic, times
+from .family import MU, ROLES, Family, Smooth
+
+DENSE = 60  # unknowns up to which the matrices are their own reduced model
+WHOLE = 6000  # and up to which branches are followed by full solves where there is none
+BEYOND = 1.3  # times the band: what full solves look for, since branches are followed up to 1.25 of it
+DECAY = 0.5  # of the highest angular frequency: modes that decay faster are not looked for
+AT_REST = 1e-5  # of the band: slower than that is a motion as a whole
+NOTHING = 1e-7  # of |λ|: growth of a reversible problem that is rounding; it opens as a square root
+GROWS = 1e-8  # of |λ|: growth of any other that may be rounding of stiff matrices
+
+
+class Along(Reduced):
+    """Eigenpairs over t = μ − low of a family. whole: whether they are those of the full problem; at_rest: how many
+    motions as a whole there are at every μ, which are left out."""
+
+    whole: bool
+    at_rest: int
+
+    def __init__(self, family: Family, frequency: float, size: int, *, damped: bool) -> None:
+        self.family, self.frequency = family, frequency
+        self.problem = SimpleNamespace(damped=damped, extras=None)  # type: ignore[assignment]
+        self.pairs = Pair(np.zeros((0, size)), np.zeros((0, size)))
+        self.forces = np.zeros((0, 0))
+        self._known: dict[float, Eigenpairs] = {}
+        self.at_rest = 0
+
+    def settle(self) -> None:
+        """Find out whether the structure moves as a whole at every μ: such eigenvalues are rounding about zero, in
+        changing numbers, and are left out from then on."""
+        least = len(self.eigenpairs(0.0).values)
+        for t in (0.0, self.family.high - self.family.low):
+            values = self.eigenpairs(t).values
+            least = min(least, double_zeros(values[np.abs(values) <= AT_REST * self.frequency]))
+        self.at_rest = least
+        if least:
+            self._known.clear()
+
+    def vectors(self, z: ComplexArray, mu: float, *, left: bool = False) -> ComplexArray:
+        """Vectors (n, k) of the full problem from those found at μ − low."""
+        raise NotImplementedError
+
+    def moving(self, found: Eigenpairs) -> Eigenpairs:
+        """Without motions as a whole, where there are any at all μ."""
+        if not self.at_rest:
+            return found
+        kept = np.abs(found.values) > AT_REST * self.frequency
+        return Eigenpairs(
+            found.mu, found.coordinate[kept], found.values[kept], found.right[:, kept], found.left[:, kept],
+            found.tangents[kept], found.own,
+        )  # fmt: skip
+
+    def steadied(self, found: Eigenpairs) -> Eigenpairs:
+        """With growth that may be rounding taken as none: modes that nothing damps would cross the axis everywhere."""
+        values = found.values.copy()
+        on_axis = np.abs(values.real) <= GROWS * np.abs(values)
+        values[on_axis] = 1j * values[on_axis].imag
+        return replace(found, coordinate=values, values=values)
+
+    def turned(self, found: Eigenpairs) -> Eigenpairs:
+        """λ² as the coordinate where the problem is reversible: it stays smooth where eigenvalues reach zero, and real
+        as long as they are on the axis."""
+        values = found.values.copy()
+        on_axis = np.abs(values.real) <= NOTHING * np.abs(values)
+        values[on_axis] = 1j * values[on_axis].imag
+        still = np.abs(values.imag) <= NOTHING * np.abs(values)
+        values[still] = values[still].real
+        # Of two real values ±λ one says everything.
+        kept = ~(still & (values.real < 0))
+        values = values[kept]
+        return Eigenpairs(
+            found.mu, values**2, values, found.right[:, kept], found.left[:, kept],
+            2 * values * found.tangents[kept], found.own,
+        )  # fmt: skip
+
+
+class Projected(Along):
+    """The family on a basis V (n, r), the same on both sides: a reduced model's, or all freedoms."""
+
+    whole = False
+
+    def __init__(self, family: Family, frequency: float, model: ReducedModel | None) -> None:
+        problem = _on_basis(family)
+        assert problem.form is not None, "asked for families that have one"
+        super().__init__(family, frequency, problem.size if model is None else model.size, damped=not family.still)
+        self.model = model
+        self._form = problem.form
+        self._parts: list[tuple[int, int, Array]] = []
+        place = 0
+        for row, role in enumerate(ROLES):
+            for k, matrix in enumerate(self._form[role].matrices):
+                if matrix.nnz:
+                    dense = matrix.toarray() if model is None else model.projected[place]
+                    self._parts.append((row, k, dense))
+                    place += 1
+
+    @property
+    def constant_mass(self) -> bool:
+        """Whether μ leaves the mass alone."""
+        return all(not m.nnz for m in self._form["mass"].matrices[1:])
+
+    def vectors(self, z: ComplexArray, mu: float, *, left: bool = False) -> ComplexArray:
+        """V z, or z where V is the unit matrix; without the forces of rigid contact."""
+        x = z if self.model is None else expanded(self.model.vectors, z)
+        if self.family.eliminated is None:
+            return x
+        elimination = self.family.eliminated[1]
+        moved = times(elimination.tests({MU: self.family.low + mu}) if left else elimination.motion, x)
+        result: ComplexArray = np.zeros((self.family.size, moved.shape[1]), dtype=complex)
+        result[: len(moved)] = moved
+        return result
+
+    def matrices(self, mu: complex) -> tuple[Array, Any, Any]:
+        """M, D and K (r, r) at μ − low, which may be complex."""
+        there = self.family.low + mu
+        real = complex(there).imag == 0.0
+        factors = [self._form[role].factors(there) for role in ROLES]
+        return self._summed([f.real if real else f for f in factors])
+
+    def slopes(self, mu: float) -> tuple[Array, Array]:
+        """dD/dμ and dK/dμ (r, r); those of a mass that varies are in `tangents` alone."""
+        _, damping, stiffness = self._changes(mu)
+        return damping, stiffness
+
+    def tangents(
+        self, mu: float, coordinate: ComplexArray, values: ComplexArray, right: ComplexArray, left: ComplexArray
+    ) -> ComplexArray:
+        """dx/dμ (k,), x the coordinate."""
+        by_mass, by_damping, by_stiffness = self._changes(mu)
+        change = values**2 * expanded(by_mass, right) + values * expanded(by_damping, right)
+        change = change + expanded(by_stiffness, right)
+        mass, damping, _ = self.matrices(mu)
+        by_x = expanded(mass, right)
+        if self.problem.damped:
+            by_x = 2 * coordinate * by_x + expanded(damping, right)
+        with np.errstate(all="ignore"):
+            return -np.einsum("ij,ij->j", left, change) / np.einsum("ij,ij->j", left, by_x)
+
+    def null_vectors(self, lam: complex, mu: complex) -> tuple[ComplexArray, ComplexArray]:
+        """The vectors z and y (r,) that make P z and yᵀP all but zero."""
+        mass, damping, stiffness = self.matrices(mu)
+        matrix = lam**2 * mass + lam * damping + stiffness
+        size = abs(lam) ** 2 * np.abs(mass) + abs(lam) * np.abs(damping) + np.abs(stiffness)
+        rows = np.maximum(size.max(axis=1), 1e-300)
+        columns = np.maximum((size / rows[:, None]).max(axis=0), 1e-300)
+        u, _, v = sl.svd(matrix / rows[:, None] / columns)
+        return v[-1].conj() / columns, u[:, -1].conj() / rows
+
+    def eigenpairs(self, mu: float) -> Eigenpairs:
+        """All eigenpairs at ``mu`` with |λ| up to 1.8 times the frequency of interest."""
+        if mu not in self._known:
+            found = super().eigenpairs(mu)
+            if not self.family.reversible:
+                found = self.steadied(found)
+            elif not self.family.still:
+                found = self.turned(found)
+            self._known[mu] = self.moving(found)
+        return self._known[mu]
+
+    def _changes(self, mu: float) -> tuple[Array, Any, Any]:
+        return self._summed([self._form[role].slopes(self.family.low + float(np.real(mu))) for role in ROLES])
+
+    def _summed(self, factors: list[Any]) -> tuple[Array, Any, Any]:
+        size = self.pairs.count
+        totals = [np.zeros((size, size), dtype=f.dtype) for f in factors]
+        for row, k, part in self._parts:
+            if factors[row][k]:
+                totals[row] += factors[row][k] * part
+        return totals[0], totals[1], totals[2]
+
+
+class Held(Projected):
+    """The same with the mass as it is at one μ, and what it changes by counted as stiffness at one λ: a problem whose
+    mass does not vary and that is the same there."""
+
+    def __init__(self, source: Projected, lam: complex, mu: complex) -> None:
+        self.__dict__.update(source.__dict__)
+        self._known = {}
+        self._mass, self._square = source.matrices(mu)[0], lam**2
+
+    def matrices(self, mu: complex) -> tuple[Array, Any, Any]:
+        """M, D and K (r, r) at μ − low, which may be complex."""
+        mass, damping, stiffness = super().matrices(mu)
+        return self._mass, damping, stiffness + self._square * (mass - self._mass)
+
+
+class Whole(Along):
+    """The family solved in full at every μ asked for."""
+
+    whole = True
+
+    def __init__(self, family: Family, frequency: float) -> None:
+        super().__init__(family, frequency, family.freedoms, damped=not family.still)
+
+    def vectors(self, z: ComplexArray, mu: float, *, left: bool = False) -> ComplexArray:
+        """The very vectors."""
+        return z
+
+    def eigenpairs(self, mu: float) -> Eigenpairs:
+        """All eigenpairs at ``mu`` up to beyond the band."""
+        if mu not in self._known:
+            there = self.family.low + mu
+            problem, top = self.family.at(there), BEYOND * self.frequency / (2 * np.pi)
+            region = Region.band(0.0, top, above=-DECAY * self.frequency)
+            found = find_modes(problem, region, left=True, solver=self.family.options.solver, count=False)
+            assert found.left is not None, "asked for"
+            change = self.family.slopes(there)
+            with np.errstate(all="ignore"):
+                by_mu = change.residual(found.values, found.right)
+                slope = by_lambda(problem, found.values, found.right)
+                tangents = -np.einsum("ij,ij->j", found.left, by_mu) / np.einsum("ij,ij->j", found.left, slope)
+            pairs = Eigenpairs(
+                mu, found.values, found.values, found.right, found.left, tangents, self.family.freedoms
+            )
+            self._known[mu] = self.moving(self.turned(pairs) if self.family.reversible else self.steadied(pairs))
+        return self._known[mu]
+
+
+def double_zeros(values: ComplexArray) -> int:
+    """Of how many motions as a whole eigenvalues near zero are: rounding makes ±ε or ±jε of a double zero, and of the
+    latter one is left unsaid."""
+    real = int(np.count_nonzero(values.imag == 0))
+    return len(values) - real + (real + 1) // 2
+
+
+def by_lambda(problem: Quadratic, lam: ComplexArray, x: ComplexArray) -> ComplexArray:
+    """P'(λ)x (n, k) for λ (k,) and x (n, k)."""
+    result: ComplexArray = 2 * lam * times(problem.mass, x) + times(problem.damping, x)
+    return result
+
+
+def along(family: Family, frequency: float) -> Along:
+    """The cheapest way to eigenpairs over μ up to a frequency [1/s]. Raises AnalysisError where there is none."""
+    try:
+        problem = _on_basis(family)
+        small = problem.form is not None and problem.size <= DENSE
+        source = Projected(family, frequency, None if small else _model(family, frequency))
+        source.settle()
+        return source
+    except (AnalysisError, np.linalg.LinAlgError, ValueError) as error:
+        return whole_or_raise(family, frequency, str(error))
+
+
+def whole_or_raise(family: Family, frequency: float, reason: str) -> Whole:
+    """By full solves. Raises AnalysisError for problems too large for that."""
+    unknowns = family.size
+    if unknowns > WHOLE:
+        raise AnalysisError(
+            f"no reduced model over mu can be made of these matrices ({reason}), and following modes by full solves is "
+            f"not tried with {unknowns} unknowns, more than {WHOLE}; take `stridor modes` at several mu"
+        )
+    source = Whole(family, frequency)
+    source.settle()
+    return source
+
+
+def _on_basis(family: Family) -> Smooth:
+    """The problem that is projected: without rigid contact, which has no stiffness."""
+    return family if family.eliminated is None else family.eliminated[0]
+
+
+def _model(family: Family, frequency: float) -> ReducedModel:
+    problem = _on_basis(family).parametric()
+    middle = problem.at(problem.reference)
+    diagonal = (middle.stiffness + frequency**2 * middle.mass).diagonal()
+    if np.any(diagonal == 0.0):
+        raise AnalysisError("some freedoms have neither stiffness nor mass of their own, as multipliers have it")
+    if not _positive(middle.mass):
+        raise AnalysisError("the mass has negative entries on its diagonal")
+    return reduce(problem, frequency / (2 * np.pi), solver=family.options.solver)
+
+
+def _positive(mass: Sparse) -> bool:
+    return bool(np.all(sp.csr_array(mass).diagonal() >= 0))

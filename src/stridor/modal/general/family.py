@@ -1,0 +1,411 @@
+"""λ²M + λD + K over the friction coefficient, for matrices of any structure, the contacts that touch put in.
+
+Factors of imported matrices may depend on μ in whatever way, contacts bring μ themselves. What a system gives at some
+μ is written in Newton's form
+
+    A(μ) = C₀ + C₁ (μ − μ₀) + C₂ (μ − μ₀)(μ − μ₁) + …
+
+whose matrices Cₖ are as sparse as what varies. Where factors are polynomials it is exact; where no such form is found
+every μ is built anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...errors import AnalysisError, CaseError
+from ...system import System
+from ...typing import Array, ComplexArray, Sparse
+from ..assembled.problem import ContactProblem, problem_of
+from ..assembled.steady import Options
+from ..parametric import Parameter, ParametricProblem, Term
+from ..parametric.contacts_rigid import Elimination, eliminate
+from ..parametric.problem import Role
+from ..quadratic import Quadratic
+
+MU = "mu"
+ROLES: tuple[Role, ...] = ("mass", "damping", "stiffness")
+MOST_POINTS = 14
+REMEMBERED = 4  # problems: both ends and the probes
+EXACT = 1e-13  # of the largest entries of row and column: what the form may leave to stand for the matrices themselves
+CLOSE = 1e-10  # and to serve following branches
+PROBES = (0.37, 0.71)  # of the range: where the form is tried
+
+
+@dataclass(frozen=True)
+class Form:
+    """Newton's form of one matrix: matrices (n, n) and the nodes (k,) of their factors."""
+
+    matrices: tuple[Sparse, ...]
+    nodes: tuple[float, ...]
+
+    def factors(self, mu: complex) -> ComplexArray:
+        """(k,) products of μ − μ_j over the nodes before each; μ may be complex."""
+        steps = [1.0, *(mu - node for node in self.nodes[: len(self.matrices) - 1])]
+        return np.array(steps, dtype=complex).cumprod()
+
+    def wide_factors(self, mu: float) -> Array:
+        """The same in extended precision."""
+        steps = [1.0, *(np.longdouble(mu) - node for node in self.nodes[: len(self.matrices) - 1])]
+        result: Array = np.cumprod(np.array(steps, dtype=np.longdouble))
+        return result
+
+    def slopes(self, mu: float) -> Array:
+        """Their derivatives (k,) over μ."""
+        result = np.zeros(len(self.matrices))
+        value, slope = 1.0, 0.0
+        for k, node in enumerate(self.nodes[: len(self.matrices) - 1]):
+            value, slope = value * (mu - node), slope * (mu - node) + value
+            result[k + 1] = slope
+        return result
+
+
+@dataclass(frozen=True)
+class Weight:
+    """The factor of one of the form's matrices, as terms of parametric problems have it."""
+
+    nodes: tuple[float, ...]
+
+    def __call__(self, values: Mapping[str, float]) -> float:
+        """The product of μ − μ_j."""
+        return float(np.prod([values[MU] - node for node in self.nodes]))
+
+
+class Smooth:
+    """A quadratic problem over μ in [low, high], ``built`` anew at any μ or from a form that stands for it."""
+
+    def __init__(self, between: tuple[float, float], make: Callable[[float], Quadratic]) -> None:
+        self.low, self.high = between
+        self._make = make
+        self._known: dict[float, Quadratic] = {}
+
+    @cached_property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.built(self.low).size
+
+    def at(self, mu: float) -> Quadratic:
+        """The problem at μ, from the form where that is exact."""
+        if self.form is None or not self.exact:
+            return self.built(mu)
+        sums = (_sum(self.form[role].matrices, self.form[role].factors(mu).real) for role in ROLES)
+        return Quadratic(*sums)
+
+    def built(self, mu: float) -> Quadratic:
+        """The problem at μ as the system gives it there."""
+        if mu not in self._known:
+            if len(self._known) >= REMEMBERED:
+                self._known.pop(next(iter(self._known)))
+            self._known[mu] = self._make(mu)
+        return self._known[mu]
+
+    def slopes(self, mu: float) -> Quadratic:
+        """dM/dμ, dD/dμ and dK/dμ."""
+        if self.form is not None:
+            return Quadratic(*(_sum(self.form[role].matrices, self.form[role].slopes(mu)) for role in ROLES))
+        step = 1e-5 * (self.high - self.low)
+        low, high = max(mu - step, self.low), min(mu + step, self.high)
+        before, after = self.built(low), self.built(high)
+        return Quadratic(
+            *(sp.csr_array((getattr(after, role) - getattr(before, role)) / (high - low)) for role in ROLES)
+        )
+
+    def functional(self, lam: complex, mu: float, y: ComplexArray, x: ComplexArray) -> complex:
+        """yᵀP(λ, μ)x in extended precision, term by term.
+
+        Stiff springs and fine meshes make terms that cancel to a millionth of a millionth of their size; how near an
+        eigenvalue is to the axis is what they leave.
+        """
+        extended = np.clongdouble(lam)
+        left, right = (np.stack([v.real, v.imag], axis=1).astype(np.longdouble) for v in (y, x))
+        total = np.clongdouble(0.0)
+        for power, pieces in zip((2, 1, 0), self._wide_terms(mu), strict=True):
+            for matrix, factor in pieces:
+                parts = left.T @ (matrix @ right)
+                real, imaginary = parts[0, 0] - parts[1, 1], parts[0, 1] + parts[1, 0]
+                total = total + extended**power * factor * (real + np.clongdouble(1j) * imaginary)
+        return complex(total)
+
+    def _wide_terms(self, mu: float) -> list[list[tuple[Sparse, Any]]]:
+        """Matrices and factors of M, D and K at μ in extended precision."""
+        if self.form is None or not self.exact:
+            problem = self.built(mu)
+            return [[(_wide(getattr(problem, role)), np.longdouble(1.0))] for role in ROLES]
+        result: list[list[tuple[Sparse, Any]]] = []
+        for role, wide in zip(ROLES, self._wide_form, strict=True):
+            factors = self.form[role].wide_factors(mu)
+            result.append([(m, f) for m, f in zip(wide, factors, strict=True) if m.nnz and f])
+        return result
+
+    @cached_property
+    def _wide_form(self) -> list[list[Sparse]]:
+        assert self.form is not None, "asked for families that have one"
+        return [[_wide(m) for m in self.form[role].matrices] for role in ROLES]
+
+    @property
+    def exact(self) -> bool:
+        """Whether the form is the matrices up to rounding."""
+        return self._formed[1]
+
+    @property
+    def form(self) -> Mapping[Role, Form] | None:
+        """Newton's form of M, D and K; None where they are no smooth functions of μ."""
+        return self._formed[0]
+
+    @cached_property
+    def _formed(self) -> tuple[Mapping[Role, Form] | None, bool]:
+        if self.low >= self.high:
+            return None, False
+        tried = [self.low + p * (self.high - self.low) for p in PROBES]
+        truth: dict[Role, list[Sparse]] = {role: [getattr(self.built(mu), role) for mu in tried] for role in ROLES}
+        nodes = _leja(self.low, self.high, MOST_POINTS)
+        columns: dict[Role, list[Sparse]] = {role: [] for role in ROLES}
+        best: dict[Role, tuple[Form | None, float]] = {role: (None, np.inf) for role in ROLES}
+        for k, node in enumerate(nodes):
+            open_: list[Role] = [role for role in ROLES if best[role][1] > EXACT]
+            if not open_:
+                break
+            there = self.built(node)
+            for role in open_:
+                new = getattr(there, role)
+                # Divided differences, of which each new node needs the last.
+                for j, known in enumerate(columns[role]):
+                    new = sp.csr_array((new - known) / (node - nodes[j]))
+                new.eliminate_zeros()
+                columns[role].append(new)
+                form = Form(tuple(columns[role]), tuple(nodes[: k + 1]))
+                left = max(
+                    _away(_sum(form.matrices, form.factors(mu).real), true)
+                    for mu, true in zip(tried, truth[role], strict=True)
+                )
+                if left < best[role][1]:
+                    best[role] = form, left
+        forms: dict[Role, Form] = {}
+        for role, (form, left) in best.items():
+            if form is not None and left <= CLOSE:
+                forms[role] = form
+        if len(forms) < len(ROLES):
+            return None, False
+        return forms, max(left for _, left in best.values()) <= EXACT
+
+    @cached_property
+    def reversible(self) -> bool:
+        """Whether −λ̄ is an eigenvalue with every λ: nothing works on velocities, or gyroscopic forces alone do and all
+        others have a potential. Stability ends there only where eigenvalues meet."""
+        if self.form is not None:
+            mass, damping, stiffness = (self.form[role].matrices for role in ROLES)
+        else:
+            there = [self.built(self.low + p * (self.high - self.low)) for p in (0.0, *PROBES, 1.0)]
+            mass, damping, stiffness = ([getattr(q, role) for q in there] for role in ROLES)
+        if not any(d.nnz and np.any(d.data) for d in damping):
+            return True
+        potential = all(_away(m, sp.csr_array(m.T)) <= EXACT for m in (*mass, *stiffness))
+        return potential and all(_away(d, sp.csr_array(-d.T)) <= EXACT for d in damping)
+
+    @cached_property
+    def sizes(self) -> Array:
+        """What a unit of each unknown (n,) is worth: the square root of its largest stiffness, at some μ."""
+        largest = np.zeros(self.built(self.low).size)
+        for part in (0.0, *PROBES, 1.0):
+            matrix = abs(self.built(self.low + part * (self.high - self.low)).stiffness)
+            largest = np.maximum(largest, np.asarray(matrix.max(axis=1).toarray()).ravel())
+        return np.sqrt(np.maximum(largest, 1e-24 * float(largest.max(initial=0.0))))
+
+    @cached_property
+    def dissipates(self) -> bool:
+        """Whether anything works on velocities that is not gyroscopic."""
+        mid = self.built(self.low + PROBES[0] * (self.high - self.low))
+        return _away(mid.damping, sp.csr_array(-mid.damping.T)) > EXACT
+
+    @cached_property
+    def still(self) -> bool:
+        """Whether nothing at all works on velocities."""
+        mid = self.built(self.low + PROBES[0] * (self.high - self.low))
+        return not (mid.damping.nnz and np.any(mid.damping.data))
+
+    def parametric(self) -> ParametricProblem:
+        """The form as a problem in one parameter. Raises AnalysisError where there is none."""
+        if self.form is None:
+            raise AnalysisError("the matrices are no smooth functions of mu")
+        terms: list[Term] = []
+        for role in ROLES:
+            form = self.form[role]
+            for k, matrix in enumerate(form.matrices):
+                if matrix.nnz:
+                    symmetric = _away(matrix, sp.csr_array(matrix.T)) <= EXACT
+                    terms.append(Term(matrix, role, Weight(form.nodes[:k]), symmetric=symmetric))
+        return ParametricProblem(tuple(terms), (Parameter(MU, self.low, self.high, (self.low + self.high) / 2),))
+
+
+class Family(Smooth):
+    """The quadratic problem of a system over μ in [low, high].
+
+    system_at: the system at a μ, the same object where its matrices do not depend on μ. damped: with all of D, else
+    with its gyroscopic part alone. touching_at: μ of the steady sliding that says which nodes touch; None takes the
+    laws' own coefficients, with the matrices at ``own``.
+    """
+
+    def __init__(
+        self,
+        system_at: Callable[[float], System],
+        between: tuple[float, float],
+        options: Options,
+        *,
+        damped: bool,
+        own: float,
+        touching_at: float | None = None,
+    ) -> None:
+        super().__init__(between, lambda mu: self._damped(quadratic_of(self._problem(mu), mu)))
+        self.options, self._whole_damping = options, damped
+        self._system_at = system_at
+        first = system_at(own)
+        # Contacts alone depend on μ by themselves; nothing needs to be built again.
+        self.varies = system_at(self.high if own != self.high else self.low) is not first
+        grid = np.linspace(0.0, self.high, 50) if self.high > 0 else None
+        self.contacts = problem_of(first, touching_at, options, damped=True, frictions=grid)
+
+    @property
+    def freedoms(self) -> int:
+        """Number of freedoms n; the forces of rigid contacts are unknowns beyond them."""
+        return self.contacts.size
+
+    @property
+    def open_contacts(self) -> tuple[str, ...]:
+        """Names of the contacts that carry no load."""
+        return self.contacts.open_contacts
+
+    @cached_property
+    def depends(self) -> bool:
+        """Whether μ changes anything."""
+        if not self.varies and not self.contacts.nodes:
+            return False
+        places = (self.low, self.high, *(self.low + p * (self.high - self.low) for p in PROBES))
+        first = self.built(places[0])
+        return any(_away(getattr(first, role), getattr(self.built(p), role)) > 0 for p in places[1:] for role in ROLES)
+
+    @cached_property
+    def eliminated(self) -> tuple[Smooth, Elimination] | None:
+        """The problem with rigid contact taken out, and how; None where there is none. Raises AnalysisError where
+        friction jams in the range or contacts press on the same freedoms twice."""
+        rigid = np.flatnonzero(self.contacts.compliance <= 0)
+        if not len(rigid):
+            return None
+        friction = Parameter(MU, self.low, self.high, self.low)
+        found = eliminate(self.contacts.normal[rigid], self.contacts.slide[rigid], friction)
+
+        def make(mu: float) -> Quadratic:
+            whole = self._damped(quadratic_of(self._problem(mu), mu, rigid=False))
+            tests = found.tests({MU: mu}).T
+            return Quadratic(*(sp.csr_array(tests @ getattr(whole, role) @ found.motion) for role in ROLES))
+
+        return Smooth((self.low, self.high), make), found
+
+    def _damped(self, found: Quadratic) -> Quadratic:
+        if self._whole_damping:
+            return found
+        # Gyroscopic forces do no work and are no damping.
+        return replace(found, damping=sp.csr_array((found.damping - found.damping.T) / 2))
+
+    def _problem(self, mu: float) -> ContactProblem:
+        if not self.varies:
+            return self.contacts
+        system = self._system_at(mu)
+        if self.contacts.extras is None:
+            return replace(self.contacts, mass=system.mass, damping=system.damping, stiffness=system.stiffness)
+        found = problem_of(system, None, self.options, damped=True)
+        if not np.array_equal(found.touching, self.contacts.touching):
+            raise AnalysisError("the nodes in contact change with mu, since matrices do; take a smaller range of mu")
+        return found
+
+
+def family_of(
+    system_at: Callable[[float], System],
+    between: tuple[float, float],
+    options: Options,
+    *,
+    damped: bool,
+    own: float,
+    touching_at: float | None = None,
+) -> Family:
+    """The family from μ = 0, where branches get their numbers, or from the low end where factors have no value at 0."""
+    low, high = between
+    start = 0.0
+    if low > 0:
+        try:
+            system_at(0.0)
+        except CaseError:
+            start = low
+    return Family(system_at, (start, high), options, damped=damped, own=own, touching_at=touching_at)
+
+
+def quadratic_of(problem: ContactProblem, mu: float, *, rigid: bool = True) -> Quadratic:
+    """λ²M + λD + K with the contacts at μ; of rigid ones the normal forces are unknowns after the displacements, unless
+    they are left out."""
+    extras = problem.at(mu)
+    damping, stiffness = problem.damping, problem.stiffness
+    if extras.damping is not None:
+        damping = damping + extras.damping
+    if extras.stiffness is not None:
+        stiffness = stiffness + extras.stiffness
+    if extras.weakening is not None:
+        damping = damping + problem.slide.T @ sp.diags_array(extras.weakening) @ problem.slide
+    push = sp.csr_array(problem.normal + mu * problem.slide)
+    soft = problem.compliance > 0
+    if soft.any():
+        springs = sp.diags_array(1.0 / problem.compliance[soft])
+        stiffness = stiffness + push[soft].T @ springs @ problem.normal[soft]
+    if soft.all() or not rigid:
+        return Quadratic(problem.mass, sp.csr_array(damping), sp.csr_array(stiffness))
+    # Forces in units of the stiffness, so that the bordered matrix is well balanced.
+    unit = float(np.abs(problem.stiffness.data).max(initial=0.0)) or 1.0
+    forces = int(np.count_nonzero(~soft))
+    bordered = sp.block_array([[stiffness, -unit * push[~soft].T], [unit * problem.normal[~soft], None]], format="csr")
+    empty = sp.csr_array((forces, forces))
+
+    def widened(matrix: Sparse) -> Sparse:
+        return sp.csr_array(sp.block_diag([matrix, empty], format="csr"))
+
+    return Quadratic(widened(problem.mass), widened(damping), sp.csr_array(bordered))
+
+
+def _wide(matrix: Sparse) -> Sparse:
+    """A matrix whose products are taken in extended precision."""
+    return sp.csr_array(matrix, dtype=np.longdouble)
+
+
+def _sum(matrices: tuple[Sparse, ...], factors: Any) -> Sparse:
+    total = matrices[0] if factors[0] == 1.0 else float(factors[0]) * matrices[0]
+    for matrix, factor in zip(matrices[1:], factors[1:], strict=True):
+        if factor and matrix.nnz:
+            total = total + float(factor) * matrix
+    total = sp.csr_array(total)
+    total.eliminate_zeros()
+    return total
+
+
+def _away(one: Sparse, other: Sparse) -> float:
+    """Largest difference of two matrices, each entry over the largest of its row and column."""
+    apart = sp.coo_array(one - other)
+    if not apart.nnz or not np.any(apart.data):
+        return 0.0
+    sizes = abs(one) + abs(other)
+    rows, columns = (np.asarray(sizes.max(axis=a).toarray()).ravel() for a in (1, 0))
+    scale = np.sqrt(rows[apart.row] * columns[apart.col])
+    return float(np.max(np.abs(apart.data) / np.maximum(scale, 1e-300)))
+
+
+def _leja(low: float, high: float, count: int) -> list[float]:
+    """Points of [low, high], each as far from those before as may be: interpolation stays stable with any number."""
+    grid = low + (high - low) * (1 - np.cos(np.linspace(0, np.pi, 257))) / 2
+    points = [low, high]
+    distance = np.abs(grid - low) * np.abs(grid - high)
+    while len(points) < count:
+        points.append(float(grid[np.argmax(distance)]))
+        distance = distance * np.abs(grid - points[-1]) * 4 / (high - low)
+    return points

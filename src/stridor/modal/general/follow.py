@@ -1,0 +1,118 @@
+"""Branches of a family followed over μ on whatever gives its eigenpairs, and what changes on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import AnalysisError
+from ..assembled.follow import Follower, State, halves
+from ..assembled.passages import Passage, crossings, meetings
+from .basis import Along
+from .family import Family
+
+BEYOND = 1.1  # modes above the band may meet inside it
+STEPS = {False: 30, True: 12}  # over the range at least, on a basis and by full solves
+MOST_STEPS = {False: 1500, True: 200}
+SMALLEST = 1.01e-9  # step at which the follower goes on whatever it sees
+EXACTLY = 1e-10  # of the range: how far off the real axis two modes may meet that meet on it
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Branches over the range: states at both ends of what was asked for, passages, and μ where they were unsure."""
+
+    source: Along
+    low: State
+    high: State
+    passages: tuple[Passage, ...]
+    unsure: tuple[float, ...]
+
+
+def follower(
+    source: Along,
+    *,
+    finer: int = 1,
+    watch: Callable[[State, State], None] | None = None,
+    unsure: Callable[[float], None],
+) -> Follower:
+    """Follows all branches of a source from where they get their numbers.
+
+    finer: by how much its longest steps are shorter. unsure is called with μ where branches cannot be told apart, equal
+    ones aside. Raises AnalysisError on the way where that takes too many steps.
+    """
+    family, steps = source.family, 0
+
+    def seen(old: State, new: State) -> None:
+        nonlocal steps
+        steps += 1
+        if steps > finer * MOST_STEPS[source.whole]:
+            raise AnalysisError(f"{steps} steps lead no further than to {_untold(family.low + new.mu)}")
+        if new.mu - old.mu <= SMALLEST and not _surely(source, old, new):
+            unsure(family.low + new.mu)
+        if not family.reversible:
+            _agree_on_names(family, old, new)
+        if watch is not None:
+            watch(old, new)
+
+    longest = (family.high - family.low) / (finer * STEPS[source.whole])
+    return Follower(source, longest=longest, watch=seen)
+
+
+def surely(source: Along) -> Follower:
+    """The same; raises AnalysisError wherever branches cannot be told apart."""
+
+    def refuse(mu: float) -> None:
+        raise AnalysisError(_untold(mu))
+
+    return follower(source, unsure=refuse)
+
+
+def _untold(mu: float) -> str:
+    return f"mu = {mu:.6g}, where branches cannot be told apart; take a smaller range of mu or a lower max_frequency_hz"
+
+
+def _agree_on_names(family: Family, old: State, new: State) -> None:
+    """Which branch is which beyond a μ where two damped modes meet exactly is a matter of taste, and rounding shall not
+    have it: the first grows, and where they part it has the higher frequency, as without damping."""
+    for i in range(len(new.place)):
+        distance = np.abs(new.values - new.values[i])
+        distance[i] = np.inf
+        j = int(np.argmin(distance))
+        if j <= i or len(distance) < 2:
+            continue
+        before, after = (halves(s.coordinate[i], s.coordinate[j])[1] for s in (old, new))
+        if (after * before.conjugate()).real >= 0:
+            continue
+        # How far beside the real axis the straight line between them passes zero, in terms of μ.
+        aside = abs((after * before.conjugate()).imag) / abs(after - before) ** 2 * (new.mu - old.mu)
+        first, second = new.values[i], new.values[j]
+        wrong = first.real < second.real if after.real > 0 else first.imag < second.imag
+        if aside <= EXACTLY * (family.high - family.low) and wrong:
+            # In place: the follower goes on from here.
+            new.place[[i, j]] = new.place[[j, i]]
+
+
+def followed(source: Along, low: float, high: float, finer: int = 1) -> Followed:
+    """Branches from where they get their numbers to the high end of a range of μ, and what changes on the way."""
+    family = source.family
+    passages: list[Passage] = []
+    unsure: list[float] = []
+
+    def watch(old: State, new: State) -> None:
+        passages.extend(meetings(source, old, new) if family.reversible else crossings(old, new))
+
+    way = follower(source, finer=finer, watch=watch, unsure=unsure.append)
+    first = way.advance(low - family.low)
+    return Followed(source, first, way.advance(high - family.low), tuple(passages), tuple(unsure))
+
+
+def _surely(source: Along, old: State, new: State) -> bool:
+    """Whether the branches of two states belong together beyond doubt, or are one eigenvalue twice."""
+    distance = np.abs(old.coordinate[:, None] - new.coordinate)
+    own = distance[np.arange(len(distance)), np.arange(len(distance))]
+    np.fill_diagonal(distance, np.inf)
+    rounding = 1e-7 * np.abs(new.coordinate) + 1e-12 * source.frequency
+    return bool(np.all((own <= 0.3 * distance.min(axis=1, initial=np.inf)) | (own <= rounding)))

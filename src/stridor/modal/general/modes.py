@@ -1,0 +1,147 @@
+"""Complex modes of systems with matrices of any structure: gyroscopic, circulatory, with friction of another program.
+
+λ²M + λD + K of such a system, the contacts that touch in steady sliding put in, is one quadratic problem per μ:
+
+    penalty contact:  K + (N + μS)ᵀ c⁻¹ N
+    rigid contact:    a row N u = 0 and a column −(N + μS)ᵀ, whose unknowns, the normal forces, have no mass
+
+`quadratic.find_modes` finds every eigenvalue of a band at each μ and says what speaks for its being all; which is which
+from one μ to the next is found by following branches on a reduced model (`numbers`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...errors import CaseError
+from ...system import System
+from ...typing import Array, ComplexArray
+from ..assembled.steady import Options
+from ..complex_modes import ComplexModes
+from ..quadratic import Region, find_modes
+from .basis import DECAY, NOTHING
+from .family import Family, family_of
+from .numbers import Numbers, numbered
+
+
+@dataclass(frozen=True)
+class Found:
+    """Eigenvalues (k,) at one μ by frequency, right and left vectors (n, k), backward errors (k,)."""
+
+    values: ComplexArray
+    right: ComplexArray
+    left: ComplexArray | None
+    residual: Array
+    sentence: str
+
+
+def general_modes(
+    system_at: Callable[[float], System],
+    mu: float | Sequence[float] | Array,
+    *,
+    count: int | None = 20,
+    max_frequency_hz: float = 40e3,
+    damped: bool = True,
+    vectors: bool | Literal["right"] = False,
+    options: Options | None = None,
+    own: float | None = None,
+) -> ComplexModes:
+    """Modes at the friction coefficients ``mu`` up to max_frequency_hz, of them the ``count`` lowest (None: all).
+
+    system_at gives the system at a μ, on which its matrices may depend; own is the μ at which the touching nodes of
+    contacts are found if several are asked for (None: the lowest). Numbers of modes are those of branches followed from
+    μ = 0; where these cannot be told apart they count by frequency at each μ, and completeness says so. Where a branch
+    is beyond the band there is NaN. Raises CaseError for friction coefficients that are none, AnalysisError where
+    contacts do not slide or eigenvalues do not settle.
+    """
+    values = np.atleast_1d(np.asarray(mu, dtype=float))
+    if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)) or np.any(values < 0):
+        raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
+    if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
+        raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
+    family = _family(system_at, values, options or Options(), damped=damped, own=own)
+    top = 2 * np.pi * max_frequency_hz
+    found = [_modes(family, float(m), top, left=vectors is True) for m in values]
+    numbers = numbered(family, values, [f.values for f in found], top)
+    return _table(family, values, found, numbers, count, damped=damped, vectors=vectors)
+
+
+def _family(
+    system_at: Callable[[float], System], values: Array, options: Options, *, damped: bool, own: float | None
+) -> Family:
+    """The family up to the largest μ; one alone is also where the touching nodes are found."""
+    low, high = float(values.min()), float(values.max())
+    if high == 0.0:
+        still = system_at(0.0)
+        return Family(lambda _: still, (0.0, 1.0), options, damped=damped, own=0.0, touching_at=0.0)
+    if len(values) == 1:
+        return family_of(system_at, (high, high), options, damped=damped, own=high, touching_at=high)
+    return family_of(system_at, (low, high), options, damped=damped, own=low if own is None else own)
+
+
+def _modes(family: Family, mu: float, top: float, *, left: bool) -> Found:
+    region = Region.band(0.0, top / (2 * np.pi), above=-DECAY * top)
+    spectrum = find_modes(family.built(mu), region, left=left, solver=family.options.solver)
+    n = family.freedoms
+    told = spectrum.completeness.sentence
+    values = spectrum.values.copy()
+    if family.reversible:
+        # With every λ there is −λ̄: a real part without a partner is rounding.
+        on_axis = np.abs(values.real) <= NOTHING * np.abs(values)
+        values[on_axis] = 1j * values[on_axis].imag
+    return Found(
+        values,
+        _normed(spectrum.right[:n]),
+        None if spectrum.left is None else _normed(spectrum.left[:n]),
+        spectrum.residual,
+        f"Modes up to {top / (2 * np.pi):g} Hz that decay at less than {DECAY * top:.4g} 1/s. {told}",
+    )
+
+
+def _table(
+    family: Family,
+    mu: Array,
+    found: list[Found],
+    numbers: Numbers,
+    count: int | None,
+    *,
+    damped: bool,
+    vectors: bool | Literal["right"],
+) -> ComplexModes:
+    """The modes of all μ, a column for each number."""
+    used = np.unique(np.concatenate([*numbers.of, np.zeros(0, dtype=np.int64)]))
+    used = used[used > 0] if count is None else used[(used > 0) & (used <= count)]
+    shape, n = (len(mu), len(used)), family.freedoms
+    eigenvalues = np.full(shape, complex(np.nan, np.nan))
+    residual = np.full(shape, np.nan)
+    right, left = (
+        np.full((*shape, n if wanted else 0), complex(np.nan, np.nan)) for wanted in (bool(vectors), vectors is True)
+    )
+    for row, (f, own) in enumerate(zip(found, numbers.of, strict=True)):
+        chosen = np.flatnonzero(np.isin(own, used))
+        columns = np.searchsorted(used, own[chosen])
+        eigenvalues[row, columns], residual[row, columns] = f.values[chosen], f.residual[chosen]
+        if vectors:
+            right[row, columns] = f.right[:, chosen].T
+        if f.left is not None:
+            left[row, columns] = f.left[:, chosen].T
+    return ComplexModes(
+        mu=mu,
+        eigenvalues=eigenvalues,
+        branch=used,
+        residual=residual,
+        damped=damped,
+        right=right if vectors else None,
+        left=left if vectors is True else None,
+        open_contacts=family.open_contacts,
+        completeness=tuple(f"{f.sentence}{numbers.sentence}" for f in found),
+    )
+
+
+def _normed(shapes: ComplexArray) -> ComplexArray:
+    """Vectors of unit norm, the normal forces left out."""
+    return shapes / np.maximum(np.linalg.norm(shapes, axis=0), 1e-300)

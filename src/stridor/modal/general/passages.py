@@ -1,0 +1,143 @@
+"""Passages into and out of growth, solved in the full problem from better and better guesses."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import scipy.linalg as sl
+
+from ...typing import ComplexArray
+from ..assembled.critical import crossing as reduced_crossing
+from ..assembled.critical import pair_near
+from ..assembled.follow import Follower, State
+from ..assembled.passages import COMPLEX, Passage
+from .basis import AT_REST, GROWS, Along, Projected
+from .newton import Root, crossing, meeting, standstill
+
+TRIES = 12
+Guess = tuple[float, complex, ComplexArray, ComplexArray]
+
+
+def located(source: Along, passage: Passage) -> tuple[Root, float] | None:
+    """The onset of a passage in the full problem, and t = μ − low of the guess that led to it; None where none is."""
+    family = source.family
+    between = family.low + passage.low, family.low + passage.high
+    slack = 0.05 * (passage.high - passage.low)
+    for t, lam, x, y in _guesses(source, passage):
+        mu = family.low + t
+        if passage.kind == "divergence" or abs(lam) <= AT_REST * source.frequency:
+            root = standstill(family, mu, x, y, between)
+        elif passage.kind == "meeting":
+            root = meeting(family, mu, lam, x, y, between)
+        else:
+            # Modes that nothing damps may meet on the axis beside others that are damped.
+            root = crossing(family, mu, lam, x, y, between) or meeting(family, mu, lam, x, y, between)
+        if root is None or not between[0] - slack <= root.mu <= between[1] + slack:
+            continue
+        ends = root.slope < 0 if root.slope is not None else (root.square or 0.0) < 0
+        near = max(0.05 * abs(lam), AT_REST * source.frequency)
+        if ends == passage.stabilising and abs(root.lam.imag - lam.imag) <= near:
+            return root, t
+    return None
+
+
+@contextmanager
+def quiet() -> Generator[None]:
+    """Matrices that are exactly singular at an eigenvalue are none of the user's concern."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sl.LinAlgWarning)
+        yield
+
+
+def _guesses(source: Along, passage: Passage) -> Iterator[Guess]:
+    """t, λ and vectors of the full problem, better and better."""
+    if passage.kind == "crossing":
+        if isinstance(source, Projected):
+            with quiet():
+                found = reduced_crossing(source, passage)
+            if found is not None:
+                right, left = source.null_vectors(found.lam, found.mu)
+                x, y = (v[:, None] for v in (right, left))
+                yield _expanded(source, found.mu, found.lam, x, y)
+        yield from _by_rate(source, passage)
+    else:
+        yield from _by_square(source, passage)
+
+
+def _by_rate(source: Along, passage: Passage) -> Iterator[Guess]:
+    """Where the growth rate of the branch would vanish if it were straight, again and again."""
+    state = Follower.resumed(source, passage.old).advance(passage.low)
+    low, high = passage.low, passage.high
+    end = Follower.resumed(source, state).advance(high)
+    first, last = (float(s.values[passage.branch].real) for s in (state, end))
+    rounding = GROWS * abs(end.values[passage.branch])
+    if min(abs(first), abs(last)) <= rounding:
+        # On the axis up to rounding, whichever sign that has given it.
+        first, last = (-last, last) if abs(first) < abs(last) else (first, -first)
+    for _ in range(TRIES):
+        if first * last > 0 or high <= low:
+            return
+        part = first / (first - last) if first != last else 0.5
+        t = low + float(np.clip(part, 0.05, 0.95)) * (high - low)
+        there = Follower.resumed(source, state).advance(t)
+        place, rate = int(there.place[passage.branch]), float(there.values[passage.branch].real)
+        yield _guess(source, there, place, t)
+        if abs(rate) <= rounding:
+            rate = first
+        if rate * first > 0:
+            low, first, state = t, rate, there
+        else:
+            high, last = t, rate
+
+
+def _by_square(source: Along, passage: Passage) -> Iterator[Guess]:
+    """Where the squared half difference of two eigenvalues, or an eigenvalue λ² itself, would pass zero."""
+    low, high = passage.low, passage.high
+    width = high - low
+
+    def there(t: float) -> tuple[float, int]:
+        found = source.eigenpairs(t)
+        if passage.kind == "divergence":
+            place = int(np.argmin(np.abs(found.coordinate)))
+            return float(found.coordinate[place].real), place
+        part = (t - passage.low) / width
+        guess = (1 - part) * passage.means[0] + part * passage.means[1]
+        return float(pair_near(found.coordinate, guess)[1].real), int(np.argmin(np.abs(found.coordinate - guess)))
+
+    first, last = there(low)[0], there(high)[0]
+    rounding = (COMPLEX * source.frequency**2) ** (2 if passage.kind == "meeting" else 1)
+    if first * last > 0 and min(abs(first), abs(last)) <= rounding:
+        # It passes zero at the very end, whichever sign rounding has given it there.
+        first, last = (-last, last) if abs(first) < abs(last) else (first, -first)
+    for k in range(TRIES):
+        if first * last > 0 or high <= low:
+            return
+        part = first / (first - last) if first != last else 0.5
+        t = low + float(np.clip(part, 0.02, 0.98)) * (high - low)
+        value, place = there(t)
+        # On a basis another look costs nothing beside a step in the full problem.
+        if source.whole or k >= 3 or abs(value) <= 1e-6 * max(abs(first), abs(last)):
+            found = source.eigenpairs(t)
+            lam = complex(found.values[place])
+            if passage.kind == "meeting":
+                part = (t - passage.low) / width
+                guess = (1 - part) * passage.means[0] + part * passage.means[1]
+                lam = 1j * float(np.sqrt(max(-pair_near(found.coordinate, guess)[0].real, 0.0)))
+            x, y = found.right[:, [place]], found.left[:, [place]]
+            yield _expanded(source, t, lam, x, y)
+        if value * first > 0:
+            low, first = t, value
+        else:
+            high, last = t, value
+
+
+def _guess(source: Along, state: State, place: int, t: float) -> Guess:
+    found = state.found
+    return _expanded(source, t, complex(found.values[place]), found.right[:, [place]], found.left[:, [place]])
+
+
+def _expanded(source: Along, t: float, lam: complex, x: ComplexArray, y: ComplexArray) -> Guess:
+    return t, lam, source.vectors(x, t)[:, 0], source.vectors(y, t, left=True)[:, 0]

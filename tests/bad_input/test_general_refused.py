@@ -1,0 +1,112 @@
+"""What is refused of imported matrices without structure, each with its one line."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stridor as st
+from matrix_cases import TURN, matrix_case
+
+pytestmark = pytest.mark.bad_input
+
+ONE, SPRINGS = np.eye(2), np.array([[2.0, 1.0], [1.0, 2.0]])
+BELT = np.array([[0.0, -4 / 3], [0.0, 0.0]])
+WORKS = "what works for these is `stridor modes`, `stridor onsets` and `stridor steady`"
+
+
+def model(folder: Path, *more: tuple, factor: str = "mu", extra: str = "") -> st.Case:
+    terms = [(ONE, "mass", ""), (SPRINGS, "stiffness", ""), (BELT, "stiffness", factor), *more]
+    return matrix_case(folder, terms, 1.0, more=extra)
+
+
+def message(call, *arguments, **options) -> str:
+    with pytest.raises(st.StridorError) as caught:
+        call(*arguments, **options)
+    return str(caught.value)
+
+
+def test_nothing_depends_on_friction(tmp_path: Path):
+    expected = (
+        "nothing here depends on the friction coefficient: no factor of a matrix has mu in it and there are no contacts; "
+        "`stridor reduce --onsets NAME` solves for onsets along other parameters"
+    )
+    assert message(st.onsets, model(tmp_path, factor="")) == expected
+    assert message(st.onsets, model(tmp_path, factor="0*mu")) == expected
+
+
+def test_ranges_and_frequencies_that_are_none(tmp_path: Path):
+    case = model(tmp_path)
+    assert message(st.onsets, case, (0.5, 0.2)) == "friction_range: [0.5, 0.2] – two numbers 0 ≤ a < b"
+    assert message(st.onsets, case, (-0.5, 0.2)) == "friction_range: [-0.5, 0.2] – two numbers 0 ≤ a < b"
+    assert message(st.onsets, case, max_frequency_hz=-1.0) == "max_frequency_hz: -1.0 – a positive frequency in Hz"
+    assert message(st.modes, case, -0.1).startswith("mu: -0.1 – friction coefficients are numbers ≥ 0")
+    assert message(st.modes, case, 0.1, max_frequency_hz=-1.0) == "max_frequency_hz: -1.0 – a positive frequency in Hz"
+
+
+def test_factors_without_a_value(tmp_path: Path):
+    expected = "bodies.matrices.terms.2.factor: '0.3/mu' – division by zero at mu = 0"
+    assert message(st.onsets, model(tmp_path, factor="0.3/mu")) == expected
+
+
+@pytest.mark.parametrize("call", [st.simulate, st.compare])
+def test_time_loops_take_constant_symmetric_matrices(tmp_path: Path, call):
+    """At μ = 0 these are symmetric; that nothing gives μ does not make a run of them."""
+    assert message(call, model(tmp_path)) == (
+        f"{call.__name__}: factors of imported matrices depend on mu, and beyond mu = 0 the stiffness matrix is not "
+        f"symmetric; the time loop takes constant, symmetric matrices only; {WORKS}"
+    )
+    other = " (for other parameters --set parameters.NAME.value=… or `stridor reduce --onsets NAME`)"
+    turning = model(tmp_path, (TURN, "damping", ""), factor="")
+    assert message(call, turning) == (
+        f"{call.__name__} needs symmetric matrices and a positive definite mass, and the damping matrix is not symmetric; "
+        f"{WORKS}{other}"
+    )
+    if call is st.simulate:
+        assert message(call, model(tmp_path), 0.3) == (
+            "simulate needs symmetric matrices and a positive definite mass, and the stiffness matrix is not symmetric; "
+            f"{WORKS}{other}"
+        )
+        given = model(tmp_path, extra="parameters.mu = { value = 0.3 }")
+        assert message(call, given).startswith("simulate needs symmetric matrices")
+    assert message(st.run, model(tmp_path), tmp_path / "out").startswith("run: factors of imported matrices depend on mu")
+
+
+def test_a_run_of_matrices_that_friction_only_makes_stiffer_is_fine(tmp_path: Path):
+    """μ in symmetric matrices is a number like others."""
+    terms = [(ONE, "mass", ""), (SPRINGS, "stiffness", ""), (ONE, "stiffness", "mu")]
+    case = matrix_case(tmp_path, terms, 1.0).with_({"phases": [{"name": "rest", "duration": 1.0}]})
+    assert st.simulate(case).steps > 0
+
+
+def test_too_large_for_full_solves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("stridor.modal.general.basis.WHOLE", 1)
+    assert message(st.onsets, model(tmp_path, factor="sqrt(mu)")) == (
+        "no reduced model over mu can be made of these matrices (the matrices are no smooth functions of mu), and "
+        "following modes by full solves is not tried with 2 unknowns, more than 1; take `stridor modes` at several mu"
+    )
+
+
+def test_the_verbs_say_it_in_one_line(tmp_path: Path):
+    def stridor(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "stridor.app.cli", words[0], "case.toml", *words[1:]]
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, env=environment)
+
+    model(tmp_path)
+    done = stridor("simulate")
+    assert done.returncode == 1
+    assert done.stderr.startswith("stridor: simulate: factors of imported matrices depend on mu")
+    assert done.stderr.count("\n") == 1
+    done = stridor("onsets", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["onsets"][0]["mu"] == pytest.approx(0.75, rel=1e-12)
+    assert json.loads(done.stdout)["completeness"].startswith("Complete")
+    # Nothing of what happens at exactly singular matrices gets through.
+    assert "Warning" not in done.stderr
