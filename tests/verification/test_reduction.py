@@ -19,6 +19,7 @@ from stridor.modal.onsets import onsets
 from stridor.modal.parametric import Parameter, ParametricProblem, Term, contact_parameters, craig_bampton, reduce
 from stridor.modal.parametric.basis import residual
 from stridor.modal.parametric.dense import _by_companion, dense_modes
+from stridor.modal.parametric.factors import Product
 from stridor.modal.parametric.full import verified
 from stridor.modal.parametric.onsets import onsets_along
 from stridor.study.reduced import parametric_problem, reduced_model
@@ -215,6 +216,22 @@ def test_onsets_along_any_parameter_are_those_of_the_full_problem(model):
             assert onset.growth_slope == pytest.approx((rates[1] - rates[0]) / (2 * step), rel=1e-4)
     with pytest.raises(CaseError, match=r"parameter: 'speed' – no such parameter; there are: Omega, mu"):
         onsets_along(model, "speed")
+
+
+def test_onsets_along_a_number_that_changes_the_mass():
+    whole = rotor()
+    mass, *others = whole.terms
+    terms = (Term(mass.matrix, "mass", Product((("density", 1.0),)), symmetric=True), *others)
+    box = (Parameter("density", 0.7, 1.4, 1.0), Parameter("mu", 0.0, 0.6, 0.3), Parameter("Omega", 0.9, 1.1, 1.0))
+    model = reduce(ParametricProblem(terms, box), FREQUENCY_HZ, bound=1e-7)
+    found = 0
+    for mu in (0.3, 0.4, 0.5):
+        alone = onsets_along(model, "density", {"mu": mu}, confirm=False)
+        confirmed = onsets_along(model, "density", {"mu": mu})
+        assert [o.value for o in alone] == pytest.approx([o.value for o in confirmed], rel=1e-5)
+        assert [o.growth_slope for o in alone] == pytest.approx([o.growth_slope for o in confirmed], rel=1e-3)
+        found += len(confirmed)
+    assert found > 1
 
 
 def test_what_is_refused(model):

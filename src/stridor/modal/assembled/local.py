@@ -65,6 +65,9 @@ def _slope(reduced: Reduced, mu: float, lam: complex, right: ComplexArray, left:
     by_damping, by_stiffness = reduced.slopes(mu)
     mass, damping, _ = reduced.matrices(mu)
     change = lam * (by_damping @ right) + by_stiffness @ right
+    by_mass = reduced.mass_slope(mu)
+    if by_mass is not None:
+        change = change + lam**2 * (by_mass @ right)
     by_lambda = 2 * lam * (mass @ right) + damping @ right
     return complex(-(left @ change) / (left @ by_lambda))
 

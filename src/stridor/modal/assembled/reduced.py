@@ -219,6 +219,10 @@ class Reduced:
             damping, stiffness = ((b - a) / (high - low) for a, b in zip(before, after, strict=True))
         return damping, friction + stiffness
 
+    def mass_slope(self, mu: float) -> Array | None:
+        """dM/dμ (r, r), None where friction has no part in the mass, as in this problem."""
+        return None
+
     def _steady(self, extras: Varying, mu: complex) -> tuple[Array, Array]:
         """Damping and stiffness (r, r) that steady sliding adds; outside its grid those of the real part of μ."""
         real = float(mu.real)

@@ -72,6 +72,9 @@ class _Along(Reduced):
         _, damping, stiffness = self._change(mu)
         return damping, stiffness
 
+    def mass_slope(self, mu: float) -> Array | None:
+        return self._change(mu)[0]
+
     def tangents(
         self, mu: float, coordinate: ComplexArray, values: ComplexArray, right: ComplexArray, left: ComplexArray
     ) -> ComplexArray:
