@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .app.pipeline import run
     from .case import Case, load, loads
     from .io.datasets import load_trajectory, open_dataset, save, to_dataset
+    from .io.reduced_models import load_reduced, save_reduced
     from .study.analyses import (
         body_modes,
         compare,
@@ -51,6 +52,7 @@ _HOMES = {
     "describe": ".study.analyses",
     "friction_curve": ".study.analyses",
     "load": ".case",
+    "load_reduced": ".io.reduced_models",
     "load_trajectory": ".io.datasets",
     "loads": ".case",
     "modes": ".study.analyses",
@@ -61,6 +63,7 @@ _HOMES = {
     "reduced_model": ".study.reduced",
     "run": ".app.pipeline",
     "save": ".io.datasets",
+    "save_reduced": ".io.reduced_models",
     "sensitivities": ".study.sensitivities",
     "simulate": ".study.analyses",
     "steady_sliding": ".study.analyses",
@@ -82,6 +85,7 @@ __all__ = [
     "describe",
     "friction_curve",
     "load",
+    "load_reduced",
     "load_trajectory",
     "loads",
     "modes",
@@ -92,6 +96,7 @@ __all__ = [
     "reduced_model",
     "run",
     "save",
+    "save_reduced",
     "sensitivities",
     "simulate",
     "steady_sliding",

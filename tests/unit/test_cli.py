@@ -371,7 +371,7 @@ def test_reduce_solves_anywhere_in_the_box_and_confirms_onsets(folder: Path) -> 
     assert max(found["modes"][1]["growth_rate"]) == pytest.approx(637.328, abs=1e-2)
     shown = stridor(*words, "--at", "mu=0.1", "--out", "here", cwd=folder)
     assert "unstable" in shown.stdout
-    assert (folder / "here" / "reduced.csv").read_text().count("\n") == 19
+    assert (folder / "here" / "reduced.csv").read_text().count("\n") == 20  # heads and 19 modes
     for wrong, message in (
         (["--box", "mu"], "stridor: --box: 'mu' – NAME=… such as mu=0:0.6"),
         (["--box", "mu=0.3:0.1"], "stridor: box.mu: "),

@@ -10,23 +10,44 @@ Damping may destabilise: where it differs between the two modes that meet, the o
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from ..case import Case
 from ..errors import AnalysisError, CaseError
-from ..modal.derivatives import Mode, Terms, by_friction, hold, rate_of, solve_mode, terms_of
-from ..modal.onsets import Onset, onsets
-from ..system import System, build_system
+from ..system import build_system
 from ..typing import Array, BoolArray
+from .damping_full import FullSearch, LowestOnset
+from .damping_reduced import ReducedSearch
 from .provenance import provenance
-from .sensitivities import number_at, options_of
+from .sensitivities import number_at
 
 MOST_POINTS = 10_000
 ROUNDING = 1e-9
+LARGE = 1000  # freedoms from which a reduced model pays
+MANY = 6  # points of the map, too
+
+Method = Literal["auto", "full", "reduced"]
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """An onset of the reduced model that was solved for again in the full problem: at which x and y, onset_mu there
+    and what the reduced model had said, and the backward error."""
+
+    x: float
+    y: float
+    onset_mu: float
+    reduced_mu: float
+    residual: float
+
+    @property
+    def difference(self) -> float:
+        """By how much the reduced model was off."""
+        return abs(self.onset_mu - self.reduced_mu)
 
 
 @dataclass(frozen=True)
@@ -35,8 +56,12 @@ class DampingMap:
 
     onset_mu (nx, ny), frequency_hz there, NaN where nothing grows up to the largest μ. slope_x, slope_y (nx, ny):
     ∂μ_c/∂x, ∂μ_c/∂y, NaN without onset and where the onset is a double root (no damping at all), whose slope is
-    infinite. residual (nx, ny): backward error of each onset. undamped_mu: the onset without any damping, None where
-    there is none.
+    infinite. undamped_mu: the onset without any damping, None where there is none.
+
+    residual (nx, ny): backward error of each onset in the full problem. method: "full", every point solved there, or
+    "reduced": all onsets are those of one reduced model, error (nx, ny) is what it estimates them to be off, and those
+    in ``confirmed`` were solved for again in the full problem; elsewhere residual is NaN. notes: sentences on how it
+    was done; warnings: on what went wrong.
     """
 
     x: str
@@ -53,6 +78,10 @@ class DampingMap:
     undamped_mu: float | None
     warnings: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
+    method: Literal["full", "reduced"] = "full"
+    error: Array | None = None
+    confirmed: tuple[Confirmed, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def more_x_lowers(self) -> BoolArray:
@@ -94,6 +123,10 @@ class DampingMap:
             "undamped_mu": self.undamped_mu,
             "friction_range": list(self.mu_range),
             "max_frequency_hz": self.max_frequency_hz,
+            "method": self.method,
+            "error": None if self.error is None else plain(self.error),
+            "confirmed": [vars(c) | {"difference": c.difference} for c in self.confirmed],
+            "notes": list(self.notes),
             "warnings": list(self.warnings),
         }
 
@@ -109,10 +142,12 @@ class DampingMap:
             "slope_y": (self.slope_y, f"d onset / d {self.y}"),
             "residual": (self.residual, "componentwise backward error"),
         }
+        if self.error is not None:
+            table["error"] = (self.error, "estimated error of the onset")
         return xr.Dataset(
             {name: xr.Variable(both, data, {"long_name": words}) for name, (data, words) in table.items()},
             coords={"x": self.x_values, "y": self.y_values},
-            attrs={"analysis": "damping map", "x_path": self.x, "y_path": self.y},
+            attrs={"analysis": "damping map", "x_path": self.x, "y_path": self.y, "method": self.method},
         )
 
 
@@ -126,15 +161,27 @@ def damping_map(
     grid: tuple[int, int] = (9, 9),
     mu_range: tuple[float, float] | None = None,
     max_frequency_hz: float | None = None,
+    method: Method = "auto",
+    bound: float = 1e-8,
+    progress: Callable[[int, int], None] | None = None,
 ) -> DampingMap:
     """The lowest onset in ``mu_range`` over a grid of two numbers of the case, such as "bodies.pad.damping.mass" and
     "bodies.disc.damping.mass", or a body's two Rayleigh factors, or "dashpots.NAME.damping".
 
-    x_range, y_range: two ends, divided evenly into ``grid`` values, or three and more values as they are. Every point
-    of the grid is a search for onsets of its own, so that none is missed that `onsets` would find; slopes come from
-    the eigenvectors at the onset, with the touching nodes held. Raises CaseError for paths that lead to no number.
+    x_range, y_range: two ends, divided evenly into ``grid`` values, or three and more values as they are. Slopes come
+    from the eigenvectors at the onset, with the touching nodes held.
+
+    method: "full": every point of the grid is a search for onsets of its own, so that none is missed that `onsets`
+    would find. "reduced": one reduced model over μ, x and y, whose eigenvalues are within ``bound`` of the full ones by
+    its own estimate, serves all points; the lowest onset, those at the corners and the one estimated worst are solved
+    for again in the full problem. It takes dampings only. "auto": the reduced model for large systems where it can be
+    made. progress: called with points done and planned.
+
+    Raises CaseError for paths that lead to no number and for "reduced" where there is no reduced model.
     """
     started = time.perf_counter()
+    if method not in get_args(Method):
+        raise CaseError("method", method, f"one of {', '.join(get_args(Method))}")
     low, high = case.modal.friction_range if mu_range is None else mu_range
     top = case.modal.max_frequency_hz if max_frequency_hz is None else max_frequency_hz
     xs, ys = _values(x_range, grid[0], "x_range"), _values(y_range, grid[1], "y_range")
@@ -142,81 +189,135 @@ def damping_map(
         raise CaseError("grid", f"{len(xs)} × {len(ys)}", f"at most {MOST_POINTS} points in all")
     for path in (x, y):
         number_at(case, path)
-    mu, frequency, slope_x, slope_y, residual = np.full((5, len(xs), len(ys)), np.nan)
-    warnings: list[str] = []
-    for i, j in np.ndindex(len(xs), len(ys)):
-        varied = case.with_({x: float(xs[i]), y: float(ys[j])})
-        system = build_system(varied)
-        try:
-            first = lowest_onset(varied, system, (low, high), top)
-        except AnalysisError as error:
-            warnings.append(f"{x} = {xs[i]:g}, {y} = {ys[j]:g}: {error}")
-            continue
-        if first is None:
-            continue
-        mu[i, j], frequency[i, j], residual[i, j] = first.mu, first.frequency_hz, first.residual
-        if first.growth_slope is None:
-            continue  # undamped: the onset is an exceptional point
-        try:
-            slope_x[i, j], slope_y[i, j] = onset_slopes(varied, system, first, (x, y))
-        except AnalysisError as error:
-            warnings.append(f"{x} = {xs[i]:g}, {y} = {ys[j]:g}: no slopes: {error}")
-    try:
-        bare = lowest_onset(case, build_system(case), (low, high), top, damped=False)
-    except AnalysisError as error:
-        bare = None
-        warnings.append(f"without damping: {error}")
+    full = FullSearch(case, (x, y), (low, high), top)
+    search, notes = _search(full, xs, ys, method, bound)
+    table = _Table(search, xs, ys, (x, y))
+    table.fill(progress)
+    if isinstance(search, ReducedSearch):
+        notes = (*notes, table.confirm(search))
+    undamped = table.undamped()
     return DampingMap(
-        x, y, xs, ys, (low, high), top, mu, frequency, slope_x, slope_y, residual,
-        None if bare is None else bare.mu,
-        tuple(warnings),
-        provenance(case, "damping map", time.perf_counter() - started),
+        x, y, xs, ys, (low, high), top, table.mu, table.frequency, table.slope_x, table.slope_y, table.residual,
+        None if undamped is None else undamped.mu,
+        tuple(table.warnings),
+        provenance(case, "damping map", time.perf_counter() - started, method=method, bound=bound),
+        "reduced" if isinstance(search, ReducedSearch) else "full",
+        table.error if isinstance(search, ReducedSearch) else None,
+        tuple(table.confirmed),
+        notes,
     )  # fmt: skip
 
 
-def lowest_onset(
-    case: Case, system: System, mu_range: tuple[float, float], max_frequency_hz: float, *, damped: bool = True
-) -> Onset | None:
-    """The onset of least μ from which on something grows."""
-    options = options_of(case)
-    return onsets(
-        system,
-        mu_range,
-        max_frequency_hz=max_frequency_hz,
-        damped=damped,
-        friction_damping=options.friction_damping,
-        prestress=options.prestress,
-        solver=options.solver,
-    ).first
+def _search(
+    full: FullSearch, xs: Array, ys: Array, method: Method, bound: float
+) -> tuple[FullSearch | ReducedSearch, tuple[str, ...]]:
+    """How onsets are searched for, and what is to be said about it."""
+    if method == "auto":
+        system = build_system(full.case)
+        if not system.assembled or system.size < LARGE or len(xs) * len(ys) < MANY:
+            method = "full"
+    if method == "full":
+        return full, ()
+    ends = (float(xs[0]), float(xs[-1])), (float(ys[0]), float(ys[-1]))
+    try:
+        search = ReducedSearch.of(full, ends, bound)
+        return search, search.notes
+    except (CaseError, AnalysisError) as error:
+        if method == "reduced":
+            raise
+        return full, (f"every point is searched in the full problem, there is no reduced model: {error}",)
 
 
-def onset_slopes(case: Case, system: System, onset: Onset, paths: Sequence[str]) -> list[float]:
-    """dμ_c/dp of an onset with damping for numbers of the case. Raises AnalysisError where it has no derivative."""
-    options = options_of(case)
-    mu = onset.mu
-    held = hold(system, mu, options)
-    terms = terms_of(system, mu, held, options)
-    lam = 2j * np.pi * onset.frequency_hz
-    if not abs(lam):
-        raise AnalysisError("divergence at zero frequency; slopes of flutter onsets only")
-    # How far the other mode of the meeting is: growth opens as κ √(μ − μ_e).
-    point, kappa = onset.exceptional_mu, onset.square_root_coefficient
-    gap = 2 * kappa * abs(mu - point) ** 0.5 if point is not None and kappa is not None else 1e-3 * abs(lam)
-    mode = solve_mode(terms, lam, min(gap, abs(lam)), solver=options.solver)
-    by_mu = mode.derivative(by_friction(system, mu, held, options)).real
-    if by_mu == 0.0:
-        raise AnalysisError("growth does not change with friction there")
-    return [-_derivative(case, mode, path, mu, system).real / by_mu for path in paths]
+class _Table:
+    """The onsets of all points, as they are found."""
 
+    def __init__(self, search: FullSearch | ReducedSearch, xs: Array, ys: Array, paths: tuple[str, str]) -> None:
+        self.search, self.xs, self.ys, self.paths = search, xs, ys, paths
+        empty = np.full((6, len(xs), len(ys)), np.nan)
+        self.mu, self.frequency, self.slope_x, self.slope_y, self.residual, self.error = empty
+        self.warnings: list[str] = []
+        self.confirmed: list[Confirmed] = []
 
-def _derivative(case: Case, mode: Mode, path: str, mu: float, system: System) -> complex:
-    options = options_of(case)
-    held = hold(system, mu, options)
+    def fill(self, progress: Callable[[int, int], None] | None) -> None:
+        """Search at every point, neighbours one after the other."""
+        order = [(i, j) for i in range(len(self.xs)) for j in range(len(self.ys))[:: -1 if i % 2 else 1]]
+        for done, (i, j) in enumerate(order, start=1):
+            try:
+                found, told = self.search.lowest(float(self.xs[i]), float(self.ys[j]))
+            except AnalysisError as error:
+                found, told = None, (str(error),)
+            self.warnings += [f"{self._place(i, j)}: {words}" for words in told]
+            if found is not None:
+                self._take(i, j, found)
+            if progress is not None:
+                progress(done, len(order))
 
-    def at(value: float) -> Terms:
-        return terms_of(build_system(case.with_({path: value})), mu, held, options)
+    def confirm(self, search: ReducedSearch) -> str:
+        """Solve the lowest onset, those at the corners and the one estimated worst in the full problem; returns a
+        sentence about it."""
+        for i, j in self._chosen():
+            before = self._found(i, j)
+            try:
+                after = search.confirmed(float(self.xs[i]), float(self.ys[j]), before)
+            except AnalysisError as error:
+                self.warnings.append(f"{self._place(i, j)}: not confirmed in the full problem: {error}")
+                continue
+            off = abs(after.mu - before.mu)
+            if off > max(before.error, ROUNDING):
+                self.warnings.append(
+                    f"{self._place(i, j)}: the reduced model's onset is {off:.1e} off, where {before.error:.1e} was "
+                    'estimated; take a smaller bound, or method="full"'
+                )
+            place = float(self.xs[i]), float(self.ys[j])
+            self.confirmed.append(Confirmed(*place, after.mu, before.mu, after.residual))
+            self._take(i, j, after)
+        return self._summary(search)
 
-    return mode.derivative(rate_of(at, number_at(case, path))[0])
+    def undamped(self) -> LowestOnset | None:
+        """The onset without damping."""
+        try:
+            return self.search.undamped()
+        except AnalysisError as error:
+            self.warnings.append(f"without damping: {error}")
+            return None
+
+    def _summary(self, search: ReducedSearch) -> str:
+        onsets = int(np.isfinite(self.mu).sum())
+        text = f"{onsets} onsets from a reduced model of {search.model.size} unknowns"
+        if not self.confirmed:
+            return text
+        off, rest = (max(getattr(c, name) for c in self.confirmed) for name in ("difference", "residual"))
+        known = np.isfinite(self.error)
+        worst = f", estimated within {np.max(self.error[known]):.1e}" if known.any() else ""
+        return (
+            f"{text}{worst}; {len(self.confirmed)} of them solved again in the full problem: off by {off:.1e} at most, "
+            f"backward error {rest:.1e}"
+        )
+
+    def _chosen(self) -> list[tuple[int, int]]:
+        """Points to be confirmed: where onsets are lowest, at the corners, where the error is estimated to be largest;
+        but not what was solved in the full problem already."""
+        open_ = np.isfinite(self.mu) & np.isnan(self.residual)
+        if not open_.any():
+            return []
+        lowest, worst = np.where(open_, -self.mu, -np.inf), np.where(open_ & np.isfinite(self.error), self.error, -1.0)
+        ends = [(i, j) for i in (0, len(self.xs) - 1) for j in (0, len(self.ys) - 1)]
+        chosen = [np.unravel_index(int(np.argmax(table)), table.shape) for table in (lowest, worst)]
+        places = [(int(i), int(j)) for i, j in chosen] + [place for place in ends if open_[place]]
+        return list(dict.fromkeys(places))
+
+    def _found(self, i: int, j: int) -> LowestOnset:
+        slopes = float(self.slope_x[i, j]), float(self.slope_y[i, j])
+        numbers = (float(table[i, j]) for table in (self.residual, self.error))
+        return LowestOnset(float(self.mu[i, j]), float(self.frequency[i, j]), slopes, *numbers)
+
+    def _take(self, i: int, j: int, found: LowestOnset) -> None:
+        self.mu[i, j], self.frequency[i, j] = found.mu, found.frequency_hz
+        self.slope_x[i, j], self.slope_y[i, j] = found.slopes
+        self.residual[i, j], self.error[i, j] = found.residual, found.error
+
+    def _place(self, i: int, j: int) -> str:
+        return f"{self.paths[0]} = {self.xs[i]:g}, {self.paths[1]} = {self.ys[j]:g}"
 
 
 def _values(given: tuple[float, float] | Sequence[float], count: int, name: str) -> Array:

@@ -8,12 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import Normal, Stroke
+from matplotlib.ticker import MaxNLocator
 
 from ..study.countermeasures import Countermeasures
 from ..study.damping_map import DampingMap
 from ..study.sensitivities import Sensitivities
 from ..typing import Array
-from .style import BLUE, COLOURS, GREY, INK, ORANGE, VERMILION, legend_above, panel, styled
+from .style import BLUE, COLOURS, INK, ORANGE, VERMILION, legend_above, panel, styled
 from .tables import significant
 
 LEVELS = 12
@@ -76,7 +78,8 @@ def countermeasure_bars(result: Countermeasures, *, ax: Axes | None = None) -> F
 def damping_map(result: DampingMap, *, ax: Axes | None = None) -> Figure:
     """The lowest onset over two damping values, hatched where more of one of them lowers it.
 
-    A dashed line is where the onset is that without any damping; grey: nothing grows up to the largest μ.
+    A dashed line is where the onset is that without any damping; grey: nothing grows up to the largest μ. Rings: where
+    the onset of a reduced model was solved again in the full problem.
     """
     figure, ax = panel(ax, 4.6)
     mu = np.ma.masked_invalid(result.onset_mu.T)
@@ -85,16 +88,18 @@ def damping_map(result: DampingMap, *, ax: Axes | None = None) -> Figure:
     handles: list[Artist] = []
     if mu.count():
         low, high = float(mu.min()), float(mu.max())
-        levels = np.linspace(low, high, LEVELS) if high > low else np.array([low, low + 1e-6])
+        levels = MaxNLocator(LEVELS).tick_values(low, high) if high > low else np.array([low, low + 1e-6])
         filled = ax.contourf(result.x_values, result.y_values, mu, levels=levels, cmap="viridis")
         figure.colorbar(filled, ax=ax, label="lowest onset μ", pad=0.02)
     if result.undamped_mu is not None and mu.count() and float(mu.min()) < result.undamped_mu < float(mu.max()):
-        ax.contour(
-            result.x_values, result.y_values, mu, levels=[result.undamped_mu], colors="white", linestyles="--",
-            linewidths=1.8,
+        line = ax.contour(
+            result.x_values, result.y_values, mu, levels=[result.undamped_mu], colors=INK, linestyles="--",
+            linewidths=1.6, zorder=4,
         )  # fmt: skip
+        # Dark on light and light on dark: it runs through all of the colours.
+        line.set_path_effects([Stroke(linewidth=3.4, foreground="white"), Normal()])
         label = f"undamped onset, {result.undamped_mu:.4g}"
-        handles.append(Line2D([], [], color=GREY, linestyle="--", label=label))
+        handles.append(Line2D([], [], color=INK, linestyle="--", label=label))
     for lowers, slope, hatch, colour, name in (
         (result.more_x_lowers, result.slope_x, "////", VERMILION, result.x),
         (result.more_y_lowers, result.slope_y, "\\\\\\\\", "#FFFFFF", result.y),
@@ -102,7 +107,15 @@ def damping_map(result: DampingMap, *, ax: Axes | None = None) -> Figure:
         if lowers.any():
             _hatched(ax, result, np.where(lowers, slope, np.maximum(slope, 0.0)).T, hatch, colour)
             handles.append(Patch(facecolor=TEAL, edgecolor=colour, hatch=hatch, label=f"more {name} lowers it"))
+    if result.confirmed:
+        places = [c.x for c in result.confirmed], [c.y for c in result.confirmed]
+        (rings,) = ax.plot(*places, "o", mfc="white", mec=INK, ms=6, clip_on=False, zorder=5)
+        rings.set_label("solved again in the full problem")
+        handles.append(rings)
     ax.set(xlabel=result.x, ylabel=result.y)
+    for axis in (ax.xaxis, ax.yaxis):
+        # A common power of ten would stand where the legend does.
+        axis.set_major_formatter("{x:.3g}")
     # Paths are long: one to a line, or the legend is wider than the map.
     legend_above(ax, handles, columns=1)
     return figure

@@ -1,0 +1,135 @@
+"""`stridor damping-map`: the lowest onset over two dampings as a table, a picture and a file."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from .arguments import CaseFile, Json, Out, Quiet, Set, Solver, folder, load_case, pair
+
+if TYPE_CHECKING:
+    from ..study.damping_map import DampingMap
+
+WIDEST = 13  # columns that are still read on a screen
+
+
+def damping_map(
+    case: CaseFile,
+    x: Annotated[str, typer.Option("--x", metavar="PATH", help="A damping of the case.")],
+    y: Annotated[str, typer.Option("--y", metavar="PATH", help="Another one.")],
+    x_range: Annotated[str, typer.Option("--x-range", metavar="LOW:HIGH", help="Its range.")],
+    y_range: Annotated[str, typer.Option("--y-range", metavar="LOW:HIGH", help="The other's range.")],
+    points: Annotated[int, typer.Option("--points", help="Points along each.")] = 9,
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="auto|full|reduced",
+            help="full: a search in the full problem at every point; reduced: one reduced model for all, a few points "
+            "solved again in the full problem; auto: reduced where that is faster and possible.",
+        ),
+    ] = "auto",
+    set_: Set = None,
+    solver: Solver = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """The lowest onset over two dampings, and where more damping lowers it."""
+    from ..study.damping_map import damping_map as solve
+    from ..view.sensitivity_plots import damping_map as draw
+    from .output import print_json, progress_bar, say, stdout
+
+    loaded = load_case(case, set_, quiet=quiet, solver=solver)
+    ranges = pair(x_range, "--x-range"), pair(y_range, "--y-range")
+    chosen: Any = method
+    with progress_bar("damping map", quiet=quiet) as progress:
+        result = solve(
+            loaded, x, y, x_range=ranges[0], y_range=ranges[1], grid=(points, points), method=chosen, progress=progress
+        )
+    place = folder(case, out)
+    files = [_write(place / "damping_map.csv", result), place / "damping_map.png"]
+    draw(result).savefig(files[1], dpi=150)
+    for warning in result.warnings:
+        say(f"warning: {warning}", quiet=quiet)
+    for path in files:
+        say(f"written: {path}", quiet=quiet)
+    if json:
+        print_json(result.to_json() | {"files": [str(f) for f in files]})
+        return
+    _show(result)
+    for line in (*_words(result), *result.notes):
+        stdout.print(line, markup=False)
+
+
+def _show(result: DampingMap) -> None:
+    """The onsets over the grid, x downwards, y across, with letters where more of one of them lowers the onset."""
+    from .output import table
+
+    nx, ny = result.onset_mu.shape
+    if ny > WIDEST:
+        return
+    lowers = (("x", result.more_x_lowers), ("y", result.more_y_lowers))
+    rows: list[list[str]] = []
+    for i in range(nx):
+        marks = ["".join(letter if where[i, j] else " " for letter, where in lowers) for j in range(ny)]
+        cells = [f"{mu:.6f}" if np.isfinite(mu) else "–" for mu in result.onset_mu[i]]
+        rows.append([f"{result.x_values[i]:.4g}", *(f"{c} {m}" for c, m in zip(cells, marks, strict=True))])
+    heads = ["x \\ y", *(f"{y:.4g}   " for y in result.y_values)]
+    table(f"Lowest onset μ; x: {result.x}, y: {result.y}", heads, rows)
+    if any(where.any() for _, where in lowers):
+        print("  x, y: more of it lowers the onset there")
+
+
+def _words(result: DampingMap) -> list[str]:
+    """The lowest and the highest onset, and that without damping."""
+    low, high = result.mu_range
+    known = np.isfinite(result.onset_mu)
+    if not known.any():
+        return [f"no onset for μ in {low:g} … {high:g} up to {result.max_frequency_hz:g} Hz"]
+    lines: list[str] = []
+    for word, pick in (("lowest", np.nanargmin), ("highest", np.nanargmax)):
+        i, j = (int(k) for k in np.unravel_index(int(pick(result.onset_mu)), result.onset_mu.shape))
+        lines.append(
+            f"{word}: μ = {result.onset_mu[i, j]:.9g} at {result.frequency_hz[i, j]:.2f} Hz, "
+            f"x = {result.x_values[i]:.4g}, y = {result.y_values[j]:.4g}"
+        )
+    if not known.all():
+        lines.append(f"none up to μ = {high:g} at {int((~known).sum())} of {known.size} points")
+    if result.undamped_mu is not None:
+        below = int(result.below_undamped.sum())
+        lines.append(f"without damping: μ = {result.undamped_mu:.9g}; {below} of {known.size} points lie below that")
+    return lines
+
+
+def _write(path: Path, result: DampingMap) -> Path:
+    """One line for each point, all digits, under a line of heads; empty where there is nothing."""
+    from ..io.atomic import write_text
+
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow(
+        [
+            result.x,
+            result.y,
+            "onset μ [1]",
+            "frequency [Hz]",
+            f"dμ / d {result.x}",
+            f"dμ / d {result.y}",
+            "residual [1]",
+            "estimated error of μ [1]",
+        ]
+    )
+    error = np.full_like(result.onset_mu, np.nan) if result.error is None else result.error
+    tables = (result.onset_mu, result.frequency_hz, result.slope_x, result.slope_y, result.residual, error)
+    for i, j in np.ndindex(result.onset_mu.shape):
+        numbers = (float(t[i, j]) for t in tables)
+        cells = (repr(v) if np.isfinite(v) else "" for v in numbers)
+        lines.writerow([repr(float(result.x_values[i])), repr(float(result.y_values[j])), *cells])
+    write_text(path, text.getvalue())
+    return path

@@ -1,0 +1,298 @@
+"""`stridor reduce`: a model reduced once over ranges of its numbers, kept in a file, solved anywhere in them."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import numpy as np
+import typer
+
+from ..errors import CaseError
+from .arguments import Json, Out, Quiet, Set, Solver, load_case, numbers, pair
+
+if TYPE_CHECKING:
+    from ..case import Case
+    from ..modal.parametric import ParametricOnset, ReducedModel
+
+BOUND = 1e-8
+CONTACTS = ("mu", "contact_stiffness")  # parameters without a unit; others have that of the number in the case
+
+Model = Annotated[
+    Path,
+    typer.Argument(
+        metavar="CASE|MODEL", help="Case file (TOML), or a model that --save wrote (.npz).", show_default=False
+    ),
+]
+
+
+def reduce(
+    case: Model,
+    box: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--box",
+            metavar="NAME=LOW:HIGH",
+            help="A range of mu, contact_stiffness, a parameter or a number's path. Repeatable "
+            "[default: the ranges of [parameters], else mu over modal.friction_range].",
+        ),
+    ] = None,
+    along: Annotated[str | None, typer.Option("--onsets", metavar="NAME", help="Solve for onsets along it.")] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option("--at", metavar="NAME=VALUES", help="Values to solve at: 0.1,0.2 or start:stop:count."),
+    ] = None,
+    max_frequency: Annotated[float | None, typer.Option("--max-frequency", help="Highest frequency [Hz].")] = None,
+    bound: Annotated[
+        float | None, typer.Option("--bound", help="Relative error of eigenvalues [default: 1e-8].")
+    ] = None,
+    save: Annotated[
+        Path | None,
+        typer.Option("--save", metavar="FILE.npz", help="Keep the model; give the file in place of the case later."),
+    ] = None,
+    keep: Annotated[
+        str | None,
+        typer.Option(
+            "--keep",
+            metavar="all|shapes|eigenvalues",
+            help="What goes into the file: shapes leaves out the full matrices (and with them the confirmation of "
+            "onsets), eigenvalues the basis too [default: all].",
+        ),
+    ] = None,
+    set_: Set = None,
+    solver: Solver = None,
+    out: Out = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Reduce the model once over ranges of its numbers, then solve anywhere in them within milliseconds."""
+    from ..io.left_out import kept_in
+    from ..io.reduced_models import is_reduced_file
+    from ..modal.parametric import onsets_along
+    from .output import print_json, say
+
+    _check_file(save, keep)
+    if is_reduced_file(case):
+        given = {"--box": box, "--set": set_, "--max-frequency": max_frequency, "--bound": bound}
+        model, origin = _read(case, [name for name, value in given.items() if value], quiet=quiet)
+    else:
+        origin = load_case(case, set_, quiet=quiet, solver=solver)
+        model = _made(origin, box or [], max_frequency, BOUND if bound is None else bound)
+        seconds = sum(model.seconds.values())
+        say(f"{model.problem.size} freedoms reduced to {model.size} in {seconds:.2f} s", quiet=quiet)
+    for note in getattr(model.problem, "notes", ()):
+        say(f"note: {note}", quiet=quiet)
+    files = [] if save is None else [_saved(model, save, origin, keep)]
+    points = _points(model, at or [])
+    if out is not None and at:
+        files.append(_write(out / "reduced.csv", model, points))
+    for path in files:
+        say(f"written: {path}", quiet=quiet)
+    confirm = kept_in(model) == "all"
+    onsets: tuple[ParametricOnset, ...] = ()
+    if along is not None:
+        chosen = None if solver in (None, "auto") else solver
+        onsets = onsets_along(model, along, _first(at or [], model, along), confirm=confirm, solver=chosen)
+    if json:
+        found = [_onset(o) for o in onsets]
+        print_json(_about(model) | {"modes": points, "onsets": found, "files": [str(f) for f in files]})
+        return
+    if points:
+        _show_modes(model, points)
+    if along is not None:
+        _show_onsets(model, along, onsets, confirmed=confirm)
+    if not (at or along or save):
+        say("next: --at mu=0.3 for modes, --onsets mu for onsets, --save model.npz to keep the model", quiet=quiet)
+
+
+def _check_file(save: Path | None, keep: str | None) -> None:
+    """Before hours of work: that the model will find its place."""
+    from ..io.left_out import KEEPS
+
+    if save is not None and save.suffix != ".npz":
+        raise CaseError("--save", str(save), "a name that ends in .npz")
+    if keep is not None and keep not in KEEPS:
+        raise CaseError("--keep", keep, f"one of {', '.join(KEEPS)}")
+    if keep is not None and save is None:
+        raise CaseError("--keep", keep, "goes with --save FILE.npz")
+
+
+def _read(path: Path, idle: list[str], *, quiet: bool) -> tuple[ReducedModel, dict[str, Any]]:
+    """A saved model and where it comes from."""
+    from ..io.reduced_models import load_reduced, provenance_of
+    from .output import say
+
+    if idle:
+        raise CaseError(
+            idle[0], None, f"is for making a model, and {path} holds one that is made; give its case file instead"
+        )
+    model, origin = load_reduced(path), provenance_of(path)
+    title = f" of “{_printable(origin['title'])}”" if origin["title"] else ""
+    digest = f", case {_printable(origin['case_sha256'])[:12]}" if origin["case_sha256"] else ""
+    made = f"made {_printable(origin['created'])} by stridor {_printable(origin['versions'].get('stridor', '?'))}"
+    say(f"{path}: {model.problem.size} freedoms reduced to {model.size}{title}{digest}, {made}", quiet=quiet)
+    return model, origin
+
+
+def _printable(text: str) -> str:
+    """A text of a file that somebody else may have written, without what a terminal would obey."""
+    return "".join(c for c in text if c.isprintable())
+
+
+def _saved(model: ReducedModel, path: Path, origin: Case | dict[str, Any], keep: str | None) -> Path:
+    from ..io.left_out import Keep, kept_in
+    from ..io.reduced_models import save_reduced
+
+    return save_reduced(model, path, case=origin, keep=kept_in(model) if keep is None else cast("Keep", keep))
+
+
+def _made(case: Case, box: list[str], limit: float | None, bound: float) -> ReducedModel:
+    from ..study.reduced import reduced_model
+
+    ranges = {name: pair(text, f"--box {name}") for name, text in (_named(item, "--box") for item in box)}
+    if not ranges:
+        ranges = {name: p.range for name, p in case.parameters.items() if p.range is not None}
+    if not ranges:
+        ranges = {"mu": case.modal.friction_range}
+    return reduced_model(case, ranges, max_frequency_hz=limit, bound=bound)
+
+
+def _named(text: str, option: str) -> tuple[str, str]:
+    name, equals, rest = text.partition("=")
+    if not equals or not name:
+        raise CaseError(option, text, "NAME=… such as mu=0:0.6")
+    return name.strip(), rest
+
+
+def _values(at: list[str], model: ReducedModel) -> dict[str, list[float]]:
+    given = {name: numbers(text, f"--at {name}") for name, text in (_named(item, "--at") for item in at)}
+    model.problem.point({name: values[0] for name, values in given.items()})
+    return {p.name: given.get(p.name, [p.value]) for p in model.problem.parameters}
+
+
+def _first(at: list[str], model: ReducedModel, along: str) -> dict[str, float]:
+    return {name: values[0] for name, values in _values(at, model).items() if name != along}
+
+
+def _points(model: ReducedModel, at: list[str]) -> list[dict[str, Any]]:
+    """The modes at all combinations of values, one document for each point."""
+    if not at:
+        return []
+    values = _values(at, model)
+    found: list[dict[str, Any]] = []
+    for place in np.ndindex(*(len(v) for v in values.values())):
+        modes = model.modes({name: v[k] for (name, v), k in zip(values.items(), place, strict=True)})
+        found.append(
+            {
+                "point": dict(modes.point),
+                "inside": bool(modes.inside),
+                "frequency_hz": modes.frequency_hz.tolist(),
+                "growth_rate": modes.growth_rate.tolist(),
+                "unstable": modes.unstable.tolist(),
+                "error": modes.error.tolist(),
+                "passed": modes.passed.tolist(),
+                "residual": modes.residual.tolist(),
+            }
+        )
+    return found
+
+
+def _about(model: ReducedModel) -> dict[str, Any]:
+    """What the document says of the model itself."""
+    return {
+        "freedoms": model.problem.size,
+        "size": model.size,
+        "max_frequency_hz": model.frequency / (2 * np.pi),
+        "bound": model.bound,
+        "parameters": [
+            {"name": p.name, "low": p.low, "high": p.high, "value": p.value} for p in model.problem.parameters
+        ],
+        "seconds": dict(model.seconds),
+        "solves": model.solves,
+    }
+
+
+def _onset(onset: ParametricOnset) -> dict[str, Any]:
+    return {
+        "parameter": onset.parameter,
+        "value": onset.value,
+        "point": dict(onset.point),
+        "frequency_hz": onset.frequency_hz,
+        "growth_slope": onset.growth_slope,
+        "stabilising": onset.stabilising,
+        "residual": onset.residual,
+        "reduced_value": onset.reduced_value,
+    }
+
+
+def _write(path: Path, model: ReducedModel, document: list[dict[str, Any]]) -> Path:
+    """One line for each mode of each point, all digits, under a line of heads."""
+    from ..io.atomic import write_text
+
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    names = [f"{p.name} [1]" if p.name in CONTACTS else p.name for p in model.problem.parameters]
+    heads = ("frequency [Hz]", "growth rate [1/s]", "error of λ [1]", "residual [1]", "unstable", "inside the box")
+    lines.writerow([*names, *heads])
+    for point in document:
+        for mode in _modes(point):
+            numbers_ = (mode["frequency_hz"], mode["growth_rate"], mode["error"], mode["residual"])
+            marks = int(mode["unstable"]), int(point["inside"])
+            lines.writerow([*(repr(v) for v in (*point["point"].values(), *numbers_)), *marks])
+    write_text(path, text.getvalue())
+    return path
+
+
+def _modes(point: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The modes of a point one by one."""
+    names = ("frequency_hz", "growth_rate", "unstable", "error", "passed", "residual")
+    return [dict(zip(names, values, strict=True)) for values in zip(*(point[n] for n in names), strict=True)]
+
+
+def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
+    from .output import table
+
+    rows: list[list[str]] = []
+    for point in document:
+        for mode in _modes(point):
+            remarks = {
+                "unstable": mode["unstable"],
+                "error above the bound": not mode["passed"],
+                "outside the box": not point["inside"],
+            }
+            rows.append(
+                [
+                    *(f"{v:.6g}" for v in point["point"].values()),
+                    f"{mode['frequency_hz']:.3f}",
+                    f"{mode['growth_rate']:.4f}",
+                    f"{mode['error']:.1e}",
+                    f"{mode['residual']:.1e}",
+                    ", ".join(words for words, so in remarks.items() if so),
+                ]
+            )
+    heads = [*(p.name for p in model.problem.parameters), "frequency [Hz]", "growth [1/s]", "error", "residual", ""]
+    table("Modes of the reduced model", heads, rows)
+
+
+def _show_onsets(model: ReducedModel, along: str, onsets: tuple[ParametricOnset, ...], *, confirmed: bool) -> None:
+    from .output import stdout, table
+
+    if not onsets:
+        (own,) = (p for p in model.problem.parameters if p.name == along)
+        top = model.frequency / (2 * np.pi)
+        stdout.print(f"no onset along {along} in {own.low:g} … {own.high:g} up to {top:g} Hz", markup=False)
+        return
+    how = "confirmed in the full model" if confirmed else "of the reduced model alone: its file has no full matrices"
+    rows = [
+        [
+            f"{o.value:.9g}",
+            f"{o.frequency_hz:.3f}",
+            "stable" if o.stabilising else "unstable",
+            "" if o.residual is None else f"{o.residual:.1e}",
+        ]
+        for o in onsets
+    ]
+    table(f"Onsets along {along}, {how}", [along, "frequency [Hz]", "turns", "residual"], rows)

@@ -1,0 +1,398 @@
+"""Reduced models to and from files: one .npz for each, whole or not at all, and nothing in it that could be run.
+
+An archive of NumPy arrays beside a JSON header that says what they are: format number, parameters, terms with their
+factors as data, numbers of the model, which case and which version of stridor it comes from. Matrices are compressed a
+little (a third of the size for a second or two), each array they have in common is written once; the basis is noise to
+any compression and goes in as it is.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import zipfile
+from collections.abc import Generator, Mapping
+from dataclasses import MISSING, fields
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..case import Case
+from ..errors import CaseError
+from ..modal.parametric import Parameter, ParametricProblem, ReducedModel, Term
+from ..modal.parametric.contacts import ContactsProblem
+from ..modal.parametric.contacts_rigid import Elimination
+from ..modal.parametric.factors import Factor, factor_from_json
+from ..modal.parametric.problem import POWERS
+from ..study.provenance import versions
+from ..typing import Array, IntArray, Sparse
+from .atomic import replacing
+from .left_out import KEEPS, Keep, LeftOut, kept_in
+
+FORMAT = "stridor reduced model"
+VERSION = 1
+HEADER = "header.json"
+QUICK = 1  # compression: half the time of the usual 6, a tenth larger
+ZIP = b"PK\x03\x04"
+
+_NUMBERS = ("frequency", "constant", "bound", "solves", "whole")
+_ARRAYS = ("vectors", "projected", "right_sketch", "left_sketch")
+_OF_CONTACTS = {"terms", "parameters", "elimination", "notes"}
+_NAMED = {"problem", "seconds", *_NUMBERS, *_ARRAYS}
+
+
+def save_reduced(
+    model: ReducedModel,
+    path: str | Path,
+    *,
+    case: Case | Mapping[str, Any] | None = None,
+    keep: Keep = "all",
+) -> Path:
+    """Write a reduced model to ``path`` (.npz) by way of a temporary file.
+
+    case: what it was made of, for the file to say so, or what `provenance_of` said of the file it was read from. keep:
+    "all"; "shapes" leaves the full matrices out, and with them what is solved in the full problem (`verified`,
+    `Corrector`, backward errors, confirmed onsets); "eigenvalues" leaves the basis out too, and with it vectors on the
+    full model.
+
+    Raises CaseError for factors that are plain functions, AnalysisError where the file cannot be written.
+    """
+    if keep not in KEEPS:
+        raise CaseError("keep", keep, f"one of {', '.join(KEEPS)}")
+    lost = kept_in(model)
+    if KEEPS.index(keep) < KEEPS.index(lost):
+        raise CaseError("keep", keep, f"the model holds no more than {lost!r} itself: it was read from such a file")
+    _know_every_field(model)
+    written = _Arrays()
+    header = _header(model, keep, written, case)
+    target = Path(path)
+    with replacing(target) as temporary:
+        _write(temporary, header, written)
+    return target
+
+
+def load_reduced(path: str | Path) -> ReducedModel:
+    """The reduced model in a file written by ``save_reduced``; its modes are the same to the last bit.
+
+    Raises CaseError for files that are none, cut short, damaged or of a newer format.
+    """
+    target = Path(path)
+    with _opened(target) as (archive, header):
+        return _model(archive, header)
+
+
+def provenance_of(path: str | Path) -> dict[str, Any]:
+    """Where a saved reduced model comes from: title, text and hash of its case (None where it was saved without),
+    versions, when. Raises CaseError as `load_reduced`."""
+    target = Path(path)
+    with _opened(target) as (_, header):
+        found = dict(header["provenance"])
+        texts = {name: None if found[name] is None else str(found[name]) for name in ("title", "case", "case_sha256")}
+        by = {str(name): str(version) for name, version in found["versions"].items()}
+        return {"analysis": str(found["analysis"]), **texts, "versions": by, "created": str(found["created"])}
+
+
+def is_reduced_file(path: Path) -> bool:
+    """Whether a file is meant to be a saved model: by its name, or as an archive, which no case file is."""
+    if path.suffix == ".npz":
+        return True
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(ZIP)) == ZIP
+    except OSError:
+        return False
+
+
+# -- writing ----------------------------------------------------------------------------------------------------------
+class _Arrays:
+    """Arrays by the name they get in the file, and whether they are compressed; equal ones have one name."""
+
+    def __init__(self) -> None:
+        self.arrays: dict[str, tuple[Any, bool]] = {}
+        self._known: dict[tuple[str, bytes], str] = {}
+
+    def take(self, name: str, array: Any, *, compressed: bool = False) -> str:
+        """The name under which an array is written."""
+        plain = np.ascontiguousarray(array)
+        if compressed:
+            key = str(plain.dtype), hashlib.sha256(plain.data).digest()
+            if key in self._known:
+                return self._known[key]
+            self._known[key] = name
+        self.arrays[name] = plain, compressed
+        return name
+
+
+def _write(path: Path, header: Mapping[str, Any], written: _Arrays) -> None:
+    """The archive, its header first: a file cut short can still be told for what it was."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=QUICK) as archive:
+        archive.writestr(HEADER, json.dumps(header, indent=1, ensure_ascii=False))
+        for name, (array, compressed) in written.arrays.items():
+            member = f"{name}.npy" if compressed else zipfile.ZipInfo(f"{name}.npy")
+            with archive.open(member, "w", force_zip64=True) as stream:
+                np.lib.format.write_array(stream, array, allow_pickle=False)
+
+
+def _origin(case: Case | Mapping[str, Any] | None) -> dict[str, Any]:
+    """Where a model comes from, as its file says it."""
+    if isinstance(case, Mapping):
+        return dict(case)
+    text = None if case is None else case.text
+    return {
+        "analysis": "reduce",
+        "title": None if case is None else case.title,
+        "case": text,
+        "case_sha256": None if text is None else hashlib.sha256(text.encode()).hexdigest(),
+        "versions": versions(),
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _header(
+    model: ReducedModel, keep: Keep, written: _Arrays, case: Case | Mapping[str, Any] | None
+) -> dict[str, Any]:
+    for name in _ARRAYS:
+        if name != "vectors" or keep != "eigenvalues":
+            written.take(name, getattr(model, name))
+    problem = model.problem
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "provenance": _origin(case),
+        "keep": keep,
+        "freedoms": problem.size,
+        "unknowns": model.size,
+        "sketch": int(model.right_sketch.shape[1]),
+        "parameters": [{"name": p.name, "low": p.low, "high": p.high, "value": p.value} for p in problem.parameters],
+        "terms": [_term(k, t, written, matrices=keep == "all") for k, t in enumerate(problem.terms)],
+        "contacts": _contacts(problem, written, vectors=keep != "eigenvalues"),
+        "model": {name: _plain(getattr(model, name)) for name in _NUMBERS} | {"seconds": dict(model.seconds)},
+    }
+
+
+def _term(number: int, term: Term, written: _Arrays, *, matrices: bool) -> dict[str, Any]:
+    factor = _factor(f"terms[{number}].factor", term.factor, term.role)
+    found = {"role": term.role, "symmetric": bool(term.symmetric), "factor": factor}
+    if matrices:
+        return found | {"matrix": _csr(f"term{number}", term.matrix, written)}
+    return found | {"matrix": {"nonzeros": int(term.matrix.nnz)}}
+
+
+def _contacts(problem: ParametricProblem, written: _Arrays, *, vectors: bool) -> dict[str, Any] | None:
+    """What a problem with contacts has beside its terms; None for others."""
+    if type(problem) is ParametricProblem:
+        return None
+    if not isinstance(problem, ContactsProblem) or {f.name for f in fields(problem)} != _OF_CONTACTS:
+        raise CaseError("model.problem", type(problem).__name__, f"files of format {VERSION} cannot hold it")
+    found = problem.elimination
+    if found is None or not vectors:
+        return {"notes": list(problem.notes), "elimination": None}
+    changes = [
+        {"factor": _factor(f"elimination[{k}].factor", f, "rigid contact"), "matrix": _csr(f"change{k}", v, written)}
+        for k, (f, v) in enumerate(found.changes)
+    ]
+    motion = _csr("motion", found.motion, written)
+    return {
+        "notes": list(problem.notes),
+        "elimination": {"displacements": int(found.motion.shape[0]), "motion": motion, "changes": changes},
+    }
+
+
+def _csr(name: str, matrix: Any, written: _Arrays) -> dict[str, Any]:
+    csr = sp.csr_array(matrix)
+    # The narrowest indices that will do, as they come back.
+    csr = sp.csr_array((np.asarray(csr.data, dtype=float), csr.indices, csr.indptr), shape=csr.shape)
+    return {"nonzeros": int(csr.nnz)} | {
+        part: written.take(f"{name}_{part}", getattr(csr, part), compressed=True)
+        for part in ("data", "indices", "indptr")
+    }
+
+
+def _factor(where: str, factor: object, of: str) -> dict[str, Any]:
+    """A factor as data. Raises CaseError where it is none."""
+    if isinstance(factor, Factor):
+        document = factor.to_json()
+        with contextlib.suppress(ValueError):
+            if factor_from_json(json.loads(json.dumps(document))) == factor:
+                return document
+    raise CaseError(
+        where, f"{of}, {_called(factor)}",
+        "only factors that are data can be saved, not functions of one's own: Product, Formula, Lagrange and others of "
+        "stridor.modal.parametric.factors",
+    )  # fmt: skip
+
+
+def _called(function: object) -> str:
+    return str(getattr(function, "__name__", type(function).__name__))
+
+
+def _plain(value: Any) -> Any:
+    """A number or a yes or no as Python has it."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _know_every_field(model: ReducedModel) -> None:
+    """Raise CaseError for a field that this format does not know and that is not as it would be without it."""
+    for one in fields(model):
+        if one.name in _NAMED:
+            continue
+        default = one.default if one.default_factory is MISSING else one.default_factory()
+        value = getattr(model, one.name)
+        if isinstance(value, np.ndarray) or value != default:
+            raise CaseError(f"model.{one.name}", None, f"files of format {VERSION} cannot hold it")
+
+
+# -- reading ----------------------------------------------------------------------------------------------------------
+@contextlib.contextmanager
+def _opened(path: Path) -> Generator[tuple[zipfile.ZipFile, dict[str, Any]], None, None]:
+    """The archive and its header. Raises CaseError for what is no reduced model that this version can read."""
+    foreign = CaseError("file", str(path), "no reduced model; give a file of st.save_reduced or stridor reduce --save")
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(200)
+    except FileNotFoundError:
+        raise CaseError("file", str(path), "no such file") from None
+    except OSError as error:
+        raise CaseError("file", str(path), f"cannot be read: {error.strerror or error}") from error
+    # A file cut short has lost its table of contents; its beginning says whose it is.
+    ours = start.startswith(ZIP) and HEADER.encode() in start
+    if not ours:
+        raise foreign
+    with _damage_told(path), zipfile.ZipFile(path) as archive:
+        header = json.loads(archive.read(HEADER))
+        if not isinstance(header, dict) or cast("dict[str, Any]", header).get("format") != FORMAT:
+            raise foreign
+        known = cast("dict[str, Any]", header)
+        version = known["version"]
+        if isinstance(version, int) and version > VERSION:
+            by = dict(known.get("provenance", {})).get("versions", {}).get("stridor", "a newer stridor")
+            raise CaseError(
+                "file", str(path), f"written in format {version} by stridor {by}; this one reads formats up to "
+                f"{VERSION}: bring stridor up to date",
+            )  # fmt: skip
+        if version != VERSION:
+            raise ValueError(f"format {version!r}")
+        yield archive, known
+
+
+@contextlib.contextmanager
+def _damage_told(path: Path) -> Generator[None, None, None]:
+    """Whatever goes wrong with what is in a file as one CaseError."""
+    try:
+        yield
+    except CaseError as error:
+        # A factor's text or a parameter's range that is none.
+        if error.problems[0].where == "file":
+            raise
+        raise _damaged(path, str(error)) from error
+    except MemoryError as error:
+        raise _damaged(path, "it claims to hold more than the memory does") from error
+    except Exception as error:
+        # Readers of archives, arrays and JSON raise whatever bytes make of them that are not what they should be.
+        raise _damaged(path, f"{type(error).__name__}: {error}") from error
+
+
+def _damaged(path: Path, what: str) -> CaseError:
+    short = " ".join(what.split())
+    short = short if len(short) <= 120 else short[:119] + "…"
+    return CaseError("file", str(path), f"a reduced model, but cut short or damaged ({short}); make it again")
+
+
+def _model(archive: zipfile.ZipFile, header: Mapping[str, Any]) -> ReducedModel:
+    keep = header["keep"]
+    if keep not in KEEPS:
+        raise ValueError(f"keep {keep!r}")
+    n, r, s = (_count(header[name]) for name in ("freedoms", "unknowns", "sketch"))
+    reading = _Reader(archive)
+    terms = tuple(_read_term(reading, document, n, keep) for document in header["terms"])
+    parameters = tuple(
+        Parameter(str(p["name"]), float(p["low"]), float(p["high"]), float(p["value"])) for p in header["parameters"]
+    )
+    problem = _read_problem(reading, header["contacts"], terms, parameters, n, keep)
+    if not (terms and parameters and np.all(np.isfinite(problem.factors(problem.reference)))):
+        raise ValueError("no terms or parameters, or factors that are no numbers")
+    vectors: Any = LeftOut("its basis was", (n, r), n * r)
+    if keep != "eigenvalues":
+        vectors = reading.numbers("vectors", (n, r))
+    numbers = header["model"]
+    frequency, constant, bound = (float(numbers[name]) for name in ("frequency", "constant", "bound"))
+    if not (0 < frequency < np.inf and constant > 0 and 0 < bound < np.inf):
+        raise ValueError("a frequency, a constant or a bound that is none")
+    return ReducedModel(
+        problem=problem,
+        vectors=vectors,
+        projected=reading.numbers("projected", (len(terms), r, r)),
+        right_sketch=reading.numbers("right_sketch", (len(terms), s, r)),
+        left_sketch=reading.numbers("left_sketch", (len(terms), s, r)),
+        frequency=frequency,
+        constant=constant,
+        bound=bound,
+        seconds={str(part): float(value) for part, value in numbers["seconds"].items()},
+        solves=int(numbers["solves"]),
+        whole=bool(numbers["whole"]),
+    )
+
+
+def _read_term(reading: _Reader, document: Mapping[str, Any], n: int, keep: Keep) -> Term:
+    role = document["role"]
+    if role not in POWERS:
+        raise ValueError(f"a term of role {role!r}")
+    matrix: Any = LeftOut("the full matrices were", (n, n), _count(document["matrix"]["nonzeros"]))
+    if keep == "all":
+        matrix = reading.csr(document["matrix"], (n, n))
+    return Term(matrix, role, factor_from_json(document["factor"]), bool(document["symmetric"]))
+
+
+def _read_problem(
+    reading: _Reader, contacts: Mapping[str, Any] | None, terms: tuple[Term, ...], parameters: tuple[Parameter, ...],
+    n: int, keep: Keep,
+) -> ParametricProblem:  # fmt: skip
+    if contacts is None:
+        return ParametricProblem(terms, parameters)
+    notes = tuple(str(note) for note in contacts["notes"])
+    found = contacts["elimination"]
+    if found is None or keep == "eigenvalues":
+        return ContactsProblem(terms, parameters, None, notes)
+    shape = _count(found["displacements"]), n
+    changes = tuple((factor_from_json(c["factor"]), reading.csr(c["matrix"], shape)) for c in found["changes"])
+    return ContactsProblem(terms, parameters, Elimination(reading.csr(found["motion"], shape), changes), notes)
+
+
+def _count(value: object) -> int:
+    if not isinstance(value, int) or value < 0:
+        raise ValueError(f"a count of {value!r}")
+    return value
+
+
+class _Reader:
+    """Arrays of an archive, each with the shape it must have."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+
+    def numbers(self, name: str, shape: tuple[int, ...]) -> Array:
+        """An array of floating-point numbers."""
+        return self._read(name, shape, "f").astype(np.float64, copy=False)
+
+    def csr(self, document: Mapping[str, Any], shape: tuple[int, int]) -> Sparse:
+        """A sparse matrix, its indices looked through."""
+        nonzeros = _count(document["nonzeros"])
+        data = self.numbers(document["data"], (nonzeros,))
+        indices: IntArray = self._read(document["indices"], (nonzeros,), "i")
+        starts: IntArray = self._read(document["indptr"], (shape[0] + 1,), "i")
+        matrix = sp.csr_array((data, indices, starts), shape=shape)
+        matrix.check_format(full_check=True)
+        return matrix
+
+    def _read(self, name: str, shape: tuple[int, ...], kind: str) -> Any:
+        with self._archive.open(f"{name}.npy") as stream:
+            array = np.lib.format.read_array(stream, allow_pickle=False)
+            # The checksum is compared at the end of what is stored.
+            more = stream.read(1)
+        if array.shape != shape or array.dtype.kind != kind or more:
+            raise ValueError(f"{name}: {array.dtype} of shape {array.shape} where {shape} is due")
+        return array

@@ -1,0 +1,113 @@
+"""The lowest onset of a case searched for in the full problem, and what two numbers of the case do to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case import Case
+from ..errors import AnalysisError
+from ..modal.assembled import Options
+from ..modal.assembled.steady import touching_nodes
+from ..modal.derivatives import Held, Mode, Terms, by_friction, rate_of, solve_mode, terms_of
+from ..modal.onsets import Onset, onsets
+from ..system import System, build_system
+from .sensitivities import number_at, options_of
+
+NOWHERE = (float("nan"), float("nan"))
+
+
+@dataclass(frozen=True)
+class LowestOnset:
+    """The onset of least μ from which on something grows: where, at which frequency, dμ_c/dx and dμ_c/dy (NaN where
+    there are none), its backward error (NaN where it is not known in the full problem) and the error estimated of μ
+    (NaN where the full problem was solved)."""
+
+    mu: float
+    frequency_hz: float
+    slopes: tuple[float, float] = NOWHERE
+    residual: float = float("nan")
+    error: float = float("nan")
+
+
+@dataclass(frozen=True)
+class FullSearch:
+    """A search for onsets in the full problem at every point of the map."""
+
+    case: Case
+    paths: tuple[str, str]
+    mu_range: tuple[float, float]
+    max_frequency_hz: float
+
+    def lowest(self, x: float, y: float) -> tuple[LowestOnset | None, tuple[str, ...]]:
+        """The lowest onset at values of the two numbers, and what there is to be said. Raises AnalysisError."""
+        varied = self.case.with_(dict(zip(self.paths, (x, y), strict=True)))
+        system = build_system(varied)
+        first = lowest_onset(varied, system, self.mu_range, self.max_frequency_hz)
+        if first is None:
+            return None, ()
+        found = LowestOnset(first.mu, first.frequency_hz, residual=first.residual)
+        if first.growth_slope is None:
+            return found, ()  # undamped: the onset is an exceptional point
+        try:
+            slopes = onset_slopes(varied, system, first, self.paths)
+        except AnalysisError as error:
+            return found, (f"no slopes: {error}",)
+        return LowestOnset(first.mu, first.frequency_hz, (slopes[0], slopes[1]), first.residual), ()
+
+    def undamped(self) -> LowestOnset | None:
+        """The lowest onset without structural damping. Raises AnalysisError."""
+        first = lowest_onset(self.case, build_system(self.case), self.mu_range, self.max_frequency_hz, damped=False)
+        return None if first is None else LowestOnset(first.mu, first.frequency_hz, residual=first.residual)
+
+
+def lowest_onset(
+    case: Case, system: System, mu_range: tuple[float, float], max_frequency_hz: float, *, damped: bool = True
+) -> Onset | None:
+    """The onset of least μ from which on something grows."""
+    options = options_of(case)
+    return onsets(
+        system,
+        mu_range,
+        max_frequency_hz=max_frequency_hz,
+        damped=damped,
+        friction_damping=options.friction_damping,
+        prestress=options.prestress,
+        solver=options.solver,
+    ).first
+
+
+def onset_slopes(case: Case, system: System, onset: Onset, paths: Sequence[str]) -> list[float]:
+    """dμ_c/dp of an onset with damping for numbers of the case. Raises AnalysisError where it has no derivative."""
+    options = options_of(case)
+    mu = onset.mu
+    held = _held(system, options)
+    terms = terms_of(system, mu, held, options)
+    lam = 2j * np.pi * onset.frequency_hz
+    if not abs(lam):
+        raise AnalysisError("divergence at zero frequency; slopes of flutter onsets only")
+    # How far the other mode of the meeting is: growth opens as κ √(μ − μ_e).
+    point, kappa = onset.exceptional_mu, onset.square_root_coefficient
+    gap = 2 * kappa * abs(mu - point) ** 0.5 if point is not None and kappa is not None else 1e-3 * abs(lam)
+    mode = solve_mode(terms, lam, min(gap, abs(lam)), solver=options.solver)
+    by_mu = mode.derivative(by_friction(system, mu, held, options)).real
+    if by_mu == 0.0:
+        raise AnalysisError("growth does not change with friction there")
+    return [-_derivative(case, mode, path, mu, held, options).real / by_mu for path in paths]
+
+
+def _held(system: System, options: Options) -> Held:
+    """The nodes that touch where the search for onsets has them touch: in steady sliding with the laws' own friction,
+    not with that of the onset, which other nodes may do."""
+    nodes = system.contact_nodes()
+    steady = touching_nodes(system, nodes, None, options.solver)
+    return Held(np.flatnonzero(steady.active), steady.sense, system.size, nodes.count)
+
+
+def _derivative(case: Case, mode: Mode, path: str, mu: float, held: Held, options: Options) -> complex:
+    def at(value: float) -> Terms:
+        return terms_of(build_system(case.with_({path: value})), mu, held, options)
+
+    return mode.derivative(rate_of(at, number_at(case, path))[0])
