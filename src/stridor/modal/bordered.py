@@ -152,7 +152,7 @@ class Bordered:
             factor = min(1.0, 0.1 / size) if size > 0.1 else 1.0
             omega += factor * change[0]
             mu += factor * change[1]
-            if size < 1e-13 or (size < 1e-10 and size >= last):
+            if size < 1e-13 or (size < 1e-8 and size >= last):
                 _, f_l, f_m, _, _ = self.derivatives(1j * omega, mu)
                 return omega, mu, float((-f_m / f_l).real)
             last = size
@@ -196,7 +196,7 @@ class Bordered:
             change = float((-f / f_m).real)
             mu += change
             size = abs(change) / max(abs(mu), 1e-6)
-            if size < 1e-13 or (size < 1e-10 and size >= last):
+            if size < 1e-13 or (size < 1e-8 and size >= last):
                 return mu
             last = size
         return None

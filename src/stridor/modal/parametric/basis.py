@@ -13,6 +13,7 @@ from ..quadratic.problem import times
 from .problem import ParametricProblem
 
 START = 200
+ORTHOGONAL = 1e-11  # of unit vectors
 
 
 class Indefinite(Exception):
@@ -59,28 +60,44 @@ class Basis:
     def add(self, block: Array, smallest: float) -> int:
         """Take in what ``block`` (n, k) adds but for directions that leave less than ``smallest`` of a unit vector;
         returns how many vectors that made. Raises Indefinite where the metric shows that it is."""
-        square = np.einsum("ij,ij->j", block, self.metric @ block)
+        image = self.metric @ block
+        square = np.einsum("ij,ij->j", block, image)
         if np.any(square < 0):
             raise Indefinite
         length = np.sqrt(square)
-        new = block[:, length > 0] / length[length > 0]
-        new = new - self.vectors @ (self._image.T @ new)
+        new, image = block[:, length > 0] / length[length > 0], image[:, length > 0] / length[length > 0]
         if not new.shape[1]:
             return 0
-        gram = new.T @ (self.metric @ new)
+        new, image = self._without(new, image)
+        gram = new.T @ image
         squares, turn = sl.eigh((gram + gram.T) / 2)
         if squares[0] < -1e-8 * max(squares[-1], smallest**2):
             raise Indefinite
         keep = squares > smallest**2
         if not keep.any():
             return 0
-        new = new @ (turn[:, keep] / np.sqrt(squares[keep]))
-        new = new - self.vectors @ (self._image.T @ new)
-        image = self.metric @ new
+        turn = turn[:, keep] / np.sqrt(squares[keep])
+        new, image = self._without(new @ turn, image @ turn)
         lower = sl.cholesky((new.T @ image + image.T @ new) / 2, lower=True)
         new = sl.solve_triangular(lower, new.T, lower=True).T
         self._take(new, sl.solve_triangular(lower, image.T, lower=True).T)
         return int(new.shape[1])
+
+    def turn(self, by: Array) -> None:
+        """Keep the combinations ``by`` (r, s), orthonormal columns, of the vectors only."""
+        room = [np.zeros((self.problem.size, max(START, 2 * by.shape[1])), order="F") for _ in range(2)]
+        for wide, old in zip(room, (self.vectors, self._image), strict=True):
+            wide[:, : by.shape[1]] = old @ by
+        self._room, self._count = room, by.shape[1]
+        self.projected = np.einsum("ri,jrs,sk->jik", by, self.projected, by, optimize=True)
+        self.right_sketch, self.left_sketch = self.right_sketch @ by, self.left_sketch @ by
+
+    def _without(self, block: Array, image: Array) -> tuple[Array, Array]:
+        """What of a block (n, k) and of its product with the metric is not in the basis."""
+        weights = self._image.T @ block
+        if np.abs(weights).max(initial=0.0) <= ORTHOGONAL:
+            return block, image
+        return block - self.vectors @ weights, image - self._image @ weights
 
     def _take(self, new: Array, image: Array) -> None:
         old, count = self.vectors, new.shape[1]

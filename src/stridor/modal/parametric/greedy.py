@@ -1,9 +1,9 @@
 """Growing a basis until every point of a box passes, and cutting it down to what passes as well.
 
 Candidates are the points of a grid and some in no relation to it, where errors are measured. A point passes when
-residuals of all its modes say so; else the answers to them join the basis and it is asked again. The basis is cut by
-the singular values of the modes at the points that passed, as far as errors stay small where they are measured and
-error estimates stay within the bound at further points; those that fail there are enriched in turn.
+residuals of all its modes say so; else answers to what all such points leave join the basis and they are asked again.
+The basis is cut by the singular values of the modes at the points that passed, as far as errors stay small where they
+are measured and error estimates stay within the bound at further points; those that fail there are enriched in turn.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
@@ -19,14 +18,14 @@ import scipy.linalg as sl
 from ...direct import Factor
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, IntArray
-from .basis import Basis, expanded, real_and_imaginary, residual
+from .basis import Basis, real_and_imaginary
 from .dense import DenseModes, assembled, dense_modes
-from .model import ReducedModel, product_over_slope, sketched
+from .model import ReducedModel, product_over_slope, sketched, sketched_rests
 from .problem import ParametricProblem
 
 SEED = 20061
 MARGIN = 1.03  # modes up to this much above the band are made exact
-WEAKEST = 1e-3  # of the strongest direction of a block of residuals: what waits for another point
+WEAKEST = 1e-2  # of the strongest direction of a block of residuals: what waits for another point
 LEFT_OUT = 1e-2  # of a unit vector: new directions smaller than this are not worth a column
 PASSED = 0.3  # of the bound: what residuals at a point may say
 MEASURED = 0.2  # of the bound: what an error may be where it is measured
@@ -34,8 +33,10 @@ WATCHFUL = 0.5  # of the bound: what an estimate may be at points that stand for
 SAFETY = 3.0  # the constant of error estimates over the largest one seen
 WATCHED = 6  # points for each parameter whose estimates have to stay within the bound, beside those of the grid
 FINE = 3  # parameters up to which the grid has points between the corners
-FIRST_CUT, LESS = 3e-4, 1.4  # of the largest singular value: what is cut away at first, and how it sinks
-TRIES = 3  # times a point may be asked, on average
+ASKED = 3  # of the points whose estimates fail, the worst ones, that are asked themselves
+FIRST_CUT, LESS = 3e-4, 1.6  # of the largest singular value: what is cut away at first, and how it sinks
+TOGETHER = 64  # answers at most that join the basis at once
+ROUNDS = 25
 
 Point = Mapping[str, float]
 
@@ -65,7 +66,8 @@ class Greedy:
     frequency: float
     bound: float
     work: Work
-    whole: bool = False  # damping is too strong for anything but whole companion matrices
+    tried: int = 0  # dense problems solved
+    stiff: int = 0  # of these, how many took the whole companion matrix
     passed: list[tuple[Point, DenseModes]] = field(default_factory=list[tuple[Point, DenseModes]])
 
     @property
@@ -74,23 +76,27 @@ class Greedy:
         return self.basis.problem
 
     def enrich(self, points: list[Point]) -> None:
-        """Answers to the residuals of one point after the other until every mode at every point passes. Raises
+        """Answers to what the modes at all points leave, together, until every mode at every point passes. Raises
         AnalysisError where they do not settle."""
         pending = list(points)
-        for _ in range(TRIES * len(points)):
-            if not pending:
+        failing: list[tuple[Point, DenseModes, Array]] = []
+        for _ in range(ROUNDS):
+            failing_before, failing = failing, []
+            for point in pending:
+                # Where damping was too strong, or two modes too close, for the cheap way, it still is.
+                known = next((f.whole for other, f, _ in failing_before if other is point), False)
+                found, error = self._asked(point, whole=known)
+                if np.any(error > PASSED * self.bound):
+                    failing.append((point, found, error))
+                else:
+                    self.passed.append((point, found))
+            if not failing:
                 return
-            point = pending.pop(0)
-            found, error = self._asked(point)
-            if not np.any(error > PASSED * self.bound):
-                self.passed.append((point, found))
-            elif self._answered(point, found, error):
-                pending.append(point)
-        if pending:
-            raise AnalysisError(
-                "the reduced model does not settle over the box; ask for a smaller box, a lower frequency or a larger "
-                "bound"
-            )
+            self._answer(failing)
+            pending = [point for point, _, _ in failing]
+        raise AnalysisError(
+            "the reduced model does not settle over the box; ask for a smaller box, a lower frequency or a larger bound"
+        )
 
     def cut(self) -> ReducedModel:
         """The basis as small as errors and estimates allow."""
@@ -107,16 +113,15 @@ class Greedy:
             turn = left[:, size > share * size[0]]
             model = self._model(turn)
             constant = _constant(model, measured, exact)
-            failing: list[Point] = []
             if constant is not None:
-                failing = [p for p in watched if np.any(constant * model.modes(p).error > WATCHFUL * self.bound)]
-                if not failing:
+                errors = [constant * float(np.max(model.modes(p).error, initial=0.0)) for p in watched]
+                if max(errors) <= WATCHFUL * self.bound:
                     break
                 if not asked:
-                    # Once: the modes of the points that fail join the others.
+                    # Once: modes of those that fail join the others.
                     asked = True
                     self.work.lap("cut")
-                    self.enrich(failing)
+                    self.enrich([watched[k] for k in np.argsort(errors)[-ASKED:] if errors[k] > WATCHFUL * self.bound])
                     self.work.lap("enrichment")
                     left, size = self._span()
                     continue
@@ -131,20 +136,25 @@ class Greedy:
             solves=self.work.solves,
         )  # fmt: skip
 
+    @property
+    def whole(self) -> bool:
+        """Whether damping has been too strong for anything but the whole companion matrix most of the time."""
+        return self.tried > 2 and 2 * self.stiff > self.tried
+
     def _last(self, point: Point) -> DenseModes:
         """The modes at a point that passed, on the basis as it is now."""
         known = next(found for other, found in reversed(self.passed) if other is point)
         return known if len(known.right) == self.basis.count else self._modes(point)
 
-    def _modes(self, point: Point) -> DenseModes:
+    def _modes(self, point: Point, *, whole: bool = False) -> DenseModes:
         matrices = assembled(self.basis.projected, self.problem.factors(point), self.problem.powers)
-        found = dense_modes(*matrices, self.frequency, MARGIN, whole=self.whole)
-        self.whole = found.whole
+        found = dense_modes(*matrices, self.frequency, MARGIN, whole=whole or self.whole)
+        self.tried, self.stiff = self.tried + 1, self.stiff + found.whole
         return found
 
-    def _asked(self, point: Point) -> tuple[DenseModes, Array]:
+    def _asked(self, point: Point, *, whole: bool = False) -> tuple[DenseModes, Array]:
         """The modes at a point and their errors (k,) by residuals, without a constant."""
-        found = self._modes(point)
+        found = self._modes(point, whole=whole)
         factors, powers = self.problem.factors(point), self.problem.powers
         sizes = [
             sketched(sketch, factors, powers, found.values, vectors)
@@ -153,30 +163,53 @@ class Greedy:
         matrices = assembled(self.basis.projected, factors, powers)
         return found, product_over_slope(matrices, found, *sizes)
 
-    def _answered(self, point: Point, found: DenseModes, error: Array) -> int:
-        """How many vectors the answers to what the modes leave unbalanced add."""
-        factors = self.problem.factors(point)
-        # Modes far below the bound leave nothing that another point will not ask for.
-        chosen = error > 0.01 * self.bound
-        rests: list[Any] = []
-        for left, vectors in ((False, found.right), (True, found.left)):
-            x = expanded(self.basis.vectors, vectors[:, chosen])
-            rests.append(residual(self.problem, factors, found.values[chosen], x, left=left) * self.scale[:, None])
-        rest = np.hstack([real_and_imaginary(r) for r in rests])
-        squares, turn = sl.eigh(rest.T @ rest)
-        keep = squares > max(WEAKEST**2 * squares[-1], 1e-300)
-        force = (rest @ (turn[:, keep] / np.sqrt(squares[keep]))) / self.scale[:, None]
+    def _answer(self, failing: list[tuple[Point, DenseModes, Array]]) -> None:
+        """Add the answers to what modes leave unbalanced at several points at once, from both sides."""
+        powers, terms = self.problem.powers, self.problem.terms
+        # Which combinations are worth an answer is seen in the sketches; only those are formed.
+        seen: list[Array] = []
+        weights: list[list[list[Array]]] = [[[], []] for _ in terms]
+        for point, found, error in failing:
+            factors = self.problem.factors(point)
+            # Modes far below the bound leave nothing that another point will not ask for.
+            chosen = error > 0.01 * self.bound
+            lam = found.values[chosen]
+            sketches = self.basis.right_sketch, self.basis.left_sketch
+            for side, (sketch, vectors) in enumerate(zip(sketches, (found.right, found.left), strict=True)):
+                z = vectors[:, chosen]
+                seen.append(real_and_imaginary(sketched_rests(sketch, factors, powers, lam, z)))
+                for place, (factor, power) in enumerate(zip(factors, powers, strict=True)):
+                    weights[place][side].append(factor * real_and_imaginary(lam**power * z))
+                    weights[place][1 - side].append(np.zeros((len(z), 2 * z.shape[1])))
+        block = np.hstack(seen)
+        squares, turn = sl.eigh(block.T @ block)
+        keep = np.flatnonzero(squares > max(WEAKEST**2 * squares[-1], 1e-300))[-TOGETHER:]
+        mix = turn[:, keep] / np.sqrt(squares[keep])
+        # One pass over the basis for all terms.
+        mixed: list[Array] = []
+        for term, sides in zip(terms, weights, strict=True):
+            right, left = (np.hstack(side) @ mix for side in sides)
+            mixed += [right + left] if term.symmetric else [right, left]
+        images = np.split(self.basis.vectors @ np.hstack(mixed), len(mixed), axis=1)
+        force = np.zeros((self.problem.size, len(keep)))
+        for term in terms:
+            force += term.matrix @ images.pop(0)
+            if not term.symmetric:
+                force += term.matrix.T @ images.pop(0)
         answer = self.factor.solve(force, refine=False)
         self.work.solves += force.shape[1]
-        return self.basis.add(answer, LEFT_OUT) or self.basis.add(answer, 1e-3 * LEFT_OUT)
+        if not self.basis.add(answer, LEFT_OUT):
+            self.basis.add(answer, 1e-3 * LEFT_OUT)
+
+    def _shots(self) -> Array:
+        """The modes at all points that passed (r, k), real and imaginary, right and left."""
+        count = self.basis.count
+        found = [_on(modes, count) for _, modes in self.passed]
+        return np.hstack([real_and_imaginary(v) for modes in found for v in (modes.right, modes.left)])
 
     def _span(self) -> tuple[Array, Array]:
         """Left singular vectors (r, s) and singular values (s,) of the modes at all points that passed."""
-        shots: list[Array] = []
-        for _, found in self.passed:
-            both = np.hstack([real_and_imaginary(found.right), real_and_imaginary(found.left)])
-            shots.append(np.vstack([both, np.zeros((self.basis.count - len(both), both.shape[1]))]))
-        left, size, _ = sl.svd(np.hstack(shots), full_matrices=False)
+        left, size, _ = sl.svd(self._shots(), full_matrices=False)
         return left, size
 
     def _model(self, turn: Array) -> ReducedModel:
@@ -187,6 +220,12 @@ class Greedy:
             self.problem, basis.vectors, projected, basis.right_sketch @ turn, basis.left_sketch @ turn,
             self.frequency, 1.0, self.bound, {}, 0, self.whole,
         )  # fmt: skip
+
+
+def _on(found: DenseModes, count: int) -> DenseModes:
+    """Modes found before the basis grew, on the basis as it is."""
+    more = np.zeros((count - len(found.right), found.right.shape[1]))
+    return replace(found, right=np.vstack([found.right, more]), left=np.vstack([found.left, more]))
 
 
 def _constant(model: ReducedModel, points: list[Point], exact: list[ComplexArray]) -> float | None:

@@ -114,14 +114,21 @@ class ReducedModel:
 
 
 def sketched(sketch: Array, factors: Array, powers: Array, lam: ComplexArray, z: ComplexArray) -> Array:
-    """Lengths (k,) of scaled residuals of z (r, k) from sketches (t, s, r): what acts on one power of λ at once."""
+    """Lengths (k,) of scaled residuals of z (r, k) from sketches (t, s, r)."""
+    return np.linalg.norm(sketched_rests(sketch, factors, powers, lam, z), axis=0)
+
+
+def sketched_rests(
+    sketch: Array, factors: Array, powers: Array, lam: ComplexArray, z: ComplexArray
+) -> ComplexArray:
+    """Sketches (s, k) of scaled residuals of z (r, k): what acts on one power of λ at once."""
     total: ComplexArray = np.zeros((sketch.shape[1], len(lam)), dtype=complex)
     for power in range(3):
         chosen = np.flatnonzero((powers == power) & (factors != 0.0))
         if len(chosen):
             matrix = np.tensordot(factors[chosen], sketch[chosen], axes=1)
             total += lam**power * expanded(matrix, z)
-    return np.linalg.norm(total, axis=0)
+    return total
 
 
 def product_over_slope(

@@ -23,6 +23,7 @@ from .problem import ParametricProblem
 
 BLOCK = 24
 GUARD = 1.5  # real modes up to this much above the band take part
+SETTLED = 1e-2  # of λ²: real modes only start the basis
 SHIFT = 0.3  # √s over the band
 SKETCH, NONZEROS = 300, 4  # rows of the random embedding, entries in each of its columns
 
@@ -110,29 +111,40 @@ def _krylov(factor: Factor, mass: Sparse, stiffness: Sparse, frequency: float, w
     n = mass.shape[0]
     shift = (SHIFT * frequency) ** 2
     block = np.random.default_rng(SEED).standard_normal((n, min(BLOCK, n)))
-    vectors, images = np.zeros((n, 0)), np.zeros((n, 0))
+    # Room for all: growing by copies would cost as much as multiplying.
+    room, count = [np.empty((n, 0), order="F")] * 2, 0
+    projected = np.zeros((0, 0))
     known = np.zeros(0)
     while True:
         block = factor.solve(mass @ block, refine=False)
         work.solves += block.shape[1]
+        if count + block.shape[1] > room[0].shape[1]:
+            wider = [np.empty((n, 2 * count + 8 * BLOCK), order="F") for _ in room]
+            for new, old in zip(wider, room, strict=True):
+                new[:, :count] = old[:, :count]
+            room = wider
+        vectors, images = (part[:, :count] for part in room)
         for _ in range(2):
             block = block - vectors @ (images.T @ block)
             block = np.linalg.qr(block)[0]
-        image = mass @ block
-        vectors, images = np.hstack([vectors, block]), np.hstack([images, image])
         # Orthonormalised in the mass, so that Ritz values are those of the pencil.
+        image = mass @ block
         gram = block.T @ image
         squares, turn = sl.eigh((gram + gram.T) / 2)
         good = squares > 1e-12 * squares[-1]
         turn = turn[:, good] / np.sqrt(squares[good])
         block, image = block @ turn, image @ turn
-        vectors = np.hstack([vectors[:, : -gram.shape[0]], block])
-        images = np.hstack([images[:, : -gram.shape[0]], image])
-        projected = vectors.T @ (stiffness @ vectors)
+        force = stiffness @ block
+        across = vectors.T @ force
+        projected = np.block([[projected, across], [across.T, block.T @ force]])
+        for part, new in zip(room, (block, image), strict=True):
+            part[:, count : count + new.shape[1]] = new
+        count += block.shape[1]
+        vectors = room[0][:, :count]
         values, shapes = sl.eigh((projected + projected.T) / 2)
         low = values[values < (GUARD * frequency) ** 2]
         enough = len(values) > len(low) and len(known) >= len(low)
-        if enough and np.all(np.abs(known[: len(low)] - low) <= 1e-3 * (np.abs(low) + shift)):
+        if enough and np.all(np.abs(known[: len(low)] - low) <= SETTLED * (np.abs(low) + shift)):
             return vectors @ shapes[:, : min(len(low) + 4, len(values))]
         if not block.shape[1] or vectors.shape[1] >= n:
             return vectors @ shapes[:, : min(len(low) + 4, len(values))]
