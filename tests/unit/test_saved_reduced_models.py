@@ -425,7 +425,7 @@ def test_from_the_command_line_and_back(case, tmp_path):
     assert first == second
     assert {"freedoms", "size", "max_frequency_hz", "bound", "parameters", "seconds", "solves"} <= set(first)
     assert [p["point"] for p in first["modes"]] == [{"mu": m, "contact_stiffness": 0.8} for m in (0.05, 0.1, 0.15)]
-    keys = {"point", "inside", "frequency_hz", "growth_rate", "unstable", "error", "passed", "residual"}
+    keys = {"point", "inside", "corrections", "frequency_hz", "growth_rate", "unstable", "error", "passed", "residual"}
     assert set(first["modes"][0]) == keys
     onset = first["onsets"][0]
     assert onset["parameter"] == "mu"

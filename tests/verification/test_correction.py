@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from test_reduction import FREQUENCY_HZ, eigenvalues, rotor
+from typer.testing import CliRunner
 
+from stridor.app.cli import app
+from stridor.case import load, template_text
 from stridor.errors import CaseError
+from stridor.modal.complex_modes import complex_modes
 from stridor.modal.parametric import Corrector, Parameter, ParametricProblem, reduce
+from stridor.system import build_system
 
 pytestmark = pytest.mark.verification
 
@@ -72,3 +79,20 @@ def test_what_is_refused(corrector):
         corrector.modes({}, steps=-1)
     with pytest.raises(CaseError, match="no such parameter"):
         corrector.modes({"speed": 1.0})
+
+
+def test_the_program_corrects_where_errors_are_above_the_bound(tmp_path):
+    case = tmp_path / "bench.toml"
+    case.write_text(template_text("two-beams"))
+    words = ["reduce", str(case), "--box", "mu=0:0.3", "--at", "mu=0.2,0.9", "--json", "--quiet"]
+    inside, outside = json.loads(CliRunner().invoke(app, words).stdout)["modes"]
+    assert inside["corrections"] == 0
+    assert outside["corrections"] > 0
+    assert all(inside["passed"] + outside["passed"])
+    assert not outside["inside"]
+    (_, alone) = json.loads(CliRunner().invoke(app, [*words, "--corrections", "0"]).stdout)["modes"]
+    assert alone["corrections"] == 0
+    assert not all(alone["passed"])
+    exact = complex_modes(build_system(load(case)), 0.9, max_frequency_hz=20e3).frequency_hz[0]
+    found = np.array(outside["frequency_hz"])
+    assert np.abs(exact[:, None] - found).min(axis=1) == pytest.approx(0, abs=1e-6 * 20e3)

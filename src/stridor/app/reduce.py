@@ -16,7 +16,8 @@ from .arguments import Json, Out, Quiet, Set, Solver, load_case, numbers, pair
 
 if TYPE_CHECKING:
     from ..case import Case
-    from ..modal.parametric import ParametricOnset, ReducedModel
+    from ..modal.parametric import CorrectedModes, ParametricOnset, ReducedModel, ReducedModes
+    from ..typing import Array
 
 BOUND = 1e-8
 CONTACTS = ("mu", "contact_stiffness")  # parameters without a unit; others have that of the number in the case
@@ -62,6 +63,12 @@ def reduce(
             "onsets), eigenvalues the basis too [default: all].",
         ),
     ] = None,
+    corrections: Annotated[
+        int,
+        typer.Option(
+            "--corrections", min=0, max=10, help="Correction steps at most where an error is above the bound."
+        ),
+    ] = 3,
     set_: Set = None,
     solver: Solver = None,
     out: Out = None,
@@ -86,7 +93,8 @@ def reduce(
     for note in getattr(model.problem, "notes", ()):
         say(f"note: {note}", quiet=quiet)
     files = [] if save is None else [_saved(model, save, origin, keep)]
-    points = _points(model, at or [])
+    chosen = None if solver in (None, "auto") else solver
+    points = _points(model, at or [], corrections if kept_in(model) == "all" else 0, chosen)
     if out is not None and at:
         files.append(_write(out / "reduced.csv", model, points))
     for path in files:
@@ -94,7 +102,6 @@ def reduce(
     confirm = kept_in(model) == "all"
     onsets: tuple[ParametricOnset, ...] = ()
     if along is not None:
-        chosen = None if solver in (None, "auto") else solver
         onsets = onsets_along(model, along, _first(at or [], model, along), confirm=confirm, solver=chosen)
     if json:
         found = [_onset(o) for o in onsets]
@@ -177,27 +184,41 @@ def _first(at: list[str], model: ReducedModel, along: str) -> dict[str, float]:
     return {name: values[0] for name, values in _values(at, model).items() if name != along}
 
 
-def _points(model: ReducedModel, at: list[str]) -> list[dict[str, Any]]:
-    """The modes at all combinations of values, one document for each point."""
+def _points(model: ReducedModel, at: list[str], corrections: int, solver: str | None) -> list[dict[str, Any]]:
+    """The modes at all combinations of values, one document for each point; corrected where they do not pass."""
+    from ..modal.parametric import Corrector
+
     if not at:
         return []
     values = _values(at, model)
+    corrector: Corrector | None = None
     found: list[dict[str, Any]] = []
     for place in np.ndindex(*(len(v) for v in values.values())):
-        modes = model.modes({name: v[k] for (name, v), k in zip(values.items(), place, strict=True)})
-        found.append(
-            {
-                "point": dict(modes.point),
-                "inside": bool(modes.inside),
-                "frequency_hz": modes.frequency_hz.tolist(),
-                "growth_rate": modes.growth_rate.tolist(),
-                "unstable": modes.unstable.tolist(),
-                "error": modes.error.tolist(),
-                "passed": modes.passed.tolist(),
-                "residual": modes.residual.tolist(),
-            }
-        )
+        point = {name: v[k] for (name, v), k in zip(values.items(), place, strict=True)}
+        reduced = model.modes(point)
+        if corrections and not reduced.passed.all():
+            corrector = corrector or Corrector(model, solver=solver)
+            corrected = corrector.modes(point, steps=corrections)
+            found.append(_point(corrected, corrected.scaled_residual, corrected.steps))
+        else:
+            found.append(_point(reduced, reduced.residual, 0))
+    if corrector is not None:
+        corrector.free()
     return found
+
+
+def _point(modes: ReducedModes | CorrectedModes, residual: Array, steps: int) -> dict[str, Any]:
+    return {
+        "point": dict(modes.point),
+        "inside": bool(modes.inside),
+        "corrections": steps,
+        "frequency_hz": modes.frequency_hz.tolist(),
+        "growth_rate": modes.growth_rate.tolist(),
+        "unstable": modes.unstable.tolist(),
+        "error": modes.error.tolist(),
+        "passed": modes.passed.tolist(),
+        "residual": residual.tolist(),
+    }
 
 
 def _about(model: ReducedModel) -> dict[str, Any]:
@@ -262,6 +283,7 @@ def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
                 "unstable": mode["unstable"],
                 "error above the bound": not mode["passed"],
                 "outside the box": not point["inside"],
+                f"corrected {point['corrections']} ×": point["corrections"],
             }
             rows.append(
                 [

@@ -23,7 +23,7 @@ from ...errors import CaseError
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from .basis import expanded, real_and_imaginary, residual
-from .dense import DenseModes, assembled, dense_modes
+from .dense import assembled, dense_modes
 from .model import REACH, UNSTABLE, ReducedModel, product_over_slope
 from .offline import static_operator, symmetric_parts
 
@@ -35,7 +35,8 @@ NEW = 1e-10  # of a unit vector: what is less is rounding of vectors known alrea
 class CorrectedModes:
     """Modes at one point: λ (k,) [1/s], right and left vectors (n, k) of unit length in the full problem.
 
-    residual (k,): the larger of both sides' componentwise backward errors there. error (k,): estimated of λ, relative,
+    residual (k,): the larger of both sides' componentwise backward errors there; scaled_residual (k,): as that of
+    `ReducedModes`, but formed. error (k,): estimated of λ, relative,
     from the full residuals; passed (k,): whether that is below the model's bound. steps: how many corrections were
     made. point, inside as in `ReducedModes`.
     """
@@ -45,6 +46,7 @@ class CorrectedModes:
     right: ComplexArray
     left: ComplexArray
     residual: Array
+    scaled_residual: Array
     error: Array
     passed: BoolArray
     steps: int
@@ -105,7 +107,8 @@ class Corrector:
                 residual(problem, factors, found.values, right),
                 residual(problem, factors, found.values, left, left=True),
             )
-            error = model.constant * self._estimate(matrices, found, rests)
+            lengths = [np.linalg.norm(self._scale[:, None] * rest, axis=0) for rest in rests]
+            error = model.constant * product_over_slope(matrices, found, *lengths)
             doubtful = error > model.bound
             if made == steps or not doubtful.any():
                 break
@@ -121,14 +124,9 @@ class Corrector:
             full.backward_error(found.values, right), full.transposed.backward_error(found.values, left)
         )
         return CorrectedModes(
-            point, found.values, right, left, backward, error, ~doubtful, made, problem.inside(point)
+            point, found.values, right, left, backward, np.maximum(*lengths), error, ~doubtful, made,
+            problem.inside(point),
         )  # fmt: skip
-
-    def _estimate(
-        self, matrices: tuple[Array, Array, Array], found: DenseModes, rests: tuple[ComplexArray, ComplexArray]
-    ) -> Array:
-        lengths = [np.linalg.norm(self._scale[:, None] * rest, axis=0) for rest in rests]
-        return product_over_slope(matrices, found, *lengths)
 
     def _extended(self, basis: Array, projected: Array, block: Array) -> tuple[Array, Array] | None:
         """The basis with what is new in ``block`` (n, k), and the terms on it; None where nothing is."""
