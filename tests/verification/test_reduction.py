@@ -218,6 +218,16 @@ def test_onsets_along_any_parameter_are_those_of_the_full_problem(model):
         onsets_along(model, "speed")
 
 
+def test_an_onset_just_beside_where_two_modes_meet_is_found():
+    changes = {"bodies.beam1.damping.mass": 0.0, "bodies.beam2.damping.mass": 50.0}
+    bench = paper_case().with_(changes)
+    model = reduced_model(bench, {"mu": (0.0, 0.0958)}, max_frequency_hz=20e3)
+    found = onsets_along(model, "mu")
+    direct = onsets(build_system(bench), (0.0, 0.0958), max_frequency_hz=20e3)
+    assert len(found) == 2
+    assert [o.value for o in found] == pytest.approx([o.mu for o in direct.onsets], rel=1e-9)
+
+
 def test_onsets_along_a_number_that_changes_the_mass():
     whole = rotor()
     mass, *others = whole.terms

@@ -77,9 +77,16 @@ def refined(
             lam -= change
             if abs(change) <= SETTLED * abs(lam):
                 return lam, x, y
-    if abs(change) <= 1e-12 * abs(lam):
+    if np.isfinite(change) and abs(change) <= max(1e-12 * abs(lam), rounding(problem, lam, x, y)):
         return lam, x, y
     raise AnalysisError(f"the mode near λ = {lam:.6g} 1/s does not settle in the full problem")
+
+
+def rounding(problem: Quadratic, lam: complex, x: ComplexArray, y: ComplexArray) -> float:
+    """What rounding of the matrices' entries and products may make of λ: of stiff ones far more than of λ itself."""
+    rate, size = abs(lam), np.abs(x)
+    scale = rate**2 * (abs(problem.mass) @ size) + rate * (abs(problem.damping) @ size) + abs(problem.stiffness) @ size
+    return float(4 * np.finfo(float).eps * (np.abs(y) @ scale) / abs(y @ _slope(problem, lam, x)))
 
 
 def _slope(problem: Quadratic, lam: complex, x: ComplexArray) -> ComplexArray:

@@ -19,11 +19,11 @@ from ..assembled.reduced import Reduced
 from ..assembled.shifted import Pair
 from ..quadratic.problem import times
 from .dense import assembled
-from .full import refined
+from .full import refined, rounding
 from .model import ReducedModel
 from .problem import ParametricProblem
 
-STEPS = 30  # at least, over the range of the parameter
+STEPS = (30, 120, 480)  # at least, over the range of the parameter; more where onsets do not balance
 ROUNDS = 6
 ON_AXIS = 1e-13  # |Re λ| / |λ| of the full problem at which an onset is confirmed
 BELIEVED = 1e-10
@@ -116,18 +116,38 @@ def onsets_along(
         raise CaseError("parameter", parameter, f"no such parameter; there are: {', '.join(names)}")
     along = _Along(model, parameter, model.problem.point(fixed or {}))
     length = along.high - along.low
+    found: list[ParametricOnset] = []
+    balance = sum(sign * _growing(model, along.at(t)) for sign, t in ((1, length), (-1, 0.0)))
+    for steps in STEPS:
+        finer: list[ParametricOnset] = []
+        for passage in _passages(along, length / steps):
+            onset = _located(along, model, passage)
+            if onset is not None and not any(_same(onset, other, length) for other in finer):
+                finer.append(onset)
+        if len(finer) >= len(found):
+            found = finer
+        # As many modes must turn unstable as grow at the end and not at the start; else steps have been too long, as
+        # beside a point where two modes meet. Modes that leave the band while they grow may leave it unbalanced.
+        if sum(-1 if o.stabilising else 1 for o in found) == balance:
+            break
+    found.sort(key=lambda o: o.value)
+    return tuple(_confirmed(model, o, solver) if confirm else o for o in found)
+
+
+def _growing(model: ReducedModel, point: Mapping[str, float]) -> int:
+    """How many modes grow at a point."""
+    return int(model.modes(point).unstable.sum())
+
+
+def _passages(along: _Along, longest: float) -> list[Passage]:
+    """Enclosed changes of stability over the parameter's range, in steps of at most ``longest``."""
     passages: list[Passage] = []
 
     def watch(old: State, new: State) -> None:
         passages.extend(crossings(old, new))
 
-    Follower(along, longest=length / STEPS, watch=watch).advance(length)
-    found: list[ParametricOnset] = []
-    for passage in passages:
-        onset = _located(along, model, passage)
-        if onset is not None and not any(_same(onset, other, length) for other in found):
-            found.append(_confirmed(model, onset, solver) if confirm else onset)
-    return tuple(sorted(found, key=lambda o: o.value))
+    Follower(along, longest=longest, watch=watch).advance(along.high - along.low)
+    return passages
 
 
 def _same(one: ParametricOnset, other: ParametricOnset, length: float) -> bool:
@@ -163,7 +183,8 @@ def _confirmed(model: ReducedModel, onset: ParametricOnset, solver: str | None) 
         full = problem.at(point)
         lam, x, y = refined(full, lam, x, y, solver)
         slope = _full_slope(problem, point, name, lam, x, y)
-        if abs(lam.real) <= ON_AXIS * abs(lam) or abs(lam.real / slope) <= 1e-14 * max(abs(point[name]), 1e-300):
+        on_axis = abs(lam.real) <= max(ON_AXIS * abs(lam), rounding(full, lam, x, y))
+        if on_axis or abs(lam.real / slope) <= 1e-14 * max(abs(point[name]), 1e-300):
             residual = float(full.backward_error(np.array([lam]), x[:, None])[0])
             if residual > BELIEVED:
                 break
