@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from ...typing import Array, IntArray, Sparse
 from ..quadratic.problem import times
 from .problem import ParametricProblem
+from .proportional import proportional
 
 START = 200
 ORTHOGONAL = 1e-11  # of unit vectors
@@ -23,8 +24,9 @@ class Indefinite(Exception):
 class Basis:
     """V (n, r), orthonormal in the symmetric positive definite ``metric`` (n, n), and VᵀA_jV (t, r, r) of all terms.
 
+    Damping that is proportional takes mass and stiffness times V, and what of it is not is a term of few freedoms.
     embedding (s, n) applied to A_jV and A_jᵀV gives their sketches (t, s, r): residuals are known without being
-    formed.
+    formed. shares: of damping terms that are proportional, the factors of the terms they are sums of.
     """
 
     def __init__(self, problem: ParametricProblem, metric: Sparse, embedding: Sparse) -> None:
@@ -33,8 +35,12 @@ class Basis:
         self._room = [np.zeros((problem.size, START), order="F") for _ in range(2)]
         self._count = 0
         self.projected = np.zeros((len(problem.terms), 0, 0))
+        sums = proportional(problem.terms)
+        self.shares = {j: shares for j, (shares, _) in sums.items()}
         # Terms of few freedoms, as contact has them, are multiplied on those alone.
-        self._parts: list[tuple[IntArray, IntArray, Sparse]] = [_support(t.matrix) for t in problem.terms]
+        self._parts: list[tuple[IntArray, IntArray, Sparse]] = [
+            _support(sums[j][1] if j in sums else term.matrix) for j, term in enumerate(problem.terms)
+        ]
         by_column = sp.csc_array(embedding)
         self._embeddings = [
             tuple(sp.csr_array(by_column[:, place]) for place in (rows, columns)) for rows, columns, _ in self._parts
@@ -57,19 +63,20 @@ class Basis:
         """metric · V (n, r)."""
         return self._room[1][:, : self._count]
 
-    def add(self, block: Array, smallest: float) -> int:
+    def add(self, block: Array, smallest: float, image: Array | None = None) -> int:
         """Take in what ``block`` (n, k) adds but for directions that leave less than ``smallest`` of a unit vector;
-        returns how many vectors that made. Raises Indefinite where the metric shows that it is."""
-        image = self.metric @ block
-        square = np.einsum("ij,ij->j", block, image)
+        returns how many vectors that made. image: metric · block where it is known. Raises Indefinite where the metric
+        shows that it is."""
+        images: Array = self.metric @ block if image is None else image
+        square = np.einsum("ij,ij->j", block, images)
         if np.any(square < 0):
             raise Indefinite
         length = np.sqrt(square)
-        new, image = block[:, length > 0] / length[length > 0], image[:, length > 0] / length[length > 0]
+        new, images = block[:, length > 0] / length[length > 0], images[:, length > 0] / length[length > 0]
         if not new.shape[1]:
             return 0
-        new, image = self._without(new, image)
-        gram = new.T @ image
+        new, images = self._without(new, images)
+        gram = new.T @ images
         squares, turn = sl.eigh((gram + gram.T) / 2)
         if squares[0] < -1e-8 * max(squares[-1], smallest**2):
             raise Indefinite
@@ -77,20 +84,45 @@ class Basis:
         if not keep.any():
             return 0
         turn = turn[:, keep] / np.sqrt(squares[keep])
-        new, image = self._without(new @ turn, image @ turn)
-        lower = sl.cholesky((new.T @ image + image.T @ new) / 2, lower=True)
-        new = sl.solve_triangular(lower, new.T, lower=True).T
-        self._take(new, sl.solve_triangular(lower, image.T, lower=True).T)
+        new, images = self._without(new @ turn, images @ turn)
+        gram = (new.T @ images + images.T @ new) / 2
+        if np.abs(gram - np.eye(len(gram))).max() > ORTHOGONAL:
+            straight = sl.solve_triangular(sl.cholesky(gram, lower=True), np.eye(len(gram)), lower=True).T
+            new, images = new @ straight, images @ straight
+        self._take(new, images)
         return int(new.shape[1])
 
-    def turn(self, by: Array) -> None:
-        """Keep the combinations ``by`` (r, s), orthonormal columns, of the vectors only."""
-        room = [np.zeros((self.problem.size, max(START, 2 * by.shape[1])), order="F") for _ in range(2)]
-        for wide, old in zip(room, (self.vectors, self._image), strict=True):
-            wide[:, : by.shape[1]] = old @ by
-        self._room, self._count = room, by.shape[1]
-        self.projected = np.einsum("ri,jrs,sk->jik", by, self.projected, by, optimize=True)
-        self.right_sketch, self.left_sketch = self.right_sketch @ by, self.left_sketch @ by
+    def forces(self, right: list[Array], left: list[Array]) -> Array:
+        """Σ_j A_j V R_j + A_jᵀ V L_j (n, k) of combinations R_j and L_j (r, k), one of each for every term j."""
+        n = self.problem.size
+        total = np.zeros((n, right[0].shape[1]))
+        # For terms of all freedoms, V is gone through once.
+        large: list[tuple[Sparse, Array]] = []
+        for (rows, columns, matrix), (own, mirrored) in zip(self._parts, self._shared(right, left), strict=True):
+            for into, of, part, mix in ((rows, columns, matrix, own), (columns, rows, matrix.T, mirrored)):
+                if mix is None:
+                    continue
+                if len(of) == n:
+                    large.append((part, mix))
+                else:
+                    total[into] += part @ (self.vectors[of] @ mix)
+        if large:
+            images = np.split(self.vectors @ np.hstack([mix for _, mix in large]), len(large), axis=1)
+            for (part, _), image in zip(large, images, strict=True):
+                total += part @ image
+        return total
+
+    def _shared(self, right: list[Array], left: list[Array]) -> list[tuple[Array, Array | None]]:
+        """Combinations of each term and of its transpose, of symmetric ones together, with those of terms that are
+        sums of it."""
+        terms = self.problem.terms
+        mixes: list[tuple[Array, Array | None]] = [
+            (r + w, None) if t.symmetric else (r, w) for t, r, w in zip(terms, right, left, strict=True)
+        ]
+        for j, shares in self.shares.items():
+            for i, share in shares.items():
+                mixes[i] = mixes[i][0] + share * mixes[j][0], None
+        return mixes
 
     def _without(self, block: Array, image: Array) -> tuple[Array, Array]:
         """What of a block (n, k) and of its product with the metric is not in the basis."""
@@ -127,6 +159,12 @@ class Basis:
                 product = part.T @ new[rows]
                 grown[j, r - count :, : r - count] = product.T @ old[columns]
                 left_sketch.append(self._embeddings[j][1] @ product)
+        for j, shares in self.shares.items():
+            for i, share in shares.items():
+                grown[j, :, r - count :] += share * grown[i, :, r - count :]
+                grown[j, r - count :, : r - count] += share * grown[i, r - count :, : r - count]
+                right_sketch[j] = right_sketch[j] + share * right_sketch[i]
+            left_sketch[j] = right_sketch[j]
         self.projected = grown
         self.right_sketch = np.concatenate([self.right_sketch, np.stack(right_sketch)], axis=2)
         self.left_sketch = np.concatenate([self.left_sketch, np.stack(left_sketch)], axis=2)

@@ -8,11 +8,15 @@ import numpy as np
 import scipy.linalg as sl
 
 from ...errors import AnalysisError
-from ...typing import Array, ComplexArray
+from ...threads import one_thread
+from ...typing import Array, BoolArray, ComplexArray
 
 NEAR = (1.6, 4.0)  # modes up to this much above the band are solved for together: first try, second try
 SMALL = 1e-13
 ANSWERS = 6
+FEW = 20  # modes that others' answers leave unsettled, solved for one by one
+OFF = 1e-10  # of λ: how far beside it is factorised, so that the matrix is not singular
+JUMP = 0.1  # of the distance to the next mode: what an inverse iteration may move one
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,7 @@ class DenseModes:
     whole: bool = True
 
 
+@one_thread
 def dense_modes(
     mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float, *, whole: bool = False
 ) -> DenseModes:
@@ -110,21 +115,52 @@ def _with_damping(
     z, w = z / np.linalg.norm(z, axis=0), w / np.linalg.norm(w, axis=0)
     # Answer of the modes further away: (λ²M + K)⁻¹ is a sum over modes.
     weight = np.einsum("ij,ij->j", left[:, far], mass @ right[:, far])
+    number, open_modes = len(lam) + 1, np.ones(len(lam), dtype=bool)
     for _ in range(ANSWERS):
         inverse = 1.0 / ((lam**2 - squares[far, None]) * weight[:, None])
         z = z - right[:, far] @ (inverse * (left[:, far].T @ _rest(lam, z, mass, damping, stiffness)))
         w = w - left[:, far] @ (inverse * (right[:, far].T @ _rest(lam, w, mass.T, damping.T, stiffness.T)))
         lam = _functional(lam, z, w, mass, damping, stiffness)
-        ends = [
-            np.linalg.norm(_rest(lam, v, *side), axis=0)
-            for v, side in ((z, (mass, damping, stiffness)), (w, (mass.T, damping.T, stiffness.T)))
-        ]
-        slope = np.einsum("ij,ij->j", w, 2 * lam * (mass @ z) + damping @ z)
-        if np.all(ends[0] * ends[1] <= SMALL * np.abs(lam * slope)):
+        before, open_modes = number, _unsettled(lam, z, w, matrices)
+        number = int(open_modes.sum())
+        if not number or number == before:
             break
-    else:
+    if number > FEW:
+        return None
+    for k in np.flatnonzero(open_modes):
+        # Two modes that are about to meet take the inverse itself.
+        apart = np.abs(np.delete(lam, k) - lam[k]).min(initial=np.inf)
+        value, z[:, k], w[:, k] = _inverse_iteration(complex(lam[k]), z[:, k], w[:, k], matrices)
+        if not abs(value - lam[k]) < JUMP * apart:
+            return None
+        lam[k] = value
+    if number and _unsettled(lam, z, w, matrices).any():
         return None
     return None if np.any(np.abs(lam) > reach * frequency * 1.001) else DenseModes(lam, z, w, whole=False)
+
+
+def _unsettled(lam: ComplexArray, z: ComplexArray, w: ComplexArray, matrices: tuple[Array, Array, Array]) -> BoolArray:
+    """Of which modes (k,) what is left on both sides allows for an error above SMALL."""
+    mass, damping, stiffness = matrices
+    right = np.linalg.norm(_rest(lam, z, mass, damping, stiffness), axis=0)
+    left = np.linalg.norm(_rest(lam, w, mass.T, damping.T, stiffness.T), axis=0)
+    slope = np.einsum("ij,ij->j", w, 2 * lam * (mass @ z) + damping @ z)
+    unsettled: BoolArray = ~(right * left <= SMALL * np.abs(lam * slope))
+    return unsettled
+
+
+def _inverse_iteration(
+    lam: complex, z: ComplexArray, w: ComplexArray, matrices: tuple[Array, Array, Array]
+) -> tuple[complex, ComplexArray, ComplexArray]:
+    """λ, right and left vectors (r,) of one mode from those close by, by one factorisation."""
+    mass, damping, stiffness = matrices
+    beside = lam * (1 + OFF)
+    factor = sl.lu_factor(beside**2 * mass + beside * damping + stiffness)
+    slope = 2 * lam * mass + damping
+    for _ in range(2):
+        z, w = sl.lu_solve(factor, slope @ z), sl.lu_solve(factor, slope.T @ w, trans=1)
+        z, w = z / np.linalg.norm(z), w / np.linalg.norm(w)
+    return complex(_functional(np.array([lam]), z[:, None], w[:, None], *matrices)[0]), z, w
 
 
 def _rest(lam: ComplexArray, z: ComplexArray, mass: Array, damping: Array, stiffness: Array) -> ComplexArray:

@@ -17,7 +17,7 @@ import scipy.linalg as sl
 
 from ...direct import Factor
 from ...errors import AnalysisError
-from ...typing import Array, ComplexArray, IntArray
+from ...typing import Array, ComplexArray, IntArray, Sparse
 from .basis import Basis, real_and_imaginary
 from .dense import DenseModes, assembled, dense_modes
 from .model import ReducedModel, product_over_slope, sketched, sketched_rests
@@ -58,11 +58,11 @@ class Work:
 
 @dataclass
 class Greedy:
-    """One basis on its way to a model. scale: D^{-1/2} (n,) of the static operator that ``factor`` holds."""
+    """One basis on its way to a model. factor: of the static ``operator`` (n, n)."""
 
     basis: Basis
+    operator: Sparse
     factor: Factor
-    scale: Array
     frequency: float
     bound: float
     work: Work
@@ -114,7 +114,12 @@ class Greedy:
             model = self._model(turn)
             constant = _constant(model, measured, exact)
             if constant is not None:
-                errors = [constant * float(np.max(model.modes(p).error, initial=0.0)) for p in watched]
+                model = replace(model, constant=constant)
+                errors: list[float] = []
+                for point in watched:
+                    errors.append(float(np.max(model.modes(point).error, initial=0.0)))
+                    if asked and errors[-1] > WATCHFUL * self.bound:
+                        break
                 if max(errors) <= WATCHFUL * self.bound:
                     break
                 if not asked:
@@ -165,10 +170,10 @@ class Greedy:
 
     def _answer(self, failing: list[tuple[Point, DenseModes, Array]]) -> None:
         """Add the answers to what modes leave unbalanced at several points at once, from both sides."""
-        powers, terms = self.problem.powers, self.problem.terms
+        powers = self.problem.powers
         # Which combinations are worth an answer is seen in the sketches; only those are formed.
         seen: list[Array] = []
-        weights: list[list[list[Array]]] = [[[], []] for _ in terms]
+        weights: list[list[list[Array]]] = [[[], []] for _ in powers]
         for point, found, error in failing:
             factors = self.problem.factors(point)
             # Modes far below the bound leave nothing that another point will not ask for.
@@ -185,21 +190,13 @@ class Greedy:
         squares, turn = sl.eigh(block.T @ block)
         keep = np.flatnonzero(squares > max(WEAKEST**2 * squares[-1], 1e-300))[-TOGETHER:]
         mix = turn[:, keep] / np.sqrt(squares[keep])
-        # One pass over the basis for all terms.
-        mixed: list[Array] = []
-        for term, sides in zip(terms, weights, strict=True):
-            right, left = (np.hstack(side) @ mix for side in sides)
-            mixed += [right + left] if term.symmetric else [right, left]
-        images = np.split(self.basis.vectors @ np.hstack(mixed), len(mixed), axis=1)
-        force = np.zeros((self.problem.size, len(keep)))
-        for term in terms:
-            force += term.matrix @ images.pop(0)
-            if not term.symmetric:
-                force += term.matrix.T @ images.pop(0)
+        right, left = ([np.hstack(sides[side]) @ mix for sides in weights] for side in (0, 1))
+        force = self.basis.forces(right, left)
         answer = self.factor.solve(force, refine=False)
         self.work.solves += force.shape[1]
-        if not self.basis.add(answer, LEFT_OUT):
-            self.basis.add(answer, 1e-3 * LEFT_OUT)
+        image = force if self.basis.metric is self.operator else None
+        if not self.basis.add(answer, LEFT_OUT, image):
+            self.basis.add(answer, 1e-3 * LEFT_OUT, image)
 
     def _shots(self) -> Array:
         """The modes at all points that passed (r, k), real and imaginary, right and left."""

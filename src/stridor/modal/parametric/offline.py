@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from ...direct import Factor, factorise
 from ...errors import AnalysisError, CaseError
-from ...threads import one_thread
+from ...threads import one_thread_if_small
 from ...typing import Array, IntArray, Sparse
 from .basis import Basis, Indefinite
 from .dense import assembled
@@ -28,7 +28,7 @@ SHIFT = 0.3  # √s over the band
 SKETCH, NONZEROS = 300, 4  # rows of the random embedding, entries in each of its columns
 
 
-@one_thread
+@one_thread_if_small
 def reduce(
     problem: ParametricProblem,
     max_frequency_hz: float,
@@ -64,7 +64,7 @@ def reduce(
                 basis.add(start, 1e-6)
                 _first_answers(basis, factor, frequency, work)
                 work.lap("first answers")
-                growing = Greedy(basis, factor, scale, frequency, bound, work)
+                growing = Greedy(basis, operator, factor, frequency, bound, work)
                 growing.enrich(grid_points(problem, counts))
                 return growing.cut()
             except Indefinite:
@@ -110,13 +110,13 @@ def _krylov(factor: Factor, mass: Sparse, stiffness: Sparse, frequency: float, w
     they have settled to some digits. They only start the basis."""
     n = mass.shape[0]
     shift = (SHIFT * frequency) ** 2
-    block = np.random.default_rng(SEED).standard_normal((n, min(BLOCK, n)))
+    image = mass @ np.random.default_rng(SEED).standard_normal((n, min(BLOCK, n)))
     # Room for all: growing by copies would cost as much as multiplying.
     room, count = [np.empty((n, 0), order="F")] * 2, 0
     projected = np.zeros((0, 0))
     known = np.zeros(0)
     while True:
-        block = factor.solve(mass @ block, refine=False)
+        block = factor.solve(image, refine=False)
         work.solves += block.shape[1]
         if count + block.shape[1] > room[0].shape[1]:
             wider = [np.empty((n, 2 * count + 8 * BLOCK), order="F") for _ in room]
@@ -126,12 +126,11 @@ def _krylov(factor: Factor, mass: Sparse, stiffness: Sparse, frequency: float, w
         vectors, images = (part[:, :count] for part in room)
         for _ in range(2):
             block = block - vectors @ (images.T @ block)
-            block = np.linalg.qr(block)[0]
         # Orthonormalised in the mass, so that Ritz values are those of the pencil.
         image = mass @ block
         gram = block.T @ image
         squares, turn = sl.eigh((gram + gram.T) / 2)
-        good = squares > 1e-12 * squares[-1]
+        good = squares > max(1e-12 * squares[-1], 1e-300)
         turn = turn[:, good] / np.sqrt(squares[good])
         block, image = block @ turn, image @ turn
         force = stiffness @ block
@@ -160,6 +159,9 @@ def _first_answers(basis: Basis, factor: Factor, frequency: float, work: Work) -
     forces: list[Array] = []
     corners = [problem.factors(c) for c in problem.corners([2] * len(problem.parameters))]
     for j, term in enumerate(problem.terms):
+        if j in basis.shares:
+            # Mass and stiffness make nothing new of the modes.
+            continue
         varies = any(abs(c[j] - corners[0][j]) > 0 for c in corners)
         if term.role == "damping" or varies or not term.symmetric:
             forces.append(term.matrix @ shapes)
