@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from threadpoolctl import threadpool_info
+
 import stridor as st
 from stridor.case import Case, template_text
 
@@ -36,5 +38,6 @@ def best(call: Callable[[], Any], repeats: int = 3) -> tuple[float, Any]:
 
 
 def machine() -> str:
-    """Cores, as far as Python tells."""
-    return f"{os.cpu_count()} cores"
+    """Cores, as far as Python tells, and threads of the BLAS."""
+    threads = max((int(library["num_threads"]) for library in threadpool_info()), default=1)
+    return f"{os.cpu_count()} cores, {threads} BLAS thread{'s' if threads > 1 else ''}"

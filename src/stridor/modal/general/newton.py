@@ -30,6 +30,7 @@ SETTLED = 1e-13
 # |Re λ| / |λ| up to which an eigenvalue is on the axis; not all processors know more than double precision.
 ON_AXIS = 1e-12 if np.finfo(np.longdouble).eps < 1e-18 else 1e-9
 BELIEVED = 1e-10  # backward error
+STALLED = 0.5  # of the smallest step so far: a longer one is made of rounding
 FLAT = 1e-9  # dRe λ/dμ times the range, over |λ|, below which friction has no say in it
 
 
@@ -124,9 +125,10 @@ def crossing(
         if here.by_lam == 0:
             break
         off = abs(here.g / here.by_lam) / max(abs(omega), 1e-300)
+        stalled = off > STALLED * best
         if off < best:
             best, kept = off, (omega, mu, here)
-        elif best <= ON_AXIS:
+        if stalled and best <= ON_AXIS:
             break
         tangent = -here.by_mu / here.by_lam
         # λ(jω, μ) moves by −g/g_λ and is to end on the axis: dRe λ/dμ δμ = −Re, and ω goes along.
@@ -168,9 +170,10 @@ def meeting(
         if not np.isfinite(by_lam) or not np.isfinite(by_mu):
             break
         off = abs(by_lam) / max(abs(omega), 1e-300) + abs(by_mu) / max(abs(mu), 1e-3 * width)
+        stalled = off > STALLED * best
         if off < best:
             best, kept = off, (omega, mu, here)
-        elif best <= 1e3 * ON_AXIS:
+        if stalled and best <= 1e3 * ON_AXIS:
             break
         if not between[0] - width <= mu + by_mu.real <= between[1] + width:
             return None
@@ -202,9 +205,10 @@ def standstill(
             break
         change = -float((here.g / here.by_mu).real)
         off = abs(change) / max(abs(mu), 1e-3 * width)
+        stalled = off > STALLED * best
         if off < best:
             best, kept = off, (mu, here)
-        elif best <= ON_AXIS:
+        if stalled and best <= ON_AXIS:
             break
         if not between[0] - width <= mu + change <= between[1] + width:
             return None

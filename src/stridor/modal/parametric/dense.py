@@ -8,7 +8,6 @@ import numpy as np
 import scipy.linalg as sl
 
 from ...errors import AnalysisError
-from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 
 NEAR = (1.6, 4.0)  # modes up to this much above the band are solved for together: first try, second try
@@ -30,7 +29,6 @@ class DenseModes:
     whole: bool = True
 
 
-@one_thread
 def dense_modes(
     mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float, *, whole: bool = False
 ) -> DenseModes:

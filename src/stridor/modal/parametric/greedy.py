@@ -25,7 +25,7 @@ from .problem import ParametricProblem
 
 SEED = 20061
 MARGIN = 1.03  # modes up to this much above the band are made exact
-WEAKEST = 1e-2  # of the strongest direction of a block of residuals: what waits for another point
+WEAKEST = 3e-2  # of the strongest direction of a block of residuals: what waits for another point
 LEFT_OUT = 1e-2  # of a unit vector: new directions smaller than this are not worth a column
 PASSED = 0.3  # of the bound: what residuals at a point may say
 MEASURED = 0.2  # of the bound: what an error may be where it is measured
@@ -187,9 +187,9 @@ class Greedy:
                     weights[place][side].append(factor * real_and_imaginary(lam**power * z))
                     weights[place][1 - side].append(np.zeros((len(z), 2 * z.shape[1])))
         block = np.hstack(seen)
-        squares, turn = sl.eigh(block.T @ block)
+        squares, turn = sl.eigh(block @ block.T)
         keep = np.flatnonzero(squares > max(WEAKEST**2 * squares[-1], 1e-300))[-TOGETHER:]
-        mix = turn[:, keep] / np.sqrt(squares[keep])
+        mix = block.T @ (turn[:, keep] / squares[keep])
         right, left = ([np.hstack(sides[side]) @ mix for sides in weights] for side in (0, 1))
         force = self.basis.forces(right, left)
         answer = self.factor.solve(force, refine=False)

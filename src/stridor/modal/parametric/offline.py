@@ -13,22 +13,23 @@ import scipy.sparse as sp
 
 from ...direct import Factor, factorise
 from ...errors import AnalysisError, CaseError
-from ...threads import one_thread_if_small
+from ...threads import one_thread
 from ...typing import Array, IntArray, Sparse
 from .basis import Basis, Indefinite
 from .dense import assembled
-from .greedy import MARGIN, SEED, WEAKEST, Greedy, Work, grid_points
+from .greedy import MARGIN, SEED, Greedy, Work, grid_points
 from .model import ReducedModel
 from .problem import ParametricProblem
 
 BLOCK = 24
 GUARD = 1.5  # real modes up to this much above the band take part
 SETTLED = 1e-2  # of λ²: real modes only start the basis
+FAINT = 1e-2  # of a unit vector: first answers smaller than this are left out
 SHIFT = 0.3  # √s over the band
 SKETCH, NONZEROS = 300, 4  # rows of the random embedding, entries in each of its columns
 
 
-@one_thread_if_small
+@one_thread
 def reduce(
     problem: ParametricProblem,
     max_frequency_hz: float,
@@ -169,7 +170,7 @@ def _first_answers(basis: Basis, factor: Factor, frequency: float, work: Work) -
                 forces.append(term.matrix.T @ shapes)
     if forces:
         force = np.hstack(forces)
-        basis.add(factor.solve(force, refine=False), WEAKEST)
+        basis.add(factor.solve(force, refine=False), FAINT)
         work.solves += force.shape[1]
 
 

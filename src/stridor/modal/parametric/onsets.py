@@ -25,6 +25,7 @@ from .problem import ParametricProblem
 
 STEPS = (30, 120, 480)  # at least, over the range of the parameter; more where onsets do not balance
 ROUNDS = 6
+STALLED = 0.5  # of Re λ one step before: what is left is rounding
 ON_AXIS = 1e-13  # |Re λ| / |λ| of the full problem at which an onset is confirmed
 BELIEVED = 1e-10
 
@@ -178,12 +179,16 @@ def _confirmed(model: ReducedModel, onset: ParametricOnset, solver: str | None) 
     modes = model.modes(point)
     k = int(np.argmin(np.abs(modes.values - lam)))
     x, y = model.expand(modes)[:, k], model.expand(modes, left=True)[:, k]
-    lam = complex(modes.values[k])
+    lam, before = complex(modes.values[k]), np.inf
     for _ in range(ROUNDS):
         full = problem.at(point)
         lam, x, y = refined(full, lam, x, y, solver)
         slope = _full_slope(problem, point, name, lam, x, y)
-        on_axis = abs(lam.real) <= max(ON_AXIS * abs(lam), rounding(full, lam, x, y))
+        off = abs(lam.real)
+        # Rounding of a stiff problem may leave more; Newton goes on as long as that helps.
+        stalled = off > STALLED * before and off <= rounding(full, lam, x, y)
+        before = off
+        on_axis = stalled or off <= ON_AXIS * abs(lam)
         if on_axis or abs(lam.real / slope) <= 1e-14 * max(abs(point[name]), 1e-300):
             residual = float(full.backward_error(np.array([lam]), x[:, None])[0])
             if residual > BELIEVED:
