@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Concatenate, ParamSpec
 
 import typer
 
@@ -13,6 +17,7 @@ from ..errors import CaseError
 if TYPE_CHECKING:
     from ..case import Case
     from ..io.datasets import Result
+P = ParamSpec("P")
 
 CaseFile = Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML).", show_default=False)]
 Set = Annotated[
@@ -37,35 +42,77 @@ Solver = Annotated[
 Undamped = Annotated[bool, typer.Option("--undamped", help="Leave structural damping out.")]
 
 
-def load_case(path: Path, overrides: list[str] | None, *, quiet: bool, solver: str | None = None) -> Case:
-    """The case in a file with overrides, its warnings printed. Raises CaseError.
+@dataclass(frozen=True)
+class Call:
+    """What every verb is called with: the file it is about, what is to be changed, where results go and who reads them.
 
     solver: the one for everything that the program factorises, whatever case and environment say.
     """
-    from ..case import load
 
-    case = load(path, [*(overrides or ()), *([] if solver is None else [f'modal.solver="{solver}"'])])
-    if solver is not None and solver != "auto":
-        os.environ["STRIDOR_SOLVER"] = solver
-    from .output import say
+    path: Path
+    set_: list[str] | None
+    solver: str | None
+    out: Path | None
+    json: bool
+    quiet: bool
 
-    for warning in case.warnings:
-        say(f"warning: {warning}", quiet=quiet)
-    return case
+    def case(self) -> Case:
+        """The case in the file with overrides, its warnings printed. Raises CaseError."""
+        from ..case import load
+
+        own = [] if self.solver is None else [f'modal.solver="{self.solver}"']
+        case = load(self.path, [*(self.set_ or ()), *own])
+        if self.solver is not None and self.solver != "auto":
+            os.environ["STRIDOR_SOLVER"] = self.solver
+        for warning in case.warnings:
+            self.say(f"warning: {warning}")
+        return case
+
+    @property
+    def folder(self) -> Path:
+        """Where results go: the folder asked for, else CASE.out beside the case."""
+        return self.out if self.out is not None else self.path.with_suffix(".out")
+
+    def say(self, text: str) -> None:
+        """A line of log."""
+        from .output import say
+
+        say(text, quiet=self.quiet)
+
+    def keep(self, result: Result, name: str) -> None:
+        """Save a result as a dataset in the folder, and say so."""
+        from ..io.datasets import save
+
+        save(result, self.folder / name)
+        self.say(f"written: {self.folder / name}")
 
 
-def folder(path: Path, out: Path | None) -> Path:
-    """Where results go: the folder asked for, else CASE.out beside the case."""
-    return out if out is not None else path.with_suffix(".out")
+def _common(
+    case: CaseFile, set_: Set = None, solver: Solver = None, out: Out = None, json: Json = False, quiet: Quiet = False
+) -> Call:
+    return Call(case, set_, solver, out, json, quiet)
 
 
-def keep(result: Result, path: Path, *, quiet: bool) -> None:
-    """Save a result as a dataset, and say so."""
-    from ..io.datasets import save
-    from .output import say
+def verb(file: Any = CaseFile) -> Callable[[Callable[Concatenate[Call, P], None]], Callable[..., None]]:
+    """Give a function the arguments that all verbs have: the file before its own, the others after, as one `Call`."""
 
-    save(result, path)
-    say(f"written: {path}", quiet=quiet)
+    def made(function: Callable[Concatenate[Call, P], None]) -> Callable[..., None]:
+        case, *common = inspect.signature(_common, eval_str=True).parameters.values()
+        _, *own = inspect.signature(function, eval_str=True).parameters.values()
+        names = [p.name for p in (case, *common)]
+
+        @wraps(function)
+        def called(**given: Any) -> None:
+            function(_common(**{name: given.pop(name) for name in names}), **given)  # type: ignore[call-arg]
+
+        order = (case.replace(annotation=file), *own, *common)
+        # Typer takes them one by one, after one another, by keyword.
+        called.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in order]
+        )
+        return called
+
+    return made
 
 
 def numbers(text: str, name: str) -> list[float]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from .arguments import CaseFile, Json, Out, Quiet, Set, Solver, folder, load_case, pair
+from .arguments import Call, pair, verb
 
 if TYPE_CHECKING:
     from ..study.damping_map import DampingMap
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 WIDEST = 13  # columns that are still read on a screen
 
 
+@verb()
 def damping_map(
-    case: CaseFile,
+    call: Call,
     x: Annotated[str, typer.Option("--x", metavar="PATH", help="A damping of the case.")],
     y: Annotated[str, typer.Option("--y", metavar="PATH", help="Another one.")],
     x_range: Annotated[str, typer.Option("--x-range", metavar="LOW:HIGH", help="Its range.")],
@@ -34,32 +35,27 @@ def damping_map(
             "solved again in the full problem; auto: reduced where that is faster and possible.",
         ),
     ] = "auto",
-    set_: Set = None,
-    solver: Solver = None,
-    out: Out = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """The lowest onset over two dampings, and where more damping lowers it."""
     from ..study.damping_map import damping_map as solve
     from ..view.sensitivity_plots import damping_map as draw
-    from .output import print_json, progress_bar, say, stdout
+    from .output import print_json, progress_bar, stdout
 
-    loaded = load_case(case, set_, quiet=quiet, solver=solver)
+    loaded = call.case()
     ranges = pair(x_range, "--x-range"), pair(y_range, "--y-range")
     chosen: Any = method
-    with progress_bar("damping map", quiet=quiet) as progress:
+    with progress_bar("damping map", quiet=call.quiet) as progress:
         result = solve(
             loaded, x, y, x_range=ranges[0], y_range=ranges[1], grid=(points, points), method=chosen, progress=progress
         )
-    place = folder(case, out)
+    place = call.folder
     files = [_write(place / "damping_map.csv", result), place / "damping_map.png"]
     draw(result).savefig(files[1], dpi=150)
     for warning in result.warnings:
-        say(f"warning: {warning}", quiet=quiet)
+        call.say(f"warning: {warning}")
     for path in files:
-        say(f"written: {path}", quiet=quiet)
-    if json:
+        call.say(f"written: {path}")
+    if call.json:
         print_json(result.to_json() | {"files": [str(f) for f in files]})
         return
     _show(result)

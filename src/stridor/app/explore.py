@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .arguments import CaseFile, Json, Out, Quiet, Set, Solver, folder, load_case
+from .arguments import Call, verb
 from .damping import damping_map
 from .reduce import reduce
 
@@ -18,81 +17,72 @@ Friction = Annotated[float | None, typer.Option("--mu", help="Friction coefficie
 Branch = Annotated[int | None, typer.Option("--branch", help="One branch only [default: all unstable ones].")]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the verbs to the program."""
-    app.command()(sensitivities)
-    app.command()(countermeasures)
-    app.command(name="damping-map")(damping_map)
-    app.command()(reduce)
-
-
+@verb()
 def sensitivities(
-    case: CaseFile,
+    call: Call,
     parameter: Annotated[
         list[str] | None,
         typer.Option("--parameter", metavar="PATH", help="A number of the case, or mu. Repeatable [default: mu]."),
     ] = None,
     mu: Friction = None,
     branch: Branch = None,
-    set_: Set = None,
-    solver: Solver = None,
-    out: Out = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """What a per cent of any number of the case does to each mode's growth and frequency."""
     from ..study.sensitivities import sensitivities as solve
     from ..view.sensitivity_plots import sensitivity_bars
     from ..view.sensitivity_tables import sensitivity_table
 
-    loaded = load_case(case, set_, quiet=quiet, solver=solver)
+    loaded = call.case()
     result = solve(loaded, parameter or ["mu"], mu=mu, modes="unstable" if branch is None else (branch,))
     drawn = sensitivity_bars(result) if len(result.branch) else None
-    _show(result.to_json(), sensitivity_table(result), result.warnings, json=json)
-    _draw(drawn, folder(case, out) / "sensitivities.png", quiet=quiet)
+    _show(call, result, sensitivity_table(result))
+    _draw(call, drawn, "sensitivities.png")
 
 
+@verb()
 def countermeasures(
-    case: CaseFile,
+    call: Call,
     mu: Friction = None,
     branch: Branch = None,
     percent: Annotated[float, typer.Option("--percent", help="Size of the change that is predicted.")] = 5.0,
     verify: Annotated[int, typer.Option("--verify", help="How many of the best are solved again.")] = 3,
-    set_: Set = None,
-    solver: Solver = None,
-    out: Out = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Changes ranked by the growth rate they take away per per cent, the best ones solved again."""
     from ..study.countermeasures import rank_countermeasures
     from ..view.sensitivity_plots import countermeasure_bars
     from ..view.sensitivity_tables import countermeasure_table
 
-    loaded = load_case(case, set_, quiet=quiet, solver=solver)
+    loaded = call.case()
     target: Any = "sum" if branch is None else branch
     result = rank_countermeasures(loaded, mu=mu, target=target, percent=percent, verify=verify)
-    _show(result.to_json(), countermeasure_table(result), result.warnings, json=json)
+    _show(call, result, countermeasure_table(result))
     drawn = countermeasure_bars(result) if result.measures else None
-    _draw(drawn, folder(case, out) / "countermeasures.png", quiet=quiet)
+    _draw(call, drawn, "countermeasures.png")
 
 
-def _show(document: dict[str, Any], shown: Table, warnings: tuple[str, ...], *, json: bool) -> None:
+def _show(call: Call, result: Any, shown: Table) -> None:
     from .output import print_json, stdout, table
 
-    if json:
-        print_json(document)
+    if call.json:
+        print_json(result.to_json())
         return
     if shown.rows:
         table(shown.title, shown.heads, [row.cells for row in shown.rows])
-    for warning in warnings:
+    for warning in result.warnings:
         stdout.print(warning, markup=False)
 
 
-def _draw(figure: Any, path: Path, *, quiet: bool) -> None:
-    from .output import say
-
+def _draw(call: Call, figure: Any, name: str) -> None:
     if figure is not None:
+        path = call.folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=150)
-        say(f"written: {path}", quiet=quiet)
+        call.say(f"written: {path}")
+
+
+VERBS = {
+    "sensitivities": sensitivities,
+    "countermeasures": countermeasures,
+    "damping-map": damping_map,
+    "reduce": reduce,
+}

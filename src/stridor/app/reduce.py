@@ -12,7 +12,7 @@ import numpy as np
 import typer
 
 from ..errors import CaseError
-from .arguments import Json, Out, Quiet, Set, Solver, load_case, numbers, pair
+from .arguments import Call, numbers, pair, verb
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -30,8 +30,9 @@ Model = Annotated[
 ]
 
 
+@verb(Model)
 def reduce(
-    case: Model,
+    call: Call,
     box: Annotated[
         list[str] | None,
         typer.Option(
@@ -69,41 +70,36 @@ def reduce(
             "--corrections", min=0, max=10, help="Correction steps at most where an error is above the bound."
         ),
     ] = 3,
-    set_: Set = None,
-    solver: Solver = None,
-    out: Out = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Reduce the model once over ranges of its numbers, then solve anywhere in them within milliseconds."""
     from ..io.left_out import kept_in
     from ..io.reduced_models import is_reduced_file
     from ..modal.parametric import onsets_along
-    from .output import print_json, say
+    from .output import print_json
 
     _check_file(save, keep)
-    if is_reduced_file(case):
-        given = {"--box": box, "--set": set_, "--max-frequency": max_frequency, "--bound": bound}
-        model, origin = _read(case, [name for name, value in given.items() if value], quiet=quiet)
+    if is_reduced_file(call.path):
+        given = {"--box": box, "--set": call.set_, "--max-frequency": max_frequency, "--bound": bound}
+        model, origin = _read(call.path, [name for name, value in given.items() if value], quiet=call.quiet)
     else:
-        origin = load_case(case, set_, quiet=quiet, solver=solver)
+        origin = call.case()
         model = _made(origin, box or [], max_frequency, BOUND if bound is None else bound)
         seconds = sum(model.seconds.values())
-        say(f"{model.problem.size} freedoms reduced to {model.size} in {seconds:.2f} s", quiet=quiet)
+        call.say(f"{model.problem.size} freedoms reduced to {model.size} in {seconds:.2f} s")
     for note in getattr(model.problem, "notes", ()):
-        say(f"note: {note}", quiet=quiet)
+        call.say(f"note: {note}")
     files = [] if save is None else [_saved(model, save, origin, keep)]
-    chosen = None if solver in (None, "auto") else solver
+    chosen = None if call.solver in (None, "auto") else call.solver
     points = _points(model, at or [], corrections if kept_in(model) == "all" else 0, chosen)
-    if out is not None and at:
-        files.append(_write(out / "reduced.csv", model, points))
+    if call.out is not None and at:
+        files.append(_write(call.out / "reduced.csv", model, points))
     for path in files:
-        say(f"written: {path}", quiet=quiet)
+        call.say(f"written: {path}")
     confirm = kept_in(model) == "all"
     onsets: tuple[ParametricOnset, ...] = ()
     if along is not None:
         onsets = onsets_along(model, along, _first(at or [], model, along), confirm=confirm, solver=chosen)
-    if json:
+    if call.json:
         found = [_onset(o) for o in onsets]
         print_json(_about(model) | {"modes": points, "onsets": found, "files": [str(f) for f in files]})
         return
@@ -112,7 +108,7 @@ def reduce(
     if along is not None:
         _show_onsets(model, along, onsets, confirmed=confirm)
     if not (at or along or save):
-        say("next: --at mu=0.3 for modes, --onsets mu for onsets, --save model.npz to keep the model", quiet=quiet)
+        call.say("next: --at mu=0.3 for modes, --onsets mu for onsets, --save model.npz to keep the model")
 
 
 def _check_file(save: Path | None, keep: str | None) -> None:
