@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 import stridor as st
+from rubbing_block import rubbing_block
 from stridor.mesh.model import Mesh
 from stridor.modal.assembled import Options
 from stridor.modal.assembled.problem import problem_of
@@ -51,40 +52,18 @@ def export(folder: Path, case: st.Case, hz: float | None = None) -> st.Case:
     return matrix_case(folder, exported(case), hz or settings.max_frequency_hz, settings.friction_range)
 
 
-RUBBING = """
-materials.steel = { young_modulus = 200e9, density = 7800.0, poisson_ratio = 0.3 }
-materials.pad = { young_modulus = 2e9, density = 2000.0, poisson_ratio = 0.3 }
-[bodies.slider]
-type = "solid"
-model = "plane strain"
-material = "steel"
-mesh = { shape = "rectangle", corner = [-0.05, -0.01], size = [0.1, 0.01], divisions = [10, 2], cells = "quad" }
-damping = { mass = 20.0, stiffness = 1e-8 }
-sliding = { velocity = [1.0, 0.0] }
-[supports.ground]
-at = "slider.bottom"
-fixed = ["x", "y"]
-[supports.holder]
-at = "block.top"
-fixed = ["x"]
-[loads.press]
-at = "block.top"
-pressure = 1e5
-[contacts.face]
-slave = "block.bottom"
-master = "slider.top"
-stiffness = 1e12
-friction = { law = "coulomb", coefficient = 0.4 }
-[modal]
-max_frequency_hz = 30e3
-[bodies.block]
-"""
-MESHED = RUBBING + """
-type = "solid"
-model = "plane strain"
-material = "pad"
-mesh = { shape = "rectangle", corner = [-0.01, 0.0], size = [0.02, 0.02], divisions = [5, 5], cells = "quad" }
-damping = { mass = 20.0, stiffness = 1e-8 }
+MESHED = rubbing_block("max_frequency_hz = 30e3")
+IMPORTED = """
+type = "matrices"
+dimension = 2
+mesh = "block.inp"
+labels = "dof.txt"
+terms = [
+  { file = "M.npz", role = "mass" },
+  { file = "C.npz", role = "damping" },
+  { file = "K.npz", role = "stiffness" },
+  { file = "S.npz", role = "stiffness", factor = "mu" },
+]
 """
 
 
@@ -106,18 +85,7 @@ def rubbing(folder: Path, skew: float) -> st.Case:
     parts = {"M": body.mass, "C": body.damping, "K": body.stiffness, "S": small}
     for name, matrix in parts.items():
         sp.save_npz(folder / f"{name}.npz", sp.csr_array(matrix))
-    return st.loads(RUBBING + """
-type = "matrices"
-dimension = 2
-mesh = "block.inp"
-labels = "dof.txt"
-terms = [
-  { file = "M.npz", role = "mass" },
-  { file = "C.npz", role = "damping" },
-  { file = "K.npz", role = "stiffness" },
-  { file = "S.npz", role = "stiffness", factor = "mu" },
-]
-""", folder=folder)  # fmt: skip
+    return st.loads(rubbing_block("max_frequency_hz = 30e3", IMPORTED), folder=folder)
 
 
 def _quads(mesh: Mesh) -> list[tuple[int, list[int]]]:

@@ -21,6 +21,7 @@ import scipy.io as sio
 import scipy.sparse as sp
 
 import stridor as st
+from rubbing_block import rubbing_block
 from stridor import direct
 from stridor.app import launch
 from stridor.direct import backends
@@ -166,40 +167,7 @@ def by_slepc(mass, damping, stiffness, near: np.ndarray, folder: Path) -> np.nda
 
 
 # -- the same results --------------------------------------------------------------------------------------------------
-BENCH = """
-materials.steel = { young_modulus = 200e9, density = 7800.0, poisson_ratio = 0.3 }
-materials.pad = { young_modulus = 2e9, density = 2000.0, poisson_ratio = 0.3 }
-[bodies.slider]
-type = "solid"
-model = "plane strain"
-material = "steel"
-mesh = { shape = "rectangle", corner = [-0.05, -0.01], size = [0.1, 0.01], divisions = [10, 2], cells = "quad" }
-damping = { mass = 20.0, stiffness = 1e-8 }
-sliding = { velocity = [1.0, 0.0] }
-[bodies.block]
-type = "solid"
-model = "plane strain"
-material = "pad"
-mesh = { shape = "rectangle", corner = [-0.01, 0.0], size = [0.02, 0.02], divisions = [5, 5], cells = "quad" }
-damping = { mass = 20.0, stiffness = 1e-8 }
-[supports.ground]
-at = "slider.bottom"
-fixed = ["x", "y"]
-[supports.holder]
-at = "block.top"
-fixed = ["x"]
-[loads.press]
-at = "block.top"
-pressure = 1e5
-[contacts.face]
-slave = "block.bottom"
-master = "slider.top"
-stiffness = 1e12
-friction = { law = "coulomb", coefficient = 0.4 }
-[modal]
-max_frequency_hz = 40e3
-modes = 6
-"""
+BENCH = rubbing_block("max_frequency_hz = 40e3\nmodes = 6")
 
 
 @pytest.fixture(scope="module")

@@ -12,53 +12,23 @@ import numpy as np
 import pytest
 
 import stridor as st
+from rubbing_block import rubbing_block
 
-BLOCK = """
-title = "a block on a moving slider"
-materials.steel = { young_modulus = 200e9, density = 7800.0, poisson_ratio = 0.3 }
-materials.pad = { young_modulus = 2e9, density = 2000.0, poisson_ratio = 0.3 }
-[bodies.slider]
-type = "solid"
-model = "plane strain"
-material = "steel"
-mesh = { shape = "rectangle", corner = [-0.05, -0.01], size = [0.1, 0.01], divisions = [10, 2], cells = "quad" }
-damping = { mass = 20.0, stiffness = 1e-8 }
-sliding = { velocity = [1.0, 0.0] }
-[bodies.block]
-type = "solid"
-model = "plane strain"
-material = "pad"
-mesh = { shape = "rectangle", corner = [-0.01, 0.0], size = [0.02, 0.02], divisions = [5, 5], cells = "quad" }
-damping = { mass = 20.0, stiffness = 1e-8 }
-points = { crown = [0.0, 0.02] }
-[supports.ground]
-at = "slider.bottom"
-fixed = ["x", "y"]
-[supports.holder]
-at = "block.top"
-fixed = ["x"]
-[loads.press]
-at = "block.top"
-pressure = 1e5
-[contacts.face]
-slave = "block.bottom"
-master = "slider.top"
-stiffness = 1e12
-friction = { law = "coulomb", coefficient = 0.4 }
+BLOCK = rubbing_block(
+    "friction_range = [0.0, 0.6]\nmax_frequency_hz = 15e3\nsweep_points = 3",
+    title="a block on a moving slider",
+    more="""
 [[phases]]
 name = "slide"
 duration = 5e-4
-[modal]
-friction_range = [0.0, 0.6]
-max_frequency_hz = 15e3
-sweep_points = 3
 [temporal]
 initial = "steady-sliding"
 perturbation = 1e-3
 watch = ["block.crown"]
 [comparison]
 critical = false
-"""
+""",
+)
 
 
 @pytest.fixture(scope="module")
