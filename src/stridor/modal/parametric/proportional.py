@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from ...typing import Array, Sparse
 from .problem import Term
 
-ROWS = 200  # looked at for factors
+ROWS = 40  # looked at for factors
 FITS = 1e-10  # of a row: what a sum may leave of it
 AGREE = 1e-6  # two rows' factors, relative
 SAME = 1e-14  # of an entry's parts: what rounding leaves of a difference
