@@ -376,10 +376,19 @@ def test_reduce_solves_anywhere_in_the_box_and_confirms_onsets(folder: Path) -> 
         (["--box", "mu"], "stridor: --box: 'mu' – NAME=… such as mu=0:0.6"),
         (["--box", "mu=0.3:0.1"], "stridor: box.mu: "),
         (["--box", "mu=0:0.1", "--at", "nu=1"], "stridor: values: 'nu' – no such parameter; there are: mu"),
+        (
+            ["--box", "mu=0:0.1", "--at", "mu=-0.1"],
+            "stridor: --at mu: '-0.1' – a number, numbers with commas, or start:stop:count, each number ≥ 0",
+        ),
     ):
         refused = stridor("reduce", "two-beams.toml", *wrong, "--quiet", cwd=folder)
         assert refused.returncode == 2
         assert refused.stderr.startswith(message)
+
+
+def test_reduce_says_that_it_keeps_damping(folder: Path) -> None:
+    words = ("reduce", "two-beams.toml", "--box", "mu=0:0.1", "--set", "modal.damped=false")
+    assert "note: modal.damped = false does not hold here" in stridor(*words, cwd=folder).stderr
 
 
 def test_what_a_change_would_do(folder: Path) -> None:

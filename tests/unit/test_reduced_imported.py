@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 import scipy.io as sio
 import scipy.sparse as sp
 from test_matrix_bodies import MESHED, Export
+from typer.testing import CliRunner
 
 import stridor as st
+from stridor.app.cli import app
 from stridor.modal.parametric.factors import Formula, Product
 from stridor.study.reduced import parametric_problem, reduced_model
 from stridor.system import build_system
@@ -65,6 +68,20 @@ def assert_same_matrices(one, other, rel: float = 1e-14) -> None:
 
 def named(point: dict[str, float]) -> dict[str, float]:
     return {f"parameters.{k}.value": v for k, v in point.items() if k != "mu"}
+
+
+def test_negative_values_of_parameters_on_the_command_line(turning: st.Case, tmp_path: Path) -> None:
+    text = TURNING.replace("[modal]", "offset = { value = 0.0, range = [-0.2, 0.2] }\n[modal]")
+    text = text.replace("factor = 0.25 }", 'factor = "0.25 + offset" }')
+    (tmp_path / "rotor.toml").write_text(text, encoding="utf-8")
+    words = ["reduce", str(tmp_path / "rotor.toml"), "--box", "offset=-0.2:0.2", "--at", "offset=-0.2:0.1:4"]
+    shown = CliRunner().invoke(app, [*words, "--json", "--quiet"])
+    assert shown.exit_code == 0, shown.output
+    points = json.loads(shown.stdout)["modes"]
+    assert [p["point"]["offset"] for p in points] == pytest.approx([-0.2, -0.1, 0.0, 0.1])
+    lowest = [p["frequency_hz"][0] for p in points]
+    assert lowest == sorted(lowest)
+    assert lowest[0] < lowest[3]
 
 
 def test_factors_are_those_of_the_case(turning: st.Case) -> None:

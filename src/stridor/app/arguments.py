@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..case import Case
     from ..io.datasets import Result
 P = ParamSpec("P")
+INFINITY = float("inf")
 
 CaseFile = Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML).", show_default=False)]
 Set = Annotated[
@@ -115,9 +116,11 @@ def verb(file: Any = CaseFile) -> Callable[[Callable[Concatenate[Call, P], None]
     return made
 
 
-def numbers(text: str, name: str) -> list[float]:
-    """Numbers from "0.1", "0.1,0.2" or "start:stop:count". Raises CaseError."""
-    accepted = "a number, numbers with commas, or start:stop:count, each number ≥ 0"
+def numbers(text: str, name: str, *, least: float = 0.0) -> list[float]:
+    """Numbers from "0.1", "0.1,0.2" or "start:stop:count", none below ``least``. Raises CaseError."""
+    accepted = "a number, numbers with commas, or start:stop:count"
+    if least > -INFINITY:
+        accepted += f", each number ≥ {least:g}"
     try:
         if ":" in text:
             start, stop, count = text.split(":")
@@ -131,7 +134,7 @@ def numbers(text: str, name: str) -> list[float]:
             values = [float(part) for part in text.split(",")]
     except ValueError:
         raise CaseError(name, text, accepted) from None
-    if not all(0 <= v < float("inf") for v in values):
+    if not all(least <= v < INFINITY and v > -INFINITY for v in values):
         raise CaseError(name, text, accepted)
     return values
 

@@ -12,7 +12,7 @@ import numpy as np
 import typer
 
 from ..errors import CaseError
-from .arguments import Call, numbers, pair, verb
+from .arguments import INFINITY, Call, numbers, pair, verb
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -171,7 +171,9 @@ def _named(text: str, option: str) -> tuple[str, str]:
 
 
 def _values(at: list[str], model: ReducedModel) -> dict[str, list[float]]:
-    given = {name: numbers(text, f"--at {name}") for name, text in (_named(item, "--at") for item in at)}
+    given: dict[str, list[float]] = {}
+    for name, text in (_named(item, "--at") for item in at):
+        given[name] = numbers(text, f"--at {name}", least=0.0 if name in CONTACTS else -INFINITY)
     model.problem.point({name: values[0] for name, values in given.items()})
     return {p.name: given.get(p.name, [p.value]) for p in model.problem.parameters}
 

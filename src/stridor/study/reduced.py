@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from ..modal.parametric.problem import Role
 
 REMEMBERED = 8  # systems of a case with other numbers
+DAMPED = "modal.damped = false does not hold here: a reduced model keeps the damping of the case"
 
 
 def reduced_model(
@@ -74,7 +76,8 @@ def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> Co
         tuple(p for p in parameters if p.name not in exact),
     )
     solver = None if settings.solver == "auto" else settings.solver
-    return contacts_problem(family, options=Options(settings.friction_damping, settings.prestress, solver))
+    problem = contacts_problem(family, options=Options(settings.friction_damping, settings.prestress, solver))
+    return problem if settings.damped else replace(problem, notes=(*problem.notes, DAMPED))
 
 
 def _parameters(case: Case, box: Mapping[str, tuple[float, float]]) -> tuple[Parameter, ...]:
