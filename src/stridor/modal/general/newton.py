@@ -62,6 +62,22 @@ class _Point:
     x: ComplexArray
 
 
+@dataclass
+class _Steps:
+    """Newton's way to one root: its shortest step so far and where that began."""
+
+    enough: float  # steps as short as this may end in rounding
+    shortest: float = np.inf
+    kept: tuple[float, float, _Point] | None = None
+
+    def end(self, step: float, omega: float, mu: float, here: _Point) -> bool:
+        """Take in a step from (ω, μ); whether it is made of rounding, so that there is nothing to be gained."""
+        stalled = step > STALLED * self.shortest
+        if step < self.shortest:
+            self.shortest, self.kept = step, (omega, mu, here)
+        return stalled and self.shortest <= self.enough
+
+
 class Border:
     """g(λ, μ) of a family, bordered for eigenvectors near x and y (n,)."""
 
@@ -114,9 +130,8 @@ def crossing(
 ) -> Root | None:
     """Where a simple eigenvalue is on the axis, from a guess; None where that does not settle between two μ."""
     width = between[1] - between[0]
-    omega, best = float(lam.imag), np.inf
-    kept: tuple[float, float, _Point] | None = None
-    border = Border(family, x, y)
+    omega, border = float(lam.imag), Border(family, x, y)
+    steps = _Steps(ON_AXIS)
     for _ in range(STEPS):
         try:
             here = border.at(1j * omega, mu)
@@ -125,10 +140,7 @@ def crossing(
         if here.by_lam == 0:
             break
         off = abs(here.g / here.by_lam) / max(abs(omega), 1e-300)
-        stalled = off > STALLED * best
-        if off < best:
-            best, kept = off, (omega, mu, here)
-        if stalled and best <= ON_AXIS:
+        if steps.end(off, omega, mu, here):
             break
         tangent = -here.by_mu / here.by_lam
         # λ(jω, μ) moves by −g/g_λ and is to end on the axis: dRe λ/dμ δμ = −Re, and ω goes along.
@@ -142,9 +154,9 @@ def crossing(
         if off <= 0.1 * ON_AXIS and abs(change) <= SETTLED * max(abs(mu), family.high - family.low):
             break
         mu, omega = min(max(mu + change, family.low), family.high), omega + turn
-    if kept is None or best > ON_AXIS:
+    if steps.kept is None or steps.shortest > ON_AXIS:
         return None
-    omega, mu, here = kept
+    omega, mu, here = steps.kept
     slope = float((-here.by_mu / here.by_lam).real)
     return _judged(family, mu, 1j * omega, here.x, slope, None)
 
@@ -154,9 +166,8 @@ def meeting(
 ) -> Root | None:
     """Where two eigenvalues of a reversible problem meet on the axis; None where that does not settle."""
     width = between[1] - between[0]
-    omega, best = float(lam.imag), np.inf
-    kept: tuple[float, float, _Point] | None = None
-    border = Border(family, x, y)
+    omega, border = float(lam.imag), Border(family, x, y)
+    steps = _Steps(1e3 * ON_AXIS)
     for _ in range(STEPS):
         try:
             here = border.at(1j * omega, mu)
@@ -170,19 +181,16 @@ def meeting(
         if not np.isfinite(by_lam) or not np.isfinite(by_mu):
             break
         off = abs(by_lam) / max(abs(omega), 1e-300) + abs(by_mu) / max(abs(mu), 1e-3 * width)
-        stalled = off > STALLED * best
-        if off < best:
-            best, kept = off, (omega, mu, here)
-        if stalled and best <= 1e3 * ON_AXIS:
+        if steps.end(off, omega, mu, here):
             break
         if not between[0] - width <= mu + by_mu.real <= between[1] + width:
             return None
         mu, omega = mu + float(by_mu.real), omega + float(by_lam.imag)
         if off <= SETTLED:
             break
-    if kept is None or best > 1e3 * ON_AXIS:
+    if steps.kept is None or steps.shortest > 1e3 * ON_AXIS:
         return None
-    omega, mu, here = kept
+    omega, mu, here = steps.kept
     square = complex(-2 * here.by_mu / here.by_lam_lam)
     if not np.isfinite(square) or abs(square.imag) > 1e-3 * abs(square):
         return None
@@ -194,8 +202,7 @@ def standstill(
 ) -> Root | None:
     """Where the stiffness becomes singular, λ = 0; None where that does not settle."""
     width = between[1] - between[0]
-    border, best = Border(family, x, y), np.inf
-    kept: tuple[float, _Point] | None = None
+    border, steps = Border(family, x, y), _Steps(ON_AXIS)
     for _ in range(STEPS):
         try:
             here = border.at(0.0, mu)
@@ -205,19 +212,16 @@ def standstill(
             break
         change = -float((here.g / here.by_mu).real)
         off = abs(change) / max(abs(mu), 1e-3 * width)
-        stalled = off > STALLED * best
-        if off < best:
-            best, kept = off, (mu, here)
-        if stalled and best <= ON_AXIS:
+        if steps.end(off, 0.0, mu, here):
             break
         if not between[0] - width <= mu + change <= between[1] + width:
             return None
         if off <= SETTLED:
             break
         mu = mu + change
-    if kept is None or best > 1e3 * ON_AXIS:
+    if steps.kept is None or steps.shortest > 1e3 * ON_AXIS:
         return None
-    mu, here = kept
+    _, mu, here = steps.kept
     if family.reversible:
         return _judged(family, mu, 0j, here.x, None, float((-2 * here.by_mu / here.by_lam_lam).real))
     if here.by_lam == 0:

@@ -149,23 +149,25 @@ class Greedy:
     def _last(self, point: Point) -> DenseModes:
         """The modes at a point that passed, on the basis as it is now."""
         known = next(found for other, found in reversed(self.passed) if other is point)
-        return known if len(known.right) == self.basis.count else self._modes(point)
+        return known if len(known.right) == self.basis.count else self._solved(self._matrices(point))
 
-    def _modes(self, point: Point, *, whole: bool = False) -> DenseModes:
-        matrices = assembled(self.basis.projected, self.problem.factors(point), self.problem.powers)
+    def _matrices(self, point: Point) -> tuple[Array, Array, Array]:
+        return assembled(self.basis.projected, self.problem.factors(point), self.problem.powers)
+
+    def _solved(self, matrices: tuple[Array, Array, Array], *, whole: bool = False) -> DenseModes:
         found = dense_modes(*matrices, self.frequency, MARGIN, whole=whole or self.whole)
         self.tried, self.stiff = self.tried + 1, self.stiff + found.whole
         return found
 
     def _asked(self, point: Point, *, whole: bool = False) -> tuple[DenseModes, Array]:
         """The modes at a point and their errors (k,) by residuals, without a constant."""
-        found = self._modes(point, whole=whole)
+        matrices = self._matrices(point)
+        found = self._solved(matrices, whole=whole)
         factors, powers = self.problem.factors(point), self.problem.powers
         sizes = [
             sketched(sketch, factors, powers, found.values, vectors)
             for sketch, vectors in ((self.basis.right_sketch, found.right), (self.basis.left_sketch, found.left))
         ]
-        matrices = assembled(self.basis.projected, factors, powers)
         return found, product_over_slope(matrices, found, *sizes)
 
     def _answer(self, failing: list[tuple[Point, DenseModes, Array]]) -> None:
