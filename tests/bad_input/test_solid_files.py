@@ -411,28 +411,32 @@ STEEL = "materials.steel = { young_modulus = 200e9, density = 7800.0 }\n"
 
 
 @pytest.mark.parametrize(
-    ("scale", "message"),
+    ("factor", "extent", "why"),
     [
-        (
-            1e3,
-            "20 m in extent, 0.016 elements per shear wavelength (0.0785 m) at modal.max_frequency_hz = 40000 Hz, the longest edge is 5 m; refine the mesh, lower the frequency, or check the unit of length",
-        ),
-        (
-            1e-3,
-            "2e-05 m in extent, 1.6e+04 elements per shear wavelength (0.0785 m) at modal.max_frequency_hz = 40000 Hz; are the lengths in metres (scale = 0.001 for millimetres)?",
-        ),
+        (1e3, "20", "scale = 0.001 is for one in millimetres"),
+        (1e-3, "2e-05", "scale = 0.001 is for one in millimetres"),
     ],
 )
-def test_files_in_another_unit(folder: Path, scale: float, message: str) -> None:
+def test_files_in_another_unit(folder: Path, factor: float, extent: str, why: str) -> None:
+    (folder / "a.inp").write_text(inp(POINTS * factor, QUADS, rest=ONE_MATERIAL[ONE_MATERIAL.index("*NSET") :]))
+    found = st.describe(case_of(folder, "", ALONE.replace("SCALE", ""))).warnings
+    assert found == (f"bodies.slider: {extent} m in extent is unusual, usually 0.0001 to 10 m; {why}",)
+
+
+@pytest.mark.parametrize(
+    ("scale", "message"),
+    [
+        (1e3, ".scale: 1000 m is unusual for a unit of length, usually 1e-09 to 1 m; check its unit and its digits"),
+        (1e-3, ": 2e-05 m in extent is unusual, usually 0.0001 to 10 m; scale = 0.001 made metres of the file"),
+    ],
+)
+def test_scales_that_are_wrong(folder: Path, scale: float, message: str) -> None:
     (folder / "a.inp").write_text(GOOD)
     text = STEEL + ALONE.replace("SCALE", f'material = "steel"\nscale = {scale}')
-    assert st.describe(case_of(folder, "", text)).warnings == (f"bodies.slider: {message}",)
-    # The same with the file's own lengths and material.
-    (folder / "a.inp").write_text(
-        inp(POINTS * scale, QUADS, rest=ONE_MATERIAL[ONE_MATERIAL.index("*NSET") :])
-    )
-    found = st.describe(case_of(folder, "", ALONE.replace("SCALE", ""))).warnings
-    assert found == (f"bodies.slider: {message}",)
+    assert st.describe(case_of(folder, "", text)).warnings == (f"bodies.slider{message}",)
+    # Where nothing has a unit, no size is unusual.
+    bare = case_of(folder, "", 'units = "nondimensional"\n' + text)
+    assert st.describe(bare).warnings == ()
 
 
 def test_scales_that_make_no_body(folder: Path) -> None:

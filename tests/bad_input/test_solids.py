@@ -790,22 +790,25 @@ def scaled(factor: float) -> str:
 
 WAVE = "elements per shear wavelength (0.0785 m) at modal.max_frequency_hz = 40000 Hz"
 COARSE = "refine the mesh, lower the frequency, or check the unit of length"
+UNUSUAL = "is unusual for a length, usually 0.0001 to 10 m"
+CHECK = "check its unit and its digits"
 UNITS = {
     1e3: [
-        f"bodies.slider: 20 m in extent, 0.016 {WAVE}, the longest edge is 5 m; {COARSE}",
-        f"bodies.rail: 60 m in extent, 0.016 {WAVE}, the longest edge is 5 m; {COARSE}",
+        f"bodies.slider.mesh.size: 20 m {UNUSUAL}; if 20 mm is meant, write 0.02",
+        f"bodies.rail.mesh.size: 60 m {UNUSUAL}; if 60 mm is meant, write 0.06",
     ],
     1e-3: [
-        f"bodies.slider: 2e-05 m in extent, 1.6e+04 {WAVE}; are the lengths in metres?",
-        f"bodies.rail: 6e-05 m in extent, 1.6e+04 {WAVE}; are the lengths in metres?",
+        f"bodies.slider.mesh.size: 2e-05 m {UNUSUAL}; {CHECK}",
+        f"bodies.rail.mesh.size: 6e-05 m {UNUSUAL}; {CHECK}",
     ],
     1e12: [
-        f"bodies.slider: 2e+10 m in extent, 1.6e-11 {WAVE}, the longest edge is 5e+09 m; {COARSE}",
-        f"bodies.rail: 6e+10 m in extent, 1.6e-11 {WAVE}, the longest edge is 5e+09 m; {COARSE}",
+        f"bodies.slider.mesh.corner: 2e+10 m is unusual for a coordinate, usually at most 100 m; {CHECK}",
+        f"bodies.slider.mesh.size: 2e+10 m {UNUSUAL}; {CHECK}",
+        f"bodies.rail.mesh.size: 6e+10 m {UNUSUAL}; {CHECK}",
     ],
     1e-12: [
-        f"bodies.slider: 2e-14 m in extent, 1.6e+13 {WAVE}; are the lengths in metres?",
-        f"bodies.rail: 6e-14 m in extent, 1.6e+13 {WAVE}; are the lengths in metres?",
+        f"bodies.slider.mesh.size: 2e-14 m {UNUSUAL}; {CHECK}",
+        f"bodies.rail.mesh.size: 6e-14 m {UNUSUAL}; {CHECK}",
     ],
 }
 
@@ -843,23 +846,18 @@ WARNINGS = {
     ),
     "adjust": (
         "stiffness = 1e13",
-        "stiffness = 1e13\nadjust = 1.0",
-        "contacts.rub.adjust: 1 m moves slave nodes by up to as much, and the slave is 0.02 m in extent; it is meant for the small misfit of meshes",
+        "stiffness = 1e13\nadjust = 0.005",
+        "contacts.rub.adjust: 0.005 m moves slave nodes by up to as much, and the slave is 0.02 m in extent; it is meant for the small misfit of meshes",
     ),
     "friction": (
         "coefficient = 0.2",
         "coefficient = 100.0",
-        "contacts.rub.friction.coefficient: 100 is unusually high",
+        "contacts.rub.friction.coefficient: 100 is unusual for a friction coefficient, usually at most 2; if 100 % is meant, write 1",
     ),
     "stiffness of a contact": (
         "stiffness = 1e13",
         "stiffness = 1e-3",
-        "contacts.rub.stiffness: 0.001 N/m, N/m³ per area is unusual; are the units SI (N/m, N/m³ per area)?",
-    ),
-    "element larger than the body": (
-        "divisions = [4, 2]",
-        "element_size = 1.0",
-        f"bodies.slider: 0.02 m in extent, 3.9 {WAVE}, the longest edge is 0.02 m; {COARSE}",
+        "contacts.rub.stiffness: 0.001 N/m³ is unusual for a contact stiffness per area, usually 10000 to 1e+18 N/m³; if 0.001 N/mm³ is meant, write 1e+06",
     ),
 }
 
@@ -867,6 +865,17 @@ WARNINGS = {
 @pytest.mark.parametrize("oddity", [*WARNINGS.values()], ids=[*WARNINGS])
 def test_what_is_probably_not_meant_is_said(oddity: tuple[str, ...]) -> None:
     assert list(st.describe(loads(changed(PLANE, *oddity[:-1]))).warnings) == [oddity[-1]]
+
+
+def test_meshes_too_coarse_for_the_modes_asked_for() -> None:
+    """Said of cases that say something of modes, not of those that are for the time loop alone."""
+    coarse = changed(PLANE, "divisions = [4, 2]", "element_size = 1.0")
+    assert st.describe(loads(coarse)).warnings == ()
+    said = f"bodies.slider: 0.02 m in extent, 3.9 {WAVE}, the default, the longest edge is 0.02 m; {COARSE}"
+    assert st.describe(loads(f"{coarse}[modal]\nmodes = 3\n")).warnings == (said,)
+    own = st.describe(loads(f"{coarse}[modal]\nmax_frequency_hz = 40e3\n")).warnings
+    assert own == (said.replace(", the default", ""),)
+    assert st.describe(loads(f"{coarse}[modal]\nmax_frequency_hz = 39e3\n")).warnings == ()
 
 
 def test_bodies_that_do_not_touch_yet() -> None:

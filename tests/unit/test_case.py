@@ -270,21 +270,24 @@ def test_factors_hold_until_changed(bench: Case):
     [
         (
             {"materials.steel.young_modulus": 200},
-            "materials.steel.young_modulus: 200 Pa is unusual; are the units SI (Pa)?",
+            "materials.steel.young_modulus: 200 Pa is unusual for Young's modulus, usually 1e+06 to 1.3e+12 Pa; if 200 GPa is meant, write 2e+11",
         ),
         (
             {"materials.steel.density": 7.8e-9},
-            "materials.steel.density: 7.8e-09 kg/m³ is unusual; are the units SI (kg/m³)?",
+            "materials.steel.density: 7.8e-09 kg/m³ is unusual for a density, usually 10 to 25000 kg/m³; if 7.8e-09 t/mm³ is meant, write 7800",
         ),
         (
             {"bodies.beam1.thickness": 0.02},
             "bodies.beam1: only 2.5 times as long as thick; shear matters, and is neglected",
         ),
         ({"bodies.beam1.start": [0.1, 0.01]}, "contacts.A: beam1.tip starts 0.01 m off the line of beam2"),
-        ({"contacts.A.friction.coefficient": 10}, "contacts.A.friction.coefficient: 10 is unusually high"),
+        (
+            {"contacts.A.friction.coefficient": 10},
+            "contacts.A.friction.coefficient: 10 is unusual for a friction coefficient, usually at most 2; if 10 % is meant, write 0.1",
+        ),
         (
             {"bodies.beam2.width": 1500},
-            "bodies.beam2.width: 1500 m is unusual; are the units SI (m)?",
+            "bodies.beam2.width: 1500 m is unusual for a width, usually 1e-05 to 2 m; if 1500 mm is meant, write 1.5",
         ),
     ],
 )

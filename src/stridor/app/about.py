@@ -47,19 +47,17 @@ def new(
 def check(call: Call) -> None:
     """Validate a case and print the model in words: bodies, contacts, time step against its limit."""
     from ..study.analyses import describe
-    from .output import print_json, stdout
+    from .output import stdout
 
     loaded = call.case()
     description = describe(loaded)
-    for warning in description.warnings:
-        if warning not in loaded.warnings:  # those are said already
-            call.say(f"warning: {warning}")
+    call.warn(description.warnings)
     if call.out is not None:
         from ..io.atomic import write_text
 
         write_text(call.out / "check.txt", "\n".join(description.lines) + "\n")
     if call.json:
-        print_json(description.to_json())
+        call.document(description.to_json())
         return
     for line in description.lines:
         stdout.print(line, markup=False)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Concatenate, ParamSpec
@@ -47,7 +47,8 @@ Undamped = Annotated[bool, typer.Option("--undamped", help="Leave structural dam
 class Call:
     """What every verb is called with: the file it is about, what is to be changed, where results go and who reads them.
 
-    solver: the one for everything that the program factorises, whatever case and environment say.
+    solver: the one for everything that the program factorises, whatever case and environment say. told: warnings so
+    far, each of which is said once.
     """
 
     path: Path
@@ -56,6 +57,7 @@ class Call:
     out: Path | None
     json: bool
     quiet: bool
+    told: list[str] = field(default_factory=list[str])
 
     def case(self) -> Case:
         """The case in the file with overrides, its warnings printed. Raises CaseError."""
@@ -65,9 +67,31 @@ class Call:
         case = load(self.path, [*(self.set_ or ()), *own])
         if self.solver is not None and self.solver != "auto":
             os.environ["STRIDOR_SOLVER"] = self.solver
-        for warning in case.warnings:
-            self.say(f"warning: {warning}")
+        self.warn(case.warnings)
         return case
+
+    def warn(self, warnings: Iterable[str]) -> None:
+        """Say warnings that have not been said yet; `document` lists them too."""
+        for warning in warnings:
+            if warning and warning not in self.told:
+                self.told.append(warning)
+                self.say(f"warning: {warning}")
+
+    def document(self, document: dict[str, Any]) -> None:
+        """Print the JSON document of a verb, with a list ``warnings`` of all that was warned of."""
+        from .output import print_json
+
+        own = [w for w in document.get("warnings", ()) if w not in self.told]
+        print_json({**document, "warnings": [*self.told, *own]})
+
+    def check_friction(self, mu: float | Iterable[float] | None, where: str = "--mu") -> None:
+        """Refuse friction coefficients asked for that are not finite, warn of unusual ones. Raises CaseError."""
+        from ..case.usual import friction_oddity
+
+        for value in [] if mu is None else [mu] if isinstance(mu, float | int) else mu:
+            if not 0.0 <= value < INFINITY:
+                raise CaseError(where, value, "a friction coefficient is a finite number ≥ 0")
+            self.warn([friction_oddity(where, value)])
 
     @property
     def folder(self) -> Path:

@@ -39,7 +39,7 @@ def damping_map(
     """The lowest onset over two dampings, and where more damping lowers it."""
     from ..study.damping_map import damping_map as solve
     from ..view.sensitivity_plots import damping_map as draw
-    from .output import print_json, progress_bar, stdout
+    from .output import progress_bar, stdout
 
     loaded = call.case()
     ranges = pair(x_range, "--x-range"), pair(y_range, "--y-range")
@@ -51,12 +51,11 @@ def damping_map(
     place = call.folder
     files = [_write(place / "damping_map.csv", result), place / "damping_map.png"]
     draw(result).savefig(files[1], dpi=150)
-    for warning in result.warnings:
-        call.say(f"warning: {warning}")
+    call.warn(result.warnings)
     for path in files:
         call.say(f"written: {path}")
     if call.json:
-        print_json(result.to_json() | {"files": [str(f) for f in files]})
+        call.document(result.to_json() | {"files": [str(f) for f in files]})
         return
     _show(result)
     for line in (*_words(result), *result.notes):

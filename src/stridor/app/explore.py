@@ -33,6 +33,7 @@ def sensitivities(
     from ..view.sensitivity_tables import sensitivity_table
 
     loaded = call.case()
+    call.check_friction(mu)
     result = solve(loaded, parameter or ["mu"], mu=mu, modes="unstable" if branch is None else (branch,))
     drawn = sensitivity_bars(result) if len(result.branch) else None
     _show(call, result, sensitivity_table(result))
@@ -53,6 +54,7 @@ def countermeasures(
     from ..view.sensitivity_tables import countermeasure_table
 
     loaded = call.case()
+    call.check_friction(mu)
     target: Any = "sum" if branch is None else branch
     result = rank_countermeasures(loaded, mu=mu, target=target, percent=percent, verify=verify)
     _show(call, result, countermeasure_table(result))
@@ -61,10 +63,10 @@ def countermeasures(
 
 
 def _show(call: Call, result: Any, shown: Table) -> None:
-    from .output import print_json, stdout, table
+    from .output import stdout, table
 
     if call.json:
-        print_json(result.to_json())
+        call.document(result.to_json())
         return
     if shown.rows:
         table(shown.title, shown.heads, [row.cells for row in shown.rows])

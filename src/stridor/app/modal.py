@@ -19,17 +19,17 @@ def steady(
 ) -> None:
     """Steady sliding: which nodes touch, resultants of each contact, pressure as pictures and ParaView files."""
     from ..study.analyses import steady_sliding
-    from .output import print_json
     from .pictures import steady_document, write_steady
 
     loaded = call.case()
+    call.check_friction(mu)
     found = steady_sliding(loaded, mu)
     files = write_steady(loaded, found, call.folder)
     for path in files:
         call.say(f"written: {path}")
     document = steady_document(found) | {"files": [str(f) for f in files]}
     if call.json:
-        print_json(document)
+        call.document(document)
         return
     from .show import show_steady
 
@@ -50,16 +50,19 @@ def shapes(
     gif: Annotated[bool, typer.Option("--gif", help="Also an animated GIF of each.")] = False,
 ) -> None:
     """Shapes of modes: picture, animated page, ParaView file, and where friction feeds them."""
-    from .output import print_json, table
+    from ..study.unit_warnings import resolution_warnings
+    from .output import table
     from .pictures import write_shapes
 
     loaded = call.case()
+    call.check_friction(mu)
+    call.warn(resolution_warnings(loaded))
     documents = write_shapes(loaded, call.folder, mu=mu, branches=branch or None, gif=gif)
     for document in documents:
         for path in document["files"]:
             call.say(f"written: {path}")
     if call.json:
-        print_json({"modes": documents})
+        call.document({"modes": documents})
         return
     rows = [[str(d["branch"]), f"{d['frequency_hz']:.2f}", f"{d['growth_rate']:.3f}"] for d in documents]
     table("shapes", ["branch", "frequency [Hz]", "growth [1/s]"], rows)
@@ -79,14 +82,17 @@ def modes(
 ) -> None:
     """Complex modes at one or many friction coefficients, branches followed from μ = 0."""
     from ..study import analyses
-    from .output import print_json, stdout, table
+    from ..study.unit_warnings import resolution_warnings
+    from .output import stdout, table
 
     loaded = call.case()
     values = None if mu is None else numbers(mu, "--mu")
+    call.check_friction(values)
+    call.warn(resolution_warnings(loaded))
     result = analyses.modes(loaded, values, count=count, damped=False if undamped else None)
     call.keep(result, "modes.nc")
     if call.json:
-        print_json(result.to_json())
+        call.document(result.to_json())
         return
     for row, m in enumerate(result.to_json()["modes"]):
         rows = [
@@ -133,14 +139,17 @@ def onsets(
 ) -> None:
     """Every critical friction coefficient in range: solved, not bracketed."""
     from ..study import analyses
-    from .output import print_json, stdout, table
+    from ..study.unit_warnings import resolution_warnings
+    from .output import stdout, table
 
     loaded = call.case()
     chosen = None if friction_range is None else pair(friction_range, "--range")
+    call.check_friction(chosen, "--range")
+    call.warn(resolution_warnings(loaded))
     result = analyses.onsets(loaded, chosen, max_frequency_hz=max_frequency, damped=False if undamped else None)
     call.keep(result, "onsets.nc")
     if call.json:
-        print_json(result.to_json())
+        call.document(result.to_json())
         return
     if not result.onsets:
         low, high = result.friction_range

@@ -75,7 +75,6 @@ def reduce(
     from ..io.left_out import kept_in
     from ..io.reduced_models import is_reduced_file
     from ..modal.parametric import onsets_along
-    from .output import print_json
 
     _check_file(save, keep)
     if is_reduced_file(call.path):
@@ -101,7 +100,7 @@ def reduce(
         onsets = onsets_along(model, along, _first(at or [], model, along), confirm=confirm, solver=chosen)
     if call.json:
         found = [_onset(o) for o in onsets]
-        print_json(_about(model) | {"modes": points, "onsets": found, "files": [str(f) for f in files]})
+        call.document(_about(model) | {"modes": points, "onsets": found, "files": [str(f) for f in files]})
         return
     if points:
         _show_modes(model, points)

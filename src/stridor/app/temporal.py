@@ -26,9 +26,10 @@ def simulate(
     """The temporal approach: explicit dynamics with stick, slip and separation. Ctrl-C keeps what was computed."""
     from ..io.datasets import load_trajectory, save
     from ..study import analyses
-    from .output import print_json, progress_bar
+    from .output import progress_bar
 
     loaded = call.case()
+    call.check_friction(mu)
     path = call.folder / "simulate.nc"
     if restart is not None and not restart.exists():
         raise CaseError("--restart", str(restart), "no such file")
@@ -53,7 +54,7 @@ def simulate(
     if run.interrupted:
         call.say(f"interrupted after {run.steps} of {run.planned_steps} steps; go on with --restart {path}")
     if call.json:
-        print_json(summary.to_json())
+        call.document(summary.to_json())
     else:
         from .show import show_run
 
@@ -80,14 +81,14 @@ def compare(
 ) -> None:
     """Agreement of both approaches, as a table and a verdict."""
     from ..study import analyses
-    from .output import print_json
 
     loaded = call.case()
     values = None if mu is None else numbers(mu, "--mu")
+    call.check_friction(values)
     result = analyses.compare(loaded, values, critical=critical, progress=lambda text: call.say(text))
     call.keep(result, "compare.nc")
     if call.json:
-        print_json(result.to_json())
+        call.document(result.to_json())
         return
     from .show import show_agreement
 
@@ -97,14 +98,14 @@ def compare(
 @verb()
 def run(call: Call) -> None:
     """Everything: modes, onsets, simulate, compare, and the report."""
-    from .output import print_json, progress_bar, stdout
+    from .output import progress_bar, stdout
     from .pipeline import run as run_all
 
     loaded = call.case()
     with progress_bar("simulate", quiet=call.quiet) as progress:
         outcome = run_all(loaded, call.folder, progress=progress, log=lambda text: call.say(text))
     if call.json:
-        print_json(outcome.to_json())
+        call.document(outcome.to_json())
     else:
         stdout.print(outcome.verdict, markup=False)
         stdout.print(f"report: {outcome.report}", markup=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError, model_validator
 
@@ -47,6 +47,9 @@ class Case(Table):
     """
 
     title: str = Field(default="", description="a text")
+    units: Literal["SI", "nondimensional"] = Field(
+        default="SI", description='"SI" or "nondimensional", which keeps warnings of unusual sizes away'
+    )
     parameters: Mapping[Name, Parameter] = Field(
         default_factory=dict[str, Parameter], description="tables [parameters.NAME]"
     )
@@ -82,7 +85,7 @@ class Case(Table):
     @model_validator(mode="after")
     def _fits_together(self) -> Case:
         # A CaseError is no ValueError: it passes through pydantic as it is.
-        tables = {name: getattr(self, name) for name in type(self).model_fields if name != "title"}
+        tables = {name: getattr(self, name) for name in type(self).model_fields if name not in ("title", "units")}
         if problems := problems_between(Parts(**tables)):
             raise CaseError.many(problems)
         return self
@@ -90,7 +93,7 @@ class Case(Table):
     @property
     def warnings(self) -> list[str]:
         """One line for each value that is allowed but probably not meant (units, digits)."""
-        return list(oddities(self.materials, self.bodies, self.contacts, self.springs))
+        return list(oddities(self))
 
     @property
     def text(self) -> str:

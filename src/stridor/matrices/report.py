@@ -152,7 +152,7 @@ def report(
         multipliers=multipliers,
         loose=int(np.sum(empty["mass"] & empty["stiffness"])),
         frequencies=frequencies,
-        units=_units(own_m, own_k, kept),
+        units=guessed_units(own_m, own_k, kept),
         free=_free(k, kept),
         warnings=(),
     )
@@ -306,8 +306,11 @@ def _frequencies(own_m: Array, own_k: Array) -> tuple[float, float] | None:
     return float(quotient.min()), float(quotient.max())
 
 
-def _units(own_m: Array, own_k: Array, labels: Labels | None) -> str | None:
-    """For elements of steel of any size K ω is about E times the speed of sound, which tells m from mm."""
+def guessed_units(own_m: Array, own_k: Array, labels: Labels | None) -> str | None:
+    """The units that diagonals of M and K (n,) are probably in, None where nothing tells.
+
+    For elements of steel of any size K ω is about E times the speed of sound, which tells m from mm.
+    """
     good = (own_m > 0) & (own_k > 0)
     if labels is not None:
         good &= (labels.node > 0) & (labels.direction <= 3)

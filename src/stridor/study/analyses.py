@@ -28,6 +28,7 @@ from ..temporal.simulate import Checkpoint, Progress
 from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
+from .asked import require_frequency, require_friction
 from .body_modes import BodyModes, body_modes
 from .description import Description, describe
 from .provenance import provenance
@@ -72,6 +73,7 @@ def modes(
     Raises CaseError for a bad μ, AnalysisError where the steady sliding state does not exist.
     """
     started = time.perf_counter()
+    require_frequency(max_frequency_hz)
     values = _own_friction(case) if mu is None else mu
     damped = case.modal.damped if damped is None else damped
     count = case.modal.modes if count is None else count
@@ -155,6 +157,7 @@ def steady_sliding(case: Case, mu: float | None = None) -> SurfaceSliding:
 
     mu replaces the friction coefficient of every contact. Raises AnalysisError where there is none.
     """
+    require_friction(mu)
     return steady_sliding_nodes(build_system(case, mu), mu=mu)
 
 
@@ -200,6 +203,7 @@ def onsets(
 ) -> Onsets:
     """Every critical friction coefficient in range (defaults from the case's [modal])."""
     started = time.perf_counter()
+    require_frequency(max_frequency_hz)
     between = case.modal.friction_range if friction_range is None else friction_range
     limit = max_frequency_hz or case.modal.max_frequency_hz
     damped = case.modal.damped if damped is None else damped
@@ -231,6 +235,7 @@ def simulate(
 ) -> Trajectory:
     """The temporal approach through the phases of the case; mu scales every contact's friction law."""
     started = time.perf_counter()
+    require_friction(mu)
     system = structured(case, "simulate", mu)
     _check_extent(case, system)
     result = march(
@@ -303,6 +308,7 @@ def compare(
 ) -> Agreement:
     """Both approaches at each μ (default comparison.mu, else the case's own) and by their critical μ."""
     started = time.perf_counter()
+    require_friction(mus)
     settings = case.comparison
     system = structured(case, "compare")
     chosen = list(mus if mus is not None else settings.mu) or [_own_friction(case)]

@@ -11,6 +11,7 @@ import numpy as np
 from ..case import Case
 from ..case.bodies import BeamBody, SolidBody
 from ..errors import CaseError
+from .asked import require_frequency
 from .measure_ranking import Ranking
 from .measure_verification import verified
 from .measures import Countermeasures, Measure, Target, Verified
@@ -47,9 +48,12 @@ def rank_countermeasures(
 
     Predictions are of first order; a pair of modes near its exceptional point is predicted by its mean and squared
     half difference, which go through it smoothly. Touching nodes are held in predictions, solved for anew in
-    verifications. Raises CaseError for a target that is not unstable.
+    verifications. Raises CaseError for a target that is not unstable and for a change that is not between 0 and 100 %.
     """
     started = time.perf_counter()
+    if not 0.0 < percent < 100.0:
+        raise CaseError("percent", percent, "a size of change between 0 and 100 %")
+    require_frequency(max_frequency_hz)
     linear = Linearised.of(case, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
     unstable = linear.columns("unstable")
     if not unstable:

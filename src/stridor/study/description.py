@@ -11,21 +11,18 @@ import numpy as np
 from ..case import Case
 from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBody
 from ..case.schema import Load
+from ..case.usual import USUAL
 from ..errors import AnalysisError
-from ..fe.solid import wave_speeds
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths, pieces
 from ..sliding import steady_sliding
 from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
-from ..system.meshes import load_mesh
 from ..temporal.beta2 import step_limit
 from .matrix_reports import matrix_reports
 from .settings import settings_of
+from .unit_warnings import resolution_warnings, unit_warnings
 
-LEAST_PER_WAVE = 4.0  # elements per shear wavelength below which a frequency is not resolved
-MOST_PER_WAVE = 1e5  # above it, lengths are hardly in metres
-MANY_PER_WAVE, SMALL_BODY = 1e3, 2e-3  # nor are they above this in a body smaller than this [m]
 MOST_THROUGH = 0.2  # of a sliding velocity through a surface: facets on a curve make little of it
 
 @dataclass(frozen=True)
@@ -90,7 +87,9 @@ def describe(case: Case) -> Description:
         lines.append(f"{system.general}: `stridor modes` and `stridor onsets` take any matrices, time loops do not")
     else:
         lines += _time_lines(case, system, data)
-    warnings = [*case.warnings, *mesh_warnings(case, system), *imported_warnings(case, system)]
+    warnings = [*case.warnings, *unit_warnings(case), *mesh_warnings(case, system), *imported_warnings(case, system)]
+    if "modal" in case.model_fields_set:
+        warnings += resolution_warnings(case)
     for contact in system.contacts:
         if contact.gap < -1e-9:
             warnings.append(f"contact {contact.name}: the bodies overlap by {-contact.gap:g} m; simulate refuses that")
@@ -255,8 +254,8 @@ def balance_words(steady: SurfaceSliding) -> str:
 
 
 def mesh_warnings(case: Case, system: System) -> list[str]:
-    """What of the meshes is probably not meant: too coarse or too fine for the frequencies asked for (wrong units of
-    length), several pieces, points off their body, material that slides out of its surface, overlaps passed over."""
+    """What of the meshes is probably not meant: several pieces, points off their body, material that slides out of its
+    surface, overlaps passed over."""
     found: list[str] = []
     for solid in system.solids:
         body = case.bodies[solid.name]
@@ -264,7 +263,6 @@ def mesh_warnings(case: Case, system: System) -> list[str]:
             continue
         where, mesh = f"bodies.{solid.name}", Mesh(solid.points, solid.cells)
         largest = edge_lengths(mesh)[1]
-        found += _resolution_warnings(case, where, body, mesh, largest)
         count = pieces(mesh)
         if count > 1:
             found.append(
@@ -276,31 +274,6 @@ def mesh_warnings(case: Case, system: System) -> list[str]:
             if off > 0.5 * largest:
                 found.append(f"{where}.points.{point}: the nearest node is {off:.3g} m away")
     return found + _surface_warnings(case, system)
-
-
-def _resolution_warnings(case: Case, where: str, body: SolidBody, mesh: Mesh, largest: float) -> list[str]:
-    """Elements per shear wavelength at the highest frequency, largest being the longest edge [m]."""
-    limit = case.modal.max_frequency_hz
-    if body.material is not None:
-        material = case.materials[body.material].law_object()
-    else:
-        material = load_mesh(where.partition(".")[2], body).material[0]
-        if material is None:
-            return []
-    slow = wave_speeds(material, body.model)[1]
-    extent = float(np.ptp(mesh.points, axis=0).max())
-    per_wave = slow / limit / largest
-    lead = f"{where}: {extent:.3g} m in extent, {per_wave:.2g} elements per shear wavelength ({slow / limit:.3g} m) at "
-    if per_wave < LEAST_PER_WAVE:
-        return [
-            f"{lead}modal.max_frequency_hz = {limit:g} Hz, the longest edge is {largest:.3g} m; refine the mesh, lower "
-            "the frequency, or check the unit of length"
-        ]
-    tiny = extent < SMALL_BODY and per_wave > MANY_PER_WAVE
-    if tiny or per_wave > MOST_PER_WAVE or not 1e-6 < extent < 1e3:
-        how = "" if body.mesh is not None else " (scale = 0.001 for millimetres)"
-        return [f"{lead}modal.max_frequency_hz = {limit:g} Hz; are the lengths in metres{how}?"]
-    return []
 
 
 def _surface_warnings(case: Case, system: System) -> list[str]:
@@ -317,7 +290,7 @@ def _surface_warnings(case: Case, system: System) -> list[str]:
             )
         adjust = case.contacts[surface.name].adjust
         spread = float(np.ptp(surface.slave_position, axis=0).max())
-        if spread > 0.0 and adjust > 0.1 * spread:
+        if spread > 0.0 and adjust > 0.1 * spread and not USUAL["Contact.adjust"].oddity("", adjust):
             found.append(
                 f"contacts.{surface.name}.adjust: {adjust:g} m moves slave nodes by up to as much, and the slave is "
                 f"{spread:.3g} m in extent; it is meant for the small misfit of meshes"
