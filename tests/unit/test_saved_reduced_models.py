@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
@@ -23,6 +24,7 @@ from stridor.case import template_text
 from stridor.io import reduced_models
 from stridor.io.left_out import kept_in
 from stridor.io.reduced_models import provenance_of
+from stridor.io.seals import digest, text_digest
 from stridor.modal.parametric import Parameter, ParametricProblem, Term, onsets_along, reduce, verified
 from stridor.modal.parametric.factors import CONSTANT, Formula, Product
 
@@ -53,11 +55,19 @@ def alike(one, other) -> None:
             assert np.array_equal(getattr(one.modes(point), name), getattr(other.modes(point), name)), (point, name)
 
 
-def rewritten(content: bytes, path: Path, change) -> Path:
-    """The archive with ``change`` made to its members, name → bytes."""
+def rewritten(content: bytes, path: Path, change, *, seal: bool = False) -> Path:
+    """The archive with ``change`` made to its members, name → bytes; with seal, hashes are made to fit the change."""
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     change(members)
+    with contextlib.suppress(ValueError, KeyError, RecursionError):
+        header = json.loads(members["header.json"])
+        if seal and isinstance(header, dict) and header.pop("sha256", None):
+            arrays = {n.removesuffix(".npy"): data for n, data in members.items() if n.endswith(".npy")}
+            for name, data in arrays.items():
+                with contextlib.suppress(ValueError):
+                    header["contents"][name] = digest(np.lib.format.read_array(io.BytesIO(data)))
+            members["header.json"] = json.dumps(header | {"sha256": text_digest(header)}).encode()
     with zipfile.ZipFile(path, "w") as archive:
         for name, data in members.items():
             archive.writestr(name, data)
@@ -238,7 +248,7 @@ def test_a_field_that_the_format_does_not_know_is_not_dropped(model, tmp_path):
 
     wider = Wider(**{f.name: getattr(model, f.name) for f in fields(model)})
     st.save_reduced(wider, tmp_path / "model.npz")
-    with pytest.raises(st.CaseError, match=r"model\.more: files of format 1 cannot hold it"):
+    with pytest.raises(st.CaseError, match=r"model\.more: files of format 2 cannot hold it"):
         st.save_reduced(replace(wider, more=1.0), tmp_path / "model.npz")
 
 
@@ -255,7 +265,7 @@ def refused(path: Path, words: str) -> None:
 def test_foreign_files(tmp_path, content):
     path = tmp_path / "model.npz"
     refused(tmp_path / "missing.npz", "no such file")
-    refused(tmp_path, "cannot be read: Is a directory")
+    refused(tmp_path, "is a folder; must be a file")
     np.savez(path, a=np.zeros(3))
     refused(path, "no reduced model; give a file of st.save_reduced")
     for data in (b"", b"title = 'a case'\n", pickle.dumps({"a": 1}), b"PK\x03\x04" + bytes(300)):
@@ -265,9 +275,41 @@ def test_foreign_files(tmp_path, content):
 
 
 def test_newer_files(tmp_path, content):
-    header = {"version": 2, "provenance": {"versions": {"stridor": "9.1"}}, "terms": "of another kind"}
+    header = {"version": 3, "provenance": {"versions": {"stridor": "9.1"}}, "terms": "of another kind"}
     path = rewritten(content, tmp_path / "model.npz", header_with(**header))
-    refused(path, "written in format 2 by stridor 9.1; this one reads formats up to 1: bring stridor up to date")
+    refused(path, "written in format 3 by stridor 9.1; this one reads formats up to 2: bring stridor up to date")
+
+
+def test_models_without_hashes(tmp_path, content):
+    """Nothing tells whether they are what was written: they are not believed."""
+    path = rewritten(content, tmp_path / "model.npz", header_with(version=1))
+    refused(path, "written in format 1, without the hashes by which a changed model is told; make it again")
+
+
+def test_a_changed_model_is_told_whatever_was_changed(tmp_path, content, model):
+    """A zeroed sketch estimates errors of 0: every array and every number of the header counts."""
+    path = tmp_path / "model.npz"
+    n, r = model.vectors.shape
+    s = model.right_sketch.shape[1]
+    for name, shape in (("vectors", (n, r)), ("right_sketch", None), ("left_sketch", None), ("projected", None)):
+        zeros = np.zeros(shape or getattr(model, name).shape)
+        refused(rewritten(content, path, array_with(name, zeros)), f"({name} changed)")
+    swapped = np.random.default_rng(1).permuted(model.right_sketch, axis=1)
+    refused(rewritten(content, path, array_with("right_sketch", swapped)), "(right_sketch changed)")
+    held = json.loads(zipfile.ZipFile(io.BytesIO(content)).read("header.json"))
+    numbers = held["model"]
+    for change in (
+        {"model": numbers | {"constant": 2.0 * numbers["constant"]}},
+        {"model": numbers | {"bound": 1e9}},
+        {"model": numbers | {"solves": 0}},
+        {"parameters": held["parameters"][::-1]},
+        {"contents": {}},
+        {"sketch": s + 1},
+    ):
+        refused(rewritten(content, path, header_with(**change)), "(its header changed)")
+    not_finite = np.full((n, r), np.nan)
+    refused(rewritten(content, path, array_with("vectors", not_finite), seal=True), "vectors holds values that are not")
+    alike(model, st.load_reduced(rewritten(content, path, lambda members: None)))
 
 
 class Bomb:
@@ -322,13 +364,14 @@ def test_damaged_files(tmp_path, content, model, monkeypatch):
         lambda members: members.update({"header.json": b"[" * 100_000}),
         lambda members: members.update({"header.json": b"\xff\xfe"}),
     ):
-        refused(rewritten(content, path, change), "a reduced model, but cut short or damaged")
+        for seal in (False, True):  # by its hash, and without
+            refused(rewritten(content, path, change, seal=seal), "a reduced model, but cut short or damaged")
     assert [p.name for p in tmp_path.iterdir()] == ["model.npz"]
 
 
 def test_a_file_that_does_not_say_where_it_comes_from(tmp_path, content):
     for origin in ({"title": None}, [], None):
-        path = rewritten(content, tmp_path / "model.npz", header_with(provenance=origin))
+        path = rewritten(content, tmp_path / "model.npz", header_with(provenance=origin), seal=True)
         with pytest.raises(st.CaseError, match="cut short or damaged"):
             provenance_of(path)
 
@@ -399,7 +442,7 @@ def test_arrays_are_compressed_where_it_pays(content):
         kinds = {i.filename: i.compress_type for i in archive.infolist()}
     assert kinds["vectors.npy"] == zipfile.ZIP_STORED
     assert kinds["term0_data.npy"] == zipfile.ZIP_DEFLATED
-    assert reduced_models.VERSION == 1
+    assert reduced_models.VERSION == 2
 
 
 # -- the command line -------------------------------------------------------------------------------------------------

@@ -19,9 +19,10 @@ from ..temporal.trajectory import STATUS, ContactStatistics, PhaseResult, Trajec
 from ..typing import ComplexArray
 from .atomic import replacing
 from .reduced_models import save_reduced
+from .result_files import FORMAT, damage_told, open_results
+from .seals import seal
 
 Result = ComplexModes | Onsets | Trajectory | Agreement
-FORMAT = "stridor results 1"
 
 
 def to_dataset(result: Result) -> Any:
@@ -42,7 +43,7 @@ def save(result: Result | ReducedModel, path: str | Path) -> Path:
     """
     if isinstance(result, ReducedModel):
         return save_reduced(result, path)
-    dataset = to_dataset(result)
+    dataset = seal(to_dataset(result))
     target = Path(path)
     with replacing(target) as temporary:
         dataset.to_netcdf(temporary, engine="h5netcdf")
@@ -50,17 +51,8 @@ def save(result: Result | ReducedModel, path: str | Path) -> Path:
 
 
 def open_dataset(path: str | Path) -> Any:
-    """xarray.Dataset of a file written by ``save``. Raises CaseError where it is none."""
-    import xarray as xr
-
-    try:
-        with xr.open_dataset(Path(path), engine="h5netcdf", decode_times=False) as dataset:
-            loaded = dataset.load()
-    except (OSError, ValueError, KeyError) as error:
-        raise CaseError("file", str(path), "a results file written by stridor (netCDF-4/HDF5)") from error
-    if loaded.attrs.get("format") != FORMAT:
-        raise CaseError("file", str(path), "a results file written by stridor (netCDF-4/HDF5)")
-    return loaded
+    """xarray.Dataset of a file written by ``save``. Raises CaseError where it is none, or is not as it was written."""
+    return open_results(path)
 
 
 def load_trajectory(path: str | Path) -> Trajectory:
@@ -68,6 +60,12 @@ def load_trajectory(path: str | Path) -> Trajectory:
     data = open_dataset(path)
     if data.attrs.get("analysis") != "simulate":
         raise CaseError("file", str(path), "a file of `stridor simulate`")
+    with damage_told(Path(path)):
+        return _run_of(data)
+
+
+def _run_of(data: Any) -> Trajectory:
+    """The trajectory in a dataset that has been checked."""
     names = json.loads(data.attrs["names"])
     scalars = json.loads(data.attrs["scalars"])
     phases = tuple(

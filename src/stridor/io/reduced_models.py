@@ -1,7 +1,8 @@
 """Reduced models to and from files: one .npz for each, whole or not at all, and nothing in it that could be run.
 
 An archive of NumPy arrays beside a JSON header that says what they are: format number, parameters, terms with their
-factors as data, numbers of the model, which case and which version of stridor it comes from. Matrices are compressed a
+factors as data, numbers of the model, which case and which version of stridor it comes from, and hashes of all of that:
+a model whose sketches were changed would estimate errors of 0 and be believed. Matrices are compressed a
 little (a third of the size for a second or two), each array they have in common is written once; the basis is noise to
 any compression and goes in as it is.
 """
@@ -28,14 +29,18 @@ from ..modal.parametric.contacts import ContactsProblem
 from ..modal.parametric.contacts_rigid import Elimination
 from ..modal.parametric.factors import Factor, factor_from_json
 from ..modal.parametric.problem import POWERS
+from ..reading import irregular, size_words
 from ..study.provenance import versions
-from ..typing import Array, IntArray, Sparse
+from .archive_reader import ArchiveReader, check_unfolded, whole_count
 from .atomic import replacing
 from .left_out import KEEPS, Keep, LeftOut, kept_in
+from .seals import digest, text_digest
 
 FORMAT = "stridor reduced model"
-VERSION = 1
+VERSION = 2
+SEAL = "sha256"  # of the header without it, which holds the hashes of all arrays
 HEADER = "header.json"
+MOST_HEADER = 2**28
 QUICK = 1  # compression: half the time of the usual 6, a tenth larger
 ZIP = b"PK\x03\x04"
 
@@ -69,6 +74,8 @@ def save_reduced(
     _know_every_field(model)
     written = _Arrays()
     header = _header(model, keep, written, case)
+    header["contents"] = {name: digest(array) for name, (array, _) in written.arrays.items()}
+    header[SEAL] = text_digest(header)
     target = Path(path)
     with replacing(target) as temporary:
         _write(temporary, header, written)
@@ -101,9 +108,11 @@ def is_reduced_file(path: Path) -> bool:
     if path.suffix == ".npz":
         return True
     try:
+        if irregular(path):
+            return False
         with path.open("rb") as stream:
             return stream.read(len(ZIP)) == ZIP
-    except OSError:
+    except (OSError, ValueError):
         return False
 
 
@@ -252,18 +261,21 @@ def _opened(path: Path) -> Generator[tuple[zipfile.ZipFile, dict[str, Any]], Non
     """The archive and its header. Raises CaseError for what is no reduced model that this version can read."""
     foreign = CaseError("file", str(path), "no reduced model; give a file of st.save_reduced or stridor reduce --save")
     try:
+        if reason := irregular(path):
+            raise CaseError("file", str(path), reason)
         with path.open("rb") as stream:
             start = stream.read(200)
     except FileNotFoundError:
         raise CaseError("file", str(path), "no such file") from None
-    except OSError as error:
-        raise CaseError("file", str(path), f"cannot be read: {error.strerror or error}") from error
+    except (OSError, ValueError) as error:
+        raise CaseError("file", str(path), f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
     # A file cut short has lost its table of contents; its beginning says whose it is.
     ours = start.startswith(ZIP) and HEADER.encode() in start
     if not ours:
         raise foreign
     with _damage_told(path), zipfile.ZipFile(path) as archive:
-        header = json.loads(archive.read(HEADER))
+        check_unfolded(archive, path.stat().st_size)
+        header = json.loads(_header_bytes(archive))
         if not isinstance(header, dict) or cast("dict[str, Any]", header).get("format") != FORMAT:
             raise foreign
         known = cast("dict[str, Any]", header)
@@ -274,9 +286,24 @@ def _opened(path: Path) -> Generator[tuple[zipfile.ZipFile, dict[str, Any]], Non
                 "file", str(path), f"written in format {version} by stridor {by}; this one reads formats up to "
                 f"{VERSION}: bring stridor up to date",
             )  # fmt: skip
+        if version == 1:
+            raise CaseError(
+                "file", str(path), "written in format 1, without the hashes by which a changed model is told; make it "
+                "again",
+            )  # fmt: skip
         if version != VERSION:
             raise ValueError(f"format {version!r}")
+        if text_digest({name: value for name, value in known.items() if name != SEAL}) != known[SEAL]:
+            raise ValueError("its header changed")
         yield archive, known
+
+
+def _header_bytes(archive: zipfile.ZipFile) -> bytes:
+    """The header, which may be as large as the terms of many bodies make it. Raises ValueError beyond that."""
+    size = archive.getinfo(HEADER).file_size
+    if size > MOST_HEADER:
+        raise ValueError(f"its header claims {size_words(size)}")
+    return archive.read(HEADER)
 
 
 @contextlib.contextmanager
@@ -293,7 +320,8 @@ def _damage_told(path: Path) -> Generator[None, None, None]:
         raise _damaged(path, "it claims to hold more than the memory does") from error
     except Exception as error:
         # Readers of archives, arrays and JSON raise whatever bytes make of them that are not what they should be.
-        raise _damaged(path, f"{type(error).__name__}: {error}") from error
+        said = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+        raise _damaged(path, said) from error
 
 
 def _damaged(path: Path, what: str) -> CaseError:
@@ -306,8 +334,8 @@ def _model(archive: zipfile.ZipFile, header: Mapping[str, Any]) -> ReducedModel:
     keep = header["keep"]
     if keep not in KEEPS:
         raise ValueError(f"keep {keep!r}")
-    n, r, s = (_count(header[name]) for name in ("freedoms", "unknowns", "sketch"))
-    reading = _Reader(archive)
+    n, r, s = (whole_count(header[name]) for name in ("freedoms", "unknowns", "sketch"))
+    reading = ArchiveReader(archive, header["contents"])
     terms = tuple(_read_term(reading, document, n, keep) for document in header["terms"])
     parameters = tuple(
         Parameter(str(p["name"]), float(p["low"]), float(p["high"]), float(p["value"])) for p in header["parameters"]
@@ -337,19 +365,19 @@ def _model(archive: zipfile.ZipFile, header: Mapping[str, Any]) -> ReducedModel:
     )
 
 
-def _read_term(reading: _Reader, document: Mapping[str, Any], n: int, keep: Keep) -> Term:
+def _read_term(reading: ArchiveReader, document: Mapping[str, Any], n: int, keep: Keep) -> Term:
     role = document["role"]
     if role not in POWERS:
         raise ValueError(f"a term of role {role!r}")
-    matrix: Any = LeftOut("the full matrices were", (n, n), _count(document["matrix"]["nonzeros"]))
+    matrix: Any = LeftOut("the full matrices were", (n, n), whole_count(document["matrix"]["nonzeros"]))
     if keep == "all":
         matrix = reading.csr(document["matrix"], (n, n))
     return Term(matrix, role, factor_from_json(document["factor"]), bool(document["symmetric"]))
 
 
 def _read_problem(
-    reading: _Reader, contacts: Mapping[str, Any] | None, terms: tuple[Term, ...], parameters: tuple[Parameter, ...],
-    n: int, keep: Keep,
+    reading: ArchiveReader, contacts: Mapping[str, Any] | None, terms: tuple[Term, ...],
+    parameters: tuple[Parameter, ...], n: int, keep: Keep,
 ) -> ParametricProblem:  # fmt: skip
     if contacts is None:
         return ParametricProblem(terms, parameters)
@@ -357,42 +385,6 @@ def _read_problem(
     found = contacts["elimination"]
     if found is None or keep == "eigenvalues":
         return ContactsProblem(terms, parameters, None, notes)
-    shape = _count(found["displacements"]), n
+    shape = whole_count(found["displacements"]), n
     changes = tuple((factor_from_json(c["factor"]), reading.csr(c["matrix"], shape)) for c in found["changes"])
     return ContactsProblem(terms, parameters, Elimination(reading.csr(found["motion"], shape), changes), notes)
-
-
-def _count(value: object) -> int:
-    if not isinstance(value, int) or value < 0:
-        raise ValueError(f"a count of {value!r}")
-    return value
-
-
-class _Reader:
-    """Arrays of an archive, each with the shape it must have."""
-
-    def __init__(self, archive: zipfile.ZipFile) -> None:
-        self._archive = archive
-
-    def numbers(self, name: str, shape: tuple[int, ...]) -> Array:
-        """An array of floating-point numbers."""
-        return self._read(name, shape, "f").astype(np.float64, copy=False)
-
-    def csr(self, document: Mapping[str, Any], shape: tuple[int, int]) -> Sparse:
-        """A sparse matrix, its indices looked through."""
-        nonzeros = _count(document["nonzeros"])
-        data = self.numbers(document["data"], (nonzeros,))
-        indices: IntArray = self._read(document["indices"], (nonzeros,), "i")
-        starts: IntArray = self._read(document["indptr"], (shape[0] + 1,), "i")
-        matrix = sp.csr_array((data, indices, starts), shape=shape)
-        matrix.check_format(full_check=True)
-        return matrix
-
-    def _read(self, name: str, shape: tuple[int, ...], kind: str) -> Any:
-        with self._archive.open(f"{name}.npy") as stream:
-            array = np.lib.format.read_array(stream, allow_pickle=False)
-            # The checksum is compared at the end of what is stored.
-            more = stream.read(1)
-        if array.shape != shape or array.dtype.kind != kind or more:
-            raise ValueError(f"{name}: {array.dtype} of shape {array.shape} where {shape} is due")
-        return array

@@ -17,6 +17,8 @@ from ..system.uncoupled import UncoupledModes
 from ..typing import Array
 from .beta2 import Scheme
 from .machine import Machine
+from .operators import FINITE
+from .saved import INFINITY, STATUS_RANGE, Bounds, agrees, check_arrays, check_done
 from .schedule import Schedule
 from .settings import Settings
 from .trajectory import Trajectory
@@ -111,15 +113,15 @@ def _model_numbers(system: System) -> Array:
 
 def restore(machine: Machine, restart: Trajectory, settings: Settings, *, join: bool) -> None:
     """Go on from a saved state; raises CaseError where it belongs to another model, scheme or record."""
-    given, own = restart.state.get("settings"), np.array([machine.scheme.step, machine.scheme.beta2])
-    if given is None or restart.path != machine.path or not np.array_equal(given[:2], own):
+    own = np.array([machine.scheme.step, machine.scheme.beta2])
+    if restart.path != machine.path or not agrees(restart.state, "settings", own, first=2):
         raise CaseError(
             "restart",
             f"step {restart.step:g} s, beta2 {restart.beta2:g}, path {restart.path}",
             f"a state of the same scheme: step {own[0]:g} s, beta2 {own[1]:g}, path {machine.path}",
         )
     # Padded modes can have the same shape in different models.
-    if not np.allclose(restart.state.get("model", np.zeros(5)), _model_numbers(machine.system), rtol=1e-9, atol=0):
+    if not agrees(restart.state, "model", _model_numbers(machine.system), relative=1e-9):
         raise CaseError("restart", "model", "a state of the same model: this one has other freedoms or contacts")
     if join and (restart.record_every != settings.record_every or restart.watch_names != settings.watch):
         raise CaseError(
@@ -130,15 +132,27 @@ def restore(machine: Machine, restart: Trajectory, settings: Settings, *, join: 
         )
     pairs: list[tuple[Any, str, str]] = [(machine.fields, name, f"field_{name}") for name in STATE_FIELDS]
     pairs += [(machine.state, name, f"state_{name}") for name in machine.state._fields]
-    for target, name, key in pairs:
-        array = getattr(target, name)
-        if key not in restart.state or restart.state[key].shape != array.shape:
-            raise CaseError("restart", key, "a state of the same model: this one has other freedoms or contacts")
-        array[:] = restart.state[key]
+    check_arrays(restart.state, {key: getattr(part, name) for part, name, key in pairs}, _bounds(machine))
+    check_done(restart.state, "state_counters", 0, restart.steps)
+    for part, name, key in pairs:
+        getattr(part, name)[:] = restart.state[key]
     kept = {name: getattr(machine.state, name).copy() for name in ("predicted", "value", "rate")}
     machine.repack()
     for name, values in kept.items():
         getattr(machine.state, name)[:] = values
+
+
+def _bounds(machine: Machine) -> Bounds:
+    """What a state of this machine must stay within: what is counted, and what points into its arrays."""
+    contacts = machine.table.contacts
+    segments = np.where(contacts.kind == FINITE, np.diff(contacts.nodes_at) - 2, machine.state.segment)
+    return {
+        "state_status": STATUS_RANGE,
+        "state_segment": (np.minimum(segments, 0), segments),
+        "state_counters": (0, np.array([INFINITY, INFINITY, INFINITY, max(machine.contacts - 1, 0)])),
+        "state_active": (0, machine.table_values.shape[0] - 1),
+        "state_statistics": (-1.0, INFINITY),
+    }
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:

@@ -12,6 +12,7 @@ from ...errors import CaseError
 from ...system import System
 from ...typing import Array
 from ..node_history import NodeHistory
+from ..saved import INFINITY, STATUS_RANGE, agrees, check_arrays, check_done
 from ..schedule import Schedule
 from ..settings import Settings
 from ..start import Disturbance, joined
@@ -115,21 +116,16 @@ def _model_numbers(system: System) -> Array:
 
 def check_restart(machine: Machine, restart: Trajectory, settings: Settings, *, join: bool) -> None:
     """Raise CaseError where a saved state belongs to another model, scheme or record."""
-    given, own = restart.state.get("settings"), np.array([machine.scheme.step, machine.scheme.beta2])
-    if given is None or restart.path != "assembled" or not np.array_equal(given[:2], own):
+    own = np.array([machine.scheme.step, machine.scheme.beta2])
+    if restart.path != "assembled" or not agrees(restart.state, "settings", own, first=2):
         raise CaseError(
             "restart",
             f"step {restart.step:g} s, beta2 {restart.beta2:g}, path {restart.path}",
             f"a state of the same scheme: step {own[0]:g} s, beta2 {own[1]:g}, path assembled",
         )
-    same = np.allclose(restart.state.get("model", np.zeros(5)), _model_numbers(machine.system), rtol=1e-9, atol=0)
-    shapes = [
-        restart.state.get(f"{part}_{name}", np.zeros(0)).shape == getattr(getattr(machine, part), name).shape
-        for part, names in SAVED.items()
-        for name in names
-    ]
-    if not same or not all(shapes):
+    if not agrees(restart.state, "model", _model_numbers(machine.system), relative=1e-9):
         raise CaseError("restart", "model", "a state of the same model: this one has other freedoms or contacts")
+    _check_state(machine, restart)
     if join and (restart.record_every != settings.record_every or restart.watch_names != settings.watch):
         raise CaseError(
             "restart",
@@ -137,6 +133,21 @@ def check_restart(machine: Machine, restart: Trajectory, settings: Settings, *, 
             f"the same records as before (here every {settings.record_every} steps of "
             f"{', '.join(settings.watch) or 'no points'}), or join=False",
         )
+
+
+def _check_state(machine: Machine, restart: Trajectory) -> None:
+    """Raise CaseError for a state that this machine cannot take."""
+    held = {f"{part}_{name}": getattr(getattr(machine, part), name) for part, names in SAVED.items() for name in names}
+    held["renewal"] = np.zeros(2, dtype=np.int64)
+    held["renewed_at"] = np.zeros(machine.system.size + len(machine.system.motion.names))
+    bounds = {
+        "contacts_status": STATUS_RANGE,
+        "state_counters": (0, INFINITY),
+        "state_statistics": (-1.0, INFINITY),
+        "renewal": (np.array([0, 1]), INFINITY),
+    }
+    check_arrays(restart.state, held, bounds)
+    check_done(restart.state, "state_counters", STEPS_DONE, restart.steps)
 
 
 def restore(machine: Machine, restart: Trajectory) -> None:

@@ -1,0 +1,82 @@
+"""Files before they are opened: regular ones only, and no larger than this computer can read.
+
+Every reader of case files, meshes, matrices, results and reduced models asks here first, so that a device, a pipe or a
+file made to fill the memory costs a message and nothing else.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+GIB = 2**30
+# Environment variable: the largest file, and the most that a packed one may unfold to, in GiB.
+VARIABLE = "STRIDOR_READ_LIMIT"
+_SHARE = 4  # of the memory: what is read is turned into numbers while it is still there
+_LEAST = GIB
+
+
+def irregular(path: Path, most: int | None = None) -> str | None:
+    """Why a path is no file to be read, None where it is one. Raises OSError where nothing can be said of it, with
+    FileNotFoundError for what is not there, ValueError for names that cannot be.
+
+    most: bytes that may be in it; by default `largest_file`.
+    """
+    found = path.stat()
+    if stat.S_ISDIR(found.st_mode):
+        return "is a folder; must be a file"
+    if not stat.S_ISREG(found.st_mode):
+        kinds = ((stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"), (stat.S_ISCHR, "a device"))
+        kind = next((word for check, word in kinds if check(found.st_mode)), "a device")
+        return f"is no regular file but {kind}; must be a file"
+    limit = largest_file() if most is None else most
+    if found.st_size > limit:
+        how = f"; a larger {VARIABLE} in the environment (GiB) allows it" if most is None else ""
+        return f"has {size_words(found.st_size)}, and no more than {size_words(limit)} are read{how}"
+    return None
+
+
+def largest_file() -> int:
+    """Bytes that a file may have: what STRIDOR_READ_LIMIT says in GiB, else a quarter of the memory, at least 1 GiB."""
+    given = _asked()
+    return given if given is not None else max(_LEAST, memory() // _SHARE)
+
+
+def largest_unfolded(packed: int, *, unquestioned: int, times: int) -> int:
+    """Bytes that so many packed ones may unfold to: ``unquestioned``, or ``times`` as many, but never more than the
+    memory holds; what STRIDOR_READ_LIMIT says in GiB instead, where that is set."""
+    given = _asked()
+    return given if given is not None else min(max(unquestioned, times * packed), memory() // 2)
+
+
+def memory() -> int:
+    """Bytes of memory that this process may have."""
+    try:
+        held = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):  # not on every system
+        return 16 * GIB
+    try:
+        import resource
+
+        soft = resource.getrlimit(resource.RLIMIT_AS)[0]
+    except (ImportError, OSError, ValueError):
+        return held
+    return held if soft == resource.RLIM_INFINITY else min(held, soft)
+
+
+def size_words(count: int) -> str:
+    """A number of bytes for a message."""
+    for unit, size in (("GiB", GIB), ("MiB", 2**20), ("KiB", 2**10)):
+        if count >= size:
+            return f"{count / size:.3g} {unit}"
+    return f"{count} bytes"
+
+
+def _asked() -> int | None:
+    """Bytes that the environment allows, None where it says nothing that can be understood."""
+    try:
+        given = float(os.environ.get(VARIABLE, ""))
+    except ValueError:
+        return None
+    return int(given * GIB) if 0 < given < 2**30 else None
