@@ -228,15 +228,39 @@ FILES = {
         "coefficient = -0.1",
         "contacts.A.friction.coefficient: -0.1 – must be a number >= 0, the friction coefficient while sliding",
     ),
+    "weight at a place": (
+        "[loads.press]\n",
+        "[loads.press]\ngravity = [0.0, -9.81, 0.0]\nbodies = ['pin', 'pinn']\n",
+        [
+            "loads.press.at: 'pin.top' – gravity and centrifugal act on whole bodies; make it another load",
+            "loads.press.force: [0.0, -20.0] – gravity and centrifugal act on whole bodies; make it another load",
+            "loads.press.bodies: ['pin', 'pinn'] – no such body; did you mean 'pin'? the case has: pin, disc",
+            "loads.press.gravity: [0.0, -9.81, 0.0] – must have 2 numbers, as pin lives in 2 dimensions",
+        ],
+    ),
+    "turning without bodies": (
+        '[loads.press]\nat = "pin.top"',
+        "[loads.spin]\ncentrifugal = { speed = 3.0, axis = [1, 0, 0] }\n[loads.press]",
+        [
+            "loads.spin.bodies: missing – give a list of the bodies that turn",
+            "loads.spin.centrifugal.axis: [1.0, 0.0, 0.0] – in the plane bodies turn about z; leave it out",
+            'loads.press.at: missing – give a point, "body.point" or "body@distance", or a boundary, "body.boundary"',
+        ],
+    ),
+    "bodies of a force": (
+        '[loads.press]\n',
+        '[loads.press]\nbodies = ["pin"]\n',
+        "loads.press.bodies: ['pin'] – only used with gravity or centrifugal",
+    ),
     "friction law": (
         'law = "coulomb"',
         'law = "coloumb"',
-        'contacts.A.friction.law: \'coloumb\' – must be "coulomb", "static-kinetic" or "weakening", the law of friction; did you mean \'coulomb\'?',
+        'contacts.A.friction.law: \'coloumb\' – must be "coulomb", "static-kinetic", "weakening", "hyperbolic" or "table", the law of friction; did you mean \'coulomb\'?',
     ),
     "friction no law": (
         'law = "coulomb", ',
         "",
-        'contacts.A.friction.law: missing – give "coulomb", "static-kinetic" or "weakening", the law of friction',
+        'contacts.A.friction.law: missing – give "coulomb", "static-kinetic", "weakening", "hyperbolic" or "table", the law of friction',
     ),
     "friction number": (
         'friction = { law = "coulomb", coefficient = 0.1 }',
@@ -260,6 +284,25 @@ FILES = {
         'law = "coulomb", coefficient = 0.1',
         'law = "static-kinetic", coefficient = 0.3, static_coefficient = 0.2',
         "contacts.A.friction.static_coefficient: 0.2 – must be at least the coefficient, 0.3",
+    ),
+    "friction table short": (
+        'law = "coulomb", coefficient = 0.1',
+        'law = "table", speeds = [0.0], coefficients = [0.1, 0.2]',
+        "contacts.A.friction.speeds: [0.0] – must be a list of 2 to 1000 rising numbers >= 0 [m/s], slip speeds",
+    ),
+    "friction table falls back": (
+        'law = "coulomb", coefficient = 0.1',
+        'law = "table", speeds = [0.0, 0.2, 0.2], coefficients = [0.3, 0.2], static_coefficient = 0.1',
+        [
+            "contacts.A.friction.speeds: [0.0, 0.2, 0.2] – must rise from one to the next; 0.2 follows 0.2",
+            "contacts.A.friction.coefficients: [0.3, 0.2] – must be as many as speeds, 3, not 2",
+            "contacts.A.friction.static_coefficient: 0.1 – must be at least the first of coefficients, that at rest, 0.3",
+        ],
+    ),
+    "friction hyperbolic": (
+        'law = "coulomb", coefficient = 0.1',
+        'law = "hyperbolic", coefficient = 0.1, static_coefficient = 0.05, delta = 1.0',
+        "contacts.A.friction.static_coefficient: 0.05 – must be at least the coefficient, 0.1",
     ),
     "friction decay zero": (
         'law = "coulomb", coefficient = 0.1',
@@ -566,7 +609,7 @@ FILES = {
     "table entry that is a number": (
         "[loads.press]",
         "[loads]\npull = 3\n[loads.press]",
-        "loads.pull: 3 – must be a table with the keys at, force, moment, pressure",
+        "loads.pull: 3 – must be a table with the keys at, force, moment, pressure, gravity, centrifugal, bodies",
     ),
     "title": ("[materials.steel]", "title = 3\n[materials.steel]", "title: 3 – must be a text"),
     "point name": (

@@ -9,11 +9,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 from stridor.case import Case, PointRef, load, loads, template_text, templates
 from stridor.case.schema import BeamBody
 from stridor.errors import CaseError, Problem, shown
-from stridor.laws import Coulomb, Material, Rayleigh, RectangularSection, StaticKinetic, Weakening
+from stridor.laws import (
+    Coulomb,
+    FrictionLaw,
+    Hyperbolic,
+    Material,
+    Rayleigh,
+    RectangularSection,
+    StaticKinetic,
+    Tabulated,
+    Weakening,
+)
 
 
 def beam(**changes: object) -> BeamBody:
@@ -326,16 +337,52 @@ def test_section_and_damping():
     assert damping.damping_ratio(2 * math.pi * 28800) == pytest.approx(0.00104, abs=5e-6)
 
 
-LAWS = [Coulomb(0.3), StaticKinetic(0.3, 0.4), Weakening(0.2, 0.5, 0.05)]
+LAWS = [
+    Coulomb(0.3),
+    StaticKinetic(0.3, 0.4),
+    Weakening(0.2, 0.5, 0.05),
+    Hyperbolic(0.2, 0.5, 30.0),
+    Tabulated((0.0, 0.01, 0.1), (0.5, 0.4, 0.2)),
+    Tabulated((0.0, 0.01, 0.1, 0.4), (0.5, 0.4, 0.2, 0.3), "monotone-cubic", 0.6),
+]
 
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("speed", [1e-3, 0.02, 0.3, -0.02])
-def test_slope_is_the_derivative(law: Coulomb | StaticKinetic | Weakening, speed: float):
+def test_slope_is_the_derivative(law: FrictionLaw, speed: float):
     step = 1e-7
     difference = (law.sliding(abs(speed) + step) - law.sliding(abs(speed) - step)) / (2 * step)
     assert law.slope(speed) == pytest.approx(difference, rel=1e-6, abs=1e-9)
     assert law.sliding(speed) == law.sliding(-speed)
+
+
+def test_cubic_pieces_of_a_table_are_those_of_pchip():
+    """Values and slopes of SciPy's interpolant at any points, and straight lines of NumPy's; constant beyond the ends."""
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        n = rng.integers(2, 8)
+        speeds = np.cumsum(0.05 + rng.random(n)) - 0.05
+        coefficients = rng.random(n)
+        cubic = Tabulated(tuple(speeds), tuple(coefficients), "monotone-cubic")
+        reference = PchipInterpolator(speeds, coefficients)
+        between = np.linspace(speeds[0], speeds[-1], 23)[1:-1]
+        assert [cubic.sliding(v) for v in between] == pytest.approx(reference(between), abs=1e-13)
+        assert [cubic.slope(v) for v in between] == pytest.approx(reference(between, 1), abs=1e-11)
+        anywhere = [0.0, *between, *speeds, speeds[-1] + 1.0]
+        straight = Tabulated(tuple(speeds), tuple(coefficients))
+        assert [straight.sliding(v) for v in anywhere] == pytest.approx(np.interp(anywhere, speeds, coefficients))
+        assert cubic.sliding(speeds[-1] + 1.0) == coefficients[-1]
+        assert cubic.slope(speeds[-1] + 1.0) == straight.slope(speeds[-1] + 1.0) == 0.0
+
+
+def test_slopes_of_a_table_at_its_points():
+    """The mean of both sides where pieces meet; at rest that towards higher speeds; half at the ends."""
+    law = Tabulated((0.0, 1.0, 2.0), (0.5, 0.3, 0.4))
+    assert [law.slope(v) for v in (0.0, 1.0, 2.0)] == pytest.approx([-0.2, -0.05, 0.05])
+    late = Tabulated((0.5, 1.0), (0.5, 0.3), "monotone-cubic")
+    assert [late.slope(v) for v in (0.2, 0.5, 0.7, 1.0)] == pytest.approx([0.0, -0.2, -0.4, -0.2])
+    assert late.sticking == late.sliding(0.0) == 0.5
+    assert Tabulated((0.0, 1.0), (0.3, 0.2), static_coefficient=0.4).sticking == 0.4
 
 
 def test_weakening_runs_from_static_to_sliding():
@@ -351,7 +398,7 @@ def test_weakening_runs_from_static_to_sliding():
 @pytest.mark.parametrize("speed", [0.0, 0.02])
 @pytest.mark.parametrize("mu", [0.0, 0.1, 1.0])
 def test_scaled_laws_have_the_friction_asked_for_and_keep_their_shape(
-    law: Coulomb | StaticKinetic | Weakening, speed: float, mu: float
+    law: FrictionLaw, speed: float, mu: float
 ):
     scaled = law.scaled(mu, speed)
     assert type(scaled) is type(law)
@@ -363,4 +410,6 @@ def test_scaling_a_law_that_is_zero():
     assert StaticKinetic(0.0, 0.0).scaled(0.2, 0.02) == Coulomb(0.2)
     assert Weakening(0.0, 0.0, 0.05).scaled(0.2, 0.02) == Coulomb(0.2)
     assert StaticKinetic(0.0, 0.1).scaled(0.2, 0.02) == StaticKinetic(0.2, 0.2)
+    assert Tabulated((0.0, 1.0), (0.0, 0.0)).scaled(0.2, 0.02) == Coulomb(0.2)
+    assert Tabulated((0.0, 1.0), (0.5, 0.0)).scaled(0.2, 2.0) == StaticKinetic(0.2, 0.5)
     assert Weakening(0.0, 0.5, 1e-5).scaled(0.2, 1.0) == Weakening(0.2, 0.5, 1e-5)

@@ -13,7 +13,7 @@ from benches import Slave, bench
 from marching import belt_motion, one_phase, points_of, rod, touch
 from stridor.contact.interface import Rows
 from stridor.errors import AnalysisError, CaseError
-from stridor.laws import Coulomb, Weakening
+from stridor.laws import Coulomb, Tabulated, Weakening
 from stridor.system import System
 from stridor.system.model import CubicSprings
 from stridor.temporal.assembled import simulate_assembled, step_limit_assembled, storage
@@ -69,7 +69,10 @@ def run(system, duration, *, start=None, loads=None, **settings):
 
 
 @pytest.mark.parametrize("beta2", [0.5, 0.6])
-@pytest.mark.parametrize("law", [Coulomb(0.1), Weakening(0.1, 0.4, 0.2)])
+@pytest.mark.parametrize(
+    "law",
+    [Coulomb(0.1), Weakening(0.1, 0.4, 0.2), Tabulated((0.0, 0.1, 0.5), (0.4, 0.2, 0.1), "monotone-cubic", 0.45)],
+)
 def test_equals_the_path_of_small_systems(beta2, law):
     """Impacts, stick, slip, separation, moving supports, mass damping: the same numbers to rounding."""
     system = two_slaves(law=law)

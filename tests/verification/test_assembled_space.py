@@ -15,7 +15,7 @@ from stridor.contact.interface import Rows
 from stridor.contact.obstacles import Flat
 from stridor.contact.pairing import pair_surface
 from stridor.errors import AnalysisError
-from stridor.laws import Coulomb, StaticKinetic, Weakening
+from stridor.laws import Coulomb, Hyperbolic, StaticKinetic, Tabulated, Weakening
 from stridor.system import System
 from stridor.system.model import PrescribedMotion
 from stridor.temporal.assembled import simulate_assembled
@@ -58,7 +58,10 @@ def run(system, duration, **settings):
     return simulate_assembled(system, one_phase(duration), Settings(**{"record_every": 1, "watch": ("mass",), **settings}))
 
 
-@pytest.mark.parametrize("law", [(0.3, 0.3, 0.0), (0.3, 0.5, 0.0), (0.2, 0.6, 0.7), (2.0, 2.0, 0.0)])
+@pytest.mark.parametrize("law", [
+    Coulomb(0.3), StaticKinetic(0.3, 0.5), Weakening(0.2, 0.6, 0.7), Coulomb(2.0), Hyperbolic(0.2, 0.6, 1.5),
+    Tabulated((0.0, 0.5, 2.0), (0.6, 0.3, 0.4)), Tabulated((0.0, 0.5, 2.0), (0.5, 0.3, 0.2), "monotone-cubic", 0.7),
+])  # fmt: skip
 @pytest.mark.parametrize("sticking", [False, True])
 def test_one_node_obeys_the_laws(law, sticking):
     """Random problems, strongly coupled: Signorini, the disc, friction against the slip, the speed law; exactly."""
@@ -69,7 +72,7 @@ def test_one_node_obeys_the_laws(law, sticking):
         w = root @ root.T + 1e-6 * np.eye(3)
         g, s = rng.standard_normal() - 0.5, rng.standard_normal(2) * 10 ** rng.uniform(-2, 2)
         numbers = (w[0, 0], w[0, 1], w[0, 2], w[1, 1], w[1, 2], w[2, 2])
-        n, t1, t2, status = solve_disc(g, s[0], s[1], numbers, law, sticking, 1.0)
+        n, t1, t2, status = solve_disc(g, s[0], s[1], numbers, np.array(law.numbers), sticking, 1.0)
         seen[status] += 1
         force = np.array([n, t1, t2])
         gap, *slip = np.array([g, *s]) + w @ force
@@ -84,10 +87,10 @@ def test_one_node_obeys_the_laws(law, sticking):
         speed = np.linalg.norm(slip)
         if status == STICK:
             assert speed <= 1e-9 * scale
-            limit = law[1] if sticking or law[2] else law[0]
+            limit = law.sticking if sticking else law.sliding(0.0)
             assert np.linalg.norm(t) <= limit * n * (1 + 1e-12)
         else:
-            mu = law[0] + ((law[1] - law[0]) * math.exp(-speed / law[2]) if law[2] else 0.0)
+            mu = law.sliding(speed)
             assert np.linalg.norm(t) == pytest.approx(mu * n, rel=1e-6, abs=1e-9 * np.abs(force).max())
             assert np.abs(t * speed + mu * n * slip).max() <= 1e-7 * scale * max(mu * n, 1e-300)
     assert np.all(seen[[OPEN, SLIP]] > 50)
@@ -96,7 +99,7 @@ def test_one_node_obeys_the_laws(law, sticking):
 
 def test_a_node_that_cannot_move_sideways_still_rubs():
     """Held along both tangents on a moving floor: full friction against the slip."""
-    n, t1, t2, status = solve_disc(-1.0, 3.0, 4.0, (0.5, 0.0, 0.0, 0.0, 0.0, 0.0), (0.3, 0.3, 0.0), False, 1.0)
+    n, t1, t2, status = solve_disc(-1.0, 3.0, 4.0, (0.5, 0.0, 0.0, 0.0, 0.0, 0.0), np.array(Coulomb(0.3).numbers), False, 1.0)
     assert status == SLIP
     assert (n, t1, t2) == pytest.approx((2.0, -0.36, -0.48), rel=1e-9)
 

@@ -9,19 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from ..errors import CaseError, Problem
 from .bodies import AnyBody, BeamBody, MassBody, MatrixBody, SolidBody
 from .body_checks import body_problems, shape_problems
-from .fields import is_zero
+from .fields import PLACE, is_zero
+from .load_checks import body_load_problems
 from .matrix_checks import matrix_problems
 from .points import BoundaryRef, Place, PointRef, no_such, parse_place, parse_point
 from .schema import (
     DEFAULT_PHASES,
     Comparison,
     Contact,
-    CoulombTable,
     Dashpot,
+    Friction,
     Load,
     MaterialTable,
     Modal,
@@ -30,6 +32,7 @@ from .schema import (
     Reference,
     Spring,
     Support,
+    TabulatedTable,
     Temporal,
     Tie,
 )
@@ -174,6 +177,14 @@ def _beam_support_problems(
 def _load_problems(parts: Parts) -> Iterator[Problem]:
     for name, load in parts.loads.items():
         where = f"loads.{name}"
+        if load.acts_on_bodies:
+            yield from body_load_problems(where, load, parts.bodies, parts.names("bodies"))
+            continue
+        if load.bodies is not None:
+            yield Problem(f"{where}.bodies", load.bodies, "only used with gravity or centrifugal")
+        if load.at is None:
+            yield Problem(f"{where}.at", None, f"missing – give {PLACE}")
+            continue
         place = yield from _place(parts, load.at, f"{where}.at")
         if place is None:
             continue
@@ -191,10 +202,7 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
     pairs: dict[frozenset[str], str] = {}
     for name, contact in parts.contacts.items():
         where = f"contacts.{name}"
-        friction = contact.friction
-        if not isinstance(friction, CoulombTable) and friction.static_coefficient < friction.coefficient:
-            accepted = f"must be at least the coefficient, {friction.coefficient:.9g}"
-            yield Problem(f"{where}.friction.static_coefficient", friction.static_coefficient, accepted)
+        yield from _friction_problems(f"{where}.friction", contact.friction)
         pair = frozenset((contact.slave, contact.master))
         if pair in pairs:
             accepted = f"slides on {contact.master} in contacts.{pairs[pair]} already"
@@ -237,6 +245,24 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
         if contact.side is not None and not isinstance(master, BeamBody):
             accepted = "only a beam has sides; a boundary and an obstacle know theirs"
             yield Problem(f"{where}.side", contact.side, accepted)
+
+
+def _friction_problems(where: str, friction: Friction) -> Iterator[Problem]:
+    least = getattr(friction, "coefficient", 0.0)
+    called = "the coefficient"
+    if isinstance(friction, TabulatedTable):
+        least, called = friction.coefficients[0], "the first of coefficients, that at rest"
+        for before, after in pairwise(friction.speeds):
+            if after <= before:
+                accepted = f"must rise from one to the next; {after:.9g} follows {before:.9g}"
+                yield Problem(f"{where}.speeds", friction.speeds, accepted)
+                break
+        if len(friction.coefficients) != len(friction.speeds):
+            accepted = f"must be as many as speeds, {len(friction.speeds)}, not {len(friction.coefficients)}"
+            yield Problem(f"{where}.coefficients", friction.coefficients, accepted)
+    static = getattr(friction, "static_coefficient", None)
+    if static is not None and static < least:
+        yield Problem(f"{where}.static_coefficient", static, f"must be at least {called}, {least:.9g}")
 
 
 def _pairing_problems(

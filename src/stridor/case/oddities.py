@@ -134,6 +134,8 @@ def _poisson(case: Case) -> Iterator[str]:
 def _loads(case: Case) -> Iterator[str]:
     """Pressures and forces that strain what they act on beyond what is small."""
     for name, load in case.loads.items():
+        if load.at is None:
+            continue
         place = parse_place(load.at, case.bodies)
         body = case.bodies[place.body]
         if not isinstance(body, BeamBody | SolidBody) or body.material is None:

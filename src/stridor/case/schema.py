@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from ..laws import Coulomb, FrictionLaw, Material, StaticKinetic, Weakening
+from ..laws import Coulomb, FrictionLaw, Hyperbolic, Material, StaticKinetic, Tabulated, Weakening
 from .bodies import BeamBody, Body, DampingTable, MassBody, MatrixBody, ObstacleBody, SlidingTable, SolidBody
 from .fields import (
     NAME_RULE,
@@ -24,6 +24,7 @@ from .fields import (
     Number,
     PlaneOrSpace,
     Positive,
+    Space,
     Table,
     Truth,
 )
@@ -79,17 +80,45 @@ class Support(Table):
     )
 
 
-class Load(Table):
-    """[loads.NAME]: a force and a moment on a point, in global directions; a force or a pressure on a boundary."""
+class CentrifugalTable(Table):
+    """What drives bodies outwards that turn steadily, in the frame that turns with them."""
 
-    at: str = Field(description=PLACE)
+    speed: Number = Field(description="a number [rad/s], the speed of turning")
+    axis: Space | None = Field(
+        default=None, description="[x, y, z], three numbers: the axis of turning (left out: z, as in the plane)"
+    )
+    centre: PlaneOrSpace | None = Field(
+        default=None, description="[x, y] or [x, y, z], numbers [m]: a point of the axis (left out: the origin)"
+    )
+
+
+class Load(Table):
+    """[loads.NAME]: a force and a moment on a point, in global directions; a force or a pressure on a boundary; the
+    weight or the centrifugal load of whole bodies."""
+
+    at: str | None = Field(default=None, description=PLACE)
     force: PlaneOrSpace = Field(
         default=(0.0, 0.0), description="[x, y] or [x, y, z], numbers [N]: the force, on a boundary spread evenly"
     )
     moment: Number = Field(default=0.0, description="a number [N m], the moment, counter-clockwise, on a beam")
     pressure: Number = Field(default=0.0, description="a number [Pa], the pressure that pushes on a boundary")
+    gravity: PlaneOrSpace | None = Field(
+        default=None, description="[x, y] or [x, y, z], numbers [m/s²]: the acceleration of free fall, instead of at"
+    )
+    centrifugal: CentrifugalTable | None = Field(
+        default=None, description="a table { speed, axis, centre }: the load of turning steadily, instead of at"
+    )
+    bodies: Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
+        default=None, description="a list of names of bodies, on which gravity (left out: on all) or centrifugal acts"
+    )
+
+    @property
+    def acts_on_bodies(self) -> bool:
+        """Whether it is a load of whole bodies."""
+        return self.gravity is not None or self.centrifugal is not None
 
 
+MOST_POINTS = 1000
 _COEFFICIENT = "a number >= 0, the friction coefficient while sliding"
 _STATIC = "a number >= coefficient, the friction coefficient to overcome before sliding"
 
@@ -98,7 +127,7 @@ class CoulombTable(Table):
     """One friction coefficient."""
 
     law: Literal["coulomb"] = Field(
-        description='"coulomb", "static-kinetic" or "weakening", the law of friction'
+        description='"coulomb", "static-kinetic", "weakening", "hyperbolic" or "table", the law of friction'
     )
     coefficient: NotNegative = Field(description=_COEFFICIENT)
 
@@ -134,7 +163,50 @@ class WeakeningTable(Table):
         return Weakening(self.coefficient, self.static_coefficient, self.decay_speed)
 
 
-Friction = Annotated[CoulombTable | StaticKineticTable | WeakeningTable, Field(discriminator="law")]
+class HyperbolicTable(Table):
+    """A friction coefficient that falls with slip speed as 1/(1 + delta |v|)."""
+
+    law: Literal["hyperbolic"]
+    coefficient: NotNegative = Field(description="a number >= 0, the friction coefficient at high slip speed")
+    static_coefficient: NotNegative = Field(description=_STATIC)
+    delta: Positive = Field(description="a number > 0 [s/m]: at the slip speed 1/delta half of the drop is done")
+
+    def law_object(self) -> FrictionLaw:
+        """The friction as a law."""
+        return Hyperbolic(self.coefficient, self.static_coefficient, self.delta)
+
+
+class TabulatedTable(Table):
+    """Friction coefficients at slip speeds, constant beyond the ends of the table."""
+
+    law: Literal["table"]
+    speeds: Annotated[tuple[NotNegative, ...], Field(min_length=2, max_length=MOST_POINTS)] = Field(
+        description=f"a list of 2 to {MOST_POINTS} rising numbers >= 0 [m/s], slip speeds"
+    )
+    coefficients: Annotated[tuple[NotNegative, ...], Field(min_length=2, max_length=MOST_POINTS)] = Field(
+        description="a list of as many numbers >= 0, the friction coefficients at these speeds"
+    )
+    interpolation: Literal["linear", "monotone-cubic"] = Field(
+        default="linear", description='"linear" or "monotone-cubic", what lies between the points of the table'
+    )
+    static_coefficient: NotNegative | None = Field(
+        default=None,
+        description="a number >= the first of coefficients, to overcome before sliding (left out: the first itself)",
+    )
+
+    @property
+    def coefficient(self) -> float:
+        """The friction coefficient at high slip speed."""
+        return self.coefficients[-1]
+
+    def law_object(self) -> FrictionLaw:
+        """The friction as a law."""
+        return Tabulated(self.speeds, self.coefficients, self.interpolation, self.static_coefficient)
+
+
+Friction = Annotated[
+    CoulombTable | StaticKineticTable | WeakeningTable | HyperbolicTable | TabulatedTable, Field(discriminator="law")
+]
 
 
 class Contact(Table):

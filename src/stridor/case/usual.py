@@ -57,7 +57,7 @@ def _usual(quantity: str, unit: str, least: float, most: float, *, typical: floa
 
 _UNITS = {
     "g_cm3": "g/cm³", "t_mm3": "t/mm³", "kg_mm3": "kg/mm³", "mm_s": "mm/s", "km_h": "km/h", "rpm": "turns a minute",
-    "N_mm": "N/mm", "N_mm3": "N/mm³", "Ns_mm": "N s/mm", "um": "µm", "us": "µs", "percent": "%",
+    "N_mm": "N/mm", "N_mm3": "N/mm³", "Ns_mm": "N s/mm", "mm_s2": "mm/s²", "s_mm": "s/mm", "um": "µm", "us": "µs", "percent": "%",
 }  # fmt: skip
 
 LENGTH = _usual("a length", "m", 1e-4, 10.0, typical=0.1, mm=1e-3, um=1e-6)
@@ -89,11 +89,20 @@ USUAL: Mapping[str, Usual] = {
     "Load.force": _FORCE,
     "Load.moment": _usual("a moment", "N m", 1e-9, 1e7),
     "Load.pressure": _usual("a pressure", "Pa", 1.0, 1e10, MPa=1e6, bar=1e5, kPa=1e3),
+    "Load.gravity": _usual("an acceleration", "m/s²", 1e-2, 1e4, typical=9.81, mm_s2=1e-3, g=9.80665),
+    "CentrifugalTable.speed": _TURN,
+    "CentrifugalTable.centre": _PLACE,
     "CoulombTable.coefficient": _MU,
     "StaticKineticTable.coefficient": _MU,
     "StaticKineticTable.static_coefficient": _MU,
     "WeakeningTable.coefficient": _MU,
     "WeakeningTable.static_coefficient": _MU,
+    "HyperbolicTable.coefficient": _MU,
+    "HyperbolicTable.static_coefficient": _MU,
+    "HyperbolicTable.delta": _usual("a fall of friction with speed", "s/m", 1e-2, 1e6, s_mm=1e3),
+    "TabulatedTable.speeds": _SPEED,
+    "TabulatedTable.coefficients": _MU,
+    "TabulatedTable.static_coefficient": _MU,
     "WeakeningTable.decay_speed": _usual("a speed over which friction weakens", "m/s", 1e-6, 100.0, mm_s=1e-3),
     "Contact.adjust": _MISFIT,
     "Contact.stiffness": _CONTACT,
@@ -170,7 +179,7 @@ WITHOUT = frozenset({
     "MaterialTable.poisson_ratio", "DampingTable.mass", "DampingTable.stiffness", "Parameter.value", "Parameter.range",
     "Spring.direction", "Dashpot.direction", "Modal.modes", "Modal.sweep_points", "Temporal.beta2",
     "Temporal.record_every", "BeamBody.elements", "MeshTable.divisions", "SlidingTable.axis",
-    "ObstacleBody.normal", "ObstacleBody.axis", "MatrixTerm.factor", "MatrixBody.dimension",
+    "CentrifugalTable.axis", "ObstacleBody.normal", "ObstacleBody.axis", "MatrixTerm.factor", "MatrixBody.dimension",
     "ReferenceFrequency.frequency_hz", "ReferenceOnset.frequency_hz", "ReferenceOnset.mu", "ReferenceValue.value",
 })  # fmt: skip
 

@@ -61,8 +61,7 @@ class ContactNodes:
         found = np.zeros(self.count)
         for k, law in enumerate(self.laws):
             mine = np.flatnonzero(self.owner == k)
-            constant = law.slope(0.0) == 0.0 and law.slope(1.0) == 0.0
-            found[mine] = law.sliding(1.0) if constant else [law.sliding(float(v)) for v in speeds[mine]]
+            found[mine] = law.sliding(1.0) if law.constant else [law.sliding(float(v)) for v in speeds[mine]]
         return found
 
     def friction_slopes(self, speeds: Array) -> Array:

@@ -2,14 +2,16 @@
 
 from stridor.laws.damping import Rayleigh
 from stridor.laws.elasticity import Material, RectangularSection
-from stridor.laws.friction import Coulomb, FrictionLaw, StaticKinetic, Weakening
+from stridor.laws.friction import Coulomb, FrictionLaw, Hyperbolic, StaticKinetic, Tabulated, Weakening
 
 __all__ = [
     "Coulomb",
     "FrictionLaw",
+    "Hyperbolic",
     "Material",
     "Rayleigh",
     "RectangularSection",
     "StaticKinetic",
+    "Tabulated",
     "Weakening",
 ]

@@ -6,8 +6,10 @@ Nothing is regularised: at zero speed the tangential force is anything up to `st
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+from .packed import CONSTANT, CUBIC, EXPONENTIAL, HYPERBOLIC, LINEAR, coefficient_at, monotone_slopes
 
 
 class FrictionLaw(Protocol):
@@ -24,6 +26,16 @@ class FrictionLaw(Protocol):
 
     def slope(self, speed: float) -> float:
         """dμ/d|v| [s/m] while sliding at `speed` [m/s]; negative where friction weakens with speed."""
+        ...
+
+    @property
+    def constant(self) -> bool:
+        """Whether the coefficient is the same at every slip speed."""
+        ...
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The law as a row of numbers for `laws.packed.coefficient_at`, which the time loops compile."""
         ...
 
     def scaled(self, mu: float, speed: float) -> FrictionLaw:
@@ -54,6 +66,16 @@ class Coulomb:
         """The slope dμ/d|v| [s/m] at a slip speed [m/s]."""
         return 0.0
 
+    @property
+    def constant(self) -> bool:
+        """Whether the coefficient is the same at every slip speed."""
+        return True
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The law as a row of numbers; see FrictionLaw."""
+        return CONSTANT, self.coefficient, self.coefficient, 0.0, 0.0
+
     def scaled(self, mu: float, speed: float) -> FrictionLaw:
         """The law scaled to mu at a slip speed [m/s]; see FrictionLaw."""
         return Coulomb(mu)
@@ -78,6 +100,16 @@ class StaticKinetic:
     def slope(self, speed: float) -> float:
         """The slope dμ/d|v| [s/m] at a slip speed [m/s]."""
         return 0.0
+
+    @property
+    def constant(self) -> bool:
+        """Whether the coefficient is the same at every slip speed."""
+        return True
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The law as a row of numbers; see FrictionLaw."""
+        return CONSTANT, self.static_coefficient, self.coefficient, 0.0, 0.0
 
     def scaled(self, mu: float, speed: float) -> FrictionLaw:
         """The law scaled to mu at a slip speed [m/s]; see FrictionLaw."""
@@ -107,13 +139,21 @@ class Weakening:
 
     def sliding(self, speed: float) -> float:
         """The friction coefficient [-] at a slip speed [m/s]."""
-        drop = self.static_coefficient - self.coefficient
-        return self.coefficient + drop * math.exp(-abs(speed) / self.decay_speed)
+        return coefficient_at(self.numbers, abs(speed))[0]
 
     def slope(self, speed: float) -> float:
         """The slope dμ/d|v| [s/m] at a slip speed [m/s]."""
-        drop = self.static_coefficient - self.coefficient
-        return -drop / self.decay_speed * math.exp(-abs(speed) / self.decay_speed)
+        return coefficient_at(self.numbers, abs(speed))[1]
+
+    @property
+    def constant(self) -> bool:
+        """Whether the coefficient is the same at every slip speed."""
+        return self.static_coefficient == self.coefficient
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The law as a row of numbers; see FrictionLaw."""
+        return EXPONENTIAL, self.static_coefficient, self.coefficient, self.decay_speed, 0.0
 
     def scaled(self, mu: float, speed: float) -> FrictionLaw:
         """The law scaled to mu at a slip speed [m/s]; see FrictionLaw."""
@@ -123,6 +163,104 @@ class Weakening:
         if factor is None:
             return Weakening(mu, max(mu, self.static_coefficient), self.decay_speed)
         return Weakening(factor * self.coefficient, factor * self.static_coefficient, self.decay_speed)
+
+
+@dataclass(frozen=True)
+class Hyperbolic:
+    """Friction that weakens with slip speed: μ(v) = μ_k + (μ_s − μ_k)/(1 + δ|v|).
+
+    coefficient is μ_k [-], static_coefficient μ_s [-], delta δ > 0 [s/m].
+    """
+
+    coefficient: float
+    static_coefficient: float
+    delta: float
+
+    @property
+    def sticking(self) -> float:
+        """The friction coefficient [-] at which sticking ends."""
+        return self.static_coefficient
+
+    def sliding(self, speed: float) -> float:
+        """The friction coefficient [-] at a slip speed [m/s]."""
+        return coefficient_at(self.numbers, abs(speed))[0]
+
+    def slope(self, speed: float) -> float:
+        """The slope dμ/d|v| [s/m] at a slip speed [m/s]."""
+        return coefficient_at(self.numbers, abs(speed))[1]
+
+    @property
+    def constant(self) -> bool:
+        """Whether the coefficient is the same at every slip speed."""
+        return self.static_coefficient == self.coefficient
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The law as a row of numbers; see FrictionLaw."""
+        return HYPERBOLIC, self.static_coefficient, self.coefficient, self.delta, 0.0
+
+    def scaled(self, mu: float, speed: float) -> FrictionLaw:
+        """The law scaled to mu at a slip speed [m/s]; see FrictionLaw."""
+        if self.coefficient == 0.0 and self.static_coefficient == 0.0:
+            return Coulomb(mu)
+        factor = _factor(mu, self.sliding(speed))
+        if factor is None:
+            return Hyperbolic(mu, max(mu, self.static_coefficient), self.delta)
+        return Hyperbolic(factor * self.coefficient, factor * self.static_coefficient, self.delta)
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """Friction coefficients [-] at slip speeds [m/s], and what lies between them.
+
+    speeds rise from one ≥ 0, at least two; coefficients are as many, ≥ 0; interpolation joins them by straight lines or
+    by cubic pieces that keep rises and falls as they are given (`laws.packed.monotone_slopes`). Beyond its ends the
+    table is constant. A static_coefficient above the table's at rest has to be overcome before sliding; None: the
+    table's at rest.
+    """
+
+    speeds: tuple[float, ...]
+    coefficients: tuple[float, ...]
+    interpolation: Literal["linear", "monotone-cubic"] = "linear"
+    static_coefficient: float | None = None
+
+    @property
+    def sticking(self) -> float:
+        """The friction coefficient [-] at which sticking ends."""
+        return self.coefficients[0] if self.static_coefficient is None else self.static_coefficient
+
+    def sliding(self, speed: float) -> float:
+        """The friction coefficient [-] at a slip speed [m/s]."""
+        return coefficient_at(self.numbers, abs(speed))[0]
+
+    def slope(self, speed: float) -> float:
+        """The slope dμ/d|v| [s/m] at a slip speed [m/s]; where straight pieces meet, the mean of both sides."""
+        return coefficient_at(self.numbers, abs(speed))[1]
+
+    @property
+    def constant(self) -> bool:
+        """Whether the coefficient is the same at every slip speed."""
+        return len(set(self.coefficients)) == 1
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The law as a row of numbers; see FrictionLaw."""
+        if self.constant:
+            return CONSTANT, self.sticking, self.coefficients[0], 0.0, 0.0
+        straight = self.interpolation == "linear"
+        slopes = (0.0,) * len(self.speeds) if straight else monotone_slopes(self.speeds, self.coefficients)
+        head = (LINEAR if straight else CUBIC, self.sticking, self.coefficients[-1], 0.0, float(len(self.speeds)))
+        return *head, *self.speeds, *self.coefficients, *slopes
+
+    def scaled(self, mu: float, speed: float) -> FrictionLaw:
+        """The law scaled to mu at a slip speed [m/s]; see FrictionLaw."""
+        if not any(self.coefficients) and self.sticking == 0.0:
+            return Coulomb(mu)
+        factor = _factor(mu, self.sliding(speed))
+        if factor is None:
+            return StaticKinetic(mu, max(mu, self.sticking))
+        static = None if self.static_coefficient is None else factor * self.static_coefficient
+        return replace(self, coefficients=tuple(factor * c for c in self.coefficients), static_coefficient=static)
 
 
 def _factor(mu: float, present: float) -> float | None:

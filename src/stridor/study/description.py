@@ -10,7 +10,7 @@ import numpy as np
 
 from ..case import Case
 from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBody
-from ..case.schema import Load
+from ..case.schema import Friction, Load, TabulatedTable
 from ..case.usual import USUAL
 from ..errors import AnalysisError
 from ..mesh.model import Mesh
@@ -49,7 +49,8 @@ def describe(case: Case) -> Description:
         )
         lines.append(f"  support {name} at {support.at} holds {', '.join(support.fixed)}{moving}")
     for name, load in case.loads.items():
-        lines.append(f"  load {name} at {load.at}: {_load_words(load)}")
+        where = f"at {load.at}" if load.at else f"on {', '.join(load.bodies or ['all bodies'])}"
+        lines.append(f"  load {name} {where}: {_load_words(load)}")
     lines += [f"  tie {name}: {tie.slave} follows {tie.master}" for name, tie in case.ties.items()]
     lines += [
         f"  spring {name}: {' to '.join(link.between)}, {link.stiffness:g} N/m" for name, link in case.springs.items()
@@ -74,7 +75,8 @@ def describe(case: Case) -> Description:
             table = case.contacts[contact.name]
             lines.append(
                 f"  contact {contact.name}: {table.slave} on {table.master}, μ = "
-                f"{steady.friction_coefficient[k]:g}, {stiffness}, {contact.sliding} sliding, normal force {state}, "
+                f"{steady.friction_coefficient[k]:g}{_law_words(table.friction)}, {stiffness}, "
+                f"{contact.sliding} sliding, normal force {state}, "
                 f"slip speed {abs(steady.slip_speed[k]):g} m/s in steady sliding"
             )
             data["contacts"][contact.name] = {
@@ -104,6 +106,20 @@ def describe(case: Case) -> Description:
             "no load presses the bodies together: modes take the contacts as closed, a run would not keep them so"
         )
     return Description(tuple(lines), data, tuple(warnings))
+
+
+def _law_words(friction: Friction) -> str:
+    """How friction changes with slip speed, "" where it does not."""
+    law = friction.law_object()
+    static = "" if law.sticking == law.sliding(0.0) else f", {law.sticking:g} while sticking"
+    if law.constant:
+        return static
+    if isinstance(friction, TabulatedTable):
+        first, last = friction.speeds[0], friction.speeds[-1]
+        how = f"by a table of {len(friction.speeds)} speeds from {first:g} to {last:g} m/s, constant beyond"
+    else:
+        how = {"weakening": "falling exponentially", "hyperbolic": "falling as 1/(1 + delta v)"}[friction.law]
+    return f" ({how}{static})"
 
 
 def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
@@ -196,6 +212,11 @@ def _load_words(load: Load) -> str:
     parts = [f"{_vector(load.force)} N"] if any(load.force) else []
     parts += [f"{load.moment:g} N m"] if load.moment else []
     parts += [f"pressure {load.pressure:g} Pa"] if load.pressure else []
+    parts += [f"gravity {_vector(load.gravity)} m/s²"] if load.gravity is not None else []
+    if (turning := load.centrifugal) is not None:
+        about = "" if turning.axis is None else f" about {_vector(turning.axis)}"
+        through = "the origin" if turning.centre is None else f"{_vector(turning.centre)} m"
+        parts.append(f"centrifugal load of turning at {turning.speed:g} rad/s{about} round {through}")
     return ", ".join(parts or ["nothing"])
 
 
@@ -219,11 +240,12 @@ def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str
         normal = float(steady.normal_force[mine].sum())
         unit = "N/m" if np.isnan(nodes.area[mine]).any() else "N/m³"
         stiffness = "rigid" if table.stiffness == "rigid" else f"{table.stiffness:g} {unit}"
+        law = _law_words(table.friction)
         text = (
             f"  contact {name}: {table.slave} on {table.master}, {int(touching.sum())} of {int(mine.sum())} slave "
-            f"nodes touch, {stiffness}, {table.sliding} sliding, normal force {normal:.6g} N, resultant on the slave "
-            f"{_vector(tuple(float(f) for f in resultant.force))} N, slip speed up to "
-            f"{float(speeds[mine].max(initial=0.0)):g} m/s"
+            f"nodes touch, {stiffness}{f', friction{law}' if law else ''}, {table.sliding} sliding, normal force "
+            f"{normal:.6g} N, resultant on the slave {_vector(tuple(float(f) for f in resultant.force))} N, "
+            f"slip speed up to {float(speeds[mine].max(initial=0.0)):g} m/s"
         )
         if np.isfinite(resultant.largest_pressure):
             text += f", pressure up to {resultant.largest_pressure:.4g} Pa on {resultant.area:.4g} m²"

@@ -19,6 +19,7 @@ from ..mesh.boundary import require_boundary
 from ..mesh.facets import facet_areas, pressure_load, traction_load
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody, build_bodies
+from .body_loads import body_load
 from .imported import is_symmetric
 from .links import Links, links_of
 from .model import CubicSprings, Line, PrescribedMotion, Solid, Structure, System, constrain
@@ -163,6 +164,9 @@ def _references(case: Case) -> list[str]:
 
 def _load(case: Case, view: View, name: str, load: Load) -> Array:
     """Force vector (n,) of a load at factor one."""
+    if load.acts_on_bodies:
+        return body_load(case, view, name, load)
+    assert load.at is not None, "checked"
     at = case.place(load.at)
     body = view.bodies[at.body]
     if not isinstance(at, BoundaryRef):

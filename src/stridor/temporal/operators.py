@@ -7,6 +7,7 @@ along rows (Rᵀp), so the loop needs rows and nothing about elements.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,7 +17,8 @@ import scipy.sparse as sp
 
 from ..contact.interface import Contact
 from ..errors import AnalysisError
-from ..laws.friction import Coulomb, FrictionLaw, StaticKinetic, Weakening
+from ..laws import FrictionLaw
+from ..laws.packed import HEAD
 from ..system import System
 from ..typing import Array, IntArray, Sparse
 from .beta2 import Scheme
@@ -31,7 +33,7 @@ class ContactArrays(NamedTuple):
 
     kind: IntArray
     base: IntArray
-    friction: Array  # (m, 3): kinetic, static, decay speed
+    friction: Array  # (m, k): the laws' numbers, see laws.packed
     gap: Array
     table: IntArray  # first row in the table of all rows
     nodes_at: IntArray  # (m + 1,) offsets into nodes
@@ -85,18 +87,13 @@ class RowTable:
         return self.loads + 2 * self.motions
 
 
-def friction_numbers(law: FrictionLaw) -> tuple[float, float, float]:
-    """Kinetic and static coefficient and decay speed (0: none), as the compiled loop takes them."""
-    if isinstance(law, Coulomb):
-        return law.coefficient, law.coefficient, 0.0
-    if isinstance(law, StaticKinetic):
-        return law.coefficient, law.static_coefficient, 0.0
-    if isinstance(law, Weakening):
-        return law.coefficient, law.static_coefficient, law.decay_speed
-    raise AnalysisError(
-        f"the temporal approach has no compiled form of the friction law {type(law).__name__}; "
-        "it takes Coulomb, StaticKinetic and Weakening"
-    )
+def friction_rows(laws: Sequence[FrictionLaw]) -> Array:
+    """Laws (c, k) as rows of numbers (`laws.packed`), filled up with zeros to one width."""
+    rows = [law.numbers for law in laws]
+    table = np.zeros((len(rows), max((len(row) for row in rows), default=HEAD)))
+    for filled, row in zip(table, rows, strict=True):
+        filled[: len(row)] = row
+    return table
 
 
 def row_table(system: System) -> RowTable:
@@ -132,7 +129,7 @@ def row_table(system: System) -> RowTable:
     contacts = ContactArrays(
         kind=np.array(kind, dtype=np.int64),
         base=np.array(base, dtype=np.int64),
-        friction=np.array([friction_numbers(c.law) for c in system.contacts]).reshape(-1, 3),
+        friction=friction_rows([c.law for c in system.contacts]),
         gap=np.array([c.gap for c in system.contacts], dtype=float),
         table=np.array(table, dtype=np.int64),
         nodes_at=np.array(offsets, dtype=np.int64),

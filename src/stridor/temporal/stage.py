@@ -188,9 +188,8 @@ def _solve_all(
             old_n, old_t = state.normal[c], state.tangential[c]
             gap -= w_nn * old_n + w_nt * old_t
             slip -= w_nt * old_n + w_tt * old_t
-            kinetic, static, decay = contacts.friction[c, 0], contacts.friction[c, 1], contacts.friction[c, 2]
             normal, tangential, status = _solve_contact(
-                gap, slip, w_nn, w_nt, w_tt, kinetic, static, decay, state.status[c] == _STICK, scheme.step
+                gap, slip, w_nn, w_nt, w_tt, contacts.friction[c], state.status[c] == _STICK, scheme.step
             )
             scratch.delta[c] = status
             dn, dt = normal - old_n, tangential - old_t

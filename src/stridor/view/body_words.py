@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -61,9 +62,9 @@ def _sliding_words(sliding: SlidingTable | None) -> str:
 
 def contact_words(name: str, contact: Contact, *, on_line: bool) -> str:
     """One sentence about a contact; on_line: of a point on a beam, whose stiffness only the modes take."""
-    friction = contact.friction.model_dump()
+    friction = contact.friction.model_dump(exclude_none=True)
     law = friction.pop("law")
-    settings = ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in friction.items())
+    settings = ", ".join(f"{key.replace('_', ' ')} {_setting(value)}" for key, value in friction.items())
     unit = "N/m" if on_line else "N/m (of a point) or N/m³ (per area)"
     where = " in the modal approach" if on_line else ""
     stiffness = "rigid" if contact.stiffness == "rigid" else (
@@ -73,6 +74,15 @@ def contact_words(name: str, contact: Contact, *, on_line: bool) -> str:
         f"{name}: {contact.slave} slides on {contact.master} ({contact.sliding} sliding), {stiffness}{where}; "
         f"friction law {law}, {settings}."
     )
+
+
+def _setting(value: object) -> str:
+    """A number or a word as it is, a list of numbers by its ends."""
+    if isinstance(value, tuple):
+        numbers = cast("tuple[float, ...]", value)
+        shown = numbers if len(numbers) <= 4 else (*numbers[:2], "…", numbers[-1])
+        return ", ".join(n if isinstance(n, str) else f"{n:g}" for n in shown)
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def bodies_table(case: Case) -> Table:

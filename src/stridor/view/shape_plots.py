@@ -161,7 +161,7 @@ def _draw_case(ax: Axes, case: Case, reach: float) -> None:
             side = beside if beside[1] >= 0 else -beside
             _arrow(ax, at + side, speed, 0.16 * reach, GREEN, f"{np.hypot(*speed):g} m/s", away=False)
     for load in case.loads.values():
-        at = _place(case, load.at)
+        at = None if load.at is None else _place(case, load.at)
         if any(load.force) and at is not None:
             size = f"{np.linalg.norm(load.force):g} N"
             _arrow(ax, at, np.array(load.force), 0.16 * reach, VERMILION, size, away=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..agreement import GOOD_FREQUENCY, GOOD_GROWTH
+from ..case.schema import Load
 from .body_words import body_words, contact_words
 from .inputs import ReportInputs
 from .tables import Row, Table, drop_empty, significant
@@ -164,7 +165,10 @@ def model_in_words(inputs: ReportInputs) -> list[str]:
         parts = [f"{np.linalg.norm(load.force):g} N, ({components}) N"] if any(load.force) else []
         parts += [f"a pressure of {load.pressure:g} Pa"] if load.pressure else []
         parts += [f"a moment of {load.moment:g} N m"] if load.moment else []
-        lines.append(f"{name}: pushes {load.at} with {_listed(parts or ['nothing'])}.")
+        if load.acts_on_bodies:
+            lines.append(f"{name}: {_body_load(load)} on {_listed(list(load.bodies or ['all bodies']))}.")
+        else:
+            lines.append(f"{name}: pushes {load.at} with {_listed(parts or ['nothing'])}.")
     lines += [
         contact_words(name, contact, on_line=contact.master in case.beams) for name, contact in case.contacts.items()
     ]
@@ -187,12 +191,24 @@ def model_in_words(inputs: ReportInputs) -> list[str]:
     return lines
 
 
+def _body_load(load: Load) -> str:
+    """Weight and centrifugal load in words."""
+    parts: list[str] = []
+    if load.gravity is not None:
+        parts.append(f"gravity of ({', '.join(significant(g) for g in load.gravity)}) m/s²")
+    if load.centrifugal is not None:
+        parts.append(f"the centrifugal load of {significant(load.centrifugal.speed)} rad/s")
+    return _listed(parts)
+
+
 def simulation_table(inputs: ReportInputs) -> Table:
     """How the run in time was made."""
     case, run = inputs.case, inputs.trajectory
     lines: list[tuple[str, str]] = []
     for name, load in case.loads.items():
-        if any(load.force) or not load.pressure:
+        if load.acts_on_bodies:
+            lines.append((f"load {name}", _body_load(load)))
+        elif any(load.force) or not load.pressure:
             lines.append((f"force {name}", f"{np.linalg.norm(load.force):g} N"))
         if load.pressure:
             lines.append((f"pressure {name}", f"{load.pressure:g} Pa"))

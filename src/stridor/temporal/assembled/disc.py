@@ -20,9 +20,12 @@ import math
 
 from numba import njit
 
-from ...contact.multipliers import OPEN, SINGULAR, SLIP, STICK
+from ...contact.multipliers import OPEN, SINGULAR, SLIP, STICK, coefficient_at
+from ...laws import packed
+from ...typing import Array
 
 _OPEN, _STICK, _SLIP = OPEN, STICK, SLIP
+_CONSTANT, _STICKING, _KIND, _KINETIC = packed.CONSTANT, packed.STICKING, packed.KIND, packed.KINETIC
 NEWTON_STEPS = 60
 
 
@@ -45,14 +48,14 @@ def solve_disc(
     s1: float,
     s2: float,
     w: tuple[float, float, float, float, float, float],
-    friction: tuple[float, float, float],
+    law: Array,
     was_sticking: bool,
     step: float,
 ) -> tuple[float, float, float, int]:  # pragma: no cover - compiled
     """N ≥ 0, T1, T2 [N] and status from gap g and slip (s1, s2) [m] without this node's forces.
 
-    w: w_nn, w_n1, w_n2, w_11, w_12, w_22 [m/N]; friction: kinetic and static coefficient and decay speed [m/s], 0
-    meaning kinetic alone; step Δt [s] turns slip into speed. A node that W lets move along one line only closes its
+    w: w_nn, w_n1, w_n2, w_11, w_12, w_22 [m/N]; law: the friction law as a row of numbers (`laws.packed`); step Δt [s]
+    turns slip into speed. A node that W lets move along one line only closes its
     gap without friction.
     """
     if g >= 0.0 or w[0] <= 0.0:
@@ -60,7 +63,6 @@ def solve_disc(
     l1, l2, cosine, sine = _axes(w[3], w[4], w[5])
     a1, a2 = cosine * s1 + sine * s2, cosine * s2 - sine * s1
     b1, b2 = cosine * w[1] + sine * w[2], cosine * w[2] - sine * w[1]
-    kinetic, static, decay = friction
     # Sticking, with the immobile directions at rest or not at all.
     small = SINGULAR * max(l1, w[0])
     c1 = 1.0 / l1 if l1 > small else 0.0
@@ -71,12 +73,12 @@ def solve_disc(
     if not ((c1 == 0.0 and a1 != 0.0) or (c2 == 0.0 and a2 != 0.0)):
         normal = (-g + c1 * b1 * a1 + c2 * b2 * a2) / schur
         t1, t2 = -c1 * (a1 + b1 * normal), -c2 * (a2 + b2 * normal)
-        limit = static if was_sticking or decay > 0.0 else kinetic
+        limit = law[_STICKING] if was_sticking else coefficient_at(law, 0.0)[0]
         if normal >= 0.0 and t1 * t1 + t2 * t2 <= (limit * normal) ** 2:
             return normal, cosine * t1 - sine * t2, sine * t1 + cosine * t2, _STICK
-    if kinetic == 0.0 and (decay == 0.0 or static == 0.0):
+    if law[_KINETIC] == 0.0 and (law[_KIND] == _CONSTANT or law[_STICKING] == 0.0):
         return -g / w[0], 0.0, 0.0, _SLIP
-    normal, t1, t2 = _slide(g, a1, a2, w[0], b1, b2, l1, l2, kinetic, static, decay, step)
+    normal, t1, t2 = _slide(g, a1, a2, w[0], b1, b2, l1, l2, law, step)
     return normal, cosine * t1 - sine * t2, sine * t1 + cosine * t2, _SLIP
 
 
@@ -90,9 +92,7 @@ def _slide(
     w2: float,
     l1: float,
     l2: float,
-    kinetic: float,
-    static: float,
-    decay: float,
+    law: Array,
     step: float,
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """N and T in the axes of W where the node slips: the root of F(t)."""
@@ -100,7 +100,7 @@ def _slide(
     l1, l2 = scale * l1, scale * l2
     low, high = 0.0, 1.0
     size = math.sqrt(s1 * s1 + s2 * s2)
-    t = kinetic * (-g / w_nn) / (scale * size) if size > 0.0 else 0.5
+    t = coefficient_at(law, size / step)[0] * (-g / w_nn) / (scale * size) if size > 0.0 else 0.5
     t = min(max(t, 1e-12), 0.999)
     normal = t1 = t2 = 0.0
     for _ in range(NEWTON_STEPS):
@@ -115,16 +115,15 @@ def _slide(
         tangential = math.sqrt(t1 * t1 + t2 * t2)
         t1_slope, t2_slope = -r1 * f1 - c1 * w1 * slope, -r2 * f2 - c2 * w2 * slope
         rise = (t1 * t1_slope + t2 * t2_slope) / tangential if tangential > 0.0 else 0.0
-        mu, mu_slope = kinetic, 0.0
-        if decay > 0.0:
+        mu, mu_slope = law[_KINETIC], 0.0
+        if law[_KIND] != _CONSTANT:
             e1, e2 = (1.0 - t) / d1, (1.0 - t) / d2
             speed = math.sqrt((e1 * f1) ** 2 + (e2 * f2) ** 2) / step
-            drop = (static - kinetic) * math.exp(-speed / decay)
-            mu += drop
+            mu, falls = coefficient_at(law, speed)
             if speed > 0.0:
                 v1 = -l1 / (d1 * d1) * f1 + e1 * w1 * slope
                 v2 = -l2 / (d2 * d2) * f2 + e2 * w2 * slope
-                mu_slope = -drop / decay * (e1 * f1 * v1 + e2 * f2 * v2) / (speed * step * step)
+                mu_slope = falls * (e1 * f1 * v1 + e2 * f2 * v2) / (speed * step * step)
         excess = tangential - mu * normal
         if excess < 0.0:
             low = t

@@ -110,7 +110,7 @@ def _relax(
     w_nn = block[0, 0] + 2.0 * table.compliance[i]
     if d == 2:
         new[0], new[1], status = _solve_contact(
-            gap, s1, w_nn, block[0, 1], block[1, 1], law[0], law[1], law[2], state.status[i] == _STICK, step
+            gap, s1, w_nn, block[0, 1], block[1, 1], law, state.status[i] == _STICK, step
         )
         return status
     new[0], new[1], new[2], status = solve_disc(
@@ -118,7 +118,7 @@ def _relax(
         s1,
         s2,
         (w_nn, block[0, 1], block[0, 2], block[1, 1], block[1, 2], block[2, 2]),
-        (law[0], law[1], law[2]),
+        law,
         state.status[i] == _STICK,
         step,
     )

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from ...contact.nodes import ContactNodes
 from ...typing import Array, BoolArray, IntArray
-from ..operators import friction_numbers
+from ..operators import friction_rows
 from .storage import Layout
 
 
@@ -18,8 +18,8 @@ class NodeTable(NamedTuple):
 
     place (l,) among all places, gain (l,) [m/N] = displacement over the step by a unit force. Node i has entries
     ptr[i] … ptr[i+1]: col into place and row (entries, d). lift (m, d, p), gap (m,) [m], compliance (m,) [m/N],
-    block (m, d, d) [m/N] its own part of G A Gᵀ. owner (m,), friction (c, 3), along (m, d−1) the direction in which a
-    contact's tangential motion is told, weight (m,) for means without force.
+    block (m, d, d) [m/N] its own part of G A Gᵀ. owner (m,), friction (c, k) the numbers of the laws, along (m, d−1)
+    the direction in which a contact's tangential motion is told, weight (m,) for means without force.
     """
 
     place: IntArray
@@ -68,7 +68,7 @@ def node_table(nodes: ContactNodes, layout: Layout, gain: Array) -> NodeTable:
         compliance=np.array(nodes.compliance, dtype=float),
         block=block,
         owner=np.array(nodes.owner, dtype=np.int64),
-        friction=np.array([friction_numbers(law) for law in nodes.laws]).reshape(-1, 3),
+        friction=friction_rows(nodes.laws),
         along=sliding_directions(nodes),
         weight=np.where(np.isnan(nodes.area), 1.0, nodes.area),
     )
