@@ -57,7 +57,8 @@ def _usual(quantity: str, unit: str, least: float, most: float, *, typical: floa
 
 _UNITS = {
     "g_cm3": "g/cm³", "t_mm3": "t/mm³", "kg_mm3": "kg/mm³", "mm_s": "mm/s", "km_h": "km/h", "rpm": "turns a minute",
-    "N_mm": "N/mm", "N_mm3": "N/mm³", "Ns_mm": "N s/mm", "mm_s2": "mm/s²", "s_mm": "s/mm", "um": "µm", "us": "µs", "percent": "%",
+    "N_mm": "N/mm", "N_mm3": "N/mm³", "Ns_mm": "N s/mm",
+    "mm_s2": "mm/s²", "s_mm": "s/mm", "um": "µm", "us": "µs", "percent": "%",
 }  # fmt: skip
 
 LENGTH = _usual("a length", "m", 1e-4, 10.0, typical=0.1, mm=1e-3, um=1e-6)
