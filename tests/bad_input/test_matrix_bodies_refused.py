@@ -74,10 +74,9 @@ WITHIN = [
     ("range = [0.5, 5.0]", "range = [5.0, 0.5]", "parameters.Omega.range: [5.0, 0.5] – the first number must be below the second"),
     ("value = 2.0", 'value = "2.0"', "parameters.Omega.value: '2.0' – must be a number, the value of the parameter; write it without quotes"),
     ("Omega = {", "Omega = 3\nother = {", "parameters.Omega: 3 – must be a table with the keys value, range"),
-    ("[parameters]\nOmega =", "other =", "other: unknown key; accepted: title, parameters, materials, bodies, supports, loads, contacts, ties, "
-     "springs, dashpots, phases, modal, temporal, comparison, reference\n"
-     "bodies.brake.terms.1.factor: 'Omega**2' – no such parameter as 'Omega'; there are: mu, pi"),
-    ("[parameters]\nOmega =", "parametres =", "parametres: unknown key; did you mean 'parameters'? accepted: title, parameters, materials, bodies, "
+    ("[parameters]\nOmega =", "other =", "other: unknown key; accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, "
+     "springs, dashpots, phases, modal, temporal, comparison, reference"),
+    ("[parameters]\nOmega =", "parametres =", "parametres: unknown key; did you mean 'parameters'? accepted: title, units, parameters, materials, bodies, "
      "supports, loads, contacts, ties, springs, dashpots, phases, modal, temporal, comparison, reference"),
     ("Omega =", "sin = { value = 1.0 }\nOmega =", "parameters.sin: sin means something else in a factor; choose another name"),
     ("Omega =", "a-b = { value = 1.0 }\nOmega =", "parameters.a-b: a factor would read - as minus; take letters, digits and _"),

@@ -936,8 +936,9 @@ def test_rigid_contacts_that_share_slave_nodes() -> None:
     text += '[supports.hard]\nat = "rail.top"\nfixed = ["x", "y"]\nvelocity = { x = 0.1 }\n'
     text = changed(text, "normal = [0.0, 1.0]", "normal = [0.0, 1.0]\nsliding = { velocity = [0.1, 0.0] }")
     assert no_answer(text) == (
-        "steady sliding: rigid contact presses on the same freedoms twice (contacts: rub, again), so that its forces "
-        "cannot be told apart; give the contact a stiffness"
+        "steady sliding: rigid contact presses on the same freedoms twice: 5 of the 10 conditions of rigid contact follow "
+        "from the others (contacts.rub, contacts.again, supports.guide, supports.hard), so that their forces cannot be told apart; "
+        "give one of these contacts a stiffness, or remove it or a support"
     )
 
 

@@ -43,8 +43,11 @@ def shape_problems(bodies: Mapping[str, AnyBody]) -> Iterator[Problem]:
             yield from _obstacle_shape(where, body)
 
 
-def body_problems(bodies: Mapping[str, AnyBody]) -> Iterator[Problem]:
-    """Points off their bodies, vectors of the wrong length, bodies in the plane beside bodies in space."""
+def body_problems(bodies: Mapping[str, AnyBody], *, whole: bool = True) -> Iterator[Problem]:
+    """Points off their bodies, vectors of the wrong length, bodies in the plane beside bodies in space.
+
+    whole: whether these are all bodies of the case; where others are broken nothing is said of what lacks.
+    """
     for name, body in bodies.items():
         where = f"bodies.{name}"
         if isinstance(body, BeamBody):
@@ -57,7 +60,7 @@ def body_problems(bodies: Mapping[str, AnyBody]) -> Iterator[Problem]:
             yield from _sliding_problems(f"{where}.sliding", sliding, body.dimension)
         if isinstance(body, SolidBody):
             yield from _hidden_boundaries(where, body)
-    if bodies and all(isinstance(body, ObstacleBody) for body in bodies.values()):
+    if whole and bodies and all(isinstance(body, ObstacleBody) for body in bodies.values()):
         yield Problem("bodies", None, "only obstacles, which are rigid; a case needs a beam, a solid or a mass as well")
     plane = [name for name, body in bodies.items() if body.dimension == 2]
     space = [name for name, body in bodies.items() if body.dimension == 3]

@@ -85,7 +85,7 @@ def problems_between(parts: Parts) -> list[Problem]:
     return [
         *shapes,
         *_material_problems(parts),
-        *body_problems(parts.bodies),
+        *body_problems(parts.bodies, whole=not any(table == "bodies" for table, _ in parts.broken)),
         *matrix_problems(parts.bodies, parts.parameters, parts.names("parameters"), parts.contacts),
         *_support_problems(parts),
         *_load_problems(parts),

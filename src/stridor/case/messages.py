@@ -50,7 +50,8 @@ def problems_of(error: ValidationError, data: object, root: type[BaseModel]) -> 
     """One Problem for each place that `error` found wrong in `data`, validated as `root`."""
     found: dict[str, Problem] = {}
     misspelt: set[str] = set()
-    missing: list[str] = []
+    missing: dict[str, tuple[str | int, ...]] = {}
+    unknown: dict[tuple[str | int, ...], str] = {}  # the first unclear key of a table
     for item in error.errors(include_url=False, include_input=False, include_context=False):
         kind, location = item["type"], item["loc"]
         place = _reach(location, data, root)
@@ -58,9 +59,11 @@ def problems_of(error: ValidationError, data: object, root: type[BaseModel]) -> 
             problem, meant = _unknown_key(place)
             if meant:
                 misspelt.add(dotted((*place.path[:-1], meant)))
+            else:
+                unknown.setdefault(place.path[:-1], problem.where)
         elif kind == "missing" and not isinstance(location[-1], int):
             problem = Problem(dotted(place.path), None, f"missing – give {place.description}")
-            missing.append(problem.where)
+            missing[problem.where] = place.path
         elif location and location[-1] == "[key]":
             problem = _bad_key(place)
         elif kind in ("union_tag_not_found", "union_tag_invalid"):
@@ -68,7 +71,16 @@ def problems_of(error: ValidationError, data: object, root: type[BaseModel]) -> 
         else:
             problem = _bad_value(place)
         found.setdefault(problem.where, problem)
-    return [problem for where, problem in found.items() if not (where in missing and where in misspelt)]
+    for where, path in missing.items():
+        if where in misspelt:
+            del found[where]
+        elif path[:-1] in unknown:
+            # Most likely the one under another name: one line for both.
+            other = found[unknown[path[:-1]]]
+            said = f"{other.accepted}; {path[-1]} is missing"
+            found[other.where] = Problem(other.where, other.given, said)
+            del found[where]
+    return list(found.values())
 
 
 def _reach(location: Sequence[str | int], data: object, root: type[BaseModel]) -> _Place:

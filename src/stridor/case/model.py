@@ -213,9 +213,12 @@ def _sound(data: Mapping[str, Any], error: ValidationError) -> Parts:
     faults = {item["loc"][:2] for item in errors}
     unknown = [str(item["loc"][0]) for item in errors if item["type"] == "extra_forbidden" and len(item["loc"]) == 1]
     misspelt = {nearest(key, Case.model_fields) for key in unknown}
+    unclear = "" in misspelt  # any table that is not there may be the one
     for table, kind in ENTRIES.items():
         entries = data.get(table, {})
-        if not isinstance(entries, dict) or (table not in data and (table in misspelt or table == "bodies")):
+        if not isinstance(entries, dict) or (
+            table not in data and (unclear or table in misspelt or table == "bodies")
+        ):
             parts.broken.add((table, "*"))
             continue
         sound: dict[str, Any] = {}

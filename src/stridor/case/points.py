@@ -73,6 +73,8 @@ def parse_place(
         return PointRef(head, 0.0, body.position)
     if isinstance(body, ObstacleBody):
         raise CaseError(where, reference, "an obstacle has no points or boundaries; only a contact's master is one")
+    if head and body is None and not at and not point and any(isinstance(b, MassBody) for b in bodies.values()):
+        raise CaseError(where, reference, no_such("body", head, bodies))
     if not head or not (distance if at else point):
         first = head if body is not None else next(iter(bodies), "beam1")
         example = f"{first}.{_first_point(bodies.get(first), boundary=boundary)}"

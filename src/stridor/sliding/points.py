@@ -17,6 +17,7 @@ import scipy.sparse.linalg as spl
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray
+from .redundant import closed, redundant
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def _external_force(system: System, load_factors: Mapping[str, float] | None) ->
 def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: Array) -> SteadySliding:
     count = len(system.contacts)
     active = np.ones(count, dtype=bool)
-    displacement, normal = np.zeros(system.size), np.zeros(count)
+    displacement, normal, gaps = np.zeros(system.size), np.zeros(count), np.zeros(count)
     residual = 0.0
     for _ in range(2 * count + 2):
         displacement, normal, residual = _solve(system, force, mu, sense, active)
@@ -106,6 +107,8 @@ def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: A
         active = (active & ~pulled) | closing
     else:
         raise AnalysisError("steady sliding: the set of touching contacts does not settle")
+    if twice := _twice(system, closed(active, gaps, displacement)):
+        raise AnalysisError(twice)
     if count and not active.any():
         names = ", ".join(c.name for c in system.contacts)
         raise AnalysisError(
@@ -116,6 +119,8 @@ def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: A
 
 
 def _solve(system: System, force: Array, mu: Array, sense: Array, active: BoolArray) -> tuple[Array, Array, float]:
+    if twice := _twice(system, active):
+        raise AnalysisError(twice)
     touching = [k for k in range(len(system.contacts)) if active[k]]
     contacts = [system.contacts[k] for k in touching]
     normals = np.array([c.normal_row for c in contacts]).reshape(len(contacts), system.size)
@@ -152,6 +157,12 @@ def _solve(system: System, force: Array, mu: Array, sense: Array, active: BoolAr
     normal = np.zeros(len(system.contacts))
     normal[touching] = answer[size:] * scale
     return answer[:size], normal, residual
+
+
+def _twice(system: System, active: BoolArray) -> str:
+    """What is said where rigid contacts press on the same freedoms, "" where none do."""
+    rigid = active & np.array([c.compliance == 0.0 for c in system.contacts], dtype=bool)
+    return redundant(system, system.contact_nodes(), rigid) if np.count_nonzero(rigid) > 1 else ""
 
 
 def _loose(displacement: Array, system: System) -> bool:

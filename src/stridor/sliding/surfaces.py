@@ -20,6 +20,7 @@ from ..system import System
 from ..typing import Array, BoolArray, Sparse
 from .equilibrium import Equilibrium, State, settle
 from .points import full_motion
+from .redundant import closed, redundant
 from .resultants import Balance, Resultant, balance, resultants
 
 # Slip below this part of the fastest node's is that of the centre of a spin: its direction is rounding.
@@ -94,6 +95,9 @@ def steady_sliding_nodes(
         raise AnalysisError(_loose(system, nodes, error.motion)) from error
     residual = equilibrium.residual(state)
     _require_held(system, nodes, state, residual)
+    touches = closed(state.active, state.gap, state.displacement)
+    if twice := redundant(system, nodes, touches & (nodes.compliance == 0.0)):
+        raise AnalysisError(twice)
     active = state.active & (state.normal_force > 0.0)
     if nodes.count and not active.any():
         raise AnalysisError(
@@ -183,14 +187,9 @@ def _require_slip(nodes: ContactNodes, slips: BoolArray, coefficient: Array) -> 
 
 
 def _loose(system: System, nodes: ContactNodes, motion: Array | None) -> str:
+    if twice := redundant(system, nodes, nodes.compliance == 0.0):
+        return twice
     n = system.size
-    if motion is not None and len(motion) > n:
-        most = float(np.abs(motion[n:]).max())
-        if float(np.abs(motion[:n]).max(initial=0.0)) < 1e-6 * most:
-            return (
-                "steady sliding: rigid contact presses on the same freedoms twice (contacts: "
-                f"{', '.join(nodes.names)}), so that its forces cannot be told apart; give the contact a stiffness"
-            )
     who = "the structure" if motion is None else _moved_most(system, np.abs(motion[:n]))
     return (
         f"steady sliding has no equilibrium: {who} can move freely under the loads; fix a freedom of the loose "

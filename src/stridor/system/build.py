@@ -20,6 +20,7 @@ from ..mesh.facets import facet_areas, pressure_load, traction_load
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody, build_bodies
 from .body_loads import body_load
+from .holders import holders_of
 from .imported import is_symmetric
 from .links import Links, links_of
 from .model import CubicSprings, Line, PrescribedMotion, Solid, Structure, System, constrain
@@ -85,6 +86,7 @@ def build_system(case: Case, mu: float | None = None) -> System:
         initial_displacement=_initial(case, view, "initial_displacement"),
         stress_stiffness=_stress_stiffness(case, view),
         general=_general(mass, damping, stiffness) if case.imported else "",
+        holders=holders_of(case, view, contacts, surfaces),
     )
 
 

@@ -94,7 +94,7 @@ class System:
     the linear; initial_velocity (n,) [m/s] and initial_displacement (n,) [m] of bodies that start so; stress_stiffness
     gives the geometric stiffness (n, n) csr that the stresses of a displacement (n,) [m] make, None where no body
     has any. general: why its matrices, imported ones, are not all symmetric with a positive definite mass, as all
-    others are; "" where they are.
+    others are; "" where they are. holders: contact → paths of the supports and ties at its nodes.
     """
 
     mass: Sparse
@@ -114,6 +114,7 @@ class System:
     initial_displacement: Array | None = None
     stress_stiffness: Callable[[Array], Sparse] | None = None
     general: str = ""
+    holders: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness"):
