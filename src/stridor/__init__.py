@@ -15,6 +15,7 @@ Names are imported when first used, so that ``import stridor`` costs next to not
 from __future__ import annotations
 
 from importlib import import_module
+from time import time_ns
 from typing import TYPE_CHECKING, Any
 
 from .errors import AnalysisError, CaseError, StridorError
@@ -71,6 +72,7 @@ _HOMES = {
     "to_dataset": ".io.datasets",
 }
 
+STARTED_NS = time_ns()  # sources written later are not those that this process runs
 __version__ = "0.1.0"
 __all__ = [
     "AnalysisError",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import logging
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -115,6 +116,8 @@ class Call:
 def _common(
     case: CaseFile, set_: Set = None, solver: Solver = None, out: Out = None, json: Json = False, quiet: Quiet = False
 ) -> Call:
+    if quiet:
+        logging.getLogger("stridor").setLevel(logging.ERROR)
     return Call(case, set_, solver, out, json, quiet)
 
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.spatial import cKDTree
 
+from ..kernels import njit
 from ..mesh.facets import Chain, chain_of
 from ..mesh.model import Blocks
 from ..typing import Array, IntArray

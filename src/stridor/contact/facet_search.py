@@ -6,8 +6,8 @@ Reference places are (ξ, η) of the triangle (0, 0), (1, 0), (0, 1) and the squ
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..kernels import njit
 from ..typing import Array, BoolArray, IntArray
 
 NEWTON_STEPS = 25

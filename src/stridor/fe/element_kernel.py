@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..kernels import njit
 from ..typing import Array, IntArray
 
 # Volume of a cell's reference directions as mapped over that of a box with the same edges, below which it is flat.

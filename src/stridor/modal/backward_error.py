@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
+from ..kernels import njit
 from ..typing import Array, ComplexArray, IntArray, Sparse
 from .coupling import Coupling
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..kernels import njit
 from ..system.uncoupled import UncoupledModes
 from ..typing import Array, ComplexArray, IntArray
 

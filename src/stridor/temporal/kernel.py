@@ -8,8 +8,8 @@ when due; then one pass adds the forces, completes u_{n+1} and predicts t_{n+2}.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..kernels import njit
 from ..typing import Array
 from .beta2 import Scheme
 from .borrow import borrow

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from ..kernels import njit
 from ..typing import Array, IntArray
 from .beta2 import Scheme
 from .layout import FAST, Fields, ModalRows

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from ..kernels import njit
 from ..typing import Array, IntArray
 from .beta2 import Scheme
 from .layout import FAST, Fields, NodalRows

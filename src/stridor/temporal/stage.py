@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from numba import njit
-
 from ..contact import multipliers, surface
+from ..kernels import njit
 from ..typing import Array, IntArray
 from .beta2 import Scheme
 from .operators import FINITE, ContactArrays

@@ -18,9 +18,8 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from ...contact.multipliers import OPEN, SINGULAR, SLIP, STICK, coefficient_at
+from ...kernels import njit
 from ...laws import packed
 from ...typing import Array
 

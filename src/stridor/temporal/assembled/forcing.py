@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit
-
+from ...kernels import njit
 from ...typing import Array, IntArray
 from ..stage import DAMPING, EXTERNAL, SUPPORT
 from .products import Fields, Structure

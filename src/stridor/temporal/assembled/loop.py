@@ -17,8 +17,7 @@ stored: exact to rounding, whatever acts. Cubic springs count as stored what was
 
 from __future__ import annotations
 
-from numba import njit
-
+from ...kernels import njit
 from ...typing import Array
 from ..stage import DAMPING, FRICTION, NORMAL
 from .forcing import (

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import get_num_threads, njit, prange
+from numba import get_num_threads, prange
 
+from ...kernels import njit
 from ...typing import Array, IntArray
 from ..layout import FAST
 from .lanes import rows2, rows3

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ...kernels import njit
 from ...typing import Array, IntArray
 from ..stage import (
     DAMPING,

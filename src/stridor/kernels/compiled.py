@@ -1,0 +1,33 @@
+"""numba's ``njit``, with our folder and our linking."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numba
+from numba.core import config
+
+from .folder import kernel_folder
+from .linking import Closed
+from .store import KernelCache
+
+_settings: Any = config
+
+
+def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **options: Any) -> Any:
+    """Compile a function at its first call, with the options of numba's ``njit``; ``cache`` keeps the machine code.
+
+    Used as ``@njit``, ``@njit(cache=True, …)`` or ``njit(cache=True)(function)``. Where no folder can be written the
+    function is compiled by every process that calls it.
+    """
+
+    def made(plain: Callable[..., Any]) -> Any:
+        dispatcher: Any = numba.njit(pipeline_class=Closed, **options)(plain)
+        if cache and not _settings.DISABLE_JIT:  # which gives the plain function back
+            folder = kernel_folder()
+            if folder is not None:
+                dispatcher._cache = KernelCache(plain, folder, options)
+        return dispatcher
+
+    return made if function is None else made(function)

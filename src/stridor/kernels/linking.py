@@ -1,0 +1,49 @@
+"""Machine code that is closed in itself, so that it does the same in every process.
+
+A compiled function carries copies of the functions that it calls, optimised once more in their new place: sums may be
+taken in another order there and multiply-adds fused differently. numba marks these copies as weak: the first
+definition of that name in the process is taken for all. In a process that compiles, that is the callee's own, which
+was there first; in one that loads the finished caller, nobody has asked for the callee, and it is the copy. Both are
+right, but they round differently, and which one runs depends on what ran before. Here the copies become private to
+the caller's object code, after all optimisation: it is the code that a process with a filled cache would run.
+"""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+
+_Library: Any = JITCodeLibrary
+_Compiler: Any = Compiler
+
+
+class ClosedLibrary(_Library):
+    """The code of one function, whose copies of other functions nobody else sees or replaces."""
+
+    def _finalize_final_module(self) -> None:
+        own = cast("Any", self)
+        # What other functions are compiled with: as numba leaves it, with names that can be met again. Made first,
+        # because a private function could not be linked by its name.
+        own._finalized = True
+        own._get_module_for_linking()
+        own._finalized = False
+        if own._shared_module is own._final_module:
+            own._shared_module = own._final_module.clone()
+        for function in own._final_module.functions:
+            if not function.is_declaration and function.linkage.name == "linkonce_odr":
+                function.linkage = "internal"
+        super()._finalize_final_module()
+
+
+class Closed(_Compiler):
+    """numba's compiler, writing into a ``ClosedLibrary``."""
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile from bytecode."""
+        state = cast("Any", self).state
+        if state.library is None:
+            state.library = ClosedLibrary(state.targetctx.codegen(), func.__qualname__)
+            state.library.enable_object_caching()
+        return super().compile_extra(func)
