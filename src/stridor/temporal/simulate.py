@@ -155,6 +155,8 @@ class _Run:
         machine, schedule = self.machine, self.schedule
         interrupted = False
         try:
+            machine.run(0, schedule, self.record)  # compiles the loop or loads it, before the clock starts
+            started = last_saved = clock.perf_counter()
             while (done := int(machine.state.counters[0])) < schedule.steps:
                 stretch = schedule.stretch_at(done)
                 size = min(CHUNK, stretch.last - done)

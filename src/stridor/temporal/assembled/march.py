@@ -134,6 +134,8 @@ class _Run:
         interrupted = False
         pace = Pace(machine.threaded)
         try:
+            machine.run(0, schedule, self.record)  # compiles the loop or loads it, before the clock starts
+            started = last_saved = last_told = clock.perf_counter()
             while machine.done < schedule.steps:
                 if self.finite and machine.done >= self.renewal:
                     self._renew()
