@@ -1,7 +1,7 @@
 """Compiled functions: where their machine code is kept, for which sources, and that it is the same each time.
 
 Every compiled function of stridor is made by the ``njit`` of this module. It takes the options of numba's and differs
-from it in two things. What it keeps lies in a folder named after all sources of stridor (numba looks at the file of
+from it in two things. What it keeps lies in a folder named after the sources of stridor (numba looks at the file of
 the function alone, and would go on with the old code of what the function calls: ``folder``, ``sources``, ``store``).
 And the process that compiles runs the same machine code as those that load it (``linking``).
 """

@@ -1,4 +1,4 @@
-"""What compiled code depends on: all sources of stridor, the compiler, and the processor it is for."""
+"""What compiled code depends on: the sources of stridor, the compiler, and the processor it is for."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ from numba.core import config
 
 PACKAGE = __name__.partition(".")[0]
 SUFFIXES = (".py", ".pyc")  # the latter where a package is installed without its sources
+# Layers above all that is compiled, which nothing below may import (the contract of import-linter): no kernel can
+# depend on them, and whoever works on them need not wait for the time loop to be compiled again.
+ABOVE = ("app", "io", "view", "study", "agreement")
 # Settings of numba that change the code it makes.
 _SETTINGS = (
     "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "USING_SVML", "DISABLE_INTEL_SVML", "CPU_NAME",
@@ -30,7 +33,7 @@ _SETTINGS = (
 @dataclass(frozen=True)
 class Sources:
     """The package as it lies on the disk. place: its folder or archive; files: what to look at to see it change;
-    digest: of the names and contents of all its modules."""
+    digest: of the names and contents of all its modules but those above what is compiled."""
 
     place: str
     files: tuple[str, ...]
@@ -62,7 +65,8 @@ def read_sources() -> Sources | None:
 def _from_folder(top: str) -> Sources | None:
     found: list[str] = []
     for folder, inner, names in os.walk(top):
-        inner[:] = [name for name in inner if name != "__pycache__"]
+        left_out = ("__pycache__", *ABOVE) if folder == top else ("__pycache__",)
+        inner[:] = [name for name in inner if name not in left_out]
         found += [os.path.join(folder, name) for name in names if name.endswith(SUFFIXES)]
     if not found:
         return None
@@ -83,6 +87,7 @@ def _from_archive(archive: str, top: str) -> Sources | None:
             (entry.filename, entry.file_size, entry.CRC)
             for entry in file.infolist()
             if entry.filename.startswith(inside) and entry.filename.endswith(SUFFIXES)
+            and entry.filename.removeprefix(inside).partition("/")[0] not in ABOVE
         )
     if not found:
         return None
