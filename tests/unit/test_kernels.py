@@ -27,7 +27,7 @@ PACKAGE = Path(stridor.__file__).parent
 
 # A kernel whose own file stays as it is, while what it calls is changed below it.
 CALLER = """
-import numba
+import numpy as np
 
 from stridor.kernels import njit
 from stridor.contact import multipliers
@@ -36,14 +36,17 @@ _solve_contact = njit(cache=True)(multipliers.solve_contact)
 
 
 @njit(cache=True)
-def slide(gap, slip):
-    return _solve_contact(gap, slip, 1.0, 0.1, 2.0, 0.3, 0.3, 0.0, False, 1e-6)
+def slide(gap, slip, law):
+    return _solve_contact(gap, slip, 1.0, 0.1, 2.0, law, False, 1e-6)
+
+
+LAW = np.array([0.0, 0.3, 0.3, 0.0, 0.0])  # a constant coefficient, as `laws.packed` has it
 
 
 if __name__ == "__main__":
     import caller
 
-    normal, tangential, status = caller.slide(-1.0, 5.0)
+    normal, tangential, status = caller.slide(-1.0, 5.0, caller.LAW)
     print(repr(normal), repr(tangential), status, sum(caller.slide.stats.cache_hits.values()))
 """
 
@@ -234,7 +237,7 @@ def test_what_is_kept_survives_damage(tmp_path):
 # -- where nothing can be written
 # ----------------------------------------------------------------------------------------------------------
 
-SLIDE = "import caller; print(caller.slide(-1.0, 5.0)[2], sum(caller.slide.stats.cache_hits.values()))"
+SLIDE = "import caller; print(caller.slide(-1.0, 5.0, caller.LAW)[2], sum(caller.slide.stats.cache_hits.values()))"
 
 
 def test_without_a_home_temporary_files_serve_and_a_note_says_so_once(tmp_path):
