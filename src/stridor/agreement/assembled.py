@@ -103,7 +103,10 @@ def _march(
         settings, step=step, initial="steady-sliding", perturbation=0.0, watch=(), record_every=every
     )
     length = duration or PERIODS * 2 * np.pi / slowest
-    return simulate(system, [PhaseSpec("perturbed", length, {}, {})], start, mu=mu, disturbance=disturbance)
+    loads = system.load_steps[-1].loads if system.load_steps else {}
+    velocities = dict(zip(system.motion.names, full_motion(system).tolist(), strict=True))
+    phase = PhaseSpec("perturbed", length, loads, velocities)
+    return simulate(system, [phase], start, mu=mu, disturbance=disturbance)
 
 
 def _signal(run: Trajectory, node: int, steady: Array, speed: float) -> Array:

@@ -114,6 +114,8 @@ def modes(
             )
     for m, sentence in zip(result.mu, result.completeness, strict=bool(result.completeness)):
         stdout.print(f"{f'μ = {m:g}: ' if len(result.mu) > 1 else ''}{sentence}", markup=False)
+    if result.contact_state:
+        stdout.print(f"{result.contact_state}; held so at every μ", markup=False)
     if len(result.mu) > 5:
 
         call.say(f"{len(result.mu)} friction coefficients; first and last shown, all in the file")
@@ -151,6 +153,8 @@ def onsets(
     if call.json:
         call.document(result.to_json())
         return
+    if result.contact_state:
+        stdout.print(f"{result.contact_state}; held so over the range of μ", markup=False)
     if not result.onsets:
         low, high = result.friction_range
         stdout.print(f"no onset for μ in {low:g} … {high:g} up to {result.max_frequency_hz:g} Hz")

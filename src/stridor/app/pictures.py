@@ -125,7 +125,7 @@ def write_steady(case: Case, steady: SurfaceSliding, folder: Path) -> list[Path]
         tangential_force=steady.friction_force[None],
         slip_velocity=steady.slip_velocity[None],
         gap=steady.gap[None],
-        status=np.where(steady.active, 2, 0)[None],
+        status=steady.status[None],
     )
     files: list[Path] = []
     for k, name in enumerate(nodes.names):
@@ -137,6 +137,7 @@ def write_steady(case: Case, steady: SurfaceSliding, folder: Path) -> list[Path]
             figure.savefig(temporary, dpi=180)
         files.append(path)
     contact = {"normal_force": steady.normal_force, "active": steady.active.astype(np.int64), "gap": steady.gap}
+    contact |= {"status": steady.status, "friction_force": np.linalg.norm(steady.friction_force, axis=1)}
     if not np.isnan(nodes.area).any():
         contact["pressure"] = steady.normal_force / nodes.area
     files += write_vtk(
@@ -147,6 +148,8 @@ def write_steady(case: Case, steady: SurfaceSliding, folder: Path) -> list[Path]
 
 def steady_document(steady: SurfaceSliding) -> dict[str, Any]:
     """What `stridor steady --json` prints."""
+    names = ("open", "stick", "slip")
+    counted = {name: int(np.count_nonzero(steady.status == code)) for code, name in enumerate(names)}
     return {
         "contacts": {
             name: {
@@ -159,6 +162,7 @@ def steady_document(steady: SurfaceSliding) -> dict[str, Any]:
         },
         "touching_nodes": int(steady.active.sum()),
         "nodes": len(steady.active),
+        "status": counted,
         "residual": steady.residual,
         "force_error": float(steady.balance.force_error),
         "moment_error": float(steady.balance.moment_error),

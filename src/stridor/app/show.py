@@ -55,7 +55,8 @@ def show_steady(document: dict[str, Any]) -> None:
     columns = ["contact", "force on the slave [N]", "moment [N m]", "area [m²]", "largest pressure [Pa]"]
     table("steady sliding", columns, rows)
     stdout.print(
-        f"{document['touching_nodes']} of {document['nodes']} slave nodes touch; every freedom is in equilibrium to "
+        f"{document['touching_nodes']} of {document['nodes']} slave nodes touch, {document['status']['stick']} stick "
+        f"and {document['status']['slip']} slip; every freedom is in equilibrium to "
         f"{document['residual']:.1e} of the largest force"
     )
 

@@ -31,6 +31,8 @@ from .schema import (
     Phase,
     Reference,
     Spring,
+    Steady,
+    SteadyStep,
     Support,
     TabulatedTable,
     Temporal,
@@ -60,6 +62,7 @@ class Parts:
     springs: Mapping[str, Spring] = field(default_factory=dict[str, Spring])
     dashpots: Mapping[str, Dashpot] = field(default_factory=dict[str, Dashpot])
     phases: tuple[Phase, ...] = DEFAULT_PHASES
+    steady: Steady = field(default_factory=Steady)
     modal: Modal = field(default_factory=Modal)
     temporal: Temporal = field(default_factory=Temporal)
     comparison: Comparison = field(default_factory=Comparison)
@@ -93,6 +96,7 @@ def problems_between(parts: Parts) -> list[Problem]:
         *_tie_problems(parts),
         *_link_problems(parts),
         *_phase_problems(parts),
+        *_steady_problems(parts),
         *_setting_problems(parts),
         *_reference_problems(parts),
     ]
@@ -359,8 +363,7 @@ def position_of(body: AnyBody, point: PointRef) -> tuple[float, ...]:
 
 def _phase_problems(parts: Parts) -> Iterator[Problem]:
     seen: set[str] = set()
-    moving = [name for name, support in parts.supports.items() if support.velocity]
-    moving += [name for name, body in parts.bodies.items() if getattr(body, "sliding", None) is not None]
+    moving = _moving(parts)
     for name in sorted(set(parts.supports) & set(parts.bodies)):
         if moving.count(name) > 1:
             yield Problem(f"supports.{name}", None, f"bodies.{name} slides under the same name; rename the support")
@@ -373,17 +376,43 @@ def _phase_problems(parts: Parts) -> Iterator[Problem]:
             yield Problem(
                 f"{where}.ramp", phase.ramp, f"must not be longer than the phase, {phase.duration:.9g} s"
             )
-        for name, factor in phase.loads.items():
-            if name not in parts.loads and not parts.is_broken("loads", name):
-                yield Problem(f"{where}.loads.{name}", factor, no_such("load", name, parts.names("loads")))
-        for name, factor in phase.velocities.items():
-            if name in parts.supports and name not in moving:
-                yield Problem(f"{where}.velocities.{name}", factor, f"supports.{name} has no velocity")
-            elif name in parts.bodies and name not in moving:
-                yield Problem(f"{where}.velocities.{name}", factor, f"bodies.{name} has no sliding")
-            elif name not in moving and not any(parts.is_broken(t, name) for t in ("supports", "bodies")):
-                accepted = no_such("support with a velocity", name, moving)
-                yield Problem(f"{where}.velocities.{name}", factor, accepted)
+        yield from _factor_problems(parts, where, phase, moving)
+
+
+def _factor_problems(parts: Parts, where: str, phase: Phase | SteadyStep, moving: list[str]) -> Iterator[Problem]:
+    """Factors of loads and motions that are not there; moving: names of the motions."""
+    for name, factor in phase.loads.items():
+        if name not in parts.loads and not parts.is_broken("loads", name):
+            yield Problem(f"{where}.loads.{name}", factor, no_such("load", name, parts.names("loads")))
+    for name, factor in phase.velocities.items():
+        if name in parts.supports and name not in moving:
+            yield Problem(f"{where}.velocities.{name}", factor, f"supports.{name} has no velocity")
+        elif name in parts.bodies and name not in moving:
+            yield Problem(f"{where}.velocities.{name}", factor, f"bodies.{name} has no sliding")
+        elif name not in moving and not any(parts.is_broken(t, name) for t in ("supports", "bodies")):
+            accepted = no_such("support with a velocity", name, moving)
+            yield Problem(f"{where}.velocities.{name}", factor, accepted)
+
+
+def _moving(parts: Parts) -> list[str]:
+    """Names of what moves with a prescribed velocity."""
+    moving = [name for name, support in parts.supports.items() if support.velocity]
+    return moving + [name for name, body in parts.bodies.items() if getattr(body, "sliding", None) is not None]
+
+
+def _steady_problems(parts: Parts) -> Iterator[Problem]:
+    steady = parts.steady
+    if steady.friction == "sliding" and steady.steps:
+        accepted = 'nothing – load steps have no effect where every contact slides; write friction = "stick-slip"'
+        yield Problem("steady.steps", f"{len(steady.steps)} steps", accepted)
+    if steady.friction == "stick-slip" and not parts.contacts and not parts.names("contacts"):
+        yield Problem("steady.friction", steady.friction, "needs contacts that can stick, and the case has none")
+    for number, step in enumerate(steady.steps):
+        where = f"steady.steps.{number}"
+        yield from _factor_problems(parts, where, step, _moving(parts))
+        if step.duration is not None and not _moving(parts):
+            accepted = "nothing – no support moves, so that the step takes no time"
+            yield Problem(f"{where}.duration", step.duration, accepted)
 
 
 def _setting_problems(parts: Parts) -> Iterator[Problem]:

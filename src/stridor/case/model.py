@@ -32,6 +32,7 @@ from .schema import (
     Phases,
     Reference,
     Spring,
+    Steady,
     Support,
     Table,
     Temporal,
@@ -66,6 +67,7 @@ class Case(Table):
     springs: Mapping[Name, Spring] = Field(default_factory=dict[str, Spring], description="tables [springs.NAME]")
     dashpots: Mapping[Name, Dashpot] = Field(default_factory=dict[str, Dashpot], description="tables [dashpots.NAME]")
     phases: Phases = Field(default=DEFAULT_PHASES, description="a list of tables [[phases]]")
+    steady: Steady = Field(default=Steady(), description="a table [steady]")
     modal: Modal = Field(default=Modal(), description="a table [modal]")
     temporal: Temporal = Field(default=Temporal(), description="a table [temporal]")
     comparison: Comparison = Field(default=Comparison(), description="a table [comparison]")
@@ -230,6 +232,7 @@ def _sound(data: Mapping[str, Any], error: ValidationError) -> Parts:
         setattr(parts, table, sound)
     sections: dict[str, Any] = {
         "phases": Phases,
+        "steady": Steady,
         "modal": Modal,
         "temporal": Temporal,
         "comparison": Comparison,

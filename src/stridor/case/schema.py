@@ -350,6 +350,39 @@ class Temporal(Table):
     watch: tuple[str, ...] = Field(default=(), description=f"a list of points, each {POINT[8:]}")
 
 
+class SteadyStep(Table):
+    """[[steady.steps]]: loads and motions that change in equal increments, where friction may stick.
+
+    A factor not given stays as in the step before, in the first step it is 1.
+    """
+
+    loads: Mapping[str, Number] = Field(
+        default_factory=dict[str, float],
+        description="a table of loads, each a number, the factor of the load at the end of the step",
+    )
+    velocities: Mapping[str, Number] = Field(
+        default_factory=dict[str, float],
+        description="a table of supports, each a number, the factor of the support's velocity in this step",
+    )
+    duration: Positive | None = Field(
+        default=None,
+        description="a number > 0 [s], how long the supports move (left out: until all that they move slides)",
+    )
+    increments: Annotated[int, Field(strict=True, ge=1)] = Field(
+        default=10, description="a whole number >= 1, the equal parts in which the step is solved"
+    )
+
+
+class Steady(Table):
+    """[steady]: how the static equilibrium that the analyses start from comes about."""
+
+    friction: Literal["sliding", "stick-slip"] = Field(
+        default="sliding",
+        description='"sliding" (every contact slides as the supports have it) or "stick-slip" (load steps)',
+    )
+    steps: tuple[SteadyStep, ...] = Field(default=(), description="a list of tables [[steady.steps]]")
+
+
 class Comparison(Table):
     """[comparison]: what modal and temporal approach are compared at."""
 

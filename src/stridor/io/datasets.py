@@ -160,6 +160,8 @@ def _modes(result: ComplexModes) -> Any:
     data = _dataset("modes", variables, coords, result)
     if result.completeness:
         data.attrs["completeness"] = json.dumps(result.completeness)
+    if result.contact_state:
+        data.attrs["contact_state"] = result.contact_state
     data.attrs["damped"] = int(result.damped)
     return data
 
@@ -190,6 +192,8 @@ def _onsets(result: Onsets) -> Any:
     data.attrs["friction_range"] = list(result.friction_range)
     if result.completeness:
         data.attrs["completeness"] = result.completeness
+    if result.contact_state:
+        data.attrs["contact_state"] = result.contact_state
     return data
 
 

@@ -35,7 +35,8 @@ class ComplexModes:
     right, left (k, b, n) unit vectors where asked for, else None. damped: whether C was used.
     open_contacts: contacts that carry no load in steady sliding and so take no part. completeness: of matrices without
     structure, for each μ what speaks for no mode of the band being missed, and what the numbers are if branches could
-    not be followed; where a branch has left the band there is NaN.
+    not be followed; where a branch has left the band there is NaN. contact_state: where contacts may stick, how many
+    nodes stick, slip and are open, and at which μ; they do so at every μ of the list.
     """
 
     mu: Array
@@ -47,6 +48,7 @@ class ComplexModes:
     left: ComplexArray | None = None
     open_contacts: tuple[str, ...] = ()
     completeness: tuple[str, ...] = ()
+    contact_state: str = ""
     provenance: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -99,6 +101,7 @@ class ComplexModes:
             "damped": self.damped,
             "open_contacts": list(self.open_contacts),
             **({"completeness": list(self.completeness)} if self.completeness else {}),
+            **({"contact_state": self.contact_state} if self.contact_state else {}),
         }
 
 

@@ -26,10 +26,10 @@ import scipy.sparse as sp
 from ..direct import Factor, SingularMatrix, factorise
 from ..errors import AnalysisError, CaseError
 from ..system import System
-from ..typing import Array, ComplexArray, IntArray, Sparse
+from ..typing import Array, BoolArray, ComplexArray, IntArray, Sparse
 from .assembled import Options
 from .assembled.problem import times, tiny
-from .assembled.steady import steadiness, touching_nodes
+from .assembled.steady import contact_rows, steadiness, touching_nodes
 
 STEPS = 14
 SETTLED = 1e-14  # relative change of λ at which the iteration ends
@@ -43,10 +43,11 @@ AFFINE = 1e-8  # second over first differences below which a matrix is affine in
 @dataclass(frozen=True)
 class Held:
     """What stays as it is while a number changes: the touching nodes (m,) among all contact nodes, the direction
-    against the slip (all, d−1) of every node, and how many freedoms and contact nodes there are."""
+    against the slip (all, d−1) of every node, which stick (all,), and how many freedoms and contact nodes there are."""
 
     touching: IntArray
     sense: Array
+    stuck: BoolArray
     size: int
     nodes: int
 
@@ -110,7 +111,7 @@ def hold(system: System, mu: float, options: Options) -> Held:
     """The touching nodes and the directions of sliding at ``mu``. Raises AnalysisError without steady sliding."""
     nodes = system.contact_nodes()
     steady = touching_nodes(system, nodes, mu, options.solver)
-    return Held(np.flatnonzero(steady.active), steady.sense, system.size, nodes.count)
+    return Held(np.flatnonzero(steady.active), steady.sense, steady.stuck, system.size, nodes.count)
 
 
 def terms_of(system: System, mu: float, held: Held, options: Options) -> Terms:
@@ -122,9 +123,9 @@ def terms_of(system: System, mu: float, held: Held, options: Options) -> Terms:
     nodes = system.contact_nodes()
     if (system.size, nodes.count) != (held.size, held.nodes):
         raise CaseError("parameter", None, "a number that changes neither the mesh nor who is in contact")
-    chosen = nodes.select(held.touching)
-    slide = chosen.along(held.sense[held.touching])
-    state = steadiness(system, nodes, held.touching, options)
+    rows = contact_rows(nodes, held.touching, held.sense, held.stuck)
+    slide = rows.slide
+    state = steadiness(system, nodes, held.touching, options, held=len(rows.compliance) - len(held.touching))
     damping, stiffness = system.damping, system.stiffness
     if not state.neutral and (mu or state.prestress):
         weakening, extra, geometric = state.terms(mu)
@@ -134,8 +135,8 @@ def terms_of(system: System, mu: float, held: Held, options: Options) -> Terms:
             damping = damping + extra
         if geometric is not None:
             stiffness = stiffness + geometric
-    push = sp.csr_array(chosen.normal + mu * slide)
-    return Terms(system.mass, sp.csr_array(damping), sp.csr_array(stiffness), chosen.normal, push, chosen.compliance)
+    push = sp.csr_array(rows.normal + mu * slide)
+    return Terms(system.mass, sp.csr_array(damping), sp.csr_array(stiffness), rows.normal, push, rows.compliance)
 
 
 def by_friction(
@@ -152,9 +153,10 @@ def by_friction(
             accepted = "mu, of all contacts together, since the law's slope, friction damping or prestress count"
             raise CaseError(f"contacts.{contact}.friction.coefficient", None, accepted)
         return rate_of(lambda value: terms_of(system, value, held, options), mu)[0]
-    slide = chosen.along(held.sense[held.touching])
+    slide = contact_rows(nodes, held.touching, held.sense, held.stuck).slide
     if contact is not None:
-        mine = (chosen.owner == nodes.names.index(contact)).astype(float)
+        mine = np.zeros(slide.shape[0])
+        mine[: chosen.count] = chosen.owner == nodes.names.index(contact)
         slide = sp.csr_array(sp.diags_array(mine) @ slide)
     return Terms(push=slide)
 
@@ -165,7 +167,9 @@ def by_compliance(system: System, held: Held, contact: str) -> Terms:
     chosen = nodes.select(held.touching)
     area = np.where(np.isnan(chosen.area), 1.0, chosen.area)
     mine = (chosen.owner == nodes.names.index(contact)).astype(float)
-    return Terms(compliance=np.divide(mine, area, out=np.zeros_like(area), where=area > 0))
+    change = np.divide(mine, area, out=np.zeros_like(area), where=area > 0)
+    sticking = contact_rows(nodes, held.touching, held.sense, held.stuck).normal.shape[0] - len(change)
+    return Terms(compliance=np.append(change, np.zeros(sticking)))
 
 
 def by_mass_at_node(mode: Mode, rows: Sparse, dimension: int) -> ComplexArray:

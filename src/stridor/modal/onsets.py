@@ -72,7 +72,8 @@ class Onset:
 class Onsets:
     """All onsets with friction_range [a, b] and frequencies up to max_frequency_hz, by μ.
 
-    completeness: of matrices without structure, what speaks for there being no others; "" of all others.
+    completeness: of matrices without structure, what speaks for there being no others; "" of all others. contact_state:
+    where contacts may stick, how many nodes stick, slip and are open, and at which μ; it is held over the range.
     """
 
     onsets: tuple[Onset, ...]
@@ -81,6 +82,7 @@ class Onsets:
     damped: bool
     open_contacts: tuple[str, ...] = ()
     completeness: str = ""
+    contact_state: str = ""
     provenance: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -92,6 +94,7 @@ class Onsets:
         """The document that `stridor onsets --json` prints."""
         return {
             "onsets": [o.to_json() for o in self.onsets],
+            **({"contact_state": self.contact_state} if self.contact_state else {}),
             "friction_range": list(self.friction_range),
             "max_frequency_hz": self.max_frequency_hz,
             "damped": self.damped,

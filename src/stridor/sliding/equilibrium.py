@@ -20,6 +20,20 @@ NEWTON_STEPS = 60
 
 
 @dataclass(frozen=True)
+class ContactRows:
+    """What contact holds: rows normal (m, n) csr, gap (m,) [m], compliance (m,) [m/N], as `ContactNodes` has them."""
+
+    normal: Sparse
+    gap: Array
+    compliance: Array
+
+    @property
+    def count(self) -> int:
+        """Number of rows m."""
+        return len(self.gap)
+
+
+@dataclass(frozen=True)
 class State:
     """Displacement (n,) [m], normal force (m,) [N] and gap (m,) [m] for one set of touching nodes."""
 
@@ -32,17 +46,28 @@ class State:
 class Equilibrium:
     """K u + cubic(u) − Pᵀ N = f,  g₀ + n u + c N = 0 on the touching nodes, with P = n + μ s·t.
 
-    Touching nodes of finite stiffness go into K; rigid and nearly rigid ones become unknown multipliers.
+    Touching nodes of finite stiffness go into K; rigid and nearly rigid ones become unknown multipliers. travel (p,)
+    [s]: how far the prescribed motions have run, which springs beyond the linear feel.
     """
 
     def __init__(
-        self, system: System, nodes: ContactNodes, push: Sparse, force: Array, *, symmetric: bool, solver: str | None
+        self,
+        system: System,
+        nodes: ContactNodes | ContactRows,
+        push: Sparse,
+        force: Array,
+        *,
+        symmetric: bool,
+        solver: str | None,
+        travel: Array | None = None,
     ) -> None:
         self.system, self.nodes, self.push, self.force = system, nodes, push, force
         self.symmetric, self.solver = symmetric, solver
         self.scale = float(np.abs(system.stiffness.data).max(initial=0.0)) or 1.0
         self.condensed: BoolArray = nodes.compliance * self.scale * CONDENSED > 1.0
         self.factorisations = 0
+        cubic = system.cubic
+        self.stretched = 0.0 if cubic is None or travel is None else cubic.rows.lift @ travel
 
     def solve(self, active: BoolArray, start: Array | None = None) -> State:
         """The equilibrium with exactly these nodes touching, whichever the signs of gap and force.
@@ -57,10 +82,12 @@ class Equilibrium:
             return State(active, u, normal, self.nodes.gap + self.nodes.normal @ u)
         rows, before = cubic.rows.free, u
         for _ in range(NEWTON_STEPS):
-            stretch = rows @ before
+            own = rows @ before
+            stretch = own + self.stretched
             tangent = sp.csr_array(rows.T @ sp.diags_array(3 * cubic.coefficient * stretch**2) @ rows)
-            u, normal = self._linear(active, tangent, 2 * (rows.T @ (cubic.coefficient * stretch**3)))
-            moved, size = float(np.abs(rows @ u - stretch).max()), float(np.abs(rows @ u).max())
+            force = cubic.coefficient * stretch**2 * (3 * own - stretch)
+            u, normal = self._linear(active, tangent, rows.T @ force)
+            moved, size = float(np.abs(rows @ u - own).max()), float(np.abs(rows @ u).max())
             before = u
             if moved <= 1e-12 * size:
                 return State(active, u, normal, self.nodes.gap + self.nodes.normal @ u)
@@ -76,7 +103,7 @@ class Equilibrium:
         terms = abs(self.system.stiffness) @ np.abs(u) + np.abs(self.force) + abs(self.push).T @ np.abs(normal)
         if self.system.cubic is not None:
             cubic = self.system.cubic
-            internal = internal + cubic.rows.free.T @ (cubic.coefficient * (cubic.rows.free @ u) ** 3)
+            internal = internal + cubic.rows.free.T @ (cubic.coefficient * (cubic.rows.free @ u + self.stretched) ** 3)
         imbalance = internal - self.force - self.push.T @ normal
         return float(np.abs(imbalance).max(initial=0.0) / max(float(terms.max(initial=0.0)), 1e-300))
 

@@ -44,7 +44,10 @@ def slip_speeds(system: System, motion_factors: Array) -> Array:
 
 
 def full_motion(system: System) -> Array:
-    """Factor one for every moving support (p,)."""
+    """Factors (p,) of the moving supports in steady sliding: one, or those that run on after the last load step."""
+    if system.load_steps:
+        last = system.load_steps[-1]
+        return np.zeros_like(last.velocities) if last.duration is not None else last.velocities
     return np.ones(len(system.motion.names))
 
 

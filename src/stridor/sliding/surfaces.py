@@ -2,7 +2,8 @@
 
 K u − Σ (n + μ s·t) N = f − C_L v,   g₀ + n u + N/K_c = 0,   N ≥ 0
 
-with s = −w/|w| the direction opposite to a node's slip velocity w, so that friction opposes the slip.
+with s = −w/|w| the direction opposite to a node's slip velocity w, so that friction opposes the slip. Where a system
+has load steps, nodes that no motion slides stick or slip as these leave them (`stick_slip`).
 """
 
 from __future__ import annotations
@@ -13,18 +14,17 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
+from ..contact.multipliers import OPEN, SLIP
 from ..contact.nodes import ContactNodes
 from ..direct import SingularMatrix
 from ..errors import AnalysisError
 from ..system import System
-from ..typing import Array, BoolArray, Sparse
+from ..typing import Array, BoolArray, IntArray, Sparse
 from .equilibrium import Equilibrium, State, settle
+from .history import STILL, follow
 from .points import full_motion
 from .redundant import closed, redundant
 from .resultants import Balance, Resultant, balance, resultants
-
-# Slip below this part of the fastest node's is that of the centre of a spin: its direction is rounding.
-STILL = 1e-9
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,10 @@ class SurfaceSliding:
     node carries load; friction_coefficient (m,); gap (m,) [m], negative by N/K_c where contact has a stiffness.
     residual: largest imbalance of a freedom over the largest force. iterations: sets of touching nodes tried.
     resultants: contact → Resultant; balance: loads against contact forces.
+
+    status (m,): OPEN 0, STICK 1 or SLIP 2. With load steps sense is that of the friction force where nodes slip without
+    a slip velocity, and zero where they stick; travel (p,) [s] is how far the motions have run, in units of their
+    velocities.
     """
 
     displacement: Array
@@ -49,6 +53,8 @@ class SurfaceSliding:
     gap: Array
     residual: float
     iterations: int
+    status: IntArray
+    travel: Array
     resultants: Mapping[str, Resultant] = field(default_factory=dict)
     balance: Balance = Balance(np.nan, np.nan)
 
@@ -56,6 +62,11 @@ class SurfaceSliding:
     def slip_speed(self) -> Array:
         """Size (m,) [m/s] of the slip velocity."""
         return np.linalg.norm(self.slip_velocity, axis=1)
+
+    @property
+    def slips_still(self) -> BoolArray:
+        """Nodes (m,) at their limit of friction that no motion slides."""
+        return (self.status == SLIP) & np.any(self.sense != 0.0, axis=1) & (self.slip_speed == 0.0)
 
 
 def steady_sliding_nodes(
@@ -72,9 +83,13 @@ def steady_sliding_nodes(
     mu replaces the friction coefficient of every contact; load_factors default to one for every load,
     motion_factors (p,) to one for every support. guess (m,): nodes that are likely to touch, as `active` of a
     solution at another coefficient, which saves most of the steps. solver is that of `direct.factorise`.
-    Raises AnalysisError where a contact does not slide or would change its gap, where no contact carries load, and
-    where the structure is not held.
+    A system with load steps is taken through them, and factors can only be those of the last. Raises AnalysisError
+    where a contact does not slide or would change its gap, where no contact carries load, and where the structure is
+    not held.
     """
+    if system.load_steps:
+        _require_last(system, load_factors, motion_factors)
+        return _after_load_steps(system, mu, solver)
     nodes = system.contact_nodes()
     factors = full_motion(system) if motion_factors is None else np.asarray(motion_factors, dtype=float)
     slip = nodes.slip_velocity(factors)
@@ -118,9 +133,66 @@ def steady_sliding_nodes(
         gap=state.gap,
         residual=residual,
         iterations=iterations,
+        status=np.where(state.active, SLIP, OPEN),
+        travel=np.zeros(len(factors)),
         resultants=resultants(nodes, normal, friction, state.active),
         balance=balance(system, force, push.T @ state.normal_force),
     )
+
+
+def _after_load_steps(system: System, mu: float | None, solver: str | None) -> SurfaceSliding:
+    nodes = system.contact_nodes()
+    last = system.load_steps[-1]
+    if last.duration is None:
+        slip = nodes.slip_velocity(last.velocities)
+        _require_constant_gap(nodes, last.velocities, np.linalg.norm(slip, axis=1))
+    found = follow(system, mu=mu, solver=solver)
+    state, load = found.state, found.load
+    active = state.status != OPEN
+    if nodes.count and not np.any(active & (state.normal_force > 0.0)):
+        raise AnalysisError(
+            f"no contact carries load after the load steps (contacts: {', '.join(nodes.names)}); check the direction "
+            "of the loads"
+        )
+    force = nodes.normal.T @ state.normal_force + nodes.tangent.T @ state.friction.ravel()
+    return SurfaceSliding(
+        displacement=state.displacement,
+        normal_force=np.maximum(state.normal_force, 0.0),
+        friction_force=state.friction,
+        slip_velocity=found.slip,
+        sense=np.where((state.status == SLIP)[:, None], state.direction, load.driven),
+        active=active,
+        friction_coefficient=load.mu,
+        gap=state.gap,
+        residual=found.residual,
+        iterations=found.solved,
+        status=state.status,
+        travel=state.travel,
+        resultants=resultants(nodes, state.normal_force, state.friction, active),
+        balance=balance(system, load.force, force),
+    )
+
+
+def _require_last(system: System, load_factors: Mapping[str, float] | None, motion_factors: Array | None) -> None:
+    """Raise AnalysisError where other loads or motions are asked for than those that the load steps end with."""
+    last = dict.fromkeys(system.loads, 0.0)
+    for step in system.load_steps:
+        last.update(step.loads)
+    if load_factors is not None:
+        for name, factor in last.items():
+            if load_factors.get(name, 1.0) != factor:
+                raise AnalysisError(
+                    f"the static equilibrium ends with {factor:g} times load {name}, and "
+                    f"{load_factors.get(name, 1.0):g} times is asked for; give the last of steady.steps and the first "
+                    "phase the same factors"
+                )
+    running = full_motion(system)
+    if motion_factors is not None and not np.array_equal(np.asarray(motion_factors), running):
+        given, own = (", ".join(f"{v:g}" for v in np.asarray(a)) for a in (motion_factors, running))
+        raise AnalysisError(
+            f"the static equilibrium ends with {own} times the velocities of {', '.join(system.motion.names)}, and "
+            f"{given} times is asked for; give the last of steady.steps and the first phase the same factors"
+        )
 
 
 def touching(system: System, steady: SurfaceSliding) -> ContactNodes:
@@ -137,7 +209,8 @@ def friction_damping_matrix(system: System, steady: SurfaceSliding) -> Sparse:
     """
     nodes = system.contact_nodes()
     speed = steady.slip_speed
-    working = steady.active & np.any(steady.sense != 0.0, axis=1)
+    # Where a node is at its limit and no motion slides it, friction has no slip to turn with.
+    working = steady.active & np.any(steady.sense != 0.0, axis=1) & ~steady.slips_still
     chosen = nodes.select(working)
     speed, mu = speed[working], steady.friction_coefficient[working]
     normal, sense = steady.normal_force[working], steady.sense[working]

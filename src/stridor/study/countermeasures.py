@@ -11,6 +11,8 @@ import numpy as np
 from ..case import Case
 from ..case.bodies import BeamBody, SolidBody
 from ..errors import CaseError
+from ..modal.assembled.steady import refuse_stick
+from ..system import build_system
 from .asked import require_frequency
 from .measure_ranking import Ranking
 from .measure_verification import verified
@@ -54,6 +56,7 @@ def rank_countermeasures(
     if not 0.0 < percent < 100.0:
         raise CaseError("percent", percent, "a size of change between 0 and 100 %")
     require_frequency(max_frequency_hz)
+    refuse_stick(build_system(case), "the ranking of countermeasures")
     linear = Linearised.of(case, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
     unstable = linear.columns("unstable")
     if not unstable:

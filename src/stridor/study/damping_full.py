@@ -103,7 +103,7 @@ def _held(system: System, options: Options) -> Held:
     not with that of the onset, which other nodes may do."""
     nodes = system.contact_nodes()
     steady = touching_nodes(system, nodes, None, options.solver)
-    return Held(np.flatnonzero(steady.active), steady.sense, system.size, nodes.count)
+    return Held(np.flatnonzero(steady.active), steady.sense, steady.stuck, system.size, nodes.count)
 
 
 def _derivative(case: Case, mode: Mode, path: str, mu: float, held: Held, options: Options) -> complex:

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from ..case import Case
 from ..case.bodies import MassBody, SolidBody
 from ..case.points import BoundaryRef
-from ..case.schema import Load
+from ..case.schema import Load, SteadyStep
 from ..contact.interface import Rows
 from ..errors import CaseError
 from ..fe.solid import stress_stiffness
@@ -23,6 +23,7 @@ from .body_loads import body_load
 from .holders import holders_of
 from .imported import is_symmetric
 from .links import Links, links_of
+from .load_steps import LoadStep
 from .model import CubicSprings, Line, PrescribedMotion, Solid, Structure, System, constrain
 from .pairs import is_point_on_line, point_contact, surface_contact
 from .supports import constraints_of, tie_matrix, tied_mass
@@ -87,7 +88,21 @@ def build_system(case: Case, mu: float | None = None) -> System:
         stress_stiffness=_stress_stiffness(case, view),
         general=_general(mass, damping, stiffness) if case.imported else "",
         holders=holders_of(case, view, contacts, surfaces),
+        load_steps=_load_steps(case, motion),
     )
+
+
+def _load_steps(case: Case, motion: PrescribedMotion) -> tuple[LoadStep, ...]:
+    """The way to the static equilibrium, empty where every contact slides."""
+    if case.steady.friction == "sliding":
+        return ()
+    loads, velocities = dict.fromkeys(case.loads, 1.0), dict.fromkeys(motion.names, 1.0)
+    found: list[LoadStep] = []
+    for step in case.steady.steps or (SteadyStep(),):
+        loads, velocities = {**loads, **step.loads}, {**velocities, **step.velocities}
+        factors = np.array([velocities[name] for name in motion.names])
+        found.append(LoadStep(dict(loads), factors, step.duration, step.increments))
+    return tuple(found)
 
 
 def _general(mass: Sparse, damping: Sparse, stiffness: Sparse) -> str:

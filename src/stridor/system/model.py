@@ -19,6 +19,7 @@ from ..direct import factorise
 from ..errors import AnalysisError
 from ..fe.assembly import connected_components
 from ..typing import Array, IntArray, Sparse
+from .load_steps import LoadStep
 
 COMPLETE_BASIS_LIMIT = 2500
 
@@ -94,7 +95,8 @@ class System:
     the linear; initial_velocity (n,) [m/s] and initial_displacement (n,) [m] of bodies that start so; stress_stiffness
     gives the geometric stiffness (n, n) csr that the stresses of a displacement (n,) [m] make, None where no body
     has any. general: why its matrices, imported ones, are not all symmetric with a positive definite mass, as all
-    others are; "" where they are. holders: contact → paths of the supports and ties at its nodes.
+    others are; "" where they are. holders: contact → paths of the supports and ties at its nodes. load_steps: the way to
+    the static equilibrium, with stick and partial slip; empty where all contacts slide as the motions have them.
     """
 
     mass: Sparse
@@ -115,6 +117,7 @@ class System:
     stress_stiffness: Callable[[Array], Sparse] | None = None
     general: str = ""
     holders: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    load_steps: tuple[LoadStep, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness"):
@@ -135,8 +138,8 @@ class System:
     @property
     def assembled(self) -> bool:
         """Whether it is computed with on the assembled sparse matrices: contact over surfaces, forces beyond the
-        linear, or too many freedoms for the complete basis that point contacts use."""
-        return bool(self.surfaces) or self.cubic is not None or self.size > COMPLETE_BASIS_LIMIT
+        linear, contacts that may stick, or too many freedoms for the complete basis that point contacts use."""
+        return bool(self.surfaces or self.load_steps) or self.cubic is not None or self.size > COMPLETE_BASIS_LIMIT
 
     def contact_nodes(self) -> ContactNodes:
         """Every contact, point or surface, as one list of slave nodes: points first, then surfaces in order."""

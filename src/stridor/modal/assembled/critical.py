@@ -70,7 +70,8 @@ def onsets_assembled(
         if onset is not None:
             found.append(onset)
     ordered = tuple(sorted(_distinct(found), key=lambda o: o.mu))
-    return Onsets(ordered, (low, high), max_frequency_hz, damped, problem.open_contacts)
+    state = problem.contact_state
+    return Onsets(ordered, (low, high), max_frequency_hz, damped, problem.open_contacts, contact_state=state)
 
 
 def _passages(reduced: Reduced, high: float) -> list[Passage]:

@@ -69,7 +69,8 @@ def friction_energy(
     if extras.damping is not None:
         damping += 0.5 * size * form(extras.damping)
     power = np.zeros(system.contact_nodes().count)
-    power[problem.touching] = 0.5 * (np.conj(lam * slip) * force).real
+    # Nodes that stick have rows behind these, and friction does no work there.
+    power[problem.touching] = 0.5 * (np.conj(lam * slip) * force).real[: len(problem.touching)]
     return FrictionEnergy(lam, power / energy, damping / energy)
 
 

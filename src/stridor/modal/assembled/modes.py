@@ -91,6 +91,7 @@ def _followed(
         right=right if vectors else None,
         left=left if vectors is True else None,
         open_contacts=problem.open_contacts,
+        contact_state=problem.contact_state,
     )
 
 

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ...errors import AnalysisError
 from ...system import System
 from ...typing import Array, ComplexArray, IntArray, Sparse
 from ..quadratic.problem import times
-from .steady import Options, Steadiness, steadiness, touching_nodes
+from .steady import Options, Steadiness, contact_rows, steadiness, touching_nodes
 
 CHUNK = 64  # columns worked on at a time
 
@@ -46,6 +47,9 @@ class ContactProblem:
     compliance c (m,) [m/N], 0 for rigid contact. touching (m,) are the places of the nodes among all the system's.
     damped: whether anything works on velocities. extras gives what steady sliding at a μ adds, None where nothing does.
     solver: that of `direct.factorise`.
+
+    Nodes that stick have further rows behind those of the touching nodes: their tangential displacement in N, zero in
+    S. contact_state: how many stick, slip and are open, "" where every node slides.
     """
 
     mass: Sparse
@@ -59,6 +63,7 @@ class ContactProblem:
     damped: bool
     extras: Varying | None = None
     solver: str | None = None
+    contact_state: str = ""
 
     @property
     def size(self) -> int:
@@ -185,23 +190,29 @@ def problem_of(
     """
     nodes = system.contact_nodes()
     steady = touching_nodes(system, nodes, mu, options.solver)
+    if steady.still and options.friction_damping and nodes.directions == 2:
+        raise AnalysisError(
+            "friction damping μN/v needs the slip velocity, and nodes slip at their limit of friction that no motion "
+            "slides; write modal.friction_damping = false (compare has none of it in space)"
+        )
     touching = np.flatnonzero(steady.active)
-    chosen = nodes.select(touching)
+    rows = contact_rows(nodes, touching, steady.sense, steady.stuck)
     closed = {nodes.names[k] for k in nodes.owner[touching]}
-    with_state = steadiness(system, nodes, touching, options)
+    with_state = steadiness(system, nodes, touching, options, held=len(rows.compliance) - len(touching))
     has_damping = bool(system.damping.nnz and np.abs(system.damping.data).max() > 0)
     return ContactProblem(
         mass=system.mass,
         damping=system.damping if has_damping else sp.csr_array(system.damping.shape),
         stiffness=system.stiffness,
-        normal=chosen.normal,
-        slide=chosen.along(steady.sense[touching]),
-        compliance=chosen.compliance,
+        normal=rows.normal,
+        slide=rows.slide,
+        compliance=rows.compliance,
         touching=touching,
         open_contacts=tuple(name for name in nodes.names if name not in closed),
         damped=has_damping or with_state.damps,
         extras=None if with_state.neutral else Varying(with_state, _grid(system, frictions)),
         solver=options.solver,
+        contact_state=steady.words,
     )
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
+from ...contact.multipliers import SLIP, STICK
 from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError
 from ...sliding import friction_damping_matrix, full_motion, steady_sliding_nodes
+from ...sliding.stick_slip import StickRows
 from ...sliding.surfaces import STILL
 from ...system import System
 from ...typing import Array, BoolArray, IntArray, Sparse
@@ -29,10 +32,52 @@ class Options:
 
 @dataclass(frozen=True)
 class Touching:
-    """Nodes in contact: active (m,), and sense (m, d−1), the unit vector against the slip, zero where there is none."""
+    """Nodes in contact: active (m,), and sense (m, d−1), the unit vector against the slip, zero where there is none;
+    stuck (m,): touching nodes that do not slip either way. still: whether some slip at their limit without a motion
+    that slides them. words: the same for a reader, "" where every node slides."""
 
     active: BoolArray
     sense: Array
+    stuck: BoolArray
+    still: bool = False
+    words: str = ""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of the touching nodes (m, n) csr, then those that hold stuck ones along their tangents: normal N, slide S
+    (zero where a node sticks), compliance c (m,) [m/N]."""
+
+    normal: Sparse
+    slide: Sparse
+    compliance: Array
+
+
+def contact_rows(nodes: ContactNodes, touching: IntArray, sense: Array, stuck: BoolArray) -> Rows:
+    """What the nodes ``touching`` (k,) of all add to small motions: sense (m, d−1) and stuck (m,) are of all nodes.
+
+    A node that sticks is held along its tangents as a rigid contact is along its normal: rows with forces of their own.
+    """
+    chosen = nodes.select(touching)
+    slide = chosen.along(sense[touching])
+    if not np.any(stuck[touching]):
+        return Rows(chosen.normal, slide, chosen.compliance)
+    sticks = StickRows(chosen)
+    held = sticks.rows[sticks.held(np.ones(chosen.count, dtype=bool), stuck[touching])]
+    return Rows(
+        sp.csr_array(sp.vstack([chosen.normal, held])),
+        sp.csr_array(sp.vstack([slide, sp.csr_array(held.shape)])),
+        np.concatenate([chosen.compliance, np.zeros(held.shape[0])]),
+    )
+
+
+def refuse_stick(system: System, what: str) -> None:
+    """Raise AnalysisError where contacts may stick and ``what`` knows sliding only."""
+    if system.load_steps:
+        raise AnalysisError(
+            f'{what}: knows contacts that slide, and steady.friction = "stick-slip" lets them stick; what takes that '
+            "is `stridor steady`, `modes`, `onsets`, `shapes`, `simulate` and `compare`"
+        )
 
 
 def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver: str | None) -> Touching:
@@ -40,9 +85,18 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
 
     Raises AnalysisError where there is no steady sliding.
     """
-    if system.loads and nodes.count:
+    if (system.loads or system.load_steps) and nodes.count:
         steady = steady_sliding_nodes(system, mu=mu, solver=solver)
-        return Touching(steady.active, steady.sense)
+        if not system.load_steps:
+            return Touching(steady.active, steady.sense, np.zeros(nodes.count, dtype=bool))
+        stuck, still = steady.active & (steady.status == STICK), int(steady.slips_still.sum())
+        closed, slips = int(steady.active.sum()), int((steady.status == SLIP).sum())
+        limit = f" ({still} of them at their limit without a slip velocity, taken as sliding)" if still else ""
+        words = (
+            f"{np.count_nonzero(stuck)} contact nodes stick, {slips} slip{limit} and {nodes.count - closed} are open, "
+            f"as the static equilibrium at {'their own friction' if mu is None else f'μ = {mu:g}'} has them"
+        )
+        return Touching(steady.active, steady.sense, stuck, bool(steady.slips_still.any()), words)
     slip = nodes.slip_velocity(full_motion(system))
     speed = np.linalg.norm(slip, axis=1)
     slides = speed > STILL * float(speed.max(initial=0.0))
@@ -53,12 +107,13 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
             "give a support a velocity"
         )
     sense = np.where(slides[:, None], -slip / np.where(slides, speed, 1.0)[:, None], 0.0)
-    return Touching(np.ones(nodes.count, dtype=bool), sense)
+    return Touching(np.ones(nodes.count, dtype=bool), sense, np.zeros(nodes.count, dtype=bool))
 
 
 @dataclass(frozen=True)
 class Steadiness:
-    """The touching nodes' steady state as a function of μ, for the terms that depend on it."""
+    """The touching nodes' steady state as a function of μ, for the terms that depend on it; held: how many rows beyond
+    theirs hold nodes that stick."""
 
     system: System
     nodes: ContactNodes
@@ -67,6 +122,7 @@ class Steadiness:
     friction_damping: bool
     prestress: bool
     solver: str | None
+    held: int = 0
 
     @property
     def neutral(self) -> bool:
@@ -89,21 +145,23 @@ class Steadiness:
             speeds = steady.slip_speed[self.touching]
             laws = [self.nodes.laws[k] for k in self.nodes.owner[self.touching]]
             slopes = [law.scaled(mu, float(v)).slope(float(v)) for law, v in zip(laws, speeds, strict=True)]
-            weakening = steady.normal_force[self.touching] * np.array(slopes)
+            weakening = np.append(steady.normal_force[self.touching] * np.array(slopes), np.zeros(self.held))
         stiffness = None
         if self.prestress and self.system.stress_stiffness is not None:
             stiffness = self.system.stress_stiffness(steady.displacement)
         return weakening, damping, stiffness
 
 
-def steadiness(system: System, nodes: ContactNodes, touching: IntArray, options: Options) -> Steadiness:
+def steadiness(
+    system: System, nodes: ContactNodes, touching: IntArray, options: Options, *, held: int = 0
+) -> Steadiness:
     """What of the steady state matters here. Raises AnalysisError where it does but no load presses the bodies."""
     speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
     pairs = {(int(nodes.owner[k]), float(speeds[k])) for k in touching}
     sloped = any(nodes.laws[owner].slope(speed) != 0.0 for owner, speed in pairs)
     across = options.friction_damping and nodes.directions == 2
     prestress = options.prestress and system.stress_stiffness is not None
-    if (sloped or across or prestress) and not system.loads:
+    if (sloped or across or prestress) and not (system.loads or system.load_steps):
         what = "a friction law with a slope" if sloped else "friction damping" if across else "prestress"
         raise AnalysisError(f"{what} needs the normal force: give the case a load that presses the bodies")
-    return Steadiness(system, nodes, touching, sloped, across, prestress, options.solver)
+    return Steadiness(system, nodes, touching, sloped, across, prestress, options.solver, held)

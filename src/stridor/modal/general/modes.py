@@ -138,6 +138,7 @@ def _table(
         right=right if vectors else None,
         left=left if vectors is True else None,
         open_contacts=family.open_contacts,
+        contact_state=family.contacts.contact_state,
         completeness=tuple(f"{f.sentence}{numbers.sentence}" for f in found),
     )
 

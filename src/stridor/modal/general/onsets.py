@@ -67,7 +67,8 @@ def general_onsets(
     if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     family = family_of(system_at, (low, high), options or Options(), damped=damped, own=low if own is None else own)
-    result = Onsets((), (low, high), max_frequency_hz, damped, family.open_contacts)
+    state = family.contacts.contact_state
+    result = Onsets((), (low, high), max_frequency_hz, damped, family.open_contacts, contact_state=state)
     if not family.depends:
         if not family.open_contacts:
             raise AnalysisError(

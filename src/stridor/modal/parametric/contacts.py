@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from ...errors import CaseError
 from ...system import System
 from ...typing import BoolArray
-from ..assembled.steady import Options, steadiness, touching_nodes
+from ..assembled.steady import Options, refuse_stick, steadiness, touching_nodes
 from .contacts_rigid import Elimination, eliminate
 from .contacts_sampling import Values
 from .contacts_steady import FRICTION, STIFFNESS, Contacts, contacts_of, steady_terms
@@ -82,6 +82,7 @@ def contacts_problem(
     nodes = family.own.contact_nodes()
     if not nodes.count:
         return ContactsProblem(interpolated_terms(family.structure_at, family.interpolated), family.parameters)
+    refuse_stick(family.own, "reduced models over parameters")
     touching = np.flatnonzero(touching_nodes(family.own, nodes, touching_at, options.solver).active)
     effects = steadiness(family.own, nodes, touching, options)
     names = [p.name for p in family.parameters]

@@ -75,10 +75,11 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings, mu: float 
         load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
         motion_factors=stretch.velocities_after,
     )
+    machine.state.motion[0] = steady.travel
     machine.state.motion[1] = stretch.velocities_after
     machine.contacts.force[:, 0] = np.where(steady.active, steady.normal_force, 0.0)
     machine.contacts.force[:, 1:] = steady.friction_force
-    machine.contacts.status[:] = np.where(steady.active, 2, 0)
+    machine.contacts.status[:] = steady.status
     velocity = np.zeros(system.size)
     if settings.perturbation:
         for contact in range(len(machine.nodes.names)):
