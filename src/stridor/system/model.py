@@ -95,8 +95,8 @@ class System:
     the linear; initial_velocity (n,) [m/s] and initial_displacement (n,) [m] of bodies that start so; stress_stiffness
     gives the geometric stiffness (n, n) csr that the stresses of a displacement (n,) [m] make, None where no body
     has any. general: why its matrices, imported ones, are not all symmetric with a positive definite mass, as all
-    others are; "" where they are. holders: contact → paths of the supports and ties at its nodes. load_steps: the way to
-    the static equilibrium, with stick and partial slip; empty where all contacts slide as the motions have them.
+    others are; "" where they are. holders: contact → paths of the supports and ties at its nodes. load_steps: the way
+    to the static equilibrium, with stick and partial slip; empty where all contacts slide as the motions have them.
     """
 
     mass: Sparse
