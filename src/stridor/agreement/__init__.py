@@ -1,19 +1,11 @@
 """Modal against temporal: do both approaches tell the same story?"""
 
-from .comparison import (
-    GOOD_CRITICAL,
-    GOOD_FREQUENCY,
-    GOOD_GROWTH,
-    GOOD_MAC,
-    Agreement,
-    Comparison,
-    compare,
-    critical_friction,
-    dominant_response,
-    modal_assurance,
-    mode_shape,
-)
+from .comparison import PARTS, compare, dominant_response
+from .critical import critical_friction
+from .kept import Store
 from .perturbation import LINEAR, PERTURBATION, PERTURBATION_DURATION, Perturbation, linear_part, perturb
+from .result import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, Agreement, Comparison
+from .shapes import modal_assurance, mode_shape
 
 __all__ = [
     "GOOD_CRITICAL",
@@ -21,11 +13,13 @@ __all__ = [
     "GOOD_GROWTH",
     "GOOD_MAC",
     "LINEAR",
+    "PARTS",
     "PERTURBATION",
     "PERTURBATION_DURATION",
     "Agreement",
     "Comparison",
     "Perturbation",
+    "Store",
     "compare",
     "critical_friction",
     "dominant_response",

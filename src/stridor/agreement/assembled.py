@@ -17,22 +17,30 @@ from ..errors import AnalysisError
 from ..modal.complex_modes import ComplexModes, complex_modes
 from ..sliding import full_motion
 from ..system import System
+from ..temporal.observe import Snapshots
 from ..temporal.schedule import PhaseSpec
 from ..temporal.signals import components
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
-from .perturbation import LINEAR, PERTURBATION, Perturbation
+from .perturbation import LINEAR, PERTURBATION, Perturbation, whole
+from .shapes import component_shape, snapshots_of
 
 STARTED = 3  # modes
 PERIODS = 40  # of the slowest of them
 SAMPLES = 16  # per period of the fastest of them
 
 
+def turns(system: System) -> bool:
+    """Whether the modes need friction damping to be those of the model that the time loop marches: in space Coulomb
+    friction turns with the slip velocity, which damps motion across the direction of sliding."""
+    return system.assembled and system.dimension == 3
+
+
 def modes_as_in_time(system: System, mu: float, max_frequency_hz: float) -> ComplexModes:
     """Modes with right vectors, of the very model that the time loop marches."""
     return complex_modes(
-        system, mu, max_frequency_hz=max_frequency_hz, vectors="right", friction_damping=system.dimension == 3
+        system, mu, max_frequency_hz=max_frequency_hz, vectors="right", friction_damping=turns(system)
     )
 
 
@@ -44,6 +52,7 @@ def perturb_assembled(
     max_frequency_hz: float,
     duration: float | None = None,
     modes: ComplexModes | None = None,
+    shape: bool = False,
 ) -> Perturbation:
     """March the modes that should grow fastest from steady sliding; λ of what does. Raises as `perturb` does."""
     nodes = system.contact_nodes()
@@ -70,10 +79,14 @@ def perturb_assembled(
         scaled = vector / peak * np.exp(2.399963j * number)
         total += np.real([scaled, value * scaled, value**2 * scaled])
     total *= PERTURBATION * speed / len(chosen)
-    run = _march(system, mu, settings, lam, duration, (total[0], total[1], total[2]))
-    signal = _signal(run, leader, slip[leader], speed)
-    band = components(signal, run.sampling, max_frequency_hz=max_frequency_hz)
-    return Perturbation(mu, band.fastest, signal, run.sampling, band)
+    run, seen = _march(system, mu, settings, lam, duration, (total[0], total[1], total[2]), shape)
+    signal, sampling, until = _signal(run, leader, slip[leader], speed)
+    band = components(signal, sampling, max_frequency_hz=max_frequency_hz)
+    moved = None
+    if seen is not None:
+        time, motion = seen.until(until)
+        moved = component_shape(seen.rows, time, motion, band.eigenvalues, band.fastest, max_frequency_hz)
+    return Perturbation(mu, band.fastest, signal, sampling, band, moved)
 
 
 def _fastest(modes: ComplexModes, max_frequency_hz: float) -> IntArray:
@@ -90,7 +103,9 @@ def _march(
     lam: Array,
     duration: float | None,
     disturbance: tuple[Array, Array, Array],
-) -> Trajectory:
+    shape: bool,
+) -> tuple[Trajectory, Snapshots | None]:
+    """The run, and where shapes are wanted the motion of nodes."""
     slowest, fastest = float(np.abs(lam.imag).min()), float(np.abs(lam.imag).max())
     step = settings.step
     if step is None:
@@ -103,18 +118,23 @@ def _march(
         settings, step=step, initial="steady-sliding", perturbation=0.0, watch=(), record_every=every
     )
     length = duration or PERIODS * 2 * np.pi / slowest
+    seen = snapshots_of(system, round(length / step), step, fastest / (2 * np.pi)) if shape else None
     loads = system.load_steps[-1].loads if system.load_steps else {}
     velocities = dict(zip(system.motion.names, full_motion(system).tolist(), strict=True))
     phase = PhaseSpec("perturbed", length, loads, velocities)
-    return simulate(system, [phase], start, mu=mu, disturbance=disturbance)
+    run = simulate(system, [phase], start, mu=mu, disturbance=disturbance, observe=seen)
+    return whole(run), seen
 
 
-def _signal(run: Trajectory, node: int, steady: Array, speed: float) -> Array:
-    """Slip of one node along its steady direction, less the steady part, while it is small."""
+def _signal(run: Trajectory, node: int, steady: Array, speed: float) -> tuple[Array, float, float]:
+    """Slip of one node along its steady direction, less the steady part, while it is small; its sampling [s], which is
+    coarser than that of the run where many nodes are kept, and until when it is small [s]."""
     assert run.nodes is not None, "assembled runs keep node histories"
     size = float(np.linalg.norm(steady))
     direction = steady / size if size > 0 else np.eye(len(steady))[0]
     signal = run.nodes.slip_velocity[:, node] @ direction - size
     over = np.flatnonzero(np.abs(signal) > LINEAR * speed)
     last = int(over[0]) if len(over) else len(signal)
-    return signal[min(last // 8, 4) : last]
+    time = run.nodes.time
+    sampling = float(time[1] - time[0]) if len(time) > 1 else run.sampling
+    return signal[min(last // 8, 4) : last], sampling, (last - 1) * sampling

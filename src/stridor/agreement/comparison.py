@@ -7,15 +7,14 @@ separation, shows which of the unstable modes responds and how it settles (paper
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
-from ..errors import AnalysisError
+from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes, complex_modes
-from ..modal.onsets import Onsets, onsets
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape
@@ -23,120 +22,17 @@ from ..temporal.signals import Growth, growth, low_passed, spectrum
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..threads import one_thread_if_small
-from ..typing import ComplexArray, IntArray
+from ..typing import IntArray
 from .assembled import modes_as_in_time, perturb_assembled
-from .perturbation import Perturbation, perturb
+from .critical import compare_critical
+from .kept import Plain, Store, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
+from .perturbation import perturb, whole
+from .result import Agreement, Comparison, Critical, judge, likeness, overall
+from .shapes import by_body, modal_assurance, mode_shape
 
-GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Both approaches at one μ.
-
-    modal_eigenvalue: the mode that belongs to what the temporal side shows growing fastest (or decaying
-    slowest); frequency_error, growth_rate_error relative; mac between the operating shape of the full run
-    at its dominant frequency and the mode that responds (None if none does); unstable_hz: all unstable modes in range;
-    responding: position in that list of the mode that the full run answers with, None if none.
-    """
-
-    mu: float
-    modal_eigenvalue: complex
-    unstable_hz: tuple[float, ...]
-    unstable_growth: tuple[float, ...]
-    perturbation: Perturbation
-    dominant_frequency_hz: float | None
-    run_growth: Growth | None
-    frequency_error: float
-    growth_rate_error: float
-    mac: float | None
-    responding: int | None
-    agrees: bool
-    verdict: str
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain values of one comparison."""
-        modal, temporal = self.modal_eigenvalue, self.perturbation.eigenvalue
-        return {
-            "mu": self.mu,
-            "modal": {
-                "frequency_hz": modal.imag / (2 * np.pi),
-                "growth_rate": modal.real,
-                "unstable_frequencies_hz": list(self.unstable_hz),
-                "unstable_growth_rates": list(self.unstable_growth),
-            },
-            "temporal": {
-                "frequency_hz": temporal.imag / (2 * np.pi),
-                "growth_rate": temporal.real,
-                "dominant_frequency_hz": self.dominant_frequency_hz,
-                "saturated": None if self.run_growth is None else self.run_growth.saturated,
-                "responding_mode_hz": None if self.responding is None else self.unstable_hz[self.responding],
-            },
-            "frequency_error": self.frequency_error,
-            "growth_rate_error": self.growth_rate_error,
-            "mac": self.mac,
-            "agrees": self.agrees,
-            "verdict": self.verdict,
-        }
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """Comparisons at several μ and the critical friction coefficients of both approaches.
-
-    critical_mu_temporal is the middle of the last bracket of the bisection, bracket its ends and
-    tolerance its width; None where it was not asked for or not found, with the reason in notes.
-    """
-
-    comparisons: tuple[Comparison, ...]
-    critical_mu_modal: float | None
-    critical_mu_temporal: float | None
-    bracket: tuple[float, float] | None
-    verdict: str
-    notes: tuple[str, ...] = ()
-    provenance: dict[str, Any] = field(default_factory=dict)
-
-    def to_json(self) -> dict[str, Any]:
-        """The document that `stridor compare --json` prints: the first μ at the top, all in comparisons."""
-        first = self.comparisons[0].to_json()
-        return {
-            **first,
-            "critical_mu_modal": self.critical_mu_modal,
-            "critical_mu_temporal": self.critical_mu_temporal,
-            "critical_bracket": None if self.bracket is None else list(self.bracket),
-            "verdict": self.verdict,
-            "comparisons": [c.to_json() for c in self.comparisons],
-            "notes": list(self.notes),
-        }
-
-
-def critical_friction(
-    system: System,
-    bracket: tuple[float, float],
-    *,
-    settings: Settings,
-    tolerance: float = 5e-4,
-    max_frequency_hz: float = 40e3,
-    progress: Callable[[str], None] | None = None,
-) -> tuple[float, tuple[float, float]]:
-    """Bisect the μ at which small perturbations begin to grow in time; the middle and the last bracket.
-
-    Raises AnalysisError where the ends of the bracket do not differ.
-    """
-    low, high = bracket
-    state = {m: perturb(system, m, settings=settings, max_frequency_hz=max_frequency_hz).grows for m in (low, high)}
-    if state[low] or not state[high]:
-        both = "grow" if state[low] else "decay"
-        raise AnalysisError(
-            f"perturbations {both} at both ends of the bracket {low:g} … {high:g}; widen comparison.bracket"
-        )
-    while high - low > tolerance:
-        middle = (low + high) / 2
-        grows = perturb(system, middle, settings=settings, max_frequency_hz=max_frequency_hz).grows
-        low, high = (low, middle) if grows else (middle, high)
-        if progress is not None:
-            progress(f"critical μ between {low:.5f} and {high:.5f}")
-    return (low + high) / 2, (low, high)
+T = TypeVar("T")
+PARTS = ("growth", "run", "critical")
+NEAR = 0.05  # of the frequency: within it an unstable mode responds
 
 
 def _silent(text: str) -> None:
@@ -144,19 +40,15 @@ def _silent(text: str) -> None:
     del text
 
 
-def modal_assurance(first: ComplexArray, second: ComplexArray) -> float:
-    """MAC |aᴴb|²/(aᴴa bᴴb) of two complex shapes, 1 for equal up to a factor."""
-    a, b = np.ravel(first), np.ravel(second)
-    size = float(np.vdot(a, a).real * np.vdot(b, b).real)
-    return float(abs(np.vdot(a, b)) ** 2 / size) if size > 0 else 0.0
-
-
-def mode_shape(system: System, vector: ComplexArray) -> dict[str, ComplexArray]:
-    """Displacements (k, d) of the nodes of each body in an eigenvector (n,)."""
-    return {
-        body.name: np.asarray(body.rows.free @ vector).reshape(-1, system.dimension)
-        for body in (*system.lines, *system.solids)
-    }
+def chosen_parts(only: Collection[str] | None, *, critical: bool) -> set[str]:
+    """What to compare: growth of small perturbations at each μ, the full run at each μ (which takes the growth to
+    be held against), critical friction. Raises CaseError for other names and for nothing."""
+    if only is None or not len(only):
+        return {"growth", "run"} | ({"critical"} if critical else set())
+    for name in only:
+        if name not in PARTS:
+            raise CaseError("only", name, f"of what is compared: {', '.join(PARTS)}")
+    return set(only) | ({"growth"} if "run" in only else set())
 
 
 @one_thread_if_small
@@ -173,138 +65,242 @@ def compare(
     tolerance: float = 5e-4,
     runs: dict[float, Trajectory] | None = None,
     progress: Callable[[str], None] | None = None,
+    only: Collection[str] | None = None,
+    kept: Store | None = None,
+    finished: Callable[[Comparison], None] | None = None,
 ) -> Agreement:
     """Compare both approaches at each μ and, if asked, by their critical friction coefficients.
 
-    runs may hand in full trajectories already computed at some of the μ. Raises what the analyses raise.
+    runs may hand in full trajectories already computed at some of the μ. only: parts of PARTS instead of all (critical
+    False leaves out that one, and with it the solution of the onsets). kept: where finished parts are put, and sought
+    before they are computed. finished is called with each μ when it is done. Ctrl-C ends it early, and what is finished
+    is returned (``interrupted``). Raises what the analyses raise.
     """
     say = progress or _silent
+    parts = chosen_parts(only, critical=critical)
+    at = _At(system, phases, settings, max_frequency_hz, runs or {}, kept, say)
     comparisons: list[Comparison] = []
-    for mu in mus:
-        say(f"both approaches at μ = {mu:g}")
-        run = (runs or {}).get(mu)
-        if run is None:
-            run = simulate(system, phases, settings, mu=mu)
-        comparisons.append(_compare_at(system, phases, settings, mu, run, max_frequency_hz))
-    say("critical friction, modal")
-    found = onsets(system, friction_range, max_frequency_hz=max_frequency_hz)
-    modal = found.first.mu if found.first else None
-    temporal: float | None = None
-    last: tuple[float, float] | None = None
+    of_critical = Critical()
+    interrupted = False
+    try:
+        for mu in mus if "growth" in parts else ():
+            comparisons.append(at.compare(mu, full="run" in parts))
+            if finished is not None:
+                finished(comparisons[-1])
+        if "critical" in parts:
+            of_critical = compare_critical(
+                system,
+                friction_range=friction_range,
+                max_frequency_hz=max_frequency_hz,
+                settings=settings,
+                bracket=bracket,
+                tolerance=tolerance,
+                progress=say,
+                kept=kept,
+            )
+    except KeyboardInterrupt:
+        interrupted = True
+    notes = _notes(system, parts, at.taken)
+    if of_critical.why:
+        notes.append(of_critical.why)
+    return Agreement(
+        tuple(comparisons),
+        of_critical.modal,
+        of_critical.temporal,
+        of_critical.bracket,
+        overall(comparisons, of_critical, interrupted=interrupted),
+        tuple(notes),
+        interrupted=interrupted,
+    )
+
+
+def _notes(system: System, parts: Collection[str], taken: Sequence[str]) -> list[str]:
     finite = [c.name for c in (*system.contacts, *system.surfaces) if c.sliding == "finite"]
     notes: list[str] = []
     if finite:
+        full = "in the full run" if "run" in parts else "in `stridor simulate`"
         notes.append(
-            f"contact {', '.join(finite)} slides finitely in the full run; modes and perturbations are those of "
+            f"contact {', '.join(finite)} slides finitely {full}; modes and perturbations are those of "
             "its reference configuration"
         )
-    if critical:
-        ends = bracket or _bracket(found)
-        if ends is None:
-            notes.append("no modal onset in range, so no bracket for the temporal critical friction")
+    if taken:
+        notes.append(f"taken from an earlier call on the same case, not computed again: {', '.join(taken)}")
+    return notes
+
+
+@dataclass
+class _At:
+    """Both approaches at one μ after the other. taken: what came from an earlier call, in words."""
+
+    system: System
+    phases: Sequence[PhaseSpec]
+    settings: Settings
+    limit: float
+    runs: dict[float, Trajectory]
+    kept: Store | None
+    say: Callable[[str], None]
+
+    def __post_init__(self) -> None:
+        self.taken: list[str] = []
+
+    def compare(self, mu: float, *, full: bool) -> Comparison:
+        """Growth of a small perturbation at μ, and what the full run answers."""
+        modes: ComplexModes | None = None
+        found = self._recall("growth", mu, _growth_of)
+        if found is None:
+            self.say(f"both approaches at μ = {mu:g}")
+            modes = self._modes(mu)
+            found = self._growth(mu, modes)
+            self._keep("growth", mu, _growth_data(found))
+        if not full:
+            return found
+        answered = self._recall("run", mu, _run_of)
+        if answered is None:
+            self.say(f"full run at μ = {mu:g}")
+            run = self.runs.get(mu)
+            if run is None:
+                run = whole(simulate(self.system, self.phases, self.settings, mu=mu))
+            answered = self._answer(mu, run, self._modes(mu) if modes is None else modes)
+            self._keep("run", mu, _run_data(answered))
+        verdict = likeness(found.verdict, answered.dominant, answered.mac)
+        return replace(
+            found,
+            dominant_frequency_hz=answered.dominant,
+            run_growth=answered.fitted,
+            mac=answered.mac,
+            responding=answered.responding,
+            verdict=verdict,
+        )
+
+    def _modes(self, mu: float) -> ComplexModes:
+        highest = 1.02 * self.limit
+        if self.system.assembled:
+            return modes_as_in_time(self.system, mu, highest)
+        return complex_modes(self.system, mu, max_frequency_hz=highest, vectors=True)
+
+    def _growth(self, mu: float, modes: ComplexModes) -> Comparison:
+        if self.system.assembled:
+            perturbation = perturb_assembled(
+                self.system, mu, settings=self.settings, max_frequency_hz=self.limit, modes=modes, shape=True
+            )
         else:
-            say("critical friction, temporal")
-            try:
-                temporal, last = critical_friction(
-                    system,
-                    ends,
-                    settings=settings,
-                    tolerance=tolerance,
-                    max_frequency_hz=max_frequency_hz,
-                    progress=progress,
-                )
-            except AnalysisError as error:
-                notes.append(str(error))
-    return Agreement(
-        tuple(comparisons),
-        modal,
-        temporal,
-        last,
-        _overall(comparisons, modal, temporal, tolerance),
-        tuple(notes),
-    )
-
-
-def _bracket(found: Onsets) -> tuple[float, float] | None:
-    first = found.first
-    return None if first is None else (0.6 * first.mu, 1.5 * first.mu)
-
-
-def _compare_at(
-    system: System,
-    phases: Sequence[PhaseSpec],
-    settings: Settings,
-    mu: float,
-    run: Trajectory,
-    max_frequency_hz: float,
-) -> Comparison:
-    if system.assembled:
-        modes = modes_as_in_time(system, mu, 1.02 * max_frequency_hz)
-        perturbation = perturb_assembled(
-            system, mu, settings=settings, max_frequency_hz=max_frequency_hz, modes=modes
+            perturbation = perturb(
+                self.system, mu, settings=self.settings, max_frequency_hz=self.limit, shape=True
+            )
+        lam = modes.eigenvalues[0]
+        if not len(lam):
+            raise AnalysisError(f"no mode below {self.limit:g} Hz, so there is nothing to compare")
+        unstable = _unstable(modes, self.limit)
+        partner = int(unstable[0]) if len(unstable) else int(np.argmin(np.abs(lam - perturbation.eigenvalue)))
+        here = complex(lam[partner])
+        frequency = abs(perturbation.eigenvalue.imag - here.imag) / max(abs(here.imag), 1e-300)
+        rate = abs(perturbation.eigenvalue.real - here.real) / max(abs(here.real), 1e-300)
+        agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate)
+        assert modes.right is not None, "asked for with vectors"
+        shape = perturbation.shape
+        return Comparison(
+            mu=mu,
+            modal_eigenvalue=here,
+            unstable_hz=tuple(float(f) for f in modes.frequency_hz[0][unstable]),
+            unstable_growth=tuple(float(g) for g in modes.growth_rate[0][unstable]),
+            perturbation=perturbation,
+            dominant_frequency_hz=None,
+            run_growth=None,
+            frequency_error=float(frequency),
+            growth_rate_error=float(rate),
+            mac=None,
+            responding=None,
+            agrees=agrees,
+            verdict=verdict,
+            growth_mac=None if shape is None else shape.likeness(modes.right[0, partner]),
         )
-    else:
-        modes = complex_modes(system, mu, max_frequency_hz=1.02 * max_frequency_hz, vectors=True)
-        perturbation = perturb(system, mu, settings=settings, max_frequency_hz=max_frequency_hz)
-    lam = modes.eigenvalues[0]
-    inside = modes.unstable[0] & (modes.frequency_hz[0] <= max_frequency_hz)
-    unstable = np.flatnonzero(inside)
-    unstable = unstable[np.argsort(lam[unstable].real)[::-1]]
-    partner = int(unstable[0]) if len(unstable) else int(np.argmin(np.abs(lam - perturbation.eigenvalue)))
-    here = complex(lam[partner])
-    frequency_error = abs(perturbation.eigenvalue.imag - here.imag) / max(abs(here.imag), 1e-300)
-    growth_error = abs(perturbation.eigenvalue.real - here.real) / max(abs(here.real), 1e-300)
-    dominant, fitted = dominant_response(run, max_frequency_hz)
-    mac, responding = None, None
-    if dominant:
-        responding = _responding(modes, unstable, dominant)
-    if dominant and responding is not None and not system.assembled:
-        # Without a mode that responds there is nothing to hold the shape against.
-        shape = operating_shape(system, phases, settings, run, dominant, mu=mu)
-        assert modes.right is not None
-        expected = mode_shape(system, modes.right[0, int(unstable[responding])])
-        mac = modal_assurance(
-            np.concatenate([shape[n].ravel() for n in shape]),
-            np.concatenate([expected[n].ravel() for n in shape]),
-        )
-    agrees, verdict = _judge(mu, len(unstable) > 0, here, perturbation, frequency_error, growth_error)
-    if responding is not None and mac is not None:
-        likeness = "in its shape" if mac >= GOOD_MAC else f"in a shape that is no longer linear, MAC {mac:.2f}"
-        verdict += f"; the full run answers at {dominant:.0f} Hz {likeness}"
+
+    def _answer(self, mu: float, run: Trajectory, modes: ComplexModes) -> _Answer:
+        dominant, fitted = dominant_response(run, self.limit)
+        unstable = _unstable(modes, self.limit)
+        responding = _responding(modes, unstable, dominant) if dominant else None
+        if dominant is None or responding is None:
+            # Without a mode that responds there is nothing to hold the shape against.
+            return _Answer(dominant, fitted, responding, None)
+        assert modes.right is not None, "asked for with vectors"
+        shape = operating_shape(self.system, self.phases, self.settings, run, dominant, mu=mu)
+        expected = mode_shape(self.system, modes.right[0, int(unstable[responding])])
+        mac = modal_assurance(by_body(shape), by_body({name: expected[name] for name in shape}))
+        return _Answer(dominant, fitted, responding, mac)
+
+    def _recall(self, part: str, mu: float, read: Callable[[float, Plain], T]) -> T | None:
+        data = None if self.kept is None else self.kept.get(part, mu)
+        if data is None:
+            return None
+        try:
+            found = read(mu, data)
+        except (KeyError, TypeError, ValueError):
+            return None  # damaged, or of another version: computed again
+        self.taken.append(f"{part} at μ = {mu:g}")
+        self.say(self.taken[-1] + " is there from an earlier call on the same case")
+        return found
+
+    def _keep(self, part: str, mu: float, data: Plain) -> None:
+        if self.kept is not None:
+            self.kept.put(part, mu, data)
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What the full run answers with: dominant frequency [Hz], fit of its growth, the unstable mode, its likeness."""
+
+    dominant: float | None
+    fitted: Growth | None
+    responding: int | None
+    mac: float | None
+
+
+def _unstable(modes: ComplexModes, limit: float) -> IntArray:
+    """Columns of the unstable modes up to the limit [Hz], the fastest first."""
+    columns = np.flatnonzero(modes.unstable[0] & (modes.frequency_hz[0] <= limit))
+    return columns[np.argsort(modes.eigenvalues[0][columns].real)[::-1]]
+
+
+def _growth_data(c: Comparison) -> Plain:
+    return {
+        "modal": pair_of(c.modal_eigenvalue),
+        "unstable_hz": list(c.unstable_hz),
+        "unstable_growth": list(c.unstable_growth),
+        "perturbation": perturbation_data(c.perturbation),
+        "frequency_error": c.frequency_error,
+        "growth_rate_error": c.growth_rate_error,
+        "growth_mac": c.growth_mac,
+    }
+
+
+def _growth_of(mu: float, data: Plain) -> Comparison:
+    here, perturbation = complex(*data["modal"]), perturbation_of(mu, data["perturbation"])
+    frequency, rate = float(data["frequency_error"]), float(data["growth_rate_error"])
+    unstable = tuple(float(f) for f in data["unstable_hz"])
+    agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate)
     return Comparison(
-        mu=mu,
-        modal_eigenvalue=here,
-        unstable_hz=tuple(float(f) for f in modes.frequency_hz[0][unstable]),
-        unstable_growth=tuple(float(g) for g in modes.growth_rate[0][unstable]),
-        perturbation=perturbation,
-        dominant_frequency_hz=dominant,
-        run_growth=fitted,
-        frequency_error=float(frequency_error),
-        growth_rate_error=float(growth_error),
-        mac=mac,
-        responding=responding,
-        agrees=agrees,
-        verdict=verdict,
-    )
+        mu, here, unstable, tuple(float(g) for g in data["unstable_growth"]), perturbation, None, None, frequency, rate,
+        None, None, agrees, verdict, float_of(data, "growth_mac"),
+    )  # fmt: skip
 
 
-def _judge(
-    mu: float, unstable: bool, here: complex, perturbation: Perturbation, frequency: float, rate: float
-) -> tuple[bool, str]:
-    said = "unstable" if unstable else "stable"
-    if unstable != perturbation.grows:
-        other = "grows" if perturbation.grows else "decays"
-        return False, f"μ = {mu:g}: they disagree; modal says {said}, the temporal perturbation {other}"
-    if not unstable:
-        return True, f"μ = {mu:g}: both stable (slowest decay in time {perturbation.growth_rate:.4g} 1/s)"
-    if frequency > GOOD_FREQUENCY or rate > GOOD_GROWTH:
-        return False, (
-            f"μ = {mu:g}: both unstable, but frequency differs by {100 * frequency:.2g} % and growth by "
-            f"{100 * rate:.2g} %"
-        )
-    return True, (
-        f"μ = {mu:g}: both unstable at {here.imag / (2 * np.pi):.1f} Hz, growth {here.real:.1f} against "
-        f"{perturbation.growth_rate:.1f} 1/s ({100 * rate:.2g} %)"
+def _run_data(a: _Answer) -> Plain:
+    return {
+        "dominant_frequency_hz": a.dominant,
+        "growth": growth_data(a.fitted),
+        "responding": a.responding,
+        "mac": a.mac,
+    }
+
+
+def _run_of(mu: float, data: Plain) -> _Answer:
+    del mu
+    responding = data["responding"]
+    return _Answer(
+        float_of(data, "dominant_frequency_hz"),
+        growth_of(data["growth"]),
+        None if responding is None else int(responding),
+        float_of(data, "mac"),
     )
 
 
@@ -314,7 +310,7 @@ def _responding(modes: ComplexModes, unstable: IntArray, dominant: float) -> int
         return None
     distance = np.abs(modes.frequency_hz[0][unstable] - dominant) / dominant
     nearest = int(np.argmin(distance))
-    return nearest if distance[nearest] < 0.05 else None
+    return nearest if distance[nearest] < NEAR else None
 
 
 def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float | None, Growth | None]:
@@ -338,13 +334,3 @@ def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float |
     if amplitude == 0.0:
         return None, None
     return frequency, growth(filtered, run.sampling, frequency)
-
-
-def _overall(comparisons: Sequence[Comparison], modal: float | None, temporal: float | None, tolerance: float) -> str:
-    parts = [c.verdict for c in comparisons]
-    agree = all(c.agrees for c in comparisons)
-    if modal is not None and temporal is not None:
-        near = abs(modal - temporal) <= max(tolerance, GOOD_CRITICAL * modal)
-        agree = agree and near
-        parts.append(f"critical μ {modal:.5f} modal, {temporal:.5f} temporal")
-    return ("agree: " if agree else "disagree: ") + "; ".join(parts)

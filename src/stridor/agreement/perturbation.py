@@ -10,12 +10,14 @@ from ..errors import AnalysisError
 from ..modal.complex_modes import complex_modes
 from ..sliding import full_motion, slip_speeds
 from ..system import System
+from ..temporal.observe import MOST_INSTANTS
 from ..temporal.schedule import PhaseSpec
 from ..temporal.signals import Components, components
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..threads import one_thread_if_small
 from ..typing import Array
+from .shapes import WATCHED, TimeShape, component_shape, node_rows, watching
 
 PERTURBATION = 1e-5  # of the slip speed, at the start
 LINEAR = 0.02  # of the slip speed: beyond it the perturbation is no longer small
@@ -26,13 +28,14 @@ PERTURBATION_DURATION = 0.03  # s, or this many periods of the lowest frequency 
 class Perturbation:
     """Free vibration about steady sliding at one μ: λ of what grows fastest within the frequency range,
     the signal (slip speed minus its steady value) [m/s] where it is linear, its sampling [s], and every
-    component found in it."""
+    component found in it. shape: how nodes move in the fastest, None where it was not asked for or cannot be told."""
 
     mu: float
     eigenvalue: complex
     signal: Array
     sampling: float
     components: Components
+    shape: TimeShape | None = None
 
     @property
     def growth_rate(self) -> float:
@@ -48,6 +51,13 @@ class Perturbation:
     def grows(self) -> bool:
         """Whether it is unstable."""
         return self.eigenvalue.real > 0
+
+
+def whole(run: Trajectory) -> Trajectory:
+    """The run if it came to its end; KeyboardInterrupt where Ctrl-C cut it, since half a signal tells other rates."""
+    if run.interrupted:
+        raise KeyboardInterrupt
+    return run
 
 
 def linear_part(run: Trajectory, steady: Array, *, skip: int = 0) -> Array:
@@ -69,19 +79,21 @@ def perturb(
     settings: Settings,
     max_frequency_hz: float = 40e3,
     duration: float | None = None,
+    shape: bool = False,
 ) -> Perturbation:
     """March a small perturbation of steady sliding and take its fastest component.
 
     It starts with every mode of rigid contact up to ``max_frequency_hz`` in equal measure, 1e-5 of the
     slip speed in all, so that frequencies out of range, which may grow faster, start from nothing; the
     time scheme alone decides what becomes of them. It is used as long as it stays below 2 % of the slip
-    speed, where friction is still linear. Raises AnalysisError without steady sliding.
+    speed, where friction is still linear. shape: also how nodes move in the fastest component. Raises AnalysisError
+    without steady sliding, KeyboardInterrupt where Ctrl-C cuts the run.
     """
     if system.assembled:
         from .assembled import perturb_assembled
 
         return perturb_assembled(
-            system, mu, settings=settings, max_frequency_hz=max_frequency_hz, duration=duration
+            system, mu, settings=settings, max_frequency_hz=max_frequency_hz, duration=duration, shape=shape
         )
     steady = slip_speeds(system, full_motion(system))
     if not len(steady) or np.abs(steady).min() == 0:
@@ -97,16 +109,27 @@ def perturb(
         watch=(),
         record_every=_every(settings, max_frequency_hz),
     )
-    run = simulate(
-        rigid,
-        [PhaseSpec("perturbed", duration or PERTURBATION_DURATION, {}, {})],
-        start,
-        mu=mu,
-        disturbance=_band_limited(rigid, mu, PERTURBATION * speed, max_frequency_hz),
+    rows = node_rows(system, WATCHED if shape else 0)
+    watched, names = watching(rigid, rows)
+    run = whole(
+        simulate(
+            watched,
+            [PhaseSpec("perturbed", duration or PERTURBATION_DURATION, {}, {})],
+            replace(start, watch=names if shape else ()),
+            mu=mu,
+            disturbance=_band_limited(rigid, mu, PERTURBATION * speed, max_frequency_hz),
+        )
     )
     signal = linear_part(run, steady)
     found = components(signal, run.sampling, max_frequency_hz=max_frequency_hz)
-    return Perturbation(mu, found.fastest, signal, run.sampling, found)
+    moved = None
+    if shape:
+        part = slice(0, len(signal), max(1, len(signal) // MOST_INSTANTS))
+        motion = run.velocity[part].reshape(len(run.time[part]), -1)
+        moved = component_shape(
+            rows, run.time[part], motion, found.eigenvalues, found.fastest, max_frequency_hz
+        )
+    return Perturbation(mu, found.fastest, signal, run.sampling, found, moved)
 
 
 def _band_limited(system: System, mu: float, slip_speed: float, max_frequency_hz: float) -> tuple[Array, Array, Array]:

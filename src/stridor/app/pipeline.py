@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -10,17 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from ..agreement import modal_assurance
+from ..agreement import Store, modal_assurance
 from ..case import Case
+from ..errors import StridorError
 from ..io.atomic import write_text
-from ..io.datasets import save
+from ..io.datasets import load_trajectory, save
 from ..modal.complex_modes import ComplexModes
 from ..sliding import steady_sliding
 from ..study import analyses
+from ..study.case_key import case_key
 from ..study.everything import Everything, compute_everything
 from ..study.provenance import versions
 from ..temporal.signals import low_passed, spectrogram, spectrum
 from ..temporal.simulate import Progress
+from ..temporal.trajectory import Trajectory
 from ..view.inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
 from ..view.report import write_report
 
@@ -35,8 +38,9 @@ class Outcome:
 
     @property
     def interrupted(self) -> bool:
-        """Whether the simulation was cut short."""
-        return self.everything.run.interrupted
+        """Whether the simulation or the comparison was cut short."""
+        agreement = self.everything.agreement
+        return self.everything.run.interrupted or (agreement is not None and agreement.interrupted)
 
     @property
     def verdict(self) -> str:
@@ -73,20 +77,50 @@ def run(
     *,
     progress: Progress | None = None,
     log: Callable[[str], None] | None = None,
+    only: Collection[str] | None = None,
+    kept: Store | None = None,
 ) -> Outcome:
-    """Compute everything, keep each result as soon as it is there, write the report into ``folder``."""
+    """Compute everything, keep each result as soon as it is there, write the report into ``folder``.
+
+    only and kept are those of `analyses.compare`. A simulate.nc of the same case that is in the folder already is
+    taken, and gone on from where Ctrl-C cut it.
+    """
     target = Path(folder)
     files: list[Path] = []
 
     def keep(name: str, result: Any) -> None:
-        files.append(save(result, target / f"{name}.nc"))
+        path = save(result, target / f"{name}.nc")
+        if path not in files:  # a run is kept again and again while it goes on
+            files.append(path)
 
     write_text(target / "case.toml", case.text)
-    everything = compute_everything(case, progress=progress, log=log, keep=keep)
+    everything = compute_everything(
+        case,
+        progress=progress,
+        log=log,
+        keep=keep,
+        before=_before(case, target / "simulate.nc"),
+        only=only,
+        kept=kept,
+    )
     if log is not None:
         log("report")
     report = write_report(report_inputs(everything), target)
     return Outcome(report, tuple(files), everything)
+
+
+def _before(case: Case, path: Path) -> Trajectory | None:
+    """The run in a file, if it is one of this very case; None otherwise."""
+    if not path.is_file():
+        return None
+    try:
+        run = load_trajectory(path)
+    except StridorError:
+        return None
+    told = run.provenance
+    changed = any(restart.get("changed") for restart in told.get("restarts", []))
+    own = told.get("settings", {}).get("mu") is None and not changed
+    return run if own and told.get("key") == case_key(case) else None
 
 
 def report_inputs(e: Everything) -> ReportInputs:

@@ -75,6 +75,7 @@ def show_agreement(document: dict[str, Any]) -> None:
             number(c["modal"]["growth_rate"], ".2f"),
             number(c["temporal"]["growth_rate"], ".2f"),
             f"{100 * c['growth_rate_error']:.2f}",
+            number(c["growth_mac"], ".3f"),
             number(c["temporal"]["dominant_frequency_hz"], ".1f"),
             number(c["mac"], ".3f"),
         ]
@@ -87,10 +88,12 @@ def show_agreement(document: dict[str, Any]) -> None:
         "growth modal",
         "temporal",
         "error [%]",
-        "run answers [Hz]",
         "MAC",
+        "run answers [Hz]",
+        "MAC of run",
     ]
-    table("modal against temporal", columns, rows)
+    if rows:
+        table("modal against temporal", columns, rows)
     if document["critical_mu_modal"] is not None:
         stdout.print(
             f"critical μ: {document['critical_mu_modal']:.6f} modal, "

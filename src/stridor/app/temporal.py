@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import AnalysisError, CaseError
 from .arguments import Call, numbers, verb
+
+if TYPE_CHECKING:
+    from ..case import Case
+    from ..io.kept_parts import KeptParts
+
+Only = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--only",
+        metavar="PART",
+        help="Of the comparison only growth (small perturbations), run (the full run too) or critical. Repeatable.",
+    ),
+]
 
 
 @verb()
@@ -74,36 +87,71 @@ def compare(
         bool | None,
         typer.Option(
             "--critical/--no-critical",
-            help="Bisect the temporal critical friction [default: comparison.critical].",
+            help="Solve the critical friction and bisect it in time [default: comparison.critical].",
             show_default=False,
         ),
     ] = None,
+    only: Only = None,
 ) -> None:
-    """Agreement of both approaches, as a table and a verdict."""
+    """Agreement of both approaches, as a table and a verdict.
+
+    Each part is kept as soon as it is there; a second call on the same case takes what is finished. Ctrl-C prints it.
+    """
     from ..study import analyses
 
     loaded = call.case()
     values = None if mu is None else numbers(mu, "--mu")
     call.check_friction(values)
-    result = analyses.compare(loaded, values, critical=critical, progress=lambda text: call.say(text))
-    call.keep(result, "compare.nc")
+    if critical is not None and only and critical != ("critical" in only):
+        word = "--critical" if critical else "--no-critical"
+        raise CaseError("--only", ", ".join(only), f"says otherwise than {word}; give one of them")
+    result = analyses.compare(
+        loaded,
+        values,
+        critical=critical,
+        progress=call.say,
+        only=only,
+        kept=_kept(call, loaded),
+        finished=lambda c: call.say(c.verdict),
+    )
+    if result.comparisons or result.critical_mu_modal is not None:
+        call.keep(result, "compare.nc")
+    if result.interrupted:
+        call.say("interrupted; what is finished is kept, and the same call goes on from there")
     if call.json:
         call.document(result.to_json())
-        return
-    from .show import show_agreement
+    else:
+        from .show import show_agreement
 
-    show_agreement(result.to_json())
+        show_agreement(result.to_json())
+    if result.interrupted:
+        raise typer.Exit(130)
+
+
+def _kept(call: Call, case: Case) -> KeptParts:
+    """Parts of the comparison that earlier calls into the same folder have finished."""
+    from ..io.kept_parts import NAME, KeptParts
+    from ..study.case_key import case_key
+
+    kept = KeptParts(call.folder / NAME, case_key(case))
+    if kept.others:
+        call.say(f"{kept.path} also holds parts of other cases or of another version; they are left alone")
+    if kept.damaged:
+        call.say(f"{kept.path}: {kept.damaged} damaged lines are passed over")
+    return kept
 
 
 @verb()
-def run(call: Call) -> None:
-    """Everything: modes, onsets, simulate, compare, and the report."""
+def run(call: Call, only: Only = None) -> None:
+    """Everything: modes, onsets, simulate, compare, and the report. A second call takes what is finished in time."""
     from .output import progress_bar, stdout
     from .pipeline import run as run_all
 
     loaded = call.case()
     with progress_bar("simulate", quiet=call.quiet) as progress:
-        outcome = run_all(loaded, call.folder, progress=progress, log=lambda text: call.say(text))
+        outcome = run_all(
+            loaded, call.folder, progress=progress, log=call.say, only=only, kept=_kept(call, loaded)
+        )
     if call.json:
         call.document(outcome.to_json())
     else:

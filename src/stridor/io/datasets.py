@@ -283,6 +283,7 @@ def _agreement(result: Agreement) -> Any:
         "temporal_eigenvalue": _split(("mu",), [c.perturbation.eigenvalue for c in rows], {"units": "1/s"}),
         "frequency_error": ("mu", [c.frequency_error for c in rows], {"units": "1"}),
         "growth_rate_error": ("mu", [c.growth_rate_error for c in rows], {"units": "1"}),
+        "growth_mac": ("mu", column([c.growth_mac for c in rows]), {"units": "1"}),
         "mac": ("mu", column([c.mac for c in rows]), {"units": "1"}),
         "dominant_frequency": ("mu", column([c.dominant_frequency_hz for c in rows]), {"units": "Hz"}),
     }

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from ..agreement import Agreement, dominant_response, linear_part
+from ..agreement import Agreement, Comparison, Store, dominant_response, linear_part
 from ..agreement import compare as compare_system
 from ..case import Case
 from ..case.matrix_checks import MU
@@ -305,8 +305,16 @@ def compare(
     critical: bool | None = None,
     runs: dict[float, Trajectory] | None = None,
     progress: Callable[[str], None] | None = None,
+    only: Collection[str] | None = None,
+    kept: Store | None = None,
+    finished: Callable[[Comparison], None] | None = None,
 ) -> Agreement:
-    """Both approaches at each μ (default comparison.mu, else the case's own) and by their critical μ."""
+    """Both approaches at each μ (default comparison.mu, else the case's own) and by their critical μ.
+
+    critical False (default comparison.critical) solves neither; only: parts of "growth" (small perturbations at each
+    μ), "run" (the full run at each μ as well) and "critical" instead of all. kept: where finished parts are put and
+    sought (`io.kept_parts`); finished is called with each μ when it is done. Ctrl-C returns what is finished.
+    """
     started = time.perf_counter()
     require_friction(mus)
     settings = case.comparison
@@ -324,6 +332,9 @@ def compare(
         tolerance=settings.tolerance,
         runs=runs,
         progress=progress,
+        only=only,
+        kept=kept,
+        finished=finished,
     )
     return replace(result, provenance=provenance(case, "compare", time.perf_counter() - started, mu=chosen))
 

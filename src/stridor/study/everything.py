@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
 
-from ..agreement import Agreement, mode_shape
+from ..agreement import Agreement, Store, mode_shape
 from ..case import Case
 from ..errors import AnalysisError
 from ..modal.assembled import friction_energy
@@ -84,20 +84,76 @@ class _Clock:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - started
 
 
+@dataclass
+class _Temporal:
+    """What the temporal approach does for a report. notes: what was taken from an earlier call."""
+
+    case: Case
+    clock: _Clock
+    progress: Progress | None
+    keep: Callable[[str, object], None]
+    before: Trajectory | None
+    only: Collection[str] | None
+    kept: Store | None
+    notes: list[str] = field(default_factory=list[str])
+
+    def run(self) -> Trajectory:
+        """The full run; the one before if it is whole, else gone on from where it was cut."""
+        before = self.before
+        if before is not None:
+            how = "gone on from" if before.interrupted else "taken from"
+            self.notes.append(f"the full run was {how} an earlier call on the same case")
+            self.clock.log(self.notes[-1])
+        if before is not None and not before.interrupted:
+            return before
+        run = self.clock(
+            "simulate",
+            lambda: analyses.simulate(
+                self.case,
+                progress=self.progress,
+                restart=before,
+                checkpoint=lambda part: self.keep("simulate", part),
+            ),
+        )
+        self.keep("simulate", run)
+        return run
+
+    def compare(self, run: Trajectory) -> Agreement:
+        """The comparison, the run of the case's own friction handed in."""
+        own = analyses.own_friction(self.case)
+        result = self.clock(
+            "compare",
+            lambda: analyses.compare(
+                self.case,
+                runs={} if own is None else {own: run},
+                progress=self.clock.log,
+                only=self.only,
+                kept=self.kept,
+            ),
+        )
+        self.keep("compare", result)
+        return result
+
+
 def compute_everything(
     case: Case,
     *,
     progress: Progress | None = None,
     log: Log | None = None,
     keep: Callable[[str, object], None] | None = None,
+    before: Trajectory | None = None,
+    only: Collection[str] | None = None,
+    kept: Store | None = None,
 ) -> Everything:
     """Modes, onsets, the full run, the comparison. keep(name, result) is called as soon as each is there, so
-    that nothing computed is lost by what comes after it. Raises what the analyses raise."""
+    that nothing computed is lost by what comes after it. before: a full run of the same case, whole or cut, from an
+    earlier call; only and kept as `analyses.compare` takes them. Raises what the analyses raise."""
     clock = _Clock(log or _silent)
     keep = keep or _keep_nothing
+    temporal = _Temporal(case, clock, progress, keep, before, only, kept)
     system = analyses.structured(case, "run")
     if system.assembled:
-        return _large(case, system, clock, progress, keep)
+        return _large(case, system, clock, temporal, keep)
     description = analyses.describe(case)
     limit = case.modal.max_frequency_hz
     mus = np.linspace(*case.modal.friction_range, case.modal.sweep_points)
@@ -111,18 +167,14 @@ def compute_everything(
     keep("onsets", onsets_damped)
     zooms = clock("modes", lambda: _zooms(case, onsets_bare))
     curve = clock("onsets", lambda: _curve(case))
-    run = clock("simulate", lambda: analyses.simulate(case, progress=progress))
-    keep("simulate", run)
+    run = temporal.run()
     summary = analyses.summarise(case, run)
     agreement, notes = None, list[str]()
     operating = shape = shape_mode = None
     if not run.interrupted:
-        try:
-            agreement = clock("compare", lambda: _compare(case, run, clock.log))
-            keep("compare", agreement)
-        except AnalysisError as error:
-            notes.append(f"no comparison: {error}")
-        operating, shape, shape_mode = clock("compare", lambda: _shapes(case, system, run, summary))
+        agreement = _or_note(lambda: temporal.compare(run), notes, "no comparison")
+        if agreement is None or not agreement.interrupted:
+            operating, shape, shape_mode = clock("compare", lambda: _shapes(case, system, run, summary))
     return Everything(
         case=case,
         system=system,
@@ -143,7 +195,7 @@ def compute_everything(
         shape_mode=shape_mode,
         agreement=agreement,
         seconds=clock.seconds,
-        notes=tuple(notes),
+        notes=(*temporal.notes, *notes),
     )
 
 
@@ -151,7 +203,7 @@ def _large(
     case: Case,
     system: System,
     clock: _Clock,
-    progress: Progress | None,
+    temporal: _Temporal,
     keep: Callable[[str, object], None],
 ) -> Everything:
     """Large models and contact over surfaces: what tells most for its time."""
@@ -173,14 +225,11 @@ def _large(
         else clock("modes", lambda: analyses.modes(case, mu, max_frequency_hz=limit, vectors="right"))
     )
     vector, mode, energy = (None, None, None) if own is None else _squealing(system, own)
-    run = clock("simulate", lambda: analyses.simulate(case, progress=progress))
-    keep("simulate", run)
+    run = temporal.run()
     summary = analyses.summarise(case, run)
     agreement = None
     if not run.interrupted:
-        agreement = clock("compare", lambda: _or_note(lambda: _compare(case, run, clock.log), notes, "no comparison"))
-        if agreement is not None:
-            keep("compare", agreement)
+        agreement = _or_note(lambda: temporal.compare(run), notes, "no comparison")
     return Everything(
         case=case,
         system=system,
@@ -201,7 +250,7 @@ def _large(
         shape_mode=mode,
         agreement=agreement,
         seconds=clock.seconds,
-        notes=tuple(notes),
+        notes=(*temporal.notes, *notes),
         steady=steady,
         own=own,
         vector=vector,
@@ -255,12 +304,6 @@ def _curve(case: Case) -> tuple[Array, Array] | None:
         return None
     frequency = np.linspace(0.0, case.modal.max_frequency_hz, CURVE_POINTS)[1:]
     return frequency, analyses.friction_curve(case, frequency)
-
-
-def _compare(case: Case, run: Trajectory, log: Log) -> Agreement:
-    own = analyses.own_friction(case)
-    runs = {} if own is None else {own: run}
-    return analyses.compare(case, runs=runs, progress=log)
 
 
 def _shapes(

@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from ..case import Case
+from .case_key import case_key
 
 LIBRARIES = ("stridor", "numpy", "scipy", "numba", "pydantic")
 
@@ -28,6 +29,7 @@ def provenance(case: Case, analysis: str, seconds: float, **settings: Any) -> di
     return {
         "analysis": analysis,
         "case": case.text,
+        "key": case_key(case),
         "settings": settings,
         "versions": versions(),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),

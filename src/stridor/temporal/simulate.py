@@ -17,6 +17,7 @@ from .inputs import check_inputs
 from .kernel import NEW_ROWS, NOT_FINITE, OFF_LINE
 from .layout import ENERGY_RECORD, Record
 from .machine import Machine, modal_machine, nodal_machine
+from .observe import Observer
 from .schedule import PhaseSpec, Schedule, lay_out
 from .settings import Settings, choose_path, choose_step
 from .stage import (
@@ -63,15 +64,17 @@ def simulate(
     restart: Trajectory | None = None,
     join: bool = True,
     disturbance: Disturbance | None = None,
+    observe: Observer | None = None,
 ) -> Trajectory:
     """March through the phases.
 
     mu scales every contact's friction law. progress(done, planned) is called between chunks, checkpoint
     with the trajectory so far at most every checkpoint_seconds. restart goes on from a trajectory of the
     same system and settings (``join`` False returns the new part alone). disturbance is added to the initial
-    state. KeyboardInterrupt ends the run early and keeps what was computed
-    (``interrupted``). Raises CaseError for a step beyond the limit, AnalysisError where motion blows up
-    or a slave leaves its master line; what was computed is then in the error's ``trajectory``.
+    state. observe looks on between steps of systems on assembled matrices; of others watch points instead.
+    KeyboardInterrupt ends the run early and keeps what was computed (``interrupted``). Raises CaseError for a step
+    beyond the limit, AnalysisError where motion blows up or a slave leaves its master line; what was computed is then
+    in the error's ``trajectory``.
     """
     settings = settings or Settings()
     check_inputs(
@@ -96,7 +99,10 @@ def simulate(
             restart=restart,
             join=join,
             disturbance=disturbance,
+            observe=observe,
         )
+    if observe is not None:
+        raise ValueError("only runs on assembled matrices can be looked on at; watch points instead")
     if mu is not None:
         system = system.with_friction(mu, np.abs(slip_speeds(system, np.ones(len(system.motion.names)))))
     limit = step_limit(system, settings.beta2)

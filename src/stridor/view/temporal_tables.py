@@ -77,12 +77,19 @@ def agreement_table(comparison: Comparison) -> Table:
     modal, temporal = comparison.modal_eigenvalue, comparison.perturbation
     unstable = len(comparison.unstable_hz) > 0
     names = {True: "unstable", False: "stable"}
-    same = unstable == temporal.grows
+    undecided = comparison.agrees is None
+    same = unstable == temporal.grows and not undecided
+    seen = "not seen" if undecided else names[temporal.grows]
+    judged = "not decided" if undecided else _judged(same)
     rows = [
-        Row(("steady sliding is", names[unstable], names[temporal.grows], "", _judged(same)), _kind(same)),
+        Row(("steady sliding is", names[unstable], seen, "", judged), _kind(same)),
         agreed("frequency [Hz]", modal.imag / (2 * np.pi), temporal.frequency_hz, GOOD_FREQUENCY),
         agreed("growth rate [1/s]", modal.real, temporal.growth_rate, GOOD_GROWTH),
     ]
+    if comparison.growth_mac is not None:
+        mac = comparison.growth_mac
+        name = "likeness of shapes (MAC), small perturbation against mode"
+        rows.append(Row((name, "", number(mac, 3), "", _likeness(mac))))
     if comparison.dominant_frequency_hz is not None:
         heard = comparison.dominant_frequency_hz
         mode = None if comparison.responding is None else comparison.unstable_hz[comparison.responding]

@@ -30,7 +30,7 @@ def verdict(inputs: ReportInputs) -> Verdict:
     growing = _growing(inputs)
     at = f" at μ = {inputs.mu:g}" if inputs.mu is not None else ""
     agreement = inputs.agreement
-    agrees = None if agreement is None else agreement.verdict.startswith("agree")
+    agrees = None if agreement is None else agreement.agree
     parts = [_modal_sentence(growing, at), _onset_sentence(inputs), _run_sentence(inputs), _agreement_sentence(inputs)]
     paragraph = " ".join(part for part in parts if part)
     squeals = None if growing is None else bool(growing)
@@ -133,14 +133,20 @@ def _agreement_sentence(inputs: ReportInputs) -> str:
             )
         elif c.agrees:
             said = f"at μ = {c.mu:g} both find steady sliding stable"
+        elif c.agrees is None:
+            said = f"at μ = {c.mu:g} the signal in time shows nothing to compare"
         else:
             said = f"at μ = {c.mu:g} they contradict each other"
         texts.append(said)
     row = critical_row(agreement)
     if row is not None and row.cells[1] and row.cells[2]:
         texts.append(f"the critical friction coefficient is {row.cells[1]} by the modes and {row.cells[2]} in time")
-    opening = "agree" if agreement.verdict.startswith("agree") else "do not agree"
-    return f"The modal and the temporal approach {opening}: {'; '.join(texts)}."
+    opening = {
+        True: "The modal and the temporal approach agree",
+        False: "The modal and the temporal approach do not agree",
+        None: "Whether the modal and the temporal approach agree is not decided",
+    }[agreement.agree]
+    return f"{opening}{': ' if texts else ''}{'; '.join(texts)}."
 
 
 def _khz(inputs: ReportInputs) -> str:
@@ -252,11 +258,10 @@ def summary_table(inputs: ReportInputs) -> Table | None:
         for c in agreement.comparisons:
             both = len(c.unstable_hz) > 0, c.perturbation.grows
             names = ("stable", "unstable")
-            good = "✓ agree" if c.agrees else "✗ differ"
+            good = {True: "✓ agree", False: "✗ differ", None: "not decided"}[c.agrees]
             at = f"at μ = {c.mu:g}"
-            rows.append(
-                Row((f"steady sliding {at}", names[both[0]], names[both[1]], "", good), "good" if c.agrees else "bad")
-            )
+            seen = "not seen" if c.agrees is None else names[both[1]]
+            rows.append(Row((f"steady sliding {at}", names[both[0]], seen, "", good), "good" if c.agrees else "bad"))
             if any(both):
                 modal = c.modal_eigenvalue
                 here = c.perturbation

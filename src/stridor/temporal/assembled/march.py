@@ -15,6 +15,7 @@ from ...system import System
 from ...typing import Array
 from ..beta2 import StepLimit, scheme
 from ..inputs import check_inputs
+from ..observe import Observer
 from ..schedule import PhaseSpec, Schedule, lay_out
 from ..settings import Settings, choose_step
 from ..start import Disturbance
@@ -44,15 +45,17 @@ def simulate_assembled(
     restart: Trajectory | None = None,
     join: bool = True,
     disturbance: Disturbance | None = None,
+    observe: Observer | None = None,
 ) -> Trajectory:
     """March a system of assembled matrices through its phases.
 
     mu scales every contact's friction law at its slip speed. progress(done, planned) is called about every second,
     checkpoint with the trajectory so far at most every checkpoint_seconds. restart goes on from a trajectory of the
     same system and settings, to the last digit as if it had not been cut (``join`` False returns the new part alone).
-    disturbance (u, v, a) is added to the initial state. KeyboardInterrupt ends the run and keeps what was computed
-    (``interrupted``). Raises CaseError for a mass that is not lumped or a step beyond the limit, AnalysisError where
-    motion blows up or a slave node leaves its master; what was computed is then in the error's ``trajectory``.
+    disturbance (u, v, a) is added to the initial state. observe looks on between steps. KeyboardInterrupt ends the run
+    and keeps what was computed (``interrupted``). Raises CaseError for a mass that is not lumped or a step beyond the
+    limit, AnalysisError where motion blows up or a slave node leaves its master; what was computed is then in the
+    error's ``trajectory``.
     """
     settings = settings or Settings()
     check_inputs(
@@ -71,7 +74,7 @@ def simulate_assembled(
     coefficients = scheme(choose_step(limit, settings), settings.beta2)
     schedule = lay_out(phases, coefficients.step, list(system.loads), list(system.motion.names))
     machine = assembled_machine(system, coefficients, nodes)
-    run = _Run(machine, schedule, settings, limit, restart, join)
+    run = _Run(machine, schedule, settings, limit, restart, join, observe)
     if restart is None:
         begin(machine, schedule, settings, mu, disturbance)
     return run.march(progress, checkpoint, checkpoint_seconds)
@@ -98,9 +101,10 @@ class _Run:
         limit: StepLimit,
         restart: Trajectory | None,
         join: bool,
+        observe: Observer | None = None,
     ) -> None:
         self.machine, self.schedule, self.settings, self.limit = machine, schedule, settings, limit
-        self.restart, self.join = restart, join
+        self.restart, self.join, self.observe = restart, join, observe
         self.phases: list[PhaseResult] = []
         self.wall = 0.0
         self.finite = slides_finitely(machine.system)
@@ -142,6 +146,7 @@ class _Run:
                 size = min(pace.begin(), schedule.stretch_at(machine.done).last - machine.done)
                 if self.finite:
                     size = min(size, self.renewal - machine.done)
+                size = self._look(size)
                 machine.use_threads(two=pace.two)
                 before = clock.perf_counter()
                 self._advance(size)
@@ -158,6 +163,16 @@ class _Run:
             interrupted = True
         self.wall = clock.perf_counter() - started
         return self._trajectory(interrupted=interrupted)
+
+    def _look(self, size: int) -> int:
+        """Show the state to who looks on where it is time to; the steps from here to the next look, at most size."""
+        if self.observe is None:
+            return size
+        machine, every = self.machine, self.observe.every
+        past = (machine.done - self.first_step) % every
+        if past == 0:
+            self.observe.see(machine.done * machine.scheme.step, machine.fields.q[machine.layout.place])
+        return min(size, every - past)
 
     def _advance(self, size: int) -> None:
         machine = self.machine

@@ -1,0 +1,133 @@
+"""The critical friction coefficient by both approaches: solved by the modes, bisected in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..modal.complex_modes import complex_modes
+from ..modal.onsets import onsets
+from ..system import System
+from ..temporal.simulate import Settings
+from .assembled import turns
+from .kept import Store, bool_of, float_of
+from .perturbation import perturb
+from .result import GOOD_CRITICAL, Critical
+
+Say = Callable[[str], None]
+
+
+class NoChangeError(AnalysisError):
+    """Perturbations grow, or decay, at both ends of the bracket: grow says which."""
+
+    def __init__(self, message: str, *, grow: bool) -> None:
+        super().__init__(message)
+        self.grow = grow
+
+
+def critical_friction(
+    system: System,
+    bracket: tuple[float, float],
+    *,
+    settings: Settings,
+    tolerance: float = 5e-4,
+    max_frequency_hz: float = 40e3,
+    progress: Say | None = None,
+    kept: Store | None = None,
+) -> tuple[float, tuple[float, float]]:
+    """Bisect the μ at which small perturbations begin to grow in time; the middle and the last bracket.
+
+    kept: where finished steps are put and taken from. Raises AnalysisError where the ends of the bracket do not differ.
+    """
+
+    def grows(mu: float) -> bool:
+        known = None if kept is None else bool_of(kept.get("critical step", mu), "grows")
+        if known is not None:
+            return known
+        found = perturb(system, mu, settings=settings, max_frequency_hz=max_frequency_hz).grows
+        if kept is not None:
+            kept.put("critical step", mu, {"grows": found})
+        return found
+
+    low, high = bracket
+    state = {m: grows(m) for m in (low, high)}
+    if state[low] or not state[high]:
+        both = "grow" if state[low] else "decay"
+        raise NoChangeError(
+            f"perturbations {both} at both ends of the bracket {low:g} … {high:g}; widen comparison.bracket"
+            if state[low] == state[high]
+            else f"perturbations grow at {low:g} and decay at {high:g}, so that growth ends in the bracket instead of "
+            "beginning; choose another comparison.bracket",
+            grow=state[low],
+        )
+    while high - low > tolerance:
+        middle = (low + high) / 2
+        low, high = (low, middle) if grows(middle) else (middle, high)
+        if progress is not None:
+            progress(f"critical μ between {low:.5f} and {high:.5f}")
+    return (low + high) / 2, (low, high)
+
+
+def compare_critical(
+    system: System,
+    *,
+    friction_range: tuple[float, float],
+    max_frequency_hz: float,
+    settings: Settings,
+    bracket: tuple[float, float] | None,
+    tolerance: float,
+    progress: Say,
+    kept: Store | None,
+) -> Critical:
+    """Both critical friction coefficients, and whether they are one. Raises what the analyses raise."""
+    progress("critical friction, modal")
+    modal = _modal(system, friction_range, max_frequency_hz, kept)
+    ends = bracket or (None if modal is None else (0.6 * modal, 1.5 * modal))
+    if ends is None:
+        return Critical(why="no modal onset in range, so no bracket for the temporal critical friction")
+    progress("critical friction, temporal")
+    try:
+        temporal, last = critical_friction(
+            system,
+            ends,
+            settings=settings,
+            tolerance=tolerance,
+            max_frequency_hz=max_frequency_hz,
+            progress=progress,
+            kept=kept,
+        )
+    except NoChangeError as error:
+        return _without_change(system, ends, max_frequency_hz, modal, error)
+    except AnalysisError as error:
+        return Critical(modal, why=str(error))
+    if modal is None:
+        why = f"growth begins at {temporal:.5f} in time, and the modes have no onset in {friction_range}"
+        inside = friction_range[0] <= temporal <= friction_range[1]
+        return Critical(None, temporal, last, False if inside else None, why)
+    return Critical(modal, temporal, last, abs(modal - temporal) <= max(tolerance, GOOD_CRITICAL * modal))
+
+
+def _modal(system: System, between: tuple[float, float], limit: float, kept: Store | None) -> float | None:
+    """The first onset [1], None where there is none; taken from what is kept if it is there."""
+    known = None if kept is None else kept.get("critical modal", None)
+    if known is not None:
+        return float_of(known, "mu")
+    first = onsets(system, between, max_frequency_hz=limit, friction_damping=turns(system)).first
+    found = None if first is None else first.mu
+    if kept is not None:
+        kept.put("critical modal", None, {"mu": found})
+    return found
+
+
+def _without_change(
+    system: System, ends: tuple[float, float], limit: float, modal: float | None, error: NoChangeError
+) -> Critical:
+    """Ends of a bracket at which the motion in time does the same: do the modes say so too?"""
+    found = complex_modes(system, list(ends), max_frequency_hz=1.02 * limit, friction_damping=turns(system))
+    grow = [bool(np.any(row)) for row in found.unstable & (found.frequency_hz <= limit)]
+    if modal is not None and not grow[0] and grow[1]:
+        begins = f"by the modes growth begins at {modal:.5f} between them"
+        return Critical(modal, agrees=False, why=f"{error}; {begins}")
+    return Critical(modal, why=str(error))

@@ -1,0 +1,170 @@
+"""What a comparison of both approaches finds, and when it may be said that they agree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..temporal.signals import Growth
+from .perturbation import Perturbation
+
+GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
+AGREE, DISAGREE, UNDECIDED = "agree: ", "disagree: ", "not decided: "
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Both approaches at one μ.
+
+    modal_eigenvalue: the mode that belongs to what the temporal side shows growing fastest (or decaying
+    slowest); frequency_error, growth_rate_error relative; mac between the operating shape of the full run
+    at its dominant frequency and the mode that responds (None if none does); unstable_hz: all unstable modes in range;
+    responding: position in that list of the mode that the full run answers with, None if none. growth_mac: between the
+    shape of the fastest component of the small perturbation and that mode, None where it was not taken.
+    agrees: None where the signal in time tells nothing to hold the modes against.
+    """
+
+    mu: float
+    modal_eigenvalue: complex
+    unstable_hz: tuple[float, ...]
+    unstable_growth: tuple[float, ...]
+    perturbation: Perturbation
+    dominant_frequency_hz: float | None
+    run_growth: Growth | None
+    frequency_error: float
+    growth_rate_error: float
+    mac: float | None
+    responding: int | None
+    agrees: bool | None
+    verdict: str
+    growth_mac: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values of one comparison."""
+        modal, temporal = self.modal_eigenvalue, self.perturbation.eigenvalue
+        return {
+            "mu": self.mu,
+            "modal": {
+                "frequency_hz": modal.imag / (2 * np.pi),
+                "growth_rate": modal.real,
+                "unstable_frequencies_hz": list(self.unstable_hz),
+                "unstable_growth_rates": list(self.unstable_growth),
+            },
+            "temporal": {
+                "frequency_hz": temporal.imag / (2 * np.pi),
+                "growth_rate": temporal.real,
+                "dominant_frequency_hz": self.dominant_frequency_hz,
+                "saturated": None if self.run_growth is None else self.run_growth.saturated,
+                "responding_mode_hz": None if self.responding is None else self.unstable_hz[self.responding],
+            },
+            "frequency_error": self.frequency_error,
+            "growth_rate_error": self.growth_rate_error,
+            "growth_mac": self.growth_mac,
+            "mac": self.mac,
+            "agrees": self.agrees,
+            "verdict": self.verdict,
+        }
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Comparisons at several μ and the critical friction coefficients of both approaches.
+
+    critical_mu_temporal is the middle of the last bracket of the bisection, bracket its ends and
+    tolerance its width; None where it was not asked for or not found, with the reason in notes.
+    interrupted: Ctrl-C came before all was computed that was asked for; what is here is whole.
+    """
+
+    comparisons: tuple[Comparison, ...]
+    critical_mu_modal: float | None
+    critical_mu_temporal: float | None
+    bracket: tuple[float, float] | None
+    verdict: str
+    notes: tuple[str, ...] = ()
+    provenance: dict[str, Any] = field(default_factory=dict)
+    interrupted: bool = False
+
+    @property
+    def agree(self) -> bool | None:
+        """Whether all that was compared agrees, None where that is not decided."""
+        return True if self.verdict.startswith(AGREE) else False if self.verdict.startswith(DISAGREE) else None
+
+    def to_json(self) -> dict[str, Any]:
+        """The document that `stridor compare --json` prints: the first μ at the top, all in comparisons."""
+        first = self.comparisons[0].to_json() if self.comparisons else {}
+        return {
+            **first,
+            "critical_mu_modal": self.critical_mu_modal,
+            "critical_mu_temporal": self.critical_mu_temporal,
+            "critical_bracket": None if self.bracket is None else list(self.bracket),
+            "verdict": self.verdict,
+            "interrupted": self.interrupted,
+            "comparisons": [c.to_json() for c in self.comparisons],
+            "notes": list(self.notes),
+        }
+
+
+@dataclass(frozen=True)
+class Critical:
+    """Critical friction of both approaches: agrees is None where there is no pair to compare, and why says so."""
+
+    modal: float | None = None
+    temporal: float | None = None
+    bracket: tuple[float, float] | None = None
+    agrees: bool | None = None
+    why: str = ""
+
+
+def judge(
+    mu: float, unstable: bool, here: complex, perturbation: Perturbation, frequency: float, rate: float
+) -> tuple[bool | None, str]:
+    """Whether both approaches agree at one μ, None where the signal shows nothing, and the sentence that says it."""
+    said = "unstable" if unstable else "stable"
+    if perturbation.eigenvalue == 0 or not np.isfinite(perturbation.eigenvalue):
+        return None, f"μ = {mu:g}: modal says {said}, but the signal in time shows no vibration to compare with"
+    if unstable != perturbation.grows:
+        other = "grows" if perturbation.grows else "decays"
+        return False, f"μ = {mu:g}: they disagree; modal says {said}, the temporal perturbation {other}"
+    if not unstable:
+        return True, f"μ = {mu:g}: both stable (slowest decay in time {perturbation.growth_rate:.4g} 1/s)"
+    # What is not a number is not good.
+    if not (frequency <= GOOD_FREQUENCY and rate <= GOOD_GROWTH):
+        return False, (
+            f"μ = {mu:g}: both unstable, but frequency differs by {100 * frequency:.2g} % and growth by "
+            f"{100 * rate:.2g} %"
+        )
+    return True, (
+        f"μ = {mu:g}: both unstable at {here.imag / (2 * np.pi):.1f} Hz, growth {here.real:.1f} against "
+        f"{perturbation.growth_rate:.1f} 1/s ({100 * rate:.2g} %)"
+    )
+
+
+def likeness(verdict: str, dominant: float | None, mac: float | None) -> str:
+    """The verdict of one μ with what the full run answers, where an unstable mode does."""
+    if dominant is None or mac is None:
+        return verdict
+    how = "in its shape" if mac >= GOOD_MAC else f"in a shape that is no longer linear, MAC {mac:.2f}"
+    return f"{verdict}; the full run answers at {dominant:.0f} Hz {how}"
+
+
+def overall(comparisons: Sequence[Comparison], critical: Critical, *, interrupted: bool) -> str:
+    """One verdict on everything compared: "agree" only where each part was compared, agrees, and none is missing."""
+    parts = [c.verdict for c in comparisons]
+    answers = [c.agrees for c in comparisons]
+    if critical.modal is not None and critical.temporal is not None:
+        parts.append(f"critical μ {critical.modal:.5f} modal, {critical.temporal:.5f} temporal")
+    elif critical.agrees is False:
+        parts.append(f"critical μ: {critical.why}")
+    if critical.agrees is not None:
+        answers.append(critical.agrees)
+    if interrupted:
+        parts.append("interrupted before all was compared")
+        answers.append(None)
+    if False in answers:
+        return DISAGREE + "; ".join(parts)
+    if not answers or None in answers:
+        return UNDECIDED + ("; ".join(parts) or critical.why or "nothing was compared")
+    return AGREE + "; ".join(parts)

@@ -1,0 +1,120 @@
+"""Shapes of motion in time and of modes, and how alike they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..contact.interface import Rows
+from ..system import System
+from ..temporal.observe import Snapshots
+from ..temporal.signals import low_passed
+from ..typing import Array, ComplexArray, Sparse
+
+BEGINNINGS = (1.0, 0.8, 0.6, 0.45, 0.3)
+SLOW = 8  # degree of polynomials for slow parts
+WATCHED = 40  # nodes of a system of point contacts, whose loop records them in every record
+
+
+@dataclass(frozen=True)
+class TimeShape:
+    """Complex amplitudes (r,) of one component of a motion in time, and the rows (r, n) csr of what moved so: along
+    each axis, nodes of every body."""
+
+    rows: Sparse
+    values: ComplexArray
+
+    def likeness(self, vector: ComplexArray) -> float:
+        """MAC with a mode (n,)."""
+        return modal_assurance(self.values, self.rows @ vector)
+
+
+def modal_assurance(first: ComplexArray, second: ComplexArray) -> float:
+    """MAC |aᴴb|²/(aᴴa bᴴb) of two complex shapes, 1 for equal up to a factor."""
+    a, b = np.ravel(first), np.ravel(second)
+    size = float(np.vdot(a, a).real * np.vdot(b, b).real)
+    return float(abs(np.vdot(a, b)) ** 2 / size) if size > 0 else 0.0
+
+
+def mode_shape(system: System, vector: ComplexArray) -> dict[str, ComplexArray]:
+    """Displacements (k, d) of the nodes of each body in an eigenvector (n,)."""
+    return {
+        body.name: np.asarray(body.rows.free @ vector).reshape(-1, system.dimension)
+        for body in (*system.lines, *system.solids)
+    }
+
+
+def node_rows(system: System, most: int) -> Sparse:
+    """Rows (r, n) csr of the displacements of at most ``most`` nodes, taken evenly from all bodies."""
+    d = system.dimension
+    bodies = [sp.csr_array(body.rows.free) for body in (*system.lines, *system.solids)]
+    rows = sp.csr_array(sp.vstack([sp.csr_array((0, system.size)), *bodies]))
+    nodes = np.arange(rows.shape[0] // d)[:: max(1, -(-rows.shape[0] // d // max(most, 1)))]
+    return sp.csr_array(rows[(d * nodes[:, None] + np.arange(d)).ravel()])
+
+
+def watching(system: System, rows: Sparse) -> tuple[System, tuple[str, ...]]:
+    """The system with the nodes of the rows as points, and the names of these."""
+    d = system.dimension
+    points = dict(system.points)
+    names = tuple(f"node {k}" for k in range(rows.shape[0] // d))
+    still = np.zeros((d, len(system.motion.names)))
+    for k, name in enumerate(names):
+        points[name] = Rows(sp.csr_array(rows[d * k : d * k + d]), still)
+    return replace(system, points=points), names
+
+
+def component_shape(
+    rows: Sparse, time: Array, values: Array, eigenvalues: ComplexArray, chosen: complex, max_frequency_hz: float
+) -> TimeShape | None:
+    """Shape of the component that goes as exp(λt) with λ = chosen, one of eigenvalues (k,), in a motion.
+
+    values (s, r) at times (s,) [s], evenly spaced, passes the filter that the signal of the components has passed (what
+    grows beyond max_frequency_hz is none of them) and is split into all of them and slow parts by least squares, which
+    tells lines apart that no spectrum of so short a signal does. Nodes that hardly press or hardly slide leave the
+    linear range before others do, so of several beginnings of the motion the one is taken that the components explain
+    best. None where there are too few instants for so many components.
+    """
+    least = 3 * (2 * len(eigenvalues) + SLOW + 1)
+    if chosen == 0 or len(time) < least:
+        return None
+    values = np.column_stack([low_passed(v, float(time[1] - time[0]), max_frequency_hz) for v in values.T])
+    # The filter shifts the motion in time, which changes an exponential by a factor that all nodes share.
+    time = time[: len(values)]
+    if len(time) < least:
+        return None
+    place = int(np.argmin(np.abs(eigenvalues - chosen)))
+    best, misfit = np.zeros(0, dtype=complex), np.inf
+    for share in BEGINNINGS:
+        count = max(least, int(share * len(time)))
+        parts, off = _split(time[:count], values[:count], eigenvalues)
+        if off < misfit:
+            best, misfit = parts[place] - 1j * parts[len(eigenvalues) + place], off
+    return TimeShape(rows, best) if np.any(best) and np.isfinite(best).all() else None
+
+
+def _split(time: Array, values: Array, eigenvalues: ComplexArray) -> tuple[Array, float]:
+    """Factors (2k + SLOW + 1, r) of Re exp(λt), Im exp(λt) and slow parts in a motion, what is left of it over all."""
+    rate = eigenvalues.real
+    # Growth from the end, decay from the beginning: no column outgrows the others.
+    grown = (time[:, None] - np.where(rate > 0, time[-1], time[0])) * rate
+    waves = np.exp(grown + 1j * (time - time[-1])[:, None] * eigenvalues.imag)
+    # What turns less than twice is not among the components (`signals.components`), but moves.
+    slow = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, len(time)), SLOW)
+    basis = np.column_stack([waves.real, waves.imag, slow])
+    parts = np.linalg.lstsq(basis, values, rcond=1e-10)[0]
+    size = float(np.linalg.norm(values))
+    return parts, float(np.linalg.norm(values - basis @ parts)) / size if size > 0.0 else np.inf
+
+
+def snapshots_of(system: System, steps: int, step: float, fastest_hz: float) -> Snapshots:
+    """Room for the motion of nodes over so many steps Δt [s] with lines up to fastest_hz [Hz]."""
+    return Snapshots.over(steps, step, fastest_hz, lambda most: node_rows(system, most), system.dimension)
+
+
+def by_body(shape: Mapping[str, ComplexArray]) -> ComplexArray:
+    """Shapes of all bodies in one row."""
+    return np.concatenate([shape[name].ravel() for name in shape])
