@@ -42,7 +42,8 @@ class Curve:
     numbering, as the finite elements interpolate.
     stencils (c, 4): nodes that shape each of the c segments, −1 where the spline begins or ends; chords (c, 3) [m]:
     undisplaced lengths of the segments before, of and after it. before, after (c,): segments that continue it
-    smoothly, −1 at ends and corners.
+    smoothly, −1 at ends and corners. follows_spline: whether displacements are interpolated as positions are, by the
+    spline (the line of a beam), or by the facets.
     """
 
     nodes: IntArray
@@ -53,19 +54,22 @@ class Curve:
     chords: Array
     before: IntArray
     after: IntArray
+    follows_spline: bool = False
 
     @classmethod
-    def from_facets(cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = 40.0) -> Curve:
+    def from_facets(
+        cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = 40.0, follows_spline: bool = False
+    ) -> Curve:
         """The curve that facets "line" and "line3" of a mesh with points (·, 2) make up.
 
         Middle nodes of line3 become nodes of the spline. corner_deg: consecutive segments that turn by more make a
         corner. Raises CaseError naming ``where`` for facets that branch, that lie in several pieces or have no length.
         """
         chain = chain_of(points, facets, where=where)
-        return cls._of_chain(points, chain, corner_deg)
+        return cls._of_chain(points, chain, corner_deg, follows_spline)
 
     @classmethod
-    def _of_chain(cls, points: Array, chain: Chain, corner_deg: float) -> Curve:
+    def _of_chain(cls, points: Array, chain: Chain, corner_deg: float, follows_spline: bool) -> Curve:
         positions = np.asarray(points, dtype=float)[chain.nodes]
         count = len(positions) if chain.closed else len(positions) - 1
         start = np.arange(count)
@@ -86,7 +90,9 @@ class Curve:
         chords = np.stack(
             [np.where(before < 0, 0.0, length[before]), length, np.where(after < 0, 0.0, length[after])], axis=1
         )
-        return cls(chain.nodes, positions, chain.closed, chain.facets, stencils, chords, before, after)
+        return cls(
+            chain.nodes, positions, chain.closed, chain.facets, stencils, chords, before, after, follows_spline
+        )  # fmt: skip
 
     @property
     def node_count(self) -> int:
@@ -168,7 +174,7 @@ class Curve:
             normal[cornered] = self._corner_normals(at[cornered], slaves[cornered] - point[cornered], current)
             inside[cornered] = True
         gap = np.sum(normal * (slaves - point), axis=1)
-        return Location(nodes, weights, point, normal, gap, segment, inside)
+        return Location(nodes, weights, point, normal, gap, segment, inside, xi[:, None])
 
     def _corner_normals(self, corner: IntArray, offset: Array, current: Array) -> Array:
         """Out of a corner towards (from, inside the body) slaves at an offset (q, 2) from it."""

@@ -46,7 +46,8 @@ class FacetSurface:
     edges over which the normal turns by more than the corner angle. groups (f, 4): the number of the smoothed normal
     that a corner takes part in. elements (f, 9): nodes of the mesh's own, maybe quadratic, facet that each was split
     from, 0 in unused places; tangents (patterns, 4, 2, 9): what their positions contribute to the two tangents at
-    each corner, by the pattern (f,) of the split.
+    each corner, by the pattern (f,) of the split; kinds and splits: for each pattern the kind of that facet and which
+    of its nodes are the corners. blocks: the mesh's own facets by kind in the surface's numbering.
     """
 
     nodes: IntArray
@@ -58,6 +59,9 @@ class FacetSurface:
     elements: IntArray
     pattern: IntArray
     tangents: Array
+    kinds: tuple[str, ...]
+    splits: tuple[tuple[int, ...], ...]
+    blocks: Blocks
 
     @classmethod
     def from_facets(cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = 40.0) -> FacetSurface:
@@ -87,7 +91,11 @@ class FacetSurface:
         turn = np.einsum("fd,fed->fe", normals, normals[neighbours])
         sharp = (neighbours >= 0) & (turn < np.cos(np.radians(corner_deg)))
         groups = _groups(local, neighbours, over_edge, sharp)
-        return cls(nodes, positions, local, neighbours, sharp, groups, elements, pattern, tangents)
+        kinds, parts = tuple(kind for kind, _, _ in splits), tuple(tuple(split) for _, _, split in splits)
+        own = {kind: np.searchsorted(nodes, block).astype(np.int64) for kind, block in blocks}
+        return cls(
+            nodes, positions, local, neighbours, sharp, groups, elements, pattern, tangents, kinds, parts, own
+        )  # fmt: skip
 
     @property
     def node_count(self) -> int:
@@ -211,7 +219,8 @@ class FacetSurface:
             across = self.neighbours[facet[corner], edge[corner]]
             normal[corner] = self._edge_normals(facet[corner], across, slaves[corner] - point[corner], current)
         gap = np.sum(normal * (slaves - point), axis=1)
-        return Location(np.where(weights == 0.0, 0, self.facets[facet]), weights, point, normal, gap, facet, inside)
+        nodes = np.where(weights == 0.0, 0, self.facets[facet])
+        return Location(nodes, weights, point, normal, gap, facet, inside, place)
 
     def _at(self, current: Array, normals: Array, facet: IntArray, place: Array) -> tuple[Array, Array, Array]:
         """Points (m, 3), unit normals (m, 3) and weights (m, 4) of places (m, 2) on facets (m,)."""

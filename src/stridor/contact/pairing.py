@@ -10,7 +10,9 @@ from scipy.spatial import cKDTree
 
 from ..errors import CaseError
 from ..laws.friction import FrictionLaw
+from ..mesh.model import Blocks
 from ..typing import Array, BoolArray, IntArray
+from .coupling import SlaveFacets, coupled
 from .interface import Rows
 from .master import Location, MasterSurface
 from .surfaces import SurfaceContact, operators
@@ -33,6 +35,8 @@ def pair_surface(
     reach: float | None = None,
     allowed_overlap: float | None = None,
     adjust: bool = False,
+    facets: Blocks | None = None,
+    thickness: float = 1.0,
 ) -> SurfaceContact:
     """A surface contact of those slave nodes that the undisplaced master faces.
 
@@ -46,9 +50,16 @@ def pair_surface(
     own positions of slave nodes with |gap| up to that tolerance onto the master, without strain; the bodies' meshes
     are not touched.
 
+    facets: those between the slave nodes, by kind; in the plane of a ``thickness`` [m]. With them contacts of
+    quadratic facets are weighted over facets (`coupling`), which also says what area a node stands for; without, each
+    node stands by itself.
+
     Raises CaseError naming ``where`` when no node faces the master, or when nodes overlap it by more than that.
     """
     facing, location = _facing(where, slave_position, slave_normals, master, reach)
+    around = None
+    if facets is not None:
+        around = SlaveFacets.of(slave_position, facets, facing, thickness=thickness, nodal_gaps=adjust)
     d = slave_position.shape[1]
     own = (facing[:, None] * d + np.arange(d)).ravel()
     slave, area, drift = Rows(slave.free[own], slave.lift[own]), area[facing], drift[facing]
@@ -63,6 +74,7 @@ def pair_surface(
         moved = np.where(np.abs(location.gap) <= tolerance, location.gap, 0.0)
         position = position - moved[:, None] * location.normal
         location = replace(location, gap=location.gap - moved)
+    coupling = coupled(around, position, area, location, master)
     nodes = operators(
         name,
         slave=slave,
@@ -73,12 +85,13 @@ def pair_surface(
         stiffness_per_area=stiffness_per_area,
         law=law,
         location=location,
+        coupling=coupling,
     )
     return SurfaceContact(
         name=name,
         slave=slave,
         slave_position=position,
-        area=area,
+        area=coupling.area,
         master=master,
         master_rows=master_rows,
         drift=drift,
@@ -87,6 +100,7 @@ def pair_surface(
         sliding=sliding,
         location=location,
         nodes=nodes,
+        facets=around,
     )
 
 
@@ -121,11 +135,16 @@ def repair(
     location = contact.master.locate(
         contact.slave_position + slave_displacement, master_displacement, guess=contact.location.facet
     )
-    relative = slave_displacement
-    if location.nodes.shape[1]:
-        carried = np.einsum("mr,mrd->md", location.weights, master_displacement[location.nodes])
-        relative = slave_displacement - carried
-    reference_gap = location.gap - np.sum(location.normal * relative, axis=1)
+    now = coupled(
+        contact.facets,
+        contact.slave_position + slave_displacement,
+        contact.area,
+        location,
+        contact.master,
+        master_displacement,
+    )
+    relative = now.slave @ slave_displacement - now.master @ master_displacement
+    reference = replace(now, area=contact.area, gap=now.gap - np.sum(location.normal * relative, axis=1))
     nodes = operators(
         contact.name,
         slave=contact.slave,
@@ -135,7 +154,8 @@ def repair(
         drift=contact.drift,
         stiffness_per_area=contact.stiffness_per_area,
         law=contact.law,
-        location=replace(location, gap=reference_gap),
+        location=location,
+        coupling=reference,
     )
     return replace(contact, location=location, nodes=nodes), np.flatnonzero(~location.inside)
 
@@ -168,6 +188,7 @@ def _only(location: Location, index: IntArray) -> Location:
         gap=location.gap[index],
         facet=location.facet[index],
         inside=location.inside[index],
+        place=None if location.place is None else location.place[index],
     )
 
 

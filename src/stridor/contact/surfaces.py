@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from ..laws.friction import FrictionLaw
 from ..typing import Array, Sparse
+from .coupling import Coupling, SlaveFacets, collocated
 from .interface import Rows
 from .master import Location, MasterSurface
 from .nodes import ContactNodes
@@ -22,8 +23,8 @@ class SurfaceContact:
     slave: rows (m d, n) of the displacements of the slave nodes; slave_position (m, d) [m], area (m,) [m²].
     master_rows (k d, n) belong to the k nodes of master. drift (m, d, p) [m/s]: velocity of the slave's material
     against the master's at each slave node for a body that slides through its mesh (a turning disc), for each
-    prescribed motion at factor one. stiffness_per_area [N/m³], infinite for rigid. out_of_reach: slave nodes that
-    the master does not face at the start take no part.
+    prescribed motion at factor one. stiffness_per_area [N/m³], infinite for rigid. facets: those between the slave
+    nodes where they are known. Slave nodes that the master does not face at the start take no part.
     """
 
     name: str
@@ -38,6 +39,7 @@ class SurfaceContact:
     sliding: Literal["small", "finite"]
     location: Location
     nodes: ContactNodes
+    facets: SlaveFacets | None = None
 
 
 def frames(normal: Array, preferred: Array | None = None) -> Array:
@@ -72,35 +74,30 @@ def operators(
     stiffness_per_area: float,
     law: FrictionLaw,
     location: Location,
+    coupling: Coupling | None = None,
 ) -> ContactNodes:
-    """Normal and tangential rows of slave nodes at a location on their master."""
+    """Normal and tangential rows of slave nodes at a location on their master.
+
+    coupling: how they hang on slave and master nodes, each by itself where it is None.
+    """
     count, d = slave_position.shape
     slip = drift.sum(axis=2) if drift.shape[2] else None
     tangents = frames(location.normal, slip)
+    if coupling is None:
+        coupling = collocated(location, area, master_rows.free.shape[0] // d)
 
     def rows(directions: Array) -> tuple[Sparse, Array]:
         """Rows along directions (m, q, d), in order node by node."""
-        q = directions.shape[1]
-        place = np.repeat(np.arange(count * q), d)
-        own = (np.arange(count)[:, None, None] * d + np.arange(d)).repeat(q, axis=1).ravel()
-        pick = sp.csr_array((directions.ravel(), (place, own)), shape=(count * q, count * d))
-        free, lift = pick @ slave.free, pick @ slave.lift
-        r = location.nodes.shape[1]
-        if r:
-            place = np.repeat(np.arange(count * q), r * d)
-            at = (location.nodes[:, :, None] * d + np.arange(d))[:, None].repeat(q, axis=1).ravel()
-            value = (location.weights[:, None, :, None] * directions[:, :, None, :]).ravel()
-            pick = sp.csr_array((value, (place, at)), shape=(count * q, master_rows.free.shape[0]))
-            free, lift = free - pick @ master_rows.free, lift - pick @ master_rows.lift
-        free = sp.csr_array(free)
+        own, other = _along(coupling.slave, directions), _along(coupling.master, directions)
+        free = sp.csr_array(own @ slave.free - other @ master_rows.free)
         free.eliminate_zeros()
-        return free, np.asarray(lift)
+        return free, np.asarray(own @ slave.lift - other @ master_rows.lift)
 
     normal, normal_lift = rows(location.normal[:, None, :])
     tangent, tangent_lift = rows(tangents)
     # Material that slides through its mesh moves the surface's points along it, never the surface.
     tangent_lift = tangent_lift + np.einsum("mqd,mdp->mqp", tangents, drift).reshape(tangent_lift.shape)
-    stiffness = stiffness_per_area * area
+    stiffness = stiffness_per_area * coupling.area
     return ContactNodes(
         names=(name,),
         owner=np.zeros(count, dtype=np.int64),
@@ -109,10 +106,21 @@ def operators(
         tangent=tangent,
         normal_lift=normal_lift,
         tangent_lift=tangent_lift,
-        gap=location.gap,
-        area=area,
+        gap=coupling.gap,
+        area=coupling.area,
         compliance=np.where(np.isinf(stiffness), 0.0, 1.0 / np.maximum(stiffness, 1e-300)),
         position=slave_position,
         normals=location.normal,
         tangents=tangents,
     )
+
+
+def _along(weights: Sparse, directions: Array) -> Sparse:
+    """Rows (m q, n d) csr that take Σ_j weights (m, n) u_j of node i along its directions (m, q, d)."""
+    entries = sp.coo_array(weights)
+    _, q, d = directions.shape
+    rows = (entries.row[:, None, None] * q + np.arange(q)[:, None]).repeat(d, axis=2)
+    columns = (entries.col[:, None, None] * d + np.arange(d)).repeat(q, axis=1)
+    values = entries.data[:, None, None] * directions[entries.row]
+    shape = (weights.shape[0] * q, weights.shape[1] * d)
+    return sp.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)

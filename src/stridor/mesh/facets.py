@@ -15,9 +15,7 @@ import numpy as np
 from ..errors import CaseError
 from ..typing import Array, IntArray
 from .model import FACET_KINDS, Blocks
-
-# φ integrates to nothing (triangle6) or less than nothing (quad8) at the corners of these.
-SCALED_KINDS = ("triangle6", "quad8")
+from .positive_basis import changed_basis
 
 Order = list[tuple[int, int]]
 
@@ -83,23 +81,23 @@ def facet_areas(points: Array, facets: Blocks, *, thickness: float = 1.0) -> Map
 
 
 def nodal_areas(points: Array, facets: Blocks, *, thickness: float = 1.0) -> Array:
-    """Area (k,) [m²] that each of the points (k, d) stands for; the sum is the area of the facets.
+    """Area (k,) [m²] that each of the points (k, d) stands for; positive, and the sum is the area of the facets.
 
     ∫φ dA, which turns a uniform pressure into the exact nodal forces. On triangle6 and quad8 that would be zero or
-    negative at the corners, where a contact force per area needs a positive area: there each facet's area is shared
-    out as ∫φ² dA (the scaling of Hinton, Rock and Zienkiewicz for lumped masses).
+    negative at the corners, where a contact force per area needs a positive area: there it is ∫φ̃ dA with the
+    functions of `positive_basis`.
     """
     total = np.zeros(len(points))
     for kind, nodes in _known(facets).items():
-        rule = facet_rule(kind)
-        sizes = _size(_directed_areas(points, nodes, rule))
-        if kind in SCALED_KINDS:
-            share = sizes @ rule.values**2
-            share *= (sizes.sum(axis=1) / share.sum(axis=1))[:, None]
-        else:
-            share = sizes @ rule.values
-        np.add.at(total, nodes, share)
+        share = facet_integrals(points, nodes, kind)
+        np.add.at(total, nodes, share @ changed_basis(kind, np.ones((1, nodes.shape[1]), dtype=bool))[0].T)
     return thickness * total
+
+
+def facet_integrals(points: Array, nodes: IntArray, kind: str) -> Array:
+    """∫φ dA (f, r) [m², in the plane m] over facets (f, r) of one kind, negative at the corners of quad8."""
+    rule = facet_rule(kind)
+    return _size(_directed_areas(points, nodes, rule)) @ rule.values
 
 
 def nodal_normals(points: Array, facets: Blocks) -> Array:

@@ -19,6 +19,7 @@ from ..contact.surfaces import SurfaceContact
 from ..errors import CaseError
 from ..mesh.boundary import require_boundary
 from ..mesh.facets import nodal_areas, nodal_normals
+from ..mesh.model import Blocks
 from ..typing import Array
 from .supports import master_surface
 from .view import View, point_position
@@ -59,7 +60,7 @@ def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Co
 def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> SurfaceContact:
     """Slave nodes of a boundary, or one point, on a boundary or an obstacle."""
     where = f"contacts.{name}"
-    slave_rows, position, area, normals, is_point = _slave(case, view, where, contact)
+    slave_rows, position, area, normals, facets = _slave(case, view, where, contact)
     master, master_rows = _master(case, view, where, contact)
     slave_body = case.place(contact.slave).body
     drift = _drift(case, view, slave_body, contact.master.partition(".")[0], position)
@@ -78,34 +79,38 @@ def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> 
         sliding=contact.sliding,
         allowed_overlap=contact.adjust or None,
         adjust=contact.adjust > 0,
+        facets=facets,
+        thickness=_thickness(case, slave_body, position.shape[1]),
     )
-    if is_point:
+    if facets is None:
         # A point stands for no area: its stiffness is in N/m, and it has no pressure.
         built = replace(built, nodes=replace(built.nodes, area=np.full(len(built.area), np.nan)))
     return built
 
 
-def _slave(case: Case, view: View, where: str, contact: ContactCase) -> tuple[Rows, Array, Array, Array, bool]:
-    """Rows (m d, n), positions (m, d), areas (m,), outward normals (m, d) of the slave, and whether it is a point."""
+def _slave(
+    case: Case, view: View, where: str, contact: ContactCase
+) -> tuple[Rows, Array, Array, Array, Blocks | None]:
+    """Rows (m d, n), positions (m, d), areas (m,) and outward normals (m, d) of the slave, and the facets between
+    its nodes, None for a point."""
     at = case.place(contact.slave, where=f"{where}.slave")
     body = view.bodies[at.body]
+    d = body.dimension
     if isinstance(at, PointRef):
         rows = view.point_rows(case, contact.slave)
-        d = body.dimension
-        return (
-            Rows(rows.free[:d], rows.lift[:d]),
-            point_position(case, view.bodies, at)[None, :],
-            np.ones(1),
-            np.zeros((1, d)),
-            True,
-        )
+        position = point_position(case, view.bodies, at)[None, :]
+        return Rows(rows.free[:d], rows.lift[:d]), position, np.ones(1), np.zeros((1, d)), None
     assert body.mesh is not None, "checked: boundaries belong to meshes"
     facets = require_boundary(body.mesh, at.boundary, f"{where}.slave")
     nodes = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
-    thickness = getattr(case.bodies[at.body], "thickness", 1.0)
-    area = nodal_areas(body.points, facets, thickness=thickness if body.dimension == 2 else 1.0)[nodes]
+    area = nodal_areas(body.points, facets, thickness=_thickness(case, at.body, d))[nodes]
     normals = nodal_normals(body.points, facets)[nodes]
-    return view.node_rows(body, nodes), body.points[nodes], area, normals, False
+    own = {kind: np.searchsorted(nodes, block) for kind, block in facets.items() if len(block)}
+    return view.node_rows(body, nodes), body.points[nodes], area, normals, own
+
+
+def _thickness(case: Case, body: str, dimension: int) -> float:
+    return float(getattr(case.bodies[body], "thickness", 1.0)) if dimension == 2 else 1.0
 
 
 def _master(case: Case, view: View, where: str, contact: ContactCase) -> tuple[MasterSurface, Rows]:
@@ -121,9 +126,8 @@ def _master(case: Case, view: View, where: str, contact: ContactCase) -> tuple[M
         if case.side(where.partition(".")[2]) > 0:
             order = order[::-1]
         lines = np.stack([np.arange(len(order) - 1), np.arange(1, len(order))], axis=1)
-        return Curve.from_facets(body.points[order], {"line": lines}, where=f"{where}.master"), view.node_rows(
-            body, order
-        )
+        line = Curve.from_facets(body.points[order], {"line": lines}, where=f"{where}.master", follows_spline=True)
+        return line, view.node_rows(body, order)
     assert body.mesh is not None, "checked: boundaries belong to meshes"
     surface, nodes = master_surface(body.mesh, boundary, f"{where}.master")
     return surface, view.node_rows(body, nodes)

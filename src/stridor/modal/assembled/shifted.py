@@ -82,6 +82,9 @@ def _factorised(problem: ContactProblem, shift: float) -> tuple[Factor, float]:
         matrix = sp.block_array([[matrix, normal.T], [normal, corner]], format="csr")
     return factorise(matrix, symmetric=True, saddle=problem.nodes > 0, solver=problem.solver), scale
 
+# Squared length, of one, that a shape must have apart from the others.
+APART = 1e-8
+
 
 def modes_below(problem: ContactProblem, square: float) -> int | None:
     """How many frictionless modes have ω² below ``square`` [1/s²], by the signs of pivots (Sylvester's law of inertia).
@@ -146,10 +149,20 @@ def _polished(shifted: Shifted, shapes: Array) -> tuple[Array, Pair]:
     if not shapes.shape[1]:
         return np.zeros(0), Pair(shapes, np.zeros((problem.nodes, 0)))
     u, p = shifted.solve(problem.mass @ shapes)
-    mass = u.T @ (problem.mass @ u)
-    stiffness = u.T @ (problem.stiffness @ u) + p.T @ (problem.compliance[:, None] * p)
-    squares, turn = sl.eigh((stiffness + stiffness.T) / 2, (mass + mass.T) / 2)
-    return squares, Pair(u, p).turned(turn)
+    found = Pair(u, p)
+    # The iteration shortens each shape by its ω²: of one length again, and without what only rounding tells apart
+    # where all modes of a small problem are found.
+    found = found.turned(np.diag(1.0 / np.sqrt(np.einsum("ij,ij->j", u, problem.mass @ u))))
+    lengths, axes = sl.eigh(_symmetric(found.u.T @ (problem.mass @ found.u)))
+    told = lengths > APART
+    found = found.turned(axes[:, told] / np.sqrt(lengths[told]))
+    stiffness = found.u.T @ (problem.stiffness @ found.u) + found.p.T @ (problem.compliance[:, None] * found.p)
+    squares, turn = sl.eigh(_symmetric(stiffness))
+    return squares, found.turned(turn)
+
+
+def _symmetric(matrix: Array) -> Array:
+    return (matrix + matrix.T) / 2
 
 
 def orthonormal(problem: ContactProblem, basis: Pair, block: Pair, *, smallest: float = 1e-8) -> tuple[Pair, Array]:

@@ -1,0 +1,240 @@
+"""Quadrature of slave facets in pieces that each lie over one facet of the master.
+
+What is integrated over a slave facet, the product of its functions and the master's, has kinks where the master goes
+from facet to facet. In the plane the slave is cut at the master's nodes, in space by the outlines of its facets,
+projected along the normal of the slave facet; within a piece everything is smooth and Gauss's points are exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..mesh.facets import quadrature, reference_nodes, shape_functions
+from ..typing import Array, BoolArray, IntArray
+from .clipping import common_triangles
+from .curve import Curve
+from .facets import FacetSurface
+
+# A facet of which less than this is found over the master, or more than all, is integrated without pieces.
+LEAST_COVER = 0.9
+MOST_COVER = 1.0 + 1e-6
+OPPOSED = -0.1  # cosine between normals that face each other
+STEPS = 12
+FINE = 4  # Gauss points along each side of a piece where facets are distorted
+
+
+@dataclass(frozen=True)
+class Points:
+    """Quadrature points: the facet (q,) each belongs to, its reference place (q, e) and weight (q,) there."""
+
+    owner: IntArray
+    place: Array
+    weight: Array
+
+
+def pieces(kind: str, facets: Array, under: Array, master: Curve | FacetSurface, current: Array) -> Points:
+    """Points on slave facets (f, r, d) [m] of a kind over a master whose nodes are at current (k, d) [m].
+
+    under (f, d) [m]: the point of the master below the middle of each facet. Facets that the master does not cover
+    get points that know nothing of it.
+    """
+    if isinstance(master, Curve):
+        cut = _on_line(kind, facets, under, current)
+    else:
+        cut = _in_space(kind, facets, under, master, current)
+    owner, place, weight, good = cut
+    keep = good[owner]
+    rest = np.flatnonzero(~good)
+    plain_place, plain_weight = _composite(kind)
+    return Points(
+        np.concatenate([owner[keep], np.repeat(rest, len(plain_weight))]),
+        np.concatenate([place[keep], np.tile(plain_place, (len(rest), 1))]),
+        np.concatenate([weight[keep], np.tile(plain_weight, len(rest))]),
+    )
+
+
+def _on_line(
+    kind: str, facets: Array, under: Array, nodes: Array
+) -> tuple[IntArray, Array, Array, BoolArray]:
+    """Between the feet of the master's nodes on the chord of each facet, four Gauss points each."""
+    begin, chord = facets[:, 0], facets[:, 1] - facets[:, 0]
+    length = np.linalg.norm(chord, axis=1)
+    along = chord / length[:, None]
+    away = np.linalg.norm(under - facets[:, :2].mean(axis=1), axis=1)
+    # Only nodes around the place below: the far side of a ring has feet on the chord as well.
+    near = cKDTree(nodes).query_ball_point(under, length + 1e-9 * away)
+    counts = np.array([len(n) for n in near], dtype=np.int64)
+    facet = np.repeat(np.arange(len(facets)), counts)
+    node = np.concatenate([np.asarray(n, dtype=np.int64) for n in near]) if len(near) else np.zeros(0, dtype=np.int64)
+    foot = np.sum((nodes[node] - begin[facet]) * along[facet], axis=1) / length[facet]
+    within = (foot > 1e-9) & (foot < 1.0 - 1e-9)
+    each = np.arange(len(facets))
+    facet = np.concatenate([each, facet[within], each])
+    foot = np.concatenate([np.zeros(len(each)), foot[within], np.ones(len(each))])
+    order = np.lexsort((foot, facet))
+    facet, foot = facet[order], foot[order]
+    piece = np.flatnonzero((facet[1:] == facet[:-1]) & (np.diff(foot) > 1e-9))
+    x, w = quadrature("line3")
+    owner = np.repeat(facet[piece], len(w))
+    size = foot[piece + 1] - foot[piece]
+    part = (foot[piece][:, None] + size[:, None] * x[:, 0]).ravel()
+    weight = (size[:, None] * w).ravel()
+    flat = np.einsum("frd,fd->fr", facets - begin[:, None], along)[:, :, None]
+    place, slope, good = _inverted(kind, flat, owner, (part * length[owner])[:, None])
+    return owner, place, weight * length[owner] / slope, good
+
+
+def _in_space(
+    kind: str, facets: Array, under: Array, master: FacetSurface, current: Array
+) -> tuple[IntArray, Array, Array, BoolArray]:
+    corner_count = 3 if kind.startswith("triangle") else 4
+    corners = facets[:, :corner_count]
+    origin = corners.mean(axis=1)
+    frame = _frames(corners)  # (f, 3, 3): two tangents and the normal
+    flat = np.einsum("fij,frj->fri", frame[:, :2], facets - origin[:, None])
+    outline, sides, other_even = _outlines(master, current)
+    pair_facet, pair_other = _neighbours(corners, under, frame[:, 2], outline, sides)
+    relative = outline[pair_other] - origin[pair_facet][:, None]
+    others = np.einsum("pij,prj->pri", frame[pair_facet][:, :2], relative)
+    polygons = np.zeros((len(facets), 4, 2))
+    polygons[:, :corner_count] = flat[:, :corner_count]
+    counts = np.full(len(facets), corner_count, dtype=np.int64)
+    which, triangles = common_triangles(polygons, counts, pair_facet, np.ascontiguousarray(others), sides[pair_other])
+    owner = pair_facet[which]
+    first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    twice = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    following = np.roll(flat[:, :corner_count], -1, axis=1)
+    turned = flat[:, :corner_count, 0] * following[:, :, 1] - flat[:, :corner_count, 1] * following[:, :, 0]
+    covered = np.bincount(owner, twice, len(facets)) / np.abs(turned.sum(axis=1))
+    even = _affine(kind, facets)[owner] & other_even[pair_other[which]]
+    owners: list[IntArray] = []
+    places: list[Array] = []
+    weights: list[Array] = []
+    good = (covered >= LEAST_COVER) & (covered <= MOST_COVER)
+    for lot, (at, w) in ((even, quadrature("triangle6")), (~even, _fine_triangle(FINE))):
+        points = triangles[lot, None, 0] + at[:, :1] * first[lot, None] + at[:, 1:] * second[lot, None]
+        facet = np.repeat(owner[lot], len(w))
+        place, slope, found = _inverted(kind, flat, facet, points.reshape(-1, 2))
+        owners.append(facet)
+        places.append(place)
+        weights.append((twice[lot, None] * w).ravel() / slope)
+        good = good & found
+    return np.concatenate(owners), np.concatenate(places), np.concatenate(weights), good
+
+
+def _affine(kind: str, facets: Array) -> BoolArray:
+    """Which facets (f, r, d) are images of the reference facet without distortion: polynomials stay polynomials."""
+    places = reference_nodes(kind)
+    last = 2 if kind.startswith("triangle") else 3
+    first, second = facets[:, 1] - facets[:, 0], facets[:, last] - facets[:, 0]
+    straight = facets[:, :1] + places[:, :1] * first[:, None] + places[:, 1:] * second[:, None]
+    size = np.abs(first).max(axis=1) + np.abs(second).max(axis=1)
+    return np.abs(facets - straight).max(axis=(1, 2)) <= 1e-9 * size
+
+
+def _fine_triangle(count: int) -> tuple[Array, Array]:
+    """Places (q, 2) and weights (q,) on the reference triangle: Gauss points of a square, one side drawn together."""
+    x, w = np.polynomial.legendre.leggauss(count)
+    x, w = 0.5 * (x + 1.0), 0.5 * w
+    first, second = np.meshgrid(x, x, indexing="ij")
+    return np.column_stack([first.ravel(), ((1.0 - first) * second).ravel()]), (np.outer((1.0 - x) * w, w)).ravel()
+
+
+def _frames(corners: Array) -> Array:
+    """Tangents and outward normals (f, 3, 3), row by row, of facets by their corners (f, 3 or 4, 3)."""
+    across = corners[:, 2] - corners[:, 0]
+    other = corners[:, -1] - corners[:, 1] if corners.shape[1] == 4 else corners[:, 2] - corners[:, 1]
+    normal = np.cross(across, other) if corners.shape[1] == 4 else np.cross(corners[:, 1] - corners[:, 0], across)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    first = across - np.sum(across * normal, axis=1, keepdims=True) * normal
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normal, first), normal], axis=1)
+
+
+def _outlines(master: FacetSurface, current: Array) -> tuple[Array, IntArray, BoolArray]:
+    """Corners (o, 4, 3) of the mesh's own facets of a master, how many (o,) each has and whether (o,) it is affine."""
+    found: list[Array] = []
+    sides: list[IntArray] = []
+    even: list[BoolArray] = []
+    for kind, block in master.blocks.items():
+        count = 3 if kind.startswith("triangle") else 4
+        corners = current[block[:, :count]]
+        found.append(corners if count == 4 else np.concatenate([corners, corners[:, :1]], axis=1))
+        sides.append(np.full(len(block), count, dtype=np.int64))
+        even.append(_affine(kind, current[block]))
+    return np.concatenate(found), np.concatenate(sides), np.concatenate(even)
+
+
+def _neighbours(
+    corners: Array, under: Array, normal: Array, outline: Array, sides: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Pairs (p,) of slave facets and outlines that may lie over each other and face each other."""
+    centre = outline[:, :3].mean(axis=1)
+    size = np.linalg.norm(outline - centre[:, None], axis=2).max(axis=1)
+    own = np.linalg.norm(corners - corners.mean(axis=1)[:, None], axis=2).max(axis=1)
+    near = cKDTree(centre).query_ball_point(under, 1.01 * (own + size.max()))
+    counts = np.array([len(n) for n in near], dtype=np.int64)
+    facet = np.repeat(np.arange(len(corners)), counts)
+    other = np.concatenate([np.asarray(n, dtype=np.int64) for n in near])
+    quads = sides[other] == 4
+    a, b, c, d = (outline[other, i] for i in range(4))
+    out = np.where(quads[:, None], np.cross(c - a, d - b), np.cross(b - a, c - a))
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    offset = centre[other] - under[facet]
+    height = np.abs(np.sum(offset * normal[facet], axis=1))
+    facing = (np.sum(out * normal[facet], axis=1) < OPPOSED) & (height <= own[facet] + size[other])
+    return facet[facing], other[facing]
+
+
+def _inverted(kind: str, flat: Array, owner: IntArray, target: Array) -> tuple[Array, Array, BoolArray]:
+    """Reference places (q, e) of targets (q, e) in the plane of facets (f, r, e), the determinants (q,) of the map
+    there, and for which facets (f,) all were found."""
+    e = flat.shape[2]
+    centre = reference_nodes(kind).mean(axis=0)
+    place = np.broadcast_to(centre, (len(target), e)).copy()
+    tangents = np.zeros((len(target), e, e))
+    offset = np.zeros(target.shape)
+    with np.errstate(all="ignore"):
+        for _ in range(STEPS):
+            values, slopes = shape_functions(kind, place)
+            offset = np.einsum("qr,qre->qe", values, flat[owner]) - target
+            tangents = np.einsum("aqr,qre->qea", slopes, flat[owner])
+            place = place - np.clip(_solve(tangents, offset), -0.5, 0.5)
+        values, slopes = shape_functions(kind, place)
+        offset = np.einsum("qr,qre->qe", values, flat[owner]) - target
+        tangents = np.einsum("aqr,qre->qea", slopes, flat[owner])
+        slope = np.abs(np.linalg.det(tangents))
+    size = np.abs(flat).max(axis=(1, 2))
+    found = np.all(np.abs(offset) <= 1e-9 * size[owner][:, None], axis=1) & (slope > 0)
+    found &= np.all((place > -1e-6) & (place < 1 + 1e-6), axis=1)
+    good = np.ones(len(flat), dtype=bool)
+    good[owner[~found]] = False
+    return place, np.where(found, slope, 1.0), good
+
+
+def _solve(matrices: Array, right: Array) -> Array:
+    """Solutions (q, e) of 1 × 1 or 2 × 2 systems (q, e, e)."""
+    if matrices.shape[1] == 1:
+        return right / matrices[:, 0]
+    (a, b), (c, d) = matrices[:, 0].T, matrices[:, 1].T
+    det = a * d - b * c
+    return np.stack([d * right[:, 0] - b * right[:, 1], a * right[:, 1] - c * right[:, 0]], axis=1) / det[:, None]
+
+
+def _composite(kind: str) -> tuple[Array, Array]:
+    """Places (q, e) and weights (q,) of a fine rule for what has kinks anywhere."""
+    parts = 4
+    x, w = quadrature(kind)
+    cells = np.arange(parts) / parts
+    if x.shape[1] == 1:
+        return (cells[:, None] + x[:, 0] / parts).reshape(-1, 1), np.tile(w / parts, parts)
+    corner = np.stack(np.meshgrid(cells, cells, indexing="ij"), axis=-1).reshape(-1, 2)
+    if not kind.startswith("triangle"):
+        return (corner[:, None] + x / parts).reshape(-1, 2), np.tile(w / parts**2, parts**2)
+    upright = corner[corner.sum(axis=1) < 1.0 - 0.5 / parts]
+    turned = corner[corner.sum(axis=1) < 1.0 - 1.5 / parts] + 1.0 / parts
+    places = np.concatenate([(upright[:, None] + x / parts), (turned[:, None] - x / parts)])
+    return places.reshape(-1, 2), np.tile(w / parts**2, parts**2)
