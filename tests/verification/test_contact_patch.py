@@ -16,6 +16,7 @@ from stridor.contact.pairing import pair_surface, repair
 from stridor.laws import Coulomb
 from stridor.mesh.facets import nodal_areas, nodal_normals, pressure_load, reference_nodes, shape_functions
 from stridor.sliding import steady_sliding_nodes
+from stridor.sliding.pattern import unexplained_patterns
 from stridor.system import build_system
 
 pytestmark = pytest.mark.verification
@@ -353,3 +354,24 @@ def test_an_even_pressure_stays_even_in_time(cells, below, above, stiffness):
     pressure = run.nodes.pressure
     assert pressure.shape[0] > 3
     np.testing.assert_allclose(pressure, 1e6, rtol=1e-6)
+
+
+def test_steady_sliding_tells_of_nodes_that_open_without_a_reason():
+    system = build_system(blocks("hexahedron20", 3, 3))
+    nodes, steady = system.contact_nodes(), steady_sliding_nodes(system, mu=0.0)
+    assert steady.warnings == ()
+    # What contact taken node by node did: every inner corner of a face open amid middles that touch.
+    at = nodes.position / 0.1 * 3
+    corner = np.all(np.abs(at[:, :2] - np.round(at[:, :2])) < 1e-9, axis=1)
+    inner = corner & np.all((at[:, :2] > 0.1) & (at[:, :2] < 2.9), axis=1)
+    active, gap = steady.active & ~inner, np.where(inner, 1e-9, 0.0)
+    force = np.where(inner, 0.0, steady.normal_force)
+    (text,) = unexplained_patterns(system, force, gap, active)
+    assert text.startswith("contact c: 4 of 40 slave nodes stand open amid touching ones, which neither gap nor")
+    # A dent that was there before explains as much.
+    dented = build_system(blocks("hexahedron20", 3, 3))
+    dented.surfaces[0].nodes.gap[inner] = 1e-9
+    assert not list(unexplained_patterns(dented, force, gap, active))
+    uneven = steady.normal_force * np.where(np.arange(len(gap)) % 2, 1.9, 0.1)
+    (text,) = unexplained_patterns(system, uneven, steady.gap, steady.active)
+    assert "the pressure jumps from node to node by more than 40% of its mean" in text

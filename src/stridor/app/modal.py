@@ -24,6 +24,7 @@ def steady(
     loaded = call.case()
     call.check_friction(mu)
     found = steady_sliding(loaded, mu)
+    call.warn(found.warnings)
     files = write_steady(loaded, found, call.folder)
     for path in files:
         call.say(f"written: {path}")

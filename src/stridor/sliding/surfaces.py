@@ -22,6 +22,7 @@ from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .equilibrium import Equilibrium, State, settle
 from .history import STILL, follow
+from .pattern import unexplained_patterns
 from .points import full_motion
 from .redundant import closed, redundant
 from .resultants import Balance, Resultant, balance, resultants
@@ -36,7 +37,8 @@ class SurfaceSliding:
     sense (m, d−1) = −slip/|slip|, zero where a node does not slip and hence has no friction. active (m,) whether a
     node carries load; friction_coefficient (m,); gap (m,) [m], negative by N/K_c where contact has a stiffness.
     residual: largest imbalance of a freedom over the largest force. iterations: sets of touching nodes tried.
-    resultants: contact → Resultant; balance: loads against contact forces.
+    resultants: contact → Resultant; balance: loads against contact forces. warnings: where nodes open or press in a
+    pattern that no pressure explains.
 
     status (m,): OPEN 0, STICK 1 or SLIP 2. With load steps sense is that of the friction force where nodes slip without
     a slip velocity, and zero where they stick; travel (p,) [s] is how far the motions have run, in units of their
@@ -57,6 +59,7 @@ class SurfaceSliding:
     travel: Array
     resultants: Mapping[str, Resultant] = field(default_factory=dict)
     balance: Balance = Balance(np.nan, np.nan)
+    warnings: tuple[str, ...] = ()
 
     @property
     def slip_speed(self) -> Array:
@@ -137,6 +140,7 @@ def steady_sliding_nodes(
         travel=np.zeros(len(factors)),
         resultants=resultants(nodes, normal, friction, state.active),
         balance=balance(system, force, push.T @ state.normal_force),
+        warnings=tuple(unexplained_patterns(system, normal, state.gap, state.active)),
     )
 
 

@@ -90,6 +90,7 @@ def describe(case: Case) -> Description:
     else:
         lines += _time_lines(case, system, data)
     warnings = [*case.warnings, *unit_warnings(case), *mesh_warnings(case, system), *imported_warnings(case, system)]
+    warnings += data.get("contact_patterns", [])
     if "modal" in case.model_fields_set:
         warnings += resolution_warnings(case)
     for contact in system.contacts:
@@ -261,6 +262,7 @@ def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str
             "gap": float(nodes.gap[mine].min()),
         }
     lines.append(f"  {balance_words(steady)}")
+    data["contact_patterns"] = list(steady.warnings)
     return lines
 
 

@@ -1,0 +1,92 @@
+"""Whether contact forces look like a pressure: nodes that stand open amid others, forces that alternate.
+
+A pressure that meshes resolve varies little from a node to its neighbours, and opens where it has fallen to nothing.
+What does neither comes from the discretisation (meshes of very different size, faces that are badly distorted, rigid
+contact where a body has too few freedoms), and modes and time inherit it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..contact.coupling import SlaveFacets
+from ..system import System
+from ..typing import Array, BoolArray, Sparse
+
+# A node is surrounded by pressure where its neighbours have this part of the mean.
+PRESSED = 0.2
+# Half the nodes amid others differ from their neighbours by more than this part of the mean pressure: no picture of it.
+UNEVEN = 0.4
+LEAST_NODES = 8
+# Nodes of a facet in the order of its outline; a centre is next to the middles.
+OUTLINES = {
+    "line": [(0, 1)],
+    "line3": [(0, 2), (2, 1)],
+    "triangle": [(0, 1), (1, 2), (2, 0)],
+    "quad": [(0, 1), (1, 2), (2, 3), (3, 0)],
+    "triangle6": [(0, 3), (3, 1), (1, 4), (4, 2), (2, 5), (5, 0)],
+    "quad8": [(0, 4), (4, 1), (1, 5), (5, 2), (2, 6), (6, 3), (3, 7), (7, 0)],
+}
+OUTLINES["quad9"] = [*OUTLINES["quad8"], (8, 4), (8, 5), (8, 6), (8, 7)]
+
+
+def unexplained_patterns(system: System, normal_force: Array, gap: Array, active: BoolArray) -> Iterator[str]:
+    """A sentence for each surface contact whose nodes open or press in a pattern that no pressure explains.
+
+    normal_force (m,) [N], gap (m,) [m] and active (m,) of all contact nodes in equilibrium.
+    """
+    nodes = system.contact_nodes()
+    first = len(system.contacts)
+    for surface in system.surfaces:
+        mine = slice(first, first + surface.nodes.count)
+        first += surface.nodes.count
+        if surface.facets is None or not active[mine].any():
+            continue
+        around = _neighbours(surface.facets, surface.nodes.count)
+        loaded = active[mine] & (normal_force[mine] > 0.0)
+        pressure = np.where(loaded, normal_force[mine], 0.0) / nodes.area[mine]
+        open_amid = _open_amid(around, loaded, pressure, nodes.gap[mine], gap[mine])
+        if open_amid:
+            yield (
+                f"contact {surface.name}: {open_amid} of {surface.nodes.count} slave nodes stand open amid touching "
+                "ones, which neither gap nor pressure explains; refine the coarser mesh, mend distorted faces, or give "
+                "the contact a stiffness"
+            )
+        elif _alternates(around, loaded, pressure):
+            yield (
+                f"contact {surface.name}: the pressure jumps from node to node by more than {UNEVEN:.0%} of its mean; "
+                "refine the coarser mesh, mend distorted faces, or give the contact a stiffness"
+            )
+
+
+def _neighbours(facets: SlaveFacets, count: int) -> Sparse:
+    """Which slave nodes (m, m) follow each other on the outline of a facet, ones without the diagonal."""
+    ends = [facets.own[block[:, list(pair)]] for kind, block in facets.blocks.items() for pair in OUTLINES[kind]]
+    both = np.concatenate(ends)
+    both = both[np.all(both >= 0, axis=1)]
+    row, column = np.concatenate([both, both[:, ::-1]]).T
+    found = sp.csr_array((np.ones(len(row)), (row, column)), shape=(count, count))
+    found.data[:] = 1.0
+    return found
+
+
+def _open_amid(around: Sparse, loaded: BoolArray, pressure: Array, gap_before: Array, gap: Array) -> int:
+    """How many open nodes have touching neighbours only, under pressure, and no more gap to begin with than those."""
+    number = np.maximum(np.diff(around.indptr), 1)
+    amid = ~loaded & (around @ loaded >= number) & (np.diff(around.indptr) > 1)
+    amid &= around @ pressure / number >= PRESSED * pressure[loaded].mean()
+    opening = gap - around @ gap / number
+    given = gap_before - around @ gap_before / number
+    return int(np.sum(amid & (given < 0.5 * opening)))
+
+
+def _alternates(around: Sparse, loaded: BoolArray, pressure: Array) -> bool:
+    number = np.maximum(np.diff(around.indptr), 1)
+    inner = loaded & (around @ loaded >= number)
+    if inner.sum() < LEAST_NODES:
+        return False
+    apart = np.abs(pressure - around @ pressure / number)[inner]
+    return bool(np.median(apart) > UNEVEN * pressure[loaded].mean())
