@@ -123,8 +123,8 @@ def test_cylinder_on_a_block(tmp_path):
         *found, force = hertz_found(case(hertz(tmp_path / f"{size}.inp", size, ratio=0.9)))
         assert force == pytest.approx(17.5e3, rel=1e-9)
         errors.append(np.abs(np.array(found) / HERTZ - 1))
-    assert errors[0].max() < 0.03
-    assert np.all(errors[1] < 0.5 * errors[0])
+    # What is left does not fall with the mesh any more but moves with where the last touching node happens to be.
+    assert np.max(errors) < 0.01
     quadratic = hertz_found(case(hertz(tmp_path / "quadratic.inp", 1.0, quadratic=True)))
     assert quadratic[:2] == pytest.approx(HERTZ, rel=3e-3)
 
@@ -141,17 +141,10 @@ def test_cylinder_on_a_block_by_penalty(tmp_path):
 
 @pytest.mark.parametrize("cells", ["quad", "quad8"])
 def test_two_blocks_under_even_pressure(cells):
-    # even where meshes match; else nearly so with linear elements, while quadratic ones share out their forces badly
     assert unevenness(case(two_blocks(cells, 10, 10))) == pytest.approx((1.0, 1.0), rel=1e-8)
     model = case(two_blocks(cells, 10, 9))
     assert st.steady_sliding(model).resultants["joint"].force == pytest.approx([0.0, 1e6], rel=1e-9, abs=1e-3)
-    least, largest = unevenness(model)
-    if cells == "quad":
-        assert least > 0.99
-        assert largest < 1.02
-    else:
-        assert least > 0.7
-        assert largest < 1.6
+    assert unevenness(model) == pytest.approx((1.0, 1.0), rel=1e-8)
 
 
 def test_ring_on_a_shaft():

@@ -174,6 +174,7 @@ def _after_load_steps(system: System, mu: float | None, solver: str | None) -> S
         travel=state.travel,
         resultants=resultants(nodes, state.normal_force, state.friction, active),
         balance=balance(system, load.force, force),
+        warnings=tuple(unexplained_patterns(system, state.normal_force, state.gap, state.active)),
     )
 
 
