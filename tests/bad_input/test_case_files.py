@@ -252,6 +252,16 @@ FILES = {
         '[loads.press]\nbodies = ["pin"]\n',
         "loads.press.bodies: ['pin'] – only used with gravity or centrifugal",
     ),
+    "displacement of what is free": (
+        'fixed = ["x", "rotation"]',
+        'fixed = ["x", "rotation"]\ndisplacement = { y = 1e-5 }',
+        "supports.guide.displacement.y: 1e-05 – a displacement needs 'y' in fixed, which has: x, rotation",
+    ),
+    "interference that slides far": (
+        'stiffness = 1e10\nfriction',
+        'stiffness = 1e10\nsliding = "finite"\ninterference = 1e-6\nfriction',
+        "contacts.A.interference: 1e-06 – needs sliding = \"small\": finite sliding finds the gaps anew from the places of the nodes",
+    ),
     "friction law": (
         'law = "coulomb"',
         'law = "coloumb"',
@@ -371,7 +381,7 @@ FILES = {
     "misspelt": (
         "friction = {",
         "frictoin = {",
-        "contacts.A.frictoin: unknown key; did you mean 'friction'? accepted: slave, master, stiffness, sliding, side, adjust, friction",
+        "contacts.A.frictoin: unknown key; did you mean 'friction'? accepted: slave, master, stiffness, sliding, side, adjust, interference, friction",
     ),
     "unknown section": (
         "[materials.steel]",
@@ -664,7 +674,7 @@ OVERRIDES = {
     "contacts.A.stiffness=1\nx=2": "contacts.A.stiffness: '1\\nx=2' – not a value; accepted: a number such as 0.3, true, false, a word, \"a text\", [a, list], { a = table }",
     "contacts.A.friction.coefficient=nan": "contacts.A.friction.coefficient: nan – must be a number >= 0, the friction coefficient while sliding; it must be finite",
     "materials.steel.young_modulus=-1": "materials.steel.young_modulus: -1 – must be a number > 0 [Pa], Young's modulus",
-    "phases.0=3": "phases.0: 3 – must be a table with the keys name, duration, loads, velocities, ramp",
+    "phases.0=3": "phases.0: 3 – must be a table with the keys name, duration, loads, velocities, displacements, ramp",
     "loads.press.force.0=up": "loads.press.force: ['up', -20.0] – must be [x, y] or [x, y, z], numbers [N]: the force, on a boundary spread evenly",
     "loads.press.force.2=1": "loads.press.force.2: no such item; the list has: 0, 1",
 }

@@ -141,6 +141,10 @@ def _support_problems(parts: Parts) -> Iterator[Problem]:
             if direction not in support.fixed:
                 accepted = f"a velocity needs {direction!r} in fixed, which has: {', '.join(support.fixed)}"
                 yield Problem(f"{where}.velocity.{direction}", support.velocity[direction], accepted)
+        for direction in support.displacement:
+            if direction not in support.fixed:
+                accepted = f"a displacement needs {direction!r} in fixed, which has: {', '.join(support.fixed)}"
+                yield Problem(f"{where}.displacement.{direction}", support.displacement[direction], accepted)
         if len(set(support.fixed)) < len(support.fixed):
             yield Problem(f"{where}.fixed", support.fixed, "must name each direction once")
         point = yield from _place(parts, support.at, f"{where}.at")
@@ -207,6 +211,9 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
     for name, contact in parts.contacts.items():
         where = f"contacts.{name}"
         yield from _friction_problems(f"{where}.friction", contact.friction)
+        if contact.interference and contact.sliding == "finite":
+            accepted = 'needs sliding = "small": finite sliding finds the gaps anew from the places of the nodes'
+            yield Problem(f"{where}.interference", contact.interference, accepted)
         pair = frozenset((contact.slave, contact.master))
         if pair in pairs:
             accepted = f"slides on {contact.master} in contacts.{pairs[pair]} already"
@@ -367,8 +374,17 @@ def _phase_problems(parts: Parts) -> Iterator[Problem]:
     for name in sorted(set(parts.supports) & set(parts.bodies)):
         if moving.count(name) > 1:
             yield Problem(f"supports.{name}", None, f"bodies.{name} slides under the same name; rename the support")
+    placed = [name for name, support in parts.supports.items() if support.displacement]
+    placed += [name for name, contact in parts.contacts.items() if contact.interference]
+    for name in sorted(set(placed)):
+        if placed.count(name) > 1:
+            yield Problem(f"supports.{name}", None, f"contacts.{name} has an interference; rename the support")
     for number, phase in enumerate(parts.phases):
         where = f"phases.{number}"
+        for name, factor in phase.displacements.items():
+            if name not in placed and not any(parts.is_broken(t, name) for t in ("supports", "contacts")):
+                accepted = no_such("support with a displacement or contact with an interference", name, placed)
+                yield Problem(f"{where}.displacements.{name}", factor, accepted)
         if phase.name in seen:
             yield Problem(f"{where}.name", phase.name, "another phase has this name")
         seen.add(phase.name)
@@ -407,6 +423,14 @@ def _steady_problems(parts: Parts) -> Iterator[Problem]:
         yield Problem("steady.steps", f"{len(steady.steps)} steps", accepted)
     if steady.friction == "stick-slip" and not parts.contacts and not parts.names("contacts"):
         yield Problem("steady.friction", steady.friction, "needs contacts that can stick, and the case has none")
+    away = [f"supports.{name}.displacement" for name, s in parts.supports.items() if s.displacement]
+    away += [f"contacts.{name}.interference" for name, c in parts.contacts.items() if c.interference]
+    if steady.friction == "stick-slip" and away:
+        accepted = (
+            f"load steps do not take {', '.join(away)}; give a support a velocity and a step a duration, which goes "
+            "the same distance"
+        )
+        yield Problem("steady.friction", steady.friction, accepted)
     for number, step in enumerate(steady.steps):
         where = f"steady.steps.{number}"
         yield from _factor_problems(parts, where, step, _moving(parts))

@@ -142,6 +142,12 @@ class Case(Table):
         return supports + [name for name, body in self.bodies.items() if getattr(body, "sliding", None) is not None]
 
     @property
+    def placed(self) -> list[str]:
+        """Names of what is pressed away by a prescribed distance: supports, then contacts with an interference."""
+        supports = [name for name, support in self.supports.items() if any(support.displacement.values())]
+        return supports + [name for name, contact in self.contacts.items() if contact.interference]
+
+    @property
     def imported(self) -> dict[str, MatrixBody]:
         """The bodies that are matrices of other programs."""
         return {name: body for name, body in self.bodies.items() if isinstance(body, MatrixBody)}

@@ -68,7 +68,8 @@ class Parameter(Table):
 
 
 class Support(Table):
-    """[supports.NAME]: degrees of freedom of a point or a boundary held, or moved with a prescribed velocity."""
+    """[supports.NAME]: degrees of freedom of a point or a boundary held, moved with a prescribed velocity, or pressed
+    away by a prescribed distance."""
 
     at: str = Field(description=PLACE)
     fixed: Annotated[tuple[Direction, ...], Field(min_length=1)] = Field(
@@ -77,6 +78,10 @@ class Support(Table):
     velocity: Mapping[Direction, Number] = Field(
         default_factory=dict[Direction, float],
         description="a table of prescribed velocities, each a number, x, y, z [m/s], rotation [rad/s]",
+    )
+    displacement: Mapping[Direction, Number] = Field(
+        default_factory=dict[Direction, float],
+        description="a table of prescribed displacements, each a number, x, y, z [m], rotation [rad]",
     )
 
 
@@ -231,6 +236,9 @@ class Contact(Table):
         default=0.0,
         description="a number >= 0 [m], gaps and overlaps of slave nodes up to this count as touching",
     )
+    interference: Number = Field(
+        default=0.0, description="a number [m], the overlap that is pressed out beside that of the meshes (press fit)"
+    )
     friction: Friction = Field(description='a table such as { law = "coulomb", coefficient = 0.1 }')
 
 
@@ -281,6 +289,13 @@ class Phase(Table):
     velocities: Mapping[str, Number] = Field(
         default_factory=dict[str, float],
         description="a table of supports, each a number, the factor of the support's velocity in this phase",
+    )
+    displacements: Mapping[str, Number] = Field(
+        default_factory=dict[str, float],
+        description=(
+            "a table of supports and contacts, each a number, the factor of the support's displacement or of the "
+            "contact's interference in this phase"
+        ),
     )
     ramp: NotNegative = Field(
         default=0.0, description="a number >= 0 [s], the time in which the factors change (0: suddenly)"

@@ -112,12 +112,14 @@ def couple(system: System, *, mu: float | None = None) -> tuple[Coupling, tuple[
     """Coupling of the contacts that touch in steady sliding at ``mu`` (default: the laws' own), and
     the names of those that do not. Without loads every contact counts as touching."""
     open_names: tuple[str, ...] = ()
+    velocities = full_motion(system)
+    system = system.in_place()
     if system.contacts and system.loads:
         steady = steady_sliding(system, mu=mu)
         open_names = tuple(c.name for c, a in zip(system.contacts, steady.active, strict=True) if not a)
         touching = tuple(c for c, a in zip(system.contacts, steady.active, strict=True) if a)
         system = replace(system, contacts=touching)
-    speeds = slip_speeds(system, full_motion(system))
+    speeds = slip_speeds(system, velocities)
     sloped = any(c.law.slope(abs(float(v))) != 0.0 for c, v in zip(system.contacts, speeds, strict=True))
     if sloped and not system.loads:
         raise AnalysisError(

@@ -67,7 +67,9 @@ class Equilibrium:
         self.condensed: BoolArray = nodes.compliance * self.scale * CONDENSED > 1.0
         self.factorisations = 0
         cubic = system.cubic
-        self.stretched = 0.0 if cubic is None or travel is None else cubic.rows.lift @ travel
+        self.stretched: Array | float = 0.0 if cubic is None else cubic.stretch
+        if cubic is not None and travel is not None:
+            self.stretched = self.stretched + cubic.rows.lift @ travel
 
     def solve(self, active: BoolArray, start: Array | None = None) -> State:
         """The equilibrium with exactly these nodes touching, whichever the signs of gap and force.

@@ -44,11 +44,12 @@ def slip_speeds(system: System, motion_factors: Array) -> Array:
 
 
 def full_motion(system: System) -> Array:
-    """Factors (p,) of the moving supports in steady sliding: one, or those that run on after the last load step."""
+    """Factors (p,) of the moving supports in steady sliding: one, or those that run on after the last load step; zero
+    for those that are pressed away by a distance."""
     if system.load_steps:
         last = system.load_steps[-1]
         return np.zeros_like(last.velocities) if last.duration is not None else last.velocities
-    return np.ones(len(system.motion.names))
+    return system.motion.full
 
 
 def steady_sliding(
@@ -65,7 +66,8 @@ def steady_sliding(
     Raises AnalysisError where no contact slides, a contact is pulled apart as a whole, or the
     structure is not held.
     """
-    factors = full_motion(system) if motion_factors is None else motion_factors
+    factors = full_motion(system) if motion_factors is None else motion_factors * system.motion.full
+    system = system.in_place()
     speeds = slip_speeds(system, factors)
     for contact, speed in zip(system.contacts, speeds, strict=True):
         normal_speed = float(contact.normal_lift @ factors)

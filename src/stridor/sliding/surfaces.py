@@ -93,8 +93,10 @@ def steady_sliding_nodes(
     if system.load_steps:
         _require_last(system, load_factors, motion_factors)
         return _after_load_steps(system, mu, solver)
+    velocities = full_motion(system)
+    factors = velocities if motion_factors is None else np.asarray(motion_factors, dtype=float) * velocities
+    system = system.in_place()
     nodes = system.contact_nodes()
-    factors = full_motion(system) if motion_factors is None else np.asarray(motion_factors, dtype=float)
     slip = nodes.slip_velocity(factors)
     speed = np.linalg.norm(slip, axis=1)
     _require_constant_gap(nodes, factors, speed)

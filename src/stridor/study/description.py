@@ -41,12 +41,17 @@ class Description:
 def describe(case: Case) -> Description:
     """Build the model, find its steady sliding and its step limit, and say it in words."""
     system = build_system(case)
+    settled = system.in_place()
     lines = [f"{case.title or 'case'}: {len(case.bodies)} bodies, {system.size} free degrees of freedom"]
     lines += [_body_words(case, system, name) for name in case.bodies]
     for name, support in case.supports.items():
         moving = (
             ", moves at " + ", ".join(f"{d} {v:g}" for d, v in support.velocity.items()) if support.velocity else ""
         )
+        if support.displacement:
+            moving += ", pressed away by " + ", ".join(
+                f"{d} {v:g} {'rad' if d == 'rotation' else 'm'}" for d, v in support.displacement.items()
+            )
         lines.append(f"  support {name} at {support.at} holds {', '.join(support.fixed)}{moving}")
     for name, load in case.loads.items():
         where = f"at {load.at}" if load.at else f"on {', '.join(load.bodies or ['all bodies'])}"
@@ -65,9 +70,14 @@ def describe(case: Case) -> Description:
         "contacts": {},
     }
     lines += [f"  parameter {name} = {parameter.value:g}" for name, parameter in case.parameters.items()]
+    lines += [
+        f"  contact {name}: an interference of {contact.interference:g} m is pressed out"
+        for name, contact in case.contacts.items()
+        if contact.interference
+    ]
     if system.assembled or system.general:
         lines += _surface_lines(case, system, data)
-    elif system.contacts and system.loads:
+    elif settled.contacts and settled.loads:
         steady = steady_sliding(system)
         for k, contact in enumerate(system.contacts):
             stiffness = "rigid" if np.isinf(contact.stiffness) else f"{contact.stiffness:g} N/m"
@@ -102,11 +112,29 @@ def describe(case: Case) -> Description:
         least = float(surface.nodes.gap.min(initial=np.inf))
         if least > 1e-9 * max(1.0, float(np.ptp(surface.slave_position, axis=0).max())):
             lines.append(f"contact {surface.name} is open by {least:.3g} m or more at the start")
-    if (system.contacts or system.surfaces) and not any(np.any(v) for v in system.loads.values()):
+    warnings += _sudden(case)
+    if (system.contacts or system.surfaces) and not case.placed and not any(np.any(v) for v in settled.loads.values()):
         warnings.append(
             "no load presses the bodies together: modes take the contacts as closed, a run would not keep them so"
         )
     return Description(tuple(lines), data, tuple(warnings))
+
+
+def _sudden(case: Case) -> list[str]:
+    """Distances that a run takes in one step, which is a blow."""
+    found: list[str] = []
+    before = dict.fromkeys(case.placed, 0.0)
+    for number, phase in enumerate(case.phases):
+        after = {name: phase.displacements.get(name, b if number else 1.0) for name, b in before.items()}
+        jumps = [name for name in after if after[name] != before[name]]
+        settled = number == 0 and case.temporal.initial == "steady-sliding"
+        if phase.ramp == 0 and jumps and not settled:
+            found.append(
+                f"phase {phase.name}: {', '.join(jumps)} goes all of its distance in one step, a blow in simulate; "
+                "give the phase a ramp, or start from steady sliding"
+            )
+        before = after
+    return found
 
 
 def _law_words(friction: Friction) -> str:
@@ -224,7 +252,7 @@ def _load_words(load: Load) -> str:
 def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     """Every contact in steady sliding: nodes that touch, forces and moments, pressure, the balance."""
     nodes = system.contact_nodes()
-    if not nodes.count or not system.loads:
+    if not nodes.count or not system.in_place().loads:
         return []
     try:
         steady = steady_sliding_nodes(system)

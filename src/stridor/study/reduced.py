@@ -119,7 +119,7 @@ class _Numbers:
 
     def __init__(self, case: Case, box: Mapping[str, tuple[float, float]]) -> None:
         self._case, self._box = case, box
-        self.own = build_system(case)
+        self.own = build_system(case).in_place()
         # In factors of imported matrices, unless that is a parameter of its own.
         self._friction = MU in case.factor_names and MU not in case.parameters
         self._built: dict[tuple[tuple[str, float], ...], System] = {}
@@ -134,7 +134,7 @@ class _Numbers:
         if key not in self._built:
             while len(self._built) >= REMEMBERED:
                 del self._built[next(iter(self._built))]
-            self._built[key] = self._checked(build_system(self._case.with_(changes), mu))
+            self._built[key] = self._checked(build_system(self._case.with_(changes), mu).in_place())
         return self._built[key]
 
     def structure(self, values: Mapping[str, float]) -> Mapping[str, Piece]:

@@ -9,7 +9,7 @@ from ..temporal.settings import Settings
 
 def phases_of(case: Case) -> list[PhaseSpec]:
     """The load phases of a case as the temporal approach takes them."""
-    return [PhaseSpec(p.name, p.duration, p.loads, p.velocities, p.ramp) for p in case.phases]
+    return [PhaseSpec(p.name, p.duration, p.loads, p.velocities, p.ramp, p.displacements) for p in case.phases]
 
 
 def settings_of(case: Case) -> Settings:

@@ -24,7 +24,7 @@ from .holders import holders_of
 from .imported import is_symmetric
 from .links import Links, links_of
 from .load_steps import LoadStep
-from .model import CubicSprings, Line, PrescribedMotion, Solid, Structure, System, constrain
+from .model import CubicSprings, Line, PrescribedMotion, Solid, Structure, System, constrain, place_name
 from .pairs import is_point_on_line, point_contact, surface_contact
 from .supports import constraints_of, tie_matrix, tied_mass
 from .view import View
@@ -143,8 +143,10 @@ def _translations(bodies: Mapping[str, BuiltBody], total: int) -> Array:
 
 
 def _with_sliding(case: Case, motion: PrescribedMotion) -> PrescribedMotion:
-    """Bodies that slide through their mesh, as motions that move no freedom."""
-    names = tuple(name for name in case.moving if name not in motion.names)
+    """Bodies that slide through their mesh, and contacts that overlap, as motions that move no freedom."""
+    sliding = tuple(name for name in case.moving if name not in motion.names)
+    overlapping = tuple(place_name("contacts", name) for name, c in case.contacts.items() if c.interference)
+    names = (*sliding, *overlapping)
     if not names:
         return motion
     extra, before = len(names), len(motion.names)
@@ -165,6 +167,7 @@ def _with_sliding(case: Case, motion: PrescribedMotion) -> PrescribedMotion:
         own(motion.mass_own),
         own(motion.damping_own),
         own(motion.stiffness_own),
+        (*motion.places.tolist(), *(0.0 for _ in sliding), *(1.0 for _ in overlapping)),
     )
 
 
@@ -233,27 +236,32 @@ def _dof_names(bodies: Mapping[str, BuiltBody]) -> list[str]:
     return [body.freedom_name(local) for body in bodies.values() for local in range(body.size)]
 
 
-def _stress_stiffness(case: Case, view: View) -> Callable[[Array], Sparse] | None:
-    """Geometric stiffness on the free freedoms from the stresses of a displacement, None without solids."""
+def _stress_stiffness(case: Case, view: View) -> Callable[..., Sparse] | None:
+    """Geometric stiffness on the free freedoms from the stresses of a displacement (n,), None without solids.
+
+    place (p,): factors of the supports that are pressed away."""
     solids = [body for body in view.bodies.values() if body.mesh is not None and body.material is not None]
     if not solids:
         return None
     rows: dict[str, Rows] = {body.name: view.node_rows(body) for body in solids}
 
-    def stiffness(displacement: Array) -> Sparse:
+    def stiffness(displacement: Array, place: Array | None = None) -> Sparse:
         total = sp.csr_array((len(view.free), len(view.free)))
         for body in solids:
             table = case.bodies[body.name]
             assert isinstance(table, SolidBody), "meshed bodies are solids"
             assert body.mesh is not None, "chosen for its mesh"
             assert body.material is not None, "solids have a material"
-            own = rows[body.name].free
+            own, lift = rows[body.name].free, rows[body.name].lift
+            moved = own @ displacement
+            if place is not None:
+                moved = moved + (lift - own @ view.motion.lift) @ place
             matrix = stress_stiffness(
                 body.mesh,
                 body.material,
                 model=table.model,
                 thickness=table.thickness,
-                displacement=own @ displacement,
+                displacement=moved,
             )
             total = total + own.T @ matrix @ own
         return sp.csr_array(total)

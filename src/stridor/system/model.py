@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg as sl
@@ -52,10 +53,12 @@ class Solid:
 @dataclass(frozen=True)
 class CubicSprings:
     """Springs whose force is coefficient · (elongation)³ beside what the stiffness matrix holds: rows (q, n) of their
-    elongations [m] with their lift, coefficient (q,) [N/m³]."""
+    elongations [m] with their lift, coefficient (q,) [N/m³]; stretch (q,) [m]: elongation at zero displacement, by
+    supports that are pressed away."""
 
     rows: Rows
     coefficient: Array
+    stretch: Array | float = 0.0
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,9 @@ class PrescribedMotion:
     w are those of the structure at rest loaded by −M_L ẍ_p − C_L ẋ_p. names (p,); lift L (n, p);
     mass M_L = M L + M_fp (n, p), damping C_L likewise; mass_own, damping_own, stiffness_own (p, p)
     are the energies' own parts. Unit factor means the velocity written in the case [m/s, rad/s].
+
+    place (p,): 1 where a column is no velocity but a distance, reached at factor one and kept [m, rad]: a support
+    pressed away, the interference of a contact; () where there is none.
     """
 
     names: tuple[str, ...]
@@ -75,6 +81,17 @@ class PrescribedMotion:
     mass_own: Array
     damping_own: Array
     stiffness_own: Array
+    place: tuple[float, ...] = ()
+
+    @property
+    def places(self) -> Array:
+        """Factors (p,) of the columns where everything is in its place: 1 for distances, 0 for velocities."""
+        return np.array(self.place) if self.place else np.zeros(len(self.names))
+
+    @property
+    def full(self) -> Array:
+        """Factors (p,) of full velocity: 0 for distances."""
+        return 1.0 - self.places
 
     @staticmethod
     def none(size: int) -> PrescribedMotion:
@@ -97,6 +114,7 @@ class System:
     has any. general: why its matrices, imported ones, are not all symmetric with a positive definite mass, as all
     others are; "" where they are. holders: contact → paths of the supports and ties at its nodes. load_steps: the way
     to the static equilibrium, with stick and partial slip; empty where all contacts slide as the motions have them.
+    placed: whether it is what `in_place` has made of another.
     """
 
     mass: Sparse
@@ -114,10 +132,11 @@ class System:
     cubic: CubicSprings | None = None
     initial_velocity: Array | None = None
     initial_displacement: Array | None = None
-    stress_stiffness: Callable[[Array], Sparse] | None = None
+    stress_stiffness: Callable[..., Sparse] | None = None
     general: str = ""
     holders: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     load_steps: tuple[LoadStep, ...] = ()
+    placed: bool = False
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness"):
@@ -140,6 +159,36 @@ class System:
         """Whether it is computed with on the assembled sparse matrices: contact over surfaces, forces beyond the
         linear, contacts that may stick, or too many freedoms for the complete basis that point contacts use."""
         return bool(self.surfaces or self.load_steps) or self.cubic is not None or self.size > COMPLETE_BASIS_LIMIT
+
+    def in_place(self, factors: Array | None = None) -> System:
+        """The system with everything that a prescribed distance presses away in its place, as the statics and the modes
+        take it: supports' distances as loads by name, and the gaps that they and interferences leave.
+
+        factors (p,): of the motions, those of velocities do not count; None: one. The time loop takes the system as it
+        is, where distances are motions that end.
+        """
+        motion = self.motion
+        if self.placed or not any(motion.places):
+            return self
+        place = motion.places if factors is None else motion.places * factors
+        moved = motion.lift @ place
+        loads = dict(self.loads)
+        for k in np.flatnonzero(motion.places):
+            loads[motion.names[k]] = self.stiffness @ (motion.lift[:, k] * place[k])
+        contacts = tuple(
+            replace(c, gap=c.gap + float(c.normal_lift @ place - c.normal_row @ moved)) for c in self.contacts
+        )
+        surfaces = tuple(
+            replace(s, nodes=replace(n, gap=n.gap + n.normal_lift @ place - n.normal @ moved))
+            for s, n in ((s, s.nodes) for s in self.surfaces)
+        )
+        cubic, stresses = self.cubic, self.stress_stiffness
+        if cubic is not None:
+            cubic = replace(cubic, stretch=cubic.rows.lift @ place - cubic.rows.free @ moved)
+        return replace(
+            self, loads=loads, contacts=contacts, surfaces=surfaces, cubic=cubic, placed=True,
+            stress_stiffness=None if stresses is None else partial(stresses, place=place),
+        )  # fmt: skip
 
     def contact_nodes(self) -> ContactNodes:
         """Every contact, point or surface, as one list of slave nodes: points first, then surfaces in order."""
@@ -196,11 +245,34 @@ class Constraint:
     name: str
     freedoms: tuple[int, ...]
     velocity: tuple[float, ...]
+    displacement: tuple[float, ...] = ()
 
     @property
     def moves(self) -> bool:
         """Whether a velocity is prescribed."""
         return any(v != 0.0 for v in self.velocity)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A prescribed motion of supports: what its held freedoms do at factor one, and whether that is a distance."""
+
+    name: str
+    freedoms: tuple[int, ...]
+    values: tuple[float, ...]
+    place: float
+
+
+def columns(constraints: list[Constraint]) -> list[Column]:
+    """The motions that supports prescribe: velocities, then distances."""
+    moving = [Column(c.name, c.freedoms, c.velocity, 0.0) for c in constraints if c.moves]
+    away = [c for c in constraints if any(c.displacement)]
+    return [*moving, *(Column(place_name("supports", c.name), c.freedoms, c.displacement, 1.0) for c in away)]
+
+
+def place_name(table: str, name: str) -> str:
+    """Name of the motion of a support's displacement or a contact's interference."""
+    return f"{table}.{name}.{'displacement' if table == 'supports' else 'interference'}"
 
 
 def constrain(
@@ -221,14 +293,14 @@ def constrain(
     for c in constraints:
         held[list(c.freedoms)] = True
     free = np.flatnonzero(~held)
-    moving = [c for c in constraints if c.moves]
+    moving = columns(constraints)
     if not moving:
         return free, PrescribedMotion.none(len(free))
     selection, rigid = np.zeros((total, len(moving))), np.zeros((total, len(moving)))
     for column, c in enumerate(moving):
-        selection[list(c.freedoms), column] = c.velocity
+        selection[list(c.freedoms), column] = c.values
         if translations is not None:
-            velocity = np.linalg.lstsq(translations[list(c.freedoms)], np.array(c.velocity), rcond=None)[0]
+            velocity = np.linalg.lstsq(translations[list(c.freedoms)], np.array(c.values), rcond=None)[0]
             rigid[:, column] = translations @ velocity
     lift = _static_lift(structure, free, selection, rigid)
     whole = selection.copy()
@@ -245,7 +317,8 @@ def constrain(
     scale = np.abs(structure.stiffness).max() * np.abs(whole).max() ** 2
     stiffness_own[np.abs(stiffness_own) < 1e-13 * scale] = 0.0
     names = tuple(c.name for c in moving)
-    return free, PrescribedMotion(names, lift, mass, damping, mass_own, damping_own, stiffness_own)
+    place = tuple(c.place for c in moving)
+    return free, PrescribedMotion(names, lift, mass, damping, mass_own, damping_own, stiffness_own, place)
 
 
 DENSE_LIFT = 3000

@@ -21,6 +21,7 @@ from ..mesh.boundary import require_boundary
 from ..mesh.facets import nodal_areas, nodal_normals
 from ..mesh.model import Blocks
 from ..typing import Array
+from .model import place_name
 from .supports import master_surface
 from .view import View, point_position
 
@@ -54,7 +55,7 @@ def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Co
             f"the point ({position[0]:g}, {position[1]:g}) m lies beyond the ends of {contact.master}; "
             "move a body so that the slave faces the master line",
         )
-    return built
+    return replace(built, normal_lift=_overlapping(view, name, contact, built.normal_lift))
 
 
 def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> SurfaceContact:
@@ -85,7 +86,16 @@ def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> 
     if facets is None:
         # A point stands for no area: its stiffness is in N/m, and it has no pressure.
         built = replace(built, nodes=replace(built.nodes, area=np.full(len(built.area), np.nan)))
-    return built
+    lift = _overlapping(view, name, contact, built.nodes.normal_lift)
+    return replace(built, nodes=replace(built.nodes, normal_lift=lift))
+
+
+def _overlapping(view: View, name: str, contact: ContactCase, lift: Array) -> Array:
+    """The lift (…, p) of gaps with the column of the contact's interference, which closes them."""
+    if contact.interference:
+        lift = lift.copy()
+        lift[..., view.motion.names.index(place_name("contacts", name))] = -contact.interference
+    return lift
 
 
 def _slave(

@@ -34,7 +34,7 @@ def boundary_nodes(body: BuiltBody, at: BoundaryRef, where: str) -> IntArray:
 def constraints_of(case: Case, bodies: dict[str, BuiltBody]) -> list[Constraint]:
     """Every support as freedoms held. Raises CaseError where two supports prescribe different velocities."""
     found: list[Constraint] = []
-    taken: dict[int, tuple[str, float]] = {}
+    taken: dict[int, tuple[str, float, float]] = {}
     for name, support in case.supports.items():
         where = f"supports.{name}"
         at = case.place(support.at, where=f"{where}.at")
@@ -42,24 +42,30 @@ def constraints_of(case: Case, bodies: dict[str, BuiltBody]) -> list[Constraint]
         nodes = _held_nodes(body, at, f"{where}.at")
         freedoms: list[int] = []
         velocity: list[float] = []
+        displacement: list[float] = []
         lacking = set() if body.lacking is None else set((body.offset + body.lacking).tolist())
         moved = 0
         for direction in support.fixed:
             place = body.stride - 1 if direction == "rotation" else _DIRECTIONS[direction]
             speed = float(support.velocity.get(direction, 0.0))
+            distance = float(support.displacement.get(direction, 0.0))
             for freedom in (body.offset + body.stride * nodes + place).tolist():
                 if freedom in lacking:
-                    moved += bool(speed)
+                    moved += bool(speed or distance)
                     continue
-                other, held = taken.setdefault(freedom, (name, speed))
+                other, held, away = taken.setdefault(freedom, (name, speed, distance))
                 if other == name:
                     freedoms.append(freedom)
                     velocity.append(speed)
-                elif held != speed:
+                    displacement.append(distance)
+                elif held != speed or away != distance:
+                    two = f"displacements, {away:g} and {distance:g} m"
+                    if held != speed:
+                        two = f"velocities, {held:g} and {speed:g} m/s"
                     node = body.points[(freedom - body.offset) // body.stride]
                     accepted = (
                         f"{direction} of the node at ({', '.join(f'{x:.6g}' for x in node)}) m, shared with "
-                        f"supports.{other}, gets two velocities, {held:g} and {speed:g} m/s; let one of them hold it"
+                        f"supports.{other}, gets two {two}; let one of them hold it"
                     )
                     raise CaseError(f"{where}.fixed", support.fixed, accepted)
         if moved:
@@ -67,8 +73,9 @@ def constraints_of(case: Case, bodies: dict[str, BuiltBody]) -> list[Constraint]
                 f"cannot be moved: the matrices of {at.body} lack {moved} of its freedoms, held by the program that "
                 "wrote them; write them without that support, or let the material slide (sliding)"
             )
-            raise CaseError(f"{where}.velocity", dict(support.velocity), accepted)
-        found.append(Constraint(name, tuple(freedoms), tuple(velocity)))
+            key = "velocity" if support.velocity else "displacement"
+            raise CaseError(f"{where}.{key}", dict(getattr(support, key)), accepted)
+        found.append(Constraint(name, tuple(freedoms), tuple(velocity), tuple(displacement)))
     for name, body in bodies.items():
         if body.lacking is not None and len(body.lacking):
             freedoms = (body.offset + body.lacking).tolist()

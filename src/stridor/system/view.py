@@ -12,7 +12,7 @@ from ..case.points import PointRef
 from ..contact.interface import Rows
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody
-from .model import Constraint, PrescribedMotion
+from .model import Constraint, PrescribedMotion, columns
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,8 @@ class View:
             full = sp.csr_array(full @ self.tie)
         whole = np.zeros((self.total, len(self.motion.names)))
         whole[self.free] = self.motion.lift
-        moving = [c for c in self.constraints if c.moves]
-        for column, c in enumerate(moving):
-            whole[list(c.freedoms), column] = c.velocity
+        for column, c in enumerate(columns(self.constraints)):
+            whole[list(c.freedoms), column] = c.values
         return Rows(sp.csr_array(full[:, self.free]), np.asarray(full @ whole))
 
     def pick(self, freedoms: IntArray) -> Rows:

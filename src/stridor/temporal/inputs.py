@@ -55,7 +55,11 @@ def _phases(system: System, phases: Sequence[PhaseSpec]) -> Iterator[Problem]:
         if not (math.isfinite(phase.ramp) and phase.ramp >= 0):
             yield Problem(f"{where}.ramp", phase.ramp, "a ramp is a number ≥ 0 [s]; 0 is sudden")
         yield from _factors(f"{where}.loads", phase.loads, list(system.loads), "load")
-        yield from _factors(f"{where}.velocities", phase.velocities, system.motion.names, "moving support")
+        motion = system.motion
+        away = [n.split(".")[1] for n, p in zip(motion.names, motion.places, strict=True) if p]
+        moving = [n for n, p in zip(motion.names, motion.places, strict=True) if not p]
+        yield from _factors(f"{where}.velocities", phase.velocities, moving, "moving support")
+        yield from _factors(f"{where}.displacements", phase.displacements, away, "support or contact with a distance")
 
 
 def _factors(where: str, factors: Mapping[str, float], names: Sequence[str], what: str) -> Iterator[Problem]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,11 +19,13 @@ class PhaseSpec:
     loads: Mapping[str, float]
     velocities: Mapping[str, float]
     ramp: float = 0.0
+    displacements: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A phase laid out in steps: first and last step (exclusive), factors before and after its ramp."""
+    """A phase laid out in steps: first and last step (exclusive), factors before and after its ramp; places (p,) are
+    those of prescribed distances, zero for motions with a velocity, as velocities are for distances."""
 
     name: str
     first: int
@@ -33,6 +35,8 @@ class Stretch:
     loads_after: Array
     velocities_before: Array
     velocities_after: Array
+    places_before: Array
+    places_after: Array
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,11 @@ class Schedule:
     def steps(self) -> int:
         """Number of steps of the whole run."""
         return self.stretches[-1].last
+
+    def settled(self) -> Schedule:
+        """The same where prescribed distances are in their place at the start, as in steady sliding."""
+        first = self.stretches[0]
+        return Schedule(self.step, (replace(first, places_before=first.places_after), *self.stretches[1:]))
 
     def stretch_at(self, step: int) -> Stretch:
         """The phase that step number ``step`` belongs to."""
@@ -68,7 +77,8 @@ class Schedule:
 
     def motion_increments(self, first: int, count: int) -> Array:
         """Displacements (count, p) of the moving supports from t to t + Δt, t = first·Δt, …, in units of
-        their velocity at factor one; exact integrals of the velocity factor."""
+        their velocity at factor one, exact integrals of the velocity factor; of prescribed distances what their factor
+        changes by, all of it in the first step of a phase without a ramp."""
         out = np.empty((count, len(self.stretches[0].velocities_after)))
         for rows, stretch, steps in self._pieces(first, count):
             # A constant factor gives the same increment to the last digit in every step, so that no
@@ -81,6 +91,12 @@ class Schedule:
                 change = stretch.velocities_after - stretch.velocities_before
                 values = (stretch.velocities_before + change * blend[:, None]) * self.step
                 out[np.arange(rows.start, rows.stop)[ramping]] = values
+            away = stretch.places_after - stretch.places_before
+            if np.any(away):
+                x = np.array([steps, steps + 1.0]) - stretch.first
+                x = np.clip(x / stretch.ramp_steps, 0.0, 1.0) if stretch.ramp_steps > 0 else np.minimum(x, 1.0)
+                done = x**3 * (10 - 15 * x + 6 * x**2)
+                out[rows] += away * (done[1] - done[0])[:, None]
         return out
 
     def _pieces(self, first: int, count: int) -> Iterator[tuple[slice, Stretch, Array]]:
@@ -102,11 +118,14 @@ class Schedule:
         return r * (2.5 * x**4 - 3 * x**5 + x**6) + np.maximum(number - r, 0.0)
 
 
-def lay_out(phases: Sequence[PhaseSpec], step: float, loads: Sequence[str], supports: Sequence[str]) -> Schedule:
-    """Phases in steps. A factor not named stays as in the phase before; before the first phase loads and
-    velocities are zero, and what the first phase does not name is one."""
+def lay_out(
+    phases: Sequence[PhaseSpec], step: float, loads: Sequence[str], supports: Sequence[str], places: Array | None = None
+) -> Schedule:
+    """Phases in steps. A factor not named stays as in the phase before; before the first phase loads, velocities and
+    distances are zero, and what the first phase does not name is one. places (p,): 1 where a motion is a distance."""
     stretches: list[Stretch] = []
-    load, velocity = np.zeros(len(loads)), np.zeros(len(supports))
+    load, velocity, place = np.zeros(len(loads)), np.zeros(len(supports)), np.zeros(len(supports))
+    is_place = np.zeros(len(supports)) if places is None else places
     time, first = 0.0, 0
     for number, phase in enumerate(phases):
         default_load = np.ones(len(loads)) if number == 0 else load
@@ -118,8 +137,22 @@ def lay_out(phases: Sequence[PhaseSpec], step: float, loads: Sequence[str], supp
             [phase.velocities.get(name, d) for name, d in zip(supports, default_velocity, strict=True)],
             dtype=float,
         )
+        default_place = np.ones(len(supports)) if number == 0 else place
+        next_place = is_place * np.array(
+            [phase.displacements.get(_owner(name), d) for name, d in zip(supports, default_place, strict=True)],
+            dtype=float,
+        )
+        next_velocity = next_velocity * (1.0 - is_place)
         time += phase.duration
         last = max(round(time / step), first + 1)
-        stretches.append(Stretch(phase.name, first, last, phase.ramp / step, load, next_load, velocity, next_velocity))
-        load, velocity, first = next_load, next_velocity, last
+        ramp = phase.ramp / step
+        stretches.append(
+            Stretch(phase.name, first, last, ramp, load, next_load, velocity, next_velocity, place, next_place)
+        )
+        load, velocity, place, first = next_load, next_velocity, next_place, last
     return Schedule(step, tuple(stretches))
+
+
+def _owner(motion: str) -> str:
+    """The support or contact that a distance belongs to, by the name of its motion."""
+    return motion.split(".")[1] if motion.count(".") == 2 else motion

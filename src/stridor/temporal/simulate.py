@@ -104,10 +104,12 @@ def simulate(
     if observe is not None:
         raise ValueError("only runs on assembled matrices can be looked on at; watch points instead")
     if mu is not None:
-        system = system.with_friction(mu, np.abs(slip_speeds(system, np.ones(len(system.motion.names)))))
+        system = system.with_friction(mu, np.abs(slip_speeds(system, system.motion.full)))
     limit = step_limit(system, settings.beta2)
     coefficients = scheme(choose_step(limit, settings), settings.beta2)
-    schedule = lay_out(phases, coefficients.step, list(system.loads), list(system.motion.names))
+    schedule = lay_out(phases, coefficients.step, list(system.loads), list(system.motion.names), system.motion.places)
+    if settings.initial == "steady-sliding":
+        schedule = schedule.settled()
     modes, reason = choose_path(system, settings)
     machine = modal_machine(system, coefficients, modes) if modes else nodal_machine(system, coefficients)
     run = _Run(machine, modes, schedule, settings, limit, reason, restart, join, disturbance)

@@ -53,14 +53,15 @@ def initial_state(
         # the spring would start with a penetration, and undoing it in one step is a blow.
         rigid = replace(system, contacts=tuple(replace(c, stiffness=np.inf) for c in system.contacts))
         steady = steady_sliding(
-            rigid,
+            rigid.in_place(stretch.places_after),
             load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
             motion_factors=stretch.velocities_after,
         )
         velocity = np.zeros(system.size)
         for contact in system.contacts:
             velocity += settings.perturbation * _slip_impulse(system, contact.tangent_row)
-        fields.u[:] = machine.coordinates(steady.displacement, modes)
+        fields.u[:] = machine.coordinates(steady.displacement - system.motion.lift @ stretch.places_after, modes)
+        state.motion[0] = stretch.places_after
         fields.q[:] = machine.coordinates(velocity, modes)
         state.motion[1] = stretch.velocities_after
         state.status[:] = np.where(steady.active, 2, 0)

@@ -165,7 +165,9 @@ def model_in_words(inputs: ReportInputs) -> list[str]:
     for name, support in case.supports.items():
         moving = [f"{v:g} {'rad/s' if d == 'rotation' else 'm/s'} ({d})" for d, v in support.velocity.items()]
         text = f"{name}: holds {_listed(list(support.fixed))} of {support.at}"
-        lines.append(text + (f" and moves it with {_listed(moving)}." if moving else "."))
+        text += f" and moves it with {_listed(moving)}" if moving else ""
+        away = [f"{v:g} {'rad' if d == 'rotation' else 'm'} ({d})" for d, v in support.displacement.items()]
+        lines.append(text + (f" and presses it away by {_listed(away)}." if away else "."))
     for name, load in case.loads.items():
         components = ", ".join(significant(f) for f in load.force)
         parts = [f"{np.linalg.norm(load.force):g} N, ({components}) N"] if any(load.force) else []
@@ -241,7 +243,8 @@ def simulation_table(inputs: ReportInputs) -> Table:
             ("numerical damping β₂", f"{case.temporal.beta2:g}"),
         ]
     for phase in case.phases:
-        factors = [f"{n} × {v:g}" for n, v in (*phase.loads.items(), *phase.velocities.items())]
+        named = {**phase.loads, **phase.velocities, **phase.displacements}
+        factors = [f"{n} × {v:g}" for n, v in named.items()]
         ramp = f", ramp {phase.ramp:g} s" if phase.ramp else ""
         lines.append(
             (f"phase “{phase.name}”", f"{phase.duration:g} s{ramp}" + (f": {', '.join(factors)}" if factors else ""))

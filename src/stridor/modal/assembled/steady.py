@@ -85,6 +85,7 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
 
     Raises AnalysisError where there is no steady sliding.
     """
+    system = system.in_place()
     if (system.loads or system.load_steps) and nodes.count:
         steady = steady_sliding_nodes(system, mu=mu, solver=solver)
         if not system.load_steps:
@@ -161,6 +162,7 @@ def steadiness(
     sloped = any(nodes.laws[owner].slope(speed) != 0.0 for owner, speed in pairs)
     across = options.friction_damping and nodes.directions == 2
     prestress = options.prestress and system.stress_stiffness is not None
+    system = system.in_place()
     if (sloped or across or prestress) and not (system.loads or system.load_steps):
         what = "a friction law with a slope" if sloped else "friction damping" if across else "prestress"
         raise AnalysisError(f"{what} needs the normal force: give the case a load that presses the bodies")

@@ -71,7 +71,7 @@ class Machine:
     def set_nodes(self, nodes: ContactNodes) -> None:
         """Take contact nodes as they are paired now; forces, status and offsets are kept."""
         self.nodes = nodes
-        self.table = node_table(nodes, self.layout, self.gain)
+        self.table = node_table(nodes, self.layout, self.gain, self.system.motion.full)
         self.scratch = _scratch(self.table)
         self.contacts = self.contacts._replace(q=self.fields.q[self.table.place])
 
@@ -126,7 +126,7 @@ def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Ma
         base=aligned_zeros((layout.size,)),
         reference=np.array([0.0, 1.0 - 1.0 / OFFSET_STEPS]),
     )
-    table = node_table(nodes, layout, structure.numbers[2] * structure.kick)
+    table = node_table(nodes, layout, structure.numbers[2] * structure.kick, system.motion.full)
     contacts = NodeState(
         force=np.zeros((nodes.count, nodes.directions + 1)),
         status=np.zeros(nodes.count, dtype=np.int64),

@@ -69,10 +69,12 @@ def simulate_assembled(
     diagonal_mass(system)
     nodes = system.contact_nodes()
     if mu is not None:
-        nodes = with_friction(nodes, mu)
+        nodes = with_friction(nodes, mu, system.motion.full)
     limit = step_limit_assembled(system, settings.beta2)
     coefficients = scheme(choose_step(limit, settings), settings.beta2)
-    schedule = lay_out(phases, coefficients.step, list(system.loads), list(system.motion.names))
+    schedule = lay_out(phases, coefficients.step, list(system.loads), list(system.motion.names), system.motion.places)
+    if settings.initial == "steady-sliding":
+        schedule = schedule.settled()
     machine = assembled_machine(system, coefficients, nodes)
     run = _Run(machine, schedule, settings, limit, restart, join, observe)
     if restart is None:
@@ -80,9 +82,10 @@ def simulate_assembled(
     return run.march(progress, checkpoint, checkpoint_seconds)
 
 
-def with_friction(nodes: ContactNodes, mu: float) -> ContactNodes:
-    """The same nodes with every contact's law scaled so that it gives ``mu`` at its mean slip speed."""
-    speed = np.linalg.norm(nodes.slip_velocity(np.ones(nodes.normal_lift.shape[1])), axis=1)
+def with_friction(nodes: ContactNodes, mu: float, factors: Array) -> ContactNodes:
+    """The same nodes with every contact's law scaled so that it gives ``mu`` at its mean slip speed, with the
+    motions at these factors (p,)."""
+    speed = np.linalg.norm(nodes.slip_velocity(factors), axis=1)
     laws = tuple(
         law.scaled(mu, float(speed[nodes.owner == k].mean() if np.any(nodes.owner == k) else 0.0))
         for k, law in enumerate(nodes.laws)

@@ -37,8 +37,9 @@ class NodeTable(NamedTuple):
     weight: Array
 
 
-def node_table(nodes: ContactNodes, layout: Layout, gain: Array) -> NodeTable:
-    """Pack nodes; gain (b·w,) [m/N] is the displacement of a place over one step by a unit force on it."""
+def node_table(nodes: ContactNodes, layout: Layout, gain: Array, factors: Array) -> NodeTable:
+    """Pack nodes; gain (b·w,) [m/N] is the displacement of a place over one step by a unit force on it, factors (p,)
+    are those of the motions at full velocity."""
     m, t = nodes.count, nodes.directions
     d = t + 1
     normal, tangent = sp.coo_array(layout.rows(nodes.normal)), sp.coo_array(layout.rows(nodes.tangent))
@@ -69,17 +70,17 @@ def node_table(nodes: ContactNodes, layout: Layout, gain: Array) -> NodeTable:
         block=block,
         owner=np.array(nodes.owner, dtype=np.int64),
         friction=friction_rows(nodes.laws),
-        along=sliding_directions(nodes),
+        along=sliding_directions(nodes, factors),
         weight=np.where(np.isnan(nodes.area), 1.0, nodes.area),
     )
 
 
-def sliding_directions(nodes: ContactNodes) -> Array:
+def sliding_directions(nodes: ContactNodes, factors: Array) -> Array:
     """Unit directions (m, d−1) along the tangents in which a contact's slip is told: that in which the supports slide
     it, the first tangent where they do not and for point contacts."""
     along = np.zeros((nodes.count, nodes.directions))
     along[:, 0] = 1.0
-    slip = nodes.slip_velocity(np.ones(nodes.normal_lift.shape[1]))
+    slip = nodes.slip_velocity(factors)
     speed = np.linalg.norm(slip, axis=1)
     slides: BoolArray = (speed > 1e-12 * speed.max(initial=1e-300)) & ~np.isnan(nodes.area)
     along[slides] = slip[slides] / speed[slides][:, None]

@@ -70,12 +70,13 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings, mu: float 
     if stretch.ramp_steps:
         raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
     steady = steady_sliding_nodes(
-        system,
+        system.in_place(stretch.places_after),
         mu=mu,
         load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
         motion_factors=stretch.velocities_after,
     )
-    machine.state.motion[0] = steady.travel
+    # The loop counts from the structure that the distances carry along.
+    machine.state.motion[0] = steady.travel + stretch.places_after
     machine.state.motion[1] = stretch.velocities_after
     machine.contacts.force[:, 0] = np.where(steady.active, steady.normal_force, 0.0)
     machine.contacts.force[:, 1:] = steady.friction_force
@@ -84,13 +85,13 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings, mu: float 
     if settings.perturbation:
         for contact in range(len(machine.nodes.names)):
             velocity += settings.perturbation * _slip_impulse(system, machine.nodes, contact)
-    return np.asarray(steady.displacement), velocity
+    return np.asarray(steady.displacement) - system.motion.lift @ stretch.places_after, velocity
 
 
 def _slip_impulse(system: System, nodes: ContactNodes, contact: int) -> Array:
     """Velocity (n,) that equal impulses on the nodes of a contact along its sliding give, mean slip speed one."""
     mine = nodes.select(nodes.owner == contact)
-    along = mine.along(sliding_directions(mine))
+    along = mine.along(sliding_directions(mine, system.motion.full))
     answer = (along.T @ np.ones(mine.count)) / system.mass.diagonal()
     mean = float(np.mean(along @ answer))
     return answer / mean if mean > 0.0 else answer
