@@ -120,6 +120,7 @@ def _before(case: Case, path: Path) -> Trajectory | None:
     told = run.provenance
     changed = any(restart.get("changed") for restart in told.get("restarts", []))
     own = told.get("settings", {}).get("mu") is None and not changed
+    own = own and "fingerprint" in told
     return run if own and told.get("key") == case_key(case) else None
 
 

@@ -30,6 +30,8 @@ def show_run(summary: dict[str, Any]) -> None:
             f"last phase: {summary['dominant_frequency_hz']:.1f} Hz dominates, growth "
             f"{summary['growth_rate']:.1f} 1/s where exponential, {state}"
         )
+    for change in summary["changed"]:
+        stdout.print(f"changed in the middle of the run: {change}", markup=False)
     stdout.print(f"energy balance closes to {summary['energy']['error']:.1e} of the energy turned over")
     stdout.print(
         f"{summary['steps']} steps of {summary['dt']:.4g} s in {summary['wall_seconds']:.1f} s, {summary['path']} path"

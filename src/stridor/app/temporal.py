@@ -13,6 +13,7 @@ from .arguments import Call, numbers, verb
 if TYPE_CHECKING:
     from ..case import Case
     from ..io.kept_parts import KeptParts
+    from ..temporal.trajectory import Trajectory
 
 Only = Annotated[
     list[str] | None,
@@ -33,8 +34,12 @@ def simulate(
     ] = None,
     restart: Annotated[
         Path | None,
-        typer.Option("--restart", metavar="FILE", help="Go on from the file of an earlier, unfinished run."),
+        typer.Option("--restart", metavar="FILE", help="Go on from the file of an earlier run of the same model."),
     ] = None,
+    changed: Annotated[
+        bool,
+        typer.Option("--changed", help="With --restart: go on with another model, and record what was changed."),
+    ] = False,
 ) -> None:
     """The temporal approach: explicit dynamics with stick, slip and separation. Ctrl-C keeps what was computed."""
     from ..io.datasets import load_trajectory, save
@@ -46,7 +51,11 @@ def simulate(
     path = call.folder / "simulate.nc"
     if restart is not None and not restart.exists():
         raise CaseError("--restart", str(restart), "no such file")
+    if changed and restart is None:
+        raise CaseError("--changed", None, "goes with --restart FILE")
     before = None if restart is None else load_trajectory(restart)
+    if restart is not None and before is not None and path.exists() and path.samefile(restart):
+        _check_records(loaded, before, path)
     try:
         with progress_bar("simulate", quiet=call.quiet) as progress:
             run = analyses.simulate(
@@ -55,6 +64,7 @@ def simulate(
                 progress=progress,
                 checkpoint=lambda part: save(part, path) and None,
                 restart=before,
+                changed=changed,
             )
     except AnalysisError as error:
         part = getattr(error, "trajectory", None)
@@ -74,6 +84,20 @@ def simulate(
         show_run(summary.to_json())
     if run.interrupted:
         raise typer.Exit(130)
+
+
+def _check_records(case: Case, before: Trajectory, path: Path) -> None:
+    """Refuse to put a part of a run, which cannot be joined with what was before, over the file of that."""
+    from ..study import analyses
+    from ..study.settings import settings_of
+
+    if not analyses.same_records(settings_of(case), before):
+        raise CaseError(
+            "--restart",
+            str(path),
+            f"records every {before.record_every} steps of {', '.join(before.watch_names) or 'no points'}, as before, "
+            "or another folder (--out) for what comes now: other records cannot be joined to those in this file",
+        )
 
 
 @verb()

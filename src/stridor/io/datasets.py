@@ -14,6 +14,7 @@ from ..errors import CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..modal.parametric import ReducedModel
+from ..study.fingerprint import changes_of
 from ..temporal.node_history import NodeHistory
 from ..temporal.trajectory import STATUS, ContactStatistics, PhaseResult, Trajectory
 from ..typing import ComplexArray
@@ -249,6 +250,9 @@ def _trajectory(run: Trajectory) -> Any:
         "interrupted",
         "wall_seconds",
     )
+    changes = changes_of(run)
+    if changes:
+        data.attrs["changed"] = json.dumps(changes, ensure_ascii=False)
     data.attrs["scalars"] = json.dumps({name: getattr(run, name) for name in scalars})
     data.attrs["names"] = json.dumps(
         {

@@ -22,7 +22,7 @@ from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
 from ..temporal.beta2 import step_limit
 from ..temporal.energy import EnergyBalance, energy_balance
-from ..temporal.settings import SAFE_FRACTION
+from ..temporal.settings import SAFE_FRACTION, Settings
 from ..temporal.signals import Growth, components
 from ..temporal.simulate import Checkpoint, Progress
 from ..temporal.simulate import simulate as march
@@ -31,6 +31,7 @@ from ..typing import Array
 from .asked import require_frequency, require_friction
 from .body_modes import BodyModes, body_modes
 from .description import Description, describe
+from .fingerprint import changes_of, check_restart, fingerprint
 from .provenance import provenance
 from .settings import phases_of, settings_of
 
@@ -232,23 +233,55 @@ def simulate(
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
     restart: Trajectory | None = None,
+    changed: bool = False,
 ) -> Trajectory:
-    """The temporal approach through the phases of the case; mu scales every contact's friction law."""
+    """The temporal approach through the phases of the case; mu scales every contact's friction law.
+
+    checkpoint is called with the trajectory so far about every 20 seconds. restart goes on from an earlier run of the
+    same case, μ and files; durations of phases that are not over may differ, and what is recorded, which then gives
+    the new part alone. Raises CaseError for each thing that differs otherwise; with ``changed`` it goes on all the
+    same, and `provenance` tells in "restarts" what was changed when.
+    """
     started = time.perf_counter()
     require_friction(mu)
+    restarts: list[dict[str, Any]] = []
+    if restart is not None:
+        restarts = [*restart.provenance.get("restarts", []), check_restart(case, mu, restart, changed=changed)]
+    elif changed:
+        raise CaseError("changed", True, "goes with restart")
+    marks = {"fingerprint": fingerprint(case, mu), "restarts": restarts}
     system = structured(case, "simulate", mu)
     _check_extent(case, system)
-    result = march(
-        system,
-        phases_of(case),
-        settings_of(case),
-        mu=mu,
-        progress=progress,
-        checkpoint=checkpoint,
-        restart=restart,
-        disturbance=None if system.assembled else _initial_state(case, system),
-    )
-    return replace(result, provenance=provenance(case, "simulate", time.perf_counter() - started, mu=mu))
+
+    def told(run: Trajectory) -> Trajectory:
+        made = provenance(case, "simulate", time.perf_counter() - started, mu=mu)
+        return replace(run, provenance=made | marks)
+
+    settings = settings_of(case)
+    try:
+        result = march(
+            system,
+            phases_of(case),
+            settings,
+            mu=mu,
+            progress=progress,
+            checkpoint=None if checkpoint is None else lambda part: checkpoint(told(part)),
+            restart=restart,
+            join=restart is None or same_records(settings, restart),
+            changed=changed,
+            disturbance=None if system.assembled else _initial_state(case, system),
+        )
+    except AnalysisError as error:
+        part = getattr(error, "trajectory", None)
+        if part is not None:
+            error.trajectory = told(part)  # type: ignore[attr-defined]
+        raise
+    return told(result)
+
+
+def same_records(settings: Settings, restart: Trajectory) -> bool:
+    """Whether records go on behind those of another run: kept as often, of the same points."""
+    return settings.record_every == restart.record_every and settings.watch == restart.watch_names
 
 
 def _initial_state(case: Case, system: System) -> tuple[Array, Array, Array] | None:
@@ -393,6 +426,8 @@ class RunSummary:
             "most_sweeps": run.most_sweeps,
             "unconverged_steps": run.unconverged_steps,
             "wall_seconds": run.wall_seconds,
+            "changed": changes_of(run),
+            "restarts": run.provenance.get("restarts", []),
         }
 
 

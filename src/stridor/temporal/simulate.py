@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..errors import AnalysisError
+from ..interrupts import Held, held
 from ..sliding import slip_speeds
 from ..system import System
 from ..system.uncoupled import UncoupledModes
@@ -18,28 +20,16 @@ from .kernel import NEW_ROWS, NOT_FINITE, OFF_LINE
 from .layout import ENERGY_RECORD, Record
 from .machine import Machine, modal_machine, nodal_machine
 from .observe import Observer
+from .phase_results import PhaseResults
 from .schedule import PhaseSpec, Schedule, lay_out
 from .settings import Settings, choose_path, choose_step
-from .stage import (
-    CONTACT_RECORD,
-    DAMPING,
-    EXTERNAL,
-    FIRST_OPEN,
-    FIRST_STICK,
-    FRICTION,
-    MAX_NORMAL,
-    MAX_SPEED,
-    MAX_TANGENTIAL,
-    NORMAL,
-    OPEN_STEPS,
-    SLIP_STEPS,
-    STICK_STEPS,
-    SUPPORT,
-)
-from .start import Disturbance, initial_state, joined, restore, saved_state, watch_rows
-from .trajectory import ContactStatistics, PhaseResult, Trajectory
+from .stage import CONTACT_RECORD, DAMPING, EXTERNAL, FRICTION, NORMAL, SUPPORT
+from .start import Disturbance, initial_state, joined, restore, saved_state, settings_of_restart, watch_rows
+from .trajectory import Trajectory
 
 CHUNK = 20_000
+FIRST_CHUNK = 2_000
+CHUNK_SECONDS = 0.5
 Progress = Callable[[int, int], None]
 Checkpoint = Callable[[Trajectory], None]
 WORK_COLUMNS = {
@@ -63,6 +53,7 @@ def simulate(
     checkpoint_seconds: float = 20.0,
     restart: Trajectory | None = None,
     join: bool = True,
+    changed: bool = False,
     disturbance: Disturbance | None = None,
     observe: Observer | None = None,
 ) -> Trajectory:
@@ -70,13 +61,14 @@ def simulate(
 
     mu scales every contact's friction law. progress(done, planned) is called between chunks, checkpoint
     with the trajectory so far at most every checkpoint_seconds. restart goes on from a trajectory of the
-    same system and settings (``join`` False returns the new part alone). disturbance is added to the initial
-    state. observe looks on between steps of systems on assembled matrices; of others watch points instead.
-    KeyboardInterrupt ends the run early and keeps what was computed (``interrupted``). Raises CaseError for a step
-    beyond the limit, AnalysisError where motion blows up or a slave leaves its master line; what was computed is then
-    in the error's ``trajectory``.
+    same system and settings, with its step where the settings give none (``join`` False returns the new part
+    alone; ``changed`` takes another system of the same freedoms and contacts as well). disturbance is added to the
+    initial state, observe looks on between steps (assembled matrices only). Ctrl-C ends the run after the chunk of
+    steps that is under way and keeps what was computed (``interrupted``); so does KeyboardInterrupt from progress or checkpoint. Raises CaseError for a step beyond the
+    limit and for a restart that does not fit, AnalysisError where motion blows up or a slave leaves its master
+    line; what was computed is then in the error's ``trajectory``.
     """
-    settings = settings or Settings()
+    settings = settings_of_restart(settings or Settings(), restart)
     check_inputs(
         system,
         phases,
@@ -98,6 +90,7 @@ def simulate(
             checkpoint_seconds=checkpoint_seconds,
             restart=restart,
             join=join,
+            changed=changed,
             disturbance=disturbance,
             observe=observe,
         )
@@ -112,7 +105,12 @@ def simulate(
         schedule = schedule.settled()
     modes, reason = choose_path(system, settings)
     machine = modal_machine(system, coefficients, modes) if modes else nodal_machine(system, coefficients)
-    run = _Run(machine, modes, schedule, settings, limit, reason, restart, join, disturbance)
+    run = _Run(machine, modes, schedule, settings, limit, reason, restart, join)
+    if restart is None:
+        initial_state(machine, modes, schedule, settings, disturbance)
+    else:
+        restore(machine, restart, settings, schedule, join=join, changed=changed)
+        run.phases.resume(restart)
     return run.march(progress, checkpoint, checkpoint_seconds)
 
 
@@ -129,17 +127,13 @@ class _Run:
         reason: str,
         restart: Trajectory | None,
         join: bool,
-        disturbance: Disturbance | None = None,
     ) -> None:
         self.machine, self.modes, self.schedule, self.settings = machine, modes, schedule, settings
         self.limit, self.reason, self.restart, self.join = limit, reason, restart, join
-        self.phases: list[PhaseResult] = []
-        if restart is None:
-            initial_state(machine, modes, schedule, settings, disturbance)
-        else:
-            restore(machine, restart, settings, join=join)
-        self.record = self._buffers()
+        names = [c.name for c in machine.system.contacts]
+        self.phases = PhaseResults(schedule, names, machine.state.statistics)
         self.wall = 0.0
+        self.within = False
 
     def _buffers(self) -> Record:
         machine, settings = self.machine, self.settings
@@ -159,36 +153,61 @@ class _Run:
         )
 
     def march(self, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float) -> Trajectory:
-        started = last_saved = clock.perf_counter()
+        """Chunk by chunk to the end, or to where it is stopped."""
+        with held() as block:
+            interrupted = self._loop(block, progress, checkpoint, every_seconds)
+            result = self._trajectory(interrupted=interrupted)
+            stopped = replace(result, interrupted=True)
+            block.met = True; return stopped if block.asked else result  # noqa: E702 - nothing comes in between
+
+    def _loop(
+        self, block: Held, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float
+    ) -> bool:
+        """The chunks; whether they were interrupted."""
         machine, schedule = self.machine, self.schedule
-        interrupted = False
+        self.record = self._buffers()
+        started = last_saved = clock.perf_counter()
+        size = FIRST_CHUNK
         try:
             machine.run(0, schedule, self.record)  # compiles the loop or loads it, before the clock starts
             started = last_saved = clock.perf_counter()
-            while (done := int(machine.state.counters[0])) < schedule.steps:
-                stretch = schedule.stretch_at(done)
-                size = min(CHUNK, stretch.last - done)
-                _, code = machine.run(size, schedule, self.record)
-                done = int(machine.state.counters[0])
-                self.wall = clock.perf_counter() - started
-                if code == NEW_ROWS:
-                    _follow_segments(machine)
-                elif code in (NOT_FINITE, OFF_LINE):
-                    self._stop(code, stretch.name)
-                if not (np.isfinite(machine.fields.u).all() and np.isfinite(machine.fields.q).all()):
-                    # Between records, or where no row sees it.
-                    self._stop(NOT_FINITE, stretch.name)
-                if done >= stretch.last:
-                    self._close_phase(stretch.name, stretch.first, done)
+            while (done := int(machine.state.counters[0])) < schedule.steps and not block.asked:
+                self.phases.begin(done)
+                before = clock.perf_counter()
+                taken = self._advance(min(size, CHUNK, schedule.stretch_at(done).last - done))
+                now = clock.perf_counter()
+                self.wall = now - started
+                size = max(1, min(4 * size, int(taken * CHUNK_SECONDS / max(now - before, 1e-9))))
                 if progress is not None:
-                    progress(done, schedule.steps)
-                if checkpoint is not None and clock.perf_counter() - last_saved > every_seconds:
+                    progress(done + taken, schedule.steps)
+                if checkpoint is not None and now - last_saved > every_seconds:
                     checkpoint(self._trajectory(interrupted=True))
-                    last_saved = clock.perf_counter()
+                    last_saved = now
         except KeyboardInterrupt:
-            interrupted = True
-        self.wall = clock.perf_counter() - started
-        return self._trajectory(interrupted=interrupted)
+            if self.within:
+                raise
+            return True
+        finally:
+            self.wall = clock.perf_counter() - started
+        return block.asked
+
+    def _advance(self, size: int) -> int:
+        """Up to ``size`` steps; how many were made."""
+        machine = self.machine
+        done = int(machine.state.counters[0])
+        stretch = self.schedule.stretch_at(done)
+        # Rows half renewed are no state to go on from.
+        self.within = True
+        _, code = machine.run(size, self.schedule, self.record)
+        if code == NEW_ROWS:
+            _follow_segments(machine)
+        self.within = False
+        if code in (NOT_FINITE, OFF_LINE):
+            self._stop(code, stretch.name)
+        if not (np.isfinite(machine.fields.u).all() and np.isfinite(machine.fields.q).all()):
+            # Between records, or where no row sees it.
+            self._stop(NOT_FINITE, stretch.name)
+        return int(machine.state.counters[0]) - done
 
     def _stop(self, code: int, phase: str) -> None:
         at = int(self.machine.state.counters[0]) * self.machine.scheme.step
@@ -207,36 +226,9 @@ class _Run:
         error.trajectory = self._trajectory(interrupted=True)  # type: ignore[attr-defined]
         raise error
 
-    def _close_phase(self, name: str, first: int, last: int) -> None:
-        self.phases.append(self._phase(name, first, last))
-        statistics = self.machine.state.statistics
-        statistics[:] = 0.0
-        statistics[:, [FIRST_STICK, FIRST_OPEN]] = -1.0
-
-    def _phase(self, name: str, first: int, last: int) -> PhaseResult:
-        dt = self.machine.scheme.step
-        contacts: dict[str, ContactStatistics] = {}
-        for contact, row in zip(self.machine.system.contacts, self.machine.state.statistics, strict=True):
-            total = max(row[STICK_STEPS] + row[SLIP_STEPS] + row[OPEN_STEPS], 1.0)
-            contacts[contact.name] = ContactStatistics(
-                stick_fraction=float(row[STICK_STEPS] / total),
-                slip_fraction=float(row[SLIP_STEPS] / total),
-                separation_fraction=float(row[OPEN_STEPS] / total),
-                max_normal_force=float(row[MAX_NORMAL]),
-                max_tangential_force=float(row[MAX_TANGENTIAL]),
-                max_slip_speed=float(row[MAX_SPEED]),
-                first_stick=float(row[FIRST_STICK] * dt) if row[FIRST_STICK] >= 0 else None,
-                first_separation=float(row[FIRST_OPEN] * dt) if row[FIRST_OPEN] >= 0 else None,
-            )
-        return PhaseResult(name, first * dt, last * dt, contacts)
-
     def _trajectory(self, *, interrupted: bool) -> Trajectory:
         machine, settings = self.machine, self.settings
         done = int(machine.state.counters[0])
-        phases = list(self.phases)
-        if interrupted and done < self.schedule.steps:
-            stretch = self.schedule.stretch_at(done)
-            phases.append(self._phase(stretch.name, stretch.first, done))
         kept = int(self.record.kept[0])
         every = settings.record_every
         start = -(-_first_step(self.restart) // every)
@@ -259,7 +251,7 @@ class _Run:
             kinetic=energies[:, 0],
             elastic=energies[:, 1],
             works={name: energies[:, 2 + column] for name, column in WORK_COLUMNS.items()},
-            phases=tuple(phases),
+            phases=self.phases.all(done),
             step=machine.scheme.step,
             beta2=machine.scheme.beta2,
             record_every=every,
@@ -275,7 +267,9 @@ class _Run:
             wall_seconds=self.wall,
             state=saved_state(machine, settings),
         )
-        return new if self.restart is None or not self.join else joined(self.restart, new)
+        if self.restart is None:
+            return new
+        return joined(self.restart, new) if self.join else self.phases.new_part(self.restart, new)
 
 
 def _first_step(restart: Trajectory | None) -> int:

@@ -21,6 +21,7 @@ from .operators import FINITE
 from .saved import INFINITY, STATUS_RANGE, Bounds, agrees, check_arrays, check_done
 from .schedule import Schedule
 from .settings import Settings
+from .sketch import BODIES, MOTION, Part, differing, packed, saved_row, sketch
 from .trajectory import Trajectory
 
 STATE_FIELDS = ("u", "q", "d", "constant", "coefficients")
@@ -74,8 +75,7 @@ def initial_state(
         fields.u[:] += machine.coordinates(displacement, modes)
         fields.q[:] += machine.coordinates(rate, modes)
     machine.repack()
-    coefficients = _start_coefficients(machine, schedule)
-    machine.free_increment(coefficients)
+    machine.free_increment(_coefficients(machine, schedule))
     machine.predict()
 
 
@@ -85,15 +85,16 @@ def _slip_impulse(system: System, tangent_row: Array) -> Array:
     return answer / float(tangent_row @ answer)
 
 
-def _start_coefficients(machine: Machine, schedule: Schedule) -> Array:
-    """Forcing coefficients of step 0: loads, −a and −v of the supports."""
+def _coefficients(machine: Machine, schedule: Schedule) -> Array:
+    """Forcing coefficients of the next step: loads, −a and −v of the supports."""
     scheme: Scheme = machine.scheme
-    rate = schedule.motion_increments(0, 1)[0] / scheme.step
+    done = int(machine.state.counters[0])
+    rate = schedule.motion_increments(done, 1)[0] / scheme.step
     before = machine.state.motion[1]
     rate = np.where(np.abs(rate - before) <= 1e-13 * np.abs(before), before, rate)
     acceleration = -2.0 * (rate - before) / (scheme.step * scheme.s)
     velocity = -(before + 2.0 * scheme.beta2 * rate) / scheme.s
-    return np.concatenate([schedule.load_factors(0, 1)[0], acceleration, velocity])
+    return np.concatenate([schedule.load_factors(done, 1)[0], acceleration, velocity])
 
 
 def saved_state(machine: Machine, settings: Settings) -> dict[str, Array]:
@@ -102,18 +103,53 @@ def saved_state(machine: Machine, settings: Settings) -> dict[str, Array]:
     for name in machine.state._fields:
         saved[f"state_{name}"] = np.array(getattr(machine.state, name))
     saved["settings"] = np.array([machine.scheme.step, machine.scheme.beta2, float(settings.record_every)])
-    saved["model"] = _model_numbers(machine.system)
+    saved["model"] = packed(sketch(machine.system, machine.system.contact_nodes()))
     return saved
 
 
-def _model_numbers(system: System) -> Array:
-    """A few numbers by which two models differ: freedoms, contacts, traces of M, C and K."""
-    traces = [float(matrix.trace()) for matrix in (system.mass, system.damping, system.stiffness)]
-    return np.array([float(system.size), float(len(system.contacts)), *traces])
+def settings_of_restart(settings: Settings, restart: Trajectory | None) -> Settings:
+    """Settings with the step of the run that is gone on from, where they leave it open: the limit that it would follow
+    from differs in its last digits from machine to machine, and altogether where something was changed."""
+    return settings if restart is None or settings.step is not None else replace(settings, step=restart.step)
 
 
-def restore(machine: Machine, restart: Trajectory, settings: Settings, *, join: bool) -> None:
-    """Go on from a saved state; raises CaseError where it belongs to another model, scheme or record."""
+def check_model(parts: Sequence[Part], restart: Trajectory, *, changed: bool) -> None:
+    """Raise CaseError where a saved state belongs to another model; ``changed``: to one of other freedoms."""
+    saved = np.asarray(restart.state.get("model", np.zeros(0)))
+    found = differing(parts, saved)
+    if found is None:
+        raise CaseError("restart", "model", "a state of the same model: this one has other freedoms, loads or contacts")
+    if found and not changed:
+        names = "; ".join(part.name for part in found)
+        raise CaseError("restart", "model", f"a state of the same model; these differ: {names}")
+
+
+def motion_ratio(parts: Sequence[Part], restart: Trajectory, names: Sequence[str]) -> Array:
+    """Velocities (p,) of the moving supports over those that the saved state was computed with. Raises CaseError for
+    another direction: the way gone so far would change with it."""
+    ratios = np.ones(len(names))
+    for p, name in enumerate(names):
+        part = next(part for part in parts if part.name == f"{MOTION} {name}")
+        now, then = part.numbers, saved_row(parts, restart.state["model"], part.name)
+        if part.same(np.append(then, part.scale)):
+            continue
+        ratios[p] = float(now @ then) / float(then @ then)
+        if np.abs(now - ratios[p] * then).max() > part.close * part.scale:
+            raise CaseError(
+                "restart",
+                f"supports.{name}",
+                "the same direction: the way that it has gone so far lies along the old one; its speed may change",
+            )
+    return ratios
+
+
+def restore(
+    machine: Machine, restart: Trajectory, settings: Settings, schedule: Schedule, *, join: bool, changed: bool
+) -> None:
+    """Go on from a saved state; raises CaseError where it belongs to another model, scheme or record.
+
+    changed: loads, friction, contacts and speeds of the supports may differ; on the nodal path the bodies, too.
+    """
     own = np.array([machine.scheme.step, machine.scheme.beta2])
     if restart.path != machine.path or not agrees(restart.state, "settings", own, first=2):
         raise CaseError(
@@ -122,8 +158,16 @@ def restore(machine: Machine, restart: Trajectory, settings: Settings, *, join: 
             f"a state of the same scheme: step {own[0]:g} s, beta2 {own[1]:g}, path {machine.path}",
         )
     # Padded modes can have the same shape in different models.
-    if not agrees(restart.state, "model", _model_numbers(machine.system), relative=1e-9):
-        raise CaseError("restart", "model", "a state of the same model: this one has other freedoms or contacts")
+    parts = sketch(machine.system, machine.system.contact_nodes())
+    check_model(parts, restart, changed=changed)
+    others = [p for p in differing(parts, restart.state["model"]) or () if p.name in BODIES]
+    if others and machine.path == "modal":
+        raise CaseError(
+            "restart",
+            " and ".join(part.name for part in others),
+            "the same bodies: a run on the modal path is saved in the modes of its bodies; runs with "
+            'temporal.path = "nodal" can go on with others',
+        )
     if join and (restart.record_every != settings.record_every or restart.watch_names != settings.watch):
         raise CaseError(
             "restart",
@@ -141,6 +185,12 @@ def restore(machine: Machine, restart: Trajectory, settings: Settings, *, join: 
     machine.repack()
     for name, values in kept.items():
         getattr(machine.state, name)[:] = values
+    if changed and differing(parts, restart.state["model"]):
+        # The places that the supports have reached stay, whatever a unit of their motion is now.
+        machine.state.motion[:] /= motion_ratio(parts, restart, machine.system.motion.names)
+    if changed:
+        machine.free_increment(_coefficients(machine, schedule))
+        machine.predict()
 
 
 def _bounds(machine: Machine) -> Bounds:
@@ -175,12 +225,4 @@ def joined(before: Trajectory, after: Trajectory) -> Trajectory:
         )
     }
     works = {name: np.concatenate([before.works[name], after.works[name]]) for name in after.works}
-    # A phase that the interruption cut is counted on: the saved statistics went on in the second run.
-    finished = [p for p in before.phases if not any(q.name == p.name for q in after.phases)]
-    return replace(
-        after,
-        **together,
-        works=works,
-        phases=(*finished, *after.phases),
-        wall_seconds=before.wall_seconds + after.wall_seconds,
-    )
+    return replace(after, **together, works=works, wall_seconds=before.wall_seconds + after.wall_seconds)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..agreement import GOOD_FREQUENCY, GOOD_GROWTH
 from ..case.schema import Load
+from ..study.fingerprint import changes_of
 from .body_words import body_words, contact_words
 from .inputs import ReportInputs
 from .tables import Row, Table, drop_empty, significant
@@ -117,6 +118,9 @@ def _run_sentence(inputs: ReportInputs) -> str:
     text += f"{'s' if len(shares) > 1 else ''} {_listed(shares)}"
     if inputs.dominant_hz is not None:
         text += f"; the dominant frequency is {inputs.dominant_hz:.0f} Hz"
+    changed = changes_of(run)
+    if changed:
+        text += f". In its middle the model was changed ({'; '.join(changed)}): it is no run of one model"
     return text + (". It was interrupted before its planned end." if run.interrupted else ".")
 
 

@@ -11,22 +11,25 @@ import numpy as np
 
 from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError
+from ...interrupts import Held, held
 from ...system import System
 from ...typing import Array
 from ..beta2 import StepLimit, scheme
 from ..inputs import check_inputs
 from ..observe import Observer
+from ..phase_results import PhaseResults
 from ..schedule import PhaseSpec, Schedule, lay_out
 from ..settings import Settings, choose_step
-from ..start import Disturbance
-from ..trajectory import PhaseResult, Trajectory
+from ..sketch import Part, packed, sketch
+from ..start import Disturbance, settings_of_restart
+from ..trajectory import Trajectory
 from .limit import step_limit_assembled
 from .loop import NOT_FINITE
 from .machine import Machine, assembled_machine, diagonal_mass
 from .pace import Pace
 from .renewal import node_distances, renew, slides_finitely, steps_to_renewal, take_over
-from .results import buffers, clear_statistics, phase_result, trajectory
-from .start import begin, check_restart, joined_runs, restore, saved_state
+from .results import buffers, trajectory
+from .start import begin, check_restart, joined_runs, restore, saved_state, take_changes
 
 TOLD_SECONDS = 0.5
 Progress = Callable[[int, int], None]
@@ -44,6 +47,7 @@ def simulate_assembled(
     checkpoint_seconds: float = 20.0,
     restart: Trajectory | None = None,
     join: bool = True,
+    changed: bool = False,
     disturbance: Disturbance | None = None,
     observe: Observer | None = None,
 ) -> Trajectory:
@@ -51,13 +55,14 @@ def simulate_assembled(
 
     mu scales every contact's friction law at its slip speed. progress(done, planned) is called about every second,
     checkpoint with the trajectory so far at most every checkpoint_seconds. restart goes on from a trajectory of the
-    same system and settings, to the last digit as if it had not been cut (``join`` False returns the new part alone).
-    disturbance (u, v, a) is added to the initial state. observe looks on between steps. KeyboardInterrupt ends the run
-    and keeps what was computed (``interrupted``). Raises CaseError for a mass that is not lumped or a step beyond the
-    limit, AnalysisError where motion blows up or a slave node leaves its master; what was computed is then in the
-    error's ``trajectory``.
+    same system and settings, to the last digit as if it had not been cut (``join`` False returns the new part alone;
+    ``changed`` takes another system of the same freedoms and contacts as well). disturbance (u, v, a) is added to the
+    initial state, observe looks on between steps. Ctrl-C ends the run after the chunk of steps that is under way and
+    keeps what was computed (``interrupted``); so does KeyboardInterrupt from progress or checkpoint. Raises CaseError for a mass that is not
+    lumped, a step beyond the limit or a restart that does not fit, AnalysisError where motion blows up or a slave node
+    leaves its master; what was computed is then in the error's ``trajectory``.
     """
-    settings = settings or Settings()
+    settings = settings_of_restart(settings or Settings(), restart)
     check_inputs(
         system,
         phases,
@@ -76,9 +81,11 @@ def simulate_assembled(
     if settings.initial == "steady-sliding":
         schedule = schedule.settled()
     machine = assembled_machine(system, coefficients, nodes)
-    run = _Run(machine, schedule, settings, limit, restart, join, observe)
+    run = _Run(machine, schedule, settings, limit, restart, join, sketch(system, nodes), observe)
     if restart is None:
         begin(machine, schedule, settings, mu, disturbance)
+    else:
+        run.resume(restart, changed=changed)
     return run.march(progress, checkpoint, checkpoint_seconds)
 
 
@@ -104,25 +111,24 @@ class _Run:
         limit: StepLimit,
         restart: Trajectory | None,
         join: bool,
+        parts: tuple[Part, ...],
         observe: Observer | None = None,
     ) -> None:
         self.machine, self.schedule, self.settings, self.limit = machine, schedule, settings, limit
-        self.restart, self.join, self.observe = restart, join, observe
-        self.phases: list[PhaseResult] = []
+        self.restart, self.join, self.parts, self.observe = restart, join, parts, observe
+        self.phases = PhaseResults(schedule, machine.nodes.names, machine.state.statistics)
         self.wall = 0.0
+        self.within = False
         self.finite = slides_finitely(machine.system)
         self.distances = node_distances(machine.system) if self.finite else np.zeros(0)
         # Finite sliding finds its rows at the first step.
         self.renewal = 0 if self.finite else schedule.steps
         self.interval = 1
         self.renewed_at = np.zeros(machine.system.size + len(machine.system.motion.names))
-        if restart is not None:
-            self._resume(restart)
-        self.first_step = machine.done
-        self.record = buffers(machine, schedule, settings)
 
-    def _resume(self, restart: Trajectory) -> None:
-        check_restart(self.machine, restart, self.settings, join=self.join)
+    def resume(self, restart: Trajectory, *, changed: bool) -> None:
+        """Take up the state of another run. Raises CaseError where it does not fit."""
+        check_restart(self.machine, restart, self.settings, self.parts, join=self.join, changed=changed)
         if self.finite:
             # Rows as they were last found: first at that displacement, then the state itself.
             self.renewed_at[:] = restart.state["renewed_at"]
@@ -133,26 +139,34 @@ class _Run:
             take_over(self.machine, surfaces, nodes)
             self.renewal, self.interval = (int(v) for v in restart.state["renewal"])
         restore(self.machine, restart)
+        if changed:
+            self.renewed_at[self.machine.system.size :] /= take_changes(self.machine, restart, self.parts)
+        self.phases.resume(restart)
 
     def march(self, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float) -> Trajectory:
         """Chunk by chunk to the end, or to where it is stopped."""
-        started = last_saved = last_told = clock.perf_counter()
+        with held() as block:
+            interrupted = self._loop(block, progress, checkpoint, every_seconds)
+            result = self._trajectory(interrupted=interrupted)
+            stopped = replace(result, interrupted=True)
+            block.met = True; return stopped if block.asked else result  # noqa: E702 - nothing comes in between
+
+    def _loop(
+        self, block: Held, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float
+    ) -> bool:
+        """The chunks; whether they were interrupted."""
         machine, schedule = self.machine, self.schedule
-        interrupted = False
+        self.first_step = machine.done
+        self.record = buffers(machine, schedule, self.settings)
+        started = last_saved = last_told = clock.perf_counter()
         pace = Pace(machine.threaded)
         try:
             machine.run(0, schedule, self.record)  # compiles the loop or loads it, before the clock starts
             started = last_saved = last_told = clock.perf_counter()
-            while machine.done < schedule.steps:
-                if self.finite and machine.done >= self.renewal:
-                    self._renew()
-                size = min(pace.begin(), schedule.stretch_at(machine.done).last - machine.done)
-                if self.finite:
-                    size = min(size, self.renewal - machine.done)
-                size = self._look(size)
-                machine.use_threads(two=pace.two)
+            while machine.done < schedule.steps and not block.asked:
+                self.phases.begin(machine.done)
                 before = clock.perf_counter()
-                self._advance(size)
+                size = self._advance(pace)
                 now = clock.perf_counter()
                 self.wall = now - started
                 pace.end(size, now - before)
@@ -163,9 +177,12 @@ class _Run:
                     checkpoint(self._trajectory(interrupted=True))
                     last_saved = now
         except KeyboardInterrupt:
-            interrupted = True
-        self.wall = clock.perf_counter() - started
-        return self._trajectory(interrupted=interrupted)
+            if self.within:
+                raise
+            return True
+        finally:
+            self.wall = clock.perf_counter() - started
+        return block.asked
 
     def _look(self, size: int) -> int:
         """Show the state to who looks on where it is time to; the steps from here to the next look, at most size."""
@@ -177,10 +194,21 @@ class _Run:
             self.observe.see(machine.done * machine.scheme.step, machine.fields.q[machine.layout.place])
         return min(size, every - past)
 
-    def _advance(self, size: int) -> None:
+    def _advance(self, pace: Pace) -> int:
+        """One chunk, on rows renewed where that is due; how many steps it had."""
         machine = self.machine
         stretch = self.schedule.stretch_at(machine.done)
+        # Rows half renewed are no state to go on from.
+        self.within = True
+        if self.finite and machine.done >= self.renewal:
+            self._renew()
+        size = min(pace.begin(), stretch.last - machine.done)
+        if self.finite:
+            size = min(size, self.renewal - machine.done)
+        size = self._look(size)
+        machine.use_threads(two=pace.two)
         _, code = machine.run(size, self.schedule, self.record)
+        self.within = False
         fields = machine.fields
         if code == NOT_FINITE or not np.isfinite(fields.u.sum() + fields.q.sum()):
             at = machine.done * machine.scheme.step
@@ -188,9 +216,7 @@ class _Run:
                 f"the motion is no longer finite at t = {at:.6g} s (phase {stretch.name}): the step "
                 f"{machine.scheme.step:g} s is too large for this model or a load is absurd"
             )
-        if machine.done >= stretch.last:
-            self.phases.append(phase_result(machine, stretch.name, stretch.first, machine.done))
-            clear_statistics(machine)
+        return size
 
     def _renew(self) -> None:
         machine = self.machine
@@ -215,14 +241,11 @@ class _Run:
         raise error
 
     def _state(self) -> dict[str, Array]:
-        return saved_state(self.machine, self.settings, (self.renewal, self.interval, self.renewed_at))
+        renewal = (self.renewal, self.interval, self.renewed_at)
+        return saved_state(self.machine, self.settings, renewal, packed(self.parts))
 
     def _trajectory(self, *, interrupted: bool) -> Trajectory:
         machine = self.machine
-        phases = list(self.phases)
-        if interrupted and machine.done < self.schedule.steps:
-            stretch = self.schedule.stretch_at(machine.done)
-            phases.append(phase_result(machine, stretch.name, stretch.first, machine.done))
         new = trajectory(
             machine,
             self.schedule,
@@ -230,13 +253,15 @@ class _Run:
             self.limit,
             self.record,
             first_step=self.first_step,
-            phases=tuple(phases),
+            phases=self.phases.all(machine.done),
             interrupted=interrupted,
             wall_seconds=self.wall,
             reason=self._reason(),
             state=self._state(),
         )
-        return new if self.restart is None or not self.join else joined_runs(self.restart, new)
+        if self.restart is None:
+            return new
+        return joined_runs(self.restart, new) if self.join else self.phases.new_part(self.restart, new)
 
     def _reason(self) -> str:
         system = self.machine.system

@@ -14,24 +14,16 @@ from ..settings import Settings
 from ..stage import (
     DAMPING,
     EXTERNAL,
-    FIRST_OPEN,
-    FIRST_STICK,
     FRICTION,
-    MAX_NORMAL,
-    MAX_SPEED,
-    MAX_TANGENTIAL,
     NORMAL,
-    OPEN_STEPS,
     REC_GAP,
     REC_NORMAL,
     REC_SLIP,
     REC_STATUS,
     REC_TANGENTIAL,
-    SLIP_STEPS,
-    STICK_STEPS,
     SUPPORT,
 )
-from ..trajectory import ContactStatistics, PhaseResult, Trajectory
+from ..trajectory import PhaseResult, Trajectory
 from .forcing import KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED
 from .machine import Machine, csr_arrays
 from .recording import Record
@@ -73,31 +65,6 @@ def buffers(machine: Machine, schedule: Schedule, settings: Settings) -> Record:
         watch_val=watch_val,
         watch_lift=np.vstack([np.zeros((0, p)), *lift]),
     )
-
-
-def phase_result(machine: Machine, name: str, first: int, last: int) -> PhaseResult:
-    """Statistics of the contacts over the steps first … last − 1."""
-    dt = machine.scheme.step
-    contacts: dict[str, ContactStatistics] = {}
-    for contact, row in zip(machine.nodes.names, machine.state.statistics, strict=True):
-        total = max(row[STICK_STEPS] + row[SLIP_STEPS] + row[OPEN_STEPS], 1.0)
-        contacts[contact] = ContactStatistics(
-            stick_fraction=float(row[STICK_STEPS] / total),
-            slip_fraction=float(row[SLIP_STEPS] / total),
-            separation_fraction=float(row[OPEN_STEPS] / total),
-            max_normal_force=float(row[MAX_NORMAL]),
-            max_tangential_force=float(row[MAX_TANGENTIAL]),
-            max_slip_speed=float(row[MAX_SPEED]),
-            first_stick=float(row[FIRST_STICK] * dt) if row[FIRST_STICK] >= 0 else None,
-            first_separation=float(row[FIRST_OPEN] * dt) if row[FIRST_OPEN] >= 0 else None,
-        )
-    return PhaseResult(name, first * dt, last * dt, contacts)
-
-
-def clear_statistics(machine: Machine) -> None:
-    """Begin another phase."""
-    machine.state.statistics[:] = 0.0
-    machine.state.statistics[:, [FIRST_STICK, FIRST_OPEN]] = -1.0
 
 
 def _node_history(machine: Machine, record: Record, start: int, kept: int) -> NodeHistory | None:

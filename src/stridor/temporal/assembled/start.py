@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +16,8 @@ from ..node_history import NodeHistory
 from ..saved import INFINITY, STATUS_RANGE, agrees, check_arrays, check_done
 from ..schedule import Schedule
 from ..settings import Settings
-from ..start import Disturbance, joined
+from ..sketch import Part
+from ..start import Disturbance, check_model, joined, motion_ratio
 from ..trajectory import Trajectory
 from .forcing import STEPS_DONE
 from .machine import Machine
@@ -97,27 +99,25 @@ def _slip_impulse(system: System, nodes: ContactNodes, contact: int) -> Array:
     return answer / mean if mean > 0.0 else answer
 
 
-def saved_state(machine: Machine, settings: Settings, renewal: tuple[int, int, Array]) -> dict[str, Array]:
+def saved_state(
+    machine: Machine, settings: Settings, renewal: tuple[int, int, Array], model: Array
+) -> dict[str, Array]:
     """Everything a restart needs, as arrays. renewal: the step of the next renewal of the rows, the steps since the
-    last one, and the displacement (n + p,) the rows were found at."""
+    last one, and the displacement (n + p,) the rows were found at; model: the sketch of the system as it began."""
     saved: dict[str, Array] = {}
     for part, names in SAVED.items():
         for name in names:
             saved[f"{part}_{name}"] = np.array(getattr(getattr(machine, part), name))
     saved["settings"] = np.array([machine.scheme.step, machine.scheme.beta2, float(settings.record_every)])
-    saved["model"] = _model_numbers(machine.system)
+    saved["model"] = model
     saved["renewal"], saved["renewed_at"] = np.array(renewal[:2]), renewal[2].copy()
     return saved
 
 
-def _model_numbers(system: System) -> Array:
-    """A few numbers by which two models differ: freedoms, contacts, traces of M, C and K."""
-    traces = [float(matrix.trace()) for matrix in (system.mass, system.damping, system.stiffness)]
-    return np.array([float(system.size), float(len(system.contacts) + len(system.surfaces)), *traces])
-
-
-def check_restart(machine: Machine, restart: Trajectory, settings: Settings, *, join: bool) -> None:
-    """Raise CaseError where a saved state belongs to another model, scheme or record."""
+def check_restart(
+    machine: Machine, restart: Trajectory, settings: Settings, parts: Sequence[Part], *, join: bool, changed: bool
+) -> None:
+    """Raise CaseError where a saved state belongs to another model (``changed``: of other size), scheme or record."""
     own = np.array([machine.scheme.step, machine.scheme.beta2])
     if restart.path != "assembled" or not agrees(restart.state, "settings", own, first=2):
         raise CaseError(
@@ -125,8 +125,7 @@ def check_restart(machine: Machine, restart: Trajectory, settings: Settings, *, 
             f"step {restart.step:g} s, beta2 {restart.beta2:g}, path {restart.path}",
             f"a state of the same scheme: step {own[0]:g} s, beta2 {own[1]:g}, path assembled",
         )
-    if not agrees(restart.state, "model", _model_numbers(machine.system), relative=1e-9):
-        raise CaseError("restart", "model", "a state of the same model: this one has other freedoms or contacts")
+    check_model(parts, restart, changed=changed)
     _check_state(machine, restart)
     if join and (restart.record_every != settings.record_every or restart.watch_names != settings.watch):
         raise CaseError(
@@ -159,6 +158,18 @@ def restore(machine: Machine, restart: Trajectory) -> None:
             getattr(getattr(machine, part), name)[:] = restart.state[f"{part}_{name}"]
     machine.contacts.q[:] = machine.fields.q[machine.table.place]
     machine.state.counters[STEPS_DONE + 3 :] = 0
+
+
+def take_changes(machine: Machine, restart: Trajectory, parts: Sequence[Part]) -> Array:
+    """Bring a restored state to a model in which something was changed; velocities (p,) of the moving supports over
+    those before. Raises CaseError for a support that moves in another direction."""
+    ratio = motion_ratio(parts, restart, machine.system.motion.names)
+    # The places that the supports have reached stay, whatever a unit of their motion is now.
+    machine.state.motion[:] /= ratio
+    # No number: the next step finds its forces anew.
+    machine.state.coefficients[:] = np.nan
+    machine.show()
+    return ratio
 
 
 def joined_runs(before: Trajectory, after: Trajectory) -> Trajectory:

@@ -1,0 +1,136 @@
+"""Ctrl-C and SIGTERM: noticed at once, obeyed where nothing is lost by it, never forgotten.
+
+Python raises KeyboardInterrupt wherever it happens to be: between a chunk of steps and the note of its phase, halfway
+through writing a file, or inside a callback whose exceptions are printed and dropped. Here a signal is only noted
+inside of `held` blocks, which look at it when they can; the second one there interrupts at once. Outside of them the
+program's handler raises KeyboardInterrupt, and again until `heard` says that somebody has caught it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+from collections.abc import Generator
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any
+
+INTERRUPTED = 130  # exit code: 128 + SIGINT, as shells have it
+AGAIN_SECONDS = 1.0
+STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+@dataclass
+class Held:
+    """A block that is not to be interrupted in its middle: whether an end was asked for, whether that was met."""
+
+    asked: bool = False
+    met: bool = False
+
+
+@dataclass
+class _Program:
+    """What this process knows: the blocks it is in, and whether an interrupt is still to be caught by the program."""
+
+    blocks: list[Held]
+    installed: bool = False
+    pending: bool = False
+    leaving: bool = False
+
+
+_program = _Program([])
+
+
+def install() -> None:
+    """Let Ctrl-C, SIGTERM and a lost terminal end this program in good order. For programs, not for libraries."""
+    for number in STOPPING:
+        # What a parent process has switched off (nohup, a shell's background jobs) stays off.
+        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(number, _handle)
+    if hasattr(signal, "SIGALRM"):
+        signal.signal(signal.SIGALRM, _again)
+    _program.installed = True
+
+
+def heard() -> None:
+    """Say that the interrupt has been caught: it is not raised again."""
+    _program.pending = False
+    _stop_insisting()
+
+
+def check() -> None:
+    """Raise KeyboardInterrupt if one was asked for and got lost on its way."""
+    if _program.pending:
+        raise KeyboardInterrupt
+
+
+def leave() -> None:
+    """From here on a signal ends the process at once, without a word: everything is written."""
+    _program.leaving = True
+    _stop_insisting()
+
+
+@contextlib.contextmanager
+def held() -> Generator[Held]:
+    """A block that a first Ctrl-C does not interrupt: it looks at ``asked`` itself and says ``met`` when it ends early.
+
+    What was asked for and not met reaches the block around this one, or is raised as KeyboardInterrupt at its end.
+    """
+    block = Held()
+    before = _take_over()
+    _program.blocks.append(block)
+    try:
+        yield block
+    finally:
+        _program.blocks.remove(block)
+        if before is not None:
+            signal.signal(signal.SIGINT, before)
+    if block.asked and not block.met:
+        if _program.blocks:
+            _program.blocks[-1].asked = True
+        else:
+            _raise()
+
+
+def _take_over() -> Any:
+    """The handler of Ctrl-C that is put aside for a block; None where ours is there already or Python's own is not."""
+    if threading.current_thread() is not threading.main_thread():
+        return None
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.default_int_handler:
+        return None
+    signal.signal(signal.SIGINT, _handle)
+    return before
+
+
+def _handle(number: int, frame: FrameType | None) -> None:
+    del frame
+    if _program.leaving:
+        os._exit(INTERRUPTED)
+    block = _program.blocks[-1] if _program.blocks else None
+    if block is not None and not (block.asked or block.met):
+        block.asked = True
+        return
+    _raise()
+
+
+def _again(number: int, frame: FrameType | None) -> None:
+    del number, frame
+    if _program.pending and not _program.blocks:
+        raise KeyboardInterrupt
+
+
+def _raise() -> None:
+    """KeyboardInterrupt, and again later should it be dropped by a callback."""
+    if _program.installed:
+        _program.pending = True
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, AGAIN_SECONDS, AGAIN_SECONDS)
+    raise KeyboardInterrupt
+
+
+def _stop_insisting() -> None:
+    if _program.installed and hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
