@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         steady_sliding,
         summarise,
     )
+    from .study.copies import perturbed_copies
     from .study.countermeasures import rank_countermeasures
     from .study.damping_map import damping_map
     from .study.reduced import reduced_model
@@ -59,6 +60,7 @@ _HOMES = {
     "modes": ".study.analyses",
     "onsets": ".study.analyses",
     "open_dataset": ".io.datasets",
+    "perturbed_copies": ".study.copies",
     "plot": ".view",
     "rank_countermeasures": ".study.countermeasures",
     "reduced_model": ".study.reduced",
@@ -93,6 +95,7 @@ __all__ = [
     "modes",
     "onsets",
     "open_dataset",
+    "perturbed_copies",
     "plot",
     "rank_countermeasures",
     "reduced_model",

@@ -149,6 +149,7 @@ def test_the_digest_of_a_zip_archive_and_kernels_that_run_from_it(tmp_path):
 
 
 def test_sources_that_change_below_a_running_process_are_not_mixed_with_those_it_has_loaded(tmp_path, caplog):
+    caplog.set_level("WARNING", "stridor")  # a quiet command may have run in this process
     source = tmp_path / "module.py"
     source.write_text("1")
     folder = Folder(str(tmp_path / "kept"), Sources(str(tmp_path), (str(source),), "0"), time.time_ns() + 10**9)
@@ -259,6 +260,7 @@ def test_without_a_home_temporary_files_serve_and_a_note_says_so_once(tmp_path):
 
 
 def test_where_nothing_at_all_can_be_written_everything_is_compiled(monkeypatch, caplog):
+    caplog.set_level("WARNING", "stridor")
     monkeypatch.setattr(folders, "_places", lambda: iter([("/dev/null/a", False), ("/dev/null/b/c", True)]))
     assert folders.kernel_folder.__wrapped__() is None
     assert [r.message.split(",")[0] for r in caplog.records] == [

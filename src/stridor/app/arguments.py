@@ -116,8 +116,7 @@ class Call:
 def _common(
     case: CaseFile, set_: Set = None, solver: Solver = None, out: Out = None, json: Json = False, quiet: Quiet = False
 ) -> Call:
-    if quiet:
-        logging.getLogger("stridor").setLevel(logging.ERROR)
+    logging.getLogger("stridor").setLevel(logging.ERROR if quiet else logging.NOTSET)
     return Call(case, set_, solver, out, json, quiet)
 
 

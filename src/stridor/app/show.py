@@ -24,6 +24,7 @@ def show_run(summary: dict[str, Any]) -> None:
     ]
     columns = ["phase", "contact", "max N [N]", "max slip [m/s]", "stick [%]", "slip [%]", "open [%]"]
     table("contacts", columns, rows)
+    _show_settled(summary)
     if summary["dominant_frequency_hz"] is not None:
         state = "saturated" if summary["saturated"] else "not saturated"
         stdout.print(
@@ -36,6 +37,51 @@ def show_run(summary: dict[str, Any]) -> None:
     stdout.print(
         f"{summary['steps']} steps of {summary['dt']:.4g} s in {summary['wall_seconds']:.1f} s, {summary['path']} path"
     )
+
+
+_QUANTITIES = {
+    "mean_peak_normal_force": ("mean of peaks of N [N]", 1.0),
+    "quantile_05_normal_force": ("5 % quantile of N [N]", 1.0),
+    "quantile_50_normal_force": ("median of N [N]", 1.0),
+    "quantile_95_normal_force": ("95 % quantile of N [N]", 1.0),
+    "stick_fraction": ("stick [%]", 100.0),
+    "slip_fraction": ("slip [%]", 100.0),
+    "separation_fraction": ("open [%]", 100.0),
+}
+
+
+def _show_settled(summary: dict[str, Any]) -> None:
+    """Where contacts separate: averages that another run shares, with their spread over copies if there are any."""
+    parts, copies = summary["settled"], summary.get("copies")
+    if not parts:
+        return
+    spread = {} if copies is None else copies["contacts"]
+    rows: list[list[str]] = []
+    for name, part in parts.items():
+        for key, (words, factor) in _QUANTITIES.items():
+            row = [name, words, _figure(part["averages"][key], factor)]
+            if copies is not None:
+                both = (spread.get(name, {}).get(kind, {}).get(key) for kind in ("mean", "standard_deviation"))
+                row += [_figure(value, factor) for value in both]
+            rows.append(row)
+    columns, said = ["contact", "average", "this run"], list[str]()
+    if copies is not None:
+        columns += [f"mean of {copies['runs']}", "± one run"]
+        for name, found in spread.items():
+            low, high = found["largest_normal_force"]
+            said.append(f"contact {name}: largest recorded N from {low:.2f} to {high:.2f} N over {copies['runs']} runs")
+    table("after the first separation in the last phase", columns, rows)
+    for line in said:
+        stdout.print(line, markup=False)
+    stdout.print(
+        "contacts separate, and such motion is as a rule chaotic: largest values are of this one trajectory and\n"
+        "differ on another machine; averages belong to the motion it settles to"
+        + ("" if copies is not None else " (--copies 4 tells how far they scatter)")
+    )
+
+
+def _figure(value: float | None, factor: float) -> str:
+    return "–" if value is None else f"{factor * value:.2f}"
 
 
 def show_steady(document: dict[str, Any]) -> None:

@@ -40,6 +40,10 @@ def simulate(
         bool,
         typer.Option("--changed", help="With --restart: go on with another model, and record what was changed."),
     ] = False,
+    copies: Annotated[
+        int,
+        typer.Option("--copies", min=0, help="Run this many copies, perturbed by 1e-12: how far results scatter."),
+    ] = 0,
 ) -> None:
     """The temporal approach: explicit dynamics with stick, slip and separation. Ctrl-C keeps what was computed."""
     from ..io.datasets import load_trajectory, save
@@ -49,6 +53,8 @@ def simulate(
     loaded = call.case()
     call.check_friction(mu)
     path = call.folder / "simulate.nc"
+    if copies and restart is not None:
+        raise CaseError("--copies", copies, "a run from its start; not with --restart")
     if restart is not None and not restart.exists():
         raise CaseError("--restart", str(restart), "no such file")
     if changed and restart is None:
@@ -76,12 +82,18 @@ def simulate(
     summary = analyses.summarise(loaded, run)
     if run.interrupted:
         call.say(f"interrupted after {run.steps} of {run.planned_steps} steps; go on with --restart {path}")
+    document = summary.to_json()
+    if copies and not run.interrupted:
+        from ..study.copies import perturbed_copies
+
+        with progress_bar("copies", quiet=call.quiet) as progress:
+            document["copies"] = perturbed_copies(loaded, run, mu, count=copies, progress=progress).to_json()
     if call.json:
-        call.document(summary.to_json())
+        call.document(document)
     else:
         from .show import show_run
 
-        show_run(summary.to_json())
+        show_run(document)
     if run.interrupted:
         raise typer.Exit(130)
 

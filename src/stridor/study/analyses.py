@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -20,6 +20,7 @@ from ..modal.onsets import onsets as solve_onsets
 from ..sliding import full_motion, slip_speeds
 from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
+from ..temporal.attractor import settled
 from ..temporal.beta2 import step_limit
 from ..temporal.energy import EnergyBalance, energy_balance
 from ..temporal.settings import SAFE_FRACTION, Settings
@@ -44,6 +45,7 @@ __all__ = [
     "describe",
     "first_regime",
     "friction_curve",
+    "initial_state",
     "modes",
     "onsets",
     "own_friction",
@@ -269,7 +271,7 @@ def simulate(
             restart=restart,
             join=restart is None or same_records(settings, restart),
             changed=changed,
-            disturbance=None if system.assembled else _initial_state(case, system),
+            disturbance=None if system.assembled else initial_state(case, system),
         )
     except AnalysisError as error:
         part = getattr(error, "trajectory", None)
@@ -284,7 +286,7 @@ def same_records(settings: Settings, restart: Trajectory) -> bool:
     return settings.record_every == restart.record_every and settings.watch == restart.watch_names
 
 
-def _initial_state(case: Case, system: System) -> tuple[Array, Array, Array] | None:
+def initial_state(case: Case, system: System) -> tuple[Array, Array, Array] | None:
     """Displacement, velocity and acceleration (n,) that bodies start with, None at rest."""
     if system.initial_displacement is None and system.initial_velocity is None:
         return None
@@ -405,6 +407,7 @@ class RunSummary:
             "saturated": None if self.growth is None else self.growth.saturated,
             "contacts": {} if last is None else {name: vars(c).copy() for name, c in last.contacts.items()},
             "first_regime": first_regime(run),
+            "settled": {name: asdict(part) for name, part in settled(run).items()},
             "phases": [
                 {
                     "name": p.name,

@@ -22,7 +22,14 @@ from .modal_tables import frequency_tables, modes_table, onset_tables
 from .style import styled
 from .surface_figures import contact_figures, shape_figures, surface_table
 from .tables import Row, Table, number
-from .temporal_tables import agreement_table, contact_table, energy_table, identified_table, values_table
+from .temporal_tables import (
+    agreement_table,
+    contact_table,
+    energy_table,
+    identified_table,
+    settled_table,
+    values_table,
+)
 from .windows import Window, regime_window
 from .words import model_in_words, simulation_table, summary_table, verdict
 
@@ -158,6 +165,8 @@ def _temporal(inputs: ReportInputs, window: Window | None) -> Section:
         parts = [simulation_table(inputs)]
         if inputs.trajectory.contact_names:
             parts.append(contact_table(inputs.trajectory))
+            shared = settled_table(inputs.trajectory)
+            parts += [] if shared is None else [shared]
     parts.extend(temporal_figures(inputs, window))
     parts.extend(contact_figures(inputs))
     if inputs.energy is not None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..agreement import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, Agreement, Comparison
 from ..modal.complex_modes import ComplexModes
+from ..temporal.attractor import settled
 from ..temporal.energy import EnergyBalance
 from ..temporal.trajectory import Trajectory
 from .inputs import ReportInputs
@@ -48,7 +49,54 @@ def contact_table(trajectory: Trajectory) -> Table:
         "first separation [s]",
     )
     caption = "Counted in every step of the run, not only in the recorded ones; extrema include single impacts."
+    if settled(trajectory):
+        caption += (
+            " Contacts separate in the last phase, and such motion is as a rule chaotic: its largest values are those "
+            "of this one trajectory and come out different on another machine, unlike the averages of the next table."
+        )
     return drop_empty(Table("contacts", "What the contacts did", heads, rows, frozenset({0, 1}), caption))
+
+
+def settled_table(trajectory: Trajectory) -> Table | None:
+    """Averages from the first separation of the last phase on, None where no contact separates in it."""
+    found = settled(trajectory)
+    if not found:
+        return None
+    rows = tuple(
+        Row(
+            (
+                name,
+                significant(part.since, 5),
+                str(part.peaks),
+                number(part.averages.mean_peak_normal_force, 1),
+                number(part.averages.quantile_05_normal_force, 1),
+                number(part.averages.quantile_50_normal_force, 1),
+                number(part.averages.quantile_95_normal_force, 1),
+                number(100 * part.averages.stick_fraction, 1),
+                number(100 * part.averages.slip_fraction, 1),
+                number(100 * part.averages.separation_fraction, 1),
+            )
+        )
+        for name, part in found.items()
+    )
+    heads = (
+        "contact",
+        "from [s]",
+        "peaks",
+        "mean peak [N]",
+        "5 % quantile [N]",
+        "median [N]",
+        "95 % quantile [N]",
+        "stick [%]",
+        "slip [%]",
+        "separation [%]",
+    )
+    caption = (
+        "Normal force from the first separation of the last phase to its end, from the records; a peak is the largest "
+        "force of each stretch above the mean. These belong to the motion that the run settles to rather than to the "
+        "one trajectory; how far they scatter, stridor simulate --copies 4 tells."
+    )
+    return Table("settled", "What another run would share", heads, rows, frozenset({0}), caption)
 
 
 def energy_table(balance: EnergyBalance) -> Table:

@@ -1,0 +1,64 @@
+"""Perturbed copies of a run: what of its numbers belongs to this trajectory, and what to the motion it settles to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..case import Case
+from ..errors import AnalysisError, CaseError
+from ..temporal.attractor import Spread, spread
+from ..temporal.simulate import Progress
+from ..temporal.simulate import simulate as march
+from ..temporal.trajectory import Trajectory
+from .analyses import initial_state, structured
+from .settings import phases_of, settings_of
+
+PERTURBATION = 1e-12
+
+
+def perturbed_copies(
+    case: Case,
+    run: Trajectory,
+    mu: float | None = None,
+    *,
+    count: int = 4,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Spread:
+    """Averages of a run and of ``count`` copies whose start differs in the twelfth digit, with their spread.
+
+    run: of the same case and μ, from its start to its end (`st.simulate`). The velocities of a copy differ at t = 0,
+    on every freedom, by 1e-12 of the largest slip speed of the run times a normal deviate drawn from ``seed``; each
+    costs as much time as the run. Ctrl-C ends with the copies that are finished. Raises CaseError for a count below
+    one, AnalysisError for a run that was interrupted or in which nothing slides.
+    """
+    if count < 1:
+        raise CaseError("copies", count, "at least 1")
+    if run.interrupted:
+        raise AnalysisError("copies are compared with a finished run; this one was interrupted")
+    speed = max((s.max_slip_speed for p in run.phases for s in p.contacts.values()), default=0.0)
+    if not speed > 0.0:
+        raise AnalysisError("copies tell how a run with contacts that slide scatters; in this one nothing slides")
+    system = structured(case, "simulate", mu)
+    own = None if system.assembled else initial_state(case, system)
+    zero = np.zeros(system.size)
+    u, v, a = (zero, zero, zero) if own is None else own
+    draw = np.random.default_rng(seed)
+    runs = [run]
+    for k in range(count):
+        told = None if progress is None else _after(progress, k, count)
+        disturbed = v + PERTURBATION * speed * draw.standard_normal(system.size)
+        copy = march(system, phases_of(case), settings_of(case), mu=mu, progress=told, disturbance=(u, disturbed, a))
+        if copy.interrupted:
+            break
+        runs.append(copy)
+    return spread(runs, PERTURBATION, seed)
+
+
+def _after(progress: Progress, number: int, count: int) -> Progress:
+    """Progress of one copy as part of that of all."""
+
+    def told(done: int, planned: int) -> None:
+        progress(number * planned + done, count * planned)
+
+    return told
