@@ -176,7 +176,7 @@ def _after_load_steps(system: System, mu: float | None, solver: str | None) -> S
         travel=state.travel,
         resultants=resultants(nodes, state.normal_force, state.friction, active),
         balance=balance(system, load.force, force),
-        warnings=tuple(unexplained_patterns(system, state.normal_force, state.gap, state.active)),
+        warnings=tuple(unexplained_patterns(system, np.maximum(state.normal_force, 0.0), state.gap, active)),
     )
 
 
