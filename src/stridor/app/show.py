@@ -33,7 +33,7 @@ def show_run(summary: dict[str, Any]) -> None:
         )
     for change in summary["changed"]:
         stdout.print(f"changed in the middle of the run: {change}", markup=False)
-    stdout.print(f"energy balance closes to {summary['energy']['error']:.1e} of the energy turned over")
+    stdout.print(summary["energy"]["words"], markup=False)
     stdout.print(
         f"{summary['steps']} steps of {summary['dt']:.4g} s in {summary['wall_seconds']:.1f} s, {summary['path']} path"
     )

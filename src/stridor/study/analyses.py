@@ -33,6 +33,7 @@ from .asked import require_frequency, require_friction
 from .body_modes import BodyModes, body_modes
 from .description import Description, describe
 from .fingerprint import changes_of, check_restart, fingerprint
+from .pressed import require_pressed_in_time
 from .provenance import provenance
 from .settings import phases_of, settings_of
 
@@ -253,6 +254,7 @@ def simulate(
         raise CaseError("changed", True, "goes with restart")
     marks = {"fingerprint": fingerprint(case, mu), "restarts": restarts}
     system = structured(case, "simulate", mu)
+    require_pressed_in_time(case, system, "simulate")
     _check_extent(case, system)
 
     def told(run: Trajectory) -> Trajectory:
@@ -354,6 +356,7 @@ def compare(
     require_friction(mus)
     settings = case.comparison
     system = structured(case, "compare")
+    require_pressed_in_time(case, system, "compare", steady=True)
     chosen = list(mus if mus is not None else settings.mu) or [_own_friction(case)]
     result = compare_system(
         system,
@@ -417,7 +420,7 @@ class RunSummary:
                 }
                 for p in run.phases
             ],
-            "energy": self.energy.to_json(),
+            "energy": self.energy.to_json() | {"words": self.energy.words(run.beta2)},
             "steps": run.steps,
             "planned_steps": run.planned_steps,
             "interrupted": run.interrupted,

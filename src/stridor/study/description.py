@@ -20,6 +20,7 @@ from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
 from ..temporal.beta2 import step_limit
 from .matrix_reports import matrix_reports
+from .pressed import unpressed
 from .settings import settings_of
 from .unit_warnings import resolution_warnings, unit_warnings
 
@@ -113,9 +114,10 @@ def describe(case: Case) -> Description:
         if least > 1e-9 * max(1.0, float(np.ptp(surface.slave_position, axis=0).max())):
             lines.append(f"contact {surface.name} is open by {least:.3g} m or more at the start")
     warnings += _sudden(case)
-    if (system.contacts or system.surfaces) and not case.placed and not any(np.any(v) for v in settled.loads.values()):
+    if not system.general and (why := unpressed(case, system)):
         warnings.append(
-            "no load presses the bodies together: modes take the contacts as closed, a run would not keep them so"
+            f"nothing presses the bodies together ({why}): simulate and compare refuse that, modes at most take the "
+            "contacts as closed"
         )
     return Description(tuple(lines), data, tuple(warnings))
 

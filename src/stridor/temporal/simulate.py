@@ -64,9 +64,9 @@ def simulate(
     same system and settings, with its step where the settings give none (``join`` False returns the new part
     alone; ``changed`` takes another system of the same freedoms and contacts as well). disturbance is added to the
     initial state, observe looks on between steps (assembled matrices only). Ctrl-C ends the run after the chunk of
-    steps that is under way and keeps what was computed (``interrupted``); so does KeyboardInterrupt from progress or checkpoint. Raises CaseError for a step beyond the
-    limit and for a restart that does not fit, AnalysisError where motion blows up or a slave leaves its master
-    line; what was computed is then in the error's ``trajectory``.
+    steps that is under way and keeps what was computed (``interrupted``); so does KeyboardInterrupt from progress
+    or checkpoint. Raises CaseError for a step beyond the limit and for a restart that does not fit, AnalysisError where
+    motion blows up or a slave leaves its master line; what was computed is then in the error's ``trajectory``.
     """
     settings = settings_of_restart(settings or Settings(), restart)
     check_inputs(

@@ -113,7 +113,7 @@ def energy_table(balance: EnergyBalance) -> Table:
     )
     rows = [Row((name, number(1e3 * value, 4))) for name, value, _ in entries]
     missing = sum(sign * value for _, value, sign in entries)
-    rows.append(Row(("missing at the end", significant(1e3 * missing, 2)), "good" if balance.error < 1e-3 else "bad"))
+    rows.append(Row(("missing at the end", significant(1e3 * missing, 2)), "good" if balance.closes else "bad"))
     caption = (
         f"Largest imbalance at any time: {significant(balance.error, 2)} of the largest energy that changed hands."
     )

@@ -58,9 +58,9 @@ def simulate_assembled(
     same system and settings, to the last digit as if it had not been cut (``join`` False returns the new part alone;
     ``changed`` takes another system of the same freedoms and contacts as well). disturbance (u, v, a) is added to the
     initial state, observe looks on between steps. Ctrl-C ends the run after the chunk of steps that is under way and
-    keeps what was computed (``interrupted``); so does KeyboardInterrupt from progress or checkpoint. Raises CaseError for a mass that is not
-    lumped, a step beyond the limit or a restart that does not fit, AnalysisError where motion blows up or a slave node
-    leaves its master; what was computed is then in the error's ``trajectory``.
+    keeps what was computed (``interrupted``); so does KeyboardInterrupt from progress or checkpoint. Raises CaseError
+    for a mass that is not lumped, a step beyond the limit or a restart that does not fit, AnalysisError where motion
+    blows up or a slave node leaves its master; what was computed is then in the error's ``trajectory``.
     """
     settings = settings_of_restart(settings or Settings(), restart)
     check_inputs(
