@@ -129,6 +129,10 @@ _SOLID_CELLS = (
 )
 _DIVISIONS = "whole numbers >= 1, one for each edge: how many elements along it"
 _EDGE = "a number > 0 [m], the element size, instead of divisions"
+_GRADING = (
+    "a list with an entry for each of the divisions: a number > 0, the last element's size over the first's, or a list "
+    "of the places of the elements' ends, from 0 to 1"
+)
 PlaneCells = Literal["triangle", "triangle6", "quad", "quad8", "quad9"]
 SolidCells = Literal["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27"]
 
@@ -138,6 +142,7 @@ class MeshTable(Table):
 
     divisions: Counts | None = Field(default=None, description=_DIVISIONS)
     element_size: Positive | None = Field(default=None, description=_EDGE)
+    grading: tuple[Positive | tuple[NotNegative, ...], ...] | None = Field(default=None, description=_GRADING)
 
 
 class RectangleMesh(MeshTable):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 
@@ -162,6 +163,8 @@ def _mesh_problems(where: str, mesh: BuiltInMesh) -> Iterator[Problem]:
     elif mesh.divisions is not None and len(mesh.divisions) != _EDGES[mesh.shape][0]:
         count, names = _EDGES[mesh.shape]
         yield Problem(f"{where}.divisions", mesh.divisions, f"must have {count} numbers: {names}")
+    elif mesh.grading is not None:
+        yield from _grading_problems(where, mesh.grading, mesh.divisions, _EDGES[mesh.shape][1])
     if isinstance(mesh, AnnulusMesh | DiscMesh | PadMesh) and mesh.inner_radius >= mesh.outer_radius:
         yield Problem(f"{where}.inner_radius", mesh.inner_radius, f"must be below outer_radius, {mesh.outer_radius:g}")
     if isinstance(mesh, AnnulusMesh) and mesh.sweep_deg > 360.0:
@@ -170,6 +173,27 @@ def _mesh_problems(where: str, mesh: BuiltInMesh) -> Iterator[Problem]:
         yield Problem(f"{where}.inner_radius", 0.0, "must be > 0 in a sector; only a full disc has no hole")
     if isinstance(mesh, PadMesh) and mesh.sweep_deg >= FULL_TURN:
         yield Problem(f"{where}.sweep_deg", mesh.sweep_deg, 'must be below 360; a full turn is shape = "disc"')
+
+
+def _grading_problems(
+    where: str,
+    grading: tuple[float | tuple[float, ...], ...],
+    divisions: tuple[int, ...] | None,
+    names: str,
+) -> Iterator[Problem]:
+    """Gradings that do not go with their divisions; ratios are judged as the mesh is made."""
+    if divisions is None:
+        yield Problem(f"{where}.grading", grading, "goes with divisions, not with element_size")
+    elif len(grading) != len(divisions):
+        yield Problem(f"{where}.grading", grading, f"must have {len(divisions)} entries: {names}")
+    else:
+        for k, (entry, count) in enumerate(zip(grading, divisions, strict=True)):
+            if not isinstance(entry, tuple):
+                continue
+            rising = all(a < b for a, b in itertools.pairwise(entry))
+            if len(entry) != count + 1 or not rising or entry[0] != 0.0 or entry[-1] != 1.0:
+                accepted = f"must be {count + 1} numbers that rise from 0 to 1, the ends of {count} elements"
+                yield Problem(f"{where}.grading.{k}", entry, accepted)
 
 
 def _obstacle_shape(where: str, body: ObstacleBody) -> Iterator[Problem]:

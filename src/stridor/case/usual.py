@@ -182,7 +182,7 @@ USUAL: Mapping[str, Usual] = {
 WITHOUT = frozenset({
     "MaterialTable.poisson_ratio", "DampingTable.mass", "DampingTable.stiffness", "Parameter.value", "Parameter.range",
     "Spring.direction", "Dashpot.direction", "Modal.modes", "Modal.sweep_points", "Temporal.beta2",
-    "Temporal.record_every", "BeamBody.elements", "MeshTable.divisions", "SlidingTable.axis",
+    "Temporal.record_every", "BeamBody.elements", "MeshTable.divisions", "MeshTable.grading", "SlidingTable.axis",
     "CentrifugalTable.axis", "ObstacleBody.normal", "ObstacleBody.axis", "MatrixTerm.factor", "MatrixBody.dimension",
     "ReferenceFrequency.frequency_hz", "ReferenceOnset.frequency_hz", "ReferenceOnset.mu", "ReferenceValue.value",
 })  # fmt: skip

@@ -11,6 +11,10 @@ from ..errors import CaseError
 from ..typing import Array
 
 _MOST_CELLS = 10_000_000
+_MOST_RATIO = 1e4  # of the last cell to the first: beyond it, cells are too flat for anything
+
+Grading = Sequence[float | Sequence[float]]
+"""For each direction the size of the last cell over that of the first, or the places of the cells' ends from 0 to 1."""
 
 
 def divisions_for(lengths: Sequence[float], element_size: float) -> tuple[int, ...]:
@@ -91,3 +95,51 @@ def enough_around(count: int, sweep_deg: float, where: str) -> None:
     least = math.ceil(sweep_deg / 120.0 - 1e-9)
     if count < least:
         raise CaseError(f"{where}.divisions", count, f"needs at least {least} divisions around for {sweep_deg:g}°")
+
+
+def shares_along(
+    grading: Grading | None, counts: Sequence[int], step: int, names: Sequence[str], where: str
+) -> list[Array | None]:
+    """Places from 0 to 1 (step·n + 1,) along each direction with its n cells, midside nodes half way; None where cells
+    are even. Sizes of cells form a geometric series where a ratio is given."""
+    if grading is None:
+        return [None] * len(counts)
+    if len(grading) != len(counts):
+        accepted = f"must have {len(counts)} entries, each a ratio or a list of places: {', '.join(names)}"
+        raise CaseError(f"{where}.grading", list(grading), accepted)
+    return [
+        _shares(entry, count, step, f"{where}.grading.{k}")
+        for k, (entry, count) in enumerate(zip(grading, counts, strict=True))
+    ]
+
+
+def _shares(entry: float | Sequence[float], count: int, step: int, where: str) -> Array | None:
+    if isinstance(entry, Sequence):
+        ends = numbers(entry, count + 1, where)
+        if ends[0] != 0.0 or ends[-1] != 1.0 or np.any(np.diff(ends) <= 0.0):
+            accepted = f"must be {count + 1} numbers that rise from 0 to 1, the ends of {count} cells"
+            raise CaseError(where, list(entry), accepted)
+    else:
+        ratio = finite(entry, where)
+        if not 1.0 / _MOST_RATIO <= ratio <= _MOST_RATIO:
+            accepted = f"must be between {1 / _MOST_RATIO:g} and {_MOST_RATIO:g}: the last cell's size over the first's"
+            raise CaseError(where, entry, accepted)
+        if ratio == 1.0 or count == 1:
+            return None
+        sizes_ = ratio ** (np.arange(count) / (count - 1))
+        ends = np.concatenate([[0.0], np.cumsum(sizes_) / sizes_.sum()])
+        ends[-1] = 1.0
+    if step == 1:
+        return ends
+    found = np.empty(2 * count + 1)
+    found[::2], found[1::2] = ends, 0.5 * (ends[:-1] + ends[1:])
+    return found
+
+
+def span(start: float, end: float, intervals: int, shares: Array | None) -> Array:
+    """Places (intervals + 1,) from start to end, even or at the shares (intervals + 1,) of the way."""
+    if shares is None:
+        return np.linspace(start, end, intervals + 1)
+    places = start + (end - start) * shares
+    places[-1] = end
+    return places

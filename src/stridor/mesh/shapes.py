@@ -4,10 +4,12 @@ Every shape is a grid of cells, or two of them joined, whose nodes are placed by
 circles. Midside nodes of quadratic cells are placed by the same function, so they lie on the circle exactly.
 
 Common to all: divisions are numbers of cells along each direction; element_size [m], given in their place, is the
-length that no edge along these directions exceeds (around a circle: at its largest radius). kind is "quad" or
-"triangle" in the plane, "hexahedron" or "tetra" in space; order 2 makes them quadratic with midside nodes ("quad8",
-"triangle6", "hexahedron20", "tetra10"); the kind may also be written out, for the complete "quad9" and "hexahedron27"
-as well. where is what errors begin with. All raise CaseError for sizes, angles and divisions that make no body.
+length that no edge along these directions exceeds (around a circle: at its largest radius). grading, beside divisions,
+has an entry for each direction: the size of the last cell over that of the first, those between in a geometric series,
+or a list of the places of the cells' ends from 0 to 1. kind is "quad" or "triangle" in the plane, "hexahedron" or
+"tetra" in space; order 2 makes them quadratic with midside nodes ("quad8", "triangle6", "hexahedron20", "tetra10"); the
+kind may also be written out, for the complete "quad9" and "hexahedron27" as well. where is what errors begin with. All
+raise CaseError for sizes, angles, divisions and gradings that make no body.
 """
 
 from __future__ import annotations
@@ -22,7 +24,18 @@ from ..typing import Array
 from .grid import Grid, Side, cell_kind, mesh_of_grids
 from .kinds import KINDS
 from .model import Mesh
-from .shape_inputs import counts_along, enough_around, finite, numbers, radii, sector, sizes
+from .shape_inputs import (
+    Grading,
+    counts_along,
+    enough_around,
+    finite,
+    numbers,
+    radii,
+    sector,
+    shares_along,
+    sizes,
+    span,
+)
 from .shape_inputs import divisions_for as divisions_for
 
 # Half the side of the square in the middle of a solid disc, over its radius: it keeps the cells around it near square.
@@ -35,6 +48,7 @@ def rectangle(
     divisions: Sequence[int] | None = None,
     *,
     element_size: float | None = None,
+    grading: Grading | None = None,
     kind: str = "quad",
     order: int = 1,
     angle_deg: float = 0.0,
@@ -51,7 +65,7 @@ def rectangle(
     # A quarter turn is meant exactly: 6e-17 in its place would move points off the axes.
     along, up = (np.where(np.abs(v) < 1e-15 * np.abs(v).max(), 0.0, v) for v in (along, up))
     corners = np.array([at, at + along, at + along + up, at + up])
-    return _four_sided(corners, divisions, element_size, kind, order, where, "rectangle")
+    return _four_sided(corners, divisions, element_size, grading, kind, order, where, "rectangle")
 
 
 def quadrilateral(
@@ -59,6 +73,7 @@ def quadrilateral(
     divisions: Sequence[int] | None = None,
     *,
     element_size: float | None = None,
+    grading: Grading | None = None,
     kind: str = "quad",
     order: int = 1,
     where: str = "quadrilateral",
@@ -79,7 +94,7 @@ def quadrilateral(
             table.tolist(),
             "the corners must be convex and go round counter-clockwise: bottom left, bottom right, top right, top left",
         )
-    return _four_sided(table, divisions, element_size, kind, order, where, "quadrilateral")
+    return _four_sided(table, divisions, element_size, grading, kind, order, where, "quadrilateral")
 
 
 def annulus(
@@ -89,6 +104,7 @@ def annulus(
     divisions: Sequence[int] | None = None,
     *,
     element_size: float | None = None,
+    grading: Grading | None = None,
     start_deg: float = 0.0,
     sweep_deg: float = 360.0,
     kind: str = "quad",
@@ -106,17 +122,19 @@ def annulus(
     name = cell_kind(kind, order, 2, where)
     step = 1 if KINDS[name].nodes == KINDS[name].corners else 2
     if inner == 0.0:
-        return _solid_disc(at, outer, divisions, element_size, start_deg, sweep_deg, name, step, where)
+        return _solid_disc(at, outer, divisions, element_size, grading, start_deg, sweep_deg, name, step, where)
     start, sweep = sector(start_deg, sweep_deg, where)
     lengths = (outer - inner, outer * math.radians(sweep))
-    counts = counts_along(divisions, element_size, lengths, ("radial", "circumferential"), where)
+    names = ("radial", "circumferential")
+    counts = counts_along(divisions, element_size, lengths, names, where)
+    shares = shares_along(_with_divisions(grading, divisions, where), counts, step, names, where)
     closed = sweep == 360.0
     enough_around(counts[1], sweep, where)
-    grid, places = _ring(inner, outer, start, sweep, counts, step)
-    names = {"inner": Side(0, 0, False), "outer": Side(0, 0, True)}
+    grid, places = _ring(inner, outer, start, sweep, counts, step, shares)
+    sides = {"inner": Side(0, 0, False), "outer": Side(0, 0, True)}
     if not closed:
-        names |= {"start": Side(0, 1, False), "end": Side(0, 1, True)}
-    return mesh_of_grids([grid], places + at, name, names, "annulus")
+        sides |= {"start": Side(0, 1, False), "end": Side(0, 1, True)}
+    return mesh_of_grids([grid], places + at, name, sides, "annulus")
 
 
 def block(
@@ -125,6 +143,7 @@ def block(
     divisions: Sequence[int] | None = None,
     *,
     element_size: float | None = None,
+    grading: Grading | None = None,
     kind: str = "hexahedron",
     order: int = 1,
     where: str = "block",
@@ -135,9 +154,11 @@ def block(
     """
     at, lengths = numbers(corner, 3, f"{where}.corner"), sizes(size, 3, f"{where}.size")
     name = cell_kind(kind, order, 3, where)
-    counts = counts_along(divisions, element_size, lengths, ("along x", "along y", "along z"), where)
+    directions = ("along x", "along y", "along z")
+    counts = counts_along(divisions, element_size, lengths, directions, where)
     step = 1 if KINDS[name].nodes == KINDS[name].corners else 2
-    axes = [np.linspace(0.0, length, step * n + 1) for length, n in zip(lengths, counts, strict=True)]
+    shares = shares_along(_with_divisions(grading, divisions, where), counts, step, directions, where)
+    axes = [span(0.0, length, step * n, part) for length, n, part in zip(lengths, counts, shares, strict=True)]
     grid, order_of = Grid.of_counts(counts, step)
     places = np.stack([a.ravel()[order_of] for a in np.meshgrid(*axes, indexing="ij")], axis=1)
     names = {"left": 0, "right": 0, "front": 1, "back": 1, "bottom": 2, "top": 2}
@@ -153,6 +174,7 @@ def disc(
     divisions: Sequence[int] | None = None,
     *,
     element_size: float | None = None,
+    grading: Grading | None = None,
     kind: str = "hexahedron",
     order: int = 1,
     where: str = "disc",
@@ -162,7 +184,8 @@ def disc(
     divisions: radial, circumferential, axial. Boundaries inner, outer, bottom (z−), top (z+).
     """
     return _annular_block(
-        centre, inner_radius, outer_radius, 0.0, 360.0, thickness, divisions, element_size, kind, order, where, "disc"
+        *(centre, inner_radius, outer_radius, 0.0, 360.0, thickness),
+        *(divisions, element_size, grading, kind, order, where, "disc"),
     )
 
 
@@ -176,6 +199,7 @@ def pad(
     divisions: Sequence[int] | None = None,
     *,
     element_size: float | None = None,
+    grading: Grading | None = None,
     kind: str = "hexahedron",
     order: int = 1,
     where: str = "pad",
@@ -189,17 +213,25 @@ def pad(
         raise CaseError(f"{where}.sweep_deg", sweep_deg, "must be less than 360; a whole disc is of shape disc")
     return _annular_block(
         *(centre, inner_radius, outer_radius, start_deg, sweep_deg, thickness),
-        *(divisions, element_size, kind, order, where, "pad"),
+        *(divisions, element_size, grading, kind, order, where, "pad"),
     )
 
 
 # ---------------------------------------------------------------------------------------------------------------------
 
 
+def _with_divisions(grading: Grading | None, divisions: Sequence[int] | None, where: str) -> Grading | None:
+    """The grading, refused where an element size says how long cells are."""
+    if grading is not None and divisions is None:
+        raise CaseError(f"{where}.grading", list(grading), "goes with divisions, not with element_size")
+    return grading
+
+
 def _four_sided(
     corners: Array,
     divisions: Sequence[int] | None,
     element_size: float | None,
+    grading: Grading | None,
     kind: str,
     order: int,
     where: str,
@@ -209,10 +241,13 @@ def _four_sided(
     name = cell_kind(kind, order, 2, where)
     sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
     lengths = (float(max(sides[0], sides[2])), float(max(sides[1], sides[3])))
-    counts = counts_along(divisions, element_size, lengths, ("along the bottom", "along the sides"), where)
+    directions = ("along the bottom", "along the sides")
+    counts = counts_along(divisions, element_size, lengths, directions, where)
     step = 1 if KINDS[name].nodes == KINDS[name].corners else 2
+    shares = shares_along(_with_divisions(grading, divisions, where), counts, step, directions, where)
     grid, order_of = Grid.of_counts(counts, step)
-    axes = [np.arange(step * n + 1) / (step * n) for n in counts]
+    even = [np.arange(step * n + 1) / (step * n) for n in counts]
+    axes = [e if part is None else part for e, part in zip(even, shares, strict=True)]
     s, t = (a.ravel()[order_of][:, None] for a in np.meshgrid(*axes, indexing="ij"))
     p0, p1, p2, p3 = corners
     # Written so that points on a side lie on it exactly: at s, t = 0 and 1 the other terms vanish.
@@ -230,6 +265,7 @@ def _annular_block(
     thickness: float,
     divisions: Sequence[int] | None,
     element_size: float | None,
+    grading: Grading | None,
     kind: str,
     order: int,
     where: str,
@@ -242,10 +278,12 @@ def _annular_block(
     start, sweep = sector(start_deg, sweep_deg, where)
     name = cell_kind(kind, order, 3, where)
     lengths = (outer - inner, outer * math.radians(sweep), height)
-    counts = counts_along(divisions, element_size, lengths, ("radial", "circumferential", "axial"), where)
+    names = ("radial", "circumferential", "axial")
+    counts = counts_along(divisions, element_size, lengths, names, where)
     enough_around(counts[1], sweep, where)
     step = 1 if KINDS[name].nodes == KINDS[name].corners else 2
-    grid, places = _ring(inner, outer, start, sweep, counts, step, height)
+    shares = shares_along(_with_divisions(grading, divisions, where), counts, step, names, where)
+    grid, places = _ring(inner, outer, start, sweep, counts, step, shares, height)
     sides = {
         "inner": Side(0, 0, False),
         "outer": Side(0, 0, True),
@@ -266,17 +304,19 @@ def _ring(
     sweep_deg: float,
     counts: tuple[int, ...],
     step: int,
+    shares: Sequence[Array | None],
     height: float | None = None,
 ) -> tuple[Grid, Array]:
     """Grid and places (k, d) [m] of an annulus about the origin, in space upwards from it."""
     closed = sweep_deg == 360.0
     grid, order_of = Grid.of_counts(counts, step, closed=1 if closed else None)
-    radii = np.linspace(inner, outer, step * counts[0] + 1)
-    around = np.arange(step * counts[1] + (0 if closed else 1)) / (step * counts[1])
+    radii = span(inner, outer, step * counts[0], shares[0])
+    around = np.arange(step * counts[1] + 1) / (step * counts[1]) if shares[1] is None else shares[1]
+    around = around[:-1] if closed else around
     angles = np.radians(start_deg + sweep_deg * around)
     axes = [radii, angles]
     if height is not None:
-        axes.append(np.linspace(0.0, height, step * counts[2] + 1))
+        axes.append(span(0.0, height, step * counts[2], shares[2]))
     radius, angle, *rest = (a.ravel()[order_of] for a in np.meshgrid(*axes, indexing="ij"))
     return grid, np.stack([radius * np.cos(angle), radius * np.sin(angle), *rest], axis=1)
 
@@ -286,6 +326,7 @@ def _solid_disc(
     radius: float,
     divisions: Sequence[int] | None,
     element_size: float | None,
+    grading: Grading | None,
     start_deg: float,
     sweep_deg: float,
     name: str,
@@ -297,7 +338,11 @@ def _solid_disc(
     if sweep != 360.0:
         raise CaseError(f"{where}.inner_radius", 0, "a sector needs an inner radius above 0; a solid disc goes round")
     lengths = ((1 - _CORE) * radius, 2 * math.pi * radius)
-    rings, around = counts_along(divisions, element_size, lengths, ("rings", "circumferential"), where)
+    names = ("rings", "circumferential")
+    rings, around = counts_along(divisions, element_size, lengths, names, where)
+    shares = shares_along(_with_divisions(grading, divisions, where), (rings, around), step, names, where)
+    if shares[1] is not None:
+        raise CaseError(f"{where}.grading.1", 1.0, "a solid disc is even round its circumference: leave it at 1")
     if element_size is not None:
         around = 4 * math.ceil(around / 4)
     if around % 4:
@@ -312,7 +357,8 @@ def _solid_disc(
     # Straight lines from the rim of the square to points at equal angles on the circle.
     angles = np.radians(-135.0 + 360.0 * np.arange(4 * side) / (4 * side))
     circle = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    share = (np.arange(1, step * rings + 1) / (step * rings))[:, None, None]
+    even = np.arange(step * rings + 1) / (step * rings)
+    share = (even if shares[0] is None else shares[0])[1:, None, None]
     layers = (1 - share) * core[rim] + share * circle
     layers[-1] = circle
     ring_ids = np.concatenate([rim[None], len(core) + np.arange(layers[..., 0].size).reshape(layers.shape[:2])])

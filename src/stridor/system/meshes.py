@@ -120,7 +120,12 @@ def _from_file(where: str, body: SolidBody) -> LoadedMesh:
 
 def built_in(mesh: BuiltInMesh, where: str) -> Mesh:
     """The mesh that a [bodies.NAME] mesh = { shape = … } describes. Raises CaseError below ``where``."""
-    common: dict[str, Any] = {"element_size": mesh.element_size, "kind": mesh.cells, "where": where}
+    common: dict[str, Any] = {
+        "element_size": mesh.element_size,
+        "grading": mesh.grading,
+        "kind": mesh.cells,
+        "where": where,
+    }
     if isinstance(mesh, RectangleMesh):
         return shapes.rectangle(mesh.corner, mesh.size, mesh.divisions, angle_deg=mesh.angle_deg, **common)
     if isinstance(mesh, QuadrilateralMesh):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, Literal
 
 import numpy as np
@@ -11,13 +10,13 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.tri import TriAnalyzer, Triangulation
+from matplotlib.tri import Triangulation
 from scipy.spatial import cKDTree
 
 from ..errors import CaseError
 from ..temporal.node_history import NodeHistory
 from ..temporal.trajectory import STATUS
-from ..typing import Array, IntArray
+from ..typing import Array, BoolArray, IntArray
 from .interface_places import Places, arc_length, places_along, seen_from_normal
 from .style import BLUE, GREY, INK, VERMILION, largest, legend_above, panel, styled, zero_line
 
@@ -269,9 +268,8 @@ def _status_map(ax: Axes, places: Places, sides: Array, values: Array) -> None:
 def _value_map(
     figure: Figure, ax: Axes, places: Places, sides: Array, values: Array, quantity: Quantity, *, area: bool
 ) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)
-        low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    known = values[~np.isnan(values)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     if not np.isfinite(low):
         low, high = 0.0, 1.0
     look: dict[str, Any] = {"cmap": "cividis", "vmin": min(low, 0.0), "vmax": high if high > min(low, 0.0) else 1.0}
@@ -303,10 +301,32 @@ def _patch(ax: Axes, x: Array, y: Array, values: Array) -> Any:
         apart = cKDTree(points).query(points, k=min(5, len(points)))[0][:, -1]
         corners = points[triangles.triangles]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-        triangles.set_mask(sides.max(axis=1) > 3.0 * apart[triangles.triangles].max(axis=1))
-        triangles.set_mask(TriAnalyzer(triangles).get_flat_tri_mask(0.05))
+        long = sides.max(axis=1) > 3.0 * apart[triangles.triangles].max(axis=1)
+        triangles.set_mask(without_flat(corners, triangles.neighbors, long, 0.05))
         return ax.tripcolor(triangles, values[good], shading="gouraud", rasterized=True, **look)
     return ax.scatter(x, y, c=values, s=60, zorder=2, **look)
+
+
+def without_flat(corners: Array, neighbours: IntArray, gone: BoolArray, least: float) -> BoolArray:
+    """Triangles (t,) to leave out: those ``gone`` and, from the border inwards, those whose inscribed circle is smaller
+    than ``least`` of their circumscribed one. corners (t, 3, 2); neighbours (t, 3), −1 where there is none.
+
+    r/R = 4A²/(s a b c) with s half the circumference. The area comes from the corners: from the sides alone, by Heron,
+    rounding makes the square of that of a flat triangle negative.
+    """
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    scaled = (corners - low) / (high - low)
+    a, b, c = np.linalg.norm(scaled - np.roll(scaled, 1, axis=1), axis=2).T
+    first, second = scaled[:, 1] - scaled[:, 0], scaled[:, 2] - scaled[:, 0]
+    double_area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    flat = 2.0 * double_area**2 < least * (a + b + c) * a * b * c
+    gone = gone.copy()
+    while True:
+        at_border = ((neighbours < 0) | gone[neighbours]).any(axis=1)
+        more = flat & at_border & ~gone
+        if not more.any():
+            return gone
+        gone |= more
 
 
 def _status_markers(ax: Axes, x: Array, y: Array, status: IntArray) -> None:
