@@ -305,12 +305,44 @@ def _tie_problems(parts: Parts) -> Iterator[Problem]:
         where = f"ties.{name}"
         slave = yield from _place(parts, tie.slave, f"{where}.slave", boundary=True)
         master = yield from _place(parts, tie.master, f"{where}.master", boundary=True)
-        if slave is not None and master is not None and slave.body == master.body:
-            yield Problem(f"{where}.master", tie.master, "must belong to another body than the slave's")
+        if slave is not None and master is not None:
+            yield from _repetition_problems(parts, where, tie, slave, master)
         for other, contact in parts.contacts.items():
             if {contact.slave, contact.master} == {tie.slave, tie.master}:
                 accepted = f"what is bonded cannot slide on it in contacts.{other} as well; remove one of them"
                 yield Problem(f"{where}.slave", tie.slave, accepted)
+
+
+def _repetition_problems(parts: Parts, where: str, tie: Tie, slave: Place, master: Place) -> Iterator[Problem]:
+    """Ties within a body without a way from one of its sides to the other, and ways that are none."""
+    dimension = parts.bodies[slave.body].dimension
+    if tie.translation is None and tie.rotation is None:
+        if slave.body == master.body:
+            accepted = (
+                "must belong to another body than the slave's; of one that repeats give translation or rotation from "
+                "the master to the slave"
+            )
+            yield Problem(f"{where}.master", tie.master, accepted)
+        return
+    if tie.slave == tie.master:
+        yield Problem(f"{where}.master", tie.master, "must be another boundary than the slave")
+    if tie.translation is not None and tie.rotation is not None:
+        yield Problem(f"{where}.rotation", None, "not used with translation; give one of them")
+    if tie.translation is not None:
+        if len(tie.translation) != dimension:
+            yield Problem(f"{where}.translation", tie.translation, f"must have {dimension} numbers")
+        elif is_zero(tie.translation):
+            yield Problem(f"{where}.translation", tie.translation, "must not be zero")
+    if tie.rotation is not None:
+        turn = tie.rotation
+        if turn.angle_deg % 360.0 == 0.0:
+            yield Problem(f"{where}.rotation.angle_deg", turn.angle_deg, "must not be zero or full turns")
+        if is_zero(turn.axis):
+            yield Problem(f"{where}.rotation.axis", turn.axis, "must not be zero")
+        elif dimension == 2 and any(turn.axis[:2]):
+            yield Problem(f"{where}.rotation.axis", turn.axis, "in the plane the axis is z; leave it out")
+        if turn.centre is not None and len(turn.centre) != dimension:
+            yield Problem(f"{where}.rotation.centre", turn.centre, f"must have {dimension} numbers")
 
 
 def _link_problems(parts: Parts) -> Iterator[Problem]:

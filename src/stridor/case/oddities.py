@@ -61,7 +61,7 @@ def oddities(case: Case) -> Iterator[str]:
             yield from unusual(entry, f"{table}.{name}", scaled=scaled)
     for number, phase in enumerate(case.phases):
         yield from unusual(phase, f"phases.{number}", scaled=scaled)
-    for section in ("modal", "temporal", "comparison"):
+    for section in ("steady", "modal", "temporal", "comparison"):
         yield from unusual(getattr(case, section), section, scaled=scaled)
     if scaled:
         yield from _materials(case)

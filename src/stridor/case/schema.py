@@ -242,13 +242,30 @@ class Contact(Table):
     friction: Friction = Field(description='a table such as { law = "coulomb", coefficient = 0.1 }')
 
 
+class Rotation(Table):
+    """A turn about an axis."""
+
+    angle_deg: Number = Field(description="a number [degrees], how far, by the right hand about the axis")
+    axis: Space = Field(default=(0.0, 0.0, 1.0), description="[x, y, z], three numbers: the axis of turning")
+    centre: PlaneOrSpace | None = Field(
+        default=None, description="[x, y] or [x, y, z], numbers [m]: a point of the axis (left out: the origin)"
+    )
+
+
 class Tie(Table):
-    """[ties.NAME]: a boundary bonded to a boundary of another body; their meshes need not match."""
+    """[ties.NAME]: a boundary bonded to a boundary of another body, or to another one of the same body that repeats;
+    their meshes need not match."""
 
     slave: str = Field(description='a boundary, "body.boundary", the one that follows (the finer mesh)')
     master: str = Field(description='a boundary, "body.boundary", the one that leads')
     tolerance: NotNegative | None = Field(
         default=None, description="a number >= 0 [m], the largest distance between them (left out: 5 % of an element)"
+    )
+    translation: PlaneOrSpace | None = Field(
+        default=None, description="[x, y] or [x, y, z], numbers [m]: from the master to the slave, where both repeat"
+    )
+    rotation: Rotation | None = Field(
+        default=None, description="a table { angle_deg, axis, centre }: from the master to the slave, where both repeat"
     )
 
 

@@ -111,6 +111,9 @@ USUAL: Mapping[str, Usual] = {
     "Contact.adjust": _MISFIT,
     "Contact.stiffness": _CONTACT,
     "Tie.tolerance": _MISFIT,
+    "Tie.translation": _PLACE,
+    "Rotation.angle_deg": _ANGLE,
+    "Rotation.centre": _PLACE,
     "Spring.stiffness": _STIFFNESS,
     "Spring.cubic": _usual("a cubic stiffness", "N/m³", 1e-3, 1e25),
     "Spring.damping": _DAMPER,
@@ -119,6 +122,9 @@ USUAL: Mapping[str, Usual] = {
     "Phase.ramp": _TIME,
     "Phase.loads": _FACTOR,
     "Phase.velocities": _FACTOR,
+    "SteadyStep.loads": _FACTOR,
+    "SteadyStep.velocities": _FACTOR,
+    "SteadyStep.duration": _TIME,
     "Modal.friction_range": _RANGE_OF_MU,
     "Modal.max_frequency_hz": _usual("a highest frequency", "Hz", 10.0, 1e7, kHz=1e3),
     "Temporal.step": _usual("a time step", "s", 1e-12, 1e-2, us=1e-6, ns=1e-9),
@@ -181,7 +187,7 @@ USUAL: Mapping[str, Usual] = {
 # counts with the elements, Rayleigh's factors with the frequencies: see `oddities`.
 WITHOUT = frozenset({
     "MaterialTable.poisson_ratio", "DampingTable.mass", "DampingTable.stiffness", "Parameter.value", "Parameter.range",
-    "Spring.direction", "Dashpot.direction", "Modal.modes", "Modal.sweep_points", "Temporal.beta2",
+    "Spring.direction", "Dashpot.direction", "Rotation.axis", "Modal.modes", "Modal.sweep_points", "Temporal.beta2",
     "Temporal.record_every", "BeamBody.elements", "MeshTable.divisions", "MeshTable.grading", "SlidingTable.axis",
     "CentrifugalTable.axis", "ObstacleBody.normal", "ObstacleBody.axis", "MatrixTerm.factor", "MatrixBody.dimension",
     "ReferenceFrequency.frequency_hz", "ReferenceOnset.frequency_hz", "ReferenceOnset.mu", "ReferenceValue.value",

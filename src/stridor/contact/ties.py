@@ -9,7 +9,7 @@ such nodes before the matrices are made.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -42,13 +42,26 @@ class Tie:
 class Bond:
     """A tie between freedoms of a structure: slave (s, d) and master (k, d) indices of the displacements of the nodes.
 
-    where names it in messages.
+    where names it in messages. rotation R (d, d) turns what the master does into what the slave does, u_s = R Σ w u_m:
+    that which turns the master's face onto the slave's in a structure that repeats round an axis; None where both move
+    alike.
     """
 
     where: str
     tie: Tie
     slave: IntArray
     master: IntArray
+    rotation: Array | None = None
+
+    @property
+    def shares(self) -> Bond:
+        """The bond by which masses of the slave's nodes go to their leaders: weights without sign that add up to one,
+        and squares of the rotation's components, whose rows and columns both do, so that a mass stays the same in all
+        directions."""
+        weights = np.abs(self.tie.weights)
+        weights = weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-300)
+        turned = None if self.rotation is None else self.rotation**2
+        return replace(self, tie=replace(self.tie, weights=weights), rotation=turned)
 
 
 def tie(slave_points: Array, master: MasterSurface, *, where: str, tolerance: float) -> Tie:
@@ -98,9 +111,15 @@ def tie_transformation(total: int, bonds: Sequence[Bond]) -> Sparse:
         _claim(bond, number, bonds, owner)
         tied[bond.slave] = True
         r, d = bond.tie.weights.shape[1], bond.slave.shape[1]
-        rows.append(np.repeat(bond.slave[:, None, :], r, axis=1).ravel())
-        columns.append(bond.master[bond.tie.nodes].ravel())
-        values.append(np.repeat(bond.tie.weights[:, :, None], d, axis=2).ravel())
+        if bond.rotation is None:
+            rows.append(np.repeat(bond.slave[:, None, :], r, axis=1).ravel())
+            columns.append(bond.master[bond.tie.nodes].ravel())
+            values.append(np.repeat(bond.tie.weights[:, :, None], d, axis=2).ravel())
+            continue
+        shape = (len(bond.slave), r, d, d)  # slave node, leader, component of the slave, of the leader
+        rows.append(np.broadcast_to(bond.slave[:, None, :, None], shape).ravel())
+        columns.append(np.broadcast_to(bond.master[bond.tie.nodes][:, :, None, :], shape).ravel())
+        values.append((bond.tie.weights[:, :, None, None] * bond.rotation).ravel())
     free = np.flatnonzero(~tied)
     transformation = sp.csr_array(
         (

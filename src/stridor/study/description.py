@@ -10,7 +10,7 @@ import numpy as np
 
 from ..case import Case
 from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBody
-from ..case.schema import Friction, Load, TabulatedTable
+from ..case.schema import Friction, Load, TabulatedTable, Tie
 from ..case.usual import USUAL
 from ..errors import AnalysisError
 from ..mesh.model import Mesh
@@ -57,7 +57,7 @@ def describe(case: Case) -> Description:
     for name, load in case.loads.items():
         where = f"at {load.at}" if load.at else f"on {', '.join(load.bodies or ['all bodies'])}"
         lines.append(f"  load {name} {where}: {_load_words(load)}")
-    lines += [f"  tie {name}: {tie.slave} follows {tie.master}" for name, tie in case.ties.items()]
+    lines += [f"  tie {name}: {tie.slave} follows {tie.master}{_way_words(tie)}" for name, tie in case.ties.items()]
     lines += [
         f"  spring {name}: {' to '.join(link.between)}, {link.stiffness:g} N/m" for name, link in case.springs.items()
     ]
@@ -237,6 +237,13 @@ def _sliding_words(body: SolidBody | MatrixBody | ObstacleBody) -> str:
 
 def _vector(values: tuple[float, ...]) -> str:
     return "(" + ", ".join(f"{v:g}" for v in values) + ")"
+
+
+def _way_words(tie: Tie) -> str:
+    """How a body that repeats goes on at a tie."""
+    if tie.translation is not None:
+        return f", moved by {_vector(tie.translation)} m"
+    return "" if tie.rotation is None else f", turned by {tie.rotation.angle_deg:g}°"
 
 
 def _load_words(load: Load) -> str:

@@ -26,7 +26,7 @@ from .links import Links, links_of
 from .load_steps import LoadStep
 from .model import CubicSprings, Line, PrescribedMotion, Solid, Structure, System, constrain, place_name
 from .pairs import is_point_on_line, point_contact, surface_contact
-from .supports import constraints_of, tie_matrix, tied_mass
+from .supports import Tied, constraints_of, tie_matrix
 from .view import View
 
 
@@ -39,10 +39,9 @@ def build_system(case: Case, mu: float | None = None) -> System:
     total = sum(body.size for body in bodies.values())
     links = links_of(case, bodies, total)
     constraints = constraints_of(case, bodies)
-    held = {f for c in constraints for f in c.freedoms}
-    tied = tie_matrix(case, bodies, total, held)
-    tie, followers = (None, np.zeros(0, dtype=np.int64)) if tied is None else tied
-    structure = _structure(bodies, links, tie)
+    tied = tie_matrix(case, bodies, total, constraints)
+    tie, followers = (None, np.zeros(0, dtype=np.int64)) if tied is None else (tied.matrix, tied.followers)
+    structure = _structure(bodies, links, tied)
     free, motion = constrain(structure, constraints, followers, _translations(bodies, total))
     if not len(free):
         raise CaseError("supports", None, "hold every degree of freedom of the case; leave some of them free")
@@ -116,7 +115,7 @@ def _general(mass: Sparse, damping: Sparse, stiffness: Sparse) -> str:
     return "" if definiteness(mass)[0] == "positive definite" else "the mass matrix is not positive definite"
 
 
-def _structure(bodies: Mapping[str, BuiltBody], links: Links, tie: Sparse | None) -> Structure:
+def _structure(bodies: Mapping[str, BuiltBody], links: Links, tied: Tied | None) -> Structure:
     parts = list(bodies.values())
     mass, damping, stiffness = (
         sp.csr_array(sp.block_diag([getattr(b, kind) for b in parts], format="csr"))
@@ -125,8 +124,8 @@ def _structure(bodies: Mapping[str, BuiltBody], links: Links, tie: Sparse | None
     if links.rows.shape[0]:
         damping = damping + links.rows.T @ sp.diags_array(links.damping) @ links.rows
         stiffness = stiffness + links.rows.T @ sp.diags_array(links.stiffness) @ links.rows
-    if tie is not None:
-        mass = tied_mass(mass, tie)
+    if tied is not None:
+        mass, tie = tied.mass(mass), tied.matrix
         damping, stiffness = tie.T @ damping @ tie, tie.T @ stiffness @ tie
     return Structure(sp.csr_array(mass), sp.csr_array(damping), sp.csr_array(stiffness))
 

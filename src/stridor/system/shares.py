@@ -12,7 +12,7 @@ from ..typing import Sparse
 from .bodies import BuiltBody, build_bodies
 from .imported import ROLES, Share, load_shares
 from .links import links_of
-from .supports import constraints_of, tie_matrix, tied_mass
+from .supports import Tied, constraints_of, tie_matrix
 
 
 def system_shares(case: Case, mu: float | None = None) -> tuple[Share, ...]:
@@ -26,8 +26,8 @@ def system_shares(case: Case, mu: float | None = None) -> tuple[Share, ...]:
     links = links_of(case, bodies, total)
     constraints = constraints_of(case, bodies)
     held = {f for c in constraints for f in c.freedoms}
-    tied = tie_matrix(case, bodies, total, held)
-    tie, followers = (None, np.zeros(0, dtype=np.int64)) if tied is None else tied
+    tied = tie_matrix(case, bodies, total, constraints)
+    followers = np.zeros(0, dtype=np.int64) if tied is None else tied.followers
     free = np.setdiff1d(np.arange(total), np.concatenate([np.array(sorted(held), dtype=np.int64), followers]))
     shares: list[Share] = []
     for name, body in case.imported.items():
@@ -40,10 +40,10 @@ def system_shares(case: Case, mu: float | None = None) -> tuple[Share, ...]:
             factor = links.damping if role == "damping" else links.stiffness
             rest = sp.csr_array(rest + links.rows.T @ sp.diags_array(factor) @ links.rows)
         shares.append(Share(role, rest, 1.0))
-    if tie is not None:
+    if tied is not None:
         masses = [b.mass for b in bodies.values()]
         lumped = all(np.all(sp.coo_array(m).row == sp.coo_array(m).col) for m in masses)
-        shares = [replace(s, matrix=_tied(s, tie, lumped=lumped)) for s in shares]
+        shares = [replace(s, matrix=_tied(s, tied, lumped=lumped)) for s in shares]
     return tuple(replace(s, matrix=sp.csr_array(s.matrix[free][:, free])) for s in shares)
 
 
@@ -57,8 +57,8 @@ def _emptied(body: BuiltBody) -> BuiltBody:
     return replace(body, mass=nothing, damping=nothing, stiffness=nothing)
 
 
-def _tied(share: Share, tie: Sparse, *, lumped: bool) -> Sparse:
+def _tied(share: Share, tied: Tied, *, lumped: bool) -> Sparse:
     """TᵀAT, as a diagonal mass of all bodies together has it where that is diagonal."""
     if share.role == "mass" and lumped:
-        return tied_mass(share.matrix, tie)
-    return sp.csr_array(tie.T @ share.matrix @ tie)
+        return tied.mass(share.matrix)
+    return sp.csr_array(tied.matrix.T @ share.matrix @ tied.matrix)

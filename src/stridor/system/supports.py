@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 
 from ..case import Case
 from ..case.points import BoundaryRef, PointRef
+from ..case.schema import Rotation
+from ..case.schema import Tie as TieCase
 from ..contact.curve import Curve
 from ..contact.facets import FacetSurface
 from ..contact.ties import Bond, Tie, tie_transformation
@@ -14,7 +20,7 @@ from ..contact.ties import tie as tie_weights
 from ..errors import CaseError
 from ..mesh.boundary import require_boundary
 from ..mesh.model import Mesh
-from ..typing import Array, IntArray, Sparse
+from ..typing import Array, BoolArray, IntArray, Sparse
 from .bodies import BuiltBody
 from .model import Constraint
 from .view import nearest_node
@@ -104,44 +110,124 @@ def master_surface(mesh: Mesh, boundary: str, where: str) -> tuple[Curve | Facet
     return surface, surface.nodes
 
 
-def tie_matrix(case: Case, bodies: dict[str, BuiltBody], total: int, held: set[int]) -> tuple[Sparse, IntArray] | None:
-    """T (N, N) with u = T u_independent, and the freedoms that follow; None without ties.
+@dataclass(frozen=True)
+class Tied:
+    """T (N, N) with u = T u_independent; freedoms that follow (f,); by which shares (N, N) masses follow, None where
+    those of T do."""
+
+    matrix: Sparse
+    followers: IntArray
+    shares: Sparse | None = None
+
+    def mass(self, mass: Sparse) -> Sparse:
+        """TᵀMT, for a diagonal mass diagonal again: each node's mass goes to its leaders in their shares."""
+        if np.any(mass.tocoo().row != mass.tocoo().col):
+            return sp.csr_array(self.matrix.T @ mass @ self.matrix)
+        share = abs(self.matrix) if self.shares is None else self.shares
+        total = np.asarray(share.sum(axis=1)).ravel()
+        share = sp.diags_array(1.0 / np.where(total > 0, total, 1.0)) @ share
+        return sp.csr_array(sp.diags_array(share.T @ mass.diagonal()))
+
+
+def tie_matrix(
+    case: Case, bodies: dict[str, BuiltBody], total: int, constraints: Sequence[Constraint]
+) -> Tied | None:
+    """Ties between bodies, and of bodies that repeat with themselves; None without ties.
 
     Freedoms that a support holds stay with their support.
     """
     if not case.ties:
         return None
+    held = {f for c in constraints for f in c.freedoms}
     bonds: list[Bond] = []
+    repeated: set[int] = set()
     for name, tie in case.ties.items():
-        where = f"ties.{name}"
-        slave_at, master_at = case.place(tie.slave), case.place(tie.master)
-        assert isinstance(slave_at, BoundaryRef), "checked"
-        assert isinstance(master_at, BoundaryRef), "checked"
-        slave, master = bodies[slave_at.body], bodies[master_at.body]
-        nodes = boundary_nodes(slave, slave_at, f"{where}.slave")
-        assert master.mesh is not None, "checked: boundaries belong to meshes"
-        surface, master_nodes = master_surface(master.mesh, master_at.boundary, f"{where}.master")
-        tolerance = tie.tolerance if tie.tolerance is not None else 0.05 * _edge(master.points[master_nodes])
-        bond = Bond(
-            where,
-            tie_weights(slave.points[nodes], surface, where=where, tolerance=tolerance),
-            slave.displacements(nodes),
-            master.displacements(master_nodes),
+        bond = _bond(case, bodies, f"ties.{name}", tie)
+        if bond.rotation is not None:
+            _refuse_turned_motion(bond, constraints)
+        bond = _free_of_supports(bond, held)
+        if tie.translation is not None:
+            # A corner of a body that repeats in two directions follows by one of them; the other is implied.
+            again = np.array([bool(repeated.intersection(row)) for row in bond.slave.tolist()], dtype=bool)
+            bond = _only(bond, ~again)
+            repeated.update(bond.slave.ravel().tolist())
+        bonds.append(bond)
+    turned = any(bond.rotation is not None for bond in bonds)
+    return Tied(
+        tie_transformation(total, bonds),
+        np.unique(np.concatenate([b.slave.ravel() for b in bonds])),
+        tie_transformation(total, [bond.shares for bond in bonds]) if turned else None,
+    )
+
+
+def _bond(case: Case, bodies: dict[str, BuiltBody], where: str, tie: TieCase) -> Bond:
+    """Slave nodes with their leaders, sought where the slave would be on the master's side."""
+    slave_at, master_at = case.place(tie.slave), case.place(tie.master)
+    assert isinstance(slave_at, BoundaryRef), "checked"
+    assert isinstance(master_at, BoundaryRef), "checked"
+    slave, master = bodies[slave_at.body], bodies[master_at.body]
+    nodes = boundary_nodes(slave, slave_at, f"{where}.slave")
+    assert master.mesh is not None, "checked: boundaries belong to meshes"
+    surface, master_nodes = master_surface(master.mesh, master_at.boundary, f"{where}.master")
+    tolerance = tie.tolerance if tie.tolerance is not None else 0.05 * _edge(master.points[master_nodes])
+    points, rotation = slave.points[nodes], None
+    if tie.translation is not None:
+        points = points - np.array(tie.translation)
+    elif tie.rotation is not None:
+        rotation, centre = turn_of(tie.rotation, slave.dimension)
+        points = (points - centre) @ rotation + centre  # Rᵀ(x − c) + c, row by row
+    weights = tie_weights(points, surface, where=where, tolerance=tolerance)
+    bond = Bond(where, weights, slave.displacements(nodes), master.displacements(master_nodes), rotation)
+    own = (bond.master[weights.nodes] == bond.slave[:, None, :]).any(axis=2) & (weights.weights != 0.0)
+    if own.any():
+        at = ", ".join(f"{x:.6g}" for x in slave.points[nodes[int(np.argmax(own.any(axis=1)))]])
+        accepted = f"the node at ({at}) m would follow itself: it lies on the axis; tie boundaries without it"
+        raise CaseError(where, None, accepted)
+    return bond
+
+
+def turn_of(rotation: Rotation, dimension: int) -> tuple[Array, Array]:
+    """R (d, d) and a point (d,) [m] of the axis of a turn (Rodrigues' formula)."""
+    angle, axis = math.radians(rotation.angle_deg), np.array(rotation.axis)
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cosine, sine = (0.0 if abs(v) < 1e-15 else v for v in (math.cos(angle), math.sin(angle)))
+    full = np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+    full[np.abs(full) < 1e-15] = 0.0
+    centre = np.zeros(dimension) if rotation.centre is None else np.array(rotation.centre)
+    return full[:dimension, :dimension], centre
+
+
+def _refuse_turned_motion(bond: Bond, constraints: Sequence[Constraint]) -> None:
+    moved = {c.name for c in constraints if c.moves and np.isin(c.freedoms, [*bond.slave.ravel()]).any()}
+    if moved:
+        accepted = (
+            f"supports.{min(moved)} moves nodes of the slave in a direction of its own, which does not turn with the "
+            "rotation; let the material slide (sliding) instead"
         )
-        bonds.append(_free_of_supports(bond, held))
-    return tie_transformation(total, bonds), np.unique(np.concatenate([b.slave.ravel() for b in bonds]))
+        raise CaseError(f"{bond.where}.slave", None, accepted)
+
+
+def _only(bond: Bond, keep: BoolArray) -> Bond:
+    tie = Tie(bond.tie.nodes[keep], bond.tie.weights[keep], bond.tie.point[keep], bond.tie.distance[keep])
+    return Bond(bond.where, tie, bond.slave[keep], bond.master, bond.rotation)
 
 
 def _free_of_supports(bond: Bond, held: set[int]) -> Bond:
     """The bond without nodes that a support holds in a direction in which their leaders are free.
 
-    Where the leaders are held as well, as on a plane of symmetry, the node follows them and is held so.
+    Where the leaders are held as well, as on a plane of symmetry, the node follows them and is held so; with a rotation
+    they must be held in all directions that it mixes into that one.
     """
     is_held = np.vectorize(held.__contains__, otypes=[bool])
-    if not held:
+    if not held or not len(bond.slave):
         return bond
     leaders = bond.master[bond.tie.nodes]  # (s, r, d)
-    leading = is_held(leaders) | (bond.tie.weights == 0.0)[:, :, None]
+    leading = is_held(leaders)
+    if bond.rotation is not None:
+        mixed = np.abs(bond.rotation) > 1e-12
+        leading = np.all(leading[:, :, None, :] | ~mixed, axis=3)
+    leading = leading | (bond.tie.weights == 0.0)[:, :, None]
     conflict = np.any(is_held(bond.slave) & ~leading.all(axis=1), axis=1)
     keep = ~conflict
     if len(keep) and not keep.any():
@@ -150,8 +236,7 @@ def _free_of_supports(bond: Bond, held: set[int]) -> Bond:
             "exchange slave and master, or support the master's body instead"
         )
         raise CaseError(bond.where, None, accepted)
-    tie = Tie(bond.tie.nodes[keep], bond.tie.weights[keep], bond.tie.point[keep], bond.tie.distance[keep])
-    return Bond(bond.where, tie, bond.slave[keep], bond.master)
+    return _only(bond, keep)
 
 
 def _edge(points: Array) -> float:
@@ -160,13 +245,3 @@ def _edge(points: Array) -> float:
 
     distances, _ = cKDTree(points).query(points, k=2)
     return float(np.median(distances[:, 1]))
-
-
-def tied_mass(mass: Sparse, tie: Sparse) -> Sparse:
-    """TᵀMT, for a diagonal mass diagonal again: each node's mass goes to its leaders in their shares."""
-    if np.all(mass.tocoo().row == mass.tocoo().col):
-        share = abs(tie)
-        total = np.asarray(share.sum(axis=1)).ravel()
-        share = sp.diags_array(1.0 / np.where(total > 0, total, 1.0)) @ share
-        return sp.csr_array(sp.diags_array(share.T @ mass.diagonal()))
-    return sp.csr_array(tie.T @ mass @ tie)
