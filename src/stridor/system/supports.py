@@ -199,7 +199,8 @@ def turn_of(rotation: Rotation, dimension: int) -> tuple[Array, Array]:
 
 
 def _refuse_turned_motion(bond: Bond, constraints: Sequence[Constraint]) -> None:
-    moved = {c.name for c in constraints if c.moves and np.isin(c.freedoms, [*bond.slave.ravel()]).any()}
+    moving = [c for c in constraints if c.moves or any(c.displacement)]
+    moved = {c.name for c in moving if np.isin(c.freedoms, bond.slave).any()}
     if moved:
         accepted = (
             f"supports.{min(moved)} moves nodes of the slave in a direction of its own, which does not turn with the "
