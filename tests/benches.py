@@ -145,7 +145,7 @@ def by_hand(
                 gap=0.0, normal=np.array([0.0, 1.0]), tangent=np.array([1.0, 0.0]),
                 normal_row=np.asarray(n, dtype=float), tangent_row=np.asarray(t, dtype=float),
                 normal_lift=np.zeros(1), tangent_lift=np.array([float(slip)]),
-                stiffness=float(np.broadcast_to(contact_stiffness, number + 1)[number]),
+                stiffness=float(np.broadcast_to(contact_stiffness, len(np.atleast_2d(normal)))[number]),
                 law=law or Coulomb(0.1),
             )
         )  # fmt: skip

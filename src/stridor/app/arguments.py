@@ -165,6 +165,13 @@ def numbers(text: str, name: str, *, least: float = 0.0) -> list[float]:
     return values
 
 
+def one_of(text: str, name: str, accepted: tuple[str, ...]) -> str:
+    """The text, one of some words. Raises CaseError."""
+    if text not in accepted:
+        raise CaseError(name, text, " or ".join(accepted))
+    return text
+
+
 def pair(text: str, name: str) -> tuple[float, float]:
     """Two numbers from "low:high". Raises CaseError."""
     parts = text.split(":")

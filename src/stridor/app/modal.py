@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
-from .arguments import Call, Undamped, numbers, pair, verb
+from ..digits import readable
+from .arguments import Call, Undamped, numbers, one_of, pair, verb
+
+WORTH_A_BAR = 20  # friction coefficients
+INTERRUPTED = 130  # exit code
 
 
 @verb()
@@ -65,7 +69,7 @@ def shapes(
     if call.json:
         call.document({"modes": documents})
         return
-    rows = [[str(d["branch"]), f"{d['frequency_hz']:.2f}", f"{d['growth_rate']:.3f}"] for d in documents]
+    rows = [[str(d["branch"]), readable(d["frequency_hz"]), readable(d["growth_rate"])] for d in documents]
     table("shapes", ["branch", "frequency [Hz]", "growth [1/s]"], rows)
 
 
@@ -77,49 +81,41 @@ def modes(
         typer.Option("--mu", metavar="μ|a,b|start:stop:count", help="Friction coefficients [default: the case's]."),
     ] = None,
     count: Annotated[
-        int | None, typer.Option("--count", min=1, help="How many branches [default: modal.modes].")
+        int | None,
+        typer.Option("--count", min=1, help="How many branches; unstable ones come on top [default: modal.modes]."),
     ] = None,
+    unstable: Annotated[bool, typer.Option("--unstable", help="List unstable modes alone.")] = False,
+    sort: Annotated[
+        str, typer.Option("--sort", metavar="frequency|growth", help="What comes first: lowest or fastest growing.")
+    ] = "frequency",
     undamped: Undamped = False,
 ) -> None:
-    """Complex modes at one or many friction coefficients, branches followed from μ = 0."""
+    """Complex modes at one or many friction coefficients, branches followed from μ = 0. Every unstable mode of the band
+    up to modal.max_frequency_hz is among them."""
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
-    from .output import stdout, table
+    from .output import counting
+    from .show_modes import show_modes
 
     loaded = call.case()
     values = None if mu is None else numbers(mu, "--mu")
     call.check_friction(values)
     call.warn(resolution_warnings(loaded))
-    result = analyses.modes(loaded, values, count=count, damped=False if undamped else None)
+    order: Literal["frequency", "growth"]
+    order = "growth" if one_of(sort, "--sort", ("frequency", "growth")) == "growth" else "frequency"
+    with counting("modes, friction coefficients", quiet=call.quiet, worth=len(values or ()) > WORTH_A_BAR) as progress:
+        result = analyses.modes(
+            loaded, values, count=count, damped=False if undamped else None, progress=progress
+        )
     call.keep(result, "modes.nc")
+    if result.interrupted:
+        call.say(f"interrupted: {len(result.mu)} of {result.planned} friction coefficients, which are kept")
     if call.json:
-        call.document(result.to_json())
-        return
-    for row, m in enumerate(result.to_json()["modes"]):
-        rows = [
-            [
-                str(x["branch"]),
-                f"{x['frequency_hz']:.2f}",
-                f"{x['growth_rate']:.3f}",
-                f"{100 * x['damping_ratio']:.4f}",
-                "unstable" if x["unstable"] else "",
-                f"{x['residual']:.1e}",
-            ]
-            for x in m
-        ]
-        if len(result.mu) <= 5 or row in (0, len(result.mu) - 1):
-            table(
-                f"μ = {result.mu[row]:g}",
-                ["branch", "frequency [Hz]", "growth [1/s]", "damping [%]", "", "residual"],
-                rows,
-            )
-    for m, sentence in zip(result.mu, result.completeness, strict=bool(result.completeness)):
-        stdout.print(f"{f'μ = {m:g}: ' if len(result.mu) > 1 else ''}{sentence}", markup=False)
-    if result.contact_state:
-        stdout.print(f"{result.contact_state}; held so at every μ", markup=False)
-    if len(result.mu) > 5:
-
-        call.say(f"{len(result.mu)} friction coefficients; first and last shown, all in the file")
+        call.document(result.to_json(sort=order, unstable=unstable))
+    else:
+        show_modes(result, sort=order, unstable=unstable, say=call.say)
+    if result.interrupted:
+        raise typer.Exit(INTERRUPTED)
 
 
 @verb()
@@ -143,7 +139,7 @@ def onsets(
     """Every critical friction coefficient in range: solved, not bracketed."""
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
-    from .output import stdout, table
+    from .show_modes import show_onsets
 
     loaded = call.case()
     chosen = None if friction_range is None else pair(friction_range, "--range")
@@ -154,41 +150,7 @@ def onsets(
     if call.json:
         call.document(result.to_json())
         return
-    if result.contact_state:
-        stdout.print(f"{result.contact_state}; held so over the range of μ", markup=False)
-    if not result.onsets:
-        low, high = result.friction_range
-        stdout.print(f"no onset for μ in {low:g} … {high:g} up to {result.max_frequency_hz:g} Hz")
-        if result.completeness:
-            stdout.print(result.completeness, markup=False)
-        return
-    rows = [
-        [
-            f"{o.mu:.10f}",
-            f"{o.frequency_hz:.3f}",
-            o.kind,
-            f"{o.branches[0]} + {o.branches[1]}" if o.kind == "flutter" else str(o.branches[0]),
-            "ends" if o.stabilising else "begins",
-            "" if o.square_root_coefficient is None else f"{o.square_root_coefficient:.1f}",
-            "" if o.growth_slope is None else f"{o.growth_slope:.4g}",
-            f"{o.residual:.1e}",
-        ]
-        for o in result.onsets
-    ]
-    columns = [
-        "critical μ",
-        "frequency [Hz]",
-        "kind",
-        "modes",
-        "growth",
-        "κ [1/s]",
-        "slope [1/s]",
-        "residual",
-    ]
-    table("onsets, " + ("damped" if result.damped else "undamped"), columns, rows)
-    stdout.print("κ: growth opens as κ √(μ − μ_c) without damping; slope: d growth/dμ at a damped onset")
-    if result.completeness:
-        stdout.print(result.completeness, markup=False)
+    show_onsets(result)
 
 
 VERBS = {"steady": steady, "shapes": shapes, "modes": modes, "onsets": onsets}

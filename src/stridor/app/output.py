@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+BETWEEN_LINES = 10.0  # seconds
 
 stdout = Console(highlight=False, soft_wrap=True)
 stderr = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -68,3 +71,42 @@ def progress_bar(text: str, *, quiet: bool) -> Generator[Any, None, None]:
             bar.update(task, total=planned, completed=done)
 
         yield advance
+
+
+@contextmanager
+def counting(text: str, *, quiet: bool, worth: bool = True) -> Generator[Any, None, None]:
+    """Yields progress(done, planned): a bar on a terminal, elsewhere a line every ten seconds with the time left.
+
+    worth: whether there is enough to count for any of it.
+    """
+    if quiet or not worth:
+        yield None
+    elif stderr.is_terminal:
+        with progress_bar(text, quiet=quiet) as progress:
+            yield progress
+    else:
+        yield _Lines(text)
+
+
+class _Lines:
+    """Progress as lines of a log."""
+
+    def __init__(self, text: str) -> None:
+        self.text, self.started = text, time.monotonic()
+        self.last = self.started
+
+    def __call__(self, done: int, planned: int) -> None:
+        now = time.monotonic()
+        if now - self.last < BETWEEN_LINES or done >= planned:
+            return
+        self.last = now
+        left = (now - self.started) / done * (planned - done)
+        stderr.print(f"{self.text}: {done} of {planned}, about {duration(left)} left", markup=False)
+
+
+def duration(seconds: float) -> str:
+    """A time in words: "40 s", "12 min", "3.5 h", "2.1 days"."""
+    for limit, unit, name in ((100.0, 1.0, "s"), (6000.0, 60.0, "min"), (172800.0, 3600.0, "h")):
+        if seconds < limit:
+            return f"{seconds / unit:.2g} {name}" if seconds / unit < 10 else f"{seconds / unit:.0f} {name}"
+    return f"{seconds / 86400:.3g} days"

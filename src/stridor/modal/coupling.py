@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import AnalysisError
-from ..sliding import full_motion, slip_speeds, steady_sliding
+from ..sliding import full_motion, least_force, require_pressed, slip_speeds, steady_sliding
 from ..system import System
 from ..typing import Array, ComplexArray
 
@@ -116,8 +116,11 @@ def couple(system: System, *, mu: float | None = None) -> tuple[Coupling, tuple[
     system = system.in_place()
     if system.contacts and system.loads:
         steady = steady_sliding(system, mu=mu)
-        open_names = tuple(c.name for c, a in zip(system.contacts, steady.active, strict=True) if not a)
-        touching = tuple(c for c, a in zip(system.contacts, steady.active, strict=True) if a)
+        require_pressed(system, steady.normal_force)
+        # A contact that only rounding presses is not closed.
+        closed = steady.active & (steady.normal_force > least_force(system))
+        open_names = tuple(c.name for c, a in zip(system.contacts, closed, strict=True) if not a)
+        touching = tuple(c for c, a in zip(system.contacts, closed, strict=True) if a)
         system = replace(system, contacts=touching)
     speeds = slip_speeds(system, velocities)
     sloped = any(c.law.slope(abs(float(v))) != 0.0 for c, v in zip(system.contacts, speeds, strict=True))

@@ -7,100 +7,29 @@ the bordered sense; a damped onset is a simple root λ = jω; divergence is λ =
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from ..errors import AnalysisError, CaseError
 from ..system import System
 from ..threads import one_thread_if_small
-from ..typing import ComplexArray
+from ..typing import BoolArray, ComplexArray
 from .backward_error import BackwardError
 from .bordered import Bordered
-from .complex_modes import UNSTABLE_RELATIVE, prepare, undamped
+from .complex_modes import UNSTABLE_RELATIVE, grows, prepare, undamped
 from .coupling import Coupling
+from .histories import Change, Entries, reported, unexplained
+from .onset import Onset, Onsets
 from .roots import Spectrum
 from .tracking import State, Tracker
 
+__all__ = ["Onset", "Onsets", "onsets"]
+
+FOLLOW = 1.1  # times the band: from where branches are followed
 NARROWINGS = 8
 BELIEVED = 1e-8  # backward error above which a solved onset is no onset
-
-
-@dataclass(frozen=True)
-class Onset:
-    """One critical friction coefficient.
-
-    mu, frequency_hz: where; kind: flutter (two modes meet) or divergence (a mode at zero frequency);
-    damped: with or without C; stabilising: True where growth ends there instead of beginning;
-    branches: the two modes that meet, numbered from 1 by frequency at μ = 0.
-    square_root_coefficient κ [1/s]: beyond an undamped onset growth opens as κ √(μ − μ_c); with
-    damping it belongs to the exceptional point at the complex μ ``exceptional_mu`` close by (None if
-    none was found). growth_slope d Re λ/dμ [1/s] (None undamped, where it is infinite).
-    residual: componentwise backward error of the eigenpair in the assembled matrices.
-    """
-
-    mu: float
-    frequency_hz: float
-    kind: Literal["flutter", "divergence"]
-    damped: bool
-    stabilising: bool
-    branches: tuple[int, int]
-    residual: float
-    square_root_coefficient: float | None
-    growth_slope: float | None
-    exceptional_mu: complex | None = None
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain values, as `stridor onsets --json` prints them."""
-        exceptional = self.exceptional_mu
-        return {
-            "mu": self.mu,
-            "frequency_hz": self.frequency_hz,
-            "kind": self.kind,
-            "damped": self.damped,
-            "stabilising": self.stabilising,
-            "branches": list(self.branches),
-            "residual": self.residual,
-            "square_root_coefficient": self.square_root_coefficient,
-            "growth_slope": self.growth_slope,
-            "exceptional_mu": None if exceptional is None else [exceptional.real, exceptional.imag],
-        }
-
-
-@dataclass(frozen=True)
-class Onsets:
-    """All onsets with friction_range [a, b] and frequencies up to max_frequency_hz, by μ.
-
-    completeness: of matrices without structure, what speaks for there being no others; "" of all others. contact_state:
-    where contacts may stick, how many nodes stick, slip and are open, and at which μ; it is held over the range.
-    """
-
-    onsets: tuple[Onset, ...]
-    friction_range: tuple[float, float]
-    max_frequency_hz: float
-    damped: bool
-    open_contacts: tuple[str, ...] = ()
-    completeness: str = ""
-    contact_state: str = ""
-    provenance: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def first(self) -> Onset | None:
-        """The lowest μ from which on something grows, or None."""
-        return next((o for o in self.onsets if not o.stabilising), None)
-
-    def to_json(self) -> dict[str, Any]:
-        """The document that `stridor onsets --json` prints."""
-        return {
-            "onsets": [o.to_json() for o in self.onsets],
-            **({"contact_state": self.contact_state} if self.contact_state else {}),
-            "friction_range": list(self.friction_range),
-            "max_frequency_hz": self.max_frequency_hz,
-            "damped": self.damped,
-            "open_contacts": list(self.open_contacts),
-            **({"completeness": self.completeness} if self.completeness else {}),
-        }
 
 
 @dataclass(frozen=True)
@@ -128,58 +57,94 @@ def onsets(
     friction_damping: bool = False,
     prestress: bool = False,
     solver: str | None = None,
+    follow: float = FOLLOW,
 ) -> Onsets:
     """Every critical μ in ``friction_range`` with a frequency up to ``max_frequency_hz``.
 
-    friction_damping, prestress and solver as in `complex_modes`. Raises CaseError for an empty range and AnalysisError
-    where branches cannot be followed.
+    Those above the band are among them where the mode that begins to grow there comes into it. follow: branches are
+    followed that start up to so many times the band. friction_damping, prestress and solver as in `complex_modes`; so
+    are systems whose stiffness is not positive. Nothing is sought anew here: `growing.checked_onsets` does that.
+    Raises CaseError for an empty range and AnalysisError where branches cannot be followed.
     """
     low, high = (float(v) for v in friction_range)
     if not (0 <= low < high and np.isfinite(high)):
         raise CaseError("friction_range", friction_range, "two numbers 0 ≤ a < b")
-    if system.general:
-        from .assembled import Options
-        from .general import general_onsets
+    from .assembled import NotPositive, Options, onsets_assembled
+    from .general import general_onsets
 
+    options = Options(friction_damping=friction_damping, prestress=prestress, solver=solver)
+    whole = system
+
+    def as_general() -> Onsets:
         return general_onsets(
-            lambda _: system,
-            (low, high),
-            max_frequency_hz=max_frequency_hz,
-            damped=damped,
-            options=Options(friction_damping=friction_damping, prestress=prestress, solver=solver),
+            lambda _: whole, (low, high), max_frequency_hz=max_frequency_hz, damped=damped, options=options
         )
-    if system.assembled:
-        from .assembled import Options, onsets_assembled
 
-        return onsets_assembled(
-            system,
-            (low, high),
-            max_frequency_hz=max_frequency_hz,
-            damped=damped,
-            options=Options(friction_damping=friction_damping, prestress=prestress, solver=solver),
-        )
+    if system.general:
+        return as_general()
+    if system.assembled:
+        try:
+            return onsets_assembled(
+                system, (low, high), max_frequency_hz=max_frequency_hz, damped=damped, options=options, follow=follow
+            )
+        except NotPositive:
+            return as_general()
     if not damped:
         system = undamped(system)
     spectrum, coupling, open_contacts = prepare(system)
-    if not coupling.contacts:
-        return Onsets((), (low, high), max_frequency_hz, damped, open_contacts)
-    events: list[_Event] = []
+    if spectrum.modes.indefinite and coupling.contacts:
+        return as_general()
     has_damping = bool(np.abs(system.damping).max() > 0) or coupling.sloped
+    top = 2 * np.pi * max_frequency_hz
+    if not coupling.contacts:
+        fixed = _growing(spectrum.fixed, top)
+        return Onsets((), (low, high), max_frequency_hz, has_damping, open_contacts, at_start=fixed, at_end=fixed)
+    events: list[_Event] = []
+    entries = Entries(top)
     # Roots that start above the band may meet inside it; follow some beyond.
-    tracker = Tracker(spectrum, 2 * np.pi * max_frequency_hz * 1.1)
-    tracker.watch = lambda old, new: events.extend(_passages(spectrum, old, new, has_damping))
-    tracker.advance(high)
+    tracker = Tracker(spectrum, top * follow)
+
+    def watch(old: State, new: State) -> None:
+        count = len(old.roots)
+        events.extend(_passages(spectrum, old, new, has_damping))
+        entries.watch((old.mu, new.mu), old.roots, new.roots[:count], new.branch[:count])
+
+    tracker.watch = watch
+    start = tracker.advance(low)
+    end = tracker.advance(high)
     order = _numbering(spectrum, tracker.origin)
     judge = BackwardError(coupling)
-    found = [_located(spectrum, judge, event, order, has_damping) for event in events]
-    inside = [o for o in found if o is not None and low <= o.mu <= high and o.frequency_hz <= max_frequency_hz]
+    changes = [
+        Change(event.mu, _concerned(event), _located(spectrum, judge, event, order, has_damping)) for event in events
+    ]
     return Onsets(
-        tuple(sorted(_distinct(inside), key=lambda o: o.mu)),
+        tuple(reported(changes, entries, (low, high), max_frequency_hz)),
         (low, high),
         max_frequency_hz,
-        damped,
+        has_damping,
         open_contacts,
+        at_start=_growing(np.concatenate([start.roots, spectrum.fixed]), top),
+        at_end=_growing(np.concatenate([end.roots, spectrum.fixed]), top),
+        unexplained=unexplained(
+            end.branch[_inside(end.roots, top)].tolist(),
+            np.flatnonzero(_inside(tracker.origin, np.inf)).tolist(),
+            changes,
+        ),
     )
+
+
+def _inside(roots: ComplexArray, top: float) -> BoolArray:
+    """Which roots (k,) grow with a frequency up to top [1/s], twins in the lower half plane left out."""
+    return grows(roots, top if np.isfinite(top) else 0.0) & (roots.imag >= 0) & (roots.imag <= top)
+
+
+def _growing(roots: ComplexArray, top: float) -> tuple[complex, ...]:
+    return tuple(roots[_inside(roots, top)].tolist())
+
+
+def _concerned(event: _Event) -> tuple[int, ...]:
+    """The branches that a passage is of: both that meet, else the one that crosses."""
+    return (event.branch, event.partner) if event.double and event.partner >= 0 else (event.branch,)
 
 
 def _numbering(spectrum: Spectrum, roots: ComplexArray) -> dict[int, int]:
@@ -187,19 +152,6 @@ def _numbering(spectrum: Spectrum, roots: ComplexArray) -> dict[int, int]:
     everything = np.concatenate([roots, spectrum.fixed])
     rank = np.argsort(np.argsort(np.abs(everything.imag), kind="stable"), kind="stable")
     return {k: int(rank[k]) + 1 for k in range(len(roots))}
-
-
-def _distinct(found: list[Onset]) -> list[Onset]:
-    kept: list[Onset] = []
-    for onset in found:
-        same = any(
-            abs(onset.mu - k.mu) <= 1e-9 * max(k.mu, 1e-12)
-            and abs(onset.frequency_hz - k.frequency_hz) <= 1e-9 * max(k.frequency_hz, 1.0)
-            for k in kept
-        )
-        if not same:
-            kept.append(onset)
-    return kept
 
 
 def _passages(spectrum: Spectrum, old: State, new: State, has_damping: bool) -> list[_Event]:
@@ -242,7 +194,7 @@ def _passages(spectrum: Spectrum, old: State, new: State, has_damping: bool) -> 
 
 
 def _grows(root: complex) -> bool:
-    return bool(abs(root.real) > UNSTABLE_RELATIVE * max(abs(root), 1.0))
+    return bool(abs(root.real) > UNSTABLE_RELATIVE * abs(root))
 
 
 def _named(state: State, i: int) -> int:

@@ -1,6 +1,7 @@
 """Steady sliding: the equilibrium that both approaches start from, of point contacts and of whole surfaces."""
 
 from .points import SteadySliding, full_motion, slip_speeds, steady_sliding
+from .pressing import least_force, require_pressed
 from .resultants import Balance, Resultant
 from .surfaces import SurfaceSliding, friction_damping_matrix, steady_sliding_nodes, touching
 
@@ -11,6 +12,8 @@ __all__ = [
     "SurfaceSliding",
     "friction_damping_matrix",
     "full_motion",
+    "least_force",
+    "require_pressed",
     "slip_speeds",
     "steady_sliding",
     "steady_sliding_nodes",

@@ -70,18 +70,23 @@ def modes(
     max_frequency_hz: float | None = None,
     damped: bool | None = None,
     vectors: bool | Literal["right"] = False,
+    check: bool = True,
+    progress: Progress | None = None,
 ) -> ComplexModes:
     """Complex modes at one or many friction coefficients (default: the case's own).
 
-    count: how many branches (default modal.modes); max_frequency_hz takes all that start below it instead.
-    Raises CaseError for a bad μ, AnalysisError where the steady sliding state does not exist.
+    All modes with frequencies up to modal.max_frequency_hz are found; kept are the ``count`` lowest (default
+    modal.modes) and every unstable one, with max_frequency_hz all up to that. check: whether what grows in the band is
+    sought anew in the full problem (`checked_modes`). progress is called with the number of friction coefficients done
+    and of all. Raises CaseError for a bad μ, AnalysisError where the steady sliding state does not exist.
     """
     started = time.perf_counter()
     require_frequency(max_frequency_hz)
     values = _own_friction(case) if mu is None else mu
     damped = case.modal.damped if damped is None else damped
-    count = case.modal.modes if count is None else count
+    band = max_frequency_hz or case.modal.max_frequency_hz
     system = None if _varies_with_friction(case) else build_system(case)
+    own = own_friction(case) if case.contacts else None
     if system is None or system.general:
         from ..modal.assembled import Options
         from ..modal.general import general_modes
@@ -89,25 +94,47 @@ def modes(
         result = general_modes(
             _system_at(case, system),
             values,
-            count=count if max_frequency_hz is None else None,
-            max_frequency_hz=max_frequency_hz or case.modal.max_frequency_hz,
+            count=None,
+            max_frequency_hz=band,
             damped=damped,
             vectors=vectors,
             options=Options(**_modal_options(case)),
-            own=own_friction(case) if case.contacts else None,
+            own=own,
+            progress=progress,
         )
     else:
-        result = complex_modes(
-            system,
-            values,
-            count=count,
-            max_frequency_hz=max_frequency_hz,
-            damped=damped,
-            vectors=vectors,
-            **_modal_options(case),
+        result = _followed_modes(
+            case, system, values, band, damped=damped, vectors=vectors, check=check, own=own, progress=progress
         )
+    if max_frequency_hz is None:
+        result = result.lowest(case.modal.modes if count is None else count)
     seconds = time.perf_counter() - started
     return replace(result, provenance=provenance(case, "modes", seconds, damped=damped))
+
+
+def _followed_modes(
+    case: Case,
+    system: System,
+    values: float | Sequence[float] | Array,
+    band: float,
+    *,
+    damped: bool,
+    vectors: bool | Literal["right"],
+    check: bool,
+    own: float | None,
+    progress: Progress | None,
+) -> ComplexModes:
+    """Modes followed from μ = 0, and checked."""
+    from ..modal.assembled import Options
+    from ..modal.growing import checked_modes
+
+    settings = _modal_options(case)
+    result = complex_modes(
+        system, values, max_frequency_hz=band, damped=damped, vectors=vectors, progress=progress, **settings
+    )
+    if not check or result.completeness:
+        return result
+    return checked_modes(system, result, band, own=own, options=Options(**settings))
 
 
 def _varies_with_friction(case: Case) -> bool:
@@ -204,8 +231,12 @@ def onsets(
     *,
     max_frequency_hz: float | None = None,
     damped: bool | None = None,
+    check: bool = True,
 ) -> Onsets:
-    """Every critical friction coefficient in range (defaults from the case's [modal])."""
+    """Every critical friction coefficient in range (defaults from the case's [modal]).
+
+    check: whether what grows at both ends of the range is sought anew in the full problem (`checked_onsets`).
+    """
     started = time.perf_counter()
     require_frequency(max_frequency_hz)
     between = case.modal.friction_range if friction_range is None else friction_range
@@ -225,7 +256,13 @@ def onsets(
             own=own_friction(case) if case.contacts else None,
         )
     else:
-        result = solve_onsets(system, between, max_frequency_hz=limit, damped=damped, **_modal_options(case))
+        from ..modal.assembled import Options
+        from ..modal.growing import checked_onsets
+
+        settings = _modal_options(case)
+        result = solve_onsets(system, between, max_frequency_hz=limit, damped=damped, **settings)
+        if check and not result.completeness:
+            result = checked_onsets(system, result, damped=damped, options=Options(**settings))
     return replace(result, provenance=provenance(case, "onsets", time.perf_counter() - started))
 
 

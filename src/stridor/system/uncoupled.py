@@ -18,6 +18,7 @@ from .model import System
 
 PROPORTIONAL_TOLERANCE = 1e-9
 DENSE_LIMIT = 6000
+NEGATIVE = 10.0  # times rounding: a negative stiffness that is meant
 
 
 @dataclass(frozen=True)
@@ -45,12 +46,14 @@ class ComplexBlock:
 class UncoupledModes:
     """Complete set of modes of the structure without contacts, block by block.
 
-    frequencies_hz (n_real,) are the undamped ones of all real blocks, sorted by block.
+    frequencies_hz (n_real,) are the undamped ones of all real blocks, sorted by block. indefinite: whether some motion
+    has a negative stiffness (springs that drive their ends apart), for which neither of these blocks stands.
     """
 
     size: int
     real: tuple[RealBlock, ...]
     general: tuple[ComplexBlock, ...]
+    indefinite: bool = False
 
     @property
     def proportional(self) -> bool:
@@ -85,21 +88,24 @@ def uncoupled_modes(system: System) -> UncoupledModes:
     mass, damping, stiffness = (m.tocsr() for m in (system.mass, system.damping, system.stiffness))
     real: list[RealBlock] = []
     general: list[ComplexBlock] = []
+    indefinite = False
     for part in system.components:
         if len(part) > DENSE_LIMIT:
             raise AnalysisError(
                 f"a component of {len(part)} freedoms is too large for a complete modal basis (limit {DENSE_LIMIT})"
             )
         m, c, k = (a[part][:, part].toarray() for a in (mass, damping, stiffness))
-        block = _solve_block(part, m, c, k)
+        block, negative = _solve_block(part, m, c, k)
+        indefinite |= negative
         if isinstance(block, RealBlock):
             real.append(block)
         else:
             general.append(block)
-    return UncoupledModes(system.size, tuple(real), tuple(general))
+    return UncoupledModes(system.size, tuple(real), tuple(general), indefinite)
 
 
-def _solve_block(part: IntArray, m: Array, c: Array, k: Array) -> RealBlock | ComplexBlock:
+def _solve_block(part: IntArray, m: Array, c: Array, k: Array) -> tuple[RealBlock | ComplexBlock, bool]:
+    """The block, and whether some motion has a negative stiffness."""
     try:
         _, vectors = sl.eigh(k, m)
     except sl.LinAlgError as error:
@@ -109,13 +115,15 @@ def _solve_block(part: IntArray, m: Array, c: Array, k: Array) -> RealBlock | Co
     masses = np.einsum("ij,ij->j", vectors, m @ vectors)
     quotients = np.einsum("ij,ij->j", vectors, k @ vectors) / masses
     rounding = np.einsum("ij,ij->j", np.abs(vectors), np.abs(k) @ np.abs(vectors)) / masses
-    stiffness = np.where(np.abs(quotients) < 100 * np.finfo(float).eps * rounding, 0.0, quotients)
+    smallest = 100 * np.finfo(float).eps * rounding
+    stiffness = np.where(np.abs(quotients) < smallest, 0.0, quotients)
+    negative = bool(np.any(quotients < -NEGATIVE * smallest))
     product = vectors.T @ (c @ vectors)
     diagonal = np.diag(product).copy()
     coupling = np.abs(product - np.diag(diagonal)).max()
     if coupling <= PROPORTIONAL_TOLERANCE * max(np.abs(product).max(), 1e-300):
-        return RealBlock(part, vectors, stiffness, diagonal)
-    return _complex_block(part, vectors / np.sqrt(masses), np.maximum(stiffness, 0.0), c)
+        return RealBlock(part, vectors, stiffness, diagonal), negative
+    return _complex_block(part, vectors / np.sqrt(masses), np.maximum(stiffness, 0.0), c), negative
 
 
 def _complex_block(part: IntArray, vectors: Array, squares: Array, c: Array) -> ComplexBlock:

@@ -34,11 +34,13 @@ from .critical import onsets_assembled
 from .direct_modes import DirectModes, direct_modes
 from .energy import FrictionEnergy, friction_energy
 from .modes import complex_modes_assembled
+from .shifted import NotPositive
 from .steady import Options
 
 __all__ = [
     "DirectModes",
     "FrictionEnergy",
+    "NotPositive",
     "Options",
     "complex_modes_assembled",
     "direct_modes",

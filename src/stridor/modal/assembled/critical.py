@@ -16,9 +16,10 @@ from scipy.optimize import brentq
 from ...errors import CaseError
 from ...system import System
 from ...threads import one_thread_if_small
-from ...typing import ComplexArray
-from ..complex_modes import UNSTABLE_RELATIVE, undamped
-from ..onsets import Onset, Onsets
+from ...typing import BoolArray, ComplexArray
+from ..complex_modes import UNSTABLE_RELATIVE, grows, undamped
+from ..histories import Change, Entries, reported, unexplained
+from ..onset import Onset, Onsets
 from .follow import Follower, State, halves
 from .local import Surroundings, axis_crossing, double_eigenvalue
 from .modes import samples
@@ -29,6 +30,8 @@ from .refine import BELIEVED, Band, projected, settle
 from .shifted import real_columns
 from .steady import Options
 
+FOLLOW = 1.1  # times the band: from where branches are followed
+MOST_ABOVE = 1.25  # times that: onsets above the band are solved for up to there
 SAMPLES = 9
 ROUNDS = 6
 ONSET_TOLERANCE = 1e-12  # backward error at which an onset counts as found
@@ -44,6 +47,7 @@ def onsets_assembled(
     max_frequency_hz: float = 40e3,
     damped: bool = True,
     options: Options | None = None,
+    follow: float = FOLLOW,
 ) -> Onsets:
     """Every critical μ in ``friction_range`` with a frequency up to ``max_frequency_hz``, as `onsets` gives them.
 
@@ -57,32 +61,66 @@ def onsets_assembled(
     if not damped:
         system = undamped(system)
     problem = problem_of(system, None, options or Options(), damped=damped, frictions=np.linspace(0.0, high, 50))
+    top = 2 * np.pi * max_frequency_hz
     if not problem.nodes:
-        return Onsets((), (low, high), max_frequency_hz, damped, problem.open_contacts)
+        return Onsets((), (low, high), max_frequency_hz, problem.damped, problem.open_contacts)
     # Modes that start above the band may meet inside it.
-    reduced = projected(problem, Band(1, 2 * np.pi * max_frequency_hz * 1.1))
+    reduced = projected(problem, Band(1, top * follow))
     settle(reduced, samples(high, SAMPLES))
-    found: list[Onset] = []
-    for passage in _passages(reduced, high):
-        if _is_above(passage, 2 * np.pi * max_frequency_hz * CLEARLY_ABOVE):
+    way = _way(reduced, (low, high), top)
+    changes: list[Change] = []
+    for passage in way.passages:
+        concerned = (passage.branch, passage.partner) if passage.kind == "meeting" else (passage.branch,)
+        # What begins beyond the band counts where it comes into it.
+        matters = not passage.stabilising and way.entries.after(concerned, passage.low, np.inf) is not None
+        if _is_above(passage, top * CLEARLY_ABOVE) and not matters:
             continue
-        onset = _located(reduced, passage, (low, high), max_frequency_hz)
-        if onset is not None:
-            found.append(onset)
-    ordered = tuple(sorted(_distinct(found), key=lambda o: o.mu))
-    state = problem.contact_state
-    return Onsets(ordered, (low, high), max_frequency_hz, damped, problem.open_contacts, contact_state=state)
+        limit = max_frequency_hz * (follow * MOST_ABOVE if matters else 1.0)
+        onset = _located(reduced, passage, (0.0, high), limit)
+        changes.append(Change(passage.low, concerned, onset))
+    return Onsets(
+        tuple(reported(changes, way.entries, (low, high), max_frequency_hz)),
+        (low, high),
+        max_frequency_hz,
+        problem.damped,
+        problem.open_contacts,
+        at_start=tuple(way.start.values[_inside(way.start, top)].tolist()),
+        at_end=tuple(way.end.values[_inside(way.end, top)].tolist()),
+        contact_state=problem.contact_state,
+        unexplained=unexplained(np.flatnonzero(_inside(way.end, top)), way.from_start, changes),
+    )
 
 
-def _passages(reduced: Reduced, high: float) -> list[Passage]:
-    """Enclosed changes of stability up to μ = ``high``."""
+def _inside(state: State, top: float) -> BoolArray:
+    """Which branches (b,) grow in the band."""
+    return grows(state.values, top) & (state.values.imag <= top)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Branches over the range: states at both ends, changes of stability, entries into the band, and the branches that
+    grow at μ = 0."""
+
+    start: State
+    end: State
+    passages: list[Passage]
+    entries: Entries
+    from_start: list[int]
+
+
+def _way(reduced: Reduced, between: tuple[float, float], top: float) -> _Way:
+    """What following sees from μ = 0 to the end of the range."""
     passages: list[Passage] = []
+    entries = Entries(top)
 
     def watch(old: State, new: State) -> None:
         passages.extend(crossings(old, new) if reduced.problem.damped else meetings(reduced, old, new))
+        entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.place)))
 
-    Follower(reduced, longest=high / 30, watch=watch).advance(high)
-    return passages
+    follower = Follower(reduced, longest=between[1] / 30, watch=watch)
+    first = np.flatnonzero(grows(follower.state.values, top)).tolist()
+    start = follower.advance(between[0])
+    return _Way(start, follower.advance(between[1]), passages, entries, first)
 
 
 def _is_above(passage: Passage, frequency: float) -> bool:
@@ -92,20 +130,6 @@ def _is_above(passage: Passage, frequency: float) -> bool:
     lam, tangent = passage.old.values[passage.branch], passage.old.tangents[passage.branch]
     ahead = lam + tangent * (passage.high - passage.old.mu)
     return bool(lam.imag > frequency and not ahead.imag < frequency)
-
-
-def _distinct(found: list[Onset]) -> list[Onset]:
-    """Each onset once: both modes that meet report it."""
-    kept: list[Onset] = []
-    for onset in found:
-        if not any(
-            abs(onset.mu - k.mu) <= 1e-7 * max(k.mu, 1e-9)
-            and abs(onset.frequency_hz - k.frequency_hz) <= 1e-7 * max(k.frequency_hz, 1.0)
-            and onset.stabilising == k.stabilising
-            for k in kept
-        ):
-            kept.append(onset)
-    return kept
 
 
 @dataclass(frozen=True)

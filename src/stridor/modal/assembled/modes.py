@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -10,12 +11,12 @@ import numpy as np
 from ...errors import CaseError
 from ...system import System
 from ...threads import one_thread_if_small
-from ...typing import Array
-from ..complex_modes import ComplexModes, undamped
+from ...typing import Array, BoolArray
+from ..complex_modes import ComplexModes, Progress, require_memory, undamped
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import BELIEVED, Band, left_vectors, projected, settle
+from .refine import BELIEVED, MARGIN, Band, left_vectors, projected, settle
 from .steady import Options
 
 SAMPLES = 7
@@ -31,13 +32,15 @@ def complex_modes_assembled(
     damped: bool = True,
     vectors: bool | Literal["right"] = False,
     options: Options | None = None,
+    progress: Progress | None = None,
 ) -> ComplexModes:
     """Modes at the friction coefficients ``mu``, branches followed from μ = 0, as `complex_modes` gives them.
 
-    count: how many branches, lowest frequencies at μ = 0 first; max_frequency_hz instead takes all that start below it.
-    vectors keeps left and right ones, "right" those alone, n numbers for each. Raises CaseError for friction
-    coefficients or counts that are none, AnalysisError where contacts do not slide, have no equilibrium, or the modes
-    do not settle.
+    count: how many branches, lowest frequencies at μ = 0 first; max_frequency_hz instead takes all that start below it,
+    and those that start a little above and come below it at one of these μ. vectors keeps left and right ones, "right"
+    those alone, n numbers for each. progress and KeyboardInterrupt are as in `complex_modes`. Raises CaseError for
+    friction coefficients or counts that are none, AnalysisError where contacts do not slide, have no equilibrium, or
+    the modes do not settle.
     """
     values = checked_friction(mu)
     if count < 1:
@@ -52,8 +55,28 @@ def complex_modes_assembled(
     reduced = projected(problem, band)
     top = float(values.max())
     settle(reduced, samples(top), left=vectors is True)
-    settle(reduced, values, tolerance=BELIEVED, left=vectors is True)
-    return _followed(reduced, values, band, damped=damped, vectors=vectors)
+    values, planned = _settled(reduced, values, progress, left=vectors is True)
+    found = _followed(reduced, values, band, damped=damped, vectors=vectors)
+    planned = found.planned if planned is None else planned
+    return replace(found, max_frequency_hz=max_frequency_hz, planned=planned)
+
+
+def _settled(
+    reduced: Reduced, values: Array, progress: Progress | None, *, left: bool
+) -> tuple[Array, int | None]:
+    """The μ (k,) at which the band's pairs are exact, and how many there were to be where it was interrupted."""
+    order = np.argsort(values, kind="stable")
+    done = np.zeros(len(values), dtype=bool)
+    try:
+        for at, k in enumerate(order, start=1):
+            settle(reduced, [float(values[k])], tolerance=BELIEVED, left=left)
+            done[k] = True
+            if progress is not None:
+                progress(at, len(values))
+    except KeyboardInterrupt:
+        if not done.any():
+            raise
+    return (values, None) if done.all() else (values[done], len(values))
 
 
 def _followed(
@@ -67,32 +90,48 @@ def _followed(
     if band.frequency is None:
         branches = np.arange(min(band.count, len(start.place)))
     else:
-        branches = np.flatnonzero(start.values.imag <= band.frequency * (1 + 1e-12))
+        # What is exact there: modes of the band, and beside it those that may come into it.
+        branches = np.flatnonzero(start.values.imag <= MARGIN * band.frequency)
     follower.named = len(branches)
+    require_memory(len(values), len(branches), problem.size if vectors else 0)
     shape = (len(values), len(branches))
     eigenvalues, residual = np.zeros(shape, dtype=complex), np.zeros(shape)
     right, left = np.zeros((2, *shape, problem.size if vectors else 0), dtype=complex)
-    for k in np.argsort(values, kind="stable"):
-        mu = float(values[k])
-        state = follower.advance(mu)
-        lam, place = state.values[branches], state.place[branches]
-        u, p = reduced.expand(state.found.right[:, place])
-        eigenvalues[k], residual[k] = lam, problem.backward_error(lam, u, p, mu)
-        if vectors:
-            right[k] = u.T
-        if vectors is True:
-            left[k] = left_vectors(reduced, lam, state.found.left[:, place], mu)[0].T
-    return ComplexModes(
-        mu=values,
+    done = np.zeros(len(values), dtype=bool)
+    try:
+        for k in np.argsort(values, kind="stable"):
+            mu = float(values[k])
+            state = follower.advance(mu)
+            lam, place = state.values[branches], state.place[branches]
+            u, p = reduced.expand(state.found.right[:, place])
+            eigenvalues[k], residual[k] = lam, problem.backward_error(lam, u, p, mu)
+            if vectors:
+                right[k] = u.T
+            if vectors is True:
+                left[k] = left_vectors(reduced, lam, state.found.left[:, place], mu)[0].T
+            done[k] = True
+    except KeyboardInterrupt:
+        if not done.any():
+            raise
+    eigenvalues = eigenvalues[done]
+    found = ComplexModes(
+        mu=values[done],
         eigenvalues=eigenvalues,
         branch=np.arange(1, len(branches) + 1),
-        residual=residual,
+        residual=residual[done],
         damped=damped,
-        right=right if vectors else None,
-        left=left if vectors is True else None,
+        right=right[done] if vectors else None,
+        left=left[done] if vectors is True else None,
         open_contacts=problem.open_contacts,
         contact_state=problem.contact_state,
+        planned=None if done.all() else len(values),
     )
+    if band.frequency is None:
+        return found
+    top = band.frequency * (1 + 1e-12)
+    ever: BoolArray = np.any(np.imag(eigenvalues) <= top, axis=0)
+    inside = (start.values.imag[branches] <= top) | ever
+    return found.chosen(np.flatnonzero(inside))
 
 
 def checked_friction(mu: float | Sequence[float] | Array) -> Array:

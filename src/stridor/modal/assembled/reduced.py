@@ -26,6 +26,7 @@ from .shifted import Pair, Shifted, orthonormal, real_columns
 
 REACH = 1.8  # eigenpairs up to this much above the band are looked at
 FEW = 3  # friction coefficients asked of a basis one by one before all of the grid's terms are projected
+REMEMBERED = 300  # friction coefficients whose eigenpairs are kept, and vectors before they are condensed
 KEPT = 1e-10  # of the strongest direction of the vectors kept
 
 
@@ -128,12 +129,19 @@ class Reduced:
         own = self.pairs.count
         columns = real_columns(right / np.linalg.norm(right[:own], axis=0))
         self._kept.append((columns[:own], columns[own:]))
+        if len(self._kept) > REMEMBERED:
+            self._kept = [tuple(_condensed(block) for block in self._all_kept())]  # type: ignore[list-item]
+
+    def _all_kept(self) -> tuple[Array, Array]:
+        """Vectors kept so far, on the basis as it is now: their parts on pairs and on forces."""
+        own = self.pairs.count
+        shapes = np.hstack([_padded(u, own) for u, _ in self._kept])
+        return shapes, np.hstack([_padded(p, self.forces.shape[1]) for _, p in self._kept])
 
     def compress(self) -> None:
         """Reduce the basis to the frictionless modes and the span of the vectors kept, which stay exact."""
         own, first = self.pairs.count, self._modes
-        shapes = np.hstack([_padded(u, own) for u, _ in self._kept])
-        forces = np.hstack([_padded(p, self.forces.shape[1]) for _, p in self._kept])
+        shapes, forces = self._all_kept()
         turn = np.zeros((own, own))
         turn[:first, :first] = np.eye(first)
         beyond = _span(shapes[first:])
@@ -261,6 +269,8 @@ class Reduced:
             coordinate, right, left = self.solve(mu)
             values = coordinate if self.problem.damped else upper_root(coordinate)
             tangents = self.tangents(mu, coordinate, values, right, left)
+            if len(self._known) >= REMEMBERED:
+                self._known.pop(next(iter(self._known)))
             self._known[mu] = Eigenpairs(mu, coordinate, values, right, left, tangents, self.pairs.count)
         return self._known[mu]
 
@@ -353,6 +363,15 @@ def _weighed(terms: list[tuple[Array, Array]], weights: Any) -> tuple[Any, Any]:
 def _padded(block: Any, rows: int) -> Any:
     """The block with rows of zeros added below."""
     return np.vstack([block, np.zeros((rows - len(block), block.shape[1]))])
+
+
+def _condensed(block: Array) -> Array:
+    """As few columns as have the products of those of ``block`` with their transpose, weak directions left out."""
+    if not block.size:
+        return np.zeros((len(block), 0))
+    left, size, _ = sl.svd(block, full_matrices=False)
+    strong = size > KEPT * max(float(size[0]), 1e-300)
+    return left[:, strong] * size[strong]
 
 
 def _span(block: Array) -> Array:

@@ -22,7 +22,19 @@ from .problem import ContactProblem
 BLOCK = 24  # right sides solved for at once while modes are sought
 CONVERGED = 1e-11  # of an eigenvalue of the inverse: what a Ritz vector may leave
 MOST_BLOCKS = 200
+NEGATIVE = 1e-9  # of the largest Ritz value of the inverse: one that is negative beyond rounding
+STANDS = 1e-7  # of the shift: a square of a frequency that is negative beyond rounding
 SEED = 20061
+
+
+class NotPositive(AnalysisError):
+    """Some motion without friction has a negative stiffness, so that there are no frictionless modes to start from."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "a motion has a negative stiffness, contacts included: it diverges by itself, and this analysis needs a "
+            "structure that stands; `stridor modes` and `stridor onsets` take it"
+        )
 
 
 @dataclass(frozen=True)
@@ -128,6 +140,8 @@ def frictionless_modes(shifted: Shifted, enough: Callable[[Array, int], bool]) -
         values, vectors = values[::-1], vectors[:, ::-1]
         left = np.linalg.norm(rest @ vectors[-block.count :], axis=0)
         good = (values > 0) & (left <= CONVERGED * values + 1e-14 * values[0])
+        if values[-1] < -NEGATIVE * values[0]:
+            raise NotPositive
         count = len(good) if good.all() else int(np.argmin(good))
         if not new.count or enough(1.0 / values[:count] - shifted.shift, basis.count):
             return _polished(shifted, basis.u @ vectors[:, :count])
@@ -158,6 +172,8 @@ def _polished(shifted: Shifted, shapes: Array) -> tuple[Array, Pair]:
     found = found.turned(axes[:, told] / np.sqrt(lengths[told]))
     stiffness = found.u.T @ (problem.stiffness @ found.u) + found.p.T @ (problem.compliance[:, None] * found.p)
     squares, turn = sl.eigh(_symmetric(stiffness))
+    if squares[0] < -STANDS * shifted.shift:
+        raise NotPositive
     return squares, found.turned(turn)
 
 

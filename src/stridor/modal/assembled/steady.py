@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from ...contact.multipliers import SLIP, STICK
 from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError
-from ...sliding import friction_damping_matrix, full_motion, steady_sliding_nodes
+from ...sliding import friction_damping_matrix, full_motion, require_pressed, steady_sliding_nodes
 from ...sliding.stick_slip import StickRows
 from ...sliding.surfaces import STILL
 from ...system import System
@@ -83,11 +83,12 @@ def refuse_stick(system: System, what: str) -> None:
 def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver: str | None) -> Touching:
     """The nodes that carry load in steady sliding at ``mu``; all of them where the system has no loads.
 
-    Raises AnalysisError where there is no steady sliding.
+    Raises AnalysisError where there is no steady sliding, or nothing that presses.
     """
     system = system.in_place()
     if (system.loads or system.load_steps) and nodes.count:
         steady = steady_sliding_nodes(system, mu=mu, solver=solver)
+        require_pressed(system, steady.normal_force)
         if not system.load_steps:
             return Touching(steady.active, steady.sense, np.zeros(nodes.count, dtype=bool))
         stuck, still = steady.active & (steady.status == STICK), int(steady.slips_still.sum())

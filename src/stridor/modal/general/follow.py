@@ -10,6 +10,7 @@ import numpy as np
 from ...errors import AnalysisError
 from ..assembled.follow import Follower, State, halves
 from ..assembled.passages import Passage, crossings, meetings
+from ..histories import Entries
 from .basis import Along
 from .family import Family
 
@@ -22,12 +23,14 @@ EXACTLY = 1e-10  # of the range: how far off the real axis two modes may meet th
 
 @dataclass(frozen=True)
 class Followed:
-    """Branches over the range: states at both ends of what was asked for, passages, and μ where they were unsure."""
+    """Branches over the range: states at both ends of what was asked for, passages, entries into the band (over
+    t = μ − low), and μ where they were unsure."""
 
     source: Along
     low: State
     high: State
     passages: tuple[Passage, ...]
+    entries: Entries
     unsure: tuple[float, ...]
 
 
@@ -95,18 +98,20 @@ def _agree_on_names(family: Family, old: State, new: State) -> None:
             new.place[[i, j]] = new.place[[j, i]]
 
 
-def followed(source: Along, low: float, high: float, finer: int = 1) -> Followed:
-    """Branches from where they get their numbers to the high end of a range of μ, and what changes on the way."""
-    family = source.family
+def followed(source: Along, low: float, high: float, top: float, finer: int = 1) -> Followed:
+    """Branches from where they get their numbers to the high end of a range of μ, and what changes on the way; top
+    [1/s]: the end of the band."""
+    family, entries = source.family, Entries(top)
     passages: list[Passage] = []
     unsure: list[float] = []
 
     def watch(old: State, new: State) -> None:
         passages.extend(meetings(source, old, new) if family.reversible else crossings(old, new))
+        entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.place)))
 
     way = follower(source, finer=finer, watch=watch, unsure=unsure.append)
     first = way.advance(low - family.low)
-    return Followed(source, first, way.advance(high - family.low), tuple(passages), tuple(unsure))
+    return Followed(source, first, way.advance(high - family.low), tuple(passages), entries, tuple(unsure))
 
 
 def _surely(source: Along, old: State, new: State) -> bool:

@@ -12,7 +12,7 @@ from one μ to the next is found by following branches on a reduced model (`numb
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -21,7 +21,7 @@ from ...errors import CaseError
 from ...system import System
 from ...typing import Array, ComplexArray
 from ..assembled.steady import Options
-from ..complex_modes import ComplexModes
+from ..complex_modes import ComplexModes, Progress, require_memory
 from ..quadratic import Region, find_modes
 from .basis import DECAY, NOTHING
 from .family import Family, family_of
@@ -49,8 +49,10 @@ def general_modes(
     vectors: bool | Literal["right"] = False,
     options: Options | None = None,
     own: float | None = None,
+    progress: Progress | None = None,
 ) -> ComplexModes:
-    """Modes at the friction coefficients ``mu`` up to max_frequency_hz, of them the ``count`` lowest (None: all).
+    """Modes at the friction coefficients ``mu`` up to max_frequency_hz, of them the ``count`` lowest (None: all) and
+    whatever else is unstable.
 
     system_at gives the system at a μ, on which its matrices may depend; own is the μ at which the touching nodes of
     contacts are found if several are asked for (None: the lowest). Numbers of modes are those of branches followed from
@@ -65,9 +67,32 @@ def general_modes(
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     family = _family(system_at, values, options or Options(), damped=damped, own=own)
     top = 2 * np.pi * max_frequency_hz
-    found = [_modes(family, float(m), top, left=vectors is True) for m in values]
+    values, found, planned = _each(family, values, top, progress, vectors=vectors)
     numbers = numbered(family, values, [f.values for f in found], top)
-    return _table(family, values, found, numbers, count, damped=damped, vectors=vectors)
+    table = _table(family, values, found, numbers, damped=damped, vectors=vectors)
+    table = replace(table, max_frequency_hz=max_frequency_hz, planned=planned)
+    return table if count is None else table.lowest(count)
+
+
+def _each(
+    family: Family, values: Array, top: float, progress: Progress | None, *, vectors: bool | Literal["right"]
+) -> tuple[Array, list[Found], int | None]:
+    """The μ (k,), what is found at each, and how many there were to be where it was interrupted."""
+    found: dict[int, Found] = {}
+    try:
+        for at, k in enumerate(np.argsort(values, kind="stable").tolist(), start=1):
+            found[k] = _modes(family, float(values[k]), top, left=vectors is True)
+            if not vectors:
+                found[k] = replace(found[k], right=found[k].right[:0])
+            if at == 1:
+                require_memory(len(values), len(found[k].values), family.freedoms if vectors else 0)
+            if progress is not None:
+                progress(at, len(values))
+    except KeyboardInterrupt:
+        if not found:
+            raise
+    done = np.array(sorted(found))
+    return values[done], [found[k] for k in done.tolist()], None if len(done) == len(values) else len(values)
 
 
 def _family(
@@ -107,14 +132,13 @@ def _table(
     mu: Array,
     found: list[Found],
     numbers: Numbers,
-    count: int | None,
     *,
     damped: bool,
     vectors: bool | Literal["right"],
 ) -> ComplexModes:
     """The modes of all μ, a column for each number."""
     used = np.unique(np.concatenate([*numbers.of, np.zeros(0, dtype=np.int64)]))
-    used = used[used > 0] if count is None else used[(used > 0) & (used <= count)]
+    used = used[used > 0]
     shape, n = (len(mu), len(used)), family.freedoms
     eigenvalues = np.full(shape, complex(np.nan, np.nan))
     residual = np.full(shape, np.nan)

@@ -20,7 +20,7 @@ from ..assembled.critical import exceptional_point, pair_near
 from ..assembled.follow import State
 from ..assembled.passages import Passage
 from ..assembled.steady import Options
-from ..onsets import Onset, Onsets
+from ..onset import Onset, Onsets
 from ..quadratic import Region, Spectrum, find_modes
 from ..quadratic.polish import groups, pairs
 from .basis import AT_REST, DECAY, GROWS, NOTHING, Along, Held, Projected, along, by_lambda, whole_or_raise
@@ -29,6 +29,7 @@ from .follow import BEYOND, Followed, followed
 from .newton import FLAT, Root
 from .passages import located, quiet
 
+WIDER = 1.6  # times the band: from where branches are followed if those from a little above it are not all
 FINER = 6  # times as many where the count at the ends does not agree
 ALIKE = 1e-8  # of |λ|: eigenvalues that are one
 AGREES = 1e-5  # of |λ|: how near the followed modes are to those found in full
@@ -68,7 +69,8 @@ def general_onsets(
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     family = family_of(system_at, (low, high), options or Options(), damped=damped, own=low if own is None else own)
     state = family.contacts.contact_state
-    result = Onsets((), (low, high), max_frequency_hz, damped, family.open_contacts, contact_state=state)
+    result = Onsets((), (low, high), max_frequency_hz, family.dissipates, family.open_contacts, contact_state=state)
+    top = 2 * np.pi * max_frequency_hz
     if not family.depends:
         if not family.open_contacts:
             raise AnalysisError(
@@ -76,13 +78,21 @@ def general_onsets(
                 "contacts; `stridor reduce --onsets NAME` solves for onsets along other parameters"
             )
         return replace(result, completeness="No contact carries load in steady sliding, so nothing depends on mu.")
-    top = 2 * np.pi * max_frequency_hz
     ends = _ends(family, low, high, top)
+    at_start, at_end = (tuple(end.values[unstable(family, end.values, top)].tolist()) for end in ends)
+    result = replace(result, at_start=at_start, at_end=at_end)
     source = _checked(along(family, BEYOND * top), ends, top)
     found, followed, complete = _solved(source, (low, high), ends, top, 1)
-    if not complete:
+    for beyond in (BEYOND, WIDER):
+        if complete:
+            break
+        source = source if beyond == BEYOND else _checked(along(family, beyond * top), ends, top)
         found, followed, complete = _solved(source, (low, high), ends, top, FINER)
-    inside = [f.onset for f in found if low <= f.onset.mu <= high and f.onset.frequency_hz <= max_frequency_hz]
+    inside = [
+        f.onset
+        for f in found
+        if low <= f.onset.mu <= high and (f.onset.frequency_hz <= max_frequency_hz or f.onset.enters_at is not None)
+    ]
     ordered = tuple(sorted(inside, key=lambda o: (o.mu, o.frequency_hz)))
     sentence = _sentence(followed, ends, ordered, top, complete=complete)
     return replace(result, onsets=ordered, completeness=sentence)
@@ -124,14 +134,15 @@ def _solved(
 ) -> tuple[list[_Found], Followed, bool]:
     """Onsets, and whether what grows at the ends is what they say."""
     family = source.family
-    way = followed(source, *between, finer)
+    way = followed(source, *between, top, finer)
     found = _opening(source, ends[0], way.low, top) if between[0] == family.low else []
     began = {branch - 1 - source.at_rest for f in found for branch in f.onset.branches}
     balance, lost = 0, list[Passage]()
     for passage in way.passages:
         if family.low + passage.high <= between[0]:
             continue
-        if _is_above(passage, CLEARLY * top):
+        enters = None if passage.stabilising else way.entries.after(_concerned(passage), passage.low, np.inf)
+        if _is_above(passage, CLEARLY * top) and enters is None:
             balance += -1 if passage.stabilising else 1
             continue
         if passage.low <= OPENING * (family.high - family.low) and {passage.branch, passage.partner} & began:
@@ -141,6 +152,9 @@ def _solved(
             lost.append(passage)
             continue
         one = _Found(_onset(source, passage, *root), passage.branch)
+        if enters is not None and abs(root[0].lam.imag) > top:
+            place = min(max(family.low + enters, one.onset.mu), between[1])
+            one = replace(one, onset=replace(one.onset, enters_at=place))
         if not any(_same(one.onset, other.onset, family) for other in found):
             found.append(one)
     balance += sum(-1 if f.onset.stabilising else 1 for f in found if between[0] <= f.onset.mu <= between[1])
@@ -148,6 +162,11 @@ def _solved(
     growing = [int(np.count_nonzero(unstable(family, state.values, top))) for state in (way.low, way.high)]
     agree = all(_agree(family, state, end, top) for state, end in zip((way.low, way.high), ends, strict=True))
     return found, way, agree and explained and growing[1] - growing[0] == balance
+
+
+def _concerned(passage: Passage) -> tuple[int, ...]:
+    """The branches that a passage is of: both that meet, else the one that crosses."""
+    return (passage.branch, passage.partner) if passage.kind == "meeting" else (passage.branch,)
 
 
 def _explained(lost: list[Passage]) -> bool:

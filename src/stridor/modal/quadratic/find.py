@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -91,7 +92,7 @@ def find_modes(
     run = _Run(problem, region.bounded(), left, tolerance, solver, guess)
     run.counting = problem.size <= COUNTED if count is None else count
     if problem.size <= DENSE:
-        sides, evidence = run.dense()
+        sides, evidence = run.dense(endless=not math.isfinite(region.re_max))
     else:
         sides, evidence = run.sparse()
     values, right, y = run.chosen(sides)
@@ -145,9 +146,12 @@ class _Run:
         """Eigenvalues whose vectors are wanted."""
         return self.padded.contains(values)
 
-    def dense(self) -> tuple[list[Found], Callable[[int | None], Completeness]]:
-        """Everything, by QZ."""
+    def dense(self, *, endless: bool) -> tuple[list[Found], Callable[[int | None], Completeness]]:
+        """Everything, by QZ; endless: however fast it grows."""
         lam, x, y = all_modes(self.problem)
+        strip = lam[(lam.imag >= 0) & (lam.imag <= self.region.im_max)]
+        if endless and len(strip):
+            self.region = replace(self.region, re_max=max(self.region.re_max, 1.1 * float(strip.real.max())))
         inside = self.keep(lam)
         lam, x, y = lam[inside], x[:, inside], y[:, inside]
         sides = [Found(lam, x, self.problem.backward_error(lam, x))]
@@ -156,7 +160,7 @@ class _Run:
 
         def evidence(undamped: int | None) -> Completeness:
             text = f"Complete: QZ computes all eigenvalues of {self.problem.size} freedoms at once."
-            return Completeness(True, text + self._cut(), self.region, undamped=undamped)
+            return Completeness(True, text + ("" if endless else self._cut()), self.region, undamped=undamped)
 
         return sides, evidence
 

@@ -1,0 +1,107 @@
+"""Modes and onsets as readable tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from ..digits import fixed, readable
+from ..modal.complex_modes import UNSTABLE_RELATIVE, ComplexModes
+from ..modal.onsets import Onset, Onsets
+from .output import stdout, table
+
+SHOWN = 5  # friction coefficients up to which all tables are printed
+
+MODE_HEADS = ["branch", "frequency [Hz]", "growth [1/s]", "damping [%]", "", "residual"]
+ONSET_HEADS = ["critical μ", "frequency [Hz]", "kind", "modes", "growth", "κ [1/s]", "slope [1/s]", "residual"]
+
+
+def show_modes(
+    result: ComplexModes, *, sort: Literal["frequency", "growth"], unstable: bool, say: Callable[[str], None]
+) -> None:
+    """A table for each μ, of more than five the first and the last; below it what is listed and what was checked."""
+    many = len(result.mu) > SHOWN
+    for row in range(len(result.mu)) if not many else (0, len(result.mu) - 1):
+        columns = result.order(row, sort)
+        if unstable:
+            columns = columns[result.unstable[row, columns]]
+        table(f"μ = {result.mu[row]:g}", MODE_HEADS, [_mode(result, row, int(b)) for b in columns])
+        stdout.print(f"  {_listed(result, row, len(columns), unstable=unstable)}", markup=False)
+        if result.completeness:
+            stdout.print(f"  {result.completeness[row]}", markup=False)
+    if result.contact_state:
+        stdout.print(f"{result.contact_state}; held so at every μ", markup=False)
+    for note in result.notes:
+        stdout.print(note, markup=False)
+    if many:
+        most = result.unstable & result.in_band
+        growing = most.sum(axis=1)
+        peak = int(np.argmax(growing))
+        stdout.print(
+            f"{len(result.mu)} friction coefficients, first and last shown, all in the file; most modes grow at "
+            f"μ = {result.mu[peak]:g}: {int(growing[peak])}",
+            markup=False,
+        )
+        for said in dict.fromkeys(result.completeness[1:-1]):
+            at = [k for k in range(1, len(result.mu) - 1) if result.completeness[k] == said]
+            where = f"μ = {result.mu[at[0]]:g}" + (f" and {len(at) - 1} others" if len(at) > 1 else "")
+            say(f"{where}: {said}")
+
+
+def _mode(result: ComplexModes, row: int, b: int) -> list[str]:
+    lam = complex(result.eigenvalues[row, b])
+    rounding = UNSTABLE_RELATIVE * abs(lam)
+    ratio = float(result.damping_ratio[row, b])
+    return [
+        str(result.branch[b]),
+        readable(float(result.frequency_hz[row, b])),
+        readable(lam.real, zero=rounding),
+        readable(100 * ratio, digits=5, zero=100 * UNSTABLE_RELATIVE),
+        "unstable" if result.unstable[row, b] else "",
+        f"{result.residual[row, b]:.1e}",
+    ]
+
+
+def _listed(result: ComplexModes, row: int, shown: int, *, unstable: bool) -> str:
+    """How many are listed, as in "20 of 276 modes listed; 3 unstable": those are always among them."""
+    total, growing = int(result.total[row]), int(np.count_nonzero(result.unstable[row] & result.in_band[row]))
+    band = "" if result.max_frequency_hz is None else f" up to {result.max_frequency_hz:g} Hz"
+    if unstable:
+        return f"{shown} unstable of {total} modes{band}"
+    said = f"{shown} of {total} modes{band} listed" if shown < total else f"all {total} modes{band} listed"
+    return f"{said}; {growing} unstable" + (", none left out" if growing and shown < total else "")
+
+
+def show_onsets(result: Onsets) -> None:
+    """Critical friction coefficients, what grows before any, and what was checked."""
+    if result.contact_state:
+        stdout.print(f"{result.contact_state}; held so over the range of μ", markup=False)
+    for line in result.at_start_words:
+        stdout.print(line, markup=False)
+    low, high = result.friction_range
+    if not result.onsets:
+        stdout.print(f"no onset for μ in {low:g} … {high:g} up to {result.max_frequency_hz:g} Hz", markup=False)
+    else:
+        kind = "damped" if result.damped else "undamped"
+        table(f"onsets, {kind}", ONSET_HEADS, [_onset(o) for o in result.onsets])
+        stdout.print("κ: growth opens as κ √(μ − μ_c) without damping; slope: d growth/dμ at a damped onset")
+        for line in result.from_above_words:
+            stdout.print(line, markup=False)
+    for line in (result.completeness, *result.notes):
+        if line:
+            stdout.print(line, markup=False)
+
+
+def _onset(onset: Onset) -> list[str]:
+    return [
+        fixed(onset.mu, 10),
+        readable(onset.frequency_hz, digits=7, decimals=3),
+        onset.kind,
+        f"{onset.branches[0]} + {onset.branches[1]}" if onset.kind == "flutter" else str(onset.branches[0]),
+        "ends" if onset.stabilising else "begins" if onset.enters_at is None else "begins *",
+        "" if onset.square_root_coefficient is None else f"{onset.square_root_coefficient:.5g}",
+        "" if onset.growth_slope is None else f"{onset.growth_slope:.4g}",
+        f"{onset.residual:.1e}",
+    ]

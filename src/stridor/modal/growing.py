@@ -1,0 +1,343 @@
+"""What grows in a band at one friction coefficient, sought anew in the full problem; and the check of followed modes.
+
+Branches are followed from μ = 0, and what starts beyond the band may sink into it with friction, or be born on the real
+axis. What counts at a μ is every mode of the band there, wherever it began. It is sought with `quadratic.find_modes` on
+
+    λ²M + λ(C + friction's slope) + K + (N + μS)ᵀ c⁻¹ N
+
+(rigid contact as in `general`), which shares with the followed branches nothing but these matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..system import System
+from ..threads import one_thread_if_small
+from ..typing import Array, BoolArray, ComplexArray, IntArray
+from .assembled.problem import problem_of
+from .assembled.steady import Options
+from .complex_modes import ComplexModes, complex_modes, undamped
+from .general.basis import AT_REST, GROWS, NOTHING
+from .general.family import quadratic_of
+from .onsets import Onsets, onsets
+from .quadratic import Region, find_modes
+from .quadratic.polish import pairs
+
+AFFORDABLE = 60_000  # unknowns up to which the full problem is solved unasked
+ROWS = 5  # friction coefficients up to which every one is checked, of more the ends and the case's own
+BESIDE = 1e-3  # of the band: how much faster than that modes may decay that are looked at
+NEAR = 1e-3  # of the band: eigenvalues further apart are not the same mode
+SAME = 1e-6  # of |λ|: what two ways of solving leave of one eigenvalue
+WIDER = (1.4, 2.0)  # times the band: from where branches are followed that are missing in it
+
+
+@dataclass(frozen=True)
+class Growing:
+    """Growing modes of a band at one μ: λ (k,) [1/s], right (n, k) of unit norm, backward errors residual (k,).
+
+    beside (l,): eigenvalues within rounding and a little below of the axis. complete: whether the search vouches for
+    there being no other; sentence: what speaks for that.
+    """
+
+    mu: float
+    values: ComplexArray
+    right: ComplexArray
+    residual: Array
+    beside: ComplexArray
+    complete: bool
+    sentence: str
+
+    @property
+    def words(self) -> str:
+        """How many, of which kind."""
+        return modes_grow(self.values)
+
+
+@one_thread_if_small
+def growing_modes(
+    system: System,
+    mu: float,
+    max_frequency_hz: float,
+    *,
+    touching_at: float | None,
+    damped: bool = True,
+    options: Options | None = None,
+) -> Growing:
+    """Every mode that grows at ``mu`` with a frequency up to max_frequency_hz.
+
+    touching_at: the μ of the steady sliding that says which nodes touch (None: the laws' own). Raises AnalysisError
+    where contacts do not slide or the search does not settle.
+    """
+    options = options or Options()
+    problem = problem_of(system if damped else undamped(system), touching_at, options, damped=damped)
+    top = 2 * np.pi * max_frequency_hz
+    region = Region.band(0.0, max_frequency_hz, above=-BESIDE * top)
+    found = find_modes(quadratic_of(problem, mu), region, left=False, solver=options.solver)
+    size = np.abs(found.values)
+    rounding = GROWS if problem.damped else NOTHING
+    grows = (found.values.real > rounding * size) & (size > AT_REST * top)
+    right = found.right[: problem.size, grows]
+    return Growing(
+        mu,
+        found.values[grows],
+        right / np.maximum(np.linalg.norm(right, axis=0), 1e-300),
+        found.residual[grows],
+        found.values[~grows],
+        found.completeness.complete,
+        found.completeness.sentence,
+    )
+
+
+def affordable(system: System) -> bool:
+    """Whether the full problem is solved unasked."""
+    return system.size <= AFFORDABLE
+
+
+def modes_grow(values: ComplexArray) -> str:
+    """How many grow: "1 mode grows", or "3 modes grow, 1 of them without oscillating"."""
+    still = int(np.count_nonzero(values.imag == 0.0))
+    text = "no mode grows" if not len(values) else "1 mode grows" if len(values) == 1 else f"{len(values)} modes grow"
+    if not still:
+        return text
+    return f"{text} without oscillating" if still == len(values) else f"{text}, {still} of them without oscillating"
+
+
+def missing(found: Growing, listed: ComplexArray, unstable: BoolArray, top: float) -> IntArray:
+    """Places (k,) of growing modes that are not among the eigenvalues ``listed`` (l,), of which some are unstable."""
+    ours, _ = pairs(found.values, listed[unstable], NEAR * top)
+    rest = np.setdiff1d(np.arange(len(found.values)), ours)
+    # Growth so slow that one way of solving sees it and the other does not.
+    stable = listed[~unstable & np.isfinite(listed)]
+    away = np.abs(found.values[rest][:, None] - stable).min(axis=1, initial=np.inf)
+    return rest[away > SAME * np.abs(found.values[rest])]
+
+
+def unconfirmed(found: Growing, listed: ComplexArray, unstable: BoolArray, top: float) -> int:
+    """How many of the modes listed as unstable are none in the full problem."""
+    mine = listed[unstable]
+    mine = mine[(mine.real > SAME * np.abs(mine)) & (np.abs(mine) > AT_REST * top)]
+    # On the very border of the band a mode may count on one side only.
+    mine = mine[mine.imag <= top * (1 - SAME)]
+    ours, _ = pairs(mine, found.values, NEAR * top)
+    return len(mine) - len(ours)
+
+
+def checked_modes(
+    system: System,
+    modes: ComplexModes,
+    max_frequency_hz: float,
+    *,
+    own: float | None = None,
+    options: Options | None = None,
+) -> ComplexModes:
+    """The modes of a band with those that came into it from elsewhere, and what was checked in ``completeness``.
+
+    modes: all that start in the band at μ = 0, as `complex_modes` gives them with ``max_frequency_hz``. Up to five
+    friction coefficients are all checked, of more the ends and ``own``. What lacks is followed from further above;
+    what cannot be followed at all gets a column of its own, NaN at other μ.
+    """
+    options = options or Options()
+    if not affordable(system):
+        said = f"Not checked: {_too_large(system)}."
+        return replace(modes, completeness=(said,) * len(modes.mu))
+    chosen = _rows(modes.mu, own)
+    touching = float(modes.mu.max()) if len(modes.mu) == 1 else None
+    found: dict[int, Growing | str] = {}
+    for row in chosen:
+        try:
+            found[row] = growing_modes(
+                system, float(modes.mu[row]), max_frequency_hz, touching_at=touching, damped=modes.damped,
+                options=options,
+            )  # fmt: skip
+        except AnalysisError as error:
+            found[row] = str(error)
+    began = modes.branch
+    for wider in WIDER:
+        if not _lacking(modes, found, max_frequency_hz):
+            break
+        modes = _followed_from(system, modes, wider, max_frequency_hz, options) or modes
+    modes, alone = _with_columns(modes, found, max_frequency_hz)
+    told = tuple(
+        _sentence(modes, row, found.get(row), max_frequency_hz, began, alone.get(row, 0))
+        for row in range(len(modes.mu))
+    )
+    return replace(modes, completeness=told)
+
+
+def checked_onsets(
+    system: System, found: Onsets, *, damped: bool, options: Options | None = None, follow: Sequence[float] = WIDER
+) -> Onsets:
+    """The onsets with what grows at both ends of the range sought anew in the full problem.
+
+    found: as `onsets` gives them; where a mode grows in the band at the high end that branches do not lead to, they are
+    solved again with branches from further above. ``completeness`` says what came of it, ``at_start`` and ``at_end``
+    are what the full problem has.
+    """
+    options = options or Options()
+    if not affordable(system):
+        return replace(found, completeness=f"Not checked: {_too_large(system)}.")
+    top = 2 * np.pi * found.max_frequency_hz
+    try:
+        ends = [
+            growing_modes(system, mu, found.max_frequency_hz, touching_at=None, damped=damped, options=options)
+            for mu in found.friction_range
+        ]
+    except AnalysisError as error:
+        return replace(found, completeness=f"Not checked: {error}.")
+    for wider in follow:
+        if not len(_not_in(ends[1], found.at_end, top)) and not found.unexplained:
+            break
+        try:
+            found = onsets(
+                system, found.friction_range, max_frequency_hz=found.max_frequency_hz, damped=damped, follow=wider,
+                friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
+            )  # fmt: skip
+        except AnalysisError:
+            break
+    said = _ends_sentence(found, ends[0], ends[1], top)
+    start, end = (tuple(complex(v) for v in e.values) for e in ends)
+    return replace(found, at_start=start, at_end=end, completeness=said)
+
+
+def _too_large(system: System) -> str:
+    return f"with {system.size} freedoms what grows is not sought anew in the full problem (up to {AFFORDABLE} it is)"
+
+
+def _not_in(found: Growing, known: tuple[complex, ...], top: float) -> IntArray:
+    values = np.array(known, dtype=complex)
+    return missing(found, values, np.ones(len(values), dtype=bool), top)
+
+
+def _ends_sentence(found: Onsets, start: Growing, end: Growing, top: float) -> str:
+    """What the full problem says of both ends, beside the onsets."""
+    low, high = found.friction_range
+    numbers = f"{start.words} at μ = {low:g} and {end.words} at μ = {high:g}, sought anew in the full problem"
+    wrong: list[str] = []
+    for growing, known, mu in ((start, found.at_start, low), (end, found.at_end, high)):
+        lacking = growing.values[_not_in(growing, known, top)]
+        values = np.array(known, dtype=complex)
+        extra = unconfirmed(growing, values, np.ones(len(values), dtype=bool), top)
+        if len(lacking):
+            named = ", ".join(f"{v.imag / (2 * np.pi):.6g} Hz (+{v.real:.4g} 1/s)" for v in lacking[:4])
+            wrong.append(f"no branch was seen to lead to {named} at μ = {mu:g}")
+        if extra:
+            wrong.append(f"{extra} of the branches that grow at μ = {mu:g} are not found there")
+    if found.unexplained:
+        wrong.append(f"{found.unexplained} of those at μ = {high:g} go back to no onset that was solved")
+    if wrong:
+        return f"NOT COMPLETE: {numbers}, but {'; '.join(wrong)}. Take a smaller range of μ."
+    if not (start.complete and end.complete):
+        sentence = start.sentence if not start.complete else end.sentence
+        return f"NOT COMPLETE: {numbers}, as the onsets say, but {sentence}"
+    return (
+        f"Checked at both ends: {numbers}, and each of them goes back to an onset listed or grew from the start. "
+        f"{end.sentence} What grows and ends again between them rests on the branches followed."
+    )
+
+
+def _rows(mu: Array, own: float | None) -> list[int]:
+    if len(mu) <= ROWS:
+        return list(range(len(mu)))
+    ends = {int(np.argmin(mu)), int(np.argmax(mu))}
+    if own is not None:
+        nearest = int(np.argmin(np.abs(mu - own)))
+        if abs(mu[nearest] - own) <= 1e-12 * max(own, 1e-12):
+            ends.add(nearest)
+    return sorted(ends)
+
+
+def _lacking(modes: ComplexModes, found: dict[int, Growing | str], max_frequency_hz: float) -> bool:
+    top = 2 * np.pi * max_frequency_hz
+    return any(
+        len(missing(f, modes.eigenvalues[row], modes.unstable[row], top))
+        for row, f in found.items()
+        if isinstance(f, Growing)
+    )
+
+
+def _followed_from(
+    system: System, modes: ComplexModes, wider: float, max_frequency_hz: float, options: Options
+) -> ComplexModes | None:
+    """The same modes and those that start up to ``wider`` times the band and are in it somewhere; None where they are
+    not to be followed."""
+    try:
+        more = complex_modes(
+            system, modes.mu, max_frequency_hz=wider * max_frequency_hz, damped=modes.damped,
+            vectors=False if modes.right is None else True if modes.left is not None else "right",
+            friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
+        )  # fmt: skip
+    except AnalysisError:
+        return None
+    inside = np.any(more.frequency_hz <= max_frequency_hz, axis=0)
+    known = np.isin(more.branch, modes.branch)
+    return replace(
+        more.chosen(np.flatnonzero(inside | known)), max_frequency_hz=max_frequency_hz, planned=modes.planned
+    )
+
+
+def _with_columns(
+    modes: ComplexModes, found: dict[int, Growing | str], max_frequency_hz: float
+) -> tuple[ComplexModes, dict[int, int]]:
+    """With a column for each growing mode that no branch leads to, and how many those are by row."""
+    top = 2 * np.pi * max_frequency_hz
+    alone: dict[int, int] = {}
+    for row, growing in found.items():
+        if isinstance(growing, str):
+            continue
+        places = missing(growing, modes.eigenvalues[row], modes.unstable[row], top)
+        if not len(places):
+            continue
+        alone[row] = len(places)
+        modes = _widened(modes, row, growing, places)
+    return modes, alone
+
+
+def _widened(modes: ComplexModes, row: int, found: Growing, places: IntArray) -> ComplexModes:
+    """With columns that hold eigenvalues at one μ alone."""
+    shape = (len(modes.mu), len(places))
+    values, residual = np.full(shape, complex(np.nan, np.nan)), np.full(shape, np.nan)
+    values[row], residual[row] = found.values[places], found.residual[places]
+    right = left = None
+    if modes.right is not None:
+        shapes = np.full((*shape, modes.right.shape[2]), complex(np.nan, np.nan))
+        shapes[row] = found.right[:, places].T
+        right = np.concatenate([modes.right, shapes], axis=1)
+    if modes.left is not None:
+        left = np.concatenate([modes.left, np.full((*shape, modes.left.shape[2]), complex(np.nan, np.nan))], axis=1)
+    most = int(modes.branch.max(initial=0))
+    return replace(
+        modes,
+        eigenvalues=np.concatenate([modes.eigenvalues, values], axis=1),
+        residual=np.concatenate([modes.residual, residual], axis=1),
+        branch=np.concatenate([modes.branch, most + 1 + np.arange(len(places))]),
+        right=right,
+        left=left,
+    )
+
+
+def _sentence(
+    modes: ComplexModes, row: int, found: Growing | str | None, max_frequency_hz: float, began: IntArray, alone: int
+) -> str:
+    """What was checked at one μ. began: branches that were followed because they start in the band or just above."""
+    if found is None:
+        return "Not checked at this μ: what branches followed from μ = 0 give."
+    if isinstance(found, str):
+        return f"Not checked: {found}."
+    top = 2 * np.pi * max_frequency_hz
+    unstable = modes.unstable[row] & modes.in_band[row]
+    wrong = unconfirmed(found, modes.eigenvalues[row], unstable, top)
+    said = f"{found.words} up to {max_frequency_hz:g} Hz"
+    if wrong:
+        return f"NOT CONFIRMED: {said} in the full problem, {wrong} fewer than branches do. {found.sentence}"
+    entered = int(np.count_nonzero(unstable & ~np.isin(modes.branch, began))) - alone
+    if entered > 0:
+        said += f", {entered} of which start{'s' if entered == 1 else ''} above it at μ = 0"
+    if alone:
+        said += f", {alone} of which no branch from μ = 0 was seen to lead to"
+    lead = "Checked" if found.complete else "NOT COMPLETE"
+    return f"{lead}: {said}, sought anew in the full problem. {found.sentence}"

@@ -1,0 +1,107 @@
+"""What becomes of followed branches: when they come into the band, and which onset their growth goes back to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..typing import ComplexArray, IntArray
+from .onset import Onset
+
+
+@dataclass(frozen=True)
+class Change:
+    """A passage into or out of growth, the branches that it concerns, and the onset it was solved to be, if any."""
+
+    mu: float
+    branches: tuple[int, ...]
+    onset: Onset | None
+
+
+class Entries:
+    """Where branches come into the band from above its end at the angular frequency top [1/s]."""
+
+    def __init__(self, top: float) -> None:
+        self.top = top
+        self.found: dict[int, list[tuple[float, float]]] = {}
+
+    def watch(
+        self, between: tuple[float, float], old: ComplexArray, new: ComplexArray, branch: Sequence[int] | IntArray
+    ) -> None:
+        """Take note of the eigenvalues old (k,) and new (k,) of branches (k,) at two neighbouring μ."""
+        came = np.flatnonzero((old.imag > self.top) & (new.imag <= self.top))
+        step = between[1] - between[0]
+        for i in came.tolist():
+            part = float((old.imag[i] - self.top) / (old.imag[i] - new.imag[i]))
+            self.found.setdefault(int(branch[i]), []).append((between[0] + part * step, step))
+
+    def after(self, branches: tuple[int, ...], mu: float, before: float) -> float | None:
+        """The first μ in [mu, before] at which one of these branches comes into the band, to about a step."""
+        places = [
+            max(at, mu) for b in branches for at, step in self.found.get(b, []) if at >= mu - step and at <= before
+        ]
+        return min(places, default=None)
+
+
+def reported(
+    changes: Iterable[Change], entries: Entries, between: tuple[float, float], max_frequency_hz: float
+) -> list[Onset]:
+    """Onsets of the range in the band, and those above it that begin growth which comes into it; each once."""
+    low, high = between
+    every = list(changes)
+    kept: list[Onset] = []
+    for change in every:
+        onset = change.onset
+        if onset is None or not low <= onset.mu <= high:
+            continue
+        if onset.frequency_hz > max_frequency_hz:
+            if onset.stabilising:
+                continue
+            ends = _next_end(every, change, onset.mu)
+            enters = entries.after(change.branches, onset.mu, min(ends, high))
+            if enters is None:
+                continue
+            onset = replace(onset, enters_at=enters)
+        if not any(_same(onset, other) for other in kept):
+            kept.append(onset)
+    return sorted(kept, key=_place)
+
+
+def _place(onset: Onset) -> tuple[float, float]:
+    return onset.mu, onset.frequency_hz
+
+
+def _next_end(every: list[Change], change: Change, mu: float) -> float:
+    """The next μ at which growth of all of these branches ends."""
+    ends = [
+        other.onset.mu
+        for other in every
+        if other.onset is not None
+        and other.onset.stabilising
+        and other.onset.mu > mu
+        and set(other.branches) & set(change.branches)
+    ]
+    return min(ends, default=np.inf)
+
+
+def _same(one: Onset, other: Onset) -> bool:
+    return (
+        abs(one.mu - other.mu) <= 1e-7 * max(other.mu, 1e-9)
+        and abs(one.frequency_hz - other.frequency_hz) <= 1e-7 * max(other.frequency_hz, 1e-300)
+        and one.stabilising == other.stabilising
+    )
+
+
+def unexplained(growing: Iterable[int], from_start: Iterable[int], changes: Iterable[Change]) -> int:
+    """How many of the branches that grow at the end neither grew from the start nor have begun at a solved onset."""
+    began = set(from_start)
+    last: dict[int, tuple[float, bool]] = {}
+    for change in changes:
+        if change.onset is None:
+            continue
+        for b in change.branches:
+            if b not in last or last[b][0] <= change.onset.mu:
+                last[b] = change.onset.mu, change.onset.stabilising
+    return sum(1 for b in growing if (last[b][1] if b in last else b not in began))

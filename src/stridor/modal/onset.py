@@ -1,0 +1,135 @@
+"""Onsets as data: where growth begins and ends over the friction coefficient."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import pi
+from typing import Any, Literal
+
+from ..digits import fixed, readable
+
+
+@dataclass(frozen=True)
+class Onset:
+    """One critical friction coefficient.
+
+    mu, frequency_hz: where; kind: flutter (two modes meet) or divergence (a mode at zero frequency);
+    damped: with or without C; stabilising: True where growth ends there instead of beginning;
+    branches: the two modes that meet, numbered from 1 by frequency at μ = 0.
+    square_root_coefficient κ [1/s]: beyond an undamped onset growth opens as κ √(μ − μ_c); with
+    damping it belongs to the exceptional point at the complex μ ``exceptional_mu`` close by (None if
+    none was found). growth_slope d Re λ/dμ [1/s] (None undamped, where it is infinite).
+    residual: componentwise backward error of the eigenpair in the assembled matrices. enters_at: where growth begins
+    above the band, the μ (to about a step of following) at which the growing mode comes into it; None of all others.
+    """
+
+    mu: float
+    frequency_hz: float
+    kind: Literal["flutter", "divergence"]
+    damped: bool
+    stabilising: bool
+    branches: tuple[int, int]
+    residual: float
+    square_root_coefficient: float | None
+    growth_slope: float | None
+    exceptional_mu: complex | None = None
+    enters_at: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values, as `stridor onsets --json` prints them."""
+        exceptional = self.exceptional_mu
+        return {
+            "mu": self.mu,
+            "frequency_hz": self.frequency_hz,
+            "kind": self.kind,
+            "damped": self.damped,
+            "stabilising": self.stabilising,
+            "branches": list(self.branches),
+            "residual": self.residual,
+            "square_root_coefficient": self.square_root_coefficient,
+            "growth_slope": self.growth_slope,
+            "exceptional_mu": None if exceptional is None else [exceptional.real, exceptional.imag],
+            "enters_band_at": self.enters_at,
+        }
+
+
+@dataclass(frozen=True)
+class Onsets:
+    """All onsets in friction_range [a, b] of modes with frequencies up to max_frequency_hz, by μ.
+
+    Those that begin above the band are among them where the growing mode comes into it (`Onset.enters_at`). damped:
+    whether anything works on velocities. at_start, at_end: eigenvalues [1/s] that grow in the band at a and at b;
+    unexplained: how many of the latter none of the onsets accounts for. completeness: what speaks for there being no
+    others, "" where nothing was checked. notes: what else is to be known. contact_state: where contacts may stick, how
+    many nodes stick, slip and are open, and at which μ; it is held over the range.
+    """
+
+    onsets: tuple[Onset, ...]
+    friction_range: tuple[float, float]
+    max_frequency_hz: float
+    damped: bool
+    open_contacts: tuple[str, ...] = ()
+    completeness: str = ""
+    at_start: tuple[complex, ...] = ()
+    at_end: tuple[complex, ...] = ()
+    unexplained: int = 0
+    notes: tuple[str, ...] = ()
+    contact_state: str = ""
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def first(self) -> Onset | None:
+        """The lowest μ from which on something grows, or None."""
+        return next((o for o in self.onsets if not o.stabilising), None)
+
+    @property
+    def at_start_words(self) -> list[str]:
+        """What grows before any onset, a line each."""
+        low = self.friction_range[0]
+        lines: list[str] = []
+        for lam in sorted(self.at_start, key=_by_growth):
+            if lam.imag == 0.0:
+                lines.append(f"diverges already at μ = {low:g}: λ = +{readable(lam.real)} 1/s")
+            else:
+                lines.append(
+                    f"grows already at μ = {low:g}: {readable(lam.imag / (2 * pi))} Hz, +{readable(lam.real)} 1/s"
+                )
+        return lines
+
+    @property
+    def from_above_words(self) -> list[str]:
+        """Onsets above the band whose mode comes into it, a line each."""
+        return [
+            f"* μ = {fixed(o.mu, 6)} begins at {readable(o.frequency_hz)} Hz, above the band up to "
+            f"{self.max_frequency_hz:g} Hz, and enters it at μ ≈ {o.enters_at:.3g}"
+            for o in self.onsets
+            if o.enters_at is not None
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """The document that `stridor onsets --json` prints."""
+        return {
+            "growing_at_start": [_plain(lam) for lam in self.at_start],
+            "growing_at_end": [_plain(lam) for lam in self.at_end],
+            "unexplained": self.unexplained,
+            "onsets": [o.to_json() for o in self.onsets],
+            **({"contact_state": self.contact_state} if self.contact_state else {}),
+            "friction_range": list(self.friction_range),
+            "max_frequency_hz": self.max_frequency_hz,
+            "damped": self.damped,
+            "open_contacts": list(self.open_contacts),
+            **({"completeness": self.completeness} if self.completeness else {}),
+            **({"notes": list(self.notes)} if self.notes else {}),
+        }
+
+
+def _by_growth(lam: complex) -> float:
+    return -lam.real
+
+
+def _plain(lam: complex) -> dict[str, Any]:
+    return {
+        "frequency_hz": lam.imag / (2 * pi),
+        "growth_rate": lam.real,
+        "kind": "divergence" if lam.imag == 0.0 else "flutter",
+    }

@@ -1,0 +1,33 @@
+"""Whether anything presses the bodies together: without a normal force there is no sliding contact to linearise about."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..system import System
+from ..typing import Array
+
+NOTHING = 1e-9  # of all loads together, each by itself: what their sum leaves as rounding
+
+
+def least_force(system: System) -> float:
+    """The force [N] below which a contact's normal force is rounding: a part of all loads, cancelling or not."""
+    return NOTHING * sum(float(np.abs(vector).sum()) for vector in system.loads.values())
+
+
+def require_pressed(system: System, normal_force: Array) -> None:
+    """Raise AnalysisError where normal forces (m,) [N] of steady sliding are all nothing but rounding.
+
+    Systems without any load have no normal force that is known, and pass: their contacts are taken as closed.
+    """
+    if not len(normal_force) or not system.loads:
+        return
+    if float(np.max(normal_force)) > least_force(system):
+        return
+    names = ", ".join(f"{n} ({float(np.linalg.norm(v)):.4g} N)" for n, v in system.loads.items())
+    raise AnalysisError(
+        f"no normal force: the loads {names} leave every contact at 0 N in steady sliding, where nothing rubs and a "
+        "linearisation about it means nothing; give a load that presses the bodies together, or no [loads] at all to "
+        "have the contacts taken as closed"
+    )
