@@ -259,7 +259,8 @@ def assert_same_onsets(structured: st.Onsets, imported: st.Onsets) -> None:
         if one.exceptional_mu is not None:
             assert other.exceptional_mu == pytest.approx(one.exceptional_mu, abs=1e-7)
     assert imported.completeness.startswith("Complete as far as both ends tell")
-    assert not structured.completeness
+    # `onsets` of a system says nothing; that of a case has looked at both ends.
+    assert structured.completeness == "" or structured.completeness.startswith("Checked at both ends: ")
 
 
 @pytest.mark.parametrize("damped", [True, False])
@@ -390,8 +391,16 @@ def test_growth_that_comes_into_the_band_from_above_is_told(tmp_path: Path):
     """Two modes meet at 23 213 Hz, and the one that grows has sunk to 23 096 Hz at μ = 0.6."""
     case_ = rubbing(tmp_path, 0.1)
     found = st.onsets(case_, (0.0, 0.6), max_frequency_hz=23.15e3)
-    assert not found.onsets
-    assert "1 at μ = 0.6, as the onsets say but for 1 whose growth began above 23150 Hz." in found.completeness
+    (onset,) = found.onsets
+    assert onset.frequency_hz == pytest.approx(23213, abs=1)
+    assert onset.enters_at is not None
+    assert onset.mu < onset.enters_at < 0.6
+    # The same touching nodes: those of several μ are found at the laws' own.
+    near = st.modes(case_, [onset.enters_at - 0.02, onset.enters_at + 0.02], max_frequency_hz=23.15e3)
+    assert np.sum(near.unstable & near.in_band, axis=1).tolist() == [0, 1]
+    (line,) = found.from_above_words
+    assert "Hz, above the band up to 23150 Hz, and enters it at μ ≈ 0.23" in line
+    assert "1 at μ = 0.6, as the onsets say." in found.completeness
 
 
 def test_terms_that_cancel_are_summed_in_extended_precision():

@@ -1,4 +1,4 @@
-"""Whether anything presses the bodies together: without a normal force there is no sliding contact to linearise about."""
+"""Whether anything presses the bodies together: without a normal force there is nothing to linearise about."""
 
 from __future__ import annotations
 
