@@ -150,3 +150,14 @@ def test_edge_lengths_and_elements_per_wavelength():
     assert largest == pytest.approx(0.3)
     # 3000 m/s at 1 kHz: 3 m long, ten elements of 0.3 m.
     assert waves(mesh, 3000.0, 1000.0) == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(("height", "flat"), [(0.25e-10, True), (0.4e-10, True), (0.6e-10, False), (2.5e-10, False)])
+def test_a_cell_is_flat_below_a_corner_sine_of_1e_10(height, flat):
+    """The least sine of a triangle of height h over the middle of its side 1 is 2 h."""
+    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, height]]), {"triangle": np.array([[0, 1, 2]])})
+    if not flat:
+        check_mesh(mesh, "m")
+        return
+    with pytest.raises(CaseError, match="1 of 1 cells are degenerate"):
+        check_mesh(mesh, "m")

@@ -264,6 +264,59 @@ def test_cubic_spring():
     assert "cubic" in result.path_reason
 
 
+def test_a_mass_drawn_by_a_support_on_a_cubic_spring():
+    """m ü = −γ (u − v t)³ from rest: u − v t swings with the period of the cubic oscillator of energy ½ m v²."""
+    from scipy.special import ellipk
+
+    gamma, v = 4.0, 0.5
+    springs = CubicSprings(Rows(sp.csr_array([[1.0]]), np.array([[-1.0]])), np.array([gamma]))
+    system = replace(oscillator(0.0), cubic=springs, motion=replace(belt_motion(1), names=("drive",)))
+    points = {"mass": replace(system.points["mass"], lift=np.zeros((2, 1)))}
+    system = replace(system, points=points, motion=replace(system.motion, lift=np.zeros((1, 1))))
+    amplitude = (2 * v**2 / gamma) ** 0.25
+    period = 4 * ellipk(0.5) / (math.sqrt(gamma) * amplitude)
+    step = 2e-4
+    phases = [PhaseSpec("draw", 1.01 * period, {}, {"drive": v})]
+    # q_0 = v_0 − β2 Δt a_0: the relative motion begins with −v, the mass itself at rest.
+    result = simulate_assembled(system, phases, Settings(record_every=1, step=step, watch=("mass",)))
+    u, time = result.displacement[:, 0, 0], result.time
+    relative = u - v * time
+    back = np.flatnonzero((relative[:-1] < 0) & (relative[1:] >= 0))[0]
+    assert time[back] + step / 2 == pytest.approx(period / 2, abs=2 * step)
+    assert relative.min() == pytest.approx(-amplitude, rel=1e-5)
+    # Half a period on the mass has twice the speed of the support and half its way.
+    assert result.velocity[back, 0, 0] == pytest.approx(2 * v, rel=1e-3)
+    assert u[back] == pytest.approx(v * period / 2, rel=1e-3)
+    # The support has put in the kinetic energy of the mass; at the turn also what the spring holds.
+    assert energy_balance(result).error < 1e-10
+    assert result.works["support"][back] == pytest.approx(0.5 * (2 * v) ** 2, rel=1e-3)
+
+
+@pytest.mark.parametrize("beta2", [0.5, 0.6])
+def test_a_support_that_pushes_a_mass_through_a_compliant_layer(beta2):
+    """δ̈ = −K_c/m δ with δ̇ = v at first: the mass leaves at 2 v after half a period, the force at most v √(K_c m)."""
+    v, stiffness = 0.3, 400.0
+    contact = replace(touch([0.0, 1.0], [1.0, 0.0], law=Coulomb(0.0), motions=1), stiffness=stiffness)
+    contact = replace(contact, normal_lift=np.array([-1.0]))
+    system = System(
+        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), (contact,), motion=replace(belt_motion(2), names=("push",)),
+    )  # fmt: skip
+    up = sp.csr_array(np.array([[0.0, 1.0], [1.0, 0.0]]))
+    system = replace(system, points={"mass": Rows(up, np.zeros((2, 1)))})
+    omega, step = math.sqrt(stiffness), 1e-4
+    phases = [PhaseSpec("push", 1.3 * math.pi / omega, {}, {"push": v})]
+    settings = Settings(record_every=1, step=step, beta2=beta2, watch=("mass",))
+    result = simulate_assembled(system, phases, settings)
+    force, time = result.normal_force[:, 0], result.time
+    pressed = np.flatnonzero(force > 0)
+    assert time[pressed[-1]] - time[pressed[0]] == pytest.approx(math.pi / omega, abs=4 * step)
+    first_order = 2 * step * omega * (beta2 - 0.5)
+    assert force.max() == pytest.approx(v * math.sqrt(stiffness), rel=1e-4 + first_order)
+    assert result.velocity[-1, 0, 0] == pytest.approx(2 * v, rel=1e-3 + 5 * first_order)
+    exact = stiffness * v / omega * np.sin(omega * time[pressed])
+    assert force[pressed] == pytest.approx(exact, abs=(5e-3 + 10 * first_order) * force.max())
+
+
 def test_initial_motion():
     """A system that starts displaced and in motion: u0 cos ωt + v0/ω sin ωt to second order."""
     system = replace(oscillator(4.0), initial_velocity=np.array([1.0]), initial_displacement=np.array([0.3]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from stridor.system import System
 from stridor.system.model import PrescribedMotion
 from stridor.temporal.assembled import simulate_assembled
 from stridor.temporal.assembled.disc import solve_disc
+from stridor.temporal.assembled.renewal import take_over
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.settings import Settings
 
@@ -316,3 +318,42 @@ def test_leaving_the_master_ends_the_run(monkeypatch):
     left = caught.value.trajectory
     assert left.interrupted
     assert left.time[-1] == pytest.approx(0.1, rel=0.02)
+
+
+def test_renewed_rows_go_on_with_the_gap_and_turn_the_friction_force():
+    """take_over: the gap a closed node was left at stays what the loop sees; its force in space stays what it was."""
+    rng = np.random.default_rng(8)
+    m, n, p = 4, 9, 1
+
+    def nodes(tangents):
+        return SimpleNamespace(
+            gap=rng.standard_normal(m), normal=sp.csr_array(rng.standard_normal((m, n))),
+            normal_lift=rng.standard_normal((m, p)), tangents=tangents,
+        )  # fmt: skip
+
+    frame = np.tile(np.eye(3)[:2], (m, 1, 1))
+    angle = np.radians([10.0, 35.0, -80.0, 170.0])
+    turned = np.stack([[[np.cos(a), np.sin(a), 0], [-np.sin(a), np.cos(a), 0]] for a in angle])
+    old, new = nodes(frame), nodes(turned)
+    force, offset = rng.standard_normal((m, 3)), rng.standard_normal(m)
+    force[:, 0] = [3.0, 0.0, 2.0, 1.0]
+    force[1] = 0.0
+    before, offset_before, given = force.copy(), offset.copy(), []
+    u, x = rng.standard_normal(n), rng.standard_normal(p)
+    machine = SimpleNamespace(
+        nodes=old, contacts=SimpleNamespace(force=force, offset=offset), displacement=u,
+        state=SimpleNamespace(motion=[x]), set_nodes=given.append, surfaces=None,
+    )  # fmt: skip
+    take_over(machine, ("new",), new)
+    assert given == [new]
+    assert machine.surfaces == ("new",)
+
+    def gap(of, extra):
+        return of.gap + of.normal @ u + of.normal_lift @ x + extra
+
+    closed = before[:, 0] > 0
+    np.testing.assert_allclose(gap(new, offset)[closed], gap(old, offset_before)[closed], rtol=1e-12, atol=1e-12)
+    assert offset[~closed] == offset_before[~closed]
+    in_space = np.einsum("mk,mkd->md", force[:, 1:], turned)
+    np.testing.assert_allclose(in_space[:, :2], before[:, 1:], rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(force[:, 0], before[:, 0])

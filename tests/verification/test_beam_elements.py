@@ -190,3 +190,18 @@ def test_a_beam_along_an_axis_keeps_traction_and_bending_apart():
         from stridor.fe.assembly import connected_components
 
         assert sorted(map(len, connected_components(*assemble_beam(mesh)))) == [4, 8]
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.6, 0.8)])
+def test_the_lumped_mass_is_the_scaled_diagonal_of_the_consistent_one(direction):
+    """Hinton, Rock and Zienkiewicz (1976): the bending diagonal scaled so that its translations make the mass."""
+    length, line_density = 0.3, 7.0
+    straight = BeamElement(length, 2e6, 30.0, line_density, (1.0, 0.0))
+    diagonal = np.diag(straight.mass())
+    bending = diagonal * line_density * length / (diagonal[1] + diagonal[4])
+    lumped = BeamElement(length, 2e6, 30.0, line_density, direction).mass(lumped=True)
+    np.testing.assert_array_equal(lumped, np.diag(np.diag(lumped)))
+    half = line_density * length / 2
+    expected = [half, half, bending[2], half, half, bending[5]]
+    np.testing.assert_allclose(np.diag(lumped), expected, rtol=1e-14)
+    assert bending[2] == pytest.approx(line_density * length**3 / 78, rel=1e-14)

@@ -15,6 +15,7 @@ from stridor.laws import Weakening
 from stridor.modal.assembled import complex_modes_assembled
 from stridor.modal.backward_error import BackwardError
 from stridor.modal.complex_modes import complex_modes, prepare, undamped
+from stridor.modal.coupling import couple
 from stridor.sliding import steady_sliding
 from stridor.system import System
 
@@ -262,3 +263,30 @@ def test_a_point_mass_on_a_beam_whose_damping_is_then_not_proportional():
     sparse = complex_modes_assembled(heavier, [0.0, 0.1], max_frequency_hz=40e3)
     np.testing.assert_allclose(ours.eigenvalues, sparse.eigenvalues, rtol=1e-7)
     assert ours.residual.max() < 1e-11
+
+
+def test_slopes_of_the_contact_problem_with_weakening_friction():
+    """∂T/∂λ and ∂T/∂μ of T(λ, μ) against central differences, with receptances of a structure written down."""
+    system = bench(Slave(), Slave(place=0.3, side=-1), velocity=0.7)
+    system = replace(system, contacts=tuple(replace(c, law=Weakening(0.1, 0.5, 0.4)) for c in system.contacts))
+    coupling, _ = couple(system)
+    assert coupling.sloped
+    rng = np.random.default_rng(3)
+    q = 2 * coupling.contacts
+    mass, damping, stiffness = (b @ b.T + np.eye(q) for b in rng.standard_normal((3, q, q)))
+
+    def receptance(at):
+        flexibility = np.linalg.inv(at**2 * mass + at * damping + 40 * stiffness)
+        return flexibility, -flexibility @ (2 * at * mass + damping) @ flexibility
+
+    def matrices(at, mu):
+        value, slope = receptance(at)
+        return [part[0] for part in coupling.matrices(np.array([at]), mu, value[None], slope[None])]
+
+    lam, mu, step = -0.3 + 5.0j, 0.24, 1e-5
+    _, by_lambda, by_mu = matrices(lam, mu)
+    for direction in (1.0, 1j):
+        change = (matrices(lam + step * direction, mu)[0] - matrices(lam - step * direction, mu)[0]) / (2 * step)
+        np.testing.assert_allclose(change / direction, by_lambda, rtol=1e-7, atol=1e-8 * np.abs(by_lambda).max())
+    change = (matrices(lam, mu + step)[0] - matrices(lam, mu - step)[0]) / (2 * step)
+    np.testing.assert_allclose(change, by_mu, rtol=1e-6, atol=1e-7 * np.abs(by_mu).max())

@@ -15,7 +15,7 @@ from stridor.contact.curve import Curve, weights_at
 from stridor.contact.facets import FacetSurface
 from stridor.contact.interface import Rows
 from stridor.contact.obstacles import Cylinder, Flat
-from stridor.contact.pairing import pair_surface, repair
+from stridor.contact.pairing import overlap_tolerance, pair_surface, repair
 from stridor.errors import CaseError
 from stridor.laws import Coulomb
 from stridor.mesh.facets import (
@@ -830,3 +830,31 @@ def test_places_on_any_bent_sheet_are_found_along_its_normals(seed, kind):
     np.testing.assert_allclose(found.point[three], place[three], atol=1e-11)
     residual = found.point + found.gap[:, None] * found.normal - (place + gap[:, None] * normal)
     assert np.abs(residual[found.inside]).max(initial=0) < 1e-11
+
+
+@pytest.mark.parametrize("kind", SPACE_KINDS)
+def test_chords_lie_below_a_cylinder_by_their_sagitta(kind):
+    """R (1 − cos(π/n)) with n chords around, and one and a half times that may a slave seem to overlap by."""
+    radius, around = 0.7, 40
+    parts = 1 if kind in ("triangle", "quad") else 2
+    points, facets = cylinder(kind, around // parts, 6 // parts, radius, 0.6)
+    surface = FacetSurface.from_facets(points, facets, where="m")
+    sagitta = radius * (1 - math.cos(math.pi / around))
+    # The middle of a quad8 lies on the chord between its middles, over twice the angle, and on that along the axis.
+    deepest = 2 * sagitta if kind == "quad8" else sagitta
+    assert surface.chord_height == pytest.approx(deepest, rel=0.01)
+    if kind == "quad8":
+        return
+    normals = points * [1, 1, 0] / radius
+    flat = Flat(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    assert overlap_tolerance(points, normals, flat) == pytest.approx(1.5 * sagitta, rel=0.01)
+    assert overlap_tolerance(points, normals, surface) == pytest.approx(3.0 * sagitta, rel=0.01)
+
+
+def test_a_polygon_lies_below_a_circle_by_its_sagitta():
+    points, facets = circle(40, 0.7)
+    normals = points / 0.7
+    sagitta = 0.7 * (1 - math.cos(math.pi / 40))
+    flat = Flat(np.zeros(2), np.array([0.0, 1.0]))
+    assert overlap_tolerance(points, normals, flat) == pytest.approx(1.5 * sagitta, rel=0.01)
+    assert Curve.from_facets(points, facets, where="m").chord_height == pytest.approx(sagitta, rel=0.01)

@@ -20,6 +20,7 @@ from stridor.contact.surfaces import SurfaceContact, operators
 from stridor.errors import AnalysisError
 from stridor.laws import Coulomb, Weakening
 from stridor.sliding import friction_damping_matrix, steady_sliding, steady_sliding_nodes, touching
+from stridor.sliding.equilibrium import State, offenders
 from stridor.sliding.resultants import resultants
 from stridor.system import System, build_system
 from stridor.system.model import CubicSprings, PrescribedMotion, Solid
@@ -440,3 +441,21 @@ def test_what_has_no_answer_says_why():
     twice = replace(system, surfaces=(surface, replace(surface, nodes=replace(surface.nodes, names=("again",)))))
     with pytest.raises(AnalysisError, match="presses on the same freedoms twice"):
         steady_sliding_nodes(twice)
+
+
+def test_only_what_is_beyond_rounding_pulls_or_penetrates():
+    """Forces are told apart to 1e-12 of the largest force or load, gaps to 1e-12 of the largest gap."""
+    force = np.array([1.0, -0.3e-12, -3e-12, 0.0, 0.0, 0.0])
+    gap = np.array([0.0, 0.0, 0.0, 2.0, -0.6e-12, -6e-12])
+    active = np.array([True, True, True, False, False, False])
+    state = State(active, np.zeros(1), force, gap)
+    pulled, closing = offenders(state, np.ones(6, dtype=bool), 0.5)
+    assert list(pulled) == [2]
+    assert list(closing) == [5]
+    # Against a load ten times as large as any force the same pull is rounding.
+    assert not len(offenders(state, np.ones(6, dtype=bool), 10.0)[0])
+    # A node that cannot move closes no gap.
+    assert not len(offenders(state, np.arange(6) != 5, 0.5)[1])
+    # The worst first.
+    worse = State(np.ones(3, dtype=bool), np.zeros(1), np.array([1.0, -1e-6, -1e-3]), np.zeros(3))
+    assert list(offenders(worse, np.ones(3, dtype=bool), 0.5)[0]) == [2, 1]
