@@ -292,8 +292,7 @@ def test_a_mass_drawn_by_a_support_on_a_cubic_spring():
     assert result.works["support"][back] == pytest.approx(0.5 * (2 * v) ** 2, rel=1e-3)
 
 
-@pytest.mark.parametrize("beta2", [0.5, 0.6])
-def test_a_support_that_pushes_a_mass_through_a_compliant_layer(beta2):
+def test_a_support_that_pushes_a_mass_through_a_compliant_layer():
     """δ̈ = −K_c/m δ with δ̇ = v at first: the mass leaves at 2 v after half a period, the force at most v √(K_c m)."""
     v, stiffness = 0.3, 400.0
     contact = replace(touch([0.0, 1.0], [1.0, 0.0], law=Coulomb(0.0), motions=1), stiffness=stiffness)
@@ -303,18 +302,16 @@ def test_a_support_that_pushes_a_mass_through_a_compliant_layer(beta2):
     )  # fmt: skip
     up = sp.csr_array(np.array([[0.0, 1.0], [1.0, 0.0]]))
     system = replace(system, points={"mass": Rows(up, np.zeros((2, 1)))})
-    omega, step = math.sqrt(stiffness), 1e-4
+    omega, step = math.sqrt(stiffness), 1e-3
     phases = [PhaseSpec("push", 1.3 * math.pi / omega, {}, {"push": v})]
-    settings = Settings(record_every=1, step=step, beta2=beta2, watch=("mass",))
-    result = simulate_assembled(system, phases, settings)
+    result = simulate_assembled(system, phases, Settings(record_every=1, step=step, watch=("mass",)))
     force, time = result.normal_force[:, 0], result.time
     pressed = np.flatnonzero(force > 0)
-    assert time[pressed[-1]] - time[pressed[0]] == pytest.approx(math.pi / omega, abs=4 * step)
-    first_order = 2 * step * omega * (beta2 - 0.5)
-    assert force.max() == pytest.approx(v * math.sqrt(stiffness), rel=1e-4 + first_order)
-    assert result.velocity[-1, 0, 0] == pytest.approx(2 * v, rel=1e-3 + 5 * first_order)
+    assert time[pressed[-1]] - time[pressed[0]] == pytest.approx(math.pi / omega, abs=3 * step)
+    assert result.velocity[-1, 0, 0] == pytest.approx(2 * v, rel=2e-3)
+    # (ω Δt)² = 4e-4; the support's motion of one step, forgotten or counted twice, would be 1e-2 of the largest force.
     exact = stiffness * v / omega * np.sin(omega * time[pressed])
-    assert force[pressed] == pytest.approx(exact, abs=(5e-3 + 10 * first_order) * force.max())
+    assert force[pressed] == pytest.approx(exact, abs=2e-3 * v * math.sqrt(stiffness))
 
 
 def test_initial_motion():
