@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from typing import cast
 
 _LONGEST_SHOWN = 60
+_LONGEST_PLACE = 400
+_LONGEST_NUMBER = 10_000  # bits of a whole number that is written out
+_MOST_SHOWN = 100  # problems of one error that are printed
 
 
 class StridorError(Exception):
@@ -30,9 +33,12 @@ class Problem:
     accepted: str
 
     def __str__(self) -> str:
+        where = self.where
+        if len(where) > _LONGEST_PLACE:  # a key may be as long as its file
+            where = f"{where[: _LONGEST_PLACE // 4]}…{where[-_LONGEST_PLACE // 4 :]}"
         if self.given is None:
-            return f"{self.where}: {self.accepted}"
-        return f"{self.where}: {shown(self.given)} – {self.accepted}"
+            return f"{where}: {self.accepted}"
+        return f"{where}: {shown(self.given)} – {self.accepted}"
 
 
 class CaseError(StridorError):
@@ -58,7 +64,9 @@ class CaseError(StridorError):
         return error
 
     def __str__(self) -> str:
-        return "\n".join(str(problem) for problem in self.problems)
+        lines = [str(problem) for problem in self.problems[:_MOST_SHOWN]]
+        more = len(self.problems) - len(lines)
+        return "\n".join([*lines, *([f"and {more} more problems"] if more else [])])
 
     def __reduce__(self) -> tuple[object, ...]:
         # Between processes exceptions are rebuilt from their arguments; that would keep one problem only.
@@ -74,6 +82,8 @@ def shown(value: object) -> str:
 def _written(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, int) and value.bit_length() > _LONGEST_NUMBER:  # Python refuses to write thousands of digits
+        return f"a whole number of {int(value.bit_length() * 0.30103) + 1} digits"
     if isinstance(value, Mapping):
         table = cast("Mapping[object, object]", value)
         inner = ", ".join(f"{key} = {_written(item)}" for key, item in table.items())

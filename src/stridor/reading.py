@@ -6,8 +6,11 @@ file made to fill the memory costs a message and nothing else.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
+import threading
+from collections.abc import Generator
 from pathlib import Path
 
 GIB = 2**30
@@ -15,6 +18,10 @@ GIB = 2**30
 VARIABLE = "STRIDOR_READ_LIMIT"
 _SHARE = 4  # of the memory: what is read is turned into numbers while it is still there
 _LEAST = GIB
+# Readers at work, and the limit that was there before the first of them.
+_LOCK = threading.Lock()
+_BOUNDS: list[None] = []
+_BEFORE: list[int] = []
 
 
 def irregular(path: Path, most: int | None = None) -> str | None:
@@ -65,9 +72,48 @@ def memory() -> int:
     return held if soft == resource.RLIM_INFINITY else min(held, soft)
 
 
+@contextlib.contextmanager
+def bounded() -> Generator[None, None, None]:
+    """While a file is read the process may not grow by more than half of the memory (or STRIDOR_READ_LIMIT, where that
+    is more): what a reader takes to be a mesh of 1e10 nodes ends in MemoryError, not in the machine's standing still.
+
+    Where the system knows no such limit nothing is done.
+    """
+    with _LOCK:
+        _BOUNDS.append(_set_bound() if not _BOUNDS else None)
+    try:
+        yield
+    finally:
+        with _LOCK:
+            _BOUNDS.pop()
+            if not _BOUNDS:
+                _lift_bound()
+
+
+def _set_bound() -> None:
+    try:
+        import resource
+
+        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+        held = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+        bound = held + max(memory() // 2, _asked() or 0)
+        if soft == resource.RLIM_INFINITY or bound < soft:
+            resource.setrlimit(resource.RLIMIT_AS, (bound, hard))
+            _BEFORE.append(soft)
+    except (ImportError, OSError, ValueError, IndexError):
+        return
+
+
+def _lift_bound() -> None:
+    if _BEFORE:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (_BEFORE.pop(), resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
 def size_words(count: int) -> str:
     """A number of bytes for a message."""
-    for unit, size in (("GiB", GIB), ("MiB", 2**20), ("KiB", 2**10)):
+    for unit, size in (("TiB", 2**40), ("GiB", GIB), ("MiB", 2**20), ("KiB", 2**10)):
         if count >= size:
             return f"{count / size:.3g} {unit}"
     return f"{count} bytes"

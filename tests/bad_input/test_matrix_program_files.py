@@ -64,7 +64,7 @@ def test_what_is_no_file(tmp_path, refused):
     for file, words in (
         ("folder.mtx", "is a folder; must be a file"),
         ("none.op4", "no such file"),
-        ("a\0.pch", "no such file"),
+        ("a\0.pch", "cannot be read: embedded null byte"),
     ):
         with pytest.raises(CaseError) as caught:
             read_matrix(file, where="matrices.mass")

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from stridor.errors import CaseError
 from stridor.matrices import Labels, StoredMatrix, common_labels, held_freedoms, read_matrix, report
-from stridor.matrices.report import definiteness
+from stridor.matrices.report import definiteness, single_lines
 
 
 def chain(n: int, value: float, ends: float = 1.0):
@@ -216,3 +216,30 @@ def test_from_files_to_the_report(tmp_path):
     assert found.warnings == ("1 freedom has 1e36 on the diagonal of K (Abaqus' supports); leave them out",)
     assert labels is not None
     assert labels.node[held_freedoms(stiffness)].tolist() == [9]
+
+
+def test_friction_counts_the_same_by_itself_and_beside_a_stiffness(tmp_path):
+    """Entries of very different size make a coupling of rank 20: dropped one by one they would leave another rank."""
+    rng = np.random.default_rng(8)
+    n, pairs = 120, 10
+    stiffness = 1e9 * sp.csr_array(sp.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(n, n)))
+    turn = np.zeros((n, n))
+    for k in range(pairs):
+        at = 10 * k + np.arange(8)
+        u, v = np.zeros(n), np.zeros(n)
+        u[at], v[at] = rng.standard_normal(8), rng.standard_normal(8) * 10.0 ** rng.uniform(-7, 0, 8)
+        turn += np.outer(u, v)
+    friction = sp.csr_array(turn)
+    rounded = stiffness.copy()
+    rounded.data *= 1 + 1e-15 * rng.standard_normal(len(rounded.data))
+    alone = StoredMatrix(friction, "f")
+    assert single_lines(alone)[3].endswith("rank 20, in 80 rows")
+    for first in (stiffness, rounded):
+        for factor in (1.0, 0.3, 1e-4):
+            total = sp.csr_array(first + factor * friction)
+            found = report(sp.eye_array(n), None, total, stiffness_terms=[first, sp.csr_array(factor * friction)])
+            assert (found.coupling, found.coupling_exact, found.coupled) == (20, True, 80)
+    # In one file the smallest are rounding, and the rest keeps the rank of what it is a part of.
+    whole = report(sp.eye_array(n), None, sp.csr_array(stiffness + 1e3 * friction))
+    assert whole.coupling == 20
+    assert 60 <= whole.coupled <= 80

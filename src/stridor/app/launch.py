@@ -8,9 +8,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..errors import CaseError
+from ..reading import irregular
 
 # What launchers tell each process: its number, and of how many. Slurm starts programs that know nothing of each other,
 # too; its processes are one program only where the solver that needs them is asked for.
+LARGEST = 2**24  # bytes of a case file
 MPIEXEC = (("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE"))
 SLURM = ("SLURM_PROCID", "SLURM_STEP_NUM_TASKS")
 
@@ -64,6 +66,8 @@ def asks(words: Sequence[str], environment: Mapping[str, str]) -> bool:
 
 def _text(path: str) -> str:
     try:
+        if irregular(Path(path), LARGEST):
+            return ""
         return Path(path).read_text(encoding="utf-8", errors="replace")
     except (OSError, ValueError):
         return ""  # the first process says what is wrong with it

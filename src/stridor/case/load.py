@@ -10,10 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import CaseError
+from ..reading import irregular
 from .model import Case
+from .outsized import deep_line, outsized
 from .overrides import override
 from .points import choice
 
+LARGEST = 2**24  # bytes of a case file; what is large lies in files of its own
 _POSITION = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\s*$")
 _KEYS = re.compile(r"\('[^)]*',?\)")  # how tomllib names a table
 
@@ -22,11 +25,12 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Case:
     """The case in a TOML file, with overrides such as "phases.1.duration=0.01" applied. Raises CaseError."""
     source = str(path)
     try:
+        if reason := irregular(Path(path), LARGEST):
+            told = reason.replace("is a folder", "is a directory")
+            raise CaseError(source, None, told.replace("must be a file", "give the path of a case file"))
         text = Path(path).read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         raise CaseError(source, None, "no such file") from None
-    except IsADirectoryError:
-        raise CaseError(source, None, "is a directory; give the path of a case file") from None
     except UnicodeDecodeError as error:
         raise CaseError(
             source, None, f"not UTF-8 text (byte {error.start}); save the file as UTF-8"
@@ -44,20 +48,30 @@ def loads(
 
     Mesh files are sought from `folder` (default: the working directory) and kept with their full path.
     """
+    if number := deep_line(text):
+        raise CaseError(f"{source}, line {number}", None, "a key of tables that are nested too deeply")
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise _syntax(error, source) from None
     except RecursionError:
         raise CaseError(source, None, "not valid TOML: nested too deeply") from None
+    except ValueError as error:  # a whole number of more digits than Python takes, a date that is none
+        raise CaseError(source, None, f"not valid TOML: {_readable(error)}") from None
     if not data and not overrides:
         raise CaseError(source, None, "empty; a case needs at least one table [bodies.NAME]")
     problems = override(data, overrides)
+    problems = problems or outsized(data)
     if problems:
         raise CaseError.many(problems)
     _spell_out(data)
     _resolve_files(data, folder or Path.cwd())
     return Case.checked(data)
+
+
+def _readable(error: ValueError) -> str:
+    said = str(error)
+    return "a whole number has thousands of digits" if "digits" in said else said
 
 
 def _spell_out(data: dict[str, Any]) -> None:

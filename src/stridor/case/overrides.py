@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from typing import Any, cast
 
 from ..errors import CaseError, Problem, shown
+from .outsized import deep_line
 from .points import no_such
 from .schema import DEFAULT_PHASES, SINGULAR
 
@@ -20,6 +21,7 @@ _HOW = "write an override as path=value, such as contacts.A.friction.coefficient
 _VALUES = (
     'not a value; accepted: a number such as 0.3, true, false, a word, "a text", [a, list], { a = table }'
 )
+_DEEPEST = 20
 _WORD = re.compile(r"[A-Za-z_]")
 
 
@@ -32,10 +34,12 @@ def parse_override(text: str) -> tuple[str, object]:
     if not written:
         raise CaseError(path, None, f"no value given; {_HOW}")
     try:
+        if deep_line(text):
+            raise CaseError(path, written, "tables that are nested too deeply")
         read = tomllib.loads(f"value = {written}")
         if "\n" not in written and "\r" not in written:
             return path, read["value"]
-    except (tomllib.TOMLDecodeError, RecursionError):
+    except (ValueError, RecursionError):  # TOMLDecodeError is one; a number may have too many digits
         if _WORD.match(written) and written.isprintable():
             return path, written
     raise CaseError(path, written, _VALUES)
@@ -44,7 +48,7 @@ def parse_override(text: str) -> tuple[str, object]:
 def split_path(path: str) -> tuple[str, ...]:
     """Keys of a dotted path. Raises CaseError where one of them is empty."""
     steps = tuple(step.strip() for step in path.split("."))
-    if not all(steps):
+    if not all(steps) or len(steps) > _DEEPEST:
         raise CaseError("override", path, _HOW)
     return steps
 

@@ -22,6 +22,7 @@ from .master import MasterSurface
 CANDIDATES = 3
 PROJECTION_STEPS = 30
 CHAIN_DOUBLINGS = 12
+_SAME_DIRECTION = 0.5  # cosine between outward normals above which surfaces do not face each other
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,36 @@ def tie(slave_points: Array, master: MasterSurface, *, where: str, tolerance: fl
         )
         raise CaseError(where, None, accepted)
     return Tie(nodes, weights, point, distance)
+
+
+def check_facing(
+    slave_points: Array, slave_normals: Array, master: MasterSurface, found: Tie, *, where: str, limit: float
+) -> None:
+    """Raise CaseError naming ``where`` unless the slave nodes (s, d) [m] with outward unit normals (s, d), NaN where a
+    node has none, face the master, and lie within ``limit`` [m] of their places on it: an element, whatever tolerance
+    is given.
+
+    A bond over more than an element is none: rotations would strain it by the distance times their angle. Bodies are
+    bonded where their outward normals oppose; within 60° of the same direction they turn their backs on each other.
+    """
+    away = found.distance
+    if np.any(away > limit):
+        worst = int(np.argmax(away))
+        at = ", ".join(f"{x:.6g}" for x in slave_points[worst])
+        accepted = (
+            f"the slave node at ({at}) m is {away[worst]:.3g} m from the master, more than an element ({limit:.3g} m); "
+            "a tie bonds surfaces that touch: bring them together, or set a smaller tolerance"
+        )
+        raise CaseError(where, None, accepted)
+    along = np.sum(slave_normals * master.locate(slave_points).normal, axis=1)
+    wrong = np.flatnonzero(along > _SAME_DIRECTION)
+    if len(wrong):
+        at = ", ".join(f"{x:.6g}" for x in slave_points[wrong[0]])
+        accepted = (
+            f"at {len(wrong)} of {len(along)} slave nodes both surfaces face the same way, first at ({at}) m; a tie "
+            "bonds surfaces that face each other: is it the boundary on the other side of a body?"
+        )
+        raise CaseError(where, None, accepted)
 
 
 def tie_transformation(total: int, bonds: Sequence[Bond]) -> Sparse:

@@ -29,7 +29,7 @@ from ..modal.parametric.contacts import ContactsProblem
 from ..modal.parametric.contacts_rigid import Elimination
 from ..modal.parametric.factors import Factor, factor_from_json
 from ..modal.parametric.problem import POWERS
-from ..reading import irregular, size_words
+from ..reading import bounded, irregular, size_words
 from ..study.provenance import versions
 from .archive_reader import ArchiveReader, check_unfolded, whole_count
 from .atomic import replacing
@@ -273,7 +273,7 @@ def _opened(path: Path) -> Generator[tuple[zipfile.ZipFile, dict[str, Any]], Non
     ours = start.startswith(ZIP) and HEADER.encode() in start
     if not ours:
         raise foreign
-    with _damage_told(path), zipfile.ZipFile(path) as archive:
+    with _damage_told(path), bounded(), zipfile.ZipFile(path) as archive:
         check_unfolded(archive, path.stat().st_size)
         header = json.loads(_header_bytes(archive))
         if not isinstance(header, dict) or cast("dict[str, Any]", header).get("format") != FORMAT:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import CaseError
-from ..reading import irregular, largest_unfolded, size_words
+from ..reading import bounded, irregular, largest_unfolded, size_words
 from .result_checks import check_results
 from .seals import CONTENTS, broken
 
@@ -29,7 +29,7 @@ def open_results(path: str | Path) -> Any:
     anything in it is not as it was written."""
     target = Path(path)
     _look_at(target)
-    with damage_told(target):
+    with damage_told(target), bounded():
         _check_sizes(target)
         loaded = _loaded(target)
         accept(loaded, target)

@@ -27,8 +27,11 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
         with path.open("rb") as file:
             start = file.read(128)
         if h5py.is_hdf5(path):
-            with h5py.File(path, "r") as file:
-                return _stored(source, name, *matlab_hdf5.variables(source, file))
+            try:
+                with h5py.File(path, "r") as file:
+                    return _stored(source, name, *matlab_hdf5.variables(source, file))
+            except (OSError, RuntimeError, KeyError) as error:  # h5py's words for it are HDF5's own
+                source.refuse("is a file of version 7.3 (HDF5) that breaks off or is damaged", error)
         if not (start.startswith(b"MATLAB ") or 0 in start[:4]):
             source.refuse("is no .mat file: it begins neither as version 4, 5 or 7 nor as version 7.3 (HDF5)")
         if start.startswith(b"MATLAB 7.3"):

@@ -104,7 +104,7 @@ def _numbers(source: Source, item: Any, dimensions: int) -> Any:
     size, packed = item.size * item.dtype.itemsize, source.path.stat().st_size
     if size > _MOST_PACKED * packed:
         source.refuse(f"claims {item.size} values, for which the file is too small")
-    source.check_unpacked(size, packed)
+    source.check_unpacked(item.size * max(item.dtype.itemsize, 8), packed)  # as double precision
     values = item[()]
     if values.dtype.names == ("real", "imag"):
         values = values["real"] + 1j * values["imag"]

@@ -164,7 +164,7 @@ def _unpacked(source: Source, content: bytes, before: int) -> bytes:
     while content and not unpacker.eof:
         data += unpacker.decompress(content, _STEP)
         content = unpacker.unconsumed_tail
-        source.check_unpacked(before + len(data), source.path.stat().st_size)
+        source.check_unpacked(before + len(data), _size(source))
     if not unpacker.eof:
         source.refuse("a variable that is packed breaks off")
     return bytes(data)
@@ -215,9 +215,11 @@ def _fields_5(inner: _Elements) -> dict[str, Variable]:
 
 def _values_5(inner: _Elements, kind: str, shape: tuple[int, ...], is_complex: bool, source: Source) -> Loaded:
     """A full or sparse matrix. Raises CaseError."""
-    row = whole_numbers(source, inner.numbers(), "row indices") if kind == "sparse" else None
+    row = inner.numbers() if kind == "sparse" else None
     pointers = inner.numbers() if kind == "sparse" else None
     values = inner.numbers()
+    # Bytes in the file become double precision, complex before it is seen that they need not be.
+    source.check_unpacked((16 if is_complex else 8) * max(len(values), 0 if row is None else len(row)), _size(source))
     if is_complex:
         imaginary = inner.numbers()
         if len(imaginary) != len(values):
@@ -229,5 +231,10 @@ def _values_5(inner: _Elements, kind: str, shape: tuple[int, ...], is_complex: b
             source.refuse(f"has {len(values)} values for {shape[0]} rows and {shape[1]} columns")
         return _full(values.reshape(shape, order="F"), source)
     # There may be room for more entries than there are.
-    column = expanded(source, pointers, min(len(row), len(values)), size)
-    return assembled(source, row[: len(column)], column, values[: len(column)], (size, size))
+    held = whole_numbers(source, row, "row indices")
+    column = expanded(source, pointers, min(len(held), len(values)), size)
+    return assembled(source, held[: len(column)], column, values[: len(column)], (size, size))
+
+
+def _size(source: Source) -> int:
+    return source.path.stat().st_size

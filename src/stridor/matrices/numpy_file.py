@@ -5,6 +5,7 @@ Nothing is unpickled: arrays are made from their own bytes, after what a header 
 
 from __future__ import annotations
 
+import io
 import math
 import warnings
 import zipfile
@@ -28,6 +29,7 @@ _NEEDED = {
     "coo": ("row", "col"),
     "dia": ("offsets",),
 }
+_LONGEST_HEAD = 1 << 16
 _OBJECTS = "Python objects, which are never loaded; save sparse matrices by scipy.sparse.save_npz"
 _OF_SPARSE = {"data", "shape", "format", *(key for keys in _NEEDED.values() for key in keys)}
 
@@ -47,6 +49,9 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
                 file.seek(0)
                 array = _header(source, file, path.name).values(source, file, path.stat().st_size, path.name)
                 return StoredMatrix(from_dense(source, array), path.name)
+            file.seek(0)
+            if file.read(4) == b"PK\x03\x04" and not zipfile.is_zipfile(file):
+                source.refuse("is a .npz file that breaks off: its table of contents is missing")
             with zipfile.ZipFile(file) as archive:
                 return _from_archive(source, archive, name)
     except Exception as error:  # zipfile and its decompressors raise many kinds
@@ -69,7 +74,10 @@ def _from_archive(source: Source, archive: zipfile.ZipFile, name: str | None) ->
     def load(key: str) -> Any:
         with archive.open(members[key]) as file:
             found = _header(source, file, key)
-            source.of(key).check_unpacked(members[key].file_size, source.path.stat().st_size)
+            size = members[key].file_size
+            # Bytes become double precision; what is claimed without being there is told below.
+            numbers = math.prod(found.shape) if math.prod(found.shape) * found.dtype.itemsize <= size else 0
+            source.of(key).check_unpacked(max(size, 8 * numbers), source.path.stat().st_size)
             return found.values(source, file, members[key].file_size, key)
 
     if {"data", "shape"} <= set(members) and {"format", "indptr", "row", "offsets"} & set(members):
@@ -120,12 +128,16 @@ class _Header:
 
 
 def _header(source: Source, file: IO[bytes], key: str) -> _Header:
-    """The head of a .npy. Raises CaseError for a version that is not read."""
+    """The head of a .npy. Raises CaseError for a version that is not read, and for a head that is longer than any."""
     version = np.lib.format.read_magic(file)
     readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
     if version not in readers:
         source.refuse(f"{key} is written in version {version} of .npy; versions 1.0 and 2.0 are read")
-    return _Header(*readers[version](file))
+    length = file.read(2 if version == (1, 0) else 4)
+    claimed = int.from_bytes(length, "little")
+    if claimed > _LONGEST_HEAD:
+        source.refuse(f"{key} claims a head of {claimed} bytes; no array of numbers needs so many")
+    return _Header(*readers[version](io.BytesIO(length + file.read(claimed))))
 
 
 def _sparse(source: Source, arrays: Mapping[str, Any]) -> tuple[Sparse, tuple[str, ...]]:

@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import CaseError
+from ..reading import bounded
 from ..typing import IntArray, Sparse
 from .model import Labels, StoredMatrix
 from .numbers import fortran_number
@@ -47,7 +48,8 @@ def read_matrix(path: str | Path, name: str | None = None, *, where: str = "matr
     source = source_at(Path(path), where)
     module = import_module(f".{_module(source)}", __package__)
     try:
-        stored = cast("StoredMatrix", module.read(source.path, name, where))
+        with bounded():
+            stored = cast("StoredMatrix", module.read(source.path, name, where))
     except Exception as error:  # what nobody has foreseen
         source.unreadable("a matrix file", error)
     matrix = sp.csr_array(stored.matrix, dtype=np.float64)

@@ -100,10 +100,12 @@ def report(
     *,
     labels: Labels | None = None,
     stored: Sequence[StoredMatrix] = (),
+    stiffness_terms: Sequence[Sparse] = (),
 ) -> MatrixReport:
     """Looks through mass, damping and stiffness, each (n, n); no damping is zero damping.
 
-    labels: of the n freedoms. stored: the files the matrices are from, for what these say of themselves. Raises
+    labels: of the n freedoms. stored: the files the matrices are from, for what these say of themselves.
+    stiffness_terms: (n, n) each, what adds up to the stiffness, where that is known. Raises
     CaseError at "matrices.ROLE" for a matrix that is not square, of another size, or has entries that are not finite.
     """
     size = int(stiffness.shape[0])
@@ -131,7 +133,8 @@ def report(
     damping_kind, damping_negative = definiteness(c)
     if mass_kind == "positive definite" and empty["mass"].any():
         mass_kind = "positive semidefinite"
-    rank, exact, coupled = _coupling(k)
+    terms = [sp.csr_array(part[keep][:, keep]) if len(held) else part for part in stiffness_terms]
+    rank, exact, coupled = _coupling(terms or [k])
     own_m, own_k = m.diagonal(), k.diagonal()
     multipliers = int(np.sum(empty["mass"] & (own_k == 0) & ~empty["stiffness"]))
     frequencies = _frequencies(own_m, own_k)
@@ -174,7 +177,7 @@ def single_lines(stored: StoredMatrix) -> list[str]:
         f"{counted(int(matrix.nnz), 'entry', 'entries')}, {kind}" if matrix.nnz else "zero",
         f"the symmetric part is {_shown(*definiteness(matrix))}",
     ]
-    rank, exact, coupled = _coupling(matrix)
+    rank, exact, coupled = _coupling([matrix])
     if rank:
         lines.append(f"A − Aᵀ has rank {'' if exact else 'at most '}{rank}, in {counted(coupled, 'row', 'rows')}")
     return [*lines, *(f"read: {note}" for note in stored.notes)]
@@ -264,21 +267,36 @@ def _defect(matrix: Sparse) -> float:
     return float(np.linalg.norm(skew.data / largest) / np.linalg.norm(matrix.data / largest))
 
 
-def _coupling(stiffness: Sparse) -> tuple[int, bool, int]:
-    """Rank of K − Kᵀ without what is rounding, whether that is exact, and the number of its rows with entries."""
-    skew = sp.coo_array(stiffness - stiffness.T)
-    if not skew.nnz:
+def _coupling(parts: Sequence[Sparse]) -> tuple[int, bool, int]:
+    """Rank of K − Kᵀ without what is rounding, whether that is exact, and the number of its rows with entries.
+
+    K (n, n) is the sum of the parts, each a term with its factor: what is rounding is judged within each, so that
+    friction terms count the same by themselves as beside a stiffness a million times larger. Rows that hold nothing but
+    rounding are left out. Among the others single entries are not: without its smallest entries a matrix of rank 2 is
+    one of a higher rank. They are scaled by the largest entries l of their rows, S_ij/√(l_i l_j): each is known to
+    ROUNDING then, and all of them, as a norm, to ROUNDING √(number of entries).
+    """
+    total = sp.csr_array(parts[0].shape)
+    largest: Array = np.zeros(total.shape[0])
+    is_held = np.zeros(total.shape[0], dtype=bool)
+    for part in parts:
+        skew = sp.coo_array(part - part.T)
+        if not skew.nnz:
+            continue
+        sizes = abs(part)
+        own: Array = np.maximum(sizes.max(axis=1).toarray().ravel(), sizes.max(axis=0).toarray().ravel())
+        true = np.abs(skew.data) > ROUNDING * np.minimum(own[skew.row], own[skew.col])
+        if np.any(true):
+            is_held[skew.row[true]] = True
+            largest = np.maximum(largest, own)
+            total = sp.csr_array(total + skew)
+    held = np.flatnonzero(is_held)
+    if not len(held):
         return 0, True, 0
-    sizes = abs(stiffness)
-    largest: Array = np.maximum(sizes.max(axis=1).toarray().ravel(), sizes.max(axis=0).toarray().ravel())
-    true = np.abs(skew.data) > ROUNDING * np.minimum(largest[skew.row], largest[skew.col])
-    rows, columns, values = skew.row[true], skew.col[true], skew.data[true]
-    if not len(values):
-        return 0, True, 0
-    held = np.unique(rows)
-    small = sp.csr_array(
-        (values, (np.searchsorted(held, rows), np.searchsorted(held, columns))), shape=(len(held), len(held))
-    )
+    scale = sp.diags_array(1.0 / np.sqrt(largest[held]))
+    small = sp.csr_array(scale @ total[held][:, held] @ scale)
+    small.data[np.abs(small.data) <= np.finfo(float).eps] = 0.0
+    small.eliminate_zeros()
     count, part_of = connected_components(small, directed=False)
     members = np.bincount(part_of, minlength=count)
     order = np.argsort(part_of, kind="stable")
@@ -289,8 +307,7 @@ def _coupling(stiffness: Sparse) -> tuple[int, bool, int]:
         start += int(length)
         work += float(length) ** 3
         if work <= 1.1 * DENSE**3:
-            singular = la.svdvals(block.toarray())
-            rank += int(np.sum(singular > len(singular) * np.finfo(float).eps * singular[0]))
+            rank += int(np.sum(la.svdvals(block.toarray()) > ROUNDING * np.sqrt(max(block.nnz, 1))))
         else:
             exact = False
             rank += int(structural_rank(sp.csr_matrix(block)))

@@ -13,13 +13,14 @@ from typing import BinaryIO, NoReturn
 
 from ..errors import CaseError
 from ..mesh.paths import in_one_line, shown_path
+from ..reading import VARIABLE, irregular, largest_unfolded, size_words
 
 # Text packs to about a tenth; a file that unpacks to far more is broken, or was made to fill the memory.
 _TEXT_PACKED = 100
 _TEXT_UNQUESTIONED = 1 << 28
 # Full matrices of few entries pack to far less, but beyond this they ought to be stored as sparse ones.
 _FULL_PACKED = 50
-_FULL_UNQUESTIONED = 1 << 31
+_FULL_UNQUESTIONED = 1 << 30
 _GZIP = b"\x1f\x8b"
 _MARK = b"\xef\xbb\xbf"  # what Windows puts before UTF-8
 _START = 512
@@ -58,8 +59,11 @@ class Source:
 
     def check_unpacked(self, size: int, packed: int) -> None:
         """Raises CaseError for a full matrix whose bytes are far more than those that they are packed into."""
-        if size > max(_FULL_UNQUESTIONED, _FULL_PACKED * packed):
-            self.refuse(f"unpacks to {size / 2**30:.3g} GiB; store so large a matrix as a sparse one")
+        if size > largest_unfolded(packed, unquestioned=_FULL_UNQUESTIONED, times=_FULL_PACKED):
+            self.refuse(
+                f"unpacks to {size_words(size)} or more from {size_words(packed)}; store so large a matrix as a sparse "
+                f"one, or allow it by {VARIABLE} in the environment (GiB)"
+            )
 
     def contents(self, most: int = -1) -> bytes:
         """The file's bytes, unpacked: all, or so many from its beginning. Raises CaseError."""
@@ -99,7 +103,8 @@ class Source:
                         self.refuse("is not packed by gzip, as its name says; give it a name without .gz")
                     yield Stream(plain)
                     return
-                limit = max(_TEXT_UNQUESTIONED, _TEXT_PACKED * self.path.stat().st_size)
+                packed_size = self.path.stat().st_size
+                limit = largest_unfolded(packed_size, unquestioned=_TEXT_UNQUESTIONED, times=_TEXT_PACKED)
                 with gzip.GzipFile(fileobj=plain) as stream:
                     yield Stream(stream, self, limit)  # pyright: ignore[reportArgumentType]
         except (OSError, EOFError, zlib.error) as error:
@@ -126,7 +131,10 @@ class Stream:
     def _counted(self, data: bytes, source: Source) -> bytes:
         self._left -= len(data)
         if self._left < 0:
-            source.refuse(f"unpacks to more than {_TEXT_PACKED} times its size; unpack it and give the file itself")
+            source.refuse(
+                f"unpacks to far more than its size; unpack it and give the file itself, or allow it by {VARIABLE} in "
+                "the environment (GiB)"
+            )
         return data
 
 
@@ -136,14 +144,14 @@ def source_at(path: Path, where: str) -> Source:
     try:
         if path.is_dir():
             source.refuse("is a folder; must be a file")
-        if not path.exists():
-            source.refuse("no such file")
-        if not path.is_file():
-            source.refuse("is no regular file")
+        if reason := irregular(path):
+            source.refuse(reason)
         if path.stat().st_size == 0:
             source.refuse("the file is empty (0 bytes)")
         with path.open("rb"):
             pass
+    except FileNotFoundError:
+        source.refuse("no such file")
     except (OSError, ValueError) as error:  # ValueError: a name with a NUL
         source.refuse(f"cannot be read: {in_one_line(error)}", error)
     return source
@@ -152,7 +160,8 @@ def source_at(path: Path, where: str) -> Source:
 def beside(source: Source, *names: str) -> Source | None:
     """The first file of these names in the folder of another that is there."""
     paths = (source.path.with_name(name) for name in names)
-    return next((Source(p, source.where) for p in paths if p.is_file() and p != source.path), None)
+    found = next((p for p in paths if p.is_file() and p != source.path), None)
+    return None if found is None else source_at(found, source.where)
 
 
 def printable(raw: str | bytes) -> str:

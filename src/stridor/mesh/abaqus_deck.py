@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import NoReturn
 
 from ..errors import CaseError
+from ..reading import irregular
 from .paths import in_one_line
 
 # A keyword line that ends in a comma goes on in the next line, if that holds parameters: some programs end every line
 # in a comma.
 _WITHOUT_VALUE = ("GENERATE", "INTERNAL", "UNSORTED")
+LARGEST_NUMBER = 2**31 - 1  # of nodes and elements
 _DATA_FROM_FILES = ("NODE", "ELEMENT", "NSET", "ELSET")
 
 
@@ -40,14 +42,16 @@ class Line:
             found.pop()
         return found
 
-    def whole(self, text: str, what: str) -> int:
+    def whole(self, text: str, what: str, largest: int = LARGEST_NUMBER) -> int:
         """A positive whole number. Raises CaseError."""
         try:
-            if "_" not in text and (value := int(text)) > 0:
+            if len(text) < 40 and "_" not in text and 0 < (value := int(text)) <= largest:
                 return value
         except ValueError:
             pass
-        self.refuse(f"{text!r} is not {what}, a whole number from 1")
+        most = f" to {LARGEST_NUMBER}" if len(text) > 9 and text.isdecimal() else ""
+        given = text if len(text) <= 40 else f"{text[:39]}…"
+        self.refuse(f"{given!r} is not {what}, a whole number from 1{most}")
 
     def number_of(self, text: str, what: str) -> float:
         """A finite number, also as Fortran writes it (1.D0); nothing is 0. Raises CaseError."""
@@ -139,11 +143,12 @@ def _lines(file: Path, asked: Line | None) -> list[Line]:
     """Lines of a file that are neither empty nor comments. asked: the line that includes it, for the message."""
     content = b""
     try:
-        if file.is_file():
+        reason = irregular(file) or ""
+        if not reason:
             content = file.read_bytes()
             reason = "not a text file" if b"\0" in content else ""
-        else:
-            reason = "no such file"
+    except FileNotFoundError:
+        reason = "no such file"
     except (OSError, ValueError) as error:
         reason = in_one_line(error)
     if reason:

@@ -144,7 +144,7 @@ class Collector:
     def _generated(self, table: str, body: int, line: Line) -> IntArray:
         """Those that exist of first, last, step."""
         what = "the number of a node" if table == "NSET" else "the number of an element"
-        numbers = [line.whole(f, what) for f in line.fields]
+        numbers = [line.whole(f, what, largest=10**30) for f in line.fields]  # ranges may go on for ever
         if len(numbers) not in (2, 3):
             line.refuse("with GENERATE a line is: first, last, step")
         chosen = range(numbers[0], numbers[1] + 1, *numbers[2:])

@@ -18,11 +18,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import CaseError
+from ..reading import bounded
 from ..typing import IntArray
 from .abaqus import read_abaqus
 from .boundary import require_boundary as require_boundary
 from .boundary import require_nodes as require_nodes
+from .claims import check_claims
 from .gather import Contents, gather
+from .gmsh_numbers import check_numbers
 from .kinds import KINDS
 from .model import Mesh
 from .paths import check_file, in_one_line, shown_path
@@ -54,15 +57,22 @@ def read_mesh(
     """
     file = Path(path)
     suffix = check_file(file, f"{where}.file", SUFFIXES)
-    if suffix == ".inp":
-        return read_abaqus(file, scale=scale, group=group, where=where).mesh
-    raw = _through_meshio(file, suffix, f"{where}.file")
     try:
-        contents = _gmsh_contents(raw) if suffix == ".msh" else _vtk_contents(raw)
-    except (ValueError, IndexError, KeyError, TypeError) as error:
-        text = f"is not readable as {_LOOKS[suffix]}: {in_one_line(error)}"
+        with bounded():
+            if suffix == ".inp":
+                return read_abaqus(file, scale=scale, group=group, where=where).mesh
+            check_claims(file, suffix, f"{where}.file")
+            if suffix == ".msh":
+                check_numbers(file, f"{where}.file")
+            raw = _through_meshio(file, suffix, f"{where}.file")
+            contents = _gmsh_contents(raw) if suffix == ".msh" else _vtk_contents(raw)
+            return gather(contents, source=file.name, where=where, group=group, scale=scale)
+    except MemoryError as error:
+        text = "needs more memory than there is; is it broken, or made to look larger than it is?"
         raise CaseError(f"{where}.file", shown_path(file), text) from error
-    return gather(contents, source=file.name, where=where, group=group, scale=scale)
+    except (ValueError, IndexError, KeyError, TypeError, OverflowError, AttributeError) as error:
+        text = f"is not readable as {_LOOKS.get(suffix, 'an Abaqus input file')}: {in_one_line(error)}"
+        raise CaseError(f"{where}.file", shown_path(file), text) from error
 
 
 def _through_meshio(file: Path, suffix: str, where: str) -> Any:
@@ -74,6 +84,8 @@ def _through_meshio(file: Path, suffix: str, where: str) -> Any:
             warnings.filterwarnings("error", message="string or file could not be read", category=DeprecationWarning)
             # The format's own reader: meshio.read() would exit the interpreter where that raises.
             return importlib.import_module(_MODULES[suffix]).read(str(file))
+    except MemoryError:
+        raise
     except (Exception, SystemExit) as error:
         reason = in_one_line(error) or " ".join(said.getvalue().split())
         if "could not be read to its end" in reason:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import CaseError
+from ..reading import irregular
 
 _LONGEST = 120
 _LONGEST_PATH = 56
@@ -18,14 +19,14 @@ def check_file(file: Path, where: str, suffixes: tuple[str, ...]) -> str:
             raise CaseError(where, shown_path(file), f"is a folder; must be a mesh file: {', '.join(suffixes)}")
         if suffix not in suffixes:
             raise CaseError(where, shown_path(file), f"is no mesh file by its suffix; accepted: {', '.join(suffixes)}")
-        if not file.exists():
-            raise CaseError(where, shown_path(file), "no such file")
-        if not file.is_file():
-            raise CaseError(where, shown_path(file), "is no regular file")
+        if reason := irregular(file):
+            raise CaseError(where, shown_path(file), reason)
         if file.stat().st_size == 0:
             raise CaseError(where, shown_path(file), "the file is empty (0 bytes)")
         with file.open("rb"):
             pass
+    except FileNotFoundError:
+        raise CaseError(where, shown_path(file), "no such file") from None
     except (OSError, ValueError) as error:  # ValueError: a name with a NUL
         raise CaseError(where, shown_path(file), f"cannot be read: {in_one_line(error)}") from error
     return suffix

@@ -161,7 +161,8 @@ def _cell_problems(mesh: Mesh, where: str) -> list[Problem]:
     if degenerate:
         text = f"{degenerate} of {mesh.cell_count} cells are degenerate (zero Jacobian: flat, or nodes at one place)"
         problems.append(Problem(where, None, f"{text}; {_first(*first['degenerate'])}"))
-    return [*problems, *_duplicate_problems(mesh, where)]
+    problems += _duplicate_problems(mesh, where)
+    return problems or _overlap_problems(mesh, where)
 
 
 def _duplicate_problems(mesh: Mesh, where: str) -> list[Problem]:
@@ -179,6 +180,35 @@ def _duplicate_problems(mesh: Mesh, where: str) -> list[Problem]:
             text = f"{len(again)} of {mesh.cell_count} cells have the nodes of another cell"
             problems.append(Problem(where, None, f"{text}; {_first(kind, cell, place)}; take them out of the file"))
     return problems
+
+
+def _overlap_problems(mesh: Mesh, where: str) -> list[Problem]:
+    """Sides that two cells pass in the same direction, with which both lie on the same side of it: they overlap.
+
+    For cells that are not inverted only: outward sides of neighbours run round in opposite directions.
+    """
+    mark = np.random.default_rng(1).integers(0, 2**62, len(mesh.points), dtype=np.uint64)
+    keys: list[IntArray] = []
+    places: list[Array] = []
+    for kind, facets in cell_facets(mesh.cells, mesh.points).nodes.items():
+        corners = facets[:, : FACET_CORNERS[kind]]
+        lowest, each = corners.argmin(axis=1), np.arange(len(corners))
+        count = corners.shape[1]
+        if count == 2:
+            sense = corners[:, 0] < corners[:, 1]
+        else:
+            sense = corners[each, (lowest + 1) % count] < corners[each, (lowest - 1) % count]
+        keys.append(2 * mark[corners].sum(axis=1, dtype=np.uint64) + sense.astype(np.uint64))
+        places.append(mesh.points[corners].mean(axis=1))
+    key = np.concatenate(keys)
+    order = np.argsort(key, kind="stable")
+    again = order[1:][key[order[1:]] == key[order[:-1]]]
+    if not len(again):
+        return []
+    side = "edges have two cells" if mesh.dimension == 2 else "faces have two cells"
+    place = _place(np.concatenate(places)[int(again.min())])
+    text = f"{len(again)} {side} on the same side of them, which overlap; the first is about {place}"
+    return [Problem(where, None, f"{text}; mesh the body anew, or take one of the cells out of the file")]
 
 
 def _facet_problems(mesh: Mesh, where: str) -> list[Problem]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import scipy.sparse as sp
+
 from ..case import Case
 from ..errors import CaseError
 from ..matrices.report import MatrixReport, report
@@ -29,7 +31,11 @@ def matrix_reports(case: Case, mu: float | None = None) -> dict[str, BodyReport]
     found: dict[str, BodyReport] = {}
     for name, body in case.imported.items():
         terms = load_terms(case, name, body, mu)
-        matrices = report(terms.mass, terms.damping, terms.stiffness, labels=terms.labels, stored=terms.stored)
+        pairs = zip(terms.shares, terms.values, strict=True)
+        matrices = report(
+            terms.mass, terms.damping, terms.stiffness, labels=terms.labels, stored=terms.stored,
+            stiffness_terms=[sp.csr_array(value * share.matrix) for share, value in pairs if share.role == "stiffness"],
+        )  # fmt: skip
         notes = dict.fromkeys(f"{s.source}: {note}" for s in terms.stored for note in s.notes)
         found[name] = BodyReport(matrices, tuple(notes))
     return found

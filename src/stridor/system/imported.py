@@ -45,7 +45,7 @@ class Share:
 class Terms:
     """Summed matrices (n, n) of a body by role in the order of the files' freedoms, in SI units; labels of the
     freedoms, None where nothing names them; stored: the files, each with the role it is used in; shares: the terms that
-    were summed."""
+    were summed; values: of their factors."""
 
     mass: Sparse
     damping: Sparse
@@ -53,6 +53,7 @@ class Terms:
     labels: Labels | None
     stored: tuple[StoredMatrix, ...]
     shares: tuple[Share, ...]
+    values: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -154,11 +155,13 @@ def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None)
         matrices = [_in_metres(matrix, labels, body.scale) for matrix in matrices]
     sums = {role: sp.csr_array((size, size)) for role in ROLES}
     shares: list[Share] = []
+    values: list[float] = []
     for k, (term, role, matrix) in enumerate(zip(body.terms, roles, matrices, strict=True)):
         factor = _factor(case, term, mu, f"{where}.terms.{k}.factor")
         sums[role] = sp.csr_array(sums[role] + factor * matrix)
         shares.append(Share(role, matrix, term.factor))
-    return Terms(sums["mass"], sums["damping"], sums["stiffness"], labels, tuple(stored), tuple(shares))
+        values.append(factor)
+    return Terms(sums["mass"], sums["damping"], sums["stiffness"], labels, tuple(stored), tuple(shares), tuple(values))
 
 
 def is_symmetric(matrix: Sparse) -> bool:

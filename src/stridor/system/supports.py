@@ -15,10 +15,11 @@ from ..case.schema import Rotation
 from ..case.schema import Tie as TieCase
 from ..contact.curve import Curve
 from ..contact.facets import FacetSurface
-from ..contact.ties import Bond, Tie, tie_transformation
+from ..contact.ties import Bond, Tie, check_facing, tie_transformation
 from ..contact.ties import tie as tie_weights
 from ..errors import CaseError
-from ..mesh.boundary import require_boundary
+from ..mesh.boundary import facets_within, require_boundary
+from ..mesh.facets import nodal_normals
 from ..mesh.model import Mesh
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .bodies import BuiltBody
@@ -169,14 +170,19 @@ def _bond(case: Case, bodies: dict[str, BuiltBody], where: str, tie: TieCase) ->
     nodes = boundary_nodes(slave, slave_at, f"{where}.slave")
     assert master.mesh is not None, "checked: boundaries belong to meshes"
     surface, master_nodes = master_surface(master.mesh, master_at.boundary, f"{where}.master")
-    tolerance = tie.tolerance if tie.tolerance is not None else 0.05 * _edge(master.points[master_nodes])
+    edge = _edge(master.points[master_nodes])
+    tolerance = tie.tolerance if tie.tolerance is not None else 0.05 * edge
     points, rotation = slave.points[nodes], None
+    assert slave.mesh is not None, "checked: boundaries belong to meshes"
+    normals = _outward(slave.mesh, slave_at.boundary, nodes)
     if tie.translation is not None:
         points = points - np.array(tie.translation)
     elif tie.rotation is not None:
         rotation, centre = turn_of(tie.rotation, slave.dimension)
         points = (points - centre) @ rotation + centre  # Rᵀ(x − c) + c, row by row
+        normals = normals @ rotation
     weights = tie_weights(points, surface, where=where, tolerance=tolerance)
+    check_facing(points, normals, surface, weights, where=where, limit=max(edge, _edge(slave.points[nodes])))
     bond = Bond(where, weights, slave.displacements(nodes), master.displacements(master_nodes), rotation)
     own = (bond.master[weights.nodes] == bond.slave[:, None, :]).any(axis=2) & (weights.weights != 0.0)
     if own.any():
@@ -238,6 +244,19 @@ def _free_of_supports(bond: Bond, held: set[int]) -> Bond:
         )
         raise CaseError(bond.where, None, accepted)
     return _only(bond, keep)
+
+
+def _outward(mesh: Mesh, boundary: str, nodes: IntArray) -> Array:
+    """Outward unit normals (s, d) at nodes of a boundary, or of the whole sides within a node set; NaN elsewhere."""
+    facets = mesh.boundaries.get(boundary)
+    if facets is None:
+        facets = facets_within(mesh.cells, mesh.points, mesh.node_sets[boundary])
+    if not facets:
+        return np.full((len(nodes), mesh.dimension), np.nan)
+    normals = np.full(mesh.points.shape, np.nan)
+    found = np.unique(np.concatenate([f.ravel() for f in facets.values()]))
+    normals[found] = nodal_normals(mesh.points, facets)[found]
+    return normals[nodes]
 
 
 def _edge(points: Array) -> float:

@@ -1,0 +1,252 @@
+"""Numbers of nodes that no node has, elements that overlap, ties that bond nothing: each with the line or the place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+import stridor as st
+from stridor.contact.curve import Curve
+from stridor.contact.ties import check_facing, tie
+from stridor.errors import CaseError
+from stridor.mesh.files import read_mesh
+from stridor.mesh.model import Mesh
+from stridor.mesh.quality import check_mesh
+from stridor.mesh.shapes import block, rectangle
+
+pytestmark = pytest.mark.bad_input
+
+OLD = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$Nodes
+5
+1 0 0 0
+2 1 0 0
+3 1 1 0
+4 0 1 0
+5 2 0 0
+$EndNodes
+$Elements
+3
+1 2 2 1 1 1 2 3
+2 2 2 1 1 1 3 4
+3 2 2 1 1 2 5 3
+$EndElements
+"""
+NEW = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$Nodes
+1 5 1 5
+2 1 0 5
+1
+2
+3
+4
+5
+0 0 0
+1 0 0
+1 1 0
+0 1 0
+2 0 0
+$EndNodes
+$Elements
+1 3 1 3
+2 1 2 3
+1 1 2 3
+2 1 3 4
+3 2 5 3
+$EndElements
+"""
+DECK = "*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n*ELEMENT,TYPE=CPS3\n1,1,2,3\n2,1,3,4\n"
+FILES = {"old.msh": (OLD, "1 1 2 5 3", "2 5 3"), "new.msh": (NEW, "\n3 2 5 3\n", "2 5 3")}
+
+
+def told(path: Path, content: str | bytes) -> str:
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    with pytest.raises(CaseError) as caught:
+        check_mesh(read_mesh(path), "mesh")
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("number", ["0", "-1", "6", "77", "4294967297", "99999999999999999999999"])
+def test_an_element_of_a_node_that_is_not_there(name, number, tmp_path):
+    """Node 0 was taken for the last one: an array's place −1."""
+    text, line, nodes = FILES[name]
+    path = tmp_path / name
+    path.write_text(text)
+    assert read_mesh(path).cell_count == 3
+    wrong = text.replace(line, line.replace(nodes, f"2 {number} 3"))
+    at = wrong.split("\n").index(next(w for w in wrong.split("\n") if f"2 {number} 3" in w)) + 1
+    message = told(path, wrong)
+    assert message.startswith(f"{name}, line {at}: ")
+    assert f"uses node {number}, which is not defined" in message
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        ("0", "nodes are numbered from 1 to 2147483647"),
+        ("-3", "nodes are numbered from 1"),
+        ("4", "node 4 is there twice"),
+        ("2147483648", "nodes are numbered from 1 to 2147483647"),
+        ("1" + "0" * 30, "nodes are numbered from 1 to 2147483647"),
+        ("2000000000", "node 2000000000 among 5 nodes: number them closer to one another"),
+    ],
+)
+def test_nodes_with_numbers_that_cannot_be(name, number, words, tmp_path):
+    text = FILES[name][0]
+    lines = text.split("\n")
+    at = lines.index("5 2 0 0" if name == "old.msh" else "5", 6)
+    lines[at] = f"{number}{lines[at][1:]}"
+    wrong = "\n".join(lines).replace("2 5 3", f"2 {number} 3")
+    message = told(tmp_path / name, wrong)
+    assert message.startswith(f"{name}, line {at + 1}: ")
+    assert words in message
+
+
+@pytest.mark.parametrize("form", ["gmsh22", "gmsh"])
+@pytest.mark.parametrize("number", [-1, -5, 7])
+def test_binary_files(form, number, tmp_path):
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    path = tmp_path / "a.msh"
+    for cells in ([[0, 1, 2], [0, 2, 3]], [[0, 1, 2], [0, 2, number]]):
+        data = {"gmsh:dim_tags": np.array([[2, 1]] * 4)} if form == "gmsh" else {}
+        mesh = meshio.Mesh(points, [("triangle", np.array(cells))], point_data=data)
+        if form == "gmsh":
+            mesh.cell_data |= {f"gmsh:{k}": [np.ones(2, dtype=int)] for k in ("geometrical", "physical")}
+        mesh.write(path, file_format=form, binary=True)
+        if cells[1][2] == 3:
+            assert read_mesh(path).cell_count == 2
+    assert f"uses node {number + 1}, which is not defined" in told(path, path.read_bytes())
+
+
+def test_format_4_0_is_not_guessed_at(tmp_path):
+    message = told(tmp_path / "a.msh", NEW.replace("4.1 0 8", "4.0 0 8"))
+    assert "is of Gmsh's format 4.0; save it from Gmsh as 4.1 or 2.2" in message
+
+
+@pytest.mark.parametrize("number", ["0", "-1", "5", "1" + "0" * 30, "2147483648"])
+def test_abaqus(number, tmp_path):
+    message = told(tmp_path / "a.inp", DECK.replace("2,1,3,4", f"2,1,3,{number}"))
+    assert message.startswith(("a.inp, line 8: ", f"a.inp, line 8: '2,1,3,{number}'"))
+    message = told(tmp_path / "a.inp", DECK.replace("4,0,1\n", f"{number},0,1\n"))
+    assert message.startswith(("a.inp, line 5: ", "a.inp, line 8: "))
+
+
+@pytest.mark.parametrize("number", [-1, 3, 2**31])
+def test_vtk(number, tmp_path):
+    points = "0 0 0 1 0 0 0 1 0"
+    text = f"# vtk DataFile Version 3.0\na\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 double\n{points}\n"
+    told(tmp_path / "a.vtk", f"{text}CELLS 1 4\n3 0 1 {number}\nCELL_TYPES 1\n5\n")
+
+
+# -- overlapping elements ---------------------------------------------------------------------------------------------
+def test_two_cells_on_one_side_of_an_edge():
+    points = np.array([[0.0, 0], [1, 0], [0.5, 1], [0.4, 0.6], [0.5, -1]])
+    good = Mesh(points[[0, 1, 2, 4]], {"triangle": np.array([[0, 1, 2], [1, 0, 3]])})
+    check_mesh(good, "mesh")
+    wrong = Mesh(points[:4], {"triangle": np.array([[0, 1, 2], [0, 1, 3]])})
+    with pytest.raises(CaseError) as caught:
+        check_mesh(wrong, "bodies.pad")
+    assert str(caught.value) == (
+        "bodies.pad: 1 edges have two cells on the same side of them, which overlap; the first is about (0.5, 0); "
+        "mesh the body anew, or take one of the cells out of the file"
+    )
+    # Of different kinds, too: a quadrilateral and a quadratic triangle.
+    more = np.vstack([points[:2], [[1.0, 1], [0, 1], [0.5, 0.5], [0.5, 0], [0.8, 0.3], [0.2, 0.3]]])
+    mixed = {"quad": np.array([[0, 1, 2, 3]]), "triangle6": np.array([[0, 1, 4, 5, 6, 7]])}
+    with pytest.raises(CaseError, match="1 edges have two cells on the same side"):
+        check_mesh(Mesh(more, mixed), "mesh")
+
+
+@pytest.mark.parametrize("kind", ["tetra", "hexahedron", "tetra10", "hexahedron20"])
+def test_two_cells_on_one_side_of_a_face(kind):
+    base = "tetra" if kind.startswith("tetra") else "hexahedron"
+    mesh = block((0, 0, 0), (1, 1, 1), (2, 2, 1), kind=base, order=1 if kind == base else 2)
+    check_mesh(mesh, "mesh")
+    cells = mesh.cells[kind]
+    chosen = cells[0]
+    face = chosen[:3] if base == "tetra" else chosen[:4]
+    # The same cell once more, other nodes but for one face, pushed a little into itself.
+    other = chosen.copy()
+    points = [*mesh.points]
+    centre = mesh.points[chosen].mean(axis=0)
+    middle = mesh.points[face].mean(axis=0)
+    for place, node in enumerate(chosen):
+        if node not in face:
+            other[place] = len(points)
+            points.append(middle + 0.8 * (mesh.points[node] - middle) if node not in face else centre)
+    wrong = Mesh(np.array(points), {kind: np.vstack([cells, other[None]])})
+    with pytest.raises(CaseError, match="faces have two cells on the same side of them, which overlap"):
+        check_mesh(wrong, "mesh")
+
+
+@pytest.mark.parametrize("kind", ["quad", "triangle"])
+@pytest.mark.parametrize("order", [1, 2])
+def test_sound_meshes_pass(kind, order):
+    check_mesh(rectangle((0, 0), (1, 1), (4, 3), kind=kind, order=order), "mesh")
+
+
+# -- ties -------------------------------------------------------------------------------------------------------------
+TIED = """
+materials.steel = {{ young_modulus = 200e9, density = 7800.0, poisson_ratio = 0.3 }}
+[bodies.lower]
+type = "solid"
+model = "plane strain"
+material = "steel"
+mesh = {{ shape = "rectangle", corner = [0.0, 0.0], size = [1.0, 1.0], divisions = [5, 5], cells = "quad" }}
+[bodies.upper]
+type = "solid"
+model = "plane strain"
+material = "steel"
+mesh = {{ shape = "rectangle", corner = [0.0, {height}], size = [1.0, 1.0], divisions = [4, 4], cells = "quad" }}
+[supports.ground]
+at = "lower.{held}"
+fixed = ["x", "y"]
+[ties.bond]
+slave = "upper.{slave}"
+master = "lower.{master}"
+tolerance = {tolerance}
+"""
+
+
+def tied(**given) -> str:
+    values = {"height": 1.0, "held": "bottom", "slave": "bottom", "master": "top", "tolerance": 5.0} | given
+    case = st.loads(TIED.format(**values))
+    try:
+        st.build_system(case)
+    except CaseError as error:
+        return str(error)
+    return ""
+
+
+def test_ties_bond_surfaces_that_touch_and_face_each_other():
+    assert tied() == ""
+    assert tied(height=1.1) == ""  # within an element
+    message = tied(height=1.5)
+    assert "ties.bond: the slave node at" in message
+    assert "0.5 m from the master, more than an element (0.25 m); a tie bonds surfaces that touch" in message
+    assert "3 m from the master, more than an element" in tied(height=3.0, slave="top")
+    away = tied(height=0.9, slave="top", master="top", tolerance=1.0)
+    assert "more than an element" in away
+    same = tied(height=0.1, slave="top", master="top", tolerance=0.2)
+    assert "at 5 of 5 slave nodes both surfaces face the same way, first at" in same
+    assert "is it the boundary on the other side of a body?" in same
+
+
+def test_nodes_without_a_normal_are_bonded_by_distance_alone():
+    points = np.array([[1.0, 0.0], [0.5, 0.0], [0.0, 0.0]])
+    curve = Curve.from_facets(points, {"line": np.array([[0, 1], [1, 2]])}, where="w")
+    slaves = np.array([[0.3, 0.01]])
+    found = tie(slaves, curve, where="w", tolerance=0.1)
+    check_facing(slaves, np.full((1, 2), np.nan), curve, found, where="w", limit=0.5)
+    check_facing(slaves, np.array([[0.0, -1.0]]), curve, found, where="w", limit=0.5)
+    with pytest.raises(CaseError, match="face the same way"):
+        check_facing(slaves, np.array([[0.0, 1.0]]), curve, found, where="w", limit=0.5)
