@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 import stridor as st
 from stridor.case import loads
-from stridor.errors import CaseError
+from stridor.errors import AnalysisError, CaseError
 from stridor.system import System
 
 STEEL = "materials.steel = { young_modulus = 200e9, density = 7800.0, poisson_ratio = RATIO }\n"
@@ -249,6 +249,32 @@ friction = { law = "coulomb", coefficient = 0.3 }
     sector = st.steady_sliding(loads(part))
     assert 6.0 * sector.normal_force.sum() == pytest.approx(whole.normal_force.sum(), rel=1e-9)
     assert sector.normal_force.max() == pytest.approx(whole.normal_force.max(), rel=1e-9)
+
+
+def test_rigid_contact_over_both_sides_is_named() -> None:
+    """The slave nodes at both ends are one; with a stiffness each takes half of the area of a node between."""
+    wall = """
+[bodies.flat]
+type = "obstacle"
+shape = "flat"
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+sliding = { velocity = [1.0, 0.0] }
+[loads.press]
+at = "bar.top"
+pressure = 1e5
+[contacts.rub]
+slave = "bar.bottom"
+master = "flat"
+stiffness = 1e12
+friction = { law = "coulomb", coefficient = 0.2 }
+"""
+    text = bar(4, "quad", wall).replace('[supports.low]\nat = "bar.bottom"\nfixed = ["y"]\n', "")
+    text = text.replace('at = "bar.top"\nfixed = ["y"]', 'at = "bar.top"\nfixed = ["x"]')
+    force = st.steady_sliding(loads(text)).normal_force
+    assert force == pytest.approx(1e5 * 0.01 * 0.05 * np.array([0.5, 1, 1, 1, 0.5]), rel=1e-9)
+    with pytest.raises(AnalysisError, match=r"1 of the 5 .* \(contacts\.rub, ties\.period\)"):
+        st.steady_sliding(loads(text.replace("1e12", '"rigid"')))
 
 
 @pytest.mark.parametrize(
