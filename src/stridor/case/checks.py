@@ -214,6 +214,9 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
         if contact.interference and contact.sliding == "finite":
             accepted = 'needs sliding = "small": finite sliding finds the gaps anew from the places of the nodes'
             yield Problem(f"{where}.interference", contact.interference, accepted)
+        if contact.cubic and contact.stiffness == "rigid":
+            accepted = "nothing – rigid contact has no approach to take the cube of; give the contact a stiffness"
+            yield Problem(f"{where}.cubic", contact.cubic, accepted)
         pair = frozenset((contact.slave, contact.master))
         if pair in pairs:
             accepted = f"slides on {contact.master} in contacts.{pairs[pair]} already"

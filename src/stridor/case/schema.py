@@ -225,6 +225,10 @@ class Contact(Table):
     stiffness: Positive | Literal["rigid"] = Field(
         description='a number > 0 [N/m], between boundaries per area [N/m³], or "rigid", the normal stiffness'
     )
+    cubic: NotNegative = Field(
+        default=0.0,
+        description="a number >= 0 [N/m³], between boundaries per area [N/m⁵], the factor of the cube of the approach",
+    )
     sliding: Literal["small", "finite"] = Field(
         default="small", description='"small" (the slave stays where it is on the master) or "finite"'
     )

@@ -25,7 +25,9 @@ class ContactNodes:
     the d − 1 tangents; rows i (d−1) + k of tangent belong to node i. normal_lift (m, p) and tangent_lift ((d−1) m, p)
     do so for the prescribed motions. gap (m,) [m] in the reference configuration. area (m,) [m²] is the part of the
     slave surface a node stands for, NaN for a point contact. compliance (m,) [m/N] is one over contact stiffness
-    (stiffness per area times area), 0 for rigid contact. position (m, d) [m], normals (m, d), tangents (m, d−1, d).
+    (stiffness per area times area), 0 for rigid contact. cubic (m,) [N/m³] is the factor of the cube of the approach in
+    the normal force, p = δ/compliance + cubic δ³, zero where left out and where contact is rigid. position (m, d) [m],
+    normals (m, d), tangents (m, d−1, d).
     """
 
     names: tuple[str, ...]
@@ -41,6 +43,11 @@ class ContactNodes:
     position: Array
     normals: Array
     tangents: Array
+    cubic: Array = None  # type: ignore[assignment]  # filled in __post_init__
+
+    def __post_init__(self) -> None:
+        if self.cubic is None:  # pyright: ignore[reportUnnecessaryComparison]
+            object.__setattr__(self, "cubic", np.zeros(len(self.gap)))
 
     @property
     def count(self) -> int:
@@ -75,6 +82,15 @@ class ContactNodes:
         pick = sp.csr_array((direction.ravel(), (rows, np.arange(count * d))), shape=(count, count * d))
         return sp.csr_array(pick @ self.tangent)
 
+    def at_force(self, normal_force: Array) -> ContactNodes:
+        """The same contacts with the compliance (m,) of small motions about normal forces (m,) [N]."""
+        if not np.any(self.cubic):
+            return self
+        stiffness = np.divide(1.0, self.compliance, out=np.zeros(self.count), where=self.compliance > 0)
+        tangent = stiffness + 3 * self.cubic * approach(np.maximum(normal_force, 0.0), stiffness, self.cubic) ** 2
+        soft = np.divide(1.0, tangent, out=np.zeros(self.count), where=tangent > 0)
+        return replace(self, compliance=np.where(self.cubic > 0, soft, self.compliance))
+
     def select(self, chosen: BoolArray | IntArray) -> ContactNodes:
         """The same contacts with only some of their nodes."""
         index = np.flatnonzero(chosen) if np.asarray(chosen).dtype == bool else np.asarray(chosen)
@@ -93,6 +109,7 @@ class ContactNodes:
             position=self.position[index],
             normals=self.normals[index],
             tangents=self.tangents[index],
+            cubic=self.cubic[index],
         )
 
 
@@ -134,4 +151,17 @@ def stack(parts: Sequence[ContactNodes], freedoms: int, motions: int, dimension:
         position=joined("position"),
         normals=joined("normals"),
         tangents=joined("tangents"),
+        cubic=joined("cubic"),
     )
+
+
+def approach(force: Array, stiffness: Array, cubic: Array) -> Array:
+    """δ (m,) [m] ≥ 0 with k δ + k₃ δ³ = p for forces p (m,) ≥ 0 [N], zero where there is no cubic term.
+
+    The one real root in hyperbolic functions: δ = 2a sinh(⅓ asinh(3p/2ka)), a = √(k/3k₃).
+    """
+    found = np.zeros(len(force))
+    chosen = cubic > 0
+    scale = np.sqrt(stiffness[chosen] / (3 * cubic[chosen]))
+    found[chosen] = 2 * scale * np.sinh(np.arcsinh(1.5 * force[chosen] / (stiffness[chosen] * scale)) / 3)
+    return found

@@ -25,6 +25,7 @@ import scipy.sparse as sp
 
 from ..direct import Factor, SingularMatrix, factorise
 from ..errors import AnalysisError, CaseError
+from ..sliding import steady_sliding_nodes
 from ..system import System
 from ..typing import Array, BoolArray, ComplexArray, IntArray, Sparse
 from .assembled import Options
@@ -123,9 +124,12 @@ def terms_of(system: System, mu: float, held: Held, options: Options) -> Terms:
     nodes = system.contact_nodes()
     if (system.size, nodes.count) != (held.size, held.nodes):
         raise CaseError("parameter", None, "a number that changes neither the mesh nor who is in contact")
-    rows = contact_rows(nodes, held.touching, held.sense, held.stuck)
+    shown = nodes
+    if np.any(nodes.cubic[held.touching] > 0):
+        shown = nodes.at_force(steady_sliding_nodes(system, mu=mu, solver=options.solver).normal_force)
+    rows = contact_rows(shown, held.touching, held.sense, held.stuck)
     slide = rows.slide
-    state = steadiness(system, nodes, held.touching, options, held=len(rows.compliance) - len(held.touching))
+    state = steadiness(system, nodes, held.touching, options, rows)
     damping, stiffness = system.damping, system.stiffness
     if not state.neutral and (mu or state.prestress):
         weakening, extra, geometric = state.terms(mu)
@@ -148,12 +152,13 @@ def by_friction(
     """
     nodes = system.contact_nodes()
     chosen = nodes.select(held.touching)
-    if not steadiness(system, nodes, held.touching, options).neutral:
+    rows = contact_rows(nodes, held.touching, held.sense, held.stuck)
+    if not steadiness(system, nodes, held.touching, options, rows).neutral:
         if contact is not None:
             accepted = "mu, of all contacts together, since the law's slope, friction damping or prestress count"
             raise CaseError(f"contacts.{contact}.friction.coefficient", None, accepted)
         return rate_of(lambda value: terms_of(system, value, held, options), mu)[0]
-    slide = contact_rows(nodes, held.touching, held.sense, held.stuck).slide
+    slide = rows.slide
     if contact is not None:
         mine = np.zeros(slide.shape[0])
         mine[: chosen.count] = chosen.owner == nodes.names.index(contact)
@@ -165,6 +170,9 @@ def by_compliance(system: System, held: Held, contact: str) -> Terms:
     """Change of P per unit of the compliance 1/K_c of a contact, per area [m³/N] or of a point [m/N], rigid or not."""
     nodes = system.contact_nodes()
     chosen = nodes.select(held.touching)
+    if system.contact_cubic:
+        accepted = f"contacts.{contact}.stiffness, since contact stiffness depends on the force with a cubic term"
+        raise CaseError(f"contacts.{contact}.compliance", None, accepted)
     area = np.where(np.isnan(chosen.area), 1.0, chosen.area)
     mine = (chosen.owner == nodes.names.index(contact)).astype(float)
     change = np.divide(mine, area, out=np.zeros_like(area), where=area > 0)

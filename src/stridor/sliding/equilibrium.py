@@ -21,11 +21,13 @@ NEWTON_STEPS = 60
 
 @dataclass(frozen=True)
 class ContactRows:
-    """What contact holds: rows normal (m, n) csr, gap (m,) [m], compliance (m,) [m/N], as `ContactNodes` has them."""
+    """What contact holds: rows normal (m, n) csr, gap (m,) [m], compliance (m,) [m/N] and cubic (m,) [N/m³] as
+    `ContactNodes` has them."""
 
     normal: Sparse
     gap: Array
     compliance: Array
+    cubic: Array
 
     @property
     def count(self) -> int:
@@ -64,6 +66,8 @@ class Equilibrium:
         self.system, self.nodes, self.push, self.force = system, nodes, push, force
         self.symmetric, self.solver = symmetric, solver
         self.scale = float(np.abs(system.stiffness.data).max(initial=0.0)) or 1.0
+        # Of Newton's step: contact with a cubic term has another compliance, and meets its force from another gap.
+        self.compliance, self.gap = nodes.compliance, nodes.gap
         self.condensed: BoolArray = nodes.compliance * self.scale * CONDENSED > 1.0
         self.factorisations = 0
         cubic = system.cubic
@@ -78,25 +82,60 @@ class Equilibrium:
         structure can move, AnalysisError where Newton's method does not converge.
         """
         u = np.zeros(self.system.size) if start is None else start
-        cubic = self.system.cubic
-        if cubic is None or not cubic.coefficient.size:
+        nodes, cubic = self.nodes, self.system.cubic
+        springs = cubic is not None and bool(cubic.coefficient.size)
+        if not springs and not np.any(nodes.cubic):
             u, normal = self._linear(active, None, None)
-            return State(active, u, normal, self.nodes.gap + self.nodes.normal @ u)
-        rows, before = cubic.rows.free, u
+            return State(active, u, normal, nodes.gap + nodes.normal @ u)
         for _ in range(NEWTON_STEPS):
-            own = rows @ before
-            stretch = own + self.stretched
-            tangent = sp.csr_array(rows.T @ sp.diags_array(3 * cubic.coefficient * stretch**2) @ rows)
-            force = cubic.coefficient * stretch**2 * (3 * own - stretch)
-            u, normal = self._linear(active, tangent, rows.T @ force)
-            moved, size = float(np.abs(rows @ u - own).max()), float(np.abs(rows @ u).max())
             before = u
-            if moved <= 1e-12 * size:
-                return State(active, u, normal, self.nodes.gap + self.nodes.normal @ u)
+            tangent, extra = self._springs(before)
+            self._contacts(before)
+            u, normal = self._linear(active, tangent, extra)
+            if self._settled(before, u, active):
+                return State(active, u, normal, nodes.gap + nodes.normal @ u)
         raise AnalysisError(
             "steady sliding: the springs beyond the linear find no equilibrium in "
             f"{NEWTON_STEPS} steps; check their coefficients (softening springs may have none)"
         )
+
+    def _springs(self, u: Array) -> tuple[Sparse | None, Array | None]:
+        """Tangent (n, n) of the cubic springs at u, and the force (n,) that it misses; None where there are none."""
+        cubic = self.system.cubic
+        if cubic is None or not cubic.coefficient.size:
+            return None, None
+        rows = cubic.rows.free
+        own = rows @ u
+        stretch = own + self.stretched
+        tangent = sp.csr_array(rows.T @ sp.diags_array(3 * cubic.coefficient * stretch**2) @ rows)
+        return tangent, rows.T @ (cubic.coefficient * stretch**2 * (3 * own - stretch))
+
+    def _contacts(self, u: Array) -> None:
+        """Compliance and gap of the tangent to p = kδ + k₃δ³ at the approach δ that u has."""
+        nodes = self.nodes
+        hardens = np.flatnonzero(nodes.cubic > 0)
+        if not len(hardens):
+            return
+        stiffness, factor = 1.0 / nodes.compliance[hardens], nodes.cubic[hardens]
+        approach = np.maximum(-(nodes.gap[hardens] + nodes.normal[hardens] @ u), 0.0)
+        tangent = stiffness + 3 * factor * approach**2
+        self.compliance, self.gap = nodes.compliance.copy(), nodes.gap.copy()
+        self.compliance[hardens] = 1.0 / tangent
+        self.gap[hardens] += approach - (stiffness * approach + factor * approach**3) / tangent
+        self.condensed = self.compliance * self.scale * CONDENSED > 1.0
+
+    def _settled(self, before: Array, u: Array, active: BoolArray) -> bool:
+        """Whether the ways of everything beyond the linear have stopped changing."""
+        cubic, nodes = self.system.cubic, self.nodes
+        hardens = active & (nodes.cubic > 0)
+        parts = [] if cubic is None else [cubic.rows.free]
+        if hardens.any():
+            parts.append(nodes.normal[np.flatnonzero(hardens)])
+        if not parts:
+            return True
+        rows = sp.csr_array(sp.vstack(parts))
+        moved, size = float(np.abs(rows @ (u - before)).max(initial=0.0)), float(np.abs(rows @ u).max(initial=0.0))
+        return moved <= 1e-12 * size
 
     def residual(self, state: State) -> float:
         """Largest imbalance of a freedom over the largest force that takes part."""
@@ -115,19 +154,19 @@ class Equilibrium:
         stiffness = self.system.stiffness if tangent is None else self.system.stiffness + tangent
         right = self.force if extra is None else self.force + extra
         if len(springs):
-            spring = 1.0 / nodes.compliance[springs]
+            spring = 1.0 / self.compliance[springs]
             pushing = sp.csr_array(self.push[springs].T @ sp.diags_array(spring))
             stiffness = stiffness + pushing @ nodes.normal[springs]
-            right = right - pushing @ nodes.gap[springs]
+            right = right - pushing @ self.gap[springs]
         matrix: Any = stiffness
         if len(rigid):
             # Multipliers are scaled to the stiffness so that the bordered matrix is well balanced.
             s = self.scale
-            softness = sp.diags_array(-nodes.compliance[rigid] * s * s)
+            softness = sp.diags_array(-self.compliance[rigid] * s * s)
             matrix = sp.block_array(
                 [[stiffness, -s * self.push[rigid].T], [-s * nodes.normal[rigid], softness]], format="csr"
             )
-            right = np.concatenate([right, s * nodes.gap[rigid]])
+            right = np.concatenate([right, s * self.gap[rigid]])
         self.factorisations += 1
         with direct.factorise(
             sp.csr_array(matrix), symmetric=self.symmetric, saddle=len(rigid) > 0, solver=self.solver
@@ -136,7 +175,7 @@ class Equilibrium:
         normal = np.zeros(nodes.count)
         normal[rigid] = answer[n:] * self.scale
         if len(springs):
-            normal[springs] = -(nodes.gap[springs] + nodes.normal[springs] @ answer[:n]) / nodes.compliance[springs]
+            normal[springs] = -(self.gap[springs] + nodes.normal[springs] @ answer[:n]) / self.compliance[springs]
         return answer[:n], normal
 
 

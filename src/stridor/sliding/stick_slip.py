@@ -258,6 +258,7 @@ class StickSlip:
             normal=sp.csr_array(sp.vstack([nodes.normal, extra])),
             gap=np.concatenate([nodes.gap + nodes.normal_lift @ load.travel, np.sum(along * moved[node], axis=1)]),
             compliance=np.concatenate([nodes.compliance, np.zeros(int(held.sum())), across[turning]]),
+            cubic=np.concatenate([nodes.cubic, np.zeros(q)]),
         )
         whole = sp.csr_array(sp.vstack([push, extra]))
         equilibrium = Equilibrium(

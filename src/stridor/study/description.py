@@ -278,6 +278,8 @@ def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str
         normal = float(steady.normal_force[mine].sum())
         unit = "N/m" if np.isnan(nodes.area[mine]).any() else "N/m³"
         stiffness = "rigid" if table.stiffness == "rigid" else f"{table.stiffness:g} {unit}"
+        if table.cubic:
+            stiffness += f" and {table.cubic:g} {'N/m³' if unit == 'N/m' else 'N/m⁵'} times the cube of the approach"
         law = _law_words(table.friction)
         text = (
             f"  contact {name}: {table.slave} on {table.master}, {int(touching.sum())} of {int(mine.sum())} slave "

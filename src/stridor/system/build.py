@@ -88,6 +88,7 @@ def build_system(case: Case, mu: float | None = None) -> System:
         general=_general(mass, damping, stiffness) if case.imported else "",
         holders=holders_of(case, view, contacts, surfaces),
         load_steps=_load_steps(case, motion),
+        contact_cubic={name: contact.cubic for name, contact in case.contacts.items() if contact.cubic},
     )
 
 

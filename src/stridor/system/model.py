@@ -111,7 +111,8 @@ class System:
     surfaces: contacts with many slave nodes; dimension 2 or 3; solids: meshed bodies as drawn; cubic: springs beyond
     the linear; initial_velocity (n,) [m/s] and initial_displacement (n,) [m] of bodies that start so; stress_stiffness
     gives the geometric stiffness (n, n) csr that the stresses of a displacement (n,) [m] make, None where no body
-    has any. general: why its matrices, imported ones, are not all symmetric with a positive definite mass, as all
+    has any. contact_cubic: contact → factor of the cube of the approach in its normal force, per area [N/m⁵], of a
+    point [N/m³]. general: why its matrices, imported ones, are not all symmetric with a positive definite mass, as all
     others are; "" where they are. holders: contact → paths of the supports and ties at its nodes. load_steps: the way
     to the static equilibrium, with stick and partial slip; empty where all contacts slide as the motions have them.
     placed: whether it is what `in_place` has made of another.
@@ -137,6 +138,7 @@ class System:
     holders: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     load_steps: tuple[LoadStep, ...] = ()
     placed: bool = False
+    contact_cubic: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness"):
@@ -158,7 +160,8 @@ class System:
     def assembled(self) -> bool:
         """Whether it is computed with on the assembled sparse matrices: contact over surfaces, forces beyond the
         linear, contacts that may stick, or too many freedoms for the complete basis that point contacts use."""
-        return bool(self.surfaces or self.load_steps) or self.cubic is not None or self.size > COMPLETE_BASIS_LIMIT
+        beyond = self.cubic is not None or bool(self.contact_cubic)
+        return bool(self.surfaces or self.load_steps) or beyond or self.size > COMPLETE_BASIS_LIMIT
 
     def in_place(self, factors: Array | None = None) -> System:
         """The system with everything that a prescribed distance presses away in its place, as the statics and the modes
@@ -193,7 +196,11 @@ class System:
     def contact_nodes(self) -> ContactNodes:
         """Every contact, point or surface, as one list of slave nodes: points first, then surfaces in order."""
         parts = [_point_nodes(c) for c in self.contacts] + [s.nodes for s in self.surfaces]
-        return stack(parts, self.size, len(self.motion.names), self.dimension)
+        nodes = stack(parts, self.size, len(self.motion.names), self.dimension)
+        if not self.contact_cubic:
+            return nodes
+        factor = np.array([self.contact_cubic.get(name, 0.0) for name in nodes.names])[nodes.owner]
+        return replace(nodes, cubic=factor * np.where(np.isnan(nodes.area), 1.0, nodes.area))
 
     def contact_rows(self) -> Array:
         """G (2m, n): normal and tangential relative displacement of contact 0, of contact 1, …"""

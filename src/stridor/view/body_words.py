@@ -70,6 +70,9 @@ def contact_words(name: str, contact: Contact, *, on_line: bool) -> str:
     stiffness = "rigid" if contact.stiffness == "rigid" else (
         f"with a stiffness of {significant(contact.stiffness)} {unit}"
     )
+    if contact.cubic:
+        cube = "N/m³ (of a point) or N/m⁵ (per area)"
+        stiffness += f" and {significant(contact.cubic)} {cube} times the cube of the approach"
     return (
         f"{name}: {contact.slave} slides on {contact.master} ({contact.sliding} sliding), {stiffness}{where}; "
         f"friction law {law}, {settings}."

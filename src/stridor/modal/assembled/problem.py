@@ -196,9 +196,11 @@ def problem_of(
             "slides; write modal.friction_damping = false (compare has none of it in space)"
         )
     touching = np.flatnonzero(steady.active)
-    rows = contact_rows(nodes, touching, steady.sense, steady.stuck)
+    # Contact that hardens has the stiffness of small motions about its force.
+    shown = nodes if steady.force is None else nodes.at_force(steady.force)
+    rows = contact_rows(shown, touching, steady.sense, steady.stuck)
     closed = {nodes.names[k] for k in nodes.owner[touching]}
-    with_state = steadiness(system, nodes, touching, options, held=len(rows.compliance) - len(touching))
+    with_state = steadiness(system, nodes, touching, options, rows)
     has_damping = bool(system.damping.nnz and np.abs(system.damping.data).max() > 0)
     return ContactProblem(
         mass=system.mass,
@@ -239,7 +241,7 @@ class Varying:
 
     def __call__(self, mu: float) -> Extras:
         """The terms at ``mu``."""
-        if mu == 0.0 and not self._state.prestress:
+        if mu == 0.0 and self._state.rests:
             return NOTHING
         if mu in self._known:
             return self._known[mu]

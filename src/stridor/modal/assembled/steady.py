@@ -34,13 +34,15 @@ class Options:
 class Touching:
     """Nodes in contact: active (m,), and sense (m, d−1), the unit vector against the slip, zero where there is none;
     stuck (m,): touching nodes that do not slip either way. still: whether some slip at their limit without a motion
-    that slides them. words: the same for a reader, "" where every node slides."""
+    that slides them. words: the same for a reader, "" where every node slides. force (m,): normal forces
+    [N], None without loads."""
 
     active: BoolArray
     sense: Array
     stuck: BoolArray
     still: bool = False
     words: str = ""
+    force: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
         steady = steady_sliding_nodes(system, mu=mu, solver=solver)
         require_pressed(system, steady.normal_force)
         if not system.load_steps:
-            return Touching(steady.active, steady.sense, np.zeros(nodes.count, dtype=bool))
+            none = np.zeros(nodes.count, dtype=bool)
+            return Touching(steady.active, steady.sense, none, force=steady.normal_force)
         stuck, still = steady.active & (steady.status == STICK), int(steady.slips_still.sum())
         closed, slips = int(steady.active.sum()), int((steady.status == SLIP).sum())
         limit = f" ({still} of them at their limit without a slip velocity, taken as sliding)" if still else ""
@@ -98,7 +101,7 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
             f"{np.count_nonzero(stuck)} contact nodes stick, {slips} slip{limit} and {nodes.count - closed} are open, "
             f"as the static equilibrium at {'their own friction' if mu is None else f'μ = {mu:g}'} has them"
         )
-        return Touching(steady.active, steady.sense, stuck, bool(steady.slips_still.any()), words)
+        return Touching(steady.active, steady.sense, stuck, still > 0, words, steady.normal_force)
     slip = nodes.slip_velocity(full_motion(system))
     speed = np.linalg.norm(slip, axis=1)
     slides = speed > STILL * float(speed.max(initial=0.0))
@@ -114,8 +117,11 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
 
 @dataclass(frozen=True)
 class Steadiness:
-    """The touching nodes' steady state as a function of μ, for the terms that depend on it; held: how many rows beyond
-    theirs hold nodes that stick."""
+    """The touching nodes' steady state as a function of μ, for the terms that depend on it.
+
+    hardens: whether contact stiffness depends on the force. layer: the contact rows of the problem, those that hold
+    nodes which stick behind those of the touching ones, with the compliances of some μ.
+    """
 
     system: System
     nodes: ContactNodes
@@ -124,12 +130,18 @@ class Steadiness:
     friction_damping: bool
     prestress: bool
     solver: str | None
-    held: int = 0
+    hardens: bool
+    layer: Rows
 
     @property
     def neutral(self) -> bool:
         """Whether the steady state adds nothing at any μ."""
-        return not (self.sloped or self.friction_damping or self.prestress)
+        return not (self.sloped or self.friction_damping or self.prestress or self.hardens)
+
+    @property
+    def rests(self) -> bool:
+        """Whether it adds nothing where there is no friction."""
+        return not (self.prestress or self.hardens)
 
     @property
     def damps(self) -> bool:
@@ -147,24 +159,43 @@ class Steadiness:
             speeds = steady.slip_speed[self.touching]
             laws = [self.nodes.laws[k] for k in self.nodes.owner[self.touching]]
             slopes = [law.scaled(mu, float(v)).slope(float(v)) for law, v in zip(laws, speeds, strict=True)]
-            weakening = np.append(steady.normal_force[self.touching] * np.array(slopes), np.zeros(self.held))
+            held = len(self.layer.compliance) - len(self.touching)
+            weakening = np.append(steady.normal_force[self.touching] * np.array(slopes), np.zeros(held))
         stiffness = None
         if self.prestress and self.system.stress_stiffness is not None:
             stiffness = self.system.stress_stiffness(steady.displacement)
+        if self.hardens:
+            change = self._hardening(mu, steady.normal_force)
+            stiffness = change if stiffness is None else sp.csr_array(stiffness + change)
         return weakening, damping, stiffness
 
+    def _hardening(self, mu: float, normal_force: Array) -> Sparse:
+        """What contact at ``mu`` is stiffer than the layer, (N + μS)ᵀ Δk N (n, n)."""
+        now = self.nodes.at_force(normal_force).compliance[self.touching]
+        soft = np.flatnonzero(now > 0)
+        normal = self.layer.normal[soft]
+        change = sp.diags_array(1.0 / now[soft] - 1.0 / self.layer.compliance[soft])
+        return sp.csr_array((normal + mu * self.layer.slide[soft]).T @ change @ normal)
 
-def steadiness(
-    system: System, nodes: ContactNodes, touching: IntArray, options: Options, *, held: int = 0
-) -> Steadiness:
-    """What of the steady state matters here. Raises AnalysisError where it does but no load presses the bodies."""
+
+def steadiness(system: System, nodes: ContactNodes, touching: IntArray, options: Options, layer: Rows) -> Steadiness:
+    """What of the steady state matters here, beside the contact rows of the problem.
+
+    Raises AnalysisError where something does but no load presses the bodies.
+    """
     speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
     pairs = {(int(nodes.owner[k]), float(speeds[k])) for k in touching}
     sloped = any(nodes.laws[owner].slope(speed) != 0.0 for owner, speed in pairs)
     across = options.friction_damping and nodes.directions == 2
     prestress = options.prestress and system.stress_stiffness is not None
     system = system.in_place()
-    if (sloped or across or prestress) and not (system.loads or system.load_steps):
-        what = "a friction law with a slope" if sloped else "friction damping" if across else "prestress"
+    hardens = bool(np.any(nodes.cubic[touching] > 0))
+    if (sloped or across or prestress or hardens) and not (system.loads or system.load_steps):
+        what = (
+            "a friction law with a slope" if sloped
+            else "friction damping" if across
+            else "prestress" if prestress
+            else "contact stiffness with a cubic term"
+        )  # fmt: skip
         raise AnalysisError(f"{what} needs the normal force: give the case a load that presses the bodies")
-    return Steadiness(system, nodes, touching, sloped, across, prestress, options.solver, held)
+    return Steadiness(system, nodes, touching, sloped, across, prestress, options.solver, hardens, layer)

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...errors import CaseError
+from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...typing import BoolArray
-from ..assembled.steady import Options, refuse_stick, steadiness, touching_nodes
+from ..assembled.steady import Options, contact_rows, refuse_stick, steadiness, touching_nodes
 from .contacts_rigid import Elimination, eliminate
 from .contacts_sampling import Values
 from .contacts_steady import FRICTION, STIFFNESS, Contacts, contacts_of, steady_terms
@@ -83,8 +83,15 @@ def contacts_problem(
     if not nodes.count:
         return ContactsProblem(interpolated_terms(family.structure_at, family.interpolated), family.parameters)
     refuse_stick(family.own, "reduced models over parameters")
-    touching = np.flatnonzero(touching_nodes(family.own, nodes, touching_at, options.solver).active)
-    effects = steadiness(family.own, nodes, touching, options)
+    steady = touching_nodes(family.own, nodes, touching_at, options.solver)
+    touching = np.flatnonzero(steady.active)
+    if np.any(nodes.cubic[touching] > 0):
+        raise AnalysisError(
+            "reduced models over parameters: contact stiffness is taken as constant, and contacts.NAME.cubic makes it "
+            "depend on the force; `stridor modes`, `onsets` and `simulate` take that"
+        )
+    layer = contact_rows(nodes, touching, steady.sense, steady.stuck)
+    effects = steadiness(family.own, nodes, touching, options, layer)
     names = [p.name for p in family.parameters]
     rigid = nodes.compliance[touching] == 0.0
     if STIFFNESS in names and bool(rigid.all()):

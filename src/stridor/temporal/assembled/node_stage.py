@@ -7,7 +7,8 @@ and those that the forces have closed join in.
 
 A compliant layer stretches the gap equation. Its force at t_n belongs to the gap at t_n; with g_{n+1} instead it would
 lag by a step and damp like a dashpot of Δt/compliance. The mean of g_{n+1} and g_{n−1} is centred, so that (g_{n+1} +
-g_{n−1})/2 + compliance·N is what is zero where N is not: second order, stable for any stiffness, and no damping.
+g_{n−1})/2 + compliance·N is what is zero where N is not: second order, stable for any stiffness, and no damping. A
+layer that hardens, N = δ/compliance + cubic δ³, has δ(N) in the place of compliance·N.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ _solve_contact = njit(cache=True)(multipliers.solve_contact)
 
 SWEEP_LIMIT = 1000
 SWEEP_TOLERANCE = 1e-11
+NEWTON_STEPS = 60  # on the force of a layer that hardens
 
 
 class NodeState(NamedTuple):
@@ -85,6 +87,31 @@ def _take_in(
 
 
 @njit(cache=True)
+def _solve_node(
+    i: int, gap: float, s1: float, s2: float, layer: float, step: float, new: Array, table: NodeTable, state: NodeState
+) -> int:  # pragma: no cover - compiled
+    """Forces (d,) of node i into new from its gap and slip free of them; layer: compliance [m/N] beside its own part of
+    G A Gᵀ. Its status."""
+    block, law = table.block[i], table.friction[table.owner[i]]
+    w_nn = block[0, 0] + layer
+    if table.row.shape[1] == 2:
+        new[0], new[1], status = _solve_contact(
+            gap, s1, w_nn, block[0, 1], block[1, 1], law, state.status[i] == _STICK, step
+        )
+        return status
+    new[0], new[1], new[2], status = solve_disc(
+        gap,
+        s1,
+        s2,
+        (w_nn, block[0, 1], block[0, 2], block[1, 1], block[1, 2], block[2, 2]),
+        law,
+        state.status[i] == _STICK,
+        step,
+    )
+    return status
+
+
+@njit(cache=True)
 def _relax(
     i: int, step: float, new: Array, table: NodeTable, state: NodeState, work: NodeScratch
 ) -> int:  # pragma: no cover - compiled
@@ -105,23 +132,22 @@ def _relax(
         s1 += table.row[p, 1] * moved
         if d == 3:
             s2 += table.row[p, 2] * moved
-    law = table.friction[table.owner[i]]
-    w_nn = block[0, 0] + 2.0 * table.compliance[i]
-    if d == 2:
-        new[0], new[1], status = _solve_contact(
-            gap, s1, w_nn, block[0, 1], block[1, 1], law, state.status[i] == _STICK, step
-        )
-        return status
-    new[0], new[1], new[2], status = solve_disc(
-        gap,
-        s1,
-        s2,
-        (w_nn, block[0, 1], block[0, 2], block[1, 1], block[1, 2], block[2, 2]),
-        law,
-        state.status[i] == _STICK,
-        step,
-    )
+    compliance, hardening = table.compliance[i], table.cubic[i]
+    if hardening == 0.0:
+        return _solve_node(i, gap, s1, s2, 2.0 * compliance, step, new, table, state)
+    # Newton's method on the approach δ(p), which is concave: from no force on, tangents close in from below.
+    scale = math.sqrt(1.0 / (3.0 * compliance * hardening))
+    before, status = 0.0, _OPEN
+    for _ in range(NEWTON_STEPS):
+        approach = 2.0 * scale * math.sinh(math.asinh(1.5 * before * compliance / scale) / 3.0)
+        tangent = 1.0 / (1.0 / compliance + 3.0 * hardening * approach * approach)
+        met = gap + 2.0 * (approach - tangent * before)
+        status = _solve_node(i, met, s1, s2, 2.0 * tangent, step, new, table, state)
+        if abs(new[0] - before) <= 1e-14 * new[0]:
+            break
+        before = new[0]
     return status
+
 
 
 @njit(cache=True)

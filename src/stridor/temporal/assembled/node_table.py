@@ -17,9 +17,9 @@ class NodeTable(NamedTuple):
     """m nodes, d directions (normal, then tangents), l places that any of them touches, c contacts, p motions.
 
     place (l,) among all places, gain (l,) [m/N] = displacement over the step by a unit force. Node i has entries
-    ptr[i] … ptr[i+1]: col into place and row (entries, d). lift (m, d, p), gap (m,) [m], compliance (m,) [m/N],
-    block (m, d, d) [m/N] its own part of G A Gᵀ. owner (m,), friction (c, k) the numbers of the laws, along (m, d−1)
-    the direction in which a contact's tangential motion is told, weight (m,) for means without force.
+    ptr[i] … ptr[i+1]: col into place and row (entries, d). lift (m, d, p), gap (m,) [m], compliance (m,) [m/N], cubic
+    (m,) [N/m³], block (m, d, d) [m/N] its own part of G A Gᵀ. owner (m,), friction (c, k) numbers of the laws, along
+    (m, d−1) the direction in which a contact's tangential motion is told, weight (m,) for means without force.
     """
 
     place: IntArray
@@ -30,6 +30,7 @@ class NodeTable(NamedTuple):
     lift: Array
     gap: Array
     compliance: Array
+    cubic: Array
     block: Array
     owner: IntArray
     friction: Array
@@ -67,6 +68,7 @@ def node_table(nodes: ContactNodes, layout: Layout, gain: Array, factors: Array)
         lift=lift,
         gap=np.array(nodes.gap, dtype=float),
         compliance=np.array(nodes.compliance, dtype=float),
+        cubic=np.array(nodes.cubic, dtype=float),
         block=block,
         owner=np.array(nodes.owner, dtype=np.int64),
         friction=friction_rows(nodes.laws),

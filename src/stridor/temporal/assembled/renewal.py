@@ -64,7 +64,7 @@ def _joined(machine: Machine, points: ContactNodes, surfaces: list[SurfaceContac
     together = stack(
         [*parts, *(s.nodes for s in surfaces)], system.size, len(system.motion.names), system.dimension
     )  # fmt: skip
-    return replace(together, names=old.names, owner=old.owner, laws=old.laws)
+    return replace(together, names=old.names, owner=old.owner, laws=old.laws, cubic=old.cubic)
 
 
 def take_over(machine: Machine, surfaces: tuple[SurfaceContact, ...], nodes: ContactNodes) -> None:
