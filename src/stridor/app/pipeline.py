@@ -49,6 +49,8 @@ class Outcome:
         if agreement is not None:
             return agreement.verdict
         first = self.everything.onsets_damped.first
+        if self.everything.onsets_damped.at_start:
+            return "; ".join(self.everything.onsets_damped.at_start_words)
         if first is None:
             return "no onset in range"
         return f"modal onset at μ = {first.mu:.5f}, {first.frequency_hz:.1f} Hz; no comparison was made"

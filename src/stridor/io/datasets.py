@@ -164,6 +164,9 @@ def _modes(result: ComplexModes) -> Any:
     if result.contact_state:
         data.attrs["contact_state"] = result.contact_state
     data.attrs["damped"] = int(result.damped)
+    data.attrs["modes_in_band"] = [int(n) for n in result.total]
+    if result.max_frequency_hz is not None:
+        data.attrs["max_frequency_hz"] = result.max_frequency_hz
     return data
 
 
@@ -191,6 +194,10 @@ def _onsets(result: Onsets) -> Any:
     data = _dataset("onsets", variables, {}, result)
     data.attrs.update(damped=int(result.damped), max_frequency_hz=result.max_frequency_hz)
     data.attrs["friction_range"] = list(result.friction_range)
+    for name in ("at_start", "at_end"):
+        values = getattr(result, name)
+        data.attrs[f"growing_{name}"] = json.dumps([[v.real, v.imag] for v in values])
+    data.attrs["enters_band_at"] = json.dumps([o.enters_at for o in result.onsets])
     if result.completeness:
         data.attrs["completeness"] = result.completeness
     if result.contact_state:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..case.schema import ReferenceFrequency, ReferenceOnset
-from ..modal.complex_modes import ComplexModes
+from ..digits import readable
+from ..modal.complex_modes import UNSTABLE_RELATIVE, ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..typing import Array
 from .inputs import BodyModes, ReportInputs
@@ -131,7 +130,7 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
                     if onset.kind == "flutter"
                     else str(onset.branches[0]),
                     "" if onset.kind == "flutter" else onset.kind,
-                    "growth ends here" if onset.stabilising else "",
+                    _remark(onset),
                     other.note if other else "",
                 ),
                 "far" if mark or is_far(f_diff) else "",
@@ -165,6 +164,12 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
     if printed:
         caption += " Differences beyond 0.5 % are marked with ▲; ≙: equal when rounded to the digits printed."
     return drop_empty(Table(f"onsets-{name}", f"Onsets, {name}", heads, tuple(rows), frozenset({6, 7, 8, 9}), caption))
+
+
+def _remark(onset: Onset) -> str:
+    if onset.enters_at is not None:
+        return f"above the band, comes into it at μ ≈ {onset.enters_at:.3g}"
+    return "growth ends here" if onset.stabilising else ""
 
 
 def _onset_partners(found: tuple[Onset, ...], printed: tuple[ReferenceOnset, ...]) -> dict[int, ReferenceOnset]:
@@ -214,14 +219,15 @@ def _solutions(found: list[Onset]) -> Table:
 def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float) -> Table:
     """Complex modes at one μ, by frequency."""
     row = modes.at(mu)
-    order = np.argsort(modes.frequency_hz[row], kind="stable")
-    order = [int(b) for b in order if modes.frequency_hz[row, b] <= max_frequency_hz]
+    order = [int(b) for b in modes.order(row) if modes.frequency_hz[row, b] <= max_frequency_hz]
     rows = tuple(
         Row(
             (
                 str(int(modes.branch[b])),
-                number(float(modes.frequency_hz[row, b]), 2),
-                number(float(modes.growth_rate[row, b]), 2),
+                readable(float(modes.frequency_hz[row, b])).replace("-", "−"),
+                readable(
+                    float(modes.growth_rate[row, b]), zero=UNSTABLE_RELATIVE * abs(complex(modes.eigenvalues[row, b]))
+                ).replace("-", "−"),
                 number(100 * float(modes.damping_ratio[row, b]), 4),
                 "unstable" if modes.unstable[row, b] else "stable",
                 significant(float(modes.residual[row, b]), 2),
@@ -233,4 +239,6 @@ def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float) -> Tabl
     heads = ("mode", "frequency [Hz]", "growth rate [1/s]", "damping ratio [%]", "", "residual")
     damping = "with structural damping" if modes.damped else "without damping"
     caption = f"Up to {max_frequency_hz / 1e3:g} kHz, {damping}. Growth rate is Re λ: positive grows."
+    if modes.completeness:
+        caption += f" {modes.completeness[row]}"
     return Table("modes", f"Complex modes at μ = {modes.mu[row]:g}", heads, rows, frozenset({4}), caption)

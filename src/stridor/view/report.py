@@ -147,7 +147,13 @@ def _modal(inputs: ReportInputs) -> Section:
         parts.append(modes_table(inputs.modes, mu, inputs.max_frequency_hz))
     said: list[str] = []
     for onsets, damping in ((inputs.undamped_onsets, "Without damping"), (inputs.damped_onsets, "With damping")):
-        if onsets is not None and not onsets.onsets:
+        if onsets is None:
+            continue
+        said.extend(f"{damping} it {line}." for line in onsets.at_start_words)
+        said.extend(f"{damping}: {line[2:]}." for line in onsets.from_above_words)
+        if onsets.completeness:
+            said.append(f"{damping}: {onsets.completeness}")
+        if not onsets.onsets:
             low, high = onsets.friction_range
             said.append(f"{damping} there is no onset of instability for {low:g} ≤ μ ≤ {high:g}.")
     if parts or said:

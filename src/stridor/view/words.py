@@ -90,6 +90,8 @@ def _onset_sentence(inputs: ReportInputs) -> str:
         return ""
     low, high = onsets.friction_range
     first = onsets.first
+    if onsets.at_start:
+        return f"It {' and '.join(onsets.at_start_words)}, before any onset."
     if first is None:
         return f"No friction coefficient between {low:g} and {high:g} makes it unstable up to {_khz(inputs)}."
     damping = "" if onsets.damped else " (without damping)"
