@@ -25,9 +25,9 @@ for, with enrichment at each (`critical`). `direct_modes` is the reference that 
 factorisation and Arnoldi's method for each μ.
 
 **What is complete.** Modes of the band at μ = 0 and a tenth beyond are made exact, those up to 1.25 of it are
-followed. A mode that starts higher and sinks into the band as μ rises is found by `growing`, which seeks anew what grows
-at a few μ. The set of touching nodes is that of steady sliding at one μ. Up to 20 000 freedoms the number of frictionless modes is checked by Sylvester's law of
-inertia.
+followed. A mode that starts higher and sinks into the band as μ rises is found by `growing`, which seeks anew what
+grows at a few μ. The set of touching nodes is that of steady sliding at one μ. Up to 20 000 freedoms the number of
+frictionless modes is checked by Sylvester's law of inertia.
 """
 
 from .critical import onsets_assembled
