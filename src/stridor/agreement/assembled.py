@@ -120,7 +120,9 @@ def _march(
     length = duration or PERIODS * 2 * np.pi / slowest
     seen = snapshots_of(system, round(length / step), step, fastest / (2 * np.pi)) if shape else None
     loads = system.load_steps[-1].loads if system.load_steps else {}
-    velocities = dict(zip(system.motion.names, full_motion(system).tolist(), strict=True))
+    motion = system.motion
+    factors = zip(motion.names, full_motion(system).tolist(), motion.places, strict=True)
+    velocities = {name: factor for name, factor, place in factors if not place}
     phase = PhaseSpec("perturbed", length, loads, velocities)
     run = simulate(system, [phase], start, mu=mu, disturbance=disturbance, observe=seen)
     return whole(run), seen
