@@ -6,14 +6,14 @@ import inspect
 import logging
 import os
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Concatenate, ParamSpec
 
 import typer
 
-from ..errors import CaseError
+from ..errors import CaseError, StridorError
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -59,9 +59,11 @@ class Call:
     json: bool
     quiet: bool
     told: list[str] = field(default_factory=list[str])
+    verb: str = ""
 
     def case(self) -> Case:
-        """The case in the file with overrides, its warnings printed. Raises CaseError."""
+        """The case in the file with overrides, its warnings and the settings without effect printed. Raises
+        CaseError."""
         from ..case import load
 
         own = [] if self.solver is None else [f'modal.solver="{self.solver}"']
@@ -69,7 +71,18 @@ class Call:
         if self.solver is not None and self.solver != "auto":
             os.environ["STRIDOR_SOLVER"] = self.solver
         self.warn(case.warnings)
+        self.warn(self._idle(case))
         return case
+
+    def _idle(self, case: Case) -> list[str]:
+        """Settings that do nothing on the path that the verb takes; none where the model cannot be built, which the
+        verb says."""
+        from ..study.without_effect import without_effect
+
+        try:
+            return without_effect(case, self.verb, solver=self.solver)
+        except StridorError:
+            return []
 
     def warn(self, warnings: Iterable[str]) -> None:
         """Say warnings that have not been said yet; `document` lists them too."""
@@ -130,7 +143,8 @@ def verb(file: Any = CaseFile) -> Callable[[Callable[Concatenate[Call, P], None]
 
         @wraps(function)
         def called(**given: Any) -> None:
-            function(_common(**{name: given.pop(name) for name in names}), **given)  # type: ignore[call-arg]
+            call = replace(_common(**{name: given.pop(name) for name in names}), verb=function.__name__)
+            function(call, **given)  # type: ignore[call-arg]
 
         order = (case.replace(annotation=file), *own, *common)
         # Typer takes them one by one, after one another, by keyword.

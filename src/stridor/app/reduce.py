@@ -154,7 +154,11 @@ def _saved(model: ReducedModel, path: Path, origin: Case | dict[str, Any], keep:
 def _made(case: Case, box: list[str], limit: float | None, bound: float) -> ReducedModel:
     from ..study.reduced import reduced_model
 
-    ranges = {name: pair(text, f"--box {name}") for name, text in (_named(item, "--box") for item in box)}
+    ranges: dict[str, tuple[float, float]] = {}
+    for name, text in (_named(item, "--box") for item in box):
+        if name in ranges:
+            raise CaseError("--box", f"{name}={text}", f"{name} has a range already, {ranges[name]}; give each once")
+        ranges[name] = pair(text, f"--box {name}")
     if not ranges:
         ranges = {name: p.range for name, p in case.parameters.items() if p.range is not None}
     if not ranges:
@@ -172,6 +176,8 @@ def _named(text: str, option: str) -> tuple[str, str]:
 def _values(at: list[str], model: ReducedModel) -> dict[str, list[float]]:
     given: dict[str, list[float]] = {}
     for name, text in (_named(item, "--at") for item in at):
+        if name in given:
+            raise CaseError("--at", f"{name}={text}", f"{name} has values already; give all in one, with commas")
         given[name] = numbers(text, f"--at {name}", least=0.0 if name in CONTACTS else -INFINITY)
     model.problem.point({name: values[0] for name, values in given.items()})
     return {p.name: given.get(p.name, [p.value]) for p in model.problem.parameters}

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..case import Case
 from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBody
-from ..case.schema import Friction, Load, TabulatedTable, Tie
+from ..case.schema import Friction, Load, Spring, TabulatedTable, Tie
 from ..case.usual import USUAL
 from ..errors import AnalysisError
 from ..mesh.model import Mesh
@@ -59,7 +59,8 @@ def describe(case: Case) -> Description:
         lines.append(f"  load {name} {where}: {_load_words(load)}")
     lines += [f"  tie {name}: {tie.slave} follows {tie.master}{_way_words(tie)}" for name, tie in case.ties.items()]
     lines += [
-        f"  spring {name}: {' to '.join(link.between)}, {link.stiffness:g} N/m" for name, link in case.springs.items()
+        f"  spring {name}: {' to '.join(link.between)}, {link.stiffness:g} N/m{_spring_words(link)}"
+        for name, link in case.springs.items()
     ]
     lines += [
         f"  dashpot {name}: {' to '.join(link.between)}, {link.damping:g} N s/m" for name, link in case.dashpots.items()
@@ -137,6 +138,12 @@ def _sudden(case: Case) -> list[str]:
             )
         before = after
     return found
+
+
+def _spring_words(link: Spring) -> str:
+    """The cubic part and the dashpot of a spring, "" where it has none."""
+    cubic = f" and {link.cubic:g} N/m³ times the cube" if link.cubic else ""
+    return cubic + (f", with a dashpot of {link.damping:g} N s/m" if link.damping else "")
 
 
 def _law_words(friction: Friction) -> str:

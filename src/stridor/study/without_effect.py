@@ -1,0 +1,101 @@
+"""Settings that a case gives and that change nothing on the path its analyses take: told, one line each.
+
+- modal.solver, --solver: beams in point contacts, whose modes are dense
+- modal.friction_damping: but for contact over nodes in space; `compare`, which has it as the time loop has
+- modal.prestress: but for assembled matrices with meshed solids; `compare`, `simulate`
+- modal.damped = false: `simulate`, `compare`
+- temporal.path: assembled matrices in time
+- comparison.bracket, comparison.tolerance: without critical friction
+- contacts.NAME.stiffness, a number: beams in point contacts in time, which are rigid there
+- materials.NAME.poisson_ratio: of beams only
+
+A setting that stays at its default is not told of, nor one of an approach that the verb does not take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..case import Case
+from ..system import System, build_system
+
+IN_TIME = ("simulate", "compare", "run")
+MODAL = ("steady", "modes", "shapes", "onsets", "run", "sensitivities", "countermeasures", "damping_map", "reduce")
+
+
+def without_effect(case: Case, verb: str, *, solver: str | None = None) -> list[str]:
+    """A line for each setting of the case, or ``--solver``, that changes no number of what a verb computes.
+
+    Builds the model only where such a setting is given. Raises what building it raises.
+    """
+    if verb not in (*IN_TIME, *MODAL):
+        return []
+    # By the case alone where that is enough.
+    lines = [*_of_materials(case), *_of_comparison(case, verb)]
+    if _given(case, solver):
+        system = build_system(case)
+        lines += [*_of_modes(case, system, verb, solver), *_of_time(case, system, verb)]
+    return lines
+
+
+def _given(case: Case, solver: str | None) -> bool:
+    modal = case.modal
+    return (
+        solver is not None
+        or modal.solver != "auto"
+        or modal.friction_damping
+        or modal.prestress
+        or not modal.damped
+        or case.temporal.path != "auto"
+        or any(contact.stiffness != "rigid" for contact in case.contacts.values())
+    )
+
+
+def _of_materials(case: Case) -> Iterator[str]:
+    used = {getattr(body, "material", None) for name, body in case.bodies.items() if name not in case.beams}
+    for name, material in case.materials.items():
+        if material.poisson_ratio != 0.3 and name not in used:
+            yield f"materials.{name}.poisson_ratio has no effect: only beams are made of it, and they do not use it"
+
+
+def _of_comparison(case: Case, verb: str) -> Iterator[str]:
+    if verb in ("compare", "run") and not case.comparison.critical:
+        for key in sorted({"bracket", "tolerance"} & case.comparison.model_fields_set):
+            yield f"comparison.{key} has no effect while comparison.critical is false"
+
+
+def _of_modes(case: Case, system: System, verb: str, solver: str | None) -> Iterator[str]:
+    points = not system.assembled and not system.general
+    if points and (solver is not None or case.modal.solver != "auto"):
+        what = "modal.solver" if solver is None else "--solver"
+        yield f"{what} has no effect: beams in point contacts are solved by dense methods"
+    if case.modal.friction_damping and verb != "simulate":
+        if points or system.contact_nodes().directions < 2:
+            yield "modal.friction_damping has no effect: friction turns with the slip in space only, over nodes"
+        elif verb == "compare":
+            yield "modal.friction_damping has no effect here: compare takes the modes as the time loop is, with it"
+    if case.modal.prestress:
+        if verb in ("compare", "simulate"):
+            yield f"modal.prestress has no effect on {verb}: the time loop has no geometric stiffness"
+        elif points or system.stress_stiffness is None:
+            yield "modal.prestress has no effect: only meshed solids on assembled matrices have it"
+        elif verb == "run":
+            yield "modal.prestress acts on modes and onsets only: the time loop and the comparison are without it"
+    if not case.modal.damped and verb in ("compare", "simulate"):
+        yield f"modal.damped = false has no effect on {verb}: what is marched in time keeps its damping"
+    elif not case.modal.damped and verb == "run":
+        yield "modal.damped = false acts on modes and onsets only: the time loop and the comparison keep the damping"
+
+
+def _of_time(case: Case, system: System, verb: str) -> Iterator[str]:
+    if verb not in IN_TIME or system.general:
+        return
+    if system.assembled and case.temporal.path != "auto":
+        yield f"temporal.path = {case.temporal.path!r} has no effect: assembled matrices have one path"
+    if not system.assembled:
+        for name, contact in case.contacts.items():
+            if contact.stiffness != "rigid":
+                yield (
+                    f"contacts.{name}.stiffness has no effect in time: point contacts of beams are rigid there, and "
+                    "only the modes take it"
+                )

@@ -1,0 +1,110 @@
+"""Settings that change no number on the path taken are told, and those that do are not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stridor as st
+from rubbing_block import rubbing_block
+from solid_cases import BELT
+from stridor.app.reduce import _made
+from stridor.case import template_text
+from stridor.study.without_effect import without_effect
+
+MU = 0.3
+
+
+def beams() -> st.Case:
+    return st.loads(template_text("two-beams")).with_(
+        {
+            "bodies.beam1.elements": 6,
+            "bodies.beam2.elements": 18,
+            "contacts.A.stiffness": "rigid",
+            "temporal.step": 4e-7,
+            "phases.press.duration": 1e-4,
+            "phases.slide.duration": 1e-4,
+        }
+    )
+
+
+def block() -> st.Case:
+    return st.loads(rubbing_block("max_frequency_hz = 30e3"))
+
+
+def modal(case: st.Case) -> np.ndarray:
+    return st.modes(case, MU, count=6).eigenvalues
+
+
+@pytest.mark.parametrize(
+    ("case", "change"),
+    [
+        (beams(), {"modal.solver": "superlu"}),
+        (beams(), {"modal.friction_damping": True}),
+        (beams(), {"modal.prestress": True}),
+        (beams(), {"modal.damped": False}),
+        (beams(), {"materials.steel.poisson_ratio": 0.2}),
+        (beams(), {"contacts.A.stiffness": 1e7}),
+        (beams(), {"bodies.beam1.damping.mass": 60.0}),
+        (block(), {"modal.friction_damping": True}),
+        (block(), {"modal.prestress": True}),
+        (block(), {"modal.damped": False}),
+        (block(), {"materials.pad.poisson_ratio": 0.2}),
+        (block(), {"contacts.face.stiffness": 1e11}),
+    ],
+)
+def test_what_changes_no_mode_is_told_and_nothing_else(case: st.Case, change: dict[str, Any]) -> None:
+    changed = case.with_(change)
+    (setting,) = change
+    same = bool(np.array_equal(modal(case), modal(changed)))
+    told = any(line.startswith(setting) for line in without_effect(changed, "modes"))
+    assert told is same
+    assert without_effect(case, "modes") == []
+
+
+@pytest.mark.parametrize(
+    ("change", "verbs"),
+    [
+        ({"contacts.A.stiffness": 1e7}, {"simulate"}),
+        ({"modal.damped": False}, {"simulate"}),
+        ({"modal.prestress": True}, {"simulate"}),
+        ({"temporal.beta2": 0.6}, set[str]()),
+    ],
+)
+def test_what_changes_no_motion_is_told(change: dict[str, Any], verbs: set[str]) -> None:
+    case = beams()
+    changed = case.with_(change)
+    one, two = st.simulate(case), st.simulate(changed)
+    same = np.array_equal(one.normal_force, two.normal_force) and np.array_equal(one.elastic, two.elastic)
+    (setting,) = change
+    told = {verb for verb in ("simulate",) if any(x.startswith(setting) for x in without_effect(changed, verb))}
+    assert told == verbs
+    assert bool(told) is bool(same)
+
+
+def test_settings_of_the_other_paths() -> None:
+    belt = st.loads(BELT).with_({"temporal.path": "nodal"})
+    assert without_effect(belt, "simulate") == [
+        "temporal.path = 'nodal' has no effect: assembled matrices have one path"
+    ]
+    assert without_effect(belt, "modes") == []
+    assert without_effect(beams(), "onsets", solver="mumps") == [
+        "--solver has no effect: beams in point contacts are solved by dense methods"
+    ]
+    loose = beams().with_({"comparison.critical": False, "comparison.tolerance": 1e-3})
+    assert any(line.startswith("comparison.tolerance has no effect") for line in without_effect(loose, "compare"))
+    assert without_effect(beams().with_({"modal.prestress": True}), "check") == []
+
+
+def test_a_box_with_two_ranges_of_one_parameter_is_refused() -> None:
+    with pytest.raises(st.CaseError) as error:
+        _made(beams(), ["mu=0:0.1", "mu=0:0.2"], None, 1e-6)
+    assert str(error.value) == "--box: 'mu=0:0.2' – mu has a range already, (0.0, 0.1); give each once"
+
+
+def test_check_tells_cubic_springs() -> None:
+    case = st.loads(BELT).with_({"springs.k.cubic": 2e5, "springs.k.damping": 3.0})
+    (line,) = [x for x in st.describe(case).lines if x.startswith("  spring k")]
+    assert line == "  spring k: m to ground, 1 N/m and 200000 N/m³ times the cube, with a dashpot of 3 N s/m"
