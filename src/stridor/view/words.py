@@ -93,6 +93,11 @@ def _onset_sentence(inputs: ReportInputs) -> str:
     if onsets.at_start:
         return f"It {' and '.join(onsets.at_start_words)}, before any onset."
     if first is None:
+        if _grows_somewhere(inputs):
+            return (
+                f"No onset lies between {low:g} and {high:g} up to {_khz(inputs)}, and yet modes grow there: they do "
+                "so from the lower end on."
+            )
         return f"No friction coefficient between {low:g} and {high:g} makes it unstable up to {_khz(inputs)}."
     damping = "" if onsets.damped else " (without damping)"
     more = sum(1 for o in onsets.onsets if not o.stabilising) - 1
@@ -100,6 +105,15 @@ def _onset_sentence(inputs: ReportInputs) -> str:
     if more:
         text += f"; {more} more onset{'s follow' if more > 1 else ' follows'} up to μ = {high:g}"
     return text + "."
+
+
+def _grows_somewhere(inputs: ReportInputs) -> bool:
+    """Whether any mode in the range of frequencies grows at any friction coefficient looked at."""
+    return any(
+        bool(np.any(found.unstable & (found.frequency_hz <= inputs.max_frequency_hz)))
+        for found in (inputs.damped_sweep, inputs.modes)
+        if found is not None
+    )
 
 
 def _run_sentence(inputs: ReportInputs) -> str:
@@ -132,7 +146,13 @@ def _agreement_sentence(inputs: ReportInputs) -> str:
         return ""
     texts: list[str] = []
     for c in agreement.comparisons:
-        if len(c.unstable_hz) and c.perturbation.grows:
+        if len(c.unstable_hz) and c.perturbation.grows and not c.agrees:
+            modal, seen = c.modal_eigenvalue, c.perturbation
+            said = (
+                f"at μ = {c.mu:g} both find growth, but at {modal.imag / (2 * np.pi):.0f} Hz with {modal.real:.0f} 1/s "
+                f"by the modes and at {seen.frequency_hz:.0f} Hz with {seen.growth_rate:.0f} 1/s in time"
+            )
+        elif len(c.unstable_hz) and c.perturbation.grows:
             said = (
                 f"at μ = {c.mu:g} both find growth at {c.perturbation.frequency_hz:.0f} Hz, with rates of "
                 f"{c.modal_eigenvalue.real:.0f} and {c.perturbation.growth_rate:.0f} 1/s"

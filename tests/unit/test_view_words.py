@@ -1,0 +1,53 @@
+"""Sentences of the report that claim something: said only where it was found."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from stridor.agreement import Agreement, Comparison, Perturbation
+from stridor.modal.complex_modes import ComplexModes
+from stridor.modal.onsets import Onsets
+from stridor.temporal.signals import Components
+from stridor.view.words import _agreement_sentence, _onset_sentence
+
+
+def report(**more: Any) -> Any:
+    nothing = Onsets((), (0.0, 0.5), 20e3, True)
+    fields = {"damped_onsets": nothing, "undamped_onsets": None, "damped_sweep": None, "modes": None}
+    return SimpleNamespace(**(fields | {"max_frequency_hz": 20e3, "agreement": None} | more))
+
+
+def sweep(growth: float, frequency_hz: float) -> ComplexModes:
+    lam = np.array([[growth + 2j * np.pi * frequency_hz]])
+    return ComplexModes(np.array([0.1]), lam, np.array([1]), np.zeros((1, 1)), True)
+
+
+def test_no_onset_is_not_called_stable_where_modes_grow() -> None:
+    stable = "No friction coefficient between 0 and 0.5 makes it unstable up to 20 kHz."
+    assert _onset_sentence(report()) == stable
+    assert _onset_sentence(report(damped_sweep=sweep(-5.0, 3e3))) == stable
+    assert _onset_sentence(report(modes=sweep(50.0, 30e3))) == stable
+    for found in ("damped_sweep", "modes"):
+        assert "and yet modes grow" in _onset_sentence(report(**{found: sweep(50.0, 3e3)}))
+
+
+def test_growth_at_two_frequencies_is_not_one() -> None:
+    components = Components(np.zeros(0, dtype=complex), np.zeros(0))
+    seen = Perturbation(0.1, 100 + 2j * np.pi * 5e3, np.zeros(4), 1e-6, components)
+
+    def compared(agrees: bool | None) -> str:
+        one = Comparison(
+            0.1, 400 + 2j * np.pi * 9e3, (9e3,), (400.0,), seen, None, None, 0.4, 0.7, None, None, agrees, "v"
+        )
+        word = {True: "agree: ", False: "disagree: ", None: "not decided: "}[agrees]
+        agreement = Agreement((one,), None, None, None, f"{word}v")
+        return _agreement_sentence(report(agreement=agreement))
+
+    assert compared(True).startswith("The modal and the temporal approach agree: at μ = 0.1 both find growth at 5000 Hz")
+    assert compared(False) == (
+        "The modal and the temporal approach do not agree: at μ = 0.1 both find growth, but at 9000 Hz with 400 1/s by "
+        "the modes and at 5000 Hz with 100 1/s in time."
+    )
