@@ -49,7 +49,7 @@ class Call:
     """What every verb is called with: the file it is about, what is to be changed, where results go and who reads them.
 
     solver: the one for everything that the program factorises, whatever case and environment say. told: warnings so
-    far, each of which is said once.
+    far, each of which is said once; idle: settings without effect on what the verb computes, told with its results.
     """
 
     path: Path
@@ -60,10 +60,11 @@ class Call:
     quiet: bool
     told: list[str] = field(default_factory=list[str])
     verb: str = ""
+    idle: list[str] = field(default_factory=list[str])
 
     def case(self) -> Case:
-        """The case in the file with overrides, its warnings and the settings without effect printed. Raises
-        CaseError."""
+        """The case in the file with overrides, its warnings printed; settings without effect are told with the results.
+        Raises CaseError."""
         from ..case import load
 
         own = [] if self.solver is None else [f'modal.solver="{self.solver}"']
@@ -71,10 +72,10 @@ class Call:
         if self.solver is not None and self.solver != "auto":
             os.environ["STRIDOR_SOLVER"] = self.solver
         self.warn(case.warnings)
-        self.warn(self._idle(case))
+        self.idle[:] = self._without_effect(case)
         return case
 
-    def _idle(self, case: Case) -> list[str]:
+    def _without_effect(self, case: Case) -> list[str]:
         """Settings that do nothing on the path that the verb takes; none where the model cannot be built, which the
         verb says."""
         from ..study.without_effect import without_effect
@@ -95,6 +96,7 @@ class Call:
         """Print the JSON document of a verb, with a list ``warnings`` of all that was warned of."""
         from .output import print_json
 
+        self.warn(self.idle)
         own = [w for w in document.get("warnings", ()) if w not in self.told]
         print_json({**document, "warnings": [*self.told, *own]})
 
@@ -145,6 +147,7 @@ def verb(file: Any = CaseFile) -> Callable[[Callable[Concatenate[Call, P], None]
         def called(**given: Any) -> None:
             call = replace(_common(**{name: given.pop(name) for name in names}), verb=function.__name__)
             function(call, **given)  # type: ignore[call-arg]
+            call.warn(call.idle)
 
         order = (case.replace(annotation=file), *own, *common)
         # Typer takes them one by one, after one another, by keyword.
