@@ -319,14 +319,16 @@ def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float |
     Taken from the velocity of the first watched point (what a body radiates follows velocity); without a
     watched point from the slip speed of the first contact. The spectrum is that of the second half.
     """
+    if not run.phases or not len(run.time):
+        return None, None
     part = run.phase_slice()
+    if len(run.time[part]) < 64:
+        return None, None
     if run.watch_names:
         signal = run.velocity[part, 0, int(np.argmax(np.ptp(run.velocity[part, 0], axis=0)))]
     elif run.contact_names:
         signal = run.slip_speed[part, 0]
     else:
-        return None, None
-    if len(signal) < 64:
         return None, None
     filtered = low_passed(signal, run.sampling, max_frequency_hz)
     spec = spectrum(filtered[len(filtered) // 2 :], run.sampling)

@@ -43,7 +43,7 @@ def new(
     say(f"written: {path}\nnext: stridor check {path}, then stridor run {path}", quiet=quiet)
 
 
-@verb()
+@verb(writes=False)
 def check(call: Call) -> None:
     """Validate a case and print the model in words: bodies, contacts, time step against its limit."""
     from ..study.analyses import describe
@@ -63,7 +63,7 @@ def check(call: Call) -> None:
         stdout.print(line, markup=False)
 
 
-@verb(CaseOrMatrix)
+@verb(CaseOrMatrix, writes=False)
 def matrices(
     call: Call,
     name: Annotated[str | None, typer.Option("--name", help="Which matrix of a file that holds several.")] = None,

@@ -5,7 +5,9 @@ from __future__ import annotations
 import inspect
 import logging
 import os
+import tempfile
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from functools import wraps
 from pathlib import Path
@@ -13,7 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Concatenate, ParamSpec
 
 import typer
 
-from ..errors import CaseError, StridorError
+from .. import interrupts
+from ..errors import AnalysisError, CaseError, StridorError
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -61,10 +64,21 @@ class Call:
     told: list[str] = field(default_factory=list[str])
     verb: str = ""
     idle: list[str] = field(default_factory=list[str])
+    writes: bool = True
+    parts: tuple[str, ...] = ()
+    stack: ExitStack = field(default_factory=ExitStack)
+
+    def claim(self) -> None:
+        """Take the folder for results to oneself until the verb ends, where the verb writes into one. Raises CaseError
+        where it cannot be written or another process is at it."""
+        from ..io.claims import claimed
+
+        if self.writes or self.out is not None:
+            self.stack.enter_context(claimed(self.folder, self.parts))
 
     def case(self) -> Case:
-        """The case in the file with overrides, its warnings printed; settings without effect are told with the results.
-        Raises CaseError."""
+        """The case in the file with overrides, its warnings printed and its folder claimed; settings without effect are
+        told with the results. Raises CaseError."""
         from ..case import load
 
         own = [] if self.solver is None else [f'modal.solver="{self.solver}"']
@@ -73,6 +87,7 @@ class Call:
             os.environ["STRIDOR_SOLVER"] = self.solver
         self.warn(case.warnings)
         self.idle[:] = self._without_effect(case)
+        self.claim()
         return case
 
     def _without_effect(self, case: Case) -> list[str]:
@@ -124,8 +139,22 @@ class Call:
         """Save a result as a dataset in the folder, and say so."""
         from ..io.datasets import save
 
-        save(result, self.folder / name)
-        self.say(f"written: {self.folder / name}")
+        try:
+            path = save(result, self.folder / name)
+        except AnalysisError as error:
+            path = self._elsewhere(result, name, error)
+            raise AnalysisError(f"{error}; the result is in {path}") from None
+        self.say(f"written: {path}")
+
+    def _elsewhere(self, result: Result, name: str, error: AnalysisError) -> Path:
+        """Save what was computed where there is room for it. Raises the error that there was where there is none."""
+        from ..io.datasets import save
+
+        for folder in (Path.cwd(), Path(tempfile.gettempdir())):
+            path = folder / f"{self.path.stem}-{os.getpid()}-{name}"
+            with suppress(AnalysisError):
+                return save(result, path)
+        raise error
 
 
 def _common(
@@ -135,8 +164,14 @@ def _common(
     return Call(case, set_, solver, out, json, quiet)
 
 
-def verb(file: Any = CaseFile) -> Callable[[Callable[Concatenate[Call, P], None]], Callable[..., None]]:
-    """Give a function the arguments that all verbs have: the file before its own, the others after, as one `Call`."""
+def verb(
+    file: Any = CaseFile, *, writes: bool = True, parts: tuple[str, ...] = ()
+) -> Callable[[Callable[Concatenate[Call, P], None]], Callable[..., None]]:
+    """Give a function the arguments that all verbs have: the file before its own, the others after, as one `Call`.
+
+    writes: whether it writes results without being asked to by --out; parts: the folders in that for results that it
+    writes into as well.
+    """
 
     def made(function: Callable[Concatenate[Call, P], None]) -> Callable[..., None]:
         case, *common = inspect.signature(_common, eval_str=True).parameters.values()
@@ -145,9 +180,16 @@ def verb(file: Any = CaseFile) -> Callable[[Callable[Concatenate[Call, P], None]
 
         @wraps(function)
         def called(**given: Any) -> None:
-            call = replace(_common(**{name: given.pop(name) for name in names}), verb=function.__name__)
-            function(call, **given)  # type: ignore[call-arg]
+            call = replace(
+                _common(**{name: given.pop(name) for name in names}),
+                verb=function.__name__,
+                writes=writes,
+                parts=parts,
+            )
+            with call.stack:
+                function(call, **given)  # type: ignore[call-arg]
             call.warn(call.idle)
+            interrupts.check()
 
         order = (case.replace(annotation=file), *own, *common)
         # Typer takes them one by one, after one another, by keyword.

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
+from .. import interrupts
 from ..errors import CaseError, StridorError
 from . import about, explore, launch, modal, temporal
 
@@ -38,30 +41,61 @@ def _top(
 
 
 def main() -> None:
-    """Entry point: errors as plain lines, no traceback. Exit code 2: bad input, 1: no answer, 130: Ctrl-C."""
-
-    def program() -> None:
-        launch.meet(sys.argv[1:])
-        app(standalone_mode=True)
-
-    sys.exit(_guarded(program))
-
-
-def _guarded(call: Callable[[], Any]) -> int:
+    """Entry point: errors as plain lines, no traceback. Exit codes: docs/results.md."""
+    interrupts.install()
     try:
-        call()
+        code = _guarded(_program)
+    except KeyboardInterrupt:  # a second one, while the first was told
+        code = interrupts.INTERRUPTED
+    interrupts.leave()
+    sys.exit(_flushed(code))
+
+
+def _program() -> int:
+    launch.meet(sys.argv[1:])
+    try:
+        app(standalone_mode=True)
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else 0 if end.code is None else 1
+    return 0
+
+
+def _guarded(call: Callable[[], int | None]) -> int:
+    try:
+        code = call()
+        interrupts.check()
     except StridorError as error:
         print(f"stridor: {error}" if "\n" not in str(error) else f"stridor:\n{error}", file=sys.stderr)
         return 2 if isinstance(error, CaseError) else 1
     except KeyboardInterrupt:
+        interrupts.heard()
         print("stridor: interrupted", file=sys.stderr)
-        return 130
+        return interrupts.INTERRUPTED
     except BrokenPipeError:
         return 0
+    except OSError as error:
+        # Files have messages of their own: this is what is printed.
+        print(f"stridor: cannot write the output: {error.strerror or error}", file=sys.stderr)
+        return 1
     except (OverflowError, MemoryError) as error:
         print(f"stridor: a number of the case is out of range for this computation ({error})", file=sys.stderr)
         return 1
-    return 0
+    return code or 0
+
+
+def _flushed(code: int) -> int:
+    """The exit code, 1 where what was printed could not be written; the interpreter is left nothing to tell."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError) as error:
+            with contextlib.suppress(OSError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+            if not isinstance(error, BrokenPipeError) and stream is sys.stdout:
+                with contextlib.suppress(OSError):
+                    print(f"stridor: cannot write the output: {error}", file=sys.stderr)
+                code = code or 1
+    return code
 
 
 if __name__ == "__main__":

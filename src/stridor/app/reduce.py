@@ -30,7 +30,7 @@ Model = Annotated[
 ]
 
 
-@verb(Model)
+@verb(Model, writes=False)
 def reduce(
     call: Call,
     box: Annotated[
@@ -79,6 +79,7 @@ def reduce(
     _check_file(save, keep)
     if is_reduced_file(call.path):
         given = {"--box": box, "--set": call.set_, "--max-frequency": max_frequency, "--bound": bound}
+        call.claim()
         model, origin = _read(call.path, [name for name, value in given.items() if value], quiet=call.quiet)
     else:
         origin = call.case()

@@ -27,10 +27,11 @@ def show_run(summary: dict[str, Any]) -> None:
     _show_settled(summary)
     if summary["dominant_frequency_hz"] is not None:
         state = "saturated" if summary["saturated"] else "not saturated"
-        stdout.print(
-            f"last phase: {summary['dominant_frequency_hz']:.1f} Hz dominates, growth "
-            f"{summary['growth_rate']:.1f} 1/s where exponential, {state}"
-        )
+        rate = summary["growth_rate"]
+        growth = "nowhere exponential growth" if rate is None else f"growth {rate:.1f} 1/s where exponential"
+        stdout.print(f"last phase: {summary['dominant_frequency_hz']:.1f} Hz dominates, {growth}, {state}")
+    else:
+        stdout.print("last phase: too few records for a dominant frequency, or nothing vibrates")
     for change in summary["changed"]:
         stdout.print(f"changed in the middle of the run: {change}", markup=False)
     stdout.print(summary["energy"]["words"], markup=False)

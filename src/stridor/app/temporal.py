@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import AnalysisError, CaseError
+from ..interrupts import held
 from .arguments import Call, numbers, verb
 
 if TYPE_CHECKING:
@@ -62,23 +63,28 @@ def simulate(
     before = None if restart is None else load_trajectory(restart)
     if restart is not None and before is not None and path.exists() and path.samefile(restart):
         _check_records(loaded, before, path)
-    try:
-        with progress_bar("simulate", quiet=call.quiet) as progress:
-            run = analyses.simulate(
-                loaded,
-                mu,
-                progress=progress,
-                checkpoint=lambda part: save(part, path) and None,
-                restart=before,
-                changed=changed,
-            )
-    except AnalysisError as error:
-        part = getattr(error, "trajectory", None)
-        if part is not None:
+
+    def checkpoint(part: Trajectory) -> None:
+        try:
             save(part, path)
-            call.say(f"written up to there: {path}")
-        raise
-    call.keep(run, "simulate.nc")
+        except AnalysisError as error:  # the run goes on: what it ends with may find a place
+            call.warn([str(error)])
+
+    with held():
+        # What has been computed is in its file before another Ctrl-C counts.
+        try:
+            with progress_bar("simulate", quiet=call.quiet) as progress:
+                run = analyses.simulate(
+                    loaded, mu, progress=progress, checkpoint=checkpoint, restart=before, changed=changed
+                )
+        except AnalysisError as error:
+            part = getattr(error, "trajectory", None)
+            if part is not None:
+                call.keep(part, "simulate.nc")
+            raise
+        if run.steps == (0 if before is None else before.steps) and run.interrupted:
+            raise KeyboardInterrupt  # nothing that is worth an earlier file
+        call.keep(run, "simulate.nc")
     summary = analyses.summarise(loaded, run)
     if run.interrupted:
         call.say(f"interrupted after {run.steps} of {run.planned_steps} steps; go on with --restart {path}")
@@ -177,7 +183,7 @@ def _kept(call: Call, case: Case) -> KeptParts:
     return kept
 
 
-@verb()
+@verb(parts=("figures",))
 def run(call: Call, only: Only = None) -> None:
     """Everything: modes, onsets, simulate, compare, and the report. A second call takes what is finished in time."""
     from .output import progress_bar, stdout

@@ -4,40 +4,69 @@ from __future__ import annotations
 
 import contextlib
 import os
+import platform
+import re
 import tempfile
 from collections.abc import Generator
 from pathlib import Path
 
 from ..errors import AnalysisError
+from ..interrupts import held
+from .processes import Process, this_process
+
+_TEMPORARY = re.compile(r"^\..+\.stridor-(?P<host>[^.]+)\.(?P<number>\d+)\.(?P<started>\d+)\.[^.]+(\.[^.]*)?$")
 
 
 @contextlib.contextmanager
-def replacing(path: Path) -> Generator[Path, None, None]:
+def replacing(path: Path) -> Generator[Path]:
     """A temporary path beside ``path`` that takes its place when the block ends well.
 
-    Raises AnalysisError where the folder cannot be written or the disk is full; the old file stays then.
+    Ctrl-C waits until the file is in its place. Raises AnalysisError where the folder cannot be written or the disk is
+    full; the old file stays then.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
-        os.close(handle)
-    except OSError as error:
-        raise AnalysisError(f"cannot write {path}: {error.strerror or error}") from error
-    temporary = Path(name)
-    try:
-        yield temporary
-        # A file made by mkstemp is private; give it what a plain open would have given.
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(path)
-    except OSError as error:
-        raise AnalysisError(f"cannot write {path}: {error.strerror or error}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
+    with held():
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            prefix = f".{path.name[:60]}.stridor-{this_process().mark}."
+            handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
+            os.close(handle)
+        except OSError as error:
+            raise _cannot(path, error) from error
+        temporary = Path(name)
+        try:
+            yield temporary
+            # A file made by mkstemp is private; give it what a plain open would have given.
+            mask = os.umask(0)
+            os.umask(mask)
+            temporary.chmod(0o666 & ~mask)
+            temporary.replace(path)
+        except OSError as error:
+            raise _cannot(path, error) from error
+        finally:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def _cannot(path: Path, error: OSError) -> AnalysisError:
+    return AnalysisError(f"cannot write {path}: {error.strerror or error}")
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file in one piece."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def remove_remains(folder: Path) -> None:
+    """Remove temporary files that processes left which are dead; of other computers nothing is known, so they stay."""
+    own = this_process()
+    with contextlib.suppress(OSError):
+        for file in folder.iterdir():
+            found = _TEMPORARY.match(file.name)
+            if found is None or not own.mark.startswith(f"{found['host']}."):
+                continue
+            number, started = int(found["number"]), found["started"]
+            left = Process(platform.node(), number, "" if started == "0" else started)
+            if left != own and left.dead:
+                with contextlib.suppress(OSError):
+                    file.unlink()

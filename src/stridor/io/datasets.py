@@ -22,6 +22,7 @@ from .atomic import replacing
 from .reduced_models import save_reduced
 from .result_files import FORMAT, damage_told, open_results
 from .seals import seal
+from .streams import NotedErrors
 
 Result = ComplexModes | Onsets | Trajectory | Agreement
 
@@ -47,7 +48,11 @@ def save(result: Result | ReducedModel, path: str | Path) -> Path:
     dataset = seal(to_dataset(result))
     target = Path(path)
     with replacing(target) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+        stream = NotedErrors(temporary)
+        try:
+            dataset.to_netcdf(stream, engine="h5netcdf")
+        finally:
+            stream.finish()
     return target
 
 

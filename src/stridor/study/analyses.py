@@ -59,6 +59,7 @@ __all__ = [
 ]
 
 EXPONENTIAL = 0.5  # rms of ln amplitude about the fitted line, above which nothing is called exponential
+LEAST_RECORDS = 128  # from which on components are sought in a run
 MOST_BYTES = 8e9  # of records kept in memory
 
 
@@ -511,7 +512,8 @@ def summarise(case: Case, run: Trajectory) -> RunSummary:
     dominant, fitted = dominant_response(run, case.modal.max_frequency_hz)
     linear: complex | None = None
     perturbed = case.temporal.initial == "steady-sliding" and case.temporal.perturbation > 0
-    system = build_system(case) if perturbed and run.contact_names and case.contacts else None
+    enough = len(run.time) >= LEAST_RECORDS
+    system = build_system(case) if perturbed and enough and run.contact_names and case.contacts else None
     if system is not None and not system.assembled:
         found = linear_part(run, slip_speeds(system, full_motion(system)), skip=16)
         band = components(found, run.sampling, max_frequency_hz=case.modal.max_frequency_hz)

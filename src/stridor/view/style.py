@@ -12,6 +12,7 @@ from cycler import cycler
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 
 from ..typing import Array
 
@@ -75,9 +76,27 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
     @wraps(draw)
     def drawing(*args: P.args, **kwargs: P.kwargs) -> R:
         with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType, reportUnknownMemberType]
-            return draw(*args, **kwargs)
+            drawn = draw(*args, **kwargs)
+        if isinstance(drawn, Figure):
+            _as_written(drawn)
+        return drawn
 
     return drawing
+
+
+def _as_written(figure: Figure) -> None:
+    """Show titles, labels and legends as they are written: in names of a case $ begins no formula."""
+    texts = list(figure.texts)
+    for ax in figure.axes:
+        texts += [ax.title, ax.xaxis.label, ax.yaxis.label, *ax.texts, *ax.findobj(Annotation)]
+        legend = ax.get_legend()
+        texts += [] if legend is None else [*legend.get_texts(), legend.get_title()]
+        for side in ("left", "right"):
+            texts.append(getattr(ax, f"_{side}_title", ax.title))
+    for legend in figure.legends:
+        texts += legend.get_texts()
+    for text in texts:
+        text.set_parse_math(False)
 
 
 def new_figure(height: float = 3.6, width: float = WIDTH) -> Figure:
