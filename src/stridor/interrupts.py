@@ -22,7 +22,7 @@ AGAIN_SECONDS = 1.0
 STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
-@dataclass
+@dataclass(eq=False)
 class Held:
     """A block that is not to be interrupted in its middle: whether an end was asked for, whether that was met."""
 
@@ -94,6 +94,17 @@ def held() -> Generator[Held]:
             _raise()
 
 
+@contextlib.contextmanager
+def at_once() -> Generator[None]:
+    """A part of a `held` block that may be interrupted at any place: nothing is lost by it, and it takes long."""
+    block = Held(met=True)
+    _program.blocks.append(block)
+    try:
+        yield
+    finally:
+        _program.blocks.remove(block)
+
+
 def _take_over() -> Any:
     """The handler of Ctrl-C that is put aside for a block; None where ours is there already or Python's own is not."""
     if threading.current_thread() is not threading.main_thread():
@@ -118,7 +129,7 @@ def _handle(number: int, frame: FrameType | None) -> None:
 
 def _again(number: int, frame: FrameType | None) -> None:
     del number, frame
-    if _program.pending and not _program.blocks:
+    if _program.pending and (not _program.blocks or _program.blocks[-1].met):
         raise KeyboardInterrupt
 
 

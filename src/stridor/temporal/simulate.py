@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import AnalysisError
-from ..interrupts import Held, held
+from ..interrupts import Held, at_once, held
 from ..sliding import slip_speeds
 from ..system import System
 from ..system.uncoupled import UncoupledModes
@@ -154,6 +154,9 @@ class _Run:
 
     def march(self, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float) -> Trajectory:
         """Chunk by chunk to the end, or to where it is stopped."""
+        self.record = self._buffers()
+        with at_once():  # compiles the loop or loads it, before the clock starts
+            self.machine.run(0, self.schedule, self.record)
         with held() as block:
             interrupted = self._loop(block, progress, checkpoint, every_seconds)
             result = self._trajectory(interrupted=interrupted)
@@ -165,11 +168,9 @@ class _Run:
     ) -> bool:
         """The chunks; whether they were interrupted."""
         machine, schedule = self.machine, self.schedule
-        self.record = self._buffers()
         started = last_saved = clock.perf_counter()
         size = FIRST_CHUNK
         try:
-            machine.run(0, schedule, self.record)  # compiles the loop or loads it, before the clock starts
             started = last_saved = clock.perf_counter()
             while (done := int(machine.state.counters[0])) < schedule.steps and not block.asked:
                 self.phases.begin(done)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError
-from ...interrupts import Held, held
+from ...interrupts import Held, at_once, held
 from ...system import System
 from ...typing import Array
 from ..beta2 import StepLimit, scheme
@@ -145,6 +145,10 @@ class _Run:
 
     def march(self, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float) -> Trajectory:
         """Chunk by chunk to the end, or to where it is stopped."""
+        self.first_step = self.machine.done
+        self.record = buffers(self.machine, self.schedule, self.settings)
+        with at_once():  # compiles the loop or loads it, before the clock starts
+            self.machine.run(0, self.schedule, self.record)
         with held() as block:
             interrupted = self._loop(block, progress, checkpoint, every_seconds)
             result = self._trajectory(interrupted=interrupted)
@@ -156,12 +160,9 @@ class _Run:
     ) -> bool:
         """The chunks; whether they were interrupted."""
         machine, schedule = self.machine, self.schedule
-        self.first_step = machine.done
-        self.record = buffers(machine, schedule, self.settings)
         started = last_saved = last_told = clock.perf_counter()
         pace = Pace(machine.threaded)
         try:
-            machine.run(0, schedule, self.record)  # compiles the loop or loads it, before the clock starts
             started = last_saved = last_told = clock.perf_counter()
             while machine.done < schedule.steps and not block.asked:
                 self.phases.begin(machine.done)
