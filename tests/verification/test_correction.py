@@ -96,3 +96,18 @@ def test_the_program_corrects_where_errors_are_above_the_bound(tmp_path):
     exact = complex_modes(build_system(load(case)), 0.9, max_frequency_hz=20e3).frequency_hz[0]
     found = np.array(outside["frequency_hz"])
     assert np.abs(exact[:, None] - found).min(axis=1) == pytest.approx(0, abs=1e-6 * 20e3)
+
+
+def test_a_small_problem_whose_basis_holds_all_there_is_is_corrected_too(tmp_path):
+    case = tmp_path / "bench.toml"
+    case.write_text(template_text("two-beams"))
+    small = {"bodies.beam1.elements": 6, "bodies.beam2.elements": 9, "temporal.watch": '["beam1.tip"]'}
+    words = [w for key, value in small.items() for w in ("--set", f"{key}={value}")]
+    words = ["reduce", str(case), *words, "--box", "mu=0:0.5", "--at", "mu=0.2", "--json", "--quiet"]
+    found = CliRunner().invoke(app, words)
+    assert found.exit_code == 0, found.output
+    (modes,) = json.loads(found.stdout)["modes"]
+    system = build_system(load(case).with_({"bodies.beam1.elements": 6, "bodies.beam2.elements": 9}))
+    exact = complex_modes(system, 0.2, max_frequency_hz=40e3).frequency_hz[0]
+    near = np.abs(exact[:, None] - np.array(modes["frequency_hz"])).min(axis=0)
+    assert near == pytest.approx(0.0, abs=1e-5 * 40e3)

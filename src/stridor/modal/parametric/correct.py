@@ -130,17 +130,20 @@ class Corrector:
 
     def _extended(self, basis: Array, projected: Array, block: Array) -> tuple[Array, Array] | None:
         """The basis with what is new in ``block`` (n, k), and the terms on it; None where nothing is."""
-        weight = self._scale**-2
-        image = weight[:, None] * basis
-        gram = sl.cho_factor(basis.T @ image)
-        block = block / np.sqrt(np.einsum("ij,ij->j", block, weight[:, None] * block))
+        # By orthogonal columns rather than their Gram matrix, which small problems make singular: their basis may hold
+        # all there is.
+        root = 1.0 / self._scale[:, None]
+        span = sl.qr(root * basis, mode="economic")[0]
+        block = root * block
+        size = np.linalg.norm(block, axis=0)
+        block = block[:, size > 0] / size[size > 0]
         for _ in range(2):
-            block = block - basis @ sl.cho_solve(gram, image.T @ block)
-        squares, turn = sl.eigh(block.T @ (weight[:, None] * block))
-        keep = squares > NEW**2
+            block = block - span @ (span.T @ block)
+        squares, turn = sl.eigh(block.T @ block)
+        keep = (squares > NEW**2) & (np.arange(len(squares), 0, -1) <= len(basis) - basis.shape[1])
         if not keep.any():
             return None
-        new = block @ (turn[:, keep] / np.sqrt(squares[keep]))
+        new = block @ (turn[:, keep] / np.sqrt(squares[keep])) / root
         r, total = basis.shape[1], basis.shape[1] + new.shape[1]
         result = np.zeros((len(projected), total, total))
         result[:, :r, :r] = projected
