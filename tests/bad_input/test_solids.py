@@ -257,12 +257,12 @@ MESHES = {
     "key of a mesh": (
         "size = [0.02, 0.01]",
         "sizes = [0.02, 0.01]",
-        "bodies.slider.mesh.sizes: unknown key; did you mean 'size'? accepted: divisions, element_size, shape, corner, size, angle_deg, cells",
+        "bodies.slider.mesh.sizes: unknown key; did you mean 'size'? accepted: divisions, element_size, grading, shape, corner, size, angle_deg, cells",
     ),
     "key of another shape": (
         "size = [0.02, 0.01]",
         "size = [0.02, 0.01], inner_radius = 1.0",
-        "bodies.slider.mesh.inner_radius: 1.0 – not used by 'rectangle'; accepted: divisions, element_size, shape, corner, size, angle_deg, cells",
+        "bodies.slider.mesh.inner_radius: 1.0 – not used by 'rectangle'; accepted: divisions, element_size, grading, shape, corner, size, angle_deg, cells",
     ),
     "plane mesh in space": (
         'model = "plane stress"',
