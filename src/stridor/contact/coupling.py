@@ -29,7 +29,7 @@ from .curve import Curve
 from .facets import FacetSurface
 from .interpolation import LINEAR, element_weights
 from .master import Location, MasterSurface
-from .pieces import pieces
+from .pieces import outlines, pieces
 
 # Facets integrated together: their arrays fit comfortably into memory.
 TOGETHER = 400
@@ -165,8 +165,10 @@ def _integrated(
 ) -> tuple[Sparse, Array]:
     """∫ ψ_i φ_l dA (m, k) csr [m²] and ∫ ψ_i g dA (m,) [m³] over the facets all of whose nodes take part."""
     shape = (len(positions), master.node_count)
-    total, gaps = sp.csr_array(shape), np.zeros(len(positions))
+    gaps = np.zeros(len(positions))
+    found_so_far: list[Sparse] = []
     current = master.positions if displacement is None else master.positions + displacement
+    cut_by = outlines(master, current)
     for kind in facets.blocks:
         own, change, share = _shares(facets, kind)
         whole = np.flatnonzero(np.all(own >= 0, axis=1))
@@ -175,7 +177,7 @@ def _integrated(
                 continue
             nodes = own[part]
             corners = positions[nodes]
-            points = pieces(kind, corners, location.point[nodes].mean(axis=1), master, current)
+            points = pieces(kind, corners, location.point[nodes].mean(axis=1), cut_by)
             values, slopes = shape_functions(kind, points.place)
             at = np.einsum("qr,qrd->qd", values, corners[points.owner])
             weight = points.weight * _stretch(slopes, corners[points.owner])
@@ -188,9 +190,18 @@ def _integrated(
             entries = (dual[:, :, None] * weights[:, None, :]).ravel()
             rows = np.repeat(row, weights.shape[1], axis=1).ravel()
             columns = np.repeat(element[:, None, :], row.shape[1], axis=1).ravel()
-            total = total + sp.csr_array((entries, (rows, columns)), shape=shape)
+            found_so_far.append(sp.csr_array((entries, (rows, columns)), shape=shape).tocoo())
             np.add.at(gaps, row, dual * gap[:, None])
-    return sp.csr_array(total), gaps
+    return _total(found_so_far, shape), gaps
+
+
+def _total(parts: list[Sparse], shape: tuple[int, int]) -> Sparse:
+    """The sum csr of coo matrices, taken once: one after the other would take the time of their number squared."""
+    none = np.zeros(0, dtype=np.int64)
+    rows = np.concatenate([none, *(part.row for part in parts)])
+    columns = np.concatenate([none, *(part.col for part in parts)])
+    values = np.concatenate([np.zeros(0), *(part.data for part in parts)])
+    return sp.csr_array((values, (rows, columns)), shape=shape)
 
 
 def _dual(change: Array, share: Array, values: Array, weight: Array, owner: IntArray) -> Array:

@@ -8,6 +8,7 @@ projected along the normal of the slave facet; within a piece everything is smoo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -23,6 +24,7 @@ LEAST_COVER = 0.9
 MOST_COVER = 1.0 + 1e-6
 OPPOSED = -0.1  # cosine between normals that face each other
 STEPS = 12
+SETTLED = 1e-14  # step of a reference place, of the size of facets: rounding
 FINE = 4  # Gauss points along each side of a piece where facets are distorted
 
 
@@ -35,16 +37,55 @@ class Points:
     weight: Array
 
 
-def pieces(kind: str, facets: Array, under: Array, master: Curve | FacetSurface, current: Array) -> Points:
-    """Points on slave facets (f, r, d) [m] of a kind over a master whose nodes are at current (k, d) [m].
+@dataclass(frozen=True)
+class Line:
+    """Nodes (k, 2) [m] of a master in the plane, and the tree of them."""
+
+    nodes: Array
+    tree: Any
+
+
+@dataclass(frozen=True)
+class Outlines:
+    """The mesh's own facets of a master in space: corners (o, 4, 3) [m], how many (o,) each has, whether (o,) it is
+    affine, outward unit normals (o, 3), centres (o, 3) and radii (o,) [m].
+
+    lots: which (q,) are within a factor of two of one size, the tree of their centres, the largest radius. One large
+    facet amid small ones must not make neighbours of them all.
+    """
+
+    corners: Array
+    sides: IntArray
+    even: BoolArray
+    normal: Array
+    centre: Array
+    radius: Array
+    lots: tuple[tuple[IntArray, Any, float], ...]
+
+
+def outlines(master: Curve | FacetSurface, current: Array) -> Line | Outlines:
+    """What slave facets are cut by on a master whose nodes are at current (k, d) [m]."""
+    if isinstance(master, Curve):
+        return Line(current, cKDTree(current))
+    corners, sides, even = _corners(master, current)
+    a, b, c, d = (corners[:, i] for i in range(4))
+    normal = np.where((sides == 4)[:, None], np.cross(c - a, d - b), np.cross(b - a, c - a))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    centre = corners[:, :3].mean(axis=1)
+    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    level = np.floor(np.log2(np.maximum(radius / radius.max(), 1e-12)))
+    lots = [np.flatnonzero(level == number) for number in np.unique(level)]
+    by_size = tuple((lot, cKDTree(centre[lot]), float(radius[lot].max())) for lot in lots)
+    return Outlines(corners, sides, even, normal, centre, radius, by_size)
+
+
+def pieces(kind: str, facets: Array, under: Array, below: Line | Outlines) -> Points:
+    """Points on slave facets (f, r, d) [m] of a kind over a master of these outlines.
 
     under (f, d) [m]: the point of the master below the middle of each facet. Facets that the master does not cover
     get points that know nothing of it.
     """
-    if isinstance(master, Curve):
-        cut = _on_line(kind, facets, under, current)
-    else:
-        cut = _in_space(kind, facets, under, master, current)
+    cut = _on_line(kind, facets, under, below) if isinstance(below, Line) else _in_space(kind, facets, under, below)
     owner, place, weight, good = cut
     keep = good[owner]
     rest = np.flatnonzero(~good)
@@ -57,7 +98,7 @@ def pieces(kind: str, facets: Array, under: Array, master: Curve | FacetSurface,
 
 
 def _on_line(
-    kind: str, facets: Array, under: Array, nodes: Array
+    kind: str, facets: Array, under: Array, line: Line
 ) -> tuple[IntArray, Array, Array, BoolArray]:
     """Between the feet of the master's nodes on the chord of each facet, four Gauss points each."""
     begin, chord = facets[:, 0], facets[:, 1] - facets[:, 0]
@@ -65,11 +106,11 @@ def _on_line(
     along = chord / length[:, None]
     away = np.linalg.norm(under - facets[:, :2].mean(axis=1), axis=1)
     # Only nodes around the place below: the far side of a ring has feet on the chord as well.
-    near = cKDTree(nodes).query_ball_point(under, length + 1e-9 * away)
+    near = line.tree.query_ball_point(under, length + 1e-9 * away)
     counts = np.array([len(n) for n in near], dtype=np.int64)
     facet = np.repeat(np.arange(len(facets)), counts)
     node = np.concatenate([np.asarray(n, dtype=np.int64) for n in near]) if len(near) else np.zeros(0, dtype=np.int64)
-    foot = np.sum((nodes[node] - begin[facet]) * along[facet], axis=1) / length[facet]
+    foot = np.sum((line.nodes[node] - begin[facet]) * along[facet], axis=1) / length[facet]
     within = (foot > 1e-9) & (foot < 1.0 - 1e-9)
     each = np.arange(len(facets))
     facet = np.concatenate([each, facet[within], each])
@@ -88,28 +129,28 @@ def _on_line(
 
 
 def _in_space(
-    kind: str, facets: Array, under: Array, master: FacetSurface, current: Array
+    kind: str, facets: Array, under: Array, below: Outlines
 ) -> tuple[IntArray, Array, Array, BoolArray]:
     corner_count = 3 if kind.startswith("triangle") else 4
     corners = facets[:, :corner_count]
     origin = corners.mean(axis=1)
     frame = _frames(corners)  # (f, 3, 3): two tangents and the normal
     flat = np.einsum("fij,frj->fri", frame[:, :2], facets - origin[:, None])
-    outline, sides, other_even = _outlines(master, current)
-    pair_facet, pair_other = _neighbours(corners, under, frame[:, 2], outline, sides)
-    relative = outline[pair_other] - origin[pair_facet][:, None]
+    pair_facet, pair_other = _neighbours(corners, under, frame[:, 2], below)
+    relative = below.corners[pair_other] - origin[pair_facet][:, None]
     others = np.einsum("pij,prj->pri", frame[pair_facet][:, :2], relative)
     polygons = np.zeros((len(facets), 4, 2))
     polygons[:, :corner_count] = flat[:, :corner_count]
     counts = np.full(len(facets), corner_count, dtype=np.int64)
-    which, triangles = common_triangles(polygons, counts, pair_facet, np.ascontiguousarray(others), sides[pair_other])
+    sides = below.sides[pair_other]
+    which, triangles = common_triangles(polygons, counts, pair_facet, np.ascontiguousarray(others), sides)
     owner = pair_facet[which]
     first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     twice = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
     following = np.roll(flat[:, :corner_count], -1, axis=1)
     turned = flat[:, :corner_count, 0] * following[:, :, 1] - flat[:, :corner_count, 1] * following[:, :, 0]
     covered = np.bincount(owner, twice, len(facets)) / np.abs(turned.sum(axis=1))
-    even = _affine(kind, facets)[owner] & other_even[pair_other[which]]
+    even = _affine(kind, facets)[owner] & below.even[pair_other[which]]
     owners: list[IntArray] = []
     places: list[Array] = []
     weights: list[Array] = []
@@ -154,7 +195,7 @@ def _frames(corners: Array) -> Array:
     return np.stack([first, np.cross(normal, first), normal], axis=1)
 
 
-def _outlines(master: FacetSurface, current: Array) -> tuple[Array, IntArray, BoolArray]:
+def _corners(master: FacetSurface, current: Array) -> tuple[Array, IntArray, BoolArray]:
     """Corners (o, 4, 3) of the mesh's own facets of a master, how many (o,) each has and whether (o,) it is affine."""
     found: list[Array] = []
     sides: list[IntArray] = []
@@ -168,24 +209,20 @@ def _outlines(master: FacetSurface, current: Array) -> tuple[Array, IntArray, Bo
     return np.concatenate(found), np.concatenate(sides), np.concatenate(even)
 
 
-def _neighbours(
-    corners: Array, under: Array, normal: Array, outline: Array, sides: IntArray
-) -> tuple[IntArray, IntArray]:
+def _neighbours(corners: Array, under: Array, normal: Array, below: Outlines) -> tuple[IntArray, IntArray]:
     """Pairs (p,) of slave facets and outlines that may lie over each other and face each other."""
-    centre = outline[:, :3].mean(axis=1)
-    size = np.linalg.norm(outline - centre[:, None], axis=2).max(axis=1)
     own = np.linalg.norm(corners - corners.mean(axis=1)[:, None], axis=2).max(axis=1)
-    near = cKDTree(centre).query_ball_point(under, 1.01 * (own + size.max()))
-    counts = np.array([len(n) for n in near], dtype=np.int64)
-    facet = np.repeat(np.arange(len(corners)), counts)
-    other = np.concatenate([np.asarray(n, dtype=np.int64) for n in near])
-    quads = sides[other] == 4
-    a, b, c, d = (outline[other, i] for i in range(4))
-    out = np.where(quads[:, None], np.cross(c - a, d - b), np.cross(b - a, c - a))
-    out /= np.linalg.norm(out, axis=1, keepdims=True)
-    offset = centre[other] - under[facet]
-    height = np.abs(np.sum(offset * normal[facet], axis=1))
-    facing = (np.sum(out * normal[facet], axis=1) < OPPOSED) & (height <= own[facet] + size[other])
+    facets: list[IntArray] = []
+    others: list[IntArray] = []
+    for lot, tree, largest in below.lots:
+        near = tree.query_ball_point(under, 1.01 * (own + largest))
+        counts = np.array([len(n) for n in near], dtype=np.int64)
+        facets.append(np.repeat(np.arange(len(corners)), counts))
+        others.append(lot[np.concatenate([np.asarray(n, dtype=np.int64) for n in near])])
+    facet, other = np.concatenate(facets), np.concatenate(others)
+    height = np.abs(np.sum((below.centre[other] - under[facet]) * normal[facet], axis=1))
+    facing = np.sum(below.normal[other] * normal[facet], axis=1) < OPPOSED
+    facing &= height <= own[facet] + below.radius[other]
     return facet[facing], other[facing]
 
 
@@ -202,7 +239,10 @@ def _inverted(kind: str, flat: Array, owner: IntArray, target: Array) -> tuple[A
             values, slopes = shape_functions(kind, place)
             offset = np.einsum("qr,qre->qe", values, flat[owner]) - target
             tangents = np.einsum("aqr,qre->qea", slopes, flat[owner])
-            place = place - np.clip(_solve(tangents, offset), -0.5, 0.5)
+            step = np.clip(_solve(tangents, offset), -0.5, 0.5)
+            place = place - step
+            if float(np.abs(step).max(initial=0.0)) <= SETTLED:
+                break
         values, slopes = shape_functions(kind, place)
         offset = np.einsum("qr,qre->qe", values, flat[owner]) - target
         tangents = np.einsum("aqr,qre->qea", slopes, flat[owner])
