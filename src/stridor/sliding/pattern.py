@@ -43,10 +43,11 @@ def unexplained_patterns(system: System, normal_force: Array, gap: Array, active
     for surface in system.surfaces:
         mine = slice(first, first + surface.nodes.count)
         first += surface.nodes.count
-        if surface.facets is None or not active[mine].any():
+        loaded = active[mine] & (normal_force[mine] > 0.0)
+        # A contact may touch without any force.
+        if surface.facets is None or not loaded.any():
             continue
         around = _neighbours(surface.facets, surface.nodes.count)
-        loaded = active[mine] & (normal_force[mine] > 0.0)
         pressure = np.where(loaded, normal_force[mine], 0.0) / nodes.area[mine]
         open_amid = _open_amid(around, loaded, pressure, nodes.gap[mine], gap[mine])
         if open_amid:
