@@ -251,7 +251,7 @@ def complex_modes(
     if not damped:
         system = undamped(system)
     spectrum, coupling, open_contacts = prepare(system, mu=float(values.max()) if len(values) == 1 else None)
-    if spectrum.modes.indefinite:
+    if spectrum.modes.indefinite or (spectrum.unseen and coupling.contacts):
         band = max_frequency_hz or _limit(spectrum, count, None) / (2 * np.pi)
         chosen = count if max_frequency_hz is None else None
         return _as_general(whole, values, chosen, band, damped, vectors, options, progress)

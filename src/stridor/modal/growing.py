@@ -1,7 +1,7 @@
 """What grows in a band at one friction coefficient, sought anew in the full problem; and the check of followed modes.
 
 Branches are followed from μ = 0, and what starts beyond the band may sink into it with friction, or be born on the real
-axis. What counts at a μ is every mode of the band there, wherever it began. It is sought with `quadratic.find_modes` on
+axis. What counts at a μ is every mode of the band there, wherever it began. It is sought with `quadratic.band_modes` on
 
     λ²M + λ(C + friction's slope) + K + (N + μS)ᵀ c⁻¹ N
 
@@ -25,7 +25,7 @@ from .complex_modes import ComplexModes, complex_modes, undamped
 from .general.basis import AT_REST, GROWS, NOTHING
 from .general.family import quadratic_of
 from .onsets import Onsets, onsets
-from .quadratic import Region, find_modes
+from .quadratic import band_modes
 from .quadratic.polish import pairs
 
 AFFORDABLE = 60_000  # unknowns up to which the full problem is solved unasked
@@ -76,8 +76,10 @@ def growing_modes(
     options = options or Options()
     problem = problem_of(system if damped else undamped(system), touching_at, options, damped=damped)
     top = 2 * np.pi * max_frequency_hz
-    region = Region.band(0.0, max_frequency_hz, above=-BESIDE * top)
-    found = find_modes(quadratic_of(problem, mu), region, left=False, solver=options.solver)
+    found = band_modes(
+        quadratic_of(problem, mu), max_frequency_hz, above=-BESIDE * top, still=quadratic_of(problem, 0.0),
+        solver=options.solver,
+    )  # fmt: skip
     size = np.abs(found.values)
     rounding = GROWS if problem.damped else NOTHING
     grows = (found.values.real > rounding * size) & (size > AT_REST * top)

@@ -92,7 +92,7 @@ def onsets(
     if not damped:
         system = undamped(system)
     spectrum, coupling, open_contacts = prepare(system)
-    if spectrum.modes.indefinite and coupling.contacts:
+    if (spectrum.modes.indefinite or spectrum.unseen) and coupling.contacts:
         return as_general()
     has_damping = bool(np.abs(system.damping).max() > 0) or coupling.sloped
     top = 2 * np.pi * max_frequency_hz

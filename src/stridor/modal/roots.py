@@ -45,6 +45,16 @@ class Spectrum:
         """The uncoupled modes."""
         return self.receptance.modes
 
+    @property
+    def unseen(self) -> bool:
+        """Whether a pole of a general block has no normal motion at any contact: it is a root of its own at every μ,
+        at which the receptance cannot be evaluated. Those of real blocks are ``fixed`` instead."""
+        general = np.abs(self.receptance.general)
+        if not general.size:
+            return False
+        seen = general if self.coupling.sloped else general[0::2]
+        return bool(np.any(seen.max(axis=0) <= UNCOUPLED_TOLERANCE * seen.max()))
+
     def evaluate(self, lam: ComplexArray, mu: float) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """T, ∂T/∂λ, ∂T/∂μ at λ (k,)."""
         return self.coupling.matrices(lam, mu, *self.receptance(lam))

@@ -22,7 +22,7 @@ from ...system import System
 from ...typing import Array, ComplexArray
 from ..assembled.steady import Options
 from ..complex_modes import ComplexModes, Progress, require_memory
-from ..quadratic import Region, find_modes
+from ..quadratic import band_modes
 from .basis import DECAY, NOTHING
 from .family import Family, family_of
 from .numbers import Numbers, numbered
@@ -109,8 +109,10 @@ def _family(
 
 
 def _modes(family: Family, mu: float, top: float, *, left: bool) -> Found:
-    region = Region.band(0.0, top / (2 * np.pi), above=-DECAY * top)
-    spectrum = find_modes(family.built(mu), region, left=left, solver=family.options.solver)
+    spectrum = band_modes(
+        family.built(mu), top / (2 * np.pi), above=-DECAY * top, still=family.built(family.low), left=left,
+        solver=family.options.solver,
+    )  # fmt: skip
     n = family.freedoms
     told = spectrum.completeness.sentence
     values = spectrum.values.copy()

@@ -21,7 +21,7 @@ from ..assembled.follow import State
 from ..assembled.passages import Passage
 from ..assembled.steady import Options
 from ..onset import Onset, Onsets
-from ..quadratic import Region, Spectrum, find_modes
+from ..quadratic import Spectrum, band_modes
 from ..quadratic.polish import groups, pairs
 from .basis import AT_REST, DECAY, GROWS, NOTHING, Along, Held, Projected, along, by_lambda, whole_or_raise
 from .family import Family, family_of
@@ -106,11 +106,10 @@ def unstable(family: Family, values: ComplexArray, top: float) -> BoolArray:
 
 def _ends(family: Family, low: float, high: float, top: float) -> tuple[Spectrum, Spectrum]:
     """All modes of the band at both ends, in the full problem."""
-    region = Region.band(0.0, top / (2 * np.pi), above=-DECAY * top)
-    solver = family.options.solver
+    band, least, solver, still = top / (2 * np.pi), -DECAY * top, family.options.solver, family.built(low)
     return (
-        find_modes(family.built(low), region, left=True, solver=solver),
-        find_modes(family.built(high), region, left=False, solver=solver),
+        band_modes(still, band, above=least, still=still, left=True, solver=solver),
+        band_modes(family.built(high), band, above=least, still=still, left=False, solver=solver),
     )
 
 
@@ -160,7 +159,10 @@ def _solved(
     balance += sum(-1 if f.onset.stabilising else 1 for f in found if between[0] <= f.onset.mu <= between[1])
     explained = _explained(lost)
     growing = [int(np.count_nonzero(unstable(family, state.values, top))) for state in (way.low, way.high)]
-    agree = all(_agree(family, state, end, top) for state, end in zip((way.low, way.high), ends, strict=True))
+    fast = _throughout(family, (way.low, way.high), ends, top)
+    agree = all(
+        _agree(family, state, end, top, fast) for state, end in zip((way.low, way.high), ends, strict=True)
+    )
     return found, way, agree and explained and growing[1] - growing[0] == balance
 
 
@@ -190,14 +192,25 @@ def _is_above(passage: Passage, frequency: float) -> bool:
     return bool(lam.imag > frequency and not ahead.imag < frequency)
 
 
-def _agree(family: Family, state: State, end: Spectrum, top: float) -> bool:
-    """Whether the followed modes that grow in the band are those found in full."""
+def _throughout(family: Family, states: tuple[State, State], ends: tuple[Spectrum, Spectrum], top: float) -> int:
+    """How many modes diverge faster than the band at both ends, and were not followed: branches start in the band."""
+    alone: list[int] = []
+    for state, end in zip(states, ends, strict=True):
+        theirs = end.values[unstable(family, end.values, top) & (end.values.real > top) & (end.values.imag == 0)]
+        ours, _ = pairs(theirs, state.values, 1e-3 * top)
+        alone.append(len(theirs) - len(ours))
+    return alone[0] if alone[0] == alone[1] else 0
+
+
+def _agree(family: Family, state: State, end: Spectrum, top: float, fast: int) -> bool:
+    """Whether the followed modes that grow in the band are those found in full, but for ``fast`` that diverge at every
+    μ beyond what is followed."""
     mine = state.values[unstable(family, state.values, top) & (state.values.imag <= top)]
     theirs = end.values[unstable(family, end.values, top)]
     ours, _ = pairs(mine, theirs, 1e-3 * top)
     # One on the very border of the band may count on one side only.
     slack = int(np.count_nonzero(np.abs(np.concatenate([mine, theirs]).imag - top) <= 1e-6 * top))
-    return max(len(mine), len(theirs)) - len(ours) <= slack
+    return len(mine) - len(ours) <= slack and len(theirs) - len(ours) - fast <= slack
 
 
 def _same(one: Onset, other: Onset, family: Family) -> bool:

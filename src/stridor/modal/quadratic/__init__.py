@@ -1,8 +1,9 @@
 """Quadratic eigenvalue problems of sparse matrices that need have no structure at all."""
 
+from .band import band_modes
 from .count import undamped_count
 from .find import Completeness, Spectrum, find_modes
 from .problem import Quadratic
 from .region import Disc, Region
 
-__all__ = ["Completeness", "Disc", "Quadratic", "Region", "Spectrum", "find_modes", "undamped_count"]
+__all__ = ["Completeness", "Disc", "Quadratic", "Region", "Spectrum", "band_modes", "find_modes", "undamped_count"]

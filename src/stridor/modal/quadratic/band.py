@@ -1,0 +1,86 @@
+"""The modes of a band of frequencies, those among them that grow faster than anything oscillates in it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as sl
+
+from ...typing import Array
+from .find import DENSE, Spectrum, find_modes
+from .polish import pairs
+from .problem import Quadratic
+from .region import Region
+
+FASTER = (1.0, 8.0, 64.0)  # times the band: growth rates between neighbours are searched by a disc of its own
+QUIET = 0.25  # of the band: a system that diverges no faster without friction is not searched beyond the band
+SAME = 1e-8  # of the band: one eigenvalue, found from both sides of a border
+
+
+def band_modes(
+    problem: Quadratic, max_hz: float, *, above: float, still: Quadratic, left: bool = False, solver: str | None = None
+) -> Spectrum:
+    """All eigenvalues with frequencies up to ``max_hz`` [Hz] and growth rates over ``above`` [1/s].
+
+    `find_modes` cuts an endless region off at the size of its frequencies, which holds all where stiffness is positive.
+    A negative one lets motions diverge at any rate, at frequency zero and so in every band. still: the problem at the
+    least friction; where that may diverge, rates up to 64 times 2π max_hz are searched too, with one more factorisation
+    for each factor of eight. Small problems are solved whole. What was not searched the completeness says.
+    """
+    found = find_modes(problem, Region.band(0.0, max_hz, above=above), left=left, solver=solver)
+    top = 2 * np.pi * max_hz
+    if problem.size <= DENSE or is_stiff(still, QUIET * top):
+        return found
+    cut = f" Growth rates above {found.completeness.searched.re_max:.6g} 1/s were not searched."
+    for low, high in pairwise(FASTER):
+        region = Region.box(low * top, high * top, 0.0, top)
+        found = _joined(found, find_modes(problem, region, left=left, solver=solver, count=False), SAME * top)
+    told = found.completeness
+    last = f" Growth rates above {FASTER[-1] * top:.6g} 1/s were not searched."
+    return replace(found, completeness=replace(told, sentence=told.sentence.replace(cut, last)))
+
+
+def is_stiff(problem: Quadratic, rate: float) -> bool:
+    """Whether xᵀ(σ²M + K)x > 0 of every real x at σ = ``rate`` [1/s], so that nothing diverges faster unless friction
+    or damping drives it. Rows without mass (multipliers of rigid contacts, which only hold) are left out."""
+    moving = np.flatnonzero(problem.mass.diagonal() > 0.0)
+    whole = rate**2 * problem.mass + problem.stiffness
+    part = sp.csr_array(whole)[moving][:, moving]
+    try:
+        # Pivots from the diagonal alone have the signs of the eigenvalues (Sylvester).
+        factors = sl.splu(
+            sp.csc_array(0.5 * (part + part.T)), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )  # fmt: skip
+    except RuntimeError:
+        return False
+    straight = np.array_equal(factors.perm_r, factors.perm_c)
+    return straight and bool(np.all(factors.U.diagonal() > 0.0))
+
+
+def _joined(slow: Spectrum, fast: Spectrum, near: float) -> Spectrum:
+    """Both, what is in both once; by imaginary, then real part."""
+    _, known = pairs(slow.values, fast.values, near)
+    fresh = np.setdiff1d(np.arange(len(fast.values)), known)
+    values = np.concatenate([slow.values, fast.values[fresh]])
+    order = np.lexsort((values.real, values.imag))
+
+    def rates(one: Array, other: Array) -> Array:
+        return np.concatenate([one, other[fresh]])[order]
+
+    left, left_residual = slow.left, slow.left_residual
+    if left is not None and fast.left is not None:
+        left = np.concatenate([left, fast.left[:, fresh]], axis=1)[:, order]
+    if left_residual is not None and fast.left_residual is not None:
+        left_residual = rates(left_residual, fast.left_residual)
+    told = slow.completeness
+    if not fast.completeness.complete:
+        told = replace(told, complete=False, sentence=f"{fast.completeness.sentence} {told.sentence}")
+    return Spectrum(
+        values[order], np.concatenate([slow.right, fast.right[:, fresh]], axis=1)[:, order], left,
+        rates(slow.residual, fast.residual), left_residual, told, slow.factorisations + fast.factorisations,
+        slow.solves + fast.solves, slow.seconds + fast.seconds, max(slow.memory_bytes, fast.memory_bytes),
+    )  # fmt: skip
