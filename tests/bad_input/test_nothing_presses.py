@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 import stridor as st
 from solid_cases import BELT
 from stridor.case import template_text
+from stridor.sliding import nothing_presses
 from stridor.study.pressed import unpressed
 
 pytestmark = pytest.mark.bad_input
@@ -87,3 +89,22 @@ def test_a_support_that_moves_one_body_towards_the_other_presses(speed: float, p
     system = st.build_system(case)
     assert (not unpressed(case, system)) is presses
     assert unpressed(case, system, steady=True)
+
+
+def test_modes_and_onsets_without_any_load_say_that_contacts_are_taken_as_closed() -> None:
+    coarse = {"bodies.beam1.elements": 6, "bodies.beam2.elements": 12, "modal.max_frequency_hz": 5e3}
+    loaded = st.loads(template_text("two-beams")).with_(coarse)
+    free = loaded.with_({"loads": {}, "phases": [{"name": "slide", "duration": 0.01}]})
+    for call in (st.modes, st.onsets):
+        assert any("taken as closed" in note for note in call(free).notes)
+        assert not any("taken as closed" in note for note in call(loaded).notes)
+
+
+def test_one_decision_for_what_loads_leave_as_rounding() -> None:
+    """Loads that all but cancel: what modes refuse, runs refuse."""
+    for rest, presses in ((1e-6, True), (1e-10, False)):
+        case = belt(loads__lift={"at": "m", "force": [0.0, 1.0 - rest]})
+        system = st.build_system(case)
+        assert (not unpressed(case, system)) is presses
+        forces = np.array([rest])
+        assert (not nothing_presses(system, forces)) is presses

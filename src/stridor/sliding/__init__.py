@@ -1,7 +1,7 @@
 """Steady sliding: the equilibrium that both approaches start from, of point contacts and of whole surfaces."""
 
 from .points import SteadySliding, full_motion, slip_speeds, steady_sliding
-from .pressing import least_force, require_pressed
+from .pressing import least_force, nothing_presses, require_pressed, taken_as_closed
 from .resultants import Balance, Resultant
 from .surfaces import SurfaceSliding, friction_damping_matrix, steady_sliding_nodes, touching
 
@@ -13,9 +13,11 @@ __all__ = [
     "friction_damping_matrix",
     "full_motion",
     "least_force",
+    "nothing_presses",
     "require_pressed",
     "slip_speeds",
     "steady_sliding",
     "steady_sliding_nodes",
+    "taken_as_closed",
     "touching",
 ]

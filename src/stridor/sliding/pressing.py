@@ -16,18 +16,32 @@ def least_force(system: System) -> float:
     return NOTHING * sum(float(np.abs(vector).sum()) for vector in system.loads.values())
 
 
+def nothing_presses(system: System, normal_force: Array) -> bool:
+    """Whether normal forces (m,) [N] of steady sliding are all nothing but rounding of the loads: modes, runs and
+    checks all ask here."""
+    return float(np.max(normal_force, initial=0.0)) <= least_force(system)
+
+
 def require_pressed(system: System, normal_force: Array) -> None:
-    """Raise AnalysisError where normal forces (m,) [N] of steady sliding are all nothing but rounding.
+    """Raise AnalysisError where nothing presses the contacts whose normal forces (m,) [N] in steady sliding are given.
 
     Systems without any load have no normal force that is known, and pass: their contacts are taken as closed.
     """
-    if not len(normal_force) or not system.loads:
-        return
-    if float(np.max(normal_force)) > least_force(system):
+    if not len(normal_force) or not system.loads or not nothing_presses(system, normal_force):
         return
     names = ", ".join(f"{n} ({float(np.linalg.norm(v)):.4g} N)" for n, v in system.loads.items())
     raise AnalysisError(
         f"no normal force: the loads {names} leave every contact at 0 N in steady sliding, where nothing rubs and a "
         "linearisation about it means nothing; give a load that presses the bodies together, or no [loads] at all to "
         "have the contacts taken as closed"
+    )
+
+
+def taken_as_closed(system: System) -> tuple[str, ...]:
+    """What a linearisation says of contacts that no load presses; nothing where there are loads or no contacts."""
+    if system.loads or system.load_steps or not system.contact_nodes().count:
+        return ()
+    return (
+        "no load acts: which contacts touch is not known, and all of them are taken as closed, as under a load that "
+        "presses the bodies together",
     )

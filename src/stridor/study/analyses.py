@@ -17,7 +17,7 @@ from ..errors import AnalysisError, CaseError, Problem
 from ..modal.complex_modes import ComplexModes, complex_modes
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
-from ..sliding import full_motion, slip_speeds
+from ..sliding import full_motion, slip_speeds, taken_as_closed
 from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
 from ..temporal.attractor import settled
@@ -109,8 +109,9 @@ def modes(
         )
     if max_frequency_hz is None:
         result = result.lowest(case.modal.modes if count is None else count)
+    notes = (*result.notes, *(() if system is None else taken_as_closed(system)))
     seconds = time.perf_counter() - started
-    return replace(result, provenance=provenance(case, "modes", seconds, damped=damped))
+    return replace(result, notes=notes, provenance=provenance(case, "modes", seconds, damped=damped))
 
 
 def _followed_modes(
@@ -264,7 +265,8 @@ def onsets(
         result = solve_onsets(system, between, max_frequency_hz=limit, damped=damped, **settings)
         if check and not result.completeness:
             result = checked_onsets(system, result, damped=damped, options=Options(**settings))
-    return replace(result, provenance=provenance(case, "onsets", time.perf_counter() - started))
+    notes = (*result.notes, *(() if system is None else taken_as_closed(system)))
+    return replace(result, notes=notes, provenance=provenance(case, "onsets", time.perf_counter() - started))
 
 
 def simulate(

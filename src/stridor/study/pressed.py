@@ -8,11 +8,11 @@ import numpy as np
 
 from ..case import Case
 from ..errors import AnalysisError
-from ..sliding.surfaces import steady_sliding_nodes
+from ..sliding import least_force, nothing_presses, steady_sliding_nodes
 from ..system import System
 from ..typing import Array
 
-NOTHING = 1e-9  # of all loads together, each by itself: what rounding leaves of loads that cancel
+STILL = 1e-9  # of how contacts move along: a motion towards each other that is rounding
 REMEDY = (
     "give a load that presses them, a support that moves one body towards the other, an overlap, or an initial velocity"
 )
@@ -36,15 +36,15 @@ def unpressed(case: Case, system: System, *, steady: bool = False) -> str:
     if not steady and _closing(case, system, nodes.normal_lift, float(np.abs(nodes.tangent_lift).max(initial=0.0))):
         return ""
     phases = [_net(system, factors) for factors in case.load_factors()]
-    scale = sum(float(np.abs(vector).sum()) for vector in system.loads.values())
-    acting = [k for k, net in enumerate(phases) if float(np.abs(net).max(initial=0.0)) > NOTHING * scale]
+    least = least_force(system)
+    acting = [k for k, net in enumerate(phases) if float(np.abs(net).max(initial=0.0)) > least]
     if not system.loads:
         return "no load acts"
     names = ", ".join(system.loads)
     if not acting:
         return f"loads that are 0 or cancel ({names})"
     factors = case.load_factors()[acting[-1]]
-    pressed = _press(case, system, factors, acting[-1], scale)
+    pressed = _press(case, system, factors, acting[-1])
     return "" if pressed else f"loads that leave every contact at 0 N ({names})"
 
 
@@ -61,7 +61,7 @@ def _closing(case: Case, system: System, normal_lift: Array, tangential: float) 
     names = system.motion.names
     if not names or not len(normal_lift):
         return False
-    least = NOTHING * max(tangential, float(np.abs(normal_lift).max(initial=0.0)))
+    least = STILL * max(tangential, float(np.abs(normal_lift).max(initial=0.0)))
     for factors in case.velocity_factors():
         rate = normal_lift @ np.array([factors.get(name, 1.0) for name in names])
         if float(rate.min(initial=0.0)) < -least:
@@ -77,7 +77,7 @@ def _net(system: System, factors: Mapping[str, float]) -> Array:
     return total
 
 
-def _press(case: Case, system: System, factors: Mapping[str, float], phase: int, scale: float) -> bool:
+def _press(case: Case, system: System, factors: Mapping[str, float], phase: int) -> bool:
     """Whether loads that do not cancel give a contact some force in steady sliding; yes where there is none, since
     bodies that fly or swing may meet."""
     motions = case.velocity_factors()[phase]
@@ -89,4 +89,4 @@ def _press(case: Case, system: System, factors: Mapping[str, float], phase: int,
         )
     except AnalysisError:
         return True
-    return float(steady.normal_force.max(initial=0.0)) > NOTHING * scale
+    return not nothing_presses(system, steady.normal_force)
