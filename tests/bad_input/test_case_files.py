@@ -381,17 +381,17 @@ FILES = {
     "misspelt": (
         "friction = {",
         "frictoin = {",
-        "contacts.A.frictoin: unknown key; did you mean 'friction'? accepted: slave, master, stiffness, sliding, side, adjust, interference, friction",
+        "contacts.A.frictoin: unknown key; did you mean 'friction'? accepted: slave, master, stiffness, cubic, sliding, side, adjust, interference, friction",
     ),
     "unknown section": (
         "[materials.steel]",
         "[mesh]\nsize = 1\n[materials.steel]",
-        "mesh: unknown key; accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, modal, temporal, comparison, reference",
+        "mesh: unknown key; accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, steady, modal, temporal, comparison, reference",
     ),
     "misspelt section": (
         "[contacts.A]",
         "[contact.A]",
-        "contact: unknown key; did you mean 'contacts'? accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, modal, temporal, comparison, reference",
+        "contact: unknown key; did you mean 'contacts'? accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, steady, modal, temporal, comparison, reference",
     ),
     "missing": (
         "width = 0.01\n",
@@ -614,7 +614,7 @@ FILES = {
     "misspelt section of names": (
         "[materials.steel]",
         "[material.steel]",
-        "material: unknown key; did you mean 'materials'? accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, modal, temporal, comparison, reference",
+        "material: unknown key; did you mean 'materials'? accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, steady, modal, temporal, comparison, reference",
     ),
     "table entry that is a number": (
         "[loads.press]",
@@ -660,7 +660,7 @@ OVERRIDES = {
     "phases.2.duration=1": "phases.2: no such item; the list has: 0 (press), 1 (slide)",
     "phases.slid.duration=1": "phases.slid: no such item; the list has: 0 (press), 1 (slide)",
     "bodies.pin.length.x=1": "bodies.pin.length.x: bodies.pin.length is 0.05, not a table",
-    "contcts.A.stiffness=1": "contcts: unknown key; did you mean 'contacts'? accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, modal, temporal, comparison, reference",
+    "contcts.A.stiffness=1": "contcts: unknown key; did you mean 'contacts'? accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, steady, modal, temporal, comparison, reference",
     "contacts.A.friction.coefficient=.3": "contacts.A.friction.coefficient: '.3' – not a value; accepted: a number such as 0.3, true, false, a word, \"a text\", [a, list], { a = table }",
     "contacts.A.friction.coefficient=0,3": "contacts.A.friction.coefficient: '0,3' – not a value; accepted: a number such as 0.3, true, false, a word, \"a text\", [a, list], { a = table }",
     "contacts.A.friction.coefficient=high": "contacts.A.friction.coefficient: 'high' – must be a number >= 0, the friction coefficient while sliding",

@@ -75,9 +75,9 @@ WITHIN = [
     ("value = 2.0", 'value = "2.0"', "parameters.Omega.value: '2.0' – must be a number, the value of the parameter; write it without quotes"),
     ("Omega = {", "Omega = 3\nother = {", "parameters.Omega: 3 – must be a table with the keys value, range"),
     ("[parameters]\nOmega =", "other =", "other: unknown key; accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, "
-     "springs, dashpots, phases, modal, temporal, comparison, reference"),
+     "springs, dashpots, phases, steady, modal, temporal, comparison, reference"),
     ("[parameters]\nOmega =", "parametres =", "parametres: unknown key; did you mean 'parameters'? accepted: title, units, parameters, materials, bodies, "
-     "supports, loads, contacts, ties, springs, dashpots, phases, modal, temporal, comparison, reference"),
+     "supports, loads, contacts, ties, springs, dashpots, phases, steady, modal, temporal, comparison, reference"),
     ("Omega =", "sin = { value = 1.0 }\nOmega =", "parameters.sin: sin means something else in a factor; choose another name"),
     ("Omega =", "a-b = { value = 1.0 }\nOmega =", "parameters.a-b: a factor would read - as minus; take letters, digits and _"),
     ("tip = 12", "tip = -1", "bodies.brake.points.tip: -1 – must be a node's number, or [x, y] or [x, y, z], numbers [m]: the mesh node nearest is taken"),

@@ -559,7 +559,7 @@ LINKS = {
     "tie within a body": (
         CONTACT,
         tie(master="slider.top"),
-        "ties.glue.master: 'slider.top' – must belong to another body than the slave's",
+        "ties.glue.master: 'slider.top' – must belong to another body than the slave's; of one that repeats give translation or rotation from the master to the slave",
     ),
     "tie of what is apart": (
         CONTACT,

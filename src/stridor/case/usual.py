@@ -110,6 +110,7 @@ USUAL: Mapping[str, Usual] = {
     "WeakeningTable.decay_speed": _usual("a speed over which friction weakens", "m/s", 1e-6, 100.0, mm_s=1e-3),
     "Contact.adjust": _MISFIT,
     "Contact.stiffness": _CONTACT,
+    "Contact.cubic": _usual("a cubic contact stiffness", "N/m³ or N/m⁵", 1e-3, 1e30),
     "Tie.tolerance": _MISFIT,
     "Tie.translation": _PLACE,
     "Rotation.angle_deg": _ANGLE,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..kernels import njit
 from ..typing import Array, IntArray
 
 MOST_CORNERS = 10

@@ -64,6 +64,7 @@ _AGREEMENT = {
     "temporal_eigenvalue": _Rule(("mu", "part"), missing=True),
     "frequency_error": _Rule(("mu",), missing=True),
     "growth_rate_error": _Rule(("mu",), missing=True),
+    "growth_mac": _Rule(("mu",), low=-1e-12, high=1.0 + 1e-12, missing=True),
     "mac": _Rule(("mu",), low=-1e-12, high=1.0 + 1e-12, missing=True),
     "dominant_frequency": _Rule(("mu",), low=0.0, missing=True),
 }
