@@ -1,0 +1,57 @@
+"""Laws of friction: what only some users of them ask for, by values written out."""
+
+from __future__ import annotations
+
+import pytest
+
+from stridor.laws import Coulomb, FrictionLaw, Hyperbolic, StaticKinetic, Tabulated, Weakening
+from stridor.laws.packed import coefficient_at
+
+
+@pytest.mark.parametrize(
+    ("law", "constant"),
+    [
+        (Coulomb(0.3), True),
+        (StaticKinetic(0.3, 0.4), True),  # the same at every slip speed; rest is no speed
+        (Weakening(0.2, 0.5, 0.05), False),
+        (Weakening(0.5, 0.5, 0.05), True),
+        (Weakening(0.5, 0.2, 0.05), False),  # friction that rises with speed
+        (Hyperbolic(0.2, 0.5, 30.0), False),
+        (Hyperbolic(0.5, 0.5, 30.0), True),
+        (Hyperbolic(0.5, 0.2, 30.0), False),
+        (Tabulated((0.0, 1.0), (0.3, 0.3), static_coefficient=0.4), True),
+        (Tabulated((0.0, 1.0, 2.0), (0.3, 0.2, 0.3)), False),
+    ],
+)
+def test_constant_tells_whether_friction_changes_with_speed(law: FrictionLaw, constant: bool):
+    assert law.constant is constant
+    assert (len({law.sliding(v) for v in (0.0, 0.3, 1.0, 1.7)}) == 1) is constant
+
+
+def test_hyperbolic_friction_halves_its_drop_where_delta_times_speed_is_one():
+    """μ(v) = μ_k + (μ_s − μ_k)/(1 + δv): 0.2 + 0.3/2 at v = 1/30, falling there at 0.3 · 30/4."""
+    law = Hyperbolic(0.2, 0.5, 30.0)
+    assert law.sticking == law.sliding(0.0) == 0.5
+    assert law.sliding(1.0 / 30.0) == pytest.approx(0.35, rel=1e-15)
+    assert law.slope(-1.0 / 30.0) == pytest.approx(-2.25, rel=1e-15)
+
+
+def test_scaling_what_is_zero_at_the_speed_keeps_the_stick_limit():
+    assert Hyperbolic(0.0, 0.0, 30.0).scaled(0.2, 0.02) == Coulomb(0.2)
+    # 1/(1 + δv) underflows to nothing here: no factor reaches μ.
+    assert Hyperbolic(0.0, 0.5, 1e200).scaled(0.2, 1e200) == Hyperbolic(0.2, 0.5, 1e200)
+    assert Hyperbolic(0.0, 0.1, 1e200).scaled(0.2, 1e200) == Hyperbolic(0.2, 0.2, 1e200)
+    assert Tabulated((0.0, 1.0), (0.0, 0.0), static_coefficient=0.1).scaled(0.2, 0.02) == StaticKinetic(0.2, 0.2)
+
+
+@pytest.mark.parametrize("law", [Coulomb(0.3), StaticKinetic(0.3, 0.4), Tabulated((0.0, 1.0), (0.3, 0.3))])
+@pytest.mark.parametrize("speed", [0.0, 0.5, 2.0])
+def test_the_packed_form_of_constant_friction_is_flat(law: FrictionLaw, speed: float):
+    assert coefficient_at(law.numbers, speed) == (0.3, 0.0)
+    assert law.slope(speed) == 0.0
+
+
+def test_a_table_of_one_coefficient_is_static_and_kinetic_friction_to_the_time_loop():
+    table = Tabulated((0.0, 1.0), (0.3, 0.3), static_coefficient=0.4)
+    assert table.numbers == StaticKinetic(0.3, 0.4).numbers
+    assert Tabulated((0.0, 1.0), (0.3, 0.3)).numbers == Coulomb(0.3).numbers
