@@ -10,7 +10,7 @@ BIN := .venv/bin
 STAMP := .venv/.stridor-ready
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo test weekly bench lint types layers docs lock clean FORCE
+.PHONY: help env demo test weekly mutants bench lint types layers docs lock clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -28,9 +28,16 @@ demo: $(STAMP)  ## the two-beam bench, from case file to report, in demo/
 test: $(STAMP)  ## all tests but the slow ones
 	OPENBLAS_NUM_THREADS=$${OPENBLAS_NUM_THREADS:-1} $(BIN)/python -m pytest -n $(JOBS) $(PYTEST_ARGS)
 
-weekly: $(STAMP)  ## the slow tests and the full benchmarks
+weekly: $(STAMP)  ## the slow tests, the full benchmarks and the tests of the tests
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
 	@$(call each_benchmark,)
+	@$(MAKE) --no-print-directory mutants
+
+# The tool lies in a folder of its own: the lock file stays as small as work on stridor needs.
+mutants: $(STAMP)  ## do the tests notice small faults? (a sample: MUTANTS="--sample 300 --minutes 120")
+	@test -d build/mutants/tools/cosmic_ray || $(BIN)/python -m pip install -qq --no-input --disable-pip-version-check \
+	  --target build/mutants/tools cosmic-ray==8.7.0
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/mutants/mutate.py $(MUTANTS)
 
 bench: $(STAMP)  ## the benchmarks in short mode
 	@$(call each_benchmark,--short)

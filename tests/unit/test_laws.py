@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from stridor.laws import Coulomb, FrictionLaw, Hyperbolic, StaticKinetic, Tabulated, Weakening
-from stridor.laws.packed import coefficient_at
+from stridor.laws.packed import HEAD, KIND, KINETIC, LINEAR, POINTS, STICKING, coefficient_at
 
 
 @pytest.mark.parametrize(
@@ -55,3 +55,9 @@ def test_a_table_of_one_coefficient_is_static_and_kinetic_friction_to_the_time_l
     table = Tabulated((0.0, 1.0), (0.3, 0.3), static_coefficient=0.4)
     assert table.numbers == StaticKinetic(0.3, 0.4).numbers
     assert Tabulated((0.0, 1.0), (0.3, 0.3)).numbers == Coulomb(0.3).numbers
+
+
+def test_columns_of_a_packed_table_are_as_described():
+    row = Tabulated((0.0, 1.0, 3.0), (0.5, 0.3, 0.4), static_coefficient=0.6).numbers
+    assert (row[KIND], row[STICKING], row[KINETIC], row[POINTS]) == (LINEAR, 0.6, 0.4, 3.0)
+    assert row[HEAD:] == (0.0, 1.0, 3.0, 0.5, 0.3, 0.4, 0.0, 0.0, 0.0)

@@ -101,6 +101,21 @@ def test_static_friction_holds_longer_than_kinetic():
     assert st.steady_sliding(block(pulled(4.9, increments=1), friction=law), 0.1).status.tolist() == [SLIP]
 
 
+@pytest.mark.parametrize("stiffness", ['"rigid"', "1e4"])
+@pytest.mark.parametrize("force", [2.0, 5.0])
+def test_what_is_lifted_off_lands_where_its_spring_holds_it(force, stiffness):
+    """Lifted by 10 N against a spring across, the block moves to where the spring along carries all of the force;
+    pressed again, it sticks there without friction."""
+    across = '[springs.y]\nbetween = ["block", "ground"]\nstiffness = 1000.0\ndirection = [0.0, 1.0]\n'
+    steps = ", ".join(f"{{ loads = {{ x = {force}, press = {press} }}, increments = 1 }}" for press in (1.0, -1.0, 1.0))
+    place = {"at": "[0.0, 0.0]", "up": "[0.0, 1.0]", "down": "[0.0, -10.0]", "x": "[1.0, 0.0]"}
+    case = loads(BLOCK.format(**place, stiffness=stiffness, friction=COULOMB, steps=steps) + across)
+    found = st.steady_sliding(case)
+    assert found.status.tolist() == [STICK]
+    assert found.displacement[0] == pytest.approx(force / 1000.0, rel=1e-9)
+    assert found.friction_force[0, 0] == pytest.approx(0.0, abs=1e-9)
+
+
 TRACTRIX = """
 [springs.y]
 between = ["block", "ground"]
