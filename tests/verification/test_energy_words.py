@@ -38,3 +38,12 @@ def test_numerical_damping_does_not_close_the_balance() -> None:
         none = energy_balance(replace(kept, **{name: spoilt}))
         assert not none.closes
         assert none.words(0.5) == "energy balance does not close: energies are not finite"
+
+
+def test_one_record_tells_nothing() -> None:
+    kept = st.simulate(run(0.5).with_({"temporal.record_every": 10_000_000}))
+    assert len(kept.time) == 1
+    balance = energy_balance(kept)
+    assert not balance.checked
+    assert not balance.closes
+    assert balance.words(0.5).startswith("energy balance not checked, as there is one record")

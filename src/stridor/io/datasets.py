@@ -168,6 +168,8 @@ def _modes(result: ComplexModes) -> Any:
         data.attrs["completeness"] = json.dumps(result.completeness)
     if result.contact_state:
         data.attrs["contact_state"] = result.contact_state
+    if result.notes:
+        data.attrs["notes"] = json.dumps(result.notes)
     data.attrs["damped"] = int(result.damped)
     data.attrs["modes_in_band"] = [int(n) for n in result.total]
     if result.max_frequency_hz is not None:
@@ -207,6 +209,8 @@ def _onsets(result: Onsets) -> Any:
         data.attrs["completeness"] = result.completeness
     if result.contact_state:
         data.attrs["contact_state"] = result.contact_state
+    if result.notes:
+        data.attrs["notes"] = json.dumps(result.notes)
     return data
 
 

@@ -13,6 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..contact.coupling import SlaveFacets
+from ..contact.pairing import overlap_tolerance
+from ..contact.surfaces import SurfaceContact
 from ..system import System
 from ..typing import Array, BoolArray, Sparse
 
@@ -21,6 +23,8 @@ PRESSED = 0.2
 # Half the nodes amid others differ from their neighbours by more than this part of the mean pressure: no picture of it.
 UNEVEN = 0.4
 LEAST_NODES = 8
+# Of what facets leave of curved surfaces: smaller differences of gaps are rounding.
+FACETED = 1e-3
 # Nodes of a facet in the order of its outline; a centre is next to the middles.
 OUTLINES = {
     "line": [(0, 1)],
@@ -48,6 +52,10 @@ def unexplained_patterns(system: System, normal_force: Array, gap: Array, active
         if surface.facets is None or not loaded.any():
             continue
         around = _neighbours(surface.facets, surface.nodes.count)
+        by_mesh = _open_by_mesh(surface, loaded, nodes.gap[mine], gap[mine])
+        if by_mesh:
+            yield by_mesh
+            continue
         pressure = np.where(loaded, normal_force[mine], 0.0) / nodes.area[mine]
         open_amid = _open_amid(around, loaded, pressure, nodes.gap[mine], gap[mine])
         if open_amid:
@@ -61,6 +69,25 @@ def unexplained_patterns(system: System, normal_force: Array, gap: Array, active
                 f"contact {surface.name}: the pressure jumps from node to node by more than {UNEVEN:.0%} of its mean; "
                 "refine the coarser mesh, mend distorted faces, or give the contact a stiffness"
             )
+
+
+def _open_by_mesh(surface: SurfaceContact, loaded: BoolArray, gap_before: Array, gap: Array) -> str:
+    """A sentence where nodes stand open whose gaps are no larger than those that facets make of curved surfaces which
+    fit: whether they touch is then decided by how the meshes lie to each other, not by the shapes."""
+    height = overlap_tolerance(surface.slave_position, -surface.location.normal, surface.master)
+    if height <= 1e-8 * float(np.linalg.norm(np.ptp(surface.slave_position, axis=0))):
+        return ""  # flat
+    beyond = gap_before - gap_before.min()
+    count = int(np.sum(~loaded & (beyond > FACETED * height) & (beyond <= 2 * height) & (gap <= 2 * height)))
+    if not count:
+        return ""
+    apart = np.abs(surface.location.gap)
+    widest = 1.1 * float(apart[apart <= height].max(initial=0.0))
+    return (
+        f"contact {surface.name}: {count} of {surface.nodes.count} slave nodes stand open by no more than facets leave "
+        f"of curved surfaces ({height:.2g} m), so that the meshes decide what touches; let the nodes of both sides "
+        f"match, refine, or close such gaps and overlaps with contacts.{surface.name}.adjust = {widest:.2g}"
+    )
 
 
 def _neighbours(facets: SlaveFacets, count: int) -> Sparse:

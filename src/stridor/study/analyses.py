@@ -36,6 +36,7 @@ from .fingerprint import changes_of, check_restart, fingerprint
 from .pressed import require_pressed_in_time
 from .provenance import provenance
 from .settings import phases_of, settings_of
+from .touching import LOOKS, held_elsewhere
 
 __all__ = [
     "BodyModes",
@@ -110,6 +111,8 @@ def modes(
     if max_frequency_hz is None:
         result = result.lowest(case.modal.modes if count is None else count)
     notes = (*result.notes, *(() if system is None else taken_as_closed(system)))
+    if check and system is not None:
+        notes = (*notes, *held_elsewhere(system, result.mu, _solver(case)))
     seconds = time.perf_counter() - started
     return replace(result, notes=notes, provenance=provenance(case, "modes", seconds, damped=damped))
 
@@ -181,8 +184,13 @@ def _modal_options(case: Case) -> dict[str, Any]:
     return {
         "friction_damping": settings.friction_damping,
         "prestress": settings.prestress,
-        "solver": None if settings.solver == "auto" else settings.solver,
+        "solver": _solver(case),
     }
+
+
+def _solver(case: Case) -> str | None:
+    """The sparse direct solver that the case names."""
+    return None if case.modal.solver == "auto" else case.modal.solver
 
 
 def steady_sliding(case: Case, mu: float | None = None) -> SurfaceSliding:
@@ -266,6 +274,8 @@ def onsets(
         if check and not result.completeness:
             result = checked_onsets(system, result, damped=damped, options=Options(**settings))
     notes = (*result.notes, *(() if system is None else taken_as_closed(system)))
+    if check and system is not None:
+        notes = (*notes, *held_elsewhere(system, np.linspace(*result.friction_range, LOOKS), _solver(case)))
     return replace(result, notes=notes, provenance=provenance(case, "onsets", time.perf_counter() - started))
 
 

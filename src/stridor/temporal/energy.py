@@ -38,13 +38,21 @@ class EnergyBalance:
 
     @property
     def closes(self) -> bool:
-        """Whether all that is missing is rounding; not where it is no number."""
-        return self.error <= CLOSED
+        """Whether all that is missing is rounding; not where it is no number, or where nothing was compared."""
+        return self.checked and self.error <= CLOSED
+
+    @property
+    def checked(self) -> bool:
+        """Whether there are records to compare: what is there at the first counts as put in, so it closes alone."""
+        return len(self.history) > 1
 
     def words(self, beta2: float) -> str:
         """How well the balance closes, and where not, whether the numerical damping of the scheme may be why."""
         if self.closes:
             return f"energy balance closes to {self.error:.1e} of the energy turned over"
+        if not self.checked:
+            said = "one record" if len(self.history) else "no record"
+            return f"energy balance not checked, as there is {said}; a smaller temporal.record_every gives more"
         if not np.isfinite(self.error):
             return "energy balance does not close: energies are not finite"
         text = f"energy balance does not close: {self.error:.1e} of the energy turned over is missing"
@@ -56,11 +64,12 @@ class EnergyBalance:
         return {name: float(getattr(self, name)) for name in names} | {
             "error": self.error,
             "closes": self.closes,
+            "checked": self.checked,
         }
 
 
 def energy_balance(trajectory: Trajectory) -> EnergyBalance:
-    """Close the balance over all records (needs at least two)."""
+    """Close the balance over all records; fewer than two tell nothing (`EnergyBalance.checked`)."""
     stored = trajectory.kinetic + trajectory.elastic
     works = trajectory.works
     put_in = works["external"] + works["support"]

@@ -153,6 +153,7 @@ def _modal(inputs: ReportInputs) -> Section:
         said.extend(f"{damping}: {line[2:]}." for line in onsets.from_above_words)
         if onsets.completeness:
             said.append(f"{damping}: {onsets.completeness}")
+        said.extend(f"{damping}: {note}" for note in onsets.notes)
         if not onsets.onsets:
             low, high = onsets.friction_range
             said.append(f"{damping} there is no onset of instability for {low:g} ≤ μ ≤ {high:g}.")

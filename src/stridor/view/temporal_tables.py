@@ -116,6 +116,8 @@ def energy_table(balance: EnergyBalance) -> Table:
     rows.append(Row(("missing at the end", significant(1e3 * missing, 2)), "good" if balance.closes else "bad"))
     caption = (
         f"Largest imbalance at any time: {significant(balance.error, 2)} of the largest energy that changed hands."
+        if balance.checked
+        else "Not checked: fewer than two records."
     )
     return Table("energy", "Energy balance", ("", "energy [mJ]"), tuple(rows), frozenset({0}), caption)
 
