@@ -41,6 +41,7 @@ class HandMade:
     nodes: ContactNodes
     name: str = "pad"
     sliding: str = "small"
+    facets: None = None
 
 
 def assembled(mass, damping, stiffness, normal, tangent, compliance, slip, *, law=None, loads=None, prestress=None):

@@ -42,7 +42,8 @@ def test_branches_of_the_bench_pass_through_flutter(tmp_path: Path, damped: bool
     """Modes 8 and 10 meet beside 9, which they cross; the growing one keeps its number."""
     bench = paper_case()
     mus = [0.5, 0.0, 0.0768, 0.15]
-    assert_same_branches(bench, export(tmp_path, bench), mus, 1e-8, max_frequency_hz=30e3, damped=damped)
+    # The mode at 102 Hz carries the rounding of K_c = 1e10 N/m: 1.0e-8 of it between two solvers, all others 1e-10.
+    assert_same_branches(bench, export(tmp_path, bench), mus, 2e-8, max_frequency_hz=30e3, damped=damped)
 
 
 def test_branches_that_meet_part_and_meet_others(tmp_path: Path):
@@ -154,7 +155,7 @@ def test_both_ways_to_eigenpairs_lead_along_the_same_branches(tmp_path: Path):
     source = along(family, frequency)
     assert isinstance(source, Projected)
     assert source.model is not None
-    states = [followed(s, 0.0, 0.6).high for s in (source, Whole(family, frequency))]
+    states = [followed(s, 0.0, 0.6, frequency).high for s in (source, Whole(family, frequency))]
     assert len(states[0].place) == len(states[1].place)
     inside = np.abs(states[1].values) < frequency
     assert states[0].values[inside] == pytest.approx(states[1].values[inside], rel=1e-7)

@@ -100,12 +100,12 @@ def differences(model: Case, path: str, value: float, mu: float, found, count: i
     return (8 * (at(value + h) - at(value - h)) - (at(value + 2 * h) - at(value - 2 * h))) / (12 * h)
 
 
-def assert_derivatives(model, paths, mu, *, count, damped, tolerance, modes="unstable"):
+def assert_derivatives(model, paths, mu, *, count, damped, tolerance, modes="unstable", step=3e-4):
     result = sensitivities(model, paths, mu=mu, count=count, damped=damped, modes=modes)
     assert len(result.branch)
     assert result.residual.max() < 1e-12
     for k, path in enumerate(paths):
-        numeric = differences(model, path, result.values[k], mu, result.eigenvalues, count + 2, damped)
+        numeric = differences(model, path, result.values[k], mu, result.eigenvalues, count + 2, damped, step)
         # What a number hardly does cannot be seen in differences of rounded eigenvalues.
         least = 1e-5 * np.abs(result.eigenvalues / result.values[k])
         error = np.abs(result.derivative[k] - numeric) / np.maximum(np.abs(result.derivative[k]), least)
@@ -145,7 +145,8 @@ def test_solids(stiffness, damped):
     paths = ["mu", "bodies.block.thickness"] if damped else [*SOLIDS, "bodies.block.thickness"]
     paths += [] if stiffness == "rigid" else ["contacts.rub.stiffness"]
     paths += ["bodies.slider.damping.stiffness"] if damped else []
-    assert_derivatives(model, paths, 0.6, count=4, damped=damped, tolerance=1e-6)
+    # Eigenvalues of meshes are refined to 2e-9 of their size: steps that leave of it less than the tolerance.
+    assert_derivatives(model, paths, 0.6, count=4, damped=damped, tolerance=1e-6, step=2e-3)
 
 
 def test_compliance_of_rigid_contact_is_the_limit_of_stiff_contact():

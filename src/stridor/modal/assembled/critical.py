@@ -25,7 +25,7 @@ from .local import Surroundings, axis_crossing, double_eigenvalue
 from .modes import samples
 from .passages import Passage, crossings, meetings
 from .problem import problem_of
-from .reduced import Reduced
+from .reduced import Eigenpairs, Reduced
 from .refine import BELIEVED, Band, projected, settle
 from .shifted import real_columns
 from .steady import Options
@@ -295,6 +295,8 @@ def crossing(reduced: Reduced, passage: Passage) -> Solved | None:
         start = _again(reduced, passage)
         found = None if start is None else _slow_crossing(reduced, passage, start)
     if found is None:
+        found = _by_growth(reduced, passage)
+    if found is None:
         return None
     mu, lam, slope = found
     still = abs(lam) <= NEAR_AXIS * reduced.frequency
@@ -350,6 +352,36 @@ def _slow_crossing(reduced: Reduced, passage: Passage, start: State) -> tuple[fl
         return None
     state = at(mu)
     return mu, 1j * float(state.values[passage.branch].imag), float(state.tangents[passage.branch].real)
+
+
+def _by_growth(reduced: Reduced, passage: Passage) -> tuple[float, complex, float] | None:
+    """The same where two modes all but meet and which is which cannot be told: where the fastest of those about them
+    begins, or ceases, to grow."""
+    begin = complex(passage.old.values[passage.branch])
+    ahead = reduced.eigenpairs(passage.high).values
+    ahead = ahead[(ahead.real > 0) != passage.stabilising]
+    if not len(ahead):
+        return None
+    end = complex(ahead[np.argmin(np.abs(ahead - begin))])
+
+    def fastest(mu: float) -> tuple[Eigenpairs, int]:
+        found = reduced.eigenpairs(mu)
+        part = (mu - passage.low) / (passage.high - passage.low)
+        near = np.abs(found.values - begin - part * (end - begin)) <= 2 * abs(end - begin)
+        return found, int(np.argmax(np.where(near, found.values.real, -np.inf)))
+
+    def growth(mu: float) -> float:
+        found, place = fastest(mu)
+        return float(found.values[place].real)
+
+    mu = _root(growth, passage.low, passage.high)
+    if mu is None:
+        return None
+    found, place = fastest(mu)
+    lam, slope = complex(found.values[place]), float(found.tangents[place].real)
+    if abs(lam.real) > 1e-9 * abs(lam) or (slope < 0) != passage.stabilising:
+        return None
+    return mu, 1j * lam.imag, slope
 
 
 def _again(reduced: Reduced, passage: Passage) -> State | None:
