@@ -381,7 +381,7 @@ FILES = {
     "misspelt": (
         "friction = {",
         "frictoin = {",
-        "contacts.A.frictoin: unknown key; did you mean 'friction'? accepted: slave, master, stiffness, cubic, sliding, side, adjust, interference, friction",
+        "contacts.A.frictoin: unknown key; did you mean 'friction'? accepted: slave, master, stiffness, cubic, sliding, side, adjust, interference, closed, friction",
     ),
     "unknown section": (
         "[materials.steel]",

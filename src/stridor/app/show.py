@@ -17,7 +17,7 @@ def show_run(summary: dict[str, Any]) -> None:
             f"{c['max_slip_speed']:.4f}",
             f"{100 * c['stick_fraction']:.1f}",
             f"{100 * c['slip_fraction']:.1f}",
-            f"{100 * c['separation_fraction']:.1f}",
+            f"{100 * c['separation_fraction']:.1f}" + (", kept closed" if c.get("kept_closed") else ""),
         ]
         for phase in summary["phases"]
         for name, c in phase["contacts"].items()

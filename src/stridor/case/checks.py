@@ -466,6 +466,10 @@ def _steady_problems(parts: Parts) -> Iterator[Problem]:
             "the same distance"
         )
         yield Problem("steady.friction", steady.friction, accepted)
+    kept = [name for name, c in parts.contacts.items() if c.closed]
+    if steady.friction == "stick-slip" and kept:
+        accepted = f"load steps take contacts that may open only; leave out closed = true of contacts.{kept[0]}"
+        yield Problem("steady.friction", steady.friction, accepted)
     for number, step in enumerate(steady.steps):
         where = f"steady.steps.{number}"
         yield from _factor_problems(parts, where, step, _moving(parts))

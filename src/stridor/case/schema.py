@@ -243,6 +243,9 @@ class Contact(Table):
     interference: Number = Field(
         default=0.0, description="a number [m], the overlap that is pressed out beside that of the meshes (press fit)"
     )
+    closed: Truth = Field(
+        default=False, description="true or false, whether the contact is kept closed, pulling where it would open"
+    )
     friction: Friction = Field(description='a table such as { law = "coulomb", coefficient = 0.1 }')
 
 

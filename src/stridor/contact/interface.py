@@ -40,7 +40,8 @@ class Contact:
     relative displacement slave − master of the pair: K_c (n + μ s t) nᵀ of the modal approach is
     written with them. stiffness [N/m] is K_c, infinite for rigid contact. law is the friction law.
     sliding "small" keeps pair and normal of the reference; "finite" finds both again in each step.
-    side is +1 where the normal is the master's direction turned by +90°, else −1.
+    closed: kept so, pulling where it would open. side is +1 where the normal is the master's direction turned by
+    +90°, else −1.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Contact:
     stiffness: float
     law: FrictionLaw
     sliding: Literal["small", "finite"] = "small"
+    closed: bool = False
 
     @property
     def compliance(self) -> float:

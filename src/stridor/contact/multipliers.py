@@ -25,6 +25,7 @@ for _plain in (packed._straight, packed._hermite):  # pyright: ignore[reportPriv
 coefficient_at = register_jitable(packed.coefficient_at)
 
 
+@register_jitable
 def solve_contact(
     gap: float,
     slip: float,
@@ -100,3 +101,28 @@ def solve_contact(
         # No sliding solution pushes (μ beyond the jamming limit of the pair): nothing to transmit.
         return 0.0, 0.0, OPEN
     return normal, tangential, SLIP
+
+
+@register_jitable
+def solve_kept(
+    gap: float,
+    slip: float,
+    w_nn: float,
+    w_nt: float,
+    w_tt: float,
+    law: Sequence[float] | Array,
+    was_sticking: bool,
+    step: float,
+) -> tuple[float, float, int]:
+    """Forces and status of a contact that is kept closed: N of either sign closes the gap, |T| ≤ μ|N|.
+
+    A gap that would open is the mirror image of one that would close, with the normal turned round. Where friction
+    would jam the pair it closes without.
+    """
+    turned = -1.0 if gap > 0.0 else 1.0
+    normal, tangential, status = solve_contact(
+        turned * gap, slip, w_nn, turned * w_nt, w_tt, law, was_sticking, step
+    )
+    if status == OPEN:
+        return (-gap / w_nn if w_nn > 0.0 else 0.0), 0.0, SLIP
+    return turned * normal, tangential, status

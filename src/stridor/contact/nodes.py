@@ -27,7 +27,8 @@ class ContactNodes:
     slave surface a node stands for, NaN for a point contact. compliance (m,) [m/N] is one over contact stiffness
     (stiffness per area times area), 0 for rigid contact. cubic (m,) [N/m³] is the factor of the cube of the approach in
     the normal force, p = δ/compliance + cubic δ³, zero where left out and where contact is rigid. position (m, d) [m],
-    normals (m, d), tangents (m, d−1, d).
+    normals (m, d), tangents (m, d−1, d). closed: for each contact whether it is kept closed; () where none is. Where
+    it pulls, p has the sign of δ.
     """
 
     names: tuple[str, ...]
@@ -44,10 +45,16 @@ class ContactNodes:
     normals: Array
     tangents: Array
     cubic: Array = None  # type: ignore[assignment]  # filled in __post_init__
+    closed: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
         if self.cubic is None:  # pyright: ignore[reportUnnecessaryComparison]
             object.__setattr__(self, "cubic", np.zeros(len(self.gap)))
+
+    @property
+    def kept(self) -> BoolArray:
+        """Nodes (m,) of contacts that are kept closed, whether they push or pull."""
+        return np.array(self.closed)[self.owner] if self.closed else np.zeros(self.count, dtype=bool)
 
     @property
     def count(self) -> int:
@@ -87,7 +94,8 @@ class ContactNodes:
         if not np.any(self.cubic):
             return self
         stiffness = np.divide(1.0, self.compliance, out=np.zeros(self.count), where=self.compliance > 0)
-        tangent = stiffness + 3 * self.cubic * approach(np.maximum(normal_force, 0.0), stiffness, self.cubic) ** 2
+        force = np.where(self.kept, np.abs(normal_force), np.maximum(normal_force, 0.0))
+        tangent = stiffness + 3 * self.cubic * approach(force, stiffness, self.cubic) ** 2
         soft = np.divide(1.0, tangent, out=np.zeros(self.count), where=tangent > 0)
         return replace(self, compliance=np.where(self.cubic > 0, soft, self.compliance))
 
@@ -141,6 +149,7 @@ def stack(parts: Sequence[ContactNodes], freedoms: int, motions: int, dimension:
         names=tuple(name for p in parts for name in p.names),
         owner=np.concatenate([p.owner + start for p, start in zip(parts, starts[:-1], strict=True)]),
         laws=tuple(law for p in parts for law in p.laws),
+        closed=tuple(c for p in parts for c in (p.closed or (False,) * len(p.names))),
         normal=sp.csr_array(sp.vstack([p.normal for p in parts])),
         tangent=sp.csr_array(sp.vstack([p.tangent for p in parts])),
         normal_lift=joined("normal_lift"),

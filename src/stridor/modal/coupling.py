@@ -53,7 +53,7 @@ class Coupling:
             c.law.scaled(mu, float(v)).slope(float(v))
             for c, v in zip(self.system.contacts, speeds, strict=True)
         ]
-        return steady.normal_force * np.array(slopes)
+        return np.abs(steady.normal_force) * np.array(slopes)
 
     def friction_damping_slope(self, mu: float) -> tuple[Array, Array]:
         """d and its derivative in μ (m,), the derivative by a central difference."""
@@ -117,11 +117,15 @@ def couple(system: System, *, mu: float | None = None) -> tuple[Coupling, tuple[
     if system.contacts and system.loads:
         steady = steady_sliding(system, mu=mu)
         require_pressed(system, steady.normal_force)
-        # A contact that only rounding presses is not closed.
-        closed = steady.active & (steady.normal_force > least_force(system))
+        # A contact that only rounding presses is not closed, unless it is kept so.
+        kept = np.array([c.closed for c in system.contacts], dtype=bool)
+        closed = steady.active & (kept | (steady.normal_force > least_force(system)))
         open_names = tuple(c.name for c, a in zip(system.contacts, closed, strict=True) if not a)
         touching = tuple(c for c, a in zip(system.contacts, closed, strict=True) if a)
         system = replace(system, contacts=touching)
+        pulls = steady.normal_force[closed] < 0.0
+    else:
+        pulls = np.zeros(len(system.contacts), dtype=bool)
     speeds = slip_speeds(system, velocities)
     sloped = any(c.law.slope(abs(float(v))) != 0.0 for c, v in zip(system.contacts, speeds, strict=True))
     if sloped and not system.loads:
@@ -135,4 +139,5 @@ def couple(system: System, *, mu: float | None = None) -> tuple[Coupling, tuple[
             "tangent; give a support a velocity"
         )
     compliance = np.array([c.compliance for c in system.contacts])
-    return Coupling(system, compliance, -np.sign(speeds), speeds, sloped), open_names
+    # Friction is μ|N|: where a contact kept closed pulls, it goes with −N.
+    return Coupling(system, compliance, np.where(pulls, 1.0, -1.0) * np.sign(speeds), speeds, sloped), open_names

@@ -21,13 +21,14 @@ NEWTON_STEPS = 60
 
 @dataclass(frozen=True)
 class ContactRows:
-    """What contact holds: rows normal (m, n) csr, gap (m,) [m], compliance (m,) [m/N] and cubic (m,) [N/m³] as
-    `ContactNodes` has them."""
+    """What contact holds: rows normal (m, n) csr, gap (m,) [m], compliance (m,) [m/N], cubic (m,) [N/m³] and kept (m,)
+    as `ContactNodes` has them."""
 
     normal: Sparse
     gap: Array
     compliance: Array
     cubic: Array
+    kept: BoolArray
 
     @property
     def count(self) -> int:
@@ -117,7 +118,8 @@ class Equilibrium:
         if not len(hardens):
             return
         stiffness, factor = 1.0 / nodes.compliance[hardens], nodes.cubic[hardens]
-        approach = np.maximum(-(nodes.gap[hardens] + nodes.normal[hardens] @ u), 0.0)
+        approach = -(nodes.gap[hardens] + nodes.normal[hardens] @ u)
+        approach = np.where(nodes.kept[hardens], approach, np.maximum(approach, 0.0))
         tangent = stiffness + 3 * factor * approach**2
         self.compliance, self.gap = nodes.compliance.copy(), nodes.gap.copy()
         self.compliance[hardens] = 1.0 / tangent
@@ -180,7 +182,8 @@ class Equilibrium:
 
 
 def settle(equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: int = 60) -> tuple[State, int]:
-    """Find the touching nodes: N ≥ 0 where they touch, gap ≥ 0 where they do not. Also returns the steps taken.
+    """Find the touching nodes: N ≥ 0 where they touch, gap ≥ 0 where they do not. Also returns the steps taken. Nodes
+    of contacts kept closed touch, whichever the sign of N.
 
     At first the nodes of guess (m,) touch, without one, or where these do not hold the structure, all. Each step lets
     go of those that pull and takes in those that penetrate, which is Newton's method on the complementarity and
@@ -193,7 +196,8 @@ def settle(equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: i
     # A node that no freedom moves along its normal (held, over an obstacle) can neither press nor give way.
     movable = np.diff(nodes.normal.indptr) > 0
     load = float(np.abs(equilibrium.force).max(initial=0.0))
-    active: BoolArray = movable if guess is None else movable & guess
+    kept: BoolArray = movable & nodes.kept
+    active: BoolArray = movable if guess is None else movable & (guess | kept)
     last: State | None = None
     seen: set[bytes] = set()
     care = 0
@@ -213,6 +217,7 @@ def settle(equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: i
             care = max(care, 2)
             continue
         pulled, closing = offenders(state, movable, load)
+        pulled = pulled[~kept[pulled]]
         if not len(pulled) and not len(closing):
             return state, step
         last = state

@@ -48,8 +48,8 @@ def unexplained_patterns(system: System, normal_force: Array, gap: Array, active
         mine = slice(first, first + surface.nodes.count)
         first += surface.nodes.count
         loaded = active[mine] & (normal_force[mine] > 0.0)
-        # A contact may touch without any force.
-        if surface.facets is None or not loaded.any():
+        # A contact may touch without any force; one kept closed is open nowhere, and its pressure may change sign.
+        if surface.facets is None or any(surface.nodes.closed) or not loaded.any():
             continue
         around = _neighbours(surface.facets, surface.nodes.count)
         by_mesh = _open_by_mesh(surface, loaded, nodes.gap[mine], gap[mine])

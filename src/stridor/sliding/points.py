@@ -102,12 +102,17 @@ def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: A
     active = np.ones(count, dtype=bool)
     displacement, normal, gaps = np.zeros(system.size), np.zeros(count), np.zeros(count)
     residual = 0.0
-    for _ in range(2 * count + 2):
+    kept = np.array([c.closed for c in system.contacts], dtype=bool)
+    slips, sign = sense, np.ones(count)
+    for _ in range(4 * count + 2):
+        # Friction is μ|N| against the slip: where a contact kept closed pulls, it goes with −N.
+        sense = sign * slips
         displacement, normal, residual = _solve(system, force, mu, sense, active)
         gaps = np.array([c.gap + c.normal_row @ displacement for c in system.contacts])
-        pulled = active & (normal < 0)
+        pulled = active & ~kept & (normal < 0)
         closing = ~active & (gaps < 0)
-        if not pulled.any() and not closing.any():
+        before, sign = sign, np.where(kept & (normal < 0), -1.0, 1.0)
+        if not pulled.any() and not closing.any() and np.array_equal(sign, before):
             break
         active = (active & ~pulled) | closing
     else:

@@ -19,7 +19,7 @@ def least_force(system: System) -> float:
 def nothing_presses(system: System, normal_force: Array) -> bool:
     """Whether normal forces (m,) [N] of steady sliding are all nothing but rounding of the loads: modes, runs and
     checks all ask here."""
-    return float(np.max(normal_force, initial=0.0)) <= least_force(system)
+    return float(np.max(np.abs(normal_force), initial=0.0)) <= least_force(system)
 
 
 def require_pressed(system: System, normal_force: Array) -> None:

@@ -259,6 +259,7 @@ class StickSlip:
             gap=np.concatenate([nodes.gap + nodes.normal_lift @ load.travel, np.sum(along * moved[node], axis=1)]),
             compliance=np.concatenate([nodes.compliance, np.zeros(int(held.sum())), across[turning]]),
             cubic=np.concatenate([nodes.cubic, np.zeros(q)]),
+            kept=np.zeros(nodes.count + q, dtype=bool),
         )
         whole = sp.csr_array(sp.vstack([push, extra]))
         equilibrium = Equilibrium(

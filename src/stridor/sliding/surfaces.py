@@ -27,6 +27,8 @@ from .points import full_motion
 from .redundant import closed, redundant
 from .resultants import Balance, Resultant, balance, resultants
 
+SIGN_CHANGES = 30
+
 
 @dataclass(frozen=True)
 class SurfaceSliding:
@@ -104,29 +106,45 @@ def steady_sliding_nodes(
     slips = speed > STILL * float(speed.max(initial=0.0))
     _require_slip(nodes, slips, coefficient)
     sense = np.where(slips[:, None], -slip / np.where(slips, speed, 1.0)[:, None], 0.0)
-    rubbing = coefficient[:, None] * sense
-    push = sp.csr_array(nodes.normal + nodes.along(rubbing)) if np.any(rubbing) else nodes.normal
     force = _external_force(system, load_factors) - system.motion.damping @ factors
-    symmetric = not np.any(rubbing) and not system.general
-    equilibrium = Equilibrium(system, nodes, push, force, symmetric=symmetric, solver=solver)
-    try:
-        state, iterations = settle(equilibrium, guess)
-    except SingularMatrix as error:
-        raise AnalysisError(_loose(system, nodes, error.motion)) from error
+    rubs = bool(np.any(coefficient[:, None] * sense))
+    symmetric = not rubs and not system.general
+    sign, iterations = np.ones(nodes.count), 0
+    for _ in range(SIGN_CHANGES):
+        # Friction is μ|N| against the slip: where a contact kept closed pulls, it goes with −N.
+        rubbing = (sign * coefficient)[:, None] * sense
+        push = sp.csr_array(nodes.normal + nodes.along(rubbing)) if rubs else nodes.normal
+        equilibrium = Equilibrium(system, nodes, push, force, symmetric=symmetric, solver=solver)
+        try:
+            state, tried = settle(equilibrium, guess)
+        except SingularMatrix as error:
+            raise AnalysisError(_loose(system, nodes, error.motion)) from error
+        iterations += tried
+        found = np.where(nodes.kept & (state.normal_force < 0.0), -1.0, 1.0)
+        if not rubs or np.array_equal(found, sign):
+            break
+        sign = found
+    else:
+        raise AnalysisError(
+            f"steady sliding: where contacts kept closed push and where they pull does not settle in {SIGN_CHANGES} "
+            "steps; lower the friction coefficient or give them a finite stiffness"
+        )
     residual = equilibrium.residual(state)
     _require_held(system, nodes, state, residual)
     touches = closed(state.active, state.gap, state.displacement)
     if twice := redundant(system, nodes, touches & (nodes.compliance == 0.0)):
         raise AnalysisError(twice)
-    active = state.active & (state.normal_force > 0.0)
+    active = state.active & ((state.normal_force > 0.0) | nodes.kept)
     if nodes.count and not active.any():
         raise AnalysisError(
             f"no contact carries load in steady sliding (contacts: {', '.join(nodes.names)}): the loads pull the "
             "bodies apart, or friction lifts them off at this coefficient; check the direction of the loads"
         )
     # What pulls by rounding does not pull.
-    normal = np.maximum(state.normal_force, 0.0)
+    normal = np.where(nodes.kept, state.normal_force, np.maximum(state.normal_force, 0.0))
     friction = rubbing * normal[:, None]
+    if rubs:
+        sense = sign[:, None] * sense
     return SurfaceSliding(
         displacement=state.displacement,
         normal_force=normal,
@@ -222,6 +240,7 @@ def friction_damping_matrix(system: System, steady: SurfaceSliding) -> Sparse:
     speed, mu = speed[working], steady.friction_coefficient[working]
     normal, sense = steady.normal_force[working], steady.sense[working]
     parallel = chosen.along(sense)
+    normal = np.abs(normal)  # a contact kept closed rubs where it pulls, too
     matrix = parallel.T @ sp.diags_array(normal * _slopes(chosen, speed, mu)) @ parallel
     if nodes.directions == 2:
         across = chosen.along(np.stack([-sense[:, 1], sense[:, 0]], axis=1))

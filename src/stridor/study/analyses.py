@@ -512,7 +512,7 @@ def first_regime(run: Trajectory) -> dict[str, dict[str, float | None]]:
         tail = status[-max(1, len(status) // 4) :]
         found[name] = {
             "end": float(end),
-            "max_normal_force": float(force.max()),
+            "max_normal_force": float(np.abs(force).max()),
             "max_slip_speed": float(np.abs(run.slip_speed[part][inside, k]).max()),
             "stick_fraction": float(np.mean(tail == 1)),
         }

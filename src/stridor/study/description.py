@@ -83,6 +83,7 @@ def describe(case: Case) -> Description:
         steady = steady_sliding(system)
         for k, contact in enumerate(system.contacts):
             stiffness = "rigid" if np.isinf(contact.stiffness) else f"{contact.stiffness:g} N/m"
+            stiffness += ", kept closed" if contact.closed else ""
             state = f"{steady.normal_force[k]:.6g} N" if steady.active[k] else "open"
             table = case.contacts[contact.name]
             lines.append(
@@ -287,6 +288,7 @@ def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str
         stiffness = "rigid" if table.stiffness == "rigid" else f"{table.stiffness:g} {unit}"
         if table.cubic:
             stiffness += f" and {table.cubic:g} {'N/m³' if unit == 'N/m' else 'N/m⁵'} times the cube of the approach"
+        stiffness += ", kept closed" if table.closed else ""
         law = _law_words(table.friction)
         text = (
             f"  contact {name}: {table.slave} on {table.master}, {int(touching.sum())} of {int(mine.sum())} slave "

@@ -233,6 +233,7 @@ def _point_nodes(contact: Contact) -> ContactNodes:
         position=contact.slave_position[None, :],
         normals=contact.normal[None, :],
         tangents=contact.tangent[None, None, :],
+        closed=(contact.closed,),
     )
 
 

@@ -55,7 +55,9 @@ def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Co
             f"the point ({position[0]:g}, {position[1]:g}) m lies beyond the ends of {contact.master}; "
             "move a body so that the slave faces the master line",
         )
-    return replace(built, normal_lift=_overlapping(view, name, contact, built.normal_lift))
+    return replace(
+        built, normal_lift=_overlapping(view, name, contact, built.normal_lift), closed=contact.closed
+    )
 
 
 def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> SurfaceContact:
@@ -87,7 +89,7 @@ def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> 
         # A point stands for no area: its stiffness is in N/m, and it has no pressure.
         built = replace(built, nodes=replace(built.nodes, area=np.full(len(built.area), np.nan)))
     lift = _overlapping(view, name, contact, built.nodes.normal_lift)
-    return replace(built, nodes=replace(built.nodes, normal_lift=lift))
+    return replace(built, nodes=replace(built.nodes, normal_lift=lift, closed=(contact.closed,)))
 
 
 def _overlapping(view: View, name: str, contact: ContactCase, lift: Array) -> Array:

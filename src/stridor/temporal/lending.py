@@ -61,6 +61,7 @@ def lent_contacts(x: ContactArrays) -> ContactArrays:  # pragma: no cover - comp
         borrow(x.chords),
         borrow(x.slave),
         borrow(x.side),
+        borrow(x.kept),
     )
 
 

@@ -41,6 +41,7 @@ class ContactArrays(NamedTuple):
     chords: Array  # (Σk,) chord after each node, 0 after the last
     slave: Array  # (m, 2) reference position
     side: Array
+    kept: IntArray  # (m,) 1 where the contact is kept closed
 
 
 class ModalArrays(NamedTuple):
@@ -137,6 +138,7 @@ def row_table(system: System) -> RowTable:
         chords=np.concatenate(chords) if chords else np.zeros(0),
         slave=np.array([c.slave_position for c in system.contacts]).reshape(-1, 2),
         side=np.array([float(c.side) for c in system.contacts]),
+        kept=np.array([int(c.closed) for c in system.contacts], dtype=np.int64),
     )
     return RowTable(
         free=sp.csr_array(sp.vstack([empty, *free])),

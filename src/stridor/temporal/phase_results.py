@@ -36,11 +36,15 @@ def fresh_statistics(count: int, columns: int) -> Array:
 
 @dataclass
 class PhaseResults:
-    """Results by phase: of those gone by, kept; of the one that runs, from the statistics (m, …) as they are."""
+    """Results by phase: of those gone by, kept; of the one that runs, from the statistics (m, …) as they are.
+
+    kept: for each contact whether it is kept closed; () where none is.
+    """
 
     schedule: Schedule
     contacts: Sequence[str]
     statistics: Array
+    kept: Sequence[bool] = ()
     gone: dict[int, PhaseResult] = field(default_factory=dict[int, PhaseResult])
 
     def begin(self, done: int) -> None:
@@ -88,7 +92,8 @@ class PhaseResults:
     def _result(self, number: int, done: int) -> PhaseResult:
         stretch, dt = self.schedule.stretches[number], self.schedule.step
         contacts: dict[str, ContactStatistics] = {}
-        for contact, row in zip(self.contacts, self.statistics, strict=True):
+        kept = self.kept or (False,) * len(self.contacts)
+        for contact, row, closed in zip(self.contacts, self.statistics, kept, strict=True):
             total = max(row[STICK_STEPS] + row[SLIP_STEPS] + row[OPEN_STEPS], 1.0)
             contacts[contact] = ContactStatistics(
                 stick_fraction=float(row[STICK_STEPS] / total),
@@ -99,5 +104,6 @@ class PhaseResults:
                 max_slip_speed=float(row[MAX_SPEED]),
                 first_stick=float(row[FIRST_STICK] * dt) if row[FIRST_STICK] >= 0 else None,
                 first_separation=float(row[FIRST_OPEN] * dt) if row[FIRST_OPEN] >= 0 else None,
+                kept_closed=closed,
             )
         return PhaseResult(stretch.name, stretch.first * dt, done * dt, contacts)

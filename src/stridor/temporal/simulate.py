@@ -130,8 +130,9 @@ class _Run:
     ) -> None:
         self.machine, self.modes, self.schedule, self.settings = machine, modes, schedule, settings
         self.limit, self.reason, self.restart, self.join = limit, reason, restart, join
-        names = [c.name for c in machine.system.contacts]
-        self.phases = PhaseResults(schedule, names, machine.state.statistics)
+        contacts = machine.system.contacts
+        names, kept = [c.name for c in contacts], [c.closed for c in contacts]
+        self.phases = PhaseResults(schedule, names, machine.state.statistics, kept)
         self.wall = 0.0
         self.within = False
 

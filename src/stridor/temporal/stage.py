@@ -20,6 +20,7 @@ _STICK, _SLIP = multipliers.STICK, multipliers.SLIP
 _FINITE = FINITE
 
 _solve_contact = njit(cache=True)(multipliers.solve_contact)
+_solve_kept = njit(cache=True)(multipliers.solve_kept)
 _spline_weights = njit(cache=True)(surface.spline_weights)
 
 SWEEP_LIMIT = 500
@@ -187,14 +188,16 @@ def _solve_all(
             old_n, old_t = state.normal[c], state.tangential[c]
             gap -= w_nn * old_n + w_nt * old_t
             slip -= w_nt * old_n + w_tt * old_t
-            normal, tangential, status = _solve_contact(
-                gap, slip, w_nn, w_nt, w_tt, contacts.friction[c], state.status[c] == _STICK, scheme.step
-            )
+            law, stuck = contacts.friction[c], state.status[c] == _STICK
+            if contacts.kept[c]:
+                normal, tangential, status = _solve_kept(gap, slip, w_nn, w_nt, w_tt, law, stuck, scheme.step)
+            else:
+                normal, tangential, status = _solve_contact(gap, slip, w_nn, w_nt, w_tt, law, stuck, scheme.step)
             scratch.delta[c] = status
             dn, dt = normal - old_n, tangential - old_t
             state.normal[c], state.tangential[c] = normal, tangential
             change = max(change, abs(dn) + abs(dt))
-            largest = max(largest, normal)
+            largest = max(largest, abs(normal))
             if dn != 0.0 or dt != 0.0:
                 for a in range(width):
                     p = scratch.shape[c, a] * dn + scratch.slide[c, a] * dt
@@ -317,7 +320,7 @@ def accumulate(
             row[OPEN_STEPS] += 1.0
             if row[FIRST_OPEN] < 0.0:
                 row[FIRST_OPEN] = state.counters[0]
-        row[MAX_NORMAL] = max(row[MAX_NORMAL], state.normal[c])
+        row[MAX_NORMAL] = max(row[MAX_NORMAL], abs(state.normal[c]))
         row[MAX_TANGENTIAL] = max(row[MAX_TANGENTIAL], abs(state.tangential[c]))
     works[FRICTION] -= friction * dt
     works[NORMAL] -= (total - friction) * dt

@@ -19,7 +19,8 @@ class ContactStatistics:
     """Of one contact over one phase, from every step: fractions of its duration, extrema, first events.
 
     max_normal_force, max_tangential_force [N]; max_slip_speed [m/s] over a step; first_stick,
-    first_separation [s], None where it did not happen.
+    first_separation [s], None where it did not happen. kept_closed: separation is 0 because the case asks for it
+    (`closed = true`), and max_normal_force, the largest |N|, may be one that pulls.
     """
 
     stick_fraction: float
@@ -30,6 +31,7 @@ class ContactStatistics:
     max_slip_speed: float
     first_stick: float | None
     first_separation: float | None
+    kept_closed: bool = False
 
 
 @dataclass(frozen=True)

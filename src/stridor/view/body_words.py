@@ -73,6 +73,7 @@ def contact_words(name: str, contact: Contact, *, on_line: bool) -> str:
     if contact.cubic:
         cube = "N/m³ (of a point) or N/m⁵ (per area)"
         stiffness += f" and {significant(contact.cubic)} {cube} times the cube of the approach"
+    stiffness += ", kept closed" if contact.closed else ""
     return (
         f"{name}: {contact.slave} slides on {contact.master} ({contact.sliding} sliding), {stiffness}{where}; "
         f"friction law {law}, {settings}."

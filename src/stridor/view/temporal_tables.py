@@ -25,7 +25,7 @@ def contact_table(trajectory: Trajectory) -> Table:
                 name,
                 number(100 * s.stick_fraction, 1),
                 number(100 * s.slip_fraction, 1),
-                number(100 * s.separation_fraction, 1),
+                number(100 * s.separation_fraction, 1) + (", kept closed" if s.kept_closed else ""),
                 number(s.max_normal_force, 1),
                 number(s.max_tangential_force, 2),
                 number(s.max_slip_speed, 4),
@@ -53,6 +53,11 @@ def contact_table(trajectory: Trajectory) -> Table:
         caption += (
             " Contacts separate in the last phase, and such motion is as a rule chaotic: its largest values are those "
             "of this one trajectory and come out different on another machine, unlike the averages of the next table."
+        )
+    if any(s.kept_closed for phase in trajectory.phases for s in phase.contacts.values()):
+        caption += (
+            " Contacts kept closed on request cannot separate: their 0 % says nothing of the loads, and their largest "
+            "normal force may be one that pulls."
         )
     return drop_empty(Table("contacts", "What the contacts did", heads, rows, frozenset({0, 1}), caption))
 

@@ -55,7 +55,7 @@ def regime_window(
         start=float(trajectory.time[chosen][0]),
         end=float(trajectory.time[chosen][-1]),
         reason=reason,
-        max_normal_force=float(trajectory.normal_force[chosen, contact].max()),
+        max_normal_force=float(np.abs(trajectory.normal_force[chosen, contact]).max()),
         max_slip_speed=float(np.abs(trajectory.slip_speed[chosen, contact]).max()),
         stick_fraction=float(np.mean(inside == STICK)),
         separation_fraction=float(np.mean(inside == SEPARATION)),

@@ -127,9 +127,10 @@ def _run_sentence(inputs: ReportInputs) -> str:
     shares: list[str] = []
     for name in run.contact_names:
         s = last.contacts[name]
+        of, opens = f"of the phase “{last.name}”", f"{100 * s.separation_fraction:.0f} %"
         shares.append(
-            f"{name} sticks {100 * s.stick_fraction:.0f} %, slips {100 * s.slip_fraction:.0f} % and is open "
-            f"{100 * s.separation_fraction:.0f} % of the phase “{last.name}”"
+            f"{name} sticks {100 * s.stick_fraction:.0f} %, slips {100 * s.slip_fraction:.0f} % "
+            + (f"{of} and is kept closed on request" if s.kept_closed else f"and is open {opens} {of}")
         )
     text += f"{'s' if len(shares) > 1 else ''} {_listed(shares)}"
     if inputs.dominant_hz is not None:

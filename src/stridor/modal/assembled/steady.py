@@ -160,7 +160,8 @@ class Steadiness:
             laws = [self.nodes.laws[k] for k in self.nodes.owner[self.touching]]
             slopes = [law.scaled(mu, float(v)).slope(float(v)) for law, v in zip(laws, speeds, strict=True)]
             held = len(self.layer.compliance) - len(self.touching)
-            weakening = np.append(steady.normal_force[self.touching] * np.array(slopes), np.zeros(held))
+            pressing = np.abs(steady.normal_force[self.touching])  # a contact kept closed rubs where it pulls, too
+            weakening = np.append(pressing * np.array(slopes), np.zeros(held))
         stiffness = None
         if self.prestress and self.system.stress_stiffness is not None:
             stiffness = self.system.stress_stiffness(steady.displacement)

@@ -83,6 +83,11 @@ def contacts_problem(
     if not nodes.count:
         return ContactsProblem(interpolated_terms(family.structure_at, family.interpolated), family.parameters)
     refuse_stick(family.own, "reduced models over parameters")
+    if nodes.kept.any():
+        raise AnalysisError(
+            "reduced models over parameters do not take contacts that are kept closed; leave out closed = true, or "
+            "take modes and onsets of the full problem"
+        )
     steady = touching_nodes(family.own, nodes, touching_at, options.solver)
     touching = np.flatnonzero(steady.active)
     if np.any(nodes.cubic[touching] > 0):

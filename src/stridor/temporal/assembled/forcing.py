@@ -56,7 +56,7 @@ class LoopState(NamedTuple):
 class StepWork(NamedTuple):
     """Work space of a step. Supports (p,): after, q at t_{n+1}; place, their displacement then; velocity at t_n; sent,
     what contacts, loads and springs send to them; coupling (2, p): inertia and damping rows on q_n. Cubic springs
-    (s,): spring, their force, and spring_rate on q_n; load_rate (l,) on q_n. sums (c, 5) of contacts, status (m,) of
+    (s,): spring, their force, and spring_rate on q_n; load_rate (l,) on q_n. sums (c, 6) of contacts, status (m,) of
     nodes, watched (r, 2) rows on u_n and q_n, power (16,) of the parts of the structure."""
 
     after: Array

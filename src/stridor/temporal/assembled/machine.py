@@ -246,7 +246,7 @@ def _step_work(forcing: Forcing, table: NodeTable, state: LoopState, record: Rec
         spring=np.zeros(springs),
         spring_rate=np.zeros(springs),
         load_rate=np.zeros(forcing.loads.shape[1]),
-        sums=np.zeros((len(state.statistics), 5)),
+        sums=np.zeros((len(state.statistics), 6)),
         status=np.zeros(len(table.gap), dtype=np.int64),
         watched=np.zeros((len(record.watch_lift), 2)),
         power=np.zeros(16),

@@ -116,7 +116,7 @@ class _Run:
     ) -> None:
         self.machine, self.schedule, self.settings, self.limit = machine, schedule, settings, limit
         self.restart, self.join, self.parts, self.observe = restart, join, parts, observe
-        self.phases = PhaseResults(schedule, machine.nodes.names, machine.state.statistics)
+        self.phases = PhaseResults(schedule, machine.nodes.names, machine.state.statistics, machine.nodes.closed)
         self.wall = 0.0
         self.within = False
         self.finite = slides_finitely(machine.system)

@@ -8,7 +8,8 @@ and those that the forces have closed join in.
 A compliant layer stretches the gap equation. Its force at t_n belongs to the gap at t_n; with g_{n+1} instead it would
 lag by a step and damp like a dashpot of Δt/compliance. The mean of g_{n+1} and g_{n−1} is centred, so that (g_{n+1} +
 g_{n−1})/2 + compliance·N is what is zero where N is not: second order, stable for any stiffness, and no damping. A
-layer that hardens, N = δ/compliance + cubic δ³, has δ(N) in the place of compliance·N.
+layer that hardens, N = δ/compliance + cubic δ³, has δ(N) in the place of compliance·N. A node kept closed always takes
+part, and its N may be negative.
 """
 
 from __future__ import annotations
@@ -88,26 +89,29 @@ def _take_in(
 
 @njit(cache=True)
 def _solve_node(
-    i: int, gap: float, s1: float, s2: float, layer: float, step: float, new: Array, table: NodeTable, state: NodeState
+    i: int,
+    turned: float,
+    gap: float,
+    s1: float,
+    s2: float,
+    layer: float,
+    step: float,
+    new: Array,
+    table: NodeTable,
+    state: NodeState,
 ) -> int:  # pragma: no cover - compiled
     """Forces (d,) of node i into new from its gap and slip free of them; layer: compliance [m/N] beside its own part of
-    G A Gᵀ. Its status."""
-    block, law = table.block[i], table.friction[table.owner[i]]
+    G A Gᵀ. turned: −1 where gap and normal force are those of the mirror image, else 1. Its status."""
+    block, law, stuck = table.block[i], table.friction[table.owner[i]], state.status[i] == _STICK
     w_nn = block[0, 0] + layer
     if table.row.shape[1] == 2:
-        new[0], new[1], status = _solve_contact(
-            gap, s1, w_nn, block[0, 1], block[1, 1], law, state.status[i] == _STICK, step
-        )
-        return status
-    new[0], new[1], new[2], status = solve_disc(
-        gap,
-        s1,
-        s2,
-        (w_nn, block[0, 1], block[0, 2], block[1, 1], block[1, 2], block[2, 2]),
-        law,
-        state.status[i] == _STICK,
-        step,
-    )
+        new[0], new[1], status = _solve_contact(gap, s1, w_nn, turned * block[0, 1], block[1, 1], law, stuck, step)
+    else:
+        w = (w_nn, turned * block[0, 1], turned * block[0, 2], block[1, 1], block[1, 2], block[2, 2])
+        new[0], new[1], new[2], status = solve_disc(gap, s1, s2, w, law, stuck, step)
+    if table.kept[i] and status == _OPEN:
+        # Where friction would jam it, it closes without.
+        new[0], status = (-gap / w_nn if w_nn > 0.0 else 0.0), _SLIP
     return status
 
 
@@ -132,9 +136,14 @@ def _relax(
         s1 += table.row[p, 1] * moved
         if d == 3:
             s2 += table.row[p, 2] * moved
+    # A gap kept closed that would open is the mirror image of one that would close, with the normal turned round.
+    turned = -1.0 if table.kept[i] and gap > 0.0 else 1.0
+    gap *= turned
     compliance, hardening = table.compliance[i], table.cubic[i]
     if hardening == 0.0:
-        return _solve_node(i, gap, s1, s2, 2.0 * compliance, step, new, table, state)
+        status = _solve_node(i, turned, gap, s1, s2, 2.0 * compliance, step, new, table, state)
+        new[0] *= turned
+        return status
     # Newton's method on the approach δ(p), which is concave: from no force on, tangents close in from below.
     scale = math.sqrt(1.0 / (3.0 * compliance * hardening))
     before, status = 0.0, _OPEN
@@ -142,12 +151,12 @@ def _relax(
         approach = 2.0 * scale * math.sinh(math.asinh(1.5 * before * compliance / scale) / 3.0)
         tangent = 1.0 / (1.0 / compliance + 3.0 * hardening * approach * approach)
         met = gap + 2.0 * (approach - tangent * before)
-        status = _solve_node(i, met, s1, s2, 2.0 * tangent, step, new, table, state)
+        status = _solve_node(i, turned, met, s1, s2, 2.0 * tangent, step, new, table, state)
         if abs(new[0] - before) <= 1e-14 * new[0]:
             break
         before = new[0]
+    new[0] *= turned
     return status
-
 
 
 @njit(cache=True)
@@ -168,7 +177,7 @@ def _sweeps(
                 size += abs(change[j])
                 state.force[i, j] = new[j]
             worst = max(worst, size)
-            largest = max(largest, new[0])
+            largest = max(largest, abs(new[0]))
             if size != 0.0:
                 _push(i, change, table, work.correction)
         if count == 1 or worst <= SWEEP_TOLERANCE * largest:
@@ -221,7 +230,7 @@ def solve_nodes(
             work.earlier[i] = _gap_before(i, gap, step, ratio, increments, table, state, work)
         work.marked[i] = 0
         status[i] = _OPEN
-        if gap + work.earlier[i] < 0.0 or state.force[i, 0] > 0.0:
+        if gap + work.earlier[i] < 0.0 or state.force[i, 0] > 0.0 or table.kept[i]:
             count = _take_in(i, count, increments, ratio, table, state, work)
     if count == 0:
         return 0, 0
@@ -232,7 +241,7 @@ def solve_nodes(
             state.force[work.chosen[0], j] = 0.0
     for n in range(count):
         i = work.chosen[n]
-        if state.force[i, 0] > 0.0:
+        if state.force[i, 0] != 0.0:
             _push(i, state.force[i], table, work.correction)
     done = 0
     while True:

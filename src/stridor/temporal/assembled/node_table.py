@@ -19,7 +19,8 @@ class NodeTable(NamedTuple):
     place (l,) among all places, gain (l,) [m/N] = displacement over the step by a unit force. Node i has entries
     ptr[i] … ptr[i+1]: col into place and row (entries, d). lift (m, d, p), gap (m,) [m], compliance (m,) [m/N], cubic
     (m,) [N/m³], block (m, d, d) [m/N] its own part of G A Gᵀ. owner (m,), friction (c, k) numbers of the laws, along
-    (m, d−1) the direction in which a contact's tangential motion is told, weight (m,) for means without force.
+    (m, d−1) the direction in which a contact's tangential motion is told, weight (m,) for means without force; kept
+    (m,) 1 where a node is kept closed.
     """
 
     place: IntArray
@@ -36,6 +37,7 @@ class NodeTable(NamedTuple):
     friction: Array
     along: Array
     weight: Array
+    kept: IntArray
 
 
 def node_table(nodes: ContactNodes, layout: Layout, gain: Array, factors: Array) -> NodeTable:
@@ -74,6 +76,7 @@ def node_table(nodes: ContactNodes, layout: Layout, gain: Array, factors: Array)
         friction=friction_rows(nodes.laws),
         along=sliding_directions(nodes, factors),
         weight=np.where(np.isnan(nodes.area), 1.0, nodes.area),
+        kept=nodes.kept.astype(np.int64),
     )
 
 

@@ -74,8 +74,8 @@ def statistics(
     count: int, ratio: Array, step: float, increments: Array, table: NodeTable, nodes: NodeState, work: NodeScratch,
     status: IntArray, state: LoopState, sums: Array,
 ) -> None:  # pragma: no cover - compiled
-    """Status and forces of the contacts in this step into their statistics; sums (c, 5) is work space and afterwards
-    holds normal and tangential force and status in its first three columns."""
+    """Status and forces of the contacts in this step into their statistics; sums (c, 6) is work space and afterwards
+    holds normal and tangential force and status in its first three columns, the sum of |N| in the last."""
     for c in range(sums.shape[0]):
         for j in range(sums.shape[1]):
             sums[c, j] = 0.0
@@ -83,6 +83,7 @@ def statistics(
         i = work.chosen[n]
         row = sums[table.owner[i]]
         row[0] += nodes.force[i, 0]
+        row[5] += abs(nodes.force[i, 0])
         for j in range(table.along.shape[1]):
             row[1] += nodes.force[i, 1 + j] * table.along[i, j]
         row[2] = max(row[2], float(status[i]))
@@ -102,7 +103,7 @@ def statistics(
             kept[OPEN_STEPS] += 1.0
             if kept[FIRST_OPEN] < 0.0:
                 kept[FIRST_OPEN] = number
-        kept[MAX_NORMAL] = max(kept[MAX_NORMAL], row[0])
+        kept[MAX_NORMAL] = max(kept[MAX_NORMAL], abs(row[0]))
         kept[MAX_TANGENTIAL] = max(kept[MAX_TANGENTIAL], abs(row[1]))
 
 
@@ -142,12 +143,12 @@ def _record_contacts(
         if node_place >= 0:
             record.nodes[node_place, i, 1 + 2 * t] = gap
         out[c, REC_GAP] = min(out[c, REC_GAP], gap)
-        out[c, REC_SLIP] += nodes.force[i, 0] * slip
+        out[c, REC_SLIP] += abs(nodes.force[i, 0]) * slip
         sums[c, 3] += table.weight[i]
         sums[c, 4] += table.weight[i] * slip
     for c in range(sums.shape[0]):
-        if sums[c, 0] > 0.0:
-            out[c, REC_SLIP] /= sums[c, 0]
+        if sums[c, 5] > 0.0:
+            out[c, REC_SLIP] /= sums[c, 5]
         else:
             out[c, REC_SLIP] = sums[c, 4] / sums[c, 3]
 

@@ -64,14 +64,14 @@ def _joined(machine: Machine, points: ContactNodes, surfaces: list[SurfaceContac
     together = stack(
         [*parts, *(s.nodes for s in surfaces)], system.size, len(system.motion.names), system.dimension
     )  # fmt: skip
-    return replace(together, names=old.names, owner=old.owner, laws=old.laws, cubic=old.cubic)
+    return replace(together, names=old.names, owner=old.owner, laws=old.laws, cubic=old.cubic, closed=old.closed)
 
 
 def take_over(machine: Machine, surfaces: tuple[SurfaceContact, ...], nodes: ContactNodes) -> None:
     """Go on with renewed rows: gaps of closed nodes continue, tangential forces turn with their frames."""
     old, contacts = machine.nodes, machine.contacts
     u, x = machine.displacement, machine.state.motion[0]
-    closed = contacts.force[:, 0] > 0.0
+    closed = contacts.force[:, 0] != 0.0
     before = old.gap + old.normal @ u + old.normal_lift @ x + contacts.offset
     after = nodes.gap + nodes.normal @ u + nodes.normal_lift @ x
     contacts.offset[closed] = (before - after)[closed]
