@@ -260,7 +260,7 @@ def test_run_writes_a_self_contained_report(folder: Path) -> None:
         (
             ("simulate", "two-beams.toml", "--restart", "two-beams.toml"),
             2,
-            "stridor: file: 'two-beams.toml' – a results file written by stridor (netCDF-4/HDF5)",
+            "stridor: file: 'two-beams.toml' – no results of stridor; give a results file written by stridor (netCDF-4/HDF5)",
         ),
         (
             ("simulate", "two-beams.toml", "--restart", "none.nc"),

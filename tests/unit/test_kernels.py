@@ -396,4 +396,6 @@ def test_no_code_that_is_kept_can_be_replaced_by_that_of_another_function():
         _, kind, (code, _) = pickle.loads(path.read_bytes()[32:])[0]
         assert kind == "object"
         weak = [name for name, replaceable in defined_functions(code).items() if replaceable]
+        # Wrappers of parallel loops are called after an address in the process that compiled them: no name for two.
+        weak = [name for name in weak if "__numba_parfor_gufunc_0x" not in name]
         assert not weak, f"{path.name}: {weak}"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from stridor.contact.coupling import SlaveFacets
+from stridor.contact.obstacles import Flat
 from stridor.sliding.pattern import unexplained_patterns
 
 
@@ -18,8 +19,11 @@ def test_a_contact_that_touches_without_force_has_no_pattern_and_no_warning(forc
     positions = np.column_stack([np.arange(4.0), np.zeros(4)])
     lines = np.column_stack([np.arange(3), np.arange(1, 4)])
     facets = SlaveFacets.of(positions, {"line": lines}, np.arange(4))
-    nodes: Any = SimpleNamespace(count=4, area=np.ones(4), gap=np.zeros(4))
-    surface = SimpleNamespace(name="rub", nodes=nodes, facets=facets)
+    nodes: Any = SimpleNamespace(count=4, area=np.ones(4), gap=np.zeros(4), closed=np.zeros(4, dtype=bool))
+    surface = SimpleNamespace(
+        name="rub", nodes=nodes, facets=facets, slave_position=positions, master=Flat(np.zeros(2), np.array([0.0, 1.0])),
+        location=SimpleNamespace(normal=np.tile([0.0, 1.0], (4, 1)), gap=np.zeros(4)),
+    )  # fmt: skip
     system: Any = SimpleNamespace(contacts=(), surfaces=(surface,), contact_nodes=lambda: nodes)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -375,3 +375,11 @@ def test_steady_sliding_tells_of_nodes_that_open_without_a_reason():
     uneven = steady.normal_force * np.where(np.arange(len(gap)) % 2, 1.9, 0.1)
     (text,) = unexplained_patterns(system, uneven, steady.gap, steady.active)
     assert "the pressure jumps from node to node by more than 40% of its mean" in text
+
+
+def test_a_slave_boundary_that_goes_round_an_edge_presses_with_its_face_alone():
+    square = np.array([[0.0, 0.0], [0.25, 0.0], [0.5, 0.0], [0.75, 0.0], [1.0, 0.0], [1.0, 0.25], [0.0, 0.25]])
+    bottom, sides = [[0, 1], [1, 2], [2, 3], [3, 4]], [[4, 5], [6, 0]]
+    slave = (square * 0.5 + [0.2, 0.0], {"line": np.array(bottom + sides)})
+    contact = contact_of(slave, line("line", 5, seed=2))
+    np.testing.assert_allclose(contact.nodes.area, 0.5 * np.array([0.125, 0.25, 0.25, 0.25, 0.125]), rtol=1e-12)

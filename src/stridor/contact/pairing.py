@@ -10,11 +10,13 @@ from scipy.spatial import cKDTree
 
 from ..errors import CaseError
 from ..laws.friction import FrictionLaw
+from ..mesh.facets import facet_normals
 from ..mesh.model import Blocks
 from ..typing import Array, BoolArray, IntArray
 from .coupling import SlaveFacets, coupled
 from .interface import Rows
 from .master import Location, MasterSurface
+from .pieces import OPPOSED
 from .surfaces import SurfaceContact, operators
 
 
@@ -59,6 +61,7 @@ def pair_surface(
     facing, location = _facing(where, slave_position, slave_normals, master, reach)
     around = None
     if facets is not None:
+        facets, facing, location = _opposed(facets, slave_position, facing, location)
         around = SlaveFacets.of(slave_position, facets, facing, thickness=thickness, nodal_gaps=adjust)
     d = slave_position.shape[1]
     own = (facing[:, None] * d + np.arange(d)).ravel()
@@ -117,6 +120,28 @@ def _facing(
     if not len(facing):
         raise CaseError(where, None, _never_touching(position, location, opposed, reach))
     return facing, _only(location, facing)
+
+
+def _opposed(
+    facets: Blocks, position: Array, facing: IntArray, location: Location
+) -> tuple[Blocks, IntArray, Location]:
+    """Facets that face the master, and the nodes (q,) that take part and belong to one, with their places.
+
+    A boundary may go round an edge: its nodes there take part, the facets on the other side stand for no contact.
+    """
+    out = np.zeros(position.shape)
+    out[facing] = location.normal
+    kept: dict[str, IntArray] = {}
+    for kind, block in facets.items():
+        below = out[block].sum(axis=1)
+        normal = facet_normals(position, block, kind)
+        keep = (np.sum(normal * below, axis=1) < OPPOSED * np.linalg.norm(below, axis=1)) & below.any(axis=1)
+        if keep.any():
+            kept[kind] = np.asarray(block)[keep]
+    if not kept:
+        return facets, facing, location
+    held = np.flatnonzero(np.isin(facing, np.concatenate([block.ravel() for block in kept.values()])))
+    return kept, facing[held], _only(location, held)
 
 
 def repair(

@@ -119,6 +119,13 @@ def nodal_normals(points: Array, facets: Blocks) -> Array:
     return np.divide(total, length[:, None], out=np.zeros_like(total), where=good[:, None])
 
 
+def facet_normals(points: Array, nodes: IntArray, kind: str) -> Array:
+    """Mean unit outward normals (f, d) of facets (f, r) of one kind, zero where there is no area."""
+    total = _directed_areas(points, nodes, facet_rule(kind)).sum(axis=1)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+
+
 def pressure_load(points: Array, facets: Blocks, *, thickness: float = 1.0, pressure: float = 1.0) -> Array:
     """Nodal forces (k, d) [N] of a uniform pressure [Pa] that pushes into the body: −p ∫ φ n dA, consistent."""
     total = np.zeros(points.shape)
