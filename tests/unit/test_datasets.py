@@ -99,5 +99,5 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
 
 def test_a_modes_file_is_no_trajectory(case: st.Case, tmp_path: Path) -> None:
     path = st.save(st.modes(case, 0.1, count=3), tmp_path / "modes.nc")
-    with pytest.raises(st.CaseError, match="simulate"):
+    with pytest.raises(st.CaseError, match="a file of `stridor simulate`"):
         st.load_trajectory(path)

@@ -171,7 +171,7 @@ def _modes(result: ComplexModes) -> Any:
     if result.notes:
         data.attrs["notes"] = json.dumps(result.notes)
     data.attrs["damped"] = int(result.damped)
-    data.attrs["modes_in_band"] = [int(n) for n in result.total]
+    data.attrs["modes_in_band"] = json.dumps([int(n) for n in result.total])
     if result.max_frequency_hz is not None:
         data.attrs["max_frequency_hz"] = result.max_frequency_hz
     return data
