@@ -62,7 +62,7 @@ class Memory:
 
 
 def test_without_critical_friction_no_onset_is_solved(case: st.Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bisecting, "onsets", refuse)
+    monkeypatch.setattr(bisecting, "onsets_of_band", refuse)
     result = st.compare(case, [0.05], critical=False, only=["growth"])
     assert result.critical_mu_modal is None
     assert result.agree is True

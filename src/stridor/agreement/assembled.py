@@ -14,7 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import AnalysisError
-from ..modal.complex_modes import ComplexModes, complex_modes
+from ..modal.assembled import Options
+from ..modal.complex_modes import ComplexModes
+from ..modal.growing import modes_of_band
 from ..sliding import full_motion
 from ..system import System
 from ..temporal.observe import Snapshots
@@ -39,9 +41,8 @@ def turns(system: System) -> bool:
 
 def modes_as_in_time(system: System, mu: float, max_frequency_hz: float) -> ComplexModes:
     """Modes with right vectors, of the very model that the time loop marches."""
-    return complex_modes(
-        system, mu, max_frequency_hz=max_frequency_hz, vectors="right", friction_damping=turns(system)
-    )
+    options = Options(friction_damping=turns(system))
+    return modes_of_band(system, mu, max_frequency_hz, vectors="right", options=options)
 
 
 def perturb_assembled(

@@ -7,14 +7,15 @@ separation, shows which of the unstable modes responds and how it settles (paper
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 
 from ..errors import AnalysisError, CaseError
-from ..modal.complex_modes import ComplexModes, complex_modes
+from ..modal.complex_modes import ComplexModes
+from ..modal.growing import doubt, modes_of_band
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape
@@ -100,7 +101,11 @@ def compare(
             )
     except KeyboardInterrupt:
         interrupted = True
-    notes = _notes(system, parts, at.taken)
+    notes = [
+        *_notes(system, parts, at.taken),
+        *_doubts({f"modes at μ = {c.mu:g}": c.completeness for c in comparisons}),
+        *_doubts({"onsets": of_critical.completeness}),
+    ]
     if of_critical.why:
         notes.append(of_critical.why)
     return Agreement(
@@ -126,6 +131,11 @@ def _notes(system: System, parts: Collection[str], taken: Sequence[str]) -> list
     if taken:
         notes.append(f"taken from an earlier call on the same case, not computed again: {', '.join(taken)}")
     return notes
+
+
+def _doubts(told: Mapping[str, str]) -> list[str]:
+    """What keeps a list of modes or onsets from being known to be whole."""
+    return [f"{what}: {said}" for what, said in told.items() if doubt(said)]
 
 
 @dataclass
@@ -176,7 +186,7 @@ class _At:
         highest = 1.02 * self.limit
         if self.system.assembled:
             return modes_as_in_time(self.system, mu, highest)
-        return complex_modes(self.system, mu, max_frequency_hz=highest, vectors=True)
+        return modes_of_band(self.system, mu, highest, vectors=True)
 
     def _growth(self, mu: float, modes: ComplexModes) -> Comparison:
         if self.system.assembled:
@@ -195,7 +205,8 @@ class _At:
         here = complex(lam[partner])
         frequency = abs(perturbation.eigenvalue.imag - here.imag) / max(abs(here.imag), 1e-300)
         rate = abs(perturbation.eigenvalue.real - here.real) / max(abs(here.real), 1e-300)
-        agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate)
+        told = modes.completeness[0]
+        agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate, told)
         assert modes.right is not None, "asked for with vectors"
         shape = perturbation.shape
         return Comparison(
@@ -213,6 +224,7 @@ class _At:
             agrees=agrees,
             verdict=verdict,
             growth_mac=None if shape is None else shape.likeness(modes.right[0, partner]),
+            completeness=told,
         )
 
     def _answer(self, mu: float, run: Trajectory, modes: ComplexModes) -> _Answer:
@@ -270,6 +282,7 @@ def _growth_data(c: Comparison) -> Plain:
         "frequency_error": c.frequency_error,
         "growth_rate_error": c.growth_rate_error,
         "growth_mac": c.growth_mac,
+        "completeness": c.completeness,
     }
 
 
@@ -277,10 +290,11 @@ def _growth_of(mu: float, data: Plain) -> Comparison:
     here, perturbation = complex(*data["modal"]), perturbation_of(mu, data["perturbation"])
     frequency, rate = float(data["frequency_error"]), float(data["growth_rate_error"])
     unstable = tuple(float(f) for f in data["unstable_hz"])
-    agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate)
+    told = str(data["completeness"])
+    agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate, told)
     return Comparison(
         mu, here, unstable, tuple(float(g) for g in data["unstable_growth"]), perturbation, None, None, frequency, rate,
-        None, None, agrees, verdict, float_of(data, "growth_mac"),
+        None, None, agrees, verdict, float_of(data, "growth_mac"), told,
     )  # fmt: skip
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from ..errors import AnalysisError
-from ..modal.complex_modes import complex_modes
-from ..modal.onsets import onsets
+from ..modal.assembled import Options
+from ..modal.growing import modes_of_band, onsets_of_band, refuted
 from ..system import System
 from ..temporal.simulate import Settings
 from .assembled import turns
@@ -83,7 +84,25 @@ def compare_critical(
 ) -> Critical:
     """Both critical friction coefficients, and whether they are one. Raises what the analyses raise."""
     progress("critical friction, modal")
-    modal = _modal(system, friction_range, max_frequency_hz, kept)
+    modal, told = _modal(system, friction_range, max_frequency_hz, kept)
+    found = _in_time(system, modal, friction_range, max_frequency_hz, settings, bracket, tolerance, progress, kept)
+    # A first onset that may not be the first agrees with nothing.
+    agrees = None if found.agrees and refuted(told) else found.agrees
+    return replace(found, agrees=agrees, completeness=told)
+
+
+def _in_time(
+    system: System,
+    modal: float | None,
+    friction_range: tuple[float, float],
+    max_frequency_hz: float,
+    settings: Settings,
+    bracket: tuple[float, float] | None,
+    tolerance: float,
+    progress: Say,
+    kept: Store | None,
+) -> Critical:
+    """The critical friction by bisection in time, held against the modal one."""
     ends = bracket or (None if modal is None else (0.6 * modal, 1.5 * modal))
     if ends is None:
         return Critical(why="no modal onset in range, so no bracket for the temporal critical friction")
@@ -109,23 +128,26 @@ def compare_critical(
     return Critical(modal, temporal, last, abs(modal - temporal) <= max(tolerance, GOOD_CRITICAL * modal))
 
 
-def _modal(system: System, between: tuple[float, float], limit: float, kept: Store | None) -> float | None:
-    """The first onset [1], None where there is none; taken from what is kept if it is there."""
+def _modal(
+    system: System, between: tuple[float, float], limit: float, kept: Store | None
+) -> tuple[float | None, str]:
+    """The first onset, None where there is none, and what speaks for that; taken from what is kept if it is there."""
     known = None if kept is None else kept.get("critical modal", None)
-    if known is not None:
-        return float_of(known, "mu")
-    first = onsets(system, between, max_frequency_hz=limit, friction_damping=turns(system)).first
-    found = None if first is None else first.mu
+    if known is not None and isinstance(known.get("completeness"), str):
+        return float_of(known, "mu"), known["completeness"]
+    found = onsets_of_band(system, between, limit, options=Options(friction_damping=turns(system)))
+    first = None if found.first is None else found.first.mu
     if kept is not None:
-        kept.put("critical modal", None, {"mu": found})
-    return found
+        kept.put("critical modal", None, {"mu": first, "completeness": found.completeness})
+    return first, found.completeness
 
 
 def _without_change(
     system: System, ends: tuple[float, float], limit: float, modal: float | None, error: NoChangeError
 ) -> Critical:
     """Ends of a bracket at which the motion in time does the same: do the modes say so too?"""
-    found = complex_modes(system, list(ends), max_frequency_hz=1.02 * limit, friction_damping=turns(system))
+    options = Options(friction_damping=turns(system))
+    found = modes_of_band(system, list(ends), 1.02 * limit, options=options)
     grow = [bool(np.any(row)) for row in found.unstable & (found.frequency_hz <= limit)]
     if modal is not None and not grow[0] and grow[1]:
         begins = f"by the modes growth begins at {modal:.5f} between them"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import AnalysisError
-from ..modal.complex_modes import complex_modes
+from ..modal.growing import modes_of_band
 from ..sliding import full_motion, slip_speeds
 from ..system import System
 from ..temporal.observe import MOST_INSTANTS
@@ -134,7 +134,7 @@ def perturb(
 
 def _band_limited(system: System, mu: float, slip_speed: float, max_frequency_hz: float) -> tuple[Array, Array, Array]:
     """Displacement, velocity, acceleration (n,) of all modes up to a frequency, equal in slip speed."""
-    modes = complex_modes(system, mu, max_frequency_hz=max_frequency_hz, vectors=True)
+    modes = modes_of_band(system, mu, max_frequency_hz, vectors="right")
     assert modes.right is not None
     tangents = system.contact_rows()[1::2]
     total = np.zeros((3, system.size))

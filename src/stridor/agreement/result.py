@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..modal.growing import refuted
 from ..temporal.signals import Growth
 from .perturbation import Perturbation
 
@@ -24,7 +25,8 @@ class Comparison:
     at its dominant frequency and the mode that responds (None if none does); unstable_hz: all unstable modes in range;
     responding: position in that list of the mode that the full run answers with, None if none. growth_mac: between the
     shape of the fastest component of the small perturbation and that mode, None where it was not taken.
-    agrees: None where the signal in time tells nothing to hold the modes against.
+    agrees: None where the signal in time tells nothing to hold the modes against, and where the modes are not borne out
+    by the search of the full problem; completeness says what that came to.
     """
 
     mu: float
@@ -41,6 +43,7 @@ class Comparison:
     agrees: bool | None
     verdict: str
     growth_mac: float | None = None
+    completeness: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Plain values of one comparison."""
@@ -52,6 +55,7 @@ class Comparison:
                 "growth_rate": modal.real,
                 "unstable_frequencies_hz": list(self.unstable_hz),
                 "unstable_growth_rates": list(self.unstable_growth),
+                "completeness": self.completeness,
             },
             "temporal": {
                 "frequency_hz": temporal.imag / (2 * np.pi),
@@ -109,19 +113,38 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Critical:
-    """Critical friction of both approaches: agrees is None where there is no pair to compare, and why says so."""
+    """Critical friction of both approaches: agrees is None where there is no pair to compare, and why says so.
+    completeness: what speaks for the modal one being the first."""
 
     modal: float | None = None
     temporal: float | None = None
     bracket: tuple[float, float] | None = None
     agrees: bool | None = None
     why: str = ""
+    completeness: str = ""
 
 
 def judge(
+    mu: float,
+    unstable: bool,
+    here: complex,
+    perturbation: Perturbation,
+    frequency: float,
+    rate: float,
+    completeness: str = "",
+) -> tuple[bool | None, str]:
+    """Whether both approaches agree at one μ, None where the signal shows nothing or the modes are not borne out
+    (``completeness``), and the sentence that says it."""
+    agrees, sentence = _judged(mu, unstable, here, perturbation, frequency, rate)
+    if not refuted(completeness):
+        return agrees, sentence
+    return (None if agrees else agrees), f"{sentence}; but which modes there are is not certain"
+
+
+def _judged(
     mu: float, unstable: bool, here: complex, perturbation: Perturbation, frequency: float, rate: float
 ) -> tuple[bool | None, str]:
-    """Whether both approaches agree at one μ, None where the signal shows nothing, and the sentence that says it."""
+    """The same for modes that are certain."""
     said = "unstable" if unstable else "stable"
     if perturbation.eigenvalue == 0 or not np.isfinite(perturbation.eigenvalue):
         return None, f"μ = {mu:g}: modal says {said}, but the signal in time shows no vibration to compare with"

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from ..threads import one_thread_if_small
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .assembled.problem import problem_of
 from .assembled.steady import Options
-from .complex_modes import ComplexModes, complex_modes, undamped
+from .complex_modes import ComplexModes, Progress, complex_modes, undamped
 from .general.basis import AT_REST, GROWS, NOTHING
 from .general.family import quadratic_of
 from .onsets import Onsets, onsets
@@ -33,6 +34,8 @@ ROWS = 5  # friction coefficients up to which every one is checked, of more the 
 BESIDE = 1e-3  # of the band: how much faster than that modes may decay that are looked at
 NEAR = 1e-3  # of the band: eigenvalues further apart are not the same mode
 SAME = 1e-6  # of |λ|: what two ways of solving leave of one eigenvalue
+UNCHECKED = "Not checked"
+REFUTED = ("NOT COMPLETE", "NOT CONFIRMED", "INCOMPLETE", "Not complete")
 WIDER = (1.4, 2.0)  # times the band: from where branches are followed that are missing in it
 
 
@@ -129,6 +132,56 @@ def unconfirmed(found: Growing, listed: ComplexArray, unstable: BoolArray, top: 
     return len(mine) - len(ours)
 
 
+def modes_of_band(
+    system: System,
+    mu: float | Sequence[float] | Array,
+    max_frequency_hz: float,
+    *,
+    damped: bool = True,
+    vectors: bool | Literal["right"] = False,
+    own: float | None = None,
+    options: Options | None = None,
+    progress: Progress | None = None,
+) -> ComplexModes:
+    """Every mode of a band at the friction coefficients ``mu``, as `complex_modes` follows them and `checked_modes`
+    completes them. Whatever says something about which modes grow takes this list. Raises as `complex_modes` does."""
+    options = options or Options()
+    found = complex_modes(
+        system, mu, max_frequency_hz=max_frequency_hz, damped=damped, vectors=vectors,
+        friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
+        progress=progress,
+    )  # fmt: skip
+    # Matrices without structure are solved in full as it is, and say what speaks for that.
+    return found if found.completeness else checked_modes(system, found, max_frequency_hz, own=own, options=options)
+
+
+def onsets_of_band(
+    system: System,
+    friction_range: tuple[float, float],
+    max_frequency_hz: float,
+    *,
+    damped: bool = True,
+    options: Options | None = None,
+) -> Onsets:
+    """Every onset in a range of μ, as `onsets` solves them and `checked_onsets` completes them. Raises as `onsets`."""
+    options = options or Options()
+    found = onsets(
+        system, friction_range, max_frequency_hz=max_frequency_hz, damped=damped,
+        friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
+    )  # fmt: skip
+    return found if found.completeness else checked_onsets(system, found, damped=damped, options=options)
+
+
+def doubt(completeness: str) -> str:
+    """What is said of a list of modes or onsets where it is not known to hold everything; empty where it is."""
+    return completeness if UNCHECKED in completeness or refuted(completeness) else ""
+
+
+def refuted(completeness: str) -> bool:
+    """Whether the search in the full problem has not borne out a list, or was not complete itself."""
+    return any(word in completeness for word in REFUTED)
+
+
 def checked_modes(
     system: System,
     modes: ComplexModes,
@@ -145,7 +198,7 @@ def checked_modes(
     """
     options = options or Options()
     if not affordable(system):
-        said = f"Not checked: {_too_large(system)}."
+        said = f"{UNCHECKED}: {_too_large(system)}."
         return replace(modes, completeness=(said,) * len(modes.mu))
     chosen = _rows(modes.mu, own)
     touching = float(modes.mu.max()) if len(modes.mu) == 1 else None
@@ -182,7 +235,7 @@ def checked_onsets(
     """
     options = options or Options()
     if not affordable(system):
-        return replace(found, completeness=f"Not checked: {_too_large(system)}.")
+        return replace(found, completeness=f"{UNCHECKED}: {_too_large(system)}.")
     top = 2 * np.pi * found.max_frequency_hz
     try:
         ends = [
@@ -190,7 +243,7 @@ def checked_onsets(
             for mu in found.friction_range
         ]
     except AnalysisError as error:
-        return replace(found, completeness=f"Not checked: {error}.")
+        return replace(found, completeness=f"{UNCHECKED}: {error}.")
     for wider in follow:
         if not len(_not_in(ends[1], found.at_end, top)) and not found.unexplained:
             break
@@ -327,9 +380,9 @@ def _sentence(
 ) -> str:
     """What was checked at one μ. began: branches that were followed because they start in the band or just above."""
     if found is None:
-        return "Not checked at this μ: what branches followed from μ = 0 give."
+        return f"{UNCHECKED} at this μ: what branches followed from μ = 0 give."
     if isinstance(found, str):
-        return f"Not checked: {found}."
+        return f"{UNCHECKED}: {found}."
     top = 2 * np.pi * max_frequency_hz
     unstable = modes.unstable[row] & modes.in_band[row]
     wrong = unconfirmed(found, modes.eigenvalues[row], unstable, top)

@@ -131,15 +131,16 @@ def _followed_modes(
 ) -> ComplexModes:
     """Modes followed from μ = 0, and checked."""
     from ..modal.assembled import Options
-    from ..modal.growing import checked_modes
+    from ..modal.growing import modes_of_band
 
     settings = _modal_options(case)
-    result = complex_modes(
-        system, values, max_frequency_hz=band, damped=damped, vectors=vectors, progress=progress, **settings
+    if not check:
+        return complex_modes(
+            system, values, max_frequency_hz=band, damped=damped, vectors=vectors, progress=progress, **settings
+        )
+    return modes_of_band(
+        system, values, band, damped=damped, vectors=vectors, own=own, options=Options(**settings), progress=progress
     )
-    if not check or result.completeness:
-        return result
-    return checked_modes(system, result, band, own=own, options=Options(**settings))
 
 
 def _varies_with_friction(case: Case) -> bool:
@@ -267,12 +268,13 @@ def onsets(
         )
     else:
         from ..modal.assembled import Options
-        from ..modal.growing import checked_onsets
+        from ..modal.growing import onsets_of_band
 
         settings = _modal_options(case)
-        result = solve_onsets(system, between, max_frequency_hz=limit, damped=damped, **settings)
-        if check and not result.completeness:
-            result = checked_onsets(system, result, damped=damped, options=Options(**settings))
+        if check:
+            result = onsets_of_band(system, between, limit, damped=damped, options=Options(**settings))
+        else:
+            result = solve_onsets(system, between, max_frequency_hz=limit, damped=damped, **settings)
     notes = (*result.notes, *(() if system is None else taken_as_closed(system)))
     if check and system is not None:
         notes = (*notes, *held_elsewhere(system, np.linspace(*result.friction_range, LOOKS), _solver(case)))

@@ -60,7 +60,7 @@ def rank_countermeasures(
     linear = Linearised.of(case, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
     unstable = linear.columns("unstable")
     if not unstable:
-        told = (f"no mode is unstable at μ = {linear.mu:g}: there is nothing to remove",)
+        told = (*linear.warnings, f"no mode is unstable at μ = {linear.mu:g}: there is nothing to remove")
         empty = np.zeros(0)
         return Countermeasures(linear.mu, target, empty.astype(np.int64), empty + 0j, (), margin, told)
     if target != "sum" and target not in linear.modes.branch[unstable]:

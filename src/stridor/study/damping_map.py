@@ -31,6 +31,9 @@ LARGE = 1000  # freedoms from which a reduced model pays
 MANY = 6  # points of the map, too
 
 Method = Literal["auto", "full", "reduced"]
+FOLLOWED = (
+    "onsets are those of modes followed from mu = 0, not sought anew at each point; `stridor onsets` does that for one"
+)
 
 
 @dataclass(frozen=True)
@@ -217,7 +220,7 @@ def _search(
         if not system.assembled or system.size < LARGE or len(xs) * len(ys) < MANY:
             method = "full"
     if method == "full":
-        return full, ()
+        return full, (FOLLOWED,)
     ends = (float(xs[0]), float(xs[-1])), (float(ys[0]), float(ys[-1]))
     try:
         search = ReducedSearch.of(full, ends, bound)
@@ -225,7 +228,7 @@ def _search(
     except (CaseError, AnalysisError) as error:
         if method == "reduced":
             raise
-        return full, (f"every point is searched in the full problem, there is no reduced model: {error}",)
+        return full, (f"every point is searched in the full problem, there is no reduced model: {error}", FOLLOWED)
 
 
 class _Table:

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..contact.surfaces import SurfaceContact
-from ..modal.assembled import complex_modes_assembled
+from ..modal.assembled import NotPositive, complex_modes_assembled
+from ..modal.complex_modes import ComplexModes
+from ..modal.growing import checked_modes, doubt, modes_of_band
 from ..system import System
 from ..typing import ComplexArray
 from .contact_edges import edge_rows
@@ -19,15 +21,11 @@ from .sensitivities import Linearised, number_at
 def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequency_hz: float | None) -> Measure:
     """The measure with its modes solved again, steady sliding too."""
     linear = ranking.linear
-    # The sparse path for small systems too: a mass at one node leaves their complete basis no proportional damping.
-    modes = complex_modes_assembled(
-        _changed(linear, measure),
-        linear.mu,
-        count=linear.case.modal.modes if count is None else count,
-        max_frequency_hz=max_frequency_hz,
-        damped=linear.modes.damped,
-        options=linear.options,
-    )
+    band = max_frequency_hz or linear.case.modal.max_frequency_hz
+    modes = _solved(_changed(linear, measure), linear, band)
+    if max_frequency_hz is None:
+        modes = modes.lowest(linear.case.modal.modes if count is None else count)
+    modes = modes.chosen(np.flatnonzero(modes.in_band[0]))
     actual: ComplexArray = modes.eigenvalues[0]
     unstable = modes.unstable[0]
     aimed = np.flatnonzero(ranking.aimed)
@@ -43,8 +41,20 @@ def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequenc
         removed=growth(ranking.eigenvalues[ranking.aimed]) - after,
         removed_sum=growth(ranking.eigenvalues) - growth(actual),
         unstable_hz=tuple(float(v) for v in np.sort(actual[unstable].imag) / (2 * np.pi)),
+        doubt=doubt(modes.completeness[0]),
     )
     return replace(measure, verified=result)
+
+
+def _solved(system: System, linear: Linearised, band: float) -> ComplexModes:
+    """The modes of the band of a changed system, and what was checked of them."""
+    damped, options = linear.modes.damped, linear.options
+    try:
+        # The sparse path for small systems too: a mass at one node leaves their complete basis no proportional damping.
+        found = complex_modes_assembled(system, linear.mu, max_frequency_hz=band, damped=damped, options=options)
+    except NotPositive:
+        return modes_of_band(system, linear.mu, band, damped=damped, options=options)
+    return checked_modes(system, found, band, options=options)
 
 
 def _changed(linear: Linearised, measure: Measure) -> System:
@@ -80,7 +90,8 @@ def _chamfered(linear: Linearised, measure: Measure) -> System:
     surfaces: list[SurfaceContact] = []
     for surface in system.surfaces:
         stop = start + surface.nodes.count
-        # The modal approach reads a surface's nodes alone; what it was paired from stays.
-        surfaces.append(replace(surface, nodes=surface.nodes.select(~gone[start:stop])))
+        # The modal approach reads nodes alone: what they were paired from stays, and facets number nodes that are gone.
+        kept = surface.nodes.select(~gone[start:stop])
+        surfaces.append(replace(surface, nodes=kept, facets=None))
         start = stop
     return replace(system, surfaces=tuple(surfaces))

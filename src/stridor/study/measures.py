@@ -17,14 +17,15 @@ Target = int | Literal["sum"]
 @dataclass(frozen=True)
 class Verified:
     """The modes solved again with the change made: growth_rate and frequency_hz of the target mode (of the fastest
-    growing one where the target is the sum), removed [1/s] from the target, how many modes are unstable, their
-    frequencies."""
+    growing one where the target is the sum), removed [1/s] from the target, the frequencies of what
+    is unstable then. doubt: why that may not be all, empty where the full problem was searched."""
 
     growth_rate: float
     frequency_hz: float
     removed: float
     removed_sum: float
     unstable_hz: tuple[float, ...]
+    doubt: str = ""
 
 
 @dataclass(frozen=True)

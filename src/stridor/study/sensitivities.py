@@ -13,11 +13,13 @@ from ..case import Case
 from ..case.overrides import split_path
 from ..errors import AnalysisError, CaseError
 from ..modal.assembled import Options
-from ..modal.complex_modes import ComplexModes, complex_modes, undamped
+from ..modal.complex_modes import ComplexModes, undamped
 from ..modal.derivatives import Mode, Terms, by_compliance, by_friction, hold, rate_of, solve_mode, terms_of
+from ..modal.growing import doubt, modes_of_band
 from ..system import System, build_system
 from ..typing import Array, ComplexArray, IntArray
 from .analyses import own_friction
+from .asked import require_frequency
 from .provenance import provenance
 
 NEAR = 0.05  # relative change of a number within which an exceptional point is told of
@@ -212,7 +214,7 @@ def sensitivities(
         provenance=provenance(case, "sensitivities", time.perf_counter() - started, mu=linear.mu),
     )
     told = list(linear.warnings)
-    if not columns and modes == "unstable" and not told:
+    if not columns and modes == "unstable" and not linear.columns(modes):
         told.append(f"no mode is unstable at μ = {linear.mu:g}: name branches to see what stable ones do")
     return replace(result, warnings=(*told, *_divergence(result)))
 
@@ -266,7 +268,8 @@ class Linearised:
         self.eigenvalues: ComplexArray = modes.eigenvalues[0]
         self.held = hold(system, mu, options)
         self.terms = terms_of(system, mu, self.held, options)
-        self.warnings: list[str] = []
+        doubtful = doubt(modes.completeness[0]) if modes.completeness else ""
+        self.warnings: list[str] = [f"modes at μ = {mu:g}: {doubtful}"] if doubtful else []
         self._solved: dict[int, Mode | None] = {}
 
     @staticmethod
@@ -286,16 +289,11 @@ class Linearised:
         options = options_of(case)
         damped = settings.damped if damped is None else damped
         system = build_system(case)
-        modes = complex_modes(
-            system,
-            value,
-            count=settings.modes if count is None else count,
-            max_frequency_hz=max_frequency_hz,
-            damped=damped,
-            friction_damping=options.friction_damping,
-            prestress=options.prestress,
-            solver=options.solver,
-        )
+        require_frequency(max_frequency_hz)
+        band = max_frequency_hz or settings.max_frequency_hz
+        modes = modes_of_band(system, value, band, damped=damped, options=options)
+        if max_frequency_hz is None:
+            modes = modes.lowest(settings.modes if count is None else count)
         return Linearised(case, system if damped else undamped(system), value, modes, options)
 
     def value(self, path: str) -> float:
@@ -335,7 +333,7 @@ class Linearised:
     def columns(self, choice: Choice) -> list[int]:
         """Columns of the modes chosen. Raises CaseError for numbers that no branch has."""
         if choice == "unstable":
-            return [int(b) for b in np.flatnonzero(self.modes.unstable[0])]
+            return [int(b) for b in np.flatnonzero(self.modes.unstable[0] & self.modes.in_band[0])]
         if choice == "all":
             return list(range(len(self.eigenvalues)))
         where = {int(number): column for column, number in enumerate(self.modes.branch)}

@@ -99,4 +99,6 @@ def _consequences(measure: Measure) -> str:
     elif measure.verified is not None:
         where = ", ".join(f"{f:.0f}" for f in measure.verified.unstable_hz)
         parts.append(f"solved again: grows at {where} Hz")
+    if measure.verified is not None and measure.verified.doubt:
+        parts.append(measure.verified.doubt)
     return "; ".join(parts)
