@@ -190,7 +190,8 @@ def alone(bench: Path) -> np.ndarray:
 def test_a_bench_with_contact_has_the_modes_of_the_default_solver(bench: Path, alone, words: str, processes: int | None):
     done = stridor("modes", *words.split(), "--mu", "0.4", "--json", cwd=bench.parent, processes=processes)
     assert_same(eigenvalues(done), alone, 1e-10)
-    written, solves = ours(done.stderr)  # nothing is said twice
+    coarse, written, solves = ours(done.stderr)  # nothing is said twice
+    assert coarse.startswith("warning: bodies.block: 0.02 m in extent")
     assert written == f"written: {words.partition('.')[0]}.out/modes.nc"
     assert int(solves.removeprefix("solves of slepc: ")) > 5
 
@@ -330,8 +331,9 @@ def test_an_error_of_the_case_is_said_once_and_ends_all(bench: Path):
     ):
         done = stridor("modes", *words, "--solver", "slepc", cwd=bench.parent)
         assert done.returncode in (1, 2)
-        (line,) = ours(done.stderr)
+        *warned, line = ours(done.stderr)
         assert line.startswith(said)
+        assert len(warned) == words[0].startswith("bench")  # of the mesh
         assert done.stdout == ""
 
 

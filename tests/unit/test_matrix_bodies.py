@@ -280,7 +280,7 @@ def test_a_gyroscopic_rotor_whirls_as_in_closed_form(rotor: Path, speed: float):
     found = st.modes(case)
     assert found.frequency_hz[0] == pytest.approx(np.array([300.0 - speed, 300.0 + speed]) / (2 * np.pi), rel=1e-12)
     assert np.abs(found.growth_rate).max() < 1e-9
-    assert bool(found.completeness) == (speed > 0)
+    assert "Complete" in found.completeness[0]
     if speed:
         # Gyroscopic forces are no damping.
         assert st.modes(case, damped=False).eigenvalues == pytest.approx(found.eigenvalues, rel=1e-12)
@@ -462,7 +462,13 @@ def export_in_space(folder: Path, name: str, body: BuiltBody) -> dict[str, objec
     }
 
 
-@pytest.mark.parametrize("names", [("slider",), ("plate",), ("slider", "block"), ("slider", "block", "plate")])
+@pytest.mark.parametrize(
+    "names",
+    [
+        *(pytest.param(n, marks=pytest.mark.slow) for n in (("slider",), ("plate",), ("slider", "block"))),
+        ("slider", "block", "plate"),
+    ],
+)
 def test_masters_slaves_and_bonded_bodies_in_space(tmp_path: Path, names: tuple[str, ...]):
     meshed = st.loads(SPACE)
     bodies = build_bodies(meshed)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 from dataclasses import replace
@@ -102,7 +101,7 @@ def traced(at: int, act, call):
 
 
 def press_ctrl_c() -> None:
-    os.kill(os.getpid(), signal.SIGINT)
+    signal.raise_signal(signal.SIGINT)  # into this very thread: a signal to the process may come late, by another one
 
 
 def press_twice() -> None:

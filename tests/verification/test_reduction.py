@@ -253,6 +253,7 @@ def test_an_onset_just_beside_where_two_modes_meet_is_found():
     assert [o.value for o in found] == pytest.approx([o.mu for o in direct.onsets], rel=1e-8)
 
 
+@pytest.mark.slow
 def test_onsets_along_a_number_that_changes_the_mass():
     whole = rotor()
     mass, *others = whole.terms

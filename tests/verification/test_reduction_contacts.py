@@ -144,7 +144,7 @@ def test_a_body_between_two_others():
     assert_same_onsets(case, model, 25e3)
 
 
-@pytest.mark.parametrize("stiffness", [1e12, "rigid"])
+@pytest.mark.parametrize("stiffness", [pytest.param(1e12, marks=pytest.mark.slow), "rigid"])
 def test_falling_friction_over_a_surface(stiffness):
     case = block(stiffness, FALLING)
     box = {"mu": (0.0, 0.4)} | ({} if stiffness == "rigid" else {"contact_stiffness": (0.5, 2.0)})
@@ -198,6 +198,7 @@ def test_prestress_friction_stiffness_and_a_modulus_at_once():
     assert abs(extra.stiffness).max() > 1e-6 * abs(held.stiffness).max()
 
 
+@pytest.mark.slow
 def test_friction_damping_in_space():
     case = block(1e12, FALLING, {"modal.friction_damping": True}, space=True)
     case = case.with_({"modal.prestress": True, "loads.press.force": [0.0, 0.0, -2e4]})

@@ -133,8 +133,9 @@ def test_two_beams(stiffness, damped):
 SOLIDS = ["mu", "materials.steel.density", "materials.steel.poisson_ratio"]
 
 
-@pytest.mark.parametrize("stiffness", [1e13, "rigid"])
-@pytest.mark.parametrize("damped", [True, False])
+@pytest.mark.parametrize(
+    ("stiffness", "damped"), [pytest.param("rigid", True, marks=pytest.mark.slow), (1e13, True), ("rigid", False)]
+)
 def test_solids(stiffness, damped):
     model = case(slider(space=False, stiffness=stiffness)).with_(
         {
