@@ -10,18 +10,14 @@ import time
 import numpy as np
 
 import stridor as st
-from _common import machine, options
+from _common import COARSE, machine, options
 from stridor.case import Case, template_text
 from stridor.study.damping_full import FullSearch
 
 X, Y = "bodies.disc.damping.stiffness", "bodies.lining.damping.stiffness"
 ENDS = (1e-8, 8e-8)
 SIZES = {
-    "coarse": {
-        "bodies.disc.mesh.divisions": [6, 48, 2],
-        "bodies.lining.mesh.divisions": [6, 12, 2],
-        "bodies.plate.mesh.divisions": [5, 10, 1],
-    },
+    "coarse": COARSE,
     "middle": {
         "bodies.disc.mesh.divisions": [6, 60, 2],
         "bodies.lining.mesh.divisions": [6, 14, 2],
@@ -57,6 +53,8 @@ def measure(case: Case, points: int, searched: int) -> None:
             f"  searched in the full problem   {time.perf_counter() - started:8.1f} s: μ = {exact.mu:.9f}, "
             f"{found.onset_mu[i, j] - exact.mu:+.1e} in the map; slopes off by {away:.1e} of the larger"
         )
+    if not searched:
+        return
     started = time.perf_counter()
     bare = full.undamped()
     assert bare is not None

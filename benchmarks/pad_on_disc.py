@@ -10,16 +10,11 @@ import time
 import numpy as np
 
 import stridor as st
-from _common import machine, options
+from _common import COARSE, machine, options
 from stridor.agreement.assembled import modes_as_in_time, perturb_assembled
 from stridor.case import template_text
 from stridor.study.settings import settings_of
 
-COARSE = {
-    "bodies.disc.mesh.divisions": [6, 48, 2],
-    "bodies.lining.mesh.divisions": [6, 12, 2],
-    "bodies.plate.mesh.divisions": [5, 10, 1],
-}
 MU = 0.5
 
 

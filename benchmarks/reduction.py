@@ -21,7 +21,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as ssl
 
 import stridor as st
-from _common import machine, options
+from _common import COARSE, machine, options
 from stridor.case import template_text
 from stridor.direct import factorise
 from stridor.modal.parametric import (
@@ -36,11 +36,6 @@ from stridor.modal.parametric import (
 from stridor.modal.quadratic import Region, find_modes
 
 PAIRS = 5
-COARSE = {
-    "bodies.disc.mesh.divisions": [6, 48, 2],
-    "bodies.lining.mesh.divisions": [6, 12, 2],
-    "bodies.plate.mesh.divisions": [5, 10, 1],
-}
 MIDDLE = {
     "bodies.disc.mesh.divisions": [6, 60, 2],
     "bodies.lining.mesh.divisions": [6, 14, 2],

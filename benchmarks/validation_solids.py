@@ -132,7 +132,7 @@ def pair(onset: Onset) -> str:
     return f"{onset.mu:.4f}, {onset.frequency_hz:.0f} Hz"
 
 
-def refinement(*, fine: bool) -> None:
+def refinement() -> None:
     """The bench on meshes finer and finer."""
     heads = ("elements across pin and beam, along them", "freedoms", "squeal, damped", "… undamped")
     print(f"\n| {' | '.join(heads)} | traction mode, undamped | 3.6 kHz, undamped |")
@@ -146,7 +146,7 @@ def refinement(*, fine: bool) -> None:
         ("quad", (8, 16), (240, 720)),
         ("quad", (8, 16), (480, 1440)),
     ]
-    for cells, across, along in meshes if fine else meshes[:2]:
+    for cells, across, along in meshes:
         system = bench.solids(cells, across, along)
         compared(f"{cells}, {across[0]} and {across[1]}, {along[0]} and {along[1]}", system)
     compared("beams", bench.beams())
@@ -158,9 +158,9 @@ def compared(name: str, system: System) -> None:
     print(f"| {name} | {system.size} | {pair(damped)} | {numbers(system, damped=False)}")
 
 
-def causes(*, fine: bool) -> None:
+def causes() -> None:
     """What is put into the beams and taken out of the solids."""
-    solids = bench.solids("quad8", (4, 8), (120, 360)) if fine else bench.solids()
+    solids = bench.solids("quad8", (4, 8), (120, 360))
     beams, soft = bench.beams(), bench.indentation(solids)
     swapped = bench.with_frequencies_of(beams, solids)
     print(f"\nIndentation: {soft:.3e} m/N on {solids.size} freedoms.")
@@ -191,8 +191,9 @@ def main() -> None:
         contact(Path(folder), fine=fine)
     impacts()
     evenness()
-    refinement(fine=fine)
-    causes(fine=fine)
+    if fine:
+        refinement()
+        causes()
 
 
 if __name__ == "__main__":
