@@ -136,10 +136,10 @@ def main() -> None:
     parser.add_argument("--short", action="store_true", help="a small model, for CI")
     parser.add_argument("--along", type=int, default=27, help="cells along the pad")
     chosen = parser.parse_args()
-    system = pad_on_block(5 if chosen.short else chosen.along)
-    count, frictions = (12, 9) if chosen.short else (50, 41)
+    system = pad_on_block(8 if chosen.short else chosen.along)
+    count, frictions = (10, 5) if chosen.short else (50, 41)
     print(f"{system.size} freedoms, {system.contact_nodes().count} contact nodes")
-    for damped in (False, True):
+    for damped in (True,) if chosen.short else (False, True):
         start = time.perf_counter()
         modes = complex_modes_assembled(system, np.linspace(0.0, 1.0, frictions), count=count, damped=damped)
         spent = time.perf_counter() - start
@@ -158,7 +158,7 @@ def main() -> None:
         spent = time.perf_counter() - start
         row = modes.at(0.5)
         far = np.abs(single.eigenvalues[:, None] - modes.eigenvalues[row]).min(axis=1) / np.abs(single.eigenvalues)
-        inside = single.eigenvalues.imag < 0.95 * 2 * np.pi * top
+        inside = (single.eigenvalues.imag > 0) & (single.eigenvalues.imag < 0.95 * 2 * np.pi * top)
         print(f"  one solve at μ = 0.5 for 20 modes: {spent:.1f} s, eigenvalues differ by {far[inside].max():.1e}")
 
 
