@@ -23,7 +23,8 @@ from ..system import System, build_system
 from ..temporal.attractor import settled
 from ..temporal.beta2 import step_limit
 from ..temporal.energy import EnergyBalance, energy_balance
-from ..temporal.settings import SAFE_FRACTION, Settings
+from ..temporal.inputs import unfit_in_time
+from ..temporal.settings import Settings
 from ..temporal.signals import Growth, components
 from ..temporal.simulate import Checkpoint, Progress
 from ..temporal.simulate import simulate as march
@@ -158,7 +159,8 @@ def _system_at(case: Case, system: System | None) -> Callable[[float], System]:
 
 
 def structured(case: Case, what: str, mu: float | None = None) -> System:
-    """The system of a case whose matrices are as ``what`` needs them. Raises AnalysisError for others."""
+    """The system of a case whose matrices are as ``what`` needs them: constant, with a mass that the time loop takes.
+    Raises AnalysisError for others."""
     works = "what works for these is `stridor modes`, `stridor onsets` and `stridor steady`"
     if _varies_with_friction(case):
         # Nothing gives μ: at 0 the matrices may be symmetric where they are not at any other.
@@ -167,15 +169,12 @@ def structured(case: Case, what: str, mu: float | None = None) -> System:
         if what in ("compare", "run") or beyond:
             why = f", and beyond mu = 0 {beyond}" if beyond else ""
             raise AnalysisError(
-                f"{what}: factors of imported matrices depend on mu{why}; the time loop takes constant, symmetric "
-                f"matrices only; {works}"
+                f"{what}: factors of imported matrices depend on mu{why}; the time loop takes constant matrices only; "
+                f"{works}"
             )
     system = build_system(case, mu)
-    if system.general:
-        raise AnalysisError(
-            f"{what} needs symmetric matrices and a positive definite mass, and {system.general}; {works} (for other "
-            "parameters --set parameters.NAME.value=… or `stridor reduce --onsets NAME`)"
-        )
+    if system.general and (why := unfit_in_time(system)):
+        raise AnalysisError(f"{what}: {why}; {works}")
     return system
 
 
@@ -370,7 +369,8 @@ def _check_extent(case: Case, system: System) -> None:
         for c in system.contacts
         if c.gap < -1e-9 and case.temporal.initial == "rest" and not system.assembled
     ]
-    step = case.temporal.step or SAFE_FRACTION * step_limit(system, case.temporal.beta2).step
+    limit = step_limit(system, case.temporal.beta2)
+    step = case.temporal.step or limit.share * limit.step
     steps = sum(p.duration for p in case.phases) / step
     size = 8.0 * (6 * len(system.contacts) + 6 * len(system.surfaces) + 6 * len(case.temporal.watch) + 8)
     needed = steps / case.temporal.record_every * size

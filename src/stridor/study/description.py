@@ -10,6 +10,7 @@ import numpy as np
 
 from ..case import Case
 from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBody
+from ..case.matrix_checks import MU
 from ..case.schema import Friction, Load, Spring, TabulatedTable, Tie
 from ..case.usual import USUAL
 from ..errors import AnalysisError
@@ -19,6 +20,7 @@ from ..sliding import steady_sliding
 from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
 from ..temporal.beta2 import step_limit
+from ..temporal.inputs import unfit_in_time
 from .matrix_reports import matrix_reports
 from .pressed import unpressed
 from .settings import settings_of
@@ -98,8 +100,8 @@ def describe(case: Case) -> Description:
                 "touches": bool(steady.active[k]),
                 "gap": contact.gap,
             }
-    if system.general:
-        lines.append(f"{system.general}: `stridor modes` and `stridor onsets` take any matrices, time loops do not")
+    if system.general and (why := _untimed(case, system)):
+        lines.append(f"{system.general}: `stridor modes` and `stridor onsets` take that, time loops do not: {why}")
     else:
         lines += _time_lines(case, system, data)
     warnings = [*case.warnings, *unit_warnings(case), *mesh_warnings(case, system), *imported_warnings(case, system)]
@@ -116,12 +118,19 @@ def describe(case: Case) -> Description:
         if least > 1e-9 * max(1.0, float(np.ptp(surface.slave_position, axis=0).max())):
             lines.append(f"contact {surface.name} is open by {least:.3g} m or more at the start")
     warnings += _sudden(case)
-    if not system.general and (why := unpressed(case, system)):
+    if (why := unpressed(case, system)):
         warnings.append(
             f"nothing presses the bodies together ({why}): simulate and compare refuse that, modes at most take the "
             "contacts as closed"
         )
     return Description(tuple(lines), data, tuple(warnings))
+
+
+def _untimed(case: Case, system: System) -> str:
+    """Why matrices that are not symmetric cannot be marched in time, "" where they can."""
+    if MU in case.factor_names and MU not in case.parameters and not case.contacts:
+        return "factors of imported matrices depend on mu"
+    return unfit_in_time(system)
 
 
 def _sudden(case: Case) -> list[str]:

@@ -88,7 +88,7 @@ def _of_modes(case: Case, system: System, verb: str, solver: str | None) -> Iter
 
 
 def _of_time(case: Case, system: System, verb: str) -> Iterator[str]:
-    if verb not in IN_TIME or system.general:
+    if verb not in IN_TIME:
         return
     if system.assembled and case.temporal.path != "auto":
         yield f"temporal.path = {case.temporal.path!r} has no effect: assembled matrices have one path"

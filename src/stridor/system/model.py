@@ -159,8 +159,10 @@ class System:
     @property
     def assembled(self) -> bool:
         """Whether it is computed with on the assembled sparse matrices: contact over surfaces, forces beyond the
-        linear, contacts that may stick, or too many freedoms for the complete basis that point contacts use."""
+        linear, contacts that may stick, unsymmetric matrices, or too many freedoms for the complete basis that point
+        contacts use."""
         beyond = self.cubic is not None or bool(self.contact_cubic)
+        beyond = beyond or bool(self.general)
         return bool(self.surfaces or self.load_steps) or beyond or self.size > COMPLETE_BASIS_LIMIT
 
     def in_place(self, factors: Array | None = None) -> System:

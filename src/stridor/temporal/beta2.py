@@ -21,6 +21,8 @@ import scipy.linalg as sl
 from ..errors import AnalysisError
 from ..system import System
 
+SAFE_FRACTION = 0.9  # of the limit, where no step is given
+
 
 class Scheme(NamedTuple):
     """Scalars of the scheme: step Δt [s], beta2, s = 1 + 2 β2, memory κ of q, gain 2/(sΔt) of d in q."""
@@ -40,11 +42,13 @@ def scheme(step: float, beta2: float) -> Scheme:
 
 @dataclass(frozen=True)
 class StepLimit:
-    """Largest stable step [s], the circular frequency that sets it [rad/s] and the body it lives in."""
+    """Largest stable step [s], the circular frequency that sets it [rad/s], the body it lives in, and the share of the
+    limit that is taken where no step is given."""
 
     step: float
     omega_max: float
     body: str
+    share: float = SAFE_FRACTION
 
 
 def step_limit(system: System, beta2: float) -> StepLimit:

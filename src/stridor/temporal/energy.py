@@ -13,6 +13,7 @@ from .trajectory import Trajectory
 # With β2 = 1/2 the accounts are an identity of the scheme, so that all that is missing is rounding: 1e-16 of the
 # turnover per step at worst, 1e-7 after the 1e9 steps of the longest runs. What is more than this has been lost.
 CLOSED = 1e-6
+SKEW = ("circulatory", "gyroscopic")  # works put in by unsymmetric matrices, where there are any
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,8 @@ class EnergyBalance:
     """Energies [J] at the last record, and the worst imbalance of all records.
 
     stored = kinetic + elastic; put in by external loads, moving supports and the initial state; taken out
-    by damping, friction and impacts at the contacts. error: largest |put in − stored − taken out| over
+    by damping, friction and impacts at the contacts. circulatory and gyroscopic: put in by the skew parts of imported
+    matrices, None where there are none; of the latter only rounding. error: largest |put in − stored − taken out| over
     the largest amount of energy that changed hands; for β2 = 1/2 the scheme itself conserves, for larger
     β2 the error is the numerical damping.
     """
@@ -35,6 +37,8 @@ class EnergyBalance:
     initial: float
     error: float
     history: Array
+    circulatory: float | None = None
+    gyroscopic: float | None = None
 
     @property
     def closes(self) -> bool:
@@ -60,7 +64,8 @@ class EnergyBalance:
 
     def to_json(self) -> dict[str, Any]:
         """Plain values [J] and the relative error."""
-        names = ("kinetic", "elastic", "external", "support", "damping", "friction", "contact", "initial")
+        names = ["kinetic", "elastic", "external", "support", "damping", "friction", "contact", "initial"]
+        names += [name for name in SKEW if getattr(self, name) is not None]
         return {name: float(getattr(self, name)) for name in names} | {
             "error": self.error,
             "closes": self.closes,
@@ -73,6 +78,9 @@ def energy_balance(trajectory: Trajectory) -> EnergyBalance:
     stored = trajectory.kinetic + trajectory.elastic
     works = trajectory.works
     put_in = works["external"] + works["support"]
+    for name in SKEW:
+        if name in works:
+            put_in = put_in + works[name]
     lost = works["damping"] + works["friction"] + works["contact"]
     initial = float(stored[0] - put_in[0] + lost[0]) if len(stored) else 0.0
     gap = initial + put_in - stored - lost
@@ -95,4 +103,6 @@ def energy_balance(trajectory: Trajectory) -> EnergyBalance:
         initial=initial,
         error=float(np.abs(gap).max(initial=0.0) / turnover) if np.isfinite(turnover) else float("nan"),
         history=gap,
+        circulatory=last.get("circulatory"),
+        gyroscopic=last.get("gyroscopic"),
     )

@@ -5,9 +5,50 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+import scipy.sparse as sp
+
 from ..errors import CaseError, Problem
 from ..system import System
+from ..system.imported import is_symmetric
 from .schedule import PhaseSpec
+
+DIAGONAL = 1e-14  # of the largest mass: what beside the diagonal is rounding
+
+
+def unfit_in_time(system: System) -> str:
+    """Why the time loop does not take unsymmetric matrices, "" where it does."""
+    mass = sp.csr_array(system.mass)
+    diagonal = mass.diagonal()
+    without = int(np.count_nonzero(diagonal <= 0.0))
+    off = sp.csr_array(mass - sp.diags_array(diagonal))
+    if off.nnz and float(np.abs(off.data).max()) > DIAGONAL * float(np.abs(diagonal).max()):
+        if not is_symmetric(mass):
+            return "the mass matrix is not symmetric, and the time loop needs a diagonal one"
+        return (
+            "the mass matrix is not diagonal, and beside unsymmetric matrices the time loop needs that; import a "
+            "lumped mass matrix"
+        )
+    if without:
+        words = f"{without} freedoms have" if without > 1 else "1 freedom has"
+        return f"{words} no mass, and the time loop needs one at each"
+    carried = _carried(system)
+    if carried:
+        return (
+            f"support {carried} moves matrices that are not symmetric, and the time loop takes such supports only "
+            "under symmetric ones; let the material slide through its mesh instead (sliding)"
+        )
+    return ""
+
+
+def _carried(system: System) -> str:
+    """A support whose motion or distance moves a part of the structure with unsymmetric matrices, "" for none."""
+    for part in system.components:
+        moved = np.any(system.motion.lift[part] != 0.0, axis=0)
+        own = (sp.csr_array(m)[part][:, part] for m in (system.stiffness, system.damping))
+        if np.any(moved) and not all(is_symmetric(matrix) for matrix in own):
+            return system.motion.names[int(np.flatnonzero(moved)[0])]
+    return ""
 
 
 def check_inputs(

@@ -13,13 +13,11 @@ from ..system.uncoupled import UncoupledModes, uncoupled_modes
 from .beta2 import StepLimit
 from .machine import MODAL_LIMIT
 
-SAFE_FRACTION = 0.9
-
 
 @dataclass(frozen=True)
 class Settings:
-    """How to march: step Δt [s] (None: 0.9 of the limit), β2 in [0.5, 1], steps between records, path,
-    initial state, perturbation [m/s] of the slip speed (steady sliding only), watched points."""
+    """How to march: step Δt [s] (None: 0.9 of the limit, 0.4 with circulatory forces), β2 in [0.5, 1], steps between
+    records, path, initial state, perturbation [m/s] of the slip speed (steady sliding only), watched points."""
 
     step: float | None = None
     beta2: float = 0.5
@@ -35,7 +33,7 @@ def choose_step(limit: StepLimit, settings: Settings) -> float:
     if settings.step is None:
         if not np.isfinite(limit.step):
             raise CaseError("temporal.step", None, "nothing in the system oscillates, so no step follows; give one")
-        return SAFE_FRACTION * limit.step
+        return limit.share * limit.step
     if settings.step > limit.step:
         raise CaseError(
             "temporal.step",

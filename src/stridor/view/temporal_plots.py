@@ -274,6 +274,11 @@ def energy_plot(trajectory: Trajectory, balance: EnergyBalance, *, axes: Sequenc
         ("taken out by damping", works["damping"][step], GREEN, "--"),
         ("taken out by friction", works["friction"][step], VERMILION, "--"),
         ("taken out by impacts", works["contact"][step], PURPLE, "--"),
+        *(
+            (f"put in by {name} forces", works[name][step], ORANGE, "-")
+            for name in ("circulatory",)
+            if name in works
+        ),
     )
     for name, values, colour, style in curves:
         above.plot(time, 1e3 * values, style, color=colour, label=name, linewidth=1.3)

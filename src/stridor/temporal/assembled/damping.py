@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from ...system import System
 from ...typing import Array, Sparse
+from .unsymmetric import halves
 
 PROPORTIONAL = 1e-10
 
@@ -35,8 +36,10 @@ class SplitDamping:
 
 
 def split_damping(system: System) -> SplitDamping:
-    """Split the damping matrix of a system, each uncoupled part of it by its own factor."""
-    damping, stiffness = sp.csr_array(system.damping), sp.csr_array(system.stiffness)
+    """Split the damping matrix of a system, each uncoupled part of it by its own factor; of unsymmetric matrices the
+    symmetric parts."""
+    parts = halves(system)
+    damping, stiffness = sp.csr_array(parts.damping), sp.csr_array(parts.stiffness)
     damping.eliminate_zeros()
     own = damping.diagonal()
     between = _off_diagonal(damping)

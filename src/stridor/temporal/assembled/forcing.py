@@ -11,6 +11,8 @@ from .products import Fields, Structure
 
 CUBIC = 5  # works[CUBIC]: done on cubic springs
 LOOP_WORKS = 6
+CIRCULATORY, GYROSCOPIC = 6, 7  # works put in by the skew parts of imported matrices, where there are any
+SKEW_WORKS = 8
 STEPS_DONE, MOST_SWEEPS, UNCONVERGED, KEPT, NODES_KEPT = range(5)
 COUNTERS = 5
 
@@ -40,8 +42,8 @@ class Forcing(NamedTuple):
 
 
 class LoopState(NamedTuple):
-    """What moves on beside the fields: works (6,) [J], statistics (c, 8), counters (5,), motion (2, p) displacement
-    and q of the supports, coefficients (l + 2p,) that made push, base (size,) push without cubic springs, reference
+    """What moves on beside the fields: works (6,) [J] or (8,), statistics (c, 8), counters (5,), motion (2, p)
+    displacement and q of the supports, coefficients (l + 2p,) that made push, base (size,) push without cubic springs, reference
     (2,): elastic energy at the start, decay of gap offsets per step."""
 
     works: Array

@@ -8,7 +8,8 @@ In terms of q alone (docs/theory-temporal.md, a and b) the scheme reads
     (M + β2 Δt C_d) a_n = f_n − K u_n − C_r q_n + Gᵀp_n − C_d q_n,       q_{n+1} = q_n + Δt a_n,
     v_n = (1 − β2) q_n + β2 q_{n+1},       u_{n+1} = u_n + Δt [(1/2 + β2) q_{n+1} − (β2 − 1/2) q_n],
 
-where C_d is the diagonal part of the damping and C_r the rest, which acts on q_n, the velocity β2 Δt before t_n.
+where C_d is the diagonal part of the damping and C_r the rest, which acts on q_n, the velocity β2 Δt before t_n. Skew
+parts of imported matrices act beside them (`unsymmetric`).
 
 Works of the structure: with y_n = K u_n + C_r q_n the power v·y holds the change of the elastic energy and what C_r
 takes. For β2 = 1/2 the former is the difference of ½ u_nᵀK u_{n−1}, so damping is what was accumulated less what is
@@ -21,6 +22,8 @@ from ...kernels import njit
 from ...typing import Array
 from ..stage import DAMPING, FRICTION, NORMAL
 from .forcing import (
+    CIRCULATORY,
+    GYROSCOPIC,
     MOST_SWEEPS,
     STEPS_DONE,
     UNCONVERGED,
@@ -34,6 +37,7 @@ from .node_stage import SWEEP_LIMIT, NodeScratch, NodeState, contact_power, solv
 from .node_table import NodeTable
 from .products import WITH_STIFFNESS, Fields, Structure, advance
 from .recording import Record, begin_record, end_record, statistics
+from .unsymmetric import MOST_PASSES, Unsymmetric, apply_force, keep_before, keep_free, powers, settled
 
 DONE, NOT_FINITE = 0, 1
 
@@ -69,15 +73,37 @@ def _contacts_of_step(
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Forces at t_n into the motion to t_{n+1}: powers of normal and tangential forces, and what they add to that of
     the structure."""
-    step, beta2, ratio = a.numbers[0], a.numbers[1], a.numbers[2:4]
+    count = _solve_contacts(increments, a, f, table, nodes, work, state, w)
+    extra = _correct(a, f, table, nodes, work) if count else 0.0
+    normal, friction = _after_contacts(count, increments, a, table, nodes, work, state, w)
+    return normal, friction, extra
+
+
+@njit(cache=True)
+def _solve_contacts(
+    increments: Array, a: Structure, f: Fields, table: NodeTable, nodes: NodeState, work: NodeScratch, state: LoopState,
+    w: StepWork,
+) -> int:  # pragma: no cover - compiled
+    """Forces at t_n from the motion to t_{n+1} without them; how many nodes took part."""
     for c in range(table.place.shape[0]):
         work.u[c], work.q[c] = f.u[table.place[c]], f.q[table.place[c]]
-    count, sweeps = solve_nodes(step, ratio, w.place, increments, table, nodes, work, w.status)
+    count, sweeps = solve_nodes(
+        a.numbers[0], a.numbers[2:4], w.place, increments, table, nodes, work, w.status
+    )
     state.counters[MOST_SWEEPS] = max(state.counters[MOST_SWEEPS], min(sweeps, SWEEP_LIMIT))
     state.counters[UNCONVERGED] += sweeps > SWEEP_LIMIT
-    normal = friction = extra = 0.0
+    return count
+
+
+@njit(cache=True)
+def _after_contacts(
+    count: int, increments: Array, a: Structure, table: NodeTable, nodes: NodeState, work: NodeScratch,
+    state: LoopState, w: StepWork,
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Powers of normal and tangential forces; what they send to supports, and statistics."""
+    step, beta2, ratio = a.numbers[0], a.numbers[1], a.numbers[2:4]
+    normal = friction = 0.0
     if count:
-        extra = _correct(a, f, table, nodes, work)
         normal, friction = contact_power(count, beta2, w.velocity, table, nodes, work)
         for n in range(count):
             i = work.chosen[n]
@@ -88,13 +114,44 @@ def _contacts_of_step(
         for c in range(work.correction.shape[0]):
             work.correction[c] = 0.0
     statistics(count, ratio, step, increments, table, nodes, work, w.status, state, w.sums)
+    return normal, friction
+
+
+@njit(cache=True)
+def _unsymmetric_step(
+    increments: Array, a: Structure, f: Fields, x: Unsymmetric, table: NodeTable, nodes: NodeState, work: NodeScratch,
+    state: LoopState, w: StepWork,
+) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """Skew forces and contact forces at t_n in turn until both agree with the motion to t_{n+1}: powers as
+    `_contacts_of_step` gives them."""
+    keep_free(f, x)
+    count, passes = 0, 0
+    while True:
+        apply_force(a, f, x)
+        if table.gap.shape[0]:
+            count = _solve_contacts(increments, a, f, table, nodes, work, state, w)
+            if count:
+                for c in range(table.place.shape[0]):
+                    f.u[table.place[c]], f.q[table.place[c]] = work.u[c], work.q[c]
+        passes += 1
+        if passes == MOST_PASSES:
+            state.counters[UNCONVERGED] += 1
+            break
+        if settled(a, f, x, f.y):
+            break
+    normal = friction = 0.0
+    if table.gap.shape[0]:
+        normal, friction = _after_contacts(count, increments, a, table, nodes, work, state, w)
+    circulatory, gyroscopic, extra = powers(a, f, x)
+    state.works[CIRCULATORY] += circulatory * a.numbers[0]
+    state.works[GYROSCOPIC] += gyroscopic * a.numbers[0]
     return normal, friction, extra
 
 
 @njit(cache=True)
 def run_steps(
-    steps: int, a: Structure, f: Fields, g: Forcing, table: NodeTable, nodes: NodeState, work: NodeScratch,
-    state: LoopState, w: StepWork, record: Record,
+    steps: int, a: Structure, f: Fields, x: Unsymmetric, g: Forcing, table: NodeTable, nodes: NodeState,
+    work: NodeScratch, state: LoopState, w: StepWork, record: Record,
 ) -> tuple[int, int]:  # pragma: no cover - compiled
     """Up to ``steps`` steps; how many were done and why it ended (DONE, NOT_FINITE)."""
     step = a.numbers[0]
@@ -103,9 +160,15 @@ def run_steps(
         recording = state.counters[STEPS_DONE] % record.every == 0
         if recording and not begin_record(a, f, g, state, w, record):
             return k, NOT_FINITE
+        skew = x.force.shape[0] > 0
+        if skew:
+            keep_before(f, x)
         taken = advance(a, f, w.power)
         normal = friction = 0.0
-        if table.gap.shape[0]:
+        if skew:
+            normal, friction, extra = _unsymmetric_step(g.increments[k], a, f, x, table, nodes, work, state, w)
+            taken += extra
+        elif table.gap.shape[0]:
             normal, friction, extra = _contacts_of_step(g.increments[k], a, f, table, nodes, work, state, w)
             taken += extra
         if recording:

@@ -13,16 +13,18 @@ from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...typing import Array, IntArray, Sparse
 from ..beta2 import Scheme
+from ..inputs import DIAGONAL
 from ..schedule import Schedule
 from ..stage import FIRST_OPEN, FIRST_STICK, STATISTICS
 from .damping import SplitDamping, split_damping
-from .forcing import COUNTERS, LOOP_WORKS, STEPS_DONE, Forcing, LoopState, StepWork
+from .forcing import COUNTERS, CUBIC, LOOP_WORKS, SKEW_WORKS, STEPS_DONE, Forcing, LoopState, StepWork
 from .loop import run_steps
 from .node_stage import NodeScratch, NodeState
 from .node_table import NodeTable, node_table
 from .products import DASHPOTS, WITH_STIFFNESS, Fields, Structure, stored_energies
 from .recording import Record
 from .storage import Layout, aligned_zeros, lay_out_freedoms, parts, upper_blocks
+from .unsymmetric import Unsymmetric, halves, unsymmetric
 
 OFFSET_STEPS = 100  # in which the gap that a renewal of the rows made fades
 
@@ -36,6 +38,7 @@ class Machine:
     layout: Layout
     structure: Structure
     fields: Fields
+    unsymmetric: Unsymmetric
     constant: Forcing  # without loads and increments by step
     state: LoopState
     nodes: ContactNodes
@@ -87,7 +90,7 @@ class Machine:
         cubic = self.system.cubic
         if cubic is not None:
             length = cubic.rows.free @ self.displacement + cubic.rows.lift @ self.state.motion[0]
-            self.state.works[-1] = 0.25 * float(np.sum(cubic.coefficient * length**4))
+            self.state.works[CUBIC] = 0.25 * float(np.sum(cubic.coefficient * length**4))
 
     def run(self, steps: int, schedule: Schedule, record: Record) -> tuple[int, int]:
         """March up to ``steps`` steps; what was done and why it ended (codes of the loop)."""
@@ -96,7 +99,9 @@ class Machine:
         )
         work = _step_work(forcing, self.table, self.state, record)
         structure, fields, table, nodes = self.structure, self.fields, self.table, self.contacts
-        return run_steps(steps, structure, fields, forcing, table, nodes, self.scratch, self.state, work, record)
+        return run_steps(
+            steps, structure, fields, self.unsymmetric, forcing, table, nodes, self.scratch, self.state, work, record
+        )
 
 
 def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Machine:
@@ -105,6 +110,7 @@ def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Ma
     mass = diagonal_mass(system)
     damping = split_damping(system)
     layout = lay_out_freedoms(system)
+    skew = unsymmetric(halves(system), layout)
     structure = _structure(system, scheme, layout, mass, damping)
     u = aligned_zeros((layout.size,))
     fields = Fields(
@@ -118,7 +124,7 @@ def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Ma
     statistics = np.zeros((len(nodes.names), STATISTICS))
     statistics[:, [FIRST_STICK, FIRST_OPEN]] = -1.0
     state = LoopState(
-        works=np.zeros(LOOP_WORKS),
+        works=np.zeros(SKEW_WORKS if len(skew.force) else LOOP_WORKS),
         statistics=statistics,
         counters=np.zeros(COUNTERS, dtype=np.int64),
         motion=np.zeros((2, motions)),
@@ -135,7 +141,7 @@ def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Ma
     )
     forcing = _forcing(system, layout)
     return Machine(
-        system, scheme, layout, structure, fields, forcing, state, nodes, system.surfaces, table, contacts,
+        system, scheme, layout, structure, fields, skew, forcing, state, nodes, system.surfaces, table, contacts,
         _scratch(table),
     )  # fmt: skip
 
@@ -145,12 +151,12 @@ def diagonal_mass(system: System) -> Array:
     zero."""
     mass = system.mass.diagonal()
     off = sp.csr_array(system.mass - sp.diags_array(mass))
-    if off.nnz and np.abs(off.data).max() > 1e-14 * np.abs(mass).max():
+    if off.nnz and np.abs(off.data).max() > DIAGONAL * np.abs(mass).max():
         raise CaseError(
             "bodies",
             None,
             "the temporal approach on assembled matrices needs a diagonal mass in every body; "
-            'write mass = "lumped" for beams and solids',
+            'write mass = "lumped" for beams and solids, and import lumped mass matrices',
         )
     if not np.all(mass > 0.0):
         raise AnalysisError("the mass matrix is not positive definite: a freedom has stiffness but no mass")
@@ -160,7 +166,7 @@ def diagonal_mass(system: System) -> Array:
 def _structure(system: System, scheme: Scheme, layout: Layout, mass: Array, damping: SplitDamping) -> Structure:
     step, beta2 = scheme.step, scheme.beta2
     effective = mass + beta2 * step * damping.diagonal
-    stiffness = upper_blocks(system.stiffness, layout)
+    stiffness = upper_blocks(halves(system).stiffness, layout)
     folded = damping.lagged and damping.factor is not None
     second = damping.lagged and not folded
     rest = upper_blocks(damping.rest if second else sp.csr_array(damping.rest.shape), layout)

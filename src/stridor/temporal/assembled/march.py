@@ -15,7 +15,7 @@ from ...interrupts import Held, at_once, held
 from ...system import System
 from ...typing import Array
 from ..beta2 import StepLimit, scheme
-from ..inputs import check_inputs
+from ..inputs import check_inputs, unfit_in_time
 from ..observe import Observer
 from ..phase_results import PhaseResults
 from ..schedule import PhaseSpec, Schedule, lay_out
@@ -71,6 +71,8 @@ def simulate_assembled(
         record_every=settings.record_every,
         watch=settings.watch,
     )
+    if system.general and (why := unfit_in_time(system)):
+        raise AnalysisError(why)
     diagonal_mass(system)
     nodes = system.contact_nodes()
     if mu is not None:
@@ -266,6 +268,8 @@ class _Run:
 
     def _reason(self) -> str:
         system = self.machine.system
+        if system.general:
+            return "matrices that are not symmetric: assembled matrices with lumped mass"
         if system.surfaces:
             return "contact over surfaces: assembled matrices with lumped mass"
         if system.cubic is not None:

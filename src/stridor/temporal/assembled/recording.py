@@ -8,6 +8,7 @@ import numpy as np
 
 from ...kernels import njit
 from ...typing import Array, IntArray
+from ..layout import ENERGY_RECORD
 from ..stage import (
     DAMPING,
     FIRST_OPEN,
@@ -24,15 +25,16 @@ from ..stage import (
     SLIP_STEPS,
     STICK_STEPS,
 )
-from .forcing import CUBIC, KEPT, NODES_KEPT, STEPS_DONE, Forcing, LoopState, StepWork, dot
+from .forcing import CIRCULATORY, CUBIC, GYROSCOPIC, KEPT, NODES_KEPT, STEPS_DONE, Forcing, LoopState, StepWork, dot
 from .node_stage import NodeScratch, NodeState, slip_over_step
 from .node_table import NodeTable
 from .products import WITH_STIFFNESS, Fields, Structure, stored_energies
 
 
 class Record(NamedTuple):
-    """Decimated output: contacts (r, c, 5), watched rows (r, w, 3) of u, v, a, energies (r, 7); nodes (s, m, 2d) normal
-    force, tangential forces, slip velocities, gap, with status (s, m), every nodes_every-th record (0: never)."""
+    """Decimated output: contacts (r, c, 5), watched rows (r, w, 3) of u, v, a, energies (r, 7 or 9); nodes (s, m, 2d)
+    normal force, tangential forces, slip velocities, gap, with status (s, m), every nodes_every-th record
+    (0: never)."""
 
     every: int
     nodes_every: int
@@ -50,7 +52,7 @@ class Record(NamedTuple):
 @njit(cache=True)
 def energies(a: Structure, f: Fields, g: Forcing, state: LoopState, row: Array) -> None:
     # pragma: no cover - compiled
-    """Kinetic and elastic energy half a step before t_n and the works up to there into row (7,)."""
+    """Kinetic and elastic energy half a step before t_n and the works up to there into row (7,) or (9,)."""
     kinetic, elastic = stored_energies(a, f)
     for j in range(5):
         row[2 + j] = state.works[j]
@@ -66,6 +68,8 @@ def energies(a: Structure, f: Fields, g: Forcing, state: LoopState, row: Array) 
         for o in range(x.shape[0]):
             kinetic += 0.5 * rate[p] * g.mass_own[p, o] * rate[o]
             elastic += 0.5 * x[p] * g.stiffness_own[p, o] * (x[o] - a.numbers[0] * rate[o])
+    if row.shape[0] > ENERGY_RECORD:
+        row[ENERGY_RECORD], row[ENERGY_RECORD + 1] = state.works[CIRCULATORY], state.works[GYROSCOPIC]
     row[0], row[1] = kinetic, elastic + state.works[CUBIC]
 
 

@@ -37,6 +37,7 @@ WORK_COLUMNS = {
     "external": EXTERNAL,
     "support": SUPPORT,
 }
+SKEW_COLUMNS = {"circulatory": ENERGY_RECORD - 2, "gyroscopic": ENERGY_RECORD - 1}
 
 
 def buffers(machine: Machine, schedule: Schedule, settings: Settings) -> Record:
@@ -57,7 +58,7 @@ def buffers(machine: Machine, schedule: Schedule, settings: Settings) -> Record:
         nodes_every=nodes_every,
         contacts=np.zeros((count, len(nodes.names), CONTACT_COLUMNS)),
         watch=np.zeros((count, watch.shape[0], 3)),
-        energies=np.zeros((count, ENERGY_RECORD)),
+        energies=np.zeros((count, ENERGY_RECORD + (len(SKEW_COLUMNS) if len(machine.unsymmetric.force) else 0))),
         nodes=np.zeros((kept, nodes.count, 2 * (nodes.directions + 1))),
         node_status=np.zeros((kept, nodes.count), dtype=np.int8),
         watch_ptr=watch_ptr,
@@ -111,6 +112,7 @@ def trajectory(
     kept = int(counters[KEPT])
     start = -(-first_step // every)
     contacts, energies = record.contacts[:kept], record.energies[:kept]
+    columns = WORK_COLUMNS | (SKEW_COLUMNS if len(machine.unsymmetric.force) else {})
     shaped = record.watch[:kept].reshape(kept, len(settings.watch), machine.system.dimension, 3)
     return Trajectory(
         time=(start + np.arange(kept)) * every * machine.scheme.step,
@@ -126,7 +128,7 @@ def trajectory(
         acceleration=shaped[..., 2],
         kinetic=energies[:, 0],
         elastic=energies[:, 1],
-        works={name: energies[:, 2 + column] for name, column in WORK_COLUMNS.items()},
+        works={name: energies[:, 2 + column] for name, column in columns.items()},
         phases=phases,
         step=machine.scheme.step,
         beta2=machine.scheme.beta2,
