@@ -43,8 +43,8 @@ class Forcing(NamedTuple):
 
 class LoopState(NamedTuple):
     """What moves on beside the fields: works (6,) [J] or (8,), statistics (c, 8), counters (5,), motion (2, p)
-    displacement and q of the supports, coefficients (l + 2p,) that made push, base (size,) push without cubic springs, reference
-    (2,): elastic energy at the start, decay of gap offsets per step."""
+    displacement and q of the supports, coefficients (l + 2p,) that made push, base (size,) push without cubic springs,
+    reference (2,): elastic energy at the start, decay of gap offsets per step."""
 
     works: Array
     statistics: Array
