@@ -13,6 +13,7 @@ import pytest
 
 import stridor as st
 from matrix_cases import matrix_case
+from stridor.study.analyses import structured
 
 pytestmark = pytest.mark.bad_input
 
@@ -39,6 +40,14 @@ def test_nothing_depends_on_friction(tmp_path: Path):
     )
     assert message(st.onsets, model(tmp_path, factor="")) == expected
     assert message(st.onsets, model(tmp_path, factor="0*mu")) == expected
+
+
+def test_a_run_needs_friction_and_a_comparison_contacts(tmp_path: Path):
+    """Circulatory forces alone: modes and time answer, a run has no onset to look for."""
+    case = model(tmp_path, factor="0.5", extra="[[phases]]\nname = 'free'\nduration = 1.0\n")
+    assert message(structured, case, "run").startswith("run: there are no contacts and no factor of a matrix")
+    assert message(st.compare, case) == "a perturbation of steady sliding needs contacts that slide"
+    assert st.simulate(case).steps > 0
 
 
 def test_ranges_and_frequencies_that_are_none(tmp_path: Path):

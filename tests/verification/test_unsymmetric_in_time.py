@@ -181,6 +181,5 @@ def test_a_block_that_rubs_grows_as_its_modes_do(tmp_path: Path):
     for share in (0.4, 0.2):
         settings = Settings(step=share * limit)
         found = perturb_assembled(system, mu, settings=settings, max_frequency_hz=30e3, modes=modes).eigenvalue
-        print(share, found, leading, found - leading)
         assert found.real == pytest.approx(leading.real, rel=5e-3)
         assert found.imag == pytest.approx(leading.imag, rel=5e-3)

@@ -175,6 +175,11 @@ def structured(case: Case, what: str, mu: float | None = None) -> System:
     system = build_system(case, mu)
     if system.general and (why := unfit_in_time(system)):
         raise AnalysisError(f"{what}: {why}; {works}")
+    if system.general and what == "run" and not case.contacts:
+        raise AnalysisError(
+            "run: there are no contacts and no factor of a matrix has mu in it, so there is no onset to solve for; "
+            "what works here is `stridor modes`, `stridor simulate` and `stridor reduce --onsets NAME`"
+        )
     return system
 
 

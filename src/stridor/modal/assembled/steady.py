@@ -187,7 +187,7 @@ def steadiness(system: System, nodes: ContactNodes, touching: IntArray, options:
     speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
     pairs = {(int(nodes.owner[k]), float(speeds[k])) for k in touching}
     sloped = any(nodes.laws[owner].slope(speed) != 0.0 for owner, speed in pairs)
-    across = options.friction_damping and nodes.directions == 2
+    across = options.friction_damping and nodes.directions == 2 and len(touching) > 0
     prestress = options.prestress and system.stress_stiffness is not None
     system = system.in_place()
     hardens = bool(np.any(nodes.cubic[touching] > 0))
