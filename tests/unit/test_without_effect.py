@@ -12,6 +12,7 @@ from rubbing_block import rubbing_block
 from solid_cases import BELT
 from stridor.app.reduce import _made
 from stridor.case import template_text
+from stridor.study import without_effect as settings_without_effect
 from stridor.study.without_effect import without_effect
 
 MU = 0.3
@@ -82,6 +83,83 @@ def test_what_changes_no_motion_is_told(change: dict[str, Any], verbs: set[str])
     told = {verb for verb in ("simulate",) if any(x.startswith(setting) for x in without_effect(changed, verb))}
     assert told == verbs
     assert bool(told) is bool(same)
+
+
+def test_stiffness_of_point_contacts_acts_on_the_modes_of_a_comparison_and_that_is_told() -> None:
+    case, changed = beams(), beams().with_({"contacts.A.stiffness": 1e7})
+    one, two = (st.compare(c, [MU], only=["growth"]).comparisons[0] for c in (case, changed))
+    assert one.perturbation.eigenvalue == two.perturbation.eigenvalue
+    assert one.modal_eigenvalue != two.modal_eigenvalue
+    for verb in ("compare", "run"):
+        assert without_effect(changed, verb) == [
+            "contacts.A.stiffness acts on modes and onsets only: in time point contacts are rigid"
+        ]
+    started = {
+        "temporal.initial": "steady-sliding",
+        "temporal.perturbation": 1e-6,
+        "phases": [{"name": "slide", "duration": 1e-4}],
+    }
+    runs = [st.simulate(c.with_(started)) for c in (case, changed)]
+    assert np.array_equal(runs[0].elastic, runs[1].elastic)
+    assert len(without_effect(changed.with_(started), "simulate")) == 1
+
+
+CHANGES: list[tuple[str, dict[str, Any]]] = [
+    ("beams", {"modal.friction_damping": True}),
+    ("beams", {"modal.prestress": True}),
+    ("beams", {"modal.damped": False}),
+    ("block", {"modal.friction_damping": True}),
+    ("block", {"modal.prestress": True}),
+    ("block", {"modal.damped": False}),
+    ("block", {"contacts.face.stiffness": 1e11}),
+    ("block", {"temporal.path": "nodal"}),
+    ("block", {"materials.pad.poisson_ratio": 0.2}),
+]
+
+
+def told(change: dict[str, Any], case: st.Case, verb: str) -> bool:
+    (setting,) = change
+    return any(line.startswith(setting) for line in without_effect(case.with_(change), verb))
+
+
+@pytest.mark.parametrize(("which", "change"), CHANGES)
+def test_what_changes_no_onset_is_told_and_nothing_else(which: str, change: dict[str, Any]) -> None:
+    if "temporal.path" in change:
+        pytest.skip("not of the modal approach")
+    case = beams() if which == "beams" else block()
+    ends = (0.0, 0.3) if which == "beams" else (0.0, 0.45)
+    found = [[o.to_json() for o in st.onsets(c, ends, check=False).onsets] for c in (case, case.with_(change))]
+    assert found[0]  # else nothing is compared
+    assert told(change, case, "onsets") is (found[0] == found[1])
+
+
+@pytest.mark.parametrize(("which", "change"), CHANGES)
+def test_what_changes_nothing_in_a_comparison_is_told_and_nothing_else(which: str, change: dict[str, Any]) -> None:
+    case = beams() if which == "beams" else block()
+    one, two = (st.compare(c, [MU], only=["growth"]).comparisons[0] for c in (case, case.with_(change)))
+    same = one.modal_eigenvalue == two.modal_eigenvalue and one.perturbation.eigenvalue == two.perturbation.eigenvalue
+    assert told(change, case, "compare") is same
+
+
+@pytest.mark.parametrize("change", [c for which, c in CHANGES if which == "block"])
+def test_what_changes_no_motion_of_a_solid_is_told_and_nothing_else(change: dict[str, Any]) -> None:
+    if "modal.friction_damping" in change:
+        pytest.skip("said of modes alone")
+    short = block().with_({"phases": [{"name": "slide", "duration": 2e-4}], "temporal.record_every": 1})
+    one, two = st.simulate(short), st.simulate(short.with_(change))
+    same = len(one.time) == len(two.time) and np.array_equal(one.normal_force, two.normal_force)
+    assert told(change, short, "simulate") is same
+
+
+def test_contact_over_a_surface_tells_the_path_without_another_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("built once more")
+
+    monkeypatch.setattr(settings_without_effect, "build_system", refuse)
+    case = block().with_({"modal.prestress": True, "temporal.path": "nodal"})
+    assert [line.split(" ")[0] for line in without_effect(case, "simulate")] == ["modal.prestress", "temporal.path"]
+    with pytest.raises(AssertionError, match="built once more"):
+        without_effect(beams().with_({"modal.prestress": True}), "simulate")
 
 
 def test_settings_of_the_other_paths() -> None:

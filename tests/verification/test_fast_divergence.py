@@ -95,3 +95,38 @@ def test_the_band_holds_what_diverges_at_any_rate(drive: float):
     assert len(found.values) == np.count_nonzero((dense > 0) & (dense < 1.3**2)) + len(exact)
     assert is_stiff(problem, 1.01 * exact.max(initial=0.1))
     assert not len(exact) or not is_stiff(problem, 0.99 * exact.max())
+
+
+# -- what the other verbs say of it ------------------------------------------------------------------------------------
+FAST = {"bodies.beam1.elements": 6, "bodies.beam2.elements": 18, "temporal.step": 2e-7, "modal.max_frequency_hz": 20e3}
+
+
+@pytest.fixture(scope="module")
+def diverging() -> st.Case:
+    shorter = {"phases.press.duration": 6e-3, "phases.slide.duration": 2e-4, "temporal.record_every": 5}
+    return bench(-1e7).with_(FAST | shorter)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_comparison_says_that_nothing_vibrates_about_what_diverges(diverging: st.Case):
+    rate = dense_divergence(st.build_system(diverging))[0]
+    result = st.compare(diverging, [0.0], critical=False)
+    (found,) = result.comparisons
+    assert found.modal_eigenvalue == pytest.approx(rate, rel=1e-5)
+    assert (found.agrees, result.agree) == (None, None)
+    assert "the motion diverges without oscillating, at " in result.verdict
+    assert "no full run: the motion is no longer finite" in result.verdict
+    assert "a negative stiffness drives it" in result.verdict
+    critical = st.compare(diverging, only=["critical"])
+    assert critical.agree is None
+    assert any(note.startswith("diverges already at μ = 0: λ = +1") for note in critical.notes), critical.notes
+
+
+@pytest.mark.filterwarnings("error")
+def test_sensitivities_of_divergence_are_its_slopes(diverging: st.Case):
+    path = "springs.drive.stiffness"
+    found = st.sensitivities(diverging, [path, "mu"], mu=0.1)
+    assert found.frequency_hz.tolist() == [0.0]
+    values = [st.modes(diverging.with_({path: -1e7 + d}), 0.1).eigenvalues for d in (-1e3, 1e3)]
+    far, near = (float(v.real[v.imag == 0].max()) for v in values)
+    assert found.of(path)[0].real == pytest.approx((near - far) / 2e3, rel=1e-4)

@@ -19,7 +19,7 @@ from ..modal.growing import doubt, modes_of_band
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape
-from ..temporal.signals import Growth, growth, low_passed, spectrum
+from ..temporal.signals import Components, Growth, growth, low_passed, spectrum
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..threads import one_thread_if_small
@@ -27,7 +27,7 @@ from ..typing import IntArray
 from .assembled import modes_as_in_time, perturb_assembled
 from .critical import compare_critical
 from .kept import Plain, Store, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
-from .perturbation import perturb, whole
+from .perturbation import Perturbation, perturb, whole
 from .result import Agreement, Comparison, Critical, judge, likeness, overall
 from .shapes import by_body, modal_assurance, mode_shape
 
@@ -169,7 +169,12 @@ class _At:
             self.say(f"full run at μ = {mu:g}")
             run = self.runs.get(mu)
             if run is None:
-                run = whole(simulate(self.system, self.phases, self.settings, mu=mu))
+                try:
+                    run = whole(simulate(self.system, self.phases, self.settings, mu=mu))
+                except AnalysisError as error:
+                    if found.modal_eigenvalue.imag != 0.0 or found.modal_eigenvalue.real <= 0.0:
+                        raise
+                    return replace(found, verdict=f"{found.verdict}; no full run: {error}")
             answered = self._answer(mu, run, self._modes(mu) if modes is None else modes)
             self._keep("run", mu, _run_data(answered))
         verdict = likeness(found.verdict, answered.dominant, answered.mac)
@@ -189,7 +194,12 @@ class _At:
         return modes_of_band(self.system, mu, highest, vectors=True)
 
     def _growth(self, mu: float, modes: ComplexModes) -> Comparison:
-        if self.system.assembled:
+        unstable = _unstable(modes, self.limit)
+        diverges = bool(np.any(modes.eigenvalues[0][unstable].imag == 0.0))
+        if diverges:
+            # Nothing vibrates about what runs away: a march tells no rate to hold against the mode's.
+            perturbation = Perturbation(mu, 0j, np.zeros(0), 1.0, Components(np.zeros(0, dtype=complex), np.zeros(0)))
+        elif self.system.assembled:
             perturbation = perturb_assembled(
                 self.system, mu, settings=self.settings, max_frequency_hz=self.limit, modes=modes, shape=True
             )
@@ -200,8 +210,8 @@ class _At:
         lam = modes.eigenvalues[0]
         if not len(lam):
             raise AnalysisError(f"no mode below {self.limit:g} Hz, so there is nothing to compare")
-        unstable = _unstable(modes, self.limit)
-        partner = int(unstable[0]) if len(unstable) else int(np.argmin(np.abs(lam - perturbation.eigenvalue)))
+        first = unstable if not diverges else unstable[lam[unstable].imag == 0.0]
+        partner = int(first[0]) if len(first) else int(np.argmin(np.abs(lam - perturbation.eigenvalue)))
         here = complex(lam[partner])
         frequency = abs(perturbation.eigenvalue.imag - here.imag) / max(abs(here.imag), 1e-300)
         rate = abs(perturbation.eigenvalue.real - here.real) / max(abs(here.real), 1e-300)

@@ -84,11 +84,12 @@ def compare_critical(
 ) -> Critical:
     """Both critical friction coefficients, and whether they are one. Raises what the analyses raise."""
     progress("critical friction, modal")
-    modal, told = _modal(system, friction_range, max_frequency_hz, kept)
+    modal, told, grown = _modal(system, friction_range, max_frequency_hz, kept)
     found = _in_time(system, modal, friction_range, max_frequency_hz, settings, bracket, tolerance, progress, kept)
     # A first onset that may not be the first agrees with nothing.
     agrees = None if found.agrees and refuted(told) else found.agrees
-    return replace(found, agrees=agrees, completeness=told)
+    why = "; ".join(part for part in (*grown, found.why) if part) if found.why else ""
+    return replace(found, agrees=agrees, completeness=told, why=why)
 
 
 def _in_time(
@@ -130,16 +131,17 @@ def _in_time(
 
 def _modal(
     system: System, between: tuple[float, float], limit: float, kept: Store | None
-) -> tuple[float | None, str]:
-    """The first onset, None where there is none, and what speaks for that; taken from what is kept if it is there."""
+) -> tuple[float | None, str, list[str]]:
+    """The first onset, None where there is none, what speaks for that, and what grows before any; taken from what is
+    kept if it is there."""
     known = None if kept is None else kept.get("critical modal", None)
     if known is not None and isinstance(known.get("completeness"), str):
-        return float_of(known, "mu"), known["completeness"]
+        return float_of(known, "mu"), known["completeness"], [str(line) for line in known.get("before", ())]
     found = onsets_of_band(system, between, limit, options=Options(friction_damping=turns(system)))
-    first = None if found.first is None else found.first.mu
+    first, grown = None if found.first is None else found.first.mu, found.at_start_words
     if kept is not None:
-        kept.put("critical modal", None, {"mu": first, "completeness": found.completeness})
-    return first, found.completeness
+        kept.put("critical modal", None, {"mu": first, "completeness": found.completeness, "before": grown})
+    return first, found.completeness, grown
 
 
 def _without_change(

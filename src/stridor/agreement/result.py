@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..digits import readable
 from ..modal.growing import refuted
 from ..temporal.signals import Growth
 from .perturbation import Perturbation
@@ -145,6 +146,11 @@ def _judged(
     mu: float, unstable: bool, here: complex, perturbation: Perturbation, frequency: float, rate: float
 ) -> tuple[bool | None, str]:
     """The same for modes that are certain."""
+    if unstable and here.imag == 0.0:
+        return None, (
+            f"μ = {mu:g}: by the modes the motion diverges without oscillating, at {readable(here.real)} 1/s, so that "
+            "there is no small vibration to compare"
+        )
     said = "unstable" if unstable else "stable"
     if perturbation.eigenvalue == 0 or not np.isfinite(perturbation.eigenvalue):
         return None, f"μ = {mu:g}: modal says {said}, but the signal in time shows no vibration to compare with"

@@ -6,7 +6,8 @@
 - modal.damped = false: `simulate`, `compare`
 - temporal.path: assembled matrices in time
 - comparison.bracket, comparison.tolerance: without critical friction
-- contacts.NAME.stiffness, a number: beams in point contacts in time, which are rigid there
+- contacts.NAME.stiffness, a number: beams in point contacts in time, which are rigid there (`simulate`); `compare` and
+  `run` use it in the modes alone, which is told as well
 - materials.NAME.poisson_ratio: of beams only
 
 A setting that stays at its default is not told of, nor one of an approach that the verb does not take.
@@ -15,9 +16,12 @@ A setting that stays at its default is not told of, nor one of an approach that 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from ..case import Case
-from ..system import System, build_system
+from ..case.bodies import SolidBody
+from ..system import build_system
+from ..system.pairs import is_point_on_line
 
 IN_TIME = ("simulate", "compare", "run")
 MODAL = ("steady", "modes", "shapes", "onsets", "run", "sensitivities", "countermeasures", "damping_map", "reduce")
@@ -26,16 +30,37 @@ MODAL = ("steady", "modes", "shapes", "onsets", "run", "sensitivities", "counter
 def without_effect(case: Case, verb: str, *, solver: str | None = None) -> list[str]:
     """A line for each setting of the case, or ``--solver``, that changes no number of what a verb computes.
 
-    Builds the model only where such a setting is given. Raises what building it raises.
+    Builds the model only where such a setting is given and the case alone does not tell the path, which is so for small
+    models without contact over surfaces. Raises what building it raises.
     """
     if verb not in (*IN_TIME, *MODAL):
         return []
     # By the case alone where that is enough.
     lines = [*_of_materials(case), *_of_comparison(case, verb)]
     if _given(case, solver):
-        system = build_system(case)
-        lines += [*_of_modes(case, system, verb, solver), *_of_time(case, system, verb)]
+        path = _path(case)
+        lines += [*_of_modes(case, path, verb, solver), *_of_time(case, path, verb)]
     return lines
+
+
+@dataclass(frozen=True)
+class _Path:
+    """What decides on the path: whether matrices are assembled, or without structure."""
+
+    assembled: bool
+    general: bool
+
+    @property
+    def points(self) -> bool:
+        return not self.assembled and not self.general
+
+
+def _path(case: Case) -> _Path:
+    # Contact over a surface is computed with on assembled matrices; only imported ones may lack structure.
+    if not case.imported and any(not is_point_on_line(case, contact) for contact in case.contacts.values()):
+        return _Path(assembled=True, general=False)
+    system = build_system(case)
+    return _Path(system.assembled, bool(system.general))
 
 
 def _given(case: Case, solver: str | None) -> bool:
@@ -64,20 +89,19 @@ def _of_comparison(case: Case, verb: str) -> Iterator[str]:
             yield f"comparison.{key} has no effect while comparison.critical is false"
 
 
-def _of_modes(case: Case, system: System, verb: str, solver: str | None) -> Iterator[str]:
-    points = not system.assembled and not system.general
-    if points and (solver is not None or case.modal.solver != "auto"):
+def _of_modes(case: Case, path: _Path, verb: str, solver: str | None) -> Iterator[str]:
+    if path.points and (solver is not None or case.modal.solver != "auto"):
         what = "modal.solver" if solver is None else "--solver"
         yield f"{what} has no effect: beams in point contacts are solved by dense methods"
     if case.modal.friction_damping and verb != "simulate":
-        if points or system.contact_nodes().directions < 2:
+        if path.points or case.dimension < 3:
             yield "modal.friction_damping has no effect: friction turns with the slip in space only, over nodes"
         elif verb == "compare":
             yield "modal.friction_damping has no effect here: compare takes the modes as the time loop is, with it"
     if case.modal.prestress:
         if verb in ("compare", "simulate"):
             yield f"modal.prestress has no effect on {verb}: the time loop has no geometric stiffness"
-        elif points or system.stress_stiffness is None:
+        elif path.points or not any(isinstance(body, SolidBody) for body in case.bodies.values()):
             yield "modal.prestress has no effect: only meshed solids on assembled matrices have it"
         elif verb == "run":
             yield "modal.prestress acts on modes and onsets only: the time loop and the comparison are without it"
@@ -87,15 +111,14 @@ def _of_modes(case: Case, system: System, verb: str, solver: str | None) -> Iter
         yield "modal.damped = false acts on modes and onsets only: the time loop and the comparison keep the damping"
 
 
-def _of_time(case: Case, system: System, verb: str) -> Iterator[str]:
+def _of_time(case: Case, path: _Path, verb: str) -> Iterator[str]:
     if verb not in IN_TIME:
         return
-    if system.assembled and case.temporal.path != "auto":
+    if path.assembled and case.temporal.path != "auto":
         yield f"temporal.path = {case.temporal.path!r} has no effect: assembled matrices have one path"
-    if not system.assembled:
+    if not path.assembled:
         for name, contact in case.contacts.items():
-            if contact.stiffness != "rigid":
-                yield (
-                    f"contacts.{name}.stiffness has no effect in time: point contacts of beams are rigid there, and "
-                    "only the modes take it"
-                )
+            if contact.stiffness != "rigid" and verb == "simulate":
+                yield f"contacts.{name}.stiffness has no effect in time: point contacts of beams are rigid there"
+            elif contact.stiffness != "rigid":
+                yield f"contacts.{name}.stiffness acts on modes and onsets only: in time point contacts are rigid"

@@ -28,6 +28,14 @@ class Settings:
     watch: tuple[str, ...] = ()
 
 
+def not_finite(time: float, phase: str, step: float) -> str:
+    """What to say of a motion that has left all numbers."""
+    return (
+        f"the motion is no longer finite at t = {time:.6g} s (phase {phase}): a negative stiffness drives it (`stridor "
+        f"modes` tells what diverges), the step {step:g} s is too large for this model, or a load is absurd"
+    )
+
+
 def choose_step(limit: StepLimit, settings: Settings) -> float:
     """Δt [s] within the limit; raises CaseError for a step beyond it."""
     if settings.step is None:

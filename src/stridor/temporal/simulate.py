@@ -22,7 +22,7 @@ from .machine import Machine, modal_machine, nodal_machine
 from .observe import Observer
 from .phase_results import PhaseResults
 from .schedule import PhaseSpec, Schedule, lay_out
-from .settings import Settings, choose_path, choose_step
+from .settings import Settings, choose_path, choose_step, not_finite
 from .stage import CONTACT_RECORD, DAMPING, EXTERNAL, FRICTION, NORMAL, SUPPORT
 from .start import Disturbance, initial_state, joined, restore, saved_state, settings_of_restart, watch_rows
 from .trajectory import Trajectory
@@ -220,10 +220,7 @@ class _Run:
                 f"(phase {phase}); shorten the phase, slow the support down or lengthen the master"
             )
         else:
-            message = (
-                f"the motion is no longer finite at t = {at:.6g} s (phase {phase}): the step "
-                f"{self.machine.scheme.step:g} s is too large for this model or a load is absurd"
-            )
+            message = not_finite(at, phase, self.machine.scheme.step)
         error = AnalysisError(message)
         error.trajectory = self._trajectory(interrupted=True)  # type: ignore[attr-defined]
         raise error

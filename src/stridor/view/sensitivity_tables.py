@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..digits import readable
 from ..study.countermeasures import Countermeasures, Measure
 from ..study.sensitivities import Sensitivities
 from .tables import Row, Table, drop_empty, number, significant
@@ -97,8 +98,8 @@ def _consequences(measure: Measure) -> str:
     if measure.verified is not None and not measure.verified.unstable_hz:
         parts.append("solved again: nothing grows")
     elif measure.verified is not None:
-        where = ", ".join(f"{f:.0f}" for f in measure.verified.unstable_hz)
-        parts.append(f"solved again: grows at {where} Hz")
+        where = ", ".join(f"{readable(f)} Hz" if f else "0 Hz (diverges)" for f in measure.verified.unstable_hz)
+        parts.append(f"solved again: grows at {where}")
     if measure.verified is not None and measure.verified.doubt:
         parts.append(measure.verified.doubt)
     return "; ".join(parts)

@@ -19,7 +19,7 @@ from ..inputs import check_inputs, unfit_in_time
 from ..observe import Observer
 from ..phase_results import PhaseResults
 from ..schedule import PhaseSpec, Schedule, lay_out
-from ..settings import Settings, choose_step
+from ..settings import Settings, choose_step, not_finite
 from ..sketch import Part, packed, sketch
 from ..start import Disturbance, settings_of_restart
 from ..trajectory import Trajectory
@@ -215,10 +215,7 @@ class _Run:
         fields = machine.fields
         if code == NOT_FINITE or not np.isfinite(fields.u.sum() + fields.q.sum()):
             at = machine.done * machine.scheme.step
-            self._stop(
-                f"the motion is no longer finite at t = {at:.6g} s (phase {stretch.name}): the step "
-                f"{machine.scheme.step:g} s is too large for this model or a load is absurd"
-            )
+            self._stop(not_finite(at, stretch.name, machine.scheme.step))
         return size
 
     def _renew(self) -> None:
