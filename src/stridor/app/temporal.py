@@ -49,6 +49,7 @@ def simulate(
     """The temporal approach: explicit dynamics with stick, slip and separation. Ctrl-C keeps what was computed."""
     from ..io.datasets import load_trajectory, save
     from ..study import analyses
+    from ..study.touching import case_decided_by_meshes
     from .output import progress_bar
 
     loaded = call.case()
@@ -63,6 +64,8 @@ def simulate(
     before = None if restart is None else load_trajectory(restart)
     if restart is not None and before is not None and path.exists() and path.samefile(restart):
         _check_records(loaded, before, path)
+
+    call.warn(case_decided_by_meshes(loaded, mu))
 
     def checkpoint(part: Trajectory) -> None:
         try:

@@ -23,6 +23,7 @@ PRESSED = 0.2
 # Half the nodes amid others differ from their neighbours by more than this part of the mean pressure: no picture of it.
 UNEVEN = 0.4
 LEAST_NODES = 8
+BY_MESHES = "so that the meshes decide what touches"
 # Of what facets leave of curved surfaces: smaller differences of gaps are rounding.
 FACETED = 1e-3
 # Nodes of a facet in the order of its outline; a centre is next to the middles.
@@ -71,22 +72,50 @@ def unexplained_patterns(system: System, normal_force: Array, gap: Array, active
             )
 
 
+def left_by_facets(system: System) -> Iterator[str]:
+    """A sentence for each surface contact that is open all over by what facets leave of curved surfaces."""
+    nodes = system.contact_nodes()
+    first = len(system.contacts)
+    for surface in system.surfaces:
+        gap = nodes.gap[first : first + surface.nodes.count]
+        first += surface.nodes.count
+        height = facet_height(surface)
+        if height and np.all((gap > 0.0) & (gap <= 2 * height)):
+            yield (
+                f"the facets of the curved surfaces of contact {surface.name} leave gaps up to {gap.max():.2g} m, so "
+                f"that nothing touches; {_remedy(surface, height)}"
+            )
+
+
+def facet_height(surface: SurfaceContact) -> float:
+    """How far [m] facets may be off the curved surfaces of a contact, 0 for flat ones."""
+    height = overlap_tolerance(surface.slave_position, -surface.location.normal, surface.master)
+    return height if height > 1e-8 * float(np.linalg.norm(np.ptp(surface.slave_position, axis=0))) else 0.0
+
+
+def _remedy(surface: SurfaceContact, height: float) -> str:
+    apart = np.abs(surface.location.gap)
+    # Also where every node lies on the master already: with adjust gaps count at nodes, not between them.
+    widest = max(1.1 * float(apart[apart <= height].max(initial=0.0)), 1e-3 * height)
+    return (
+        "let the nodes of both sides match, refine, or close such gaps and overlaps with "
+        f"contacts.{surface.name}.adjust = {widest:.2g}"
+    )
+
+
 def _open_by_mesh(surface: SurfaceContact, loaded: BoolArray, gap_before: Array, gap: Array) -> str:
     """A sentence where nodes stand open whose gaps are no larger than those that facets make of curved surfaces which
     fit: whether they touch is then decided by how the meshes lie to each other, not by the shapes."""
-    height = overlap_tolerance(surface.slave_position, -surface.location.normal, surface.master)
-    if height <= 1e-8 * float(np.linalg.norm(np.ptp(surface.slave_position, axis=0))):
+    height = facet_height(surface)
+    if not height:
         return ""  # flat
     beyond = gap_before - gap_before.min()
     count = int(np.sum(~loaded & (beyond > FACETED * height) & (beyond <= 2 * height) & (gap <= 2 * height)))
     if not count:
         return ""
-    apart = np.abs(surface.location.gap)
-    widest = 1.1 * float(apart[apart <= height].max(initial=0.0))
     return (
         f"contact {surface.name}: {count} of {surface.nodes.count} slave nodes stand open by no more than facets leave "
-        f"of curved surfaces ({height:.2g} m), so that the meshes decide what touches; let the nodes of both sides "
-        f"match, refine, or close such gaps and overlaps with contacts.{surface.name}.adjust = {widest:.2g}"
+        f"of curved surfaces ({height:.2g} m), {BY_MESHES}; {_remedy(surface, height)}"
     )
 
 

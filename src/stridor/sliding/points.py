@@ -122,10 +122,16 @@ def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: A
     if count and not active.any():
         names = ", ".join(c.name for c in system.contacts)
         raise AnalysisError(
-            f"no contact carries load in steady sliding (contacts: {names}): the loads pull the bodies "
-            "apart, or friction lifts them off at this coefficient; check the direction of the loads"
+            f"no contact carries load in steady sliding at {words_of_friction(mu)} (contacts: {names}): the loads pull "
+            "the bodies apart, or friction lifts them off at this coefficient; check the direction of the loads"
         )
     return SteadySliding(displacement, normal, speeds, sense, active, mu, residual)
+
+
+def words_of_friction(mu: Array) -> str:
+    """Friction coefficients (m,) of contacts, as in "μ = 0.3" or "μ = 0.1 … 0.3"."""
+    low, high = float(np.min(mu)), float(np.max(mu))
+    return f"μ = {low:g}" if f"{low:g}" == f"{high:g}" else f"μ = {low:g} … {high:g}"
 
 
 def _solve(system: System, force: Array, mu: Array, sense: Array, active: BoolArray) -> tuple[Array, Array, float]:

@@ -22,8 +22,8 @@ from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .equilibrium import Equilibrium, State, settle
 from .history import STILL, follow
-from .pattern import unexplained_patterns
-from .points import full_motion
+from .pattern import left_by_facets, unexplained_patterns
+from .points import full_motion, words_of_friction
 from .redundant import closed, redundant
 from .resultants import Balance, Resultant, balance, resultants
 
@@ -137,8 +137,13 @@ def steady_sliding_nodes(
     active = state.active & ((state.normal_force > 0.0) | nodes.kept)
     if nodes.count and not active.any():
         raise AnalysisError(
-            f"no contact carries load in steady sliding (contacts: {', '.join(nodes.names)}): the loads pull the "
-            "bodies apart, or friction lifts them off at this coefficient; check the direction of the loads"
+            f"no contact carries load in steady sliding at {words_of_friction(coefficient)} (contacts: "
+            f"{', '.join(nodes.names)}): "
+            + (
+                "; ".join(left_by_facets(system))
+                or "the loads pull the bodies apart, or friction lifts them off at this coefficient; check the "
+                "direction of the loads"
+            )
         )
     # What pulls by rounding does not pull.
     normal = np.where(nodes.kept, state.normal_force, np.maximum(state.normal_force, 0.0))

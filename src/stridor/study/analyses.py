@@ -37,7 +37,7 @@ from .fingerprint import changes_of, check_restart, fingerprint
 from .pressed import require_pressed_in_time
 from .provenance import provenance
 from .settings import phases_of, settings_of
-from .touching import LOOKS, held_elsewhere
+from .touching import LOOKS, decided_by_meshes, held_elsewhere
 
 __all__ = [
     "BodyModes",
@@ -113,7 +113,9 @@ def modes(
         result = result.lowest(case.modal.modes if count is None else count)
     notes = (*result.notes, *(() if system is None else taken_as_closed(system)))
     if check and system is not None:
+        single = float(result.mu[0]) if len(result.mu) == 1 else None
         notes = (*notes, *held_elsewhere(system, result.mu, _solver(case)))
+        notes = (*notes, *decided_by_meshes(system, single, _solver(case)))
     seconds = time.perf_counter() - started
     return replace(result, notes=notes, provenance=provenance(case, "modes", seconds, damped=damped))
 
@@ -282,6 +284,7 @@ def onsets(
     notes = (*result.notes, *(() if system is None else taken_as_closed(system)))
     if check and system is not None:
         notes = (*notes, *held_elsewhere(system, np.linspace(*result.friction_range, LOOKS), _solver(case)))
+        notes = (*notes, *decided_by_meshes(system, solver=_solver(case)))
     return replace(result, notes=notes, provenance=provenance(case, "onsets", time.perf_counter() - started))
 
 
@@ -431,7 +434,9 @@ def compare(
         kept=kept,
         finished=finished,
     )
-    return replace(result, provenance=provenance(case, "compare", time.perf_counter() - started, mu=chosen))
+    notes = dict.fromkeys((*result.notes, *(said for mu in chosen for said in decided_by_meshes(system, mu))))
+    seconds = time.perf_counter() - started
+    return replace(result, notes=tuple(notes), provenance=provenance(case, "compare", seconds, mu=chosen))
 
 
 @dataclass(frozen=True)

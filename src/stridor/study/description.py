@@ -75,7 +75,7 @@ def describe(case: Case) -> Description:
     }
     lines += [f"  parameter {name} = {parameter.value:g}" for name, parameter in case.parameters.items()]
     lines += [
-        f"  contact {name}: an interference of {contact.interference:g} m is pressed out"
+        f"  contact {name}: {_interference_words(contact.interference)}"
         for name, contact in case.contacts.items()
         if contact.interference
     ]
@@ -321,6 +321,12 @@ def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str
     lines.append(f"  {balance_words(steady)}")
     data["contact_patterns"] = list(steady.warnings)
     return lines
+
+
+def _interference_words(interference: float) -> str:
+    if interference > 0.0:
+        return f"an interference of {interference:g} m is pressed out"
+    return f"a negative interference, a gap of {-interference:g} m beside that of the meshes, which loads have to close"
 
 
 def balance_words(steady: SurfaceSliding) -> str:

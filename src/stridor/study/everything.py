@@ -250,7 +250,7 @@ def _large(
         shape_mode=mode,
         agreement=agreement,
         seconds=clock.seconds,
-        notes=(*temporal.notes, *notes),
+        notes=(*temporal.notes, *notes, *(() if steady is None else steady.warnings)),
         steady=steady,
         own=own,
         vector=vector,

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..case import Case
 from ..errors import AnalysisError
+from ..sliding.pattern import BY_MESHES, facet_height
 from ..sliding.surfaces import steady_sliding_nodes
-from ..system import System
+from ..system import System, build_system
 from ..typing import Array, BoolArray
 
 SMALL = 2000  # freedoms up to which an equilibrium costs next to nothing, and is solved between the ends too
@@ -39,6 +41,24 @@ def held_elsewhere(system: System, mus: Sequence[float] | Array, solver: str | N
         f"The {int(own.sum())} of {nodes.count} contact nodes that touch in steady sliding at the case's own friction "
         f"are held so at every μ; {'; '.join(told)}. Modes there are other ones: ask for that μ alone.",
     )
+
+
+def decided_by_meshes(system: System, mu: float | None = None, solver: str | None = None) -> tuple[str, ...]:
+    """What steady sliding warns of where the facets of curved surfaces decide what touches; nothing where all is flat,
+    and where there is no equilibrium, which the analysis says."""
+    if not any(surface.facets is not None and facet_height(surface) for surface in system.surfaces):
+        return ()
+    try:
+        return tuple(said for said in steady_sliding_nodes(system, mu=mu, solver=solver).warnings if BY_MESHES in said)
+    except AnalysisError:
+        return ()
+
+
+def case_decided_by_meshes(case: Case, mu: float | None = None) -> tuple[str, ...]:
+    """The same of a case, whose model is built only where boundaries of meshes are in contact."""
+    if not any("." in contact.master for contact in case.contacts.values()):
+        return ()
+    return decided_by_meshes(build_system(case, mu), mu)
 
 
 def _difference(system: System, mu: float, own: BoolArray, solver: str | None) -> str:

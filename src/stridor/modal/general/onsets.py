@@ -77,7 +77,9 @@ def general_onsets(
                 "nothing here depends on the friction coefficient: no factor of a matrix has mu in it and there are no "
                 "contacts; `stridor reduce --onsets NAME` solves for onsets along other parameters"
             )
-        return replace(result, completeness="No contact carries load in steady sliding, so nothing depends on mu.")
+        at = f"mu = {low if own is None else own:g}"
+        said = f"No contact carries load in steady sliding at {at}, where contacts are held, so nothing depends on mu."
+        return replace(result, completeness=said)
     ends = _ends(family, low, high, top)
     at_start, at_end = (tuple(end.values[unstable(family, end.values, top)].tolist()) for end in ends)
     result = replace(result, at_start=at_start, at_end=at_end)
