@@ -399,3 +399,19 @@ def test_no_code_that_is_kept_can_be_replaced_by_that_of_another_function():
         # Wrappers of parallel loops are called after an address in the process that compiled them: no name for two.
         weak = [name for name in weak if "__numba_parfor_gufunc_0x" not in name]
         assert not weak, f"{path.name}: {weak}"
+
+
+def test_a_file_that_is_dated_ahead_has_not_changed_for_ever(tmp_path: Path) -> None:
+    file = tmp_path / "module.py"
+    file.write_text("x = 1\n")
+    ahead = time.time() + 3e7
+    os.utime(file, (ahead, ahead))
+    found = Sources(str(tmp_path), (str(file),), "")
+    time.sleep(0.05)  # the system's clock of change times is coarse
+    moment = time.time_ns()
+    assert not found.changed_since(moment)
+    time.sleep(0.05)
+    file.write_text("x = 2\n")
+    os.utime(file, (ahead, ahead))
+    assert found.changed_since(moment)
+    assert Sources("", (str(tmp_path / "gone.py"),), "").changed_since(moment)

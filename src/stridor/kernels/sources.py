@@ -6,6 +6,7 @@ import hashlib
 import os
 import platform
 import sys
+import time
 import zipfile
 import zipimport
 from dataclasses import dataclass
@@ -41,8 +42,15 @@ class Sources:
 
     def changed_since(self, moment: int) -> bool:
         """Was any file written or put in place after a moment [ns since 1970]?"""
+        now = time.time_ns()
         try:
-            return any(max(s.st_mtime_ns, s.st_ctime_ns) > moment for s in map(os.stat, self.files))
+            for s in map(os.stat, self.files):
+                # Archives and copies may date a file ahead, for ever newer than any moment; the change time is kept by
+                # the system itself.
+                dated = s.st_mtime_ns if s.st_mtime_ns <= now else 0
+                if max(dated, s.st_ctime_ns) > moment:
+                    return True
+            return False
         except OSError:
             return True  # one is gone
 

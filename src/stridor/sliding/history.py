@@ -85,9 +85,11 @@ def _coefficients(nodes: ContactNodes, speed: Array, mu: float | None) -> tuple[
     sliding = nodes.friction_coefficients(speed) if mu is None else np.full(nodes.count, float(mu))
     sticking = np.empty(nodes.count)
     for k, law in enumerate(nodes.laws):
-        for v in np.unique(speed[nodes.owner == k]):
-            used = law if mu is None else law.scaled(float(mu), float(v))
-            sticking[(nodes.owner == k) & (speed == v)] = max(used.sticking, used.sliding(float(v)))
+        mine = np.flatnonzero(nodes.owner == k)
+        speeds, which = np.unique(speed[mine], return_inverse=True)
+        laws = [law if mu is None else law.scaled(float(mu), float(v)) for v in speeds]
+        limits = np.array([max(used.sticking, used.sliding(float(v))) for used, v in zip(laws, speeds, strict=True)])
+        sticking[mine] = limits[which]
     return sliding, sticking
 
 
