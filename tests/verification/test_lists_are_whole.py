@@ -9,7 +9,7 @@ import stridor as st
 from hidden_modes import MU_OF_BLOCK, entering_block
 from stridor.agreement import critical as bisecting
 from stridor.agreement.perturbation import Perturbation
-from stridor.agreement.result import judge
+from stridor.agreement.result import judge, likeness
 from stridor.errors import AnalysisError
 from stridor.modal import growing
 from stridor.study.countermeasures import rank_countermeasures
@@ -100,3 +100,12 @@ def test_measures_solved_again_count_what_entered_the_band(case: st.Case, monkey
     unsure = rank_countermeasures(case.with_({"modal.max_frequency_hz": 5000.0}), **settings)
     assert "Not checked" in unsure.warnings[0]
     assert any("Not checked" in cell for row in countermeasure_table(unsure).rows for cell in row.cells)
+
+
+def test_verdicts_on_nondimensional_models_can_be_read():
+    here = 1e-3 + 1.0j
+    sentence = judge(0.1, True, here, perturbation(1.01e-3 + 1.0j), 0.0, 0.01)[1]
+    assert sentence == "μ = 0.1: both unstable at 0.15915 Hz, growth 0.001000 against 0.001010 1/s (1 %)"
+    assert likeness("a", 0.159155, 0.9) == "a; the full run answers at 0.1592 Hz in its shape"
+    bench = judge(0.1, True, 637.84 + 54324.6j, perturbation(637.1 + 54324.6j), 0.0, 0.0012)[1]
+    assert bench == "μ = 0.1: both unstable at 8646.0 Hz, growth 637.8 against 637.1 1/s (0.12 %)"

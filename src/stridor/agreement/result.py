@@ -166,8 +166,9 @@ def _judged(
             f"{100 * rate:.2g} %"
         )
     return True, (
-        f"μ = {mu:g}: both unstable at {here.imag / (2 * np.pi):.1f} Hz, growth {here.real:.1f} against "
-        f"{perturbation.growth_rate:.1f} 1/s ({100 * rate:.2g} %)"
+        f"μ = {mu:g}: both unstable at {readable(here.imag / (2 * np.pi), 5, decimals=1)} Hz, growth "
+        f"{readable(here.real, 4, decimals=1)} against {readable(perturbation.growth_rate, 4, decimals=1)} 1/s "
+        f"({100 * rate:.2g} %)"
     )
 
 
@@ -176,7 +177,7 @@ def likeness(verdict: str, dominant: float | None, mac: float | None) -> str:
     if dominant is None or mac is None:
         return verdict
     how = "in its shape" if mac >= GOOD_MAC else f"in a shape that is no longer linear, MAC {mac:.2f}"
-    return f"{verdict}; the full run answers at {dominant:.0f} Hz {how}"
+    return f"{verdict}; the full run answers at {readable(dominant, 4, decimals=0)} Hz {how}"
 
 
 def overall(comparisons: Sequence[Comparison], critical: Critical, *, interrupted: bool) -> str:
