@@ -72,6 +72,18 @@ def leave() -> None:
     _stop_insisting()
 
 
+def gone() -> None:
+    """From here on a signal changes nothing, as nothing is left but to take the interpreter down.
+
+    It gives signals back to the system on its way, which would end the process by the signal and not with the exit code
+    that it has earned.
+    """
+    if _program.installed:
+        for number in STOPPING:
+            if signal.getsignal(number) is _handle:
+                signal.signal(number, signal.SIG_IGN)
+
+
 @contextlib.contextmanager
 def held() -> Generator[Held]:
     """A block that a first Ctrl-C does not interrupt: it looks at ``asked`` itself and says ``met`` when it ends early.

@@ -357,7 +357,7 @@ FILES = {
     "step": (
         FIRST_PHASE,
         "[temporal]\nstep = 0.0\n" + FIRST_PHASE,
-        "temporal.step: 0.0 – must be a number > 0 [s], the time step (left out: 0.9 of the stability limit)",
+        "temporal.step: 0.0 – must be a number > 0 [s], the time step (left out: a safe part of the stability limit)",
     ),
     "mu": (
         FIRST_PHASE,

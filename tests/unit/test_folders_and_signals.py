@@ -283,3 +283,51 @@ def test_a_folder_that_is_a_file_is_an_analysis_error_of_the_writer(tmp_path: Pa
     (tmp_path / "file").touch()
     with pytest.raises(AnalysisError, match="cannot write"):
         write_text(tmp_path / "file" / "a.txt", "")
+
+
+LEAVES = """
+import os, signal, sys
+import stridor.app.cli as cli
+
+number, own, kill = getattr(signal, sys.argv.pop(1)), os.getpid(), os.kill
+
+
+class Last:
+    def __del__(self):  # called when modules are taken down, after signals have been given back to the system
+        kill(own, number)
+
+
+last = Last()
+cli.main()
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize(("words", "code"), [(("--version",), 0), (("check", "missing.toml"), 2)])
+def test_a_signal_at_the_very_end_leaves_the_exit_code(
+    tmp_path: Path, name: str, words: tuple[str, ...], code: int
+) -> None:
+    done = in_child(LEAVES, name, *words, cwd=tmp_path)
+    assert done.returncode == code
+
+
+BEGINS = """
+import os, signal, sys
+
+
+class Early:
+    def find_spec(self, name, path=None, target=None):  # a signal while the command line is imported
+        if name == "typer":
+            os.kill(os.getpid(), getattr(signal, sys.argv[1]))
+
+
+sys.meta_path.insert(0, Early())
+from stridor.app.entry import main
+main()
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_while_the_program_is_imported_is_a_word(tmp_path: Path, name: str) -> None:
+    done = in_child(BEGINS, name, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (130, "stridor: interrupted\n")

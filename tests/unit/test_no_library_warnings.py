@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 from matplotlib.tri import Triangulation
 
+import stridor
 from stridor.case import loads, template_text
+from stridor.direct.dense import lu_factors
 from stridor.view.field_plots import without_flat
 
 PAD = [
@@ -110,3 +112,14 @@ def test_a_flat_triangle_inside_stays() -> None:
     corners, made = triangles(points)
     gone = without_flat(corners, made.neighbors, np.zeros(len(corners), dtype=bool), 0.05)
     assert not gone.any()
+
+
+def test_singular_matrices_give_no_warning_of_scipy() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        factors, _ = lu_factors(np.zeros((2, 2)))
+    assert not np.diag(factors).any()
+    # What warns is called in one place.
+    package = Path(stridor.__file__).parent
+    callers = [path.name for path in package.rglob("*.py") if "sl.lu_factor(" in path.read_text(encoding="utf-8")]
+    assert callers == ["dense.py"]

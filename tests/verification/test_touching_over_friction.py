@@ -52,3 +52,19 @@ def test_a_friction_without_steady_sliding_is_told() -> None:
     with pytest.raises(st.AnalysisError):
         st.steady_sliding(case, 0.6)
     assert "at μ = 0.6 there is no steady sliding" in st.modes(case, [0.0, 0.6]).notes[0]
+
+
+def test_where_in_a_range_there_is_no_equilibrium_is_told() -> None:
+    """A falling law asks for the equilibrium at each μ; the block tips over from about 0.5 on."""
+    case = block(1.0).with_(
+        {
+            "contacts.face.friction": {
+                "law": "hyperbolic", "coefficient": 0.2, "static_coefficient": 0.6, "delta": 2.0,
+            },
+        }
+    )  # fmt: skip
+    with pytest.raises(st.AnalysisError, match=r"can move freely .*; that is at μ = \d.*, of the range") as told:
+        st.onsets(case)
+    named = float(str(told.value).split("μ = ")[-1].split(",")[0])
+    with pytest.raises(st.AnalysisError):
+        st.steady_sliding(case, named)

@@ -48,7 +48,9 @@ def main() -> None:
     except KeyboardInterrupt:  # a second one, while the first was told
         code = interrupts.INTERRUPTED
     interrupts.leave()
-    sys.exit(_flushed(code))
+    code = _flushed(code)
+    interrupts.gone()
+    sys.exit(code)
 
 
 def _program() -> int:

@@ -368,7 +368,7 @@ class Temporal(Table):
     """[temporal]: settings of the simulation in time."""
 
     step: Positive | None = Field(
-        default=None, description="a number > 0 [s], the time step (left out: 0.9 of the stability limit)"
+        default=None, description="a number > 0 [s], the time step (left out: a safe part of the stability limit)"
     )
     beta2: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.5, le=1)] = Field(
         default=0.5, description="a number from 0.5 to 1, the scheme's numerical damping"

@@ -22,12 +22,13 @@ from ..threads import one_thread_if_small
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .assembled.problem import problem_of
 from .assembled.steady import Options
+from .assembled.whole import quadratic_of
 from .complex_modes import ComplexModes, Progress, complex_modes, undamped
 from .general.basis import AT_REST, GROWS, NOTHING
-from .general.family import quadratic_of
 from .onsets import Onsets, onsets
 from .quadratic import band_modes
 from .quadratic.polish import pairs
+from .quadratic.reach import searched
 
 AFFORDABLE = 60_000  # unknowns up to which the full problem is solved unasked
 ROWS = 5  # friction coefficients up to which every one is checked, of more the ends and the case's own
@@ -44,7 +45,7 @@ class Growing:
     """Growing modes of a band at one μ: λ (k,) [1/s], right (n, k) of unit norm, backward errors residual (k,).
 
     beside (l,): eigenvalues within rounding and a little below of the axis. complete: whether the search vouches for
-    there being no other; sentence: what speaks for that.
+    there being no other; sentence: what speaks for that. top [1/s]: how far the band had to be searched.
     """
 
     mu: float
@@ -54,6 +55,7 @@ class Growing:
     beside: ComplexArray
     complete: bool
     sentence: str
+    top: float
 
     @property
     def words(self) -> str:
@@ -78,9 +80,10 @@ def growing_modes(
     """
     options = options or Options()
     problem = problem_of(system if damped else undamped(system), touching_at, options, damped=damped)
-    top = 2 * np.pi * max_frequency_hz
+    whole = quadratic_of(problem, mu)
+    top = searched(whole, 2 * np.pi * max_frequency_hz)
     found = band_modes(
-        quadratic_of(problem, mu), max_frequency_hz, above=-BESIDE * top, still=quadratic_of(problem, 0.0),
+        whole, top / (2 * np.pi), above=-BESIDE * top, still=quadratic_of(problem, 0.0),
         solver=options.solver,
     )  # fmt: skip
     size = np.abs(found.values)
@@ -95,6 +98,7 @@ def growing_modes(
         found.values[~grows],
         found.completeness.complete,
         found.completeness.sentence,
+        top,
     )
 
 
@@ -112,9 +116,9 @@ def modes_grow(values: ComplexArray) -> str:
     return f"{text} without oscillating" if still == len(values) else f"{text}, {still} of them without oscillating"
 
 
-def missing(found: Growing, listed: ComplexArray, unstable: BoolArray, top: float) -> IntArray:
+def missing(found: Growing, listed: ComplexArray, unstable: BoolArray) -> IntArray:
     """Places (k,) of growing modes that are not among the eigenvalues ``listed`` (l,), of which some are unstable."""
-    ours, _ = pairs(found.values, listed[unstable], NEAR * top)
+    ours, _ = pairs(found.values, listed[unstable], NEAR * found.top)
     rest = np.setdiff1d(np.arange(len(found.values)), ours)
     # Growth so slow that one way of solving sees it and the other does not.
     stable = listed[~unstable & np.isfinite(listed)]
@@ -122,9 +126,9 @@ def missing(found: Growing, listed: ComplexArray, unstable: BoolArray, top: floa
     return rest[away > SAME * np.abs(found.values[rest])]
 
 
-def unconfirmed(found: Growing, listed: ComplexArray, unstable: BoolArray, top: float) -> int:
+def unconfirmed(found: Growing, listed: ComplexArray, unstable: BoolArray) -> int:
     """How many of the modes listed as unstable are none in the full problem."""
-    mine = listed[unstable]
+    mine, top = listed[unstable], found.top
     mine = mine[(mine.real > SAME * np.abs(mine)) & (np.abs(mine) > AT_REST * top)]
     # On the very border of the band a mode may count on one side only.
     mine = mine[mine.imag <= top * (1 - SAME)]
@@ -213,10 +217,10 @@ def checked_modes(
             found[row] = str(error)
     began = modes.branch
     for wider in WIDER:
-        if not _lacking(modes, found, max_frequency_hz):
+        if not _lacking(modes, found):
             break
         modes = _followed_from(system, modes, wider, max_frequency_hz, options) or modes
-    modes, alone = _with_columns(modes, found, max_frequency_hz)
+    modes, alone = _with_columns(modes, found)
     told = tuple(
         _sentence(modes, row, found.get(row), max_frequency_hz, began, alone.get(row, 0))
         for row in range(len(modes.mu))
@@ -236,7 +240,6 @@ def checked_onsets(
     options = options or Options()
     if not affordable(system):
         return replace(found, completeness=f"{UNCHECKED}: {_too_large(system)}.")
-    top = 2 * np.pi * found.max_frequency_hz
     try:
         ends = [
             growing_modes(system, mu, found.max_frequency_hz, touching_at=None, damped=damped, options=options)
@@ -245,7 +248,7 @@ def checked_onsets(
     except AnalysisError as error:
         return replace(found, completeness=f"{UNCHECKED}: {error}.")
     for wider in follow:
-        if not len(_not_in(ends[1], found.at_end, top)) and not found.unexplained:
+        if not len(_not_in(ends[1], found.at_end)) and not found.unexplained:
             break
         try:
             found = onsets(
@@ -254,7 +257,7 @@ def checked_onsets(
             )  # fmt: skip
         except AnalysisError:
             break
-    said = _ends_sentence(found, ends[0], ends[1], top)
+    said = _ends_sentence(found, ends[0], ends[1])
     start, end = (tuple(complex(v) for v in e.values) for e in ends)
     return replace(found, at_start=start, at_end=end, completeness=said)
 
@@ -263,20 +266,20 @@ def _too_large(system: System) -> str:
     return f"with {system.size} freedoms what grows is not sought anew in the full problem (up to {AFFORDABLE} it is)"
 
 
-def _not_in(found: Growing, known: tuple[complex, ...], top: float) -> IntArray:
+def _not_in(found: Growing, known: tuple[complex, ...]) -> IntArray:
     values = np.array(known, dtype=complex)
-    return missing(found, values, np.ones(len(values), dtype=bool), top)
+    return missing(found, values, np.ones(len(values), dtype=bool))
 
 
-def _ends_sentence(found: Onsets, start: Growing, end: Growing, top: float) -> str:
+def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
     """What the full problem says of both ends, beside the onsets."""
     low, high = found.friction_range
     numbers = f"{start.words} at μ = {low:g} and {end.words} at μ = {high:g}, sought anew in the full problem"
     wrong: list[str] = []
     for growing, known, mu in ((start, found.at_start, low), (end, found.at_end, high)):
-        lacking = growing.values[_not_in(growing, known, top)]
+        lacking = growing.values[_not_in(growing, known)]
         values = np.array(known, dtype=complex)
-        extra = unconfirmed(growing, values, np.ones(len(values), dtype=bool), top)
+        extra = unconfirmed(growing, values, np.ones(len(values), dtype=bool))
         if len(lacking):
             named = ", ".join(f"{v.imag / (2 * np.pi):.6g} Hz (+{v.real:.4g} 1/s)" for v in lacking[:4])
             wrong.append(f"no branch was seen to lead to {named} at μ = {mu:g}")
@@ -306,10 +309,9 @@ def _rows(mu: Array, own: float | None) -> list[int]:
     return sorted(ends)
 
 
-def _lacking(modes: ComplexModes, found: dict[int, Growing | str], max_frequency_hz: float) -> bool:
-    top = 2 * np.pi * max_frequency_hz
+def _lacking(modes: ComplexModes, found: dict[int, Growing | str]) -> bool:
     return any(
-        len(missing(f, modes.eigenvalues[row], modes.unstable[row], top))
+        len(missing(f, modes.eigenvalues[row], modes.unstable[row]))
         for row, f in found.items()
         if isinstance(f, Growing)
     )
@@ -336,15 +338,14 @@ def _followed_from(
 
 
 def _with_columns(
-    modes: ComplexModes, found: dict[int, Growing | str], max_frequency_hz: float
+    modes: ComplexModes, found: dict[int, Growing | str]
 ) -> tuple[ComplexModes, dict[int, int]]:
     """With a column for each growing mode that no branch leads to, and how many those are by row."""
-    top = 2 * np.pi * max_frequency_hz
     alone: dict[int, int] = {}
     for row, growing in found.items():
         if isinstance(growing, str):
             continue
-        places = missing(growing, modes.eigenvalues[row], modes.unstable[row], top)
+        places = missing(growing, modes.eigenvalues[row], modes.unstable[row])
         if not len(places):
             continue
         alone[row] = len(places)
@@ -383,9 +384,8 @@ def _sentence(
         return f"{UNCHECKED} at this μ: what branches followed from μ = 0 give."
     if isinstance(found, str):
         return f"{UNCHECKED}: {found}."
-    top = 2 * np.pi * max_frequency_hz
     unstable = modes.unstable[row] & modes.in_band[row]
-    wrong = unconfirmed(found, modes.eigenvalues[row], unstable, top)
+    wrong = unconfirmed(found, modes.eigenvalues[row], unstable)
     said = f"{found.words} up to {max_frequency_hz:g} Hz"
     if wrong:
         return f"NOT CONFIRMED: {said} in the full problem, {wrong} fewer than branches do. {found.sentence}"
@@ -394,5 +394,7 @@ def _sentence(
         said += f", {entered} of which start{'s' if entered == 1 else ''} above it at μ = 0"
     if alone:
         said += f", {alone} of which no branch from μ = 0 was seen to lead to"
+    if slow := int(np.count_nonzero(unstable & (np.abs(modes.eigenvalues[row]) <= AT_REST * found.top))):
+        said += f" (beside {slow} of the list below {AT_REST * found.top / (2 * np.pi):.3g} Hz, not sought there)"
     lead = "Checked" if found.complete else "NOT COMPLETE"
     return f"{lead}: {said}, sought anew in the full problem. {found.sentence}"

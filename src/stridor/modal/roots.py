@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as sl
 
+from ..direct.dense import lu_factors
 from ..errors import AnalysisError
 from ..system.uncoupled import UncoupledModes
 from ..typing import Array, BoolArray, ComplexArray, IntArray
@@ -268,7 +269,7 @@ def dense_roots(spectrum: Spectrum, mu: float, limit: float) -> ComplexArray:
         mass, damping, stiffness = (left.T @ a @ right for a in (mass, damping, stiffness))
     shift = limit / 13
     n = len(mass)
-    factor = sl.lu_factor(shift**2 * mass + shift * damping + stiffness)
+    factor = lu_factors(shift**2 * mass + shift * damping + stiffness)
     companion = np.block(
         [
             [-sl.lu_solve(factor, 2 * shift * mass + damping), -sl.lu_solve(factor, mass) * shift],

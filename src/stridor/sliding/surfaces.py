@@ -125,9 +125,10 @@ def steady_sliding_nodes(
             break
         sign = found
     else:
+        hint = " or give them a finite stiffness" if np.any(nodes.compliance[nodes.kept] == 0.0) else ""
         raise AnalysisError(
             f"steady sliding: where contacts kept closed push and where they pull does not settle in {SIGN_CHANGES} "
-            "steps; lower the friction coefficient or give them a finite stiffness"
+            f"steps; with so much friction there may be no equilibrium: lower the friction coefficient{hint}"
         )
     residual = equilibrium.residual(state)
     _require_held(system, nodes, state, residual)

@@ -22,6 +22,8 @@ from ..errors import AnalysisError
 from ..system import System
 
 SAFE_FRACTION = 0.9  # of the limit, where no step is given
+RESOLVED = 0.157  # of the limit: 20 steps to the period that sets it, which comes out 0.4 % too short
+FEW = 60  # freedoms up to which every mode of a model without elements is meant
 
 
 class Scheme(NamedTuple):
@@ -51,6 +53,17 @@ class StepLimit:
     share: float = SAFE_FRACTION
 
 
+def share_of(system: System) -> float:
+    """The share of the limit that is taken where no step is given.
+
+    The limit of a mesh is set by modes of its elements that nobody asks for, far above those looked at. Of a few masses
+    and springs it is set by modes that are: close to it their frequencies come out up to 40 % too high, and flutter
+    between them is missed.
+    """
+    elements = bool(system.lines) or any(set(solid.cells) - {"vertex"} for solid in system.solids)
+    return SAFE_FRACTION if elements or system.size > FEW else RESOLVED
+
+
 def step_limit(system: System, beta2: float) -> StepLimit:
     """Courant limit √(2/β2)/ω_max of the assembled structure; contacts by multipliers do not lower it.
 
@@ -76,4 +89,5 @@ def step_limit(system: System, beta2: float) -> StepLimit:
             owners = [line.name for line in system.lines if np.isin(part[0], line.freedoms)]
             body = owners[0] if owners else "the system"
     omega = float(np.sqrt(worst))
-    return StepLimit(float(np.sqrt(2.0 / beta2) / omega) if omega > 0 else np.inf, omega, body)
+    step = float(np.sqrt(2.0 / beta2) / omega) if omega > 0 else np.inf
+    return StepLimit(step, omega, body, share_of(system))

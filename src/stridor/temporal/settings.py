@@ -16,7 +16,7 @@ from .machine import MODAL_LIMIT
 
 @dataclass(frozen=True)
 class Settings:
-    """How to march: step Δt [s] (None: 0.9 of the limit, 0.4 with circulatory forces), β2 in [0.5, 1], steps between
+    """How to march: step Δt [s] (None: `StepLimit.share` of the limit), β2 in [0.5, 1], steps between
     records, path, initial state, perturbation [m/s] of the slip speed (steady sliding only), watched points."""
 
     step: float | None = None

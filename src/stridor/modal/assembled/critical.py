@@ -20,6 +20,7 @@ from ...typing import BoolArray, ComplexArray
 from ..complex_modes import UNSTABLE_RELATIVE, grows, undamped
 from ..histories import Change, Entries, reported, unexplained
 from ..onset import Onset, Onsets
+from ..quadratic.reach import searched
 from .follow import Follower, State, halves
 from .local import Surroundings, axis_crossing, double_eigenvalue
 from .modes import samples
@@ -29,6 +30,7 @@ from .reduced import Eigenpairs, Reduced
 from .refine import BELIEVED, Band, projected, settle
 from .shifted import real_columns
 from .steady import Options
+from .whole import quadratic_of
 
 FOLLOW = 1.1  # times the band: from where branches are followed
 MOST_ABOVE = 1.25  # times that: onsets above the band are solved for up to there
@@ -61,9 +63,9 @@ def onsets_assembled(
     if not damped:
         system = undamped(system)
     problem = problem_of(system, None, options or Options(), damped=damped, frictions=np.linspace(0.0, high, 50))
-    top = 2 * np.pi * max_frequency_hz
     if not problem.nodes:
         return Onsets((), (low, high), max_frequency_hz, problem.damped, problem.open_contacts)
+    top = searched(quadratic_of(problem, high), 2 * np.pi * max_frequency_hz)
     # Modes that start above the band may meet inside it.
     reduced = projected(problem, Band(1, top * follow))
     settle(reduced, samples(high, SAMPLES))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sl
 
+from ...direct.dense import lu_factors
 from ...typing import ComplexArray
 from .reduced import Eigenpairs, Reduced
 
@@ -24,7 +25,7 @@ def refined(
         by_lambda = 2 * lam * mass + damping
         with np.errstate(all="ignore"):
             try:
-                factor = sl.lu_factor(matrix, check_finite=False)
+                factor = lu_factors(matrix, check_finite=False)
             except (sl.LinAlgError, ValueError):
                 return None
             z = sl.lu_solve(factor, by_lambda @ z, check_finite=False)
@@ -122,7 +123,7 @@ def double_eigenvalue(reduced: Reduced, mu: complex, lam: complex) -> tuple[comp
         whole = np.zeros((size + 1, size + 1), dtype=complex)
         whole[:size, :size] = scale * (lam**2 * mass + lam * damping + stiffness)
         whole[:size, size], whole[size, :size] = b, c
-        factor = sl.lu_factor(whole, check_finite=False)
+        factor = lu_factors(whole, check_finite=False)
         unit = np.zeros(size + 1, dtype=complex)
         unit[size] = 1.0
         x, y = (sl.lu_solve(factor, unit, trans=t, check_finite=False) for t in (0, 1))

@@ -13,11 +13,13 @@ from ...system import System
 from ...threads import one_thread_if_small
 from ...typing import Array, BoolArray
 from ..complex_modes import ComplexModes, Progress, require_memory, undamped
+from ..quadratic.reach import searched
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
 from .refine import BELIEVED, MARGIN, Band, left_vectors, projected, settle
 from .steady import Options
+from .whole import quadratic_of
 
 SAMPLES = 7
 
@@ -51,9 +53,10 @@ def complex_modes_assembled(
         system = undamped(system)
     single = float(values.max()) if len(values) == 1 else None
     problem = problem_of(system, single, options or Options(), damped=damped, frictions=values)
-    band = Band(count, None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz)
-    reduced = projected(problem, band)
     top = float(values.max())
+    asked = None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz
+    band = Band(count, None if asked is None else searched(quadratic_of(problem, top), asked))
+    reduced = projected(problem, band)
     settle(reduced, samples(top), left=vectors is True)
     values, planned = _settled(reduced, values, progress, left=vectors is True)
     found = _followed(reduced, values, band, damped=damped, vectors=vectors)

@@ -19,6 +19,7 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
+from ...direct.dense import lu_factors
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
 from .problem import ContactProblem, Extras, Varying
@@ -439,7 +440,7 @@ def _transposed_solve(factor: tuple[Any, Any], right: Any) -> Any:
 def _factor(matrix: Array) -> tuple[Array, Array]:
     if not np.all(np.isfinite(matrix)):
         raise AnalysisError("the projected contact problem is not finite; check the model's units and stiffnesses")
-    factor = sl.lu_factor(matrix)
+    factor = lu_factors(matrix)
     if np.abs(np.diag(factor[0])).min(initial=np.inf) == 0.0:
         raise AnalysisError("the projected contact problem is singular: a contact is given twice, or friction jams")
     return factor

@@ -91,11 +91,12 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
 
     ``left`` asks it of the left vectors too. Raises AnalysisError where they do not settle within BELIEVED.
     """
+    stuck: list[float] = []
     pending = list(dict.fromkeys(float(mu) for mu in frictions))
     worst: dict[float, float] = dict.fromkeys(pending, np.inf)
     for _ in range(SWEEPS):
         if not pending:
-            return
+            break
         for mu in list(pending):
             worst[mu], force, opening = unbalanced(reduced, mu, tolerance, left=left)
             if not force.shape[1] and not opening.shape[1]:
@@ -105,13 +106,16 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
                 continue
             force = principal(reduced.problem, force)
             grown = reduced.enrich_left(force, opening) if left else reduced.enrich(force)
-            if not grown:
+            if not grown:  # what is left is rounding: there is nothing to take in
                 pending.remove(mu)
-    stuck = [mu for mu in pending if worst[mu] > BELIEVED]
+                stuck.append(mu)
+                found = reduced.eigenpairs(mu)
+                reduced.keep(found.right[:, wanted(reduced, found)])
+    stuck = [mu for mu in (*stuck, *pending) if worst[mu] > BELIEVED]
     if stuck:
         raise AnalysisError(
             f"the modes at μ = {stuck[0]:g} do not settle: a backward error of {worst[stuck[0]]:.1e} is left; ask for "
-            "fewer modes or smaller friction coefficients"
+            "fewer modes, a lower modal.max_frequency_hz or smaller friction coefficients"
         )
 
 

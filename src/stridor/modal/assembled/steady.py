@@ -150,7 +150,10 @@ class Steadiness:
 
     def terms(self, mu: float) -> tuple[Array | None, Sparse | None, Sparse | None]:
         """Weakening d (m,) [N s/m], damping (n, n) and stiffness (n, n) at ``mu``, None where there is none."""
-        steady = steady_sliding_nodes(self.system, mu=mu, solver=self.solver)
+        try:
+            steady = steady_sliding_nodes(self.system, mu=mu, solver=self.solver)
+        except AnalysisError as error:
+            raise AnalysisError(f"{error}; that is at μ = {mu:g}, of the range that was asked for") from error
         weakening = damping = None
         if self.friction_damping and mu:
             # It holds the law's slope too.

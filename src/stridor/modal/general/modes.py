@@ -23,6 +23,7 @@ from ...typing import Array, ComplexArray
 from ..assembled.steady import Options
 from ..complex_modes import ComplexModes, Progress, require_memory
 from ..quadratic import band_modes
+from ..quadratic.reach import searched
 from .basis import DECAY, NOTHING
 from .family import Family, family_of
 from .numbers import Numbers, numbered
@@ -66,7 +67,7 @@ def general_modes(
     if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     family = _family(system_at, values, options or Options(), damped=damped, own=own)
-    top = 2 * np.pi * max_frequency_hz
+    top = searched(family.built(float(values.max())), 2 * np.pi * max_frequency_hz)
     values, found, planned = _each(family, values, top, progress, vectors=vectors)
     numbers = numbered(family, values, [f.values for f in found], top)
     table = _table(family, values, found, numbers, damped=damped, vectors=vectors)

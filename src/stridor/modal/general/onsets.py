@@ -23,6 +23,7 @@ from ..assembled.steady import Options
 from ..onset import Onset, Onsets
 from ..quadratic import Spectrum, band_modes
 from ..quadratic.polish import groups, pairs
+from ..quadratic.reach import searched
 from .basis import AT_REST, DECAY, GROWS, NOTHING, Along, Held, Projected, along, by_lambda, whole_or_raise
 from .family import Family, family_of
 from .follow import BEYOND, Followed, followed
@@ -70,7 +71,7 @@ def general_onsets(
     family = family_of(system_at, (low, high), options or Options(), damped=damped, own=low if own is None else own)
     state = family.contacts.contact_state
     result = Onsets((), (low, high), max_frequency_hz, family.dissipates, family.open_contacts, contact_state=state)
-    top = 2 * np.pi * max_frequency_hz
+    top = searched(family.built(high), 2 * np.pi * max_frequency_hz)
     if not family.depends:
         if not family.open_contacts:
             raise AnalysisError(

@@ -22,6 +22,7 @@ import scipy.sparse as sp
 
 from ...contact.nodes import ContactNodes
 from ...direct import Factor, SingularMatrix, factorise
+from ...direct.dense import lu_factors
 from ...sliding import full_motion
 from ...sliding.equilibrium import Equilibrium
 from ...system import System
@@ -132,7 +133,7 @@ class _Many:
         share = 1.0 - self.springs * compliance
         matrix = np.diag(compliance) + self.by_normal * share + self.by_slide * mu
         try:
-            dense = sl.lu_factor(matrix)
+            dense = lu_factors(matrix)
         except (ValueError, sl.LinAlgError) as error:
             raise SingularMatrix("the contacts' equations are not finite") from error
         forces = np.zeros(len(mu))

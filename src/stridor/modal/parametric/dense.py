@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sl
 
+from ...direct.dense import lu_factors
 from ...errors import AnalysisError
 from ...typing import Array, BoolArray, ComplexArray
 
@@ -55,7 +56,7 @@ def _by_companion(mass: Array, damping: Array, stiffness: Array, frequency: floa
     """Through the companion matrix, inverted at λ = frequency."""
     scaled_mass, scaled_damping = frequency**2 * mass, frequency * damping
     r = len(mass)
-    factor = sl.lu_factor(scaled_mass + scaled_damping + stiffness)
+    factor = lu_factors(scaled_mass + scaled_damping + stiffness)
     companion = np.zeros((2 * r, 2 * r))
     companion[:r, :r] = -sl.lu_solve(factor, scaled_damping + 2 * scaled_mass)
     companion[:r, r:] = -sl.lu_solve(factor, scaled_mass)
@@ -76,7 +77,7 @@ def _by_undamped(mass: Array, damping: Array, stiffness: Array, frequency: float
     What is left on both sides bounds the error, whose product is kept below SMALL of λ.
     """
     shift = frequency**2
-    factor = sl.lu_factor(stiffness + shift * mass)
+    factor = lu_factors(stiffness + shift * mass)
     theta, left, right = sl.eig(sl.lu_solve(factor, shift * mass), left=True, right=True)
     left = left.conj()
     left = sl.lu_solve(factor, left.real, trans=1) + 1j * sl.lu_solve(factor, left.imag, trans=1)
@@ -153,7 +154,7 @@ def _inverse_iteration(
     """λ, right and left vectors (r,) of one mode from those close by, by one factorisation."""
     mass, damping, stiffness = matrices
     beside = lam * (1 + OFF)
-    factor = sl.lu_factor(beside**2 * mass + beside * damping + stiffness)
+    factor = lu_factors(beside**2 * mass + beside * damping + stiffness)
     slope = 2 * lam * mass + damping
     for _ in range(2):
         z, w = sl.lu_solve(factor, slope @ z), sl.lu_solve(factor, slope.T @ w, trans=1)

@@ -8,11 +8,11 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from ...direct import factorise
+from ...direct.dense import lu_factors
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, IntArray
 from .problem import Quadratic
@@ -79,7 +79,7 @@ def log_det(problem: Quadratic, z: complex) -> complex:
     """Logarithm of det P(z), its imaginary part up to multiples of 2π."""
     matrix = sp.csc_array(problem.at(complex(z)), dtype=complex)
     if matrix.shape[0] <= DENSE:
-        factors, pivots = sl.lu_factor(matrix.toarray(), check_finite=False)
+        factors, pivots = lu_factors(matrix.toarray(), check_finite=False)
         diagonal, odd = np.diag(factors), int((pivots != np.arange(len(pivots))).sum()) % 2
     else:
         try:

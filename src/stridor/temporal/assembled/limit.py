@@ -38,7 +38,7 @@ from ...errors import AnalysisError
 from ...fe.assembly import connected_components
 from ...system import System
 from ...typing import Array, Sparse
-from ..beta2 import SAFE_FRACTION, StepLimit
+from ..beta2 import StepLimit, share_of
 from .damping import split_damping
 from .unsymmetric import halves
 
@@ -81,7 +81,7 @@ def step_limit_assembled(system: System, beta2: float) -> StepLimit:
         step = 0.5 / (beta2 * mode.margin * math.sqrt(max(mode.value, 0.0)))
         if step < best:
             best, body = step, _owner(system, int(np.argmax(np.abs(mode.vector))))
-    share = CIRCULATORY_SHARE if parts.circulatory.nnz else SAFE_FRACTION
+    share = min(share_of(system), CIRCULATORY_SHARE if parts.circulatory.nnz else np.inf)
     return StepLimit(best, omega, body, share)
 
 
