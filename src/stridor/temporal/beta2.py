@@ -23,7 +23,7 @@ from ..system import System
 
 SAFE_FRACTION = 0.9  # of the limit, where no step is given
 RESOLVED = 0.157  # of the limit: 20 steps to the period that sets it, which comes out 0.4 % too short
-FEW = 60  # freedoms up to which every mode of a model without elements is meant
+FEW = 60  # freedoms up to which every mode of masses and springs is meant
 
 
 class Scheme(NamedTuple):
@@ -60,8 +60,8 @@ def share_of(system: System) -> float:
     and springs it is set by modes that are: close to it their frequencies come out up to 40 % too high, and flutter
     between them is missed.
     """
-    elements = bool(system.lines) or any(set(solid.cells) - {"vertex"} for solid in system.solids)
-    return SAFE_FRACTION if elements or system.size > FEW else RESOLVED
+    masses = bool(system.solids) and all(set(solid.cells) == {"vertex"} for solid in system.solids)
+    return RESOLVED if masses and not system.lines and system.size <= FEW else SAFE_FRACTION
 
 
 def step_limit(system: System, beta2: float) -> StepLimit:
