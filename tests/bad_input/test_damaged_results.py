@@ -16,9 +16,9 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from tests.rubbing_block import rubbing_block
 
 import stridor as st
+from rubbing_block import rubbing_block
 from stridor.agreement.comparison import Agreement, Comparison
 from stridor.agreement.perturbation import Perturbation
 from stridor.io.result_files import accept, damage_told

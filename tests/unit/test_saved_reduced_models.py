@@ -25,7 +25,8 @@ from stridor.io import reduced_models
 from stridor.io.left_out import kept_in
 from stridor.io.reduced_models import provenance_of
 from stridor.io.seals import digest, text_digest
-from stridor.modal.parametric import Parameter, ParametricProblem, Term, onsets_along, reduce, verified
+from stridor.modal.general import onsets_along
+from stridor.modal.parametric import Parameter, ParametricProblem, Term, reduce, verified
 from stridor.modal.parametric.factors import CONSTANT, Formula, Product
 
 COARSE = {"bodies.beam1.elements": 6, "bodies.beam2.elements": 18}

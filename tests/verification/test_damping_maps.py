@@ -56,7 +56,7 @@ def test_a_reduced_map_is_the_full_one(maps):
 
 def test_what_a_reduced_map_says_of_its_onsets(maps):
     full, reduced = maps["full"], maps["reduced"]
-    assert (full.error, full.confirmed, full.notes) == (None, (), ())
+    assert (full.error, full.confirmed, full.notes) == (None, (), (damping_map.FOLLOWED,))
     # Every onset has an estimate, and those confirmed a residual and by how much they were off: less than estimated.
     assert np.all(reduced.error > 0)
     assert 4 <= len(reduced.confirmed) <= 6
@@ -185,6 +185,7 @@ def test_only_dampings_are_mapped_on_a_reduced_model(block, monkeypatch):
     assert found.notes == (
         "every point is searched in the full problem, there is no reduced model: method: 'reduced' – for dampings "
         "only, and materials.steel.density is none",
+        damping_map.FOLLOWED,
     )
 
 
@@ -192,7 +193,7 @@ def test_small_systems_are_searched_in_full(block, monkeypatch):
     monkeypatch.setattr(damping_full, "lowest_onset", lambda *_, **__: None)
     seen = []
     found = solve(block, X, Y, grid=(2, 3), progress=lambda *counts: seen.append(counts), **RANGES)
-    assert (found.method, found.notes) == ("full", ())
+    assert (found.method, found.notes) == ("full", (damping_map.FOLLOWED,))
     assert seen == [(k, 6) for k in range(1, 7)]
 
 

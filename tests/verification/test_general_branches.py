@@ -16,7 +16,7 @@ from stridor.errors import AnalysisError
 from stridor.modal import general
 from stridor.modal.assembled import Options
 from stridor.modal.general.basis import Projected, Whole, along
-from stridor.modal.general.family import Family
+from stridor.modal.general.family import SystemFamily
 from stridor.modal.general.follow import followed
 from stridor.system import build_system
 
@@ -149,7 +149,7 @@ def test_both_ways_to_eigenpairs_lead_along_the_same_branches(tmp_path: Path):
     """On a reduced model and by full solves, with rigid contact taken out of the one and kept in the other."""
     block = case(slider(space=False, stiffness="rigid"))
     system = build_system(block)
-    family = Family(lambda _: system, (0.0, 0.6), Options(), damped=True, own=0.2)
+    family = SystemFamily(lambda _: system, (0.0, 0.6), Options(), damped=True, own=0.2)
     assert family.eliminated is not None
     frequency = 2 * np.pi * 9e3
     source = along(family, frequency)

@@ -15,13 +15,13 @@ from solid_cases import bench_as_solids, case
 from stridor.case import load
 from stridor.errors import AnalysisError, CaseError
 from stridor.modal.complex_modes import complex_modes
+from stridor.modal.general import onsets_along
 from stridor.modal.onsets import onsets
 from stridor.modal.parametric import Parameter, ParametricProblem, Term, contact_parameters, craig_bampton, reduce
 from stridor.modal.parametric.basis import residual
 from stridor.modal.parametric.dense import _by_companion, dense_modes
 from stridor.modal.parametric.factors import Product
 from stridor.modal.parametric.full import verified
-from stridor.modal.parametric.onsets import onsets_along
 from stridor.study.reduced import parametric_problem, reduced_model
 from stridor.system import build_system
 

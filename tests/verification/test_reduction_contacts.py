@@ -14,7 +14,7 @@ from solid_cases import slider
 from stridor.case import Case, loads
 from stridor.modal.assembled import Options
 from stridor.modal.assembled.problem import problem_of
-from stridor.modal.parametric import onsets_along
+from stridor.modal.general import onsets_along
 from stridor.modal.parametric.contacts_equilibria import FEW, Equilibria
 from stridor.modal.parametric.contacts_steady import contacts_of
 from stridor.modal.parametric.full import verified

@@ -16,7 +16,8 @@ from .arguments import INFINITY, Call, numbers, pair, verb
 
 if TYPE_CHECKING:
     from ..case import Case
-    from ..modal.parametric import CorrectedModes, ParametricOnset, ReducedModel, ReducedModes
+    from ..modal.general import ParametricOnset, ParametricOnsets
+    from ..modal.parametric import CorrectedModes, ReducedModel, ReducedModes
     from ..typing import Array
 
 BOUND = 1e-8
@@ -74,7 +75,7 @@ def reduce(
     """Reduce the model once over ranges of its numbers, then solve anywhere in them within milliseconds."""
     from ..io.left_out import kept_in
     from ..io.reduced_models import is_reduced_file
-    from ..modal.parametric import onsets_along
+    from ..modal.general import onsets_along
 
     _check_file(save, keep)
     if is_reduced_file(call.path):
@@ -96,16 +97,18 @@ def reduce(
     for path in files:
         call.say(f"written: {path}")
     confirm = kept_in(model) == "all"
-    onsets: tuple[ParametricOnset, ...] = ()
+    onsets: ParametricOnsets | None = None
     if along is not None:
         onsets = onsets_along(model, along, _first(at or [], model, along), confirm=confirm, solver=chosen)
     if call.json:
-        found = [_onset(o) for o in onsets]
-        call.document(_about(model) | {"modes": points, "onsets": found, "files": [str(f) for f in files]})
+        document = _about(model) | {"modes": points, "onsets": [_onset(o) for o in onsets or ()]}
+        if onsets is not None:
+            document |= {"completeness": onsets.sentence, "complete": onsets.complete}
+        call.document(document | {"files": [str(f) for f in files]})
         return
     if points:
         _show_modes(model, points)
-    if along is not None:
+    if along is not None and onsets is not None:
         _show_onsets(model, along, onsets, confirmed=confirm)
     if not (at or along or save):
         call.say("next: --at mu=0.3 for modes, --onsets mu for onsets, --save model.npz to keep the model")
@@ -246,7 +249,9 @@ def _onset(onset: ParametricOnset) -> dict[str, Any]:
         "value": onset.value,
         "point": dict(onset.point),
         "frequency_hz": onset.frequency_hz,
+        "kind": onset.kind,
         "growth_slope": onset.growth_slope,
+        "square_root_coefficient": onset.square_root_coefficient,
         "stabilising": onset.stabilising,
         "residual": onset.residual,
         "reduced_value": onset.reduced_value,
@@ -303,22 +308,25 @@ def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
     table("Modes of the reduced model", heads, rows)
 
 
-def _show_onsets(model: ReducedModel, along: str, onsets: tuple[ParametricOnset, ...], *, confirmed: bool) -> None:
+def _show_onsets(model: ReducedModel, along: str, onsets: ParametricOnsets, *, confirmed: bool) -> None:
     from .output import stdout, table
 
     if not onsets:
         (own,) = (p for p in model.problem.parameters if p.name == along)
         top = model.frequency / (2 * np.pi)
         stdout.print(f"no onset along {along} in {own.low:g} … {own.high:g} up to {top:g} Hz", markup=False)
+        stdout.print(f"  {onsets.sentence}", markup=False)
         return
     how = "confirmed in the full model" if confirmed else "of the reduced model alone: its file has no full matrices"
     rows = [
         [
             f"{o.value:.9g}",
             f"{o.frequency_hz:.3f}",
+            o.kind,
             "stable" if o.stabilising else "unstable",
             "" if o.residual is None else f"{o.residual:.1e}",
         ]
         for o in onsets
     ]
-    table(f"Onsets along {along}, {how}", [along, "frequency [Hz]", "turns", "residual"], rows)
+    table(f"Onsets along {along}, {how}", [along, "frequency [Hz]", "kind", "turns", "residual"], rows)
+    stdout.print(f"  {onsets.sentence}", markup=False)

@@ -16,7 +16,8 @@ import numpy as np
 from ..case import Case
 from ..case.overrides import split_path
 from ..errors import AnalysisError, CaseError
-from ..modal.parametric import Parameter, ParametricOnset, ReducedModel, onsets_along
+from ..modal.general import ParametricOnset, onsets_along
+from ..modal.parametric import Parameter, ReducedModel
 from ..modal.parametric.contacts import ContactsProblem
 from ..modal.parametric.dense import assembled
 from ..modal.parametric.model import ReducedModes

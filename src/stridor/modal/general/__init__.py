@@ -6,5 +6,6 @@ problem solved for onsets, `passages` how guesses for it are found, `onsets` and
 
 from .modes import general_modes
 from .onsets import general_onsets
+from .parametric_onsets import ParametricOnset, ParametricOnsets, onsets_along
 
-__all__ = ["general_modes", "general_onsets"]
+__all__ = ["ParametricOnset", "ParametricOnsets", "general_modes", "general_onsets", "onsets_along"]

@@ -6,6 +6,7 @@ Up to 60 freedoms the basis is the unit matrix, beyond that a reduced model over
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -97,10 +98,59 @@ class Along(Reduced):
         )  # fmt: skip
 
 
-class Projected(Along):
-    """The family on a basis V (n, r), the same on both sides: a reduced model's, or all freedoms."""
+class OnBasis(Along):
+    """The family on a basis V (n, r), the same on both sides: its matrices and what they change by are small."""
 
     whole = False
+
+    @abstractmethod
+    def _changes(self, mu: float) -> tuple[Array, Any, Any]:
+        """dM, dD and dK over μ (r, r) at μ − low."""
+
+    def slopes(self, mu: float) -> tuple[Array, Array]:
+        """dD/dμ and dK/dμ (r, r); those of a mass that varies are in `tangents` alone."""
+        _, damping, stiffness = self._changes(mu)
+        return damping, stiffness
+
+    def tangents(
+        self, mu: float, coordinate: ComplexArray, values: ComplexArray, right: ComplexArray, left: ComplexArray
+    ) -> ComplexArray:
+        """dx/dμ (k,), x the coordinate."""
+        by_mass, by_damping, by_stiffness = self._changes(mu)
+        change = values**2 * expanded(by_mass, right) + values * expanded(by_damping, right)
+        change = change + expanded(by_stiffness, right)
+        mass, damping, _ = self.matrices(mu)
+        by_x = expanded(mass, right)
+        if self.problem.damped:
+            by_x = 2 * coordinate * by_x + expanded(damping, right)
+        with np.errstate(all="ignore"):
+            return -np.einsum("ij,ij->j", left, change) / np.einsum("ij,ij->j", left, by_x)
+
+    def null_vectors(self, lam: complex, mu: complex) -> tuple[ComplexArray, ComplexArray]:
+        """The vectors z and y (r,) that make P z and yᵀP all but zero."""
+        mass, damping, stiffness = self.matrices(mu)
+        matrix = lam**2 * mass + lam * damping + stiffness
+        size = abs(lam) ** 2 * np.abs(mass) + abs(lam) * np.abs(damping) + np.abs(stiffness)
+        # Rows may be zero altogether, where a load takes a stiffness away.
+        rows = np.maximum(size.max(axis=1), max(1e-16 * float(size.max()), 1e-300))
+        columns = np.maximum((size / rows[:, None]).max(axis=0), 1e-16)
+        u, _, v = sl.svd(matrix / rows[:, None] / columns)
+        return v[-1].conj() / columns, u[:, -1].conj() / rows
+
+    def eigenpairs(self, mu: float) -> Eigenpairs:
+        """All eigenpairs at ``mu`` with |λ| up to 1.8 times the frequency of interest."""
+        if mu not in self._known:
+            found = super().eigenpairs(mu)
+            if not self.family.reversible:
+                found = self.steadied(found)
+            elif not self.family.still:
+                found = self.turned(found)
+            self._known[mu] = self.moving(found)
+        return self._known[mu]
+
+
+class Projected(OnBasis):
+    """The basis is a reduced model's, or all freedoms; the matrices are those of the family's form."""
 
     def __init__(self, family: Family, frequency: float, model: ReducedModel | None) -> None:
         problem = _on_basis(family)
@@ -139,46 +189,6 @@ class Projected(Along):
         real = complex(there).imag == 0.0
         factors = [self._form[role].factors(there) for role in ROLES]
         return self._summed([f.real if real else f for f in factors])
-
-    def slopes(self, mu: float) -> tuple[Array, Array]:
-        """dD/dμ and dK/dμ (r, r); those of a mass that varies are in `tangents` alone."""
-        _, damping, stiffness = self._changes(mu)
-        return damping, stiffness
-
-    def tangents(
-        self, mu: float, coordinate: ComplexArray, values: ComplexArray, right: ComplexArray, left: ComplexArray
-    ) -> ComplexArray:
-        """dx/dμ (k,), x the coordinate."""
-        by_mass, by_damping, by_stiffness = self._changes(mu)
-        change = values**2 * expanded(by_mass, right) + values * expanded(by_damping, right)
-        change = change + expanded(by_stiffness, right)
-        mass, damping, _ = self.matrices(mu)
-        by_x = expanded(mass, right)
-        if self.problem.damped:
-            by_x = 2 * coordinate * by_x + expanded(damping, right)
-        with np.errstate(all="ignore"):
-            return -np.einsum("ij,ij->j", left, change) / np.einsum("ij,ij->j", left, by_x)
-
-    def null_vectors(self, lam: complex, mu: complex) -> tuple[ComplexArray, ComplexArray]:
-        """The vectors z and y (r,) that make P z and yᵀP all but zero."""
-        mass, damping, stiffness = self.matrices(mu)
-        matrix = lam**2 * mass + lam * damping + stiffness
-        size = abs(lam) ** 2 * np.abs(mass) + abs(lam) * np.abs(damping) + np.abs(stiffness)
-        rows = np.maximum(size.max(axis=1), 1e-300)
-        columns = np.maximum((size / rows[:, None]).max(axis=0), 1e-300)
-        u, _, v = sl.svd(matrix / rows[:, None] / columns)
-        return v[-1].conj() / columns, u[:, -1].conj() / rows
-
-    def eigenpairs(self, mu: float) -> Eigenpairs:
-        """All eigenpairs at ``mu`` with |λ| up to 1.8 times the frequency of interest."""
-        if mu not in self._known:
-            found = super().eigenpairs(mu)
-            if not self.family.reversible:
-                found = self.steadied(found)
-            elif not self.family.still:
-                found = self.turned(found)
-            self._known[mu] = self.moving(found)
-        return self._known[mu]
 
     def _changes(self, mu: float) -> tuple[Array, Any, Any]:
         return self._summed([self._form[role].slopes(self.family.low + float(np.real(mu))) for role in ROLES])

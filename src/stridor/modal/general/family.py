@@ -137,17 +137,17 @@ class Smooth:
         """Matrices and factors of M, D and K at μ in extended precision."""
         if self.form is None or not self.exact:
             problem = self.built(mu)
-            return [[(_wide(getattr(problem, role)), np.longdouble(1.0))] for role in ROLES]
+            return [[(wide(getattr(problem, role)), np.longdouble(1.0))] for role in ROLES]
         result: list[list[tuple[Sparse, Any]]] = []
-        for role, wide in zip(ROLES, self._wide_form, strict=True):
+        for role, matrices in zip(ROLES, self._wide_form, strict=True):
             factors = self.form[role].wide_factors(mu)
-            result.append([(m, f) for m, f in zip(wide, factors, strict=True) if m.nnz and f])
+            result.append([(m, f) for m, f in zip(matrices, factors, strict=True) if m.nnz and f])
         return result
 
     @cached_property
     def _wide_form(self) -> list[list[Sparse]]:
         assert self.form is not None, "asked for families that have one"
-        return [[_wide(m) for m in self.form[role].matrices] for role in ROLES]
+        return [[wide(m) for m in self.form[role].matrices] for role in ROLES]
 
     @property
     def exact(self) -> bool:
@@ -182,7 +182,7 @@ class Smooth:
                 columns[role].append(new)
                 form = Form(tuple(columns[role]), tuple(nodes[: k + 1]))
                 left = max(
-                    _away(_sum(form.matrices, form.factors(mu).real), true)
+                    away(_sum(form.matrices, form.factors(mu).real), true)
                     for mu, true in zip(tried, truth[role], strict=True)
                 )
                 if left < best[role][1]:
@@ -206,8 +206,8 @@ class Smooth:
             mass, damping, stiffness = ([getattr(q, role) for q in there] for role in ROLES)
         if not any(d.nnz and np.any(d.data) for d in damping):
             return True
-        potential = all(_away(m, sp.csr_array(m.T)) <= EXACT for m in (*mass, *stiffness))
-        return potential and all(_away(d, sp.csr_array(-d.T)) <= EXACT for d in damping)
+        potential = all(away(m, sp.csr_array(m.T)) <= EXACT for m in (*mass, *stiffness))
+        return potential and all(away(d, sp.csr_array(-d.T)) <= EXACT for d in damping)
 
     @cached_property
     def sizes(self) -> Array:
@@ -222,7 +222,7 @@ class Smooth:
     def dissipates(self) -> bool:
         """Whether anything works on velocities that is not gyroscopic."""
         mid = self.built(self.low + PROBES[0] * (self.high - self.low))
-        return _away(mid.damping, sp.csr_array(-mid.damping.T)) > EXACT
+        return away(mid.damping, sp.csr_array(-mid.damping.T)) > EXACT
 
     @cached_property
     def still(self) -> bool:
@@ -239,12 +239,34 @@ class Smooth:
             form = self.form[role]
             for k, matrix in enumerate(form.matrices):
                 if matrix.nnz:
-                    symmetric = _away(matrix, sp.csr_array(matrix.T)) <= EXACT
+                    symmetric = away(matrix, sp.csr_array(matrix.T)) <= EXACT
                     terms.append(Term(matrix, role, Weight(form.nodes[:k]), symmetric=symmetric))
         return ParametricProblem(tuple(terms), (Parameter(MU, self.low, self.high, (self.low + self.high) / 2),))
 
 
 class Family(Smooth):
+    """A quadratic problem over one number, and what solving it takes."""
+
+    def __init__(self, between: tuple[float, float], make: Callable[[float], Quadratic], options: Options) -> None:
+        super().__init__(between, make)
+        self.options = options
+
+    @property
+    def freedoms(self) -> int:
+        """Number of freedoms n; the forces of rigid contacts are unknowns beyond them."""
+        return self.size
+
+    def backward_error(self, mu: float, lam: complex, x: ComplexArray) -> float:
+        """Backward error of an eigenpair λ, x (n,) in the matrices as they are given at μ."""
+        return float(self.built(mu).backward_error(np.array([lam]), x[:, None])[0])
+
+    @property
+    def eliminated(self) -> tuple[Smooth, Elimination] | None:
+        """The problem with rigid contact taken out, and how; None where there is none."""
+        return None
+
+
+class SystemFamily(Family):
     """The quadratic problem of a system over μ in [low, high].
 
     system_at: the system at a μ, the same object where its matrices do not depend on μ. damped: with all of D, else
@@ -262,8 +284,8 @@ class Family(Smooth):
         own: float,
         touching_at: float | None = None,
     ) -> None:
-        super().__init__(between, lambda mu: self._damped(quadratic_of(self._problem(mu), mu)))
-        self.options, self._whole_damping = options, damped
+        super().__init__(between, lambda mu: self._damped(quadratic_of(self._problem(mu), mu)), options)
+        self._whole_damping = damped
         self._system_at = system_at
         first = system_at(own)
         # Contacts alone depend on μ by themselves; nothing needs to be built again.
@@ -288,7 +310,7 @@ class Family(Smooth):
             return False
         places = (self.low, self.high, *(self.low + p * (self.high - self.low) for p in PROBES))
         first = self.built(places[0])
-        return any(_away(getattr(first, role), getattr(self.built(p), role)) > 0 for p in places[1:] for role in ROLES)
+        return any(away(getattr(first, role), getattr(self.built(p), role)) > 0 for p in places[1:] for role in ROLES)
 
     @cached_property
     def eliminated(self) -> tuple[Smooth, Elimination] | None:
@@ -333,7 +355,7 @@ def family_of(
     damped: bool,
     own: float,
     touching_at: float | None = None,
-) -> Family:
+) -> SystemFamily:
     """The family from μ = 0, where branches get their numbers, or from the low end where factors have no value at 0."""
     low, high = between
     start = 0.0
@@ -342,10 +364,10 @@ def family_of(
             system_at(0.0)
         except CaseError:
             start = low
-    return Family(system_at, (start, high), options, damped=damped, own=own, touching_at=touching_at)
+    return SystemFamily(system_at, (start, high), options, damped=damped, own=own, touching_at=touching_at)
 
 
-def _wide(matrix: Sparse) -> Sparse:
+def wide(matrix: Sparse) -> Sparse:
     """A matrix whose products are taken in extended precision."""
     return sp.csr_array(matrix, dtype=np.longdouble)
 
@@ -360,7 +382,7 @@ def _sum(matrices: tuple[Sparse, ...], factors: Any) -> Sparse:
     return total
 
 
-def _away(one: Sparse, other: Sparse) -> float:
+def away(one: Sparse, other: Sparse) -> float:
     """Largest difference of two matrices, each entry over the largest of its row and column."""
     apart = sp.coo_array(one - other)
     if not apart.nnz or not np.any(apart.data):

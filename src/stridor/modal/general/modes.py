@@ -25,7 +25,7 @@ from ..complex_modes import ComplexModes, Progress, require_memory
 from ..quadratic import band_modes
 from ..quadratic.reach import searched
 from .basis import DECAY, NOTHING
-from .family import Family, family_of
+from .family import SystemFamily, family_of
 from .numbers import Numbers, numbered
 
 
@@ -76,7 +76,7 @@ def general_modes(
 
 
 def _each(
-    family: Family, values: Array, top: float, progress: Progress | None, *, vectors: bool | Literal["right"]
+    family: SystemFamily, values: Array, top: float, progress: Progress | None, *, vectors: bool | Literal["right"]
 ) -> tuple[Array, list[Found], int | None]:
     """The μ (k,), what is found at each, and how many there were to be where it was interrupted."""
     found: dict[int, Found] = {}
@@ -98,18 +98,18 @@ def _each(
 
 def _family(
     system_at: Callable[[float], System], values: Array, options: Options, *, damped: bool, own: float | None
-) -> Family:
+) -> SystemFamily:
     """The family up to the largest μ; one alone is also where the touching nodes are found."""
     low, high = float(values.min()), float(values.max())
     if high == 0.0:
         still = system_at(0.0)
-        return Family(lambda _: still, (0.0, 1.0), options, damped=damped, own=0.0, touching_at=0.0)
+        return SystemFamily(lambda _: still, (0.0, 1.0), options, damped=damped, own=0.0, touching_at=0.0)
     if len(values) == 1:
         return family_of(system_at, (high, high), options, damped=damped, own=high, touching_at=high)
     return family_of(system_at, (low, high), options, damped=damped, own=low if own is None else own)
 
 
-def _modes(family: Family, mu: float, top: float, *, left: bool) -> Found:
+def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> Found:
     spectrum = band_modes(
         family.built(mu), top / (2 * np.pi), above=-DECAY * top, still=family.built(family.low), left=left,
         solver=family.options.solver,
@@ -131,7 +131,7 @@ def _modes(family: Family, mu: float, top: float, *, left: bool) -> Found:
 
 
 def _table(
-    family: Family,
+    family: SystemFamily,
     mu: Array,
     found: list[Found],
     numbers: Numbers,

@@ -233,7 +233,7 @@ def _judged(
     family: Family, mu: float, lam: complex, x: ComplexArray, slope: float | None, square: float | None
 ) -> Root | None:
     """The root with its backward error in the matrices as the system gives them there; None where that is too large."""
-    residual = float(family.built(mu).backward_error(np.array([lam]), x[:, None])[0])
+    residual = family.backward_error(mu, lam, x)
     return Root(mu, lam, x, slope, square, residual) if residual <= BELIEVED else None
 
 

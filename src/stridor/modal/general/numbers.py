@@ -16,7 +16,7 @@ from ...typing import Array, ComplexArray, IntArray
 from ..assembled.follow import State
 from ..quadratic.polish import pairs
 from .basis import AT_REST, DECAY, Along, along, double_zeros
-from .family import Family
+from .family import SystemFamily
 from .follow import BEYOND, surely
 
 NEAR = 1e-4  # of the band: how far from its branch an eigenvalue may lie
@@ -30,7 +30,7 @@ class Numbers:
     sentence: str
 
 
-def numbered(family: Family, mu: Array, values: list[ComplexArray], top: float) -> Numbers:
+def numbered(family: SystemFamily, mu: Array, values: list[ComplexArray], top: float) -> Numbers:
     """Numbers of eigenvalues (k,) sorted by frequency at each of the friction coefficients ``mu``; 0 for those that say
     nothing new, of ±ε that rounding makes of a motion as a whole."""
     plain = [_by_frequency(v, top) for v in values]
@@ -60,7 +60,7 @@ def at_rest(values: ComplexArray, top: float) -> IntArray:
 
 
 @one_thread
-def _followed(family: Family, mu: Array, values: list[ComplexArray], top: float) -> Numbers:
+def _followed(family: SystemFamily, mu: Array, values: list[ComplexArray], top: float) -> Numbers:
     source = along(family, BEYOND * top)
     if source.whole and len(mu) == 1:
         raise AnalysisError("that takes full solves on the way from μ = 0, worth while for several μ only")

@@ -40,7 +40,7 @@ CLEARLY = 1.02  # times the band: passages beyond it are counted and not solved
 
 
 @dataclass(frozen=True)
-class _Found:
+class Found:
     """An onset with the branch it is on, counted from 0."""
 
     onset: Onset
@@ -81,16 +81,16 @@ def general_onsets(
         at = f"mu = {low if own is None else own:g}"
         said = f"No contact carries load in steady sliding at {at}, where contacts are held, so nothing depends on mu."
         return replace(result, completeness=said)
-    ends = _ends(family, low, high, top)
+    ends = ends_of(family, low, high, top)
     at_start, at_end = (tuple(end.values[unstable(family, end.values, top)].tolist()) for end in ends)
     result = replace(result, at_start=at_start, at_end=at_end)
     source = _checked(along(family, BEYOND * top), ends, top)
-    found, followed, complete = _solved(source, (low, high), ends, top, 1)
+    found, followed, complete = solved(source, (low, high), ends, top, 1)
     for beyond in (BEYOND, WIDER):
         if complete:
             break
         source = source if beyond == BEYOND else _checked(along(family, beyond * top), ends, top)
-        found, followed, complete = _solved(source, (low, high), ends, top, FINER)
+        found, followed, complete = solved(source, (low, high), ends, top, FINER)
     inside = [
         f.onset
         for f in found
@@ -107,7 +107,7 @@ def unstable(family: Family, values: ComplexArray, top: float) -> BoolArray:
     return (values.real > rounding * np.abs(values)) & (np.abs(values) > AT_REST * top)
 
 
-def _ends(family: Family, low: float, high: float, top: float) -> tuple[Spectrum, Spectrum]:
+def ends_of(family: Family, low: float, high: float, top: float) -> tuple[Spectrum, Spectrum]:
     """All modes of the band at both ends, in the full problem."""
     band, least, solver, still = top / (2 * np.pi), -DECAY * top, family.options.solver, family.built(low)
     return (
@@ -131,9 +131,9 @@ def _checked(source: Along, ends: tuple[Spectrum, Spectrum], top: float) -> Alon
     return whole_or_raise(family, source.frequency, "a reduced model lacks modes that the matrices have")
 
 
-def _solved(
+def solved(
     source: Along, between: tuple[float, float], ends: tuple[Spectrum, Spectrum], top: float, finer: int
-) -> tuple[list[_Found], Followed, bool]:
+) -> tuple[list[Found], Followed, bool]:
     """Onsets, and whether what grows at the ends is what they say."""
     family = source.family
     way = followed(source, *between, top, finer)
@@ -153,7 +153,7 @@ def _solved(
         if root is None:
             lost.append(passage)
             continue
-        one = _Found(_onset(source, passage, *root), passage.branch)
+        one = Found(_onset(source, passage, *root), passage.branch)
         if enters is not None and abs(root[0].lam.imag) > top:
             place = min(max(family.low + enters, one.onset.mu), between[1])
             one = replace(one, onset=replace(one.onset, enters_at=place))
@@ -221,7 +221,7 @@ def _same(one: Onset, other: Onset, family: Family) -> bool:
     return near and abs(one.frequency_hz - other.frequency_hz) <= 1e-7 * max(one.frequency_hz, 1e-300)
 
 
-def _opening(source: Along, end: Spectrum, state: State, top: float) -> list[_Found]:
+def _opening(source: Along, end: Spectrum, state: State, top: float) -> list[Found]:
     """Growth that begins at the very start, where nothing damps: of an eigenvalue that friction drives off the axis at
     once, or of equal ones that it splits (modes of bodies that turn into themselves)."""
     assert end.left is not None, "asked for at the low end"
@@ -230,7 +230,7 @@ def _opening(source: Along, end: Spectrum, state: State, top: float) -> list[_Fo
     problem = family.built(family.low)
     on_axis = (np.abs(values.real) <= NOTHING * np.abs(values)) & (np.abs(values) > AT_REST * top)
     places = np.flatnonzero(on_axis & (values.imag > 0))
-    result: list[_Found] = []
+    result: list[Found] = []
     for group in groups(values[places], ALIKE * top):
         mine = places[group]
         if family.reversible and len(mine) < 2:
@@ -253,7 +253,7 @@ def _opening(source: Along, end: Spectrum, state: State, top: float) -> list[_Fo
                 residual=float(end.residual[mine].max()), square_root_coefficient=None,
                 growth_slope=float(slope.real),
             )  # fmt: skip
-            result.append(_Found(onset, branch))
+            result.append(Found(onset, branch))
     return result
 
 

@@ -14,7 +14,7 @@ from ..assembled.critical import crossing as reduced_crossing
 from ..assembled.critical import pair_near
 from ..assembled.follow import Follower, State
 from ..assembled.passages import COMPLEX, Passage
-from .basis import AT_REST, GROWS, Along, Projected
+from .basis import AT_REST, GROWS, Along, OnBasis
 from .newton import Root, crossing, meeting, standstill
 
 TRIES = 12
@@ -55,7 +55,7 @@ def quiet() -> Generator[None]:
 def _guesses(source: Along, passage: Passage) -> Iterator[Guess]:
     """t, λ and vectors of the full problem, better and better."""
     if passage.kind == "crossing":
-        if isinstance(source, Projected):
+        if isinstance(source, OnBasis):
             with quiet():
                 found = reduced_crossing(source, passage)
             if found is not None:

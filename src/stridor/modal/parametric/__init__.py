@@ -6,7 +6,6 @@ from .correct import CorrectedModes, Corrector
 from .full import FullModes, verified
 from .model import ReducedModel, ReducedModes
 from .offline import reduce
-from .onsets import ParametricOnset, onsets_along
 from .problem import Parameter, ParametricProblem, Term
 
 __all__ = [
@@ -14,14 +13,12 @@ __all__ = [
     "Corrector",
     "FullModes",
     "Parameter",
-    "ParametricOnset",
     "ParametricProblem",
     "ReducedModel",
     "ReducedModes",
     "Term",
     "contact_parameters",
     "craig_bampton",
-    "onsets_along",
     "reduce",
     "verified",
 ]

@@ -1,0 +1,135 @@
+"""Onsets without following branches: where the number of growing modes changes, enclosed by halving.
+
+Branches that damping beyond critical tangles on the real axis cannot always be told apart; what grows at a value can.
+Between neighbours on a grid the growing modes are counted; where the numbers differ, or where slopes say that a mode
+crosses the axis between them, the interval is halved until one mode changes in it, and Newton solves for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...typing import BoolArray, ComplexArray
+from ..assembled.reduced import Eigenpairs
+from ..quadratic.polish import pairs
+from .basis import AT_REST, GROWS, NOTHING, OnBasis
+from .newton import Root, crossing, meeting, standstill
+
+GRID = 96
+SMALLEST = 1e-9  # of the range: no interval is halved further
+ALONE = 1e-4  # of the range: an interval in which one mode changes is short enough for Newton from here on
+STILL = 1e-3  # of the highest frequency: slower than that may be divergence
+EDGE = 1e-3  # of the highest frequency: modes that come in or leave there are no onsets
+
+
+@dataclass(frozen=True)
+class _Count:
+    """Eigenpairs at t and which of them grow."""
+
+    t: float
+    found: Eigenpairs
+    growing: BoolArray
+
+    @property
+    def number(self) -> int:
+        """How many grow."""
+        return int(self.growing.sum())
+
+
+def counted(source: OnBasis, top: float) -> tuple[list[Root], list[float]]:
+    """Onsets up to |λ| = top between t = 0 and 1, and where the number of growing modes changes for no reason found."""
+    roots, open_ends = list[Root](), list[float]()
+    ts = np.linspace(0.0, 1.0, GRID + 1)
+    before = _at(source, top, 0.0)
+    for t in ts[1:]:
+        after = _at(source, top, float(t))
+        for low, high in _changes(source, top, before, after):
+            root = _solved(source, top, low, high)
+            if root is not None:
+                roots.append(root)
+            elif not _at_edge(low, high, top):
+                open_ends.append(high.t)
+        before = after
+    return roots, open_ends
+
+
+def _at(source: OnBasis, top: float, t: float) -> _Count:
+    found = source.eigenpairs(t)
+    values = found.values
+    least = NOTHING if source.family.reversible else GROWS
+    grows = (values.real > least * np.abs(values)) & (np.abs(values) > AT_REST * top) & (np.abs(values) <= top)
+    return _Count(t, found, grows)
+
+
+def _changes(source: OnBasis, top: float, low: _Count, high: _Count) -> Iterator[tuple[_Count, _Count]]:
+    """Intervals in which the growing modes change by one, those that slopes foretell included."""
+    differs = low.number != high.number
+    width = high.t - low.t
+    if not differs and not _foretold(low, width, top) and not _foretold(high, -width, top):
+        return
+    if width <= SMALLEST or (width <= ALONE and abs(low.number - high.number) == 1):
+        if differs:
+            yield low, high
+        return
+    if width <= ALONE and not differs:
+        return
+    middle = _at(source, top, 0.5 * (low.t + high.t))
+    yield from _changes(source, top, low, middle)
+    yield from _changes(source, top, middle, high)
+
+
+def _foretold(at: _Count, step: float, top: float) -> bool:
+    """Whether a mode would cross the axis within a step if it were straight."""
+    lam, ahead = at.found.values, at.found.values + step * _rates(at.found)
+    inside = (np.abs(lam) <= top) & (np.abs(lam) > AT_REST * top) & np.isfinite(ahead)
+    return bool(np.any(inside & (np.abs(lam.real) > GROWS * np.abs(lam)) & ((lam.real > 0) != (ahead.real > 0))))
+
+
+def _rates(found: Eigenpairs) -> ComplexArray:
+    """dλ/dt (k,), where the coordinate may be λ²."""
+    with np.errstate(all="ignore"):
+        squared = ~np.isclose(found.coordinate, found.values, rtol=1e-9, atol=0.0)
+        rates: ComplexArray = np.where(squared, found.tangents / (2 * found.values), found.tangents)
+    return rates
+
+
+def _at_edge(low: _Count, high: _Count, top: float) -> bool:
+    """Whether what changes is a mode that passes the highest frequency while it grows."""
+    return any(
+        bool(np.any((np.abs(np.abs(one.found.values) / top - 1.0) <= EDGE) & (one.found.values.real > 0)))
+        for one in (low, high)
+    )
+
+
+def _solved(source: OnBasis, top: float, low: _Count, high: _Count) -> Root | None:
+    """The onset in an interval in which one mode begins or ceases to grow; None where none is found."""
+    family = source.family
+    more, fewer = (high, low) if high.number > low.number else (low, high)
+    mine, others = np.flatnonzero(more.growing), np.flatnonzero(fewer.growing)
+    known, _ = pairs(more.found.values[mine], fewer.found.values[others], 1e-2 * top)
+    fresh = np.setdiff1d(np.arange(len(mine)), known)
+    if not len(fresh):
+        fresh = np.arange(len(mine))
+    place = int(mine[fresh[np.argmin(more.found.values[mine[fresh]].real)]])
+    lam = complex(more.found.values[place])
+    x, y = more.found.right[:, place], more.found.left[:, place]
+    between = (low.t, high.t)
+    slack = 1e-6 + 2 * (high.t - low.t)
+    stabilising = more is low
+    def candidates() -> Iterator[Root | None]:
+        if abs(lam.imag) <= STILL * top:
+            yield standstill(family, more.t, x, y, between)
+        if not family.reversible:
+            yield crossing(family, more.t, lam, x, y, between)
+        yield meeting(family, more.t, lam, x, y, between)
+
+    for root in candidates():
+        if root is None or not low.t - slack <= root.mu <= high.t + slack:
+            continue
+        ends = root.slope < 0 if root.slope is not None else (root.square or 0.0) < 0
+        if ends == stabilising:
+            return root
+    return None

@@ -1,0 +1,157 @@
+"""Onsets along a parameter: closed forms, and random problems against dense eigenvalues on a grid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from stridor.modal.general import onsets_along, parametric_onsets
+from stridor.modal.parametric import Parameter, ParametricProblem, Term, reduce
+from stridor.modal.parametric.factors import CONSTANT, Product
+from stridor.typing import Array, ComplexArray
+
+pytestmark = pytest.mark.verification
+
+P = Product((("p", 1.0),))
+KINDS = ("circulatory", "gyroscopic", "both", "column", "overdamped")
+
+
+def problem(terms: list[tuple[Array, str, object]], high: float) -> ParametricProblem:
+    made = (Term(sp.csr_array(m), role, f, symmetric=bool(np.allclose(m, m.T))) for m, role, f in terms)
+    return ParametricProblem(tuple(made), (Parameter("p", 0.0, high, 0.1),))
+
+
+def along(terms: list[tuple[Array, str, object]], high: float, frequency: float):
+    return onsets_along(reduce(problem(terms, high), frequency / (2 * np.pi), bound=1e-9), "p")
+
+
+def eigenvalues(whole: ParametricProblem, p: float) -> ComplexArray:
+    full = whole.at({"p": p})
+    mass, damping, stiffness = (m.toarray() for m in (full.mass, full.damping, full.stiffness))
+    n = len(mass)
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
+    values = np.linalg.eigvals(state)
+    return values[values.imag >= 0]
+
+
+def test_two_undamped_modes_meet():
+    """Hoffmann's minimal model: K = [2, 1 − 4p/3; 1, 2], λ² = −2 ± √(1 − 4p/3), so that flutter begins at p = 3/4."""
+    friction = np.array([[0.0, -4 / 3], [0.0, 0.0]])
+    found = along([(np.eye(2), "mass", CONSTANT), (np.array([[2.0, 1.0], [1.0, 2.0]]), "stiffness", CONSTANT),
+                   (friction, "stiffness", P)], 1.5, 6.0)  # fmt: skip
+    (onset,) = found
+    assert onset.value == pytest.approx(0.75, rel=1e-12)
+    assert onset.frequency_hz == pytest.approx(np.sqrt(2) / (2 * np.pi), rel=1e-12)
+    assert (onset.kind, onset.stabilising, onset.growth_slope) == ("flutter", False, None)
+    # λ² ≈ −2 ± j √(4/3 (p − p_c)), so Re λ opens as √(4/3) / (2√2).
+    assert onset.square_root_coefficient == pytest.approx(np.sqrt(4 / 3) / (2 * np.sqrt(2)), rel=1e-9)
+    assert found.complete
+    assert found.sentence.startswith("Complete as far as both ends tell: in the reduced model 0 modes grow at p = 0 and 1 at")
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_a_column_that_buckles(damping: float):
+    """k − p < 0 diverges from p = k on, with damping or without."""
+    terms = [(np.eye(2), "mass", CONSTANT), (np.diag([1.0, 4.0]), "stiffness", CONSTANT), (-np.eye(2), "stiffness", P)]
+    if damping:
+        terms.append((damping * np.eye(2), "damping", CONSTANT))
+    found = along(terms, 5.0, 6.0)
+    assert [(o.kind, o.stabilising) for o in found] == [("divergence", False)] * 2
+    assert [o.value for o in found] == pytest.approx([1.0, 4.0], rel=1e-10)
+    assert [o.frequency_hz for o in found] == [0.0, 0.0]
+
+
+def test_divergence_that_ends_and_flutter_that_begins():
+    """(λ² + cλ)² + (4 − 2p)(λ² + cλ) + (1 − p)(3 − p) + s² p² = 0 with K = diag(1, 3) − p and circulatory s p: the constant
+    vanishes at 1 and 3 for s = 0; flutter follows the closed form of two modes with equal damping."""
+    c, s = 0.2, 0.6
+    terms = [(np.eye(2), "mass", CONSTANT), (c * np.eye(2), "damping", CONSTANT), (np.diag([1.0, 3.0]), "stiffness", CONSTANT),
+             (np.array([[-0.25, s], [-s, -0.25]]), "stiffness", P)]  # fmt: skip
+    found = along(terms, 6.0, 9.0)
+    # λ² + cλ + κ = 0 with κ = 2 − p/4 ± √(1 − s²p²): on the axis where Im κ² = c² Re κ, at rest where κ = 0.
+    p = np.linspace(0.0, 6.0, 2_000_001)
+    inside = np.sqrt((1 - (s * p) ** 2).astype(complex))
+    growth = [np.where(abs(k.imag) > 0, k.imag**2 - c**2 * k.real, -k.real) for k in (2 - p / 4 - inside,)]
+    expected = p[1:][np.diff(np.sign(growth[0])) != 0]
+    assert [o.value for o in found] == pytest.approx(expected, abs=1e-5)
+    assert found.complete
+
+
+def random_problem(seed: int) -> tuple[ParametricProblem, float]:
+    rng = np.random.default_rng(seed)
+    n, kind = int(rng.integers(6, 24)), KINDS[seed % len(KINDS)]
+    scale = 0.3 / np.sqrt(n)
+
+    def skew() -> Array:
+        a = scale * rng.standard_normal((n, n))
+        return a - a.T
+
+    mass = np.diag(rng.uniform(0.5, 2.0, n))
+    turn, root = np.linalg.qr(rng.standard_normal((n, n)))[0], np.sqrt(np.diag(mass))
+    stiffness = root[:, None] * (turn @ np.diag(rng.uniform(0.3, 3.0, n) ** 2) @ turn.T) * root
+    terms = [(mass, "mass", CONSTANT), (stiffness, "stiffness", CONSTANT)]
+    damping = 3.0 if kind == "overdamped" else rng.choice([0.0, 1e-3, 0.02, 0.3])
+    if damping:
+        alone = np.diag(rng.uniform(0.0, 1.0, n))
+        terms.append((damping * (alone if rng.random() < 0.5 else 0.3 * (mass + stiffness)), "damping", CONSTANT))
+    if kind in ("circulatory", "both", "overdamped"):
+        terms.append((skew() if rng.random() < 0.5 else scale * rng.standard_normal((n, n)), "stiffness", P))
+    if kind in ("gyroscopic", "both"):
+        terms.append((skew(), "damping", P if rng.random() < 0.5 else CONSTANT))
+    if kind == "column":
+        half = scale * rng.standard_normal((n, n))
+        load = half @ half.T
+        load *= rng.uniform(0.5, 3.0) / np.linalg.eigvalsh(load)[-1]
+        terms.append((-load + rng.choice([0, 1]) * scale * rng.standard_normal((n, n)), "stiffness", P))
+    return problem(terms, float(rng.uniform(0.5, 2.0))), float(rng.uniform(2.2, 4.0))
+
+
+def disagreement(seed: int) -> str:
+    """Where on a grid more or fewer modes grow than the onsets say; "" for nowhere. Not judged: values so near an onset
+    that growth may be rounding, and problems in which growing modes pass the highest frequency."""
+    whole, frequency = random_problem(seed)
+    model = reduce(whole, frequency / (2 * np.pi), bound=1e-9)
+    found = onsets_along(model, "p")
+    top, high, base = model.frequency, whole.parameters[0].high, None
+    for p in np.linspace(0.0, high, 81)[1:-1] + 1.234e-5:
+        values = eigenvalues(whole, float(p))
+        grows = values.real > 1e-6 * np.maximum(np.abs(values), 1e-3)
+        if np.any(grows & (np.abs(np.abs(values) / top - 1.0) < 0.1)):
+            return ""
+        count = int(np.sum(grows & (np.abs(values) <= top)))
+        said = sum(-1 if o.stabilising else 1 for o in found if o.value < p)
+        base = count - said if base is None else base
+        unsure = np.any((np.abs(values.real) <= 3e-5 * np.abs(values)) & (values.real > 1e-9 * np.abs(values)))
+        if not unsure and count - said != base:
+            return f"seed {seed}, {KINDS[seed % len(KINDS)]}: {count} grow at {p:.5f}, onsets say {said + base}: {found}"
+    return ""
+
+
+@pytest.mark.parametrize("first", range(0, 30, 5))
+def test_random_problems(first: int):
+    wrong = [words for seed in range(first, first + 5) if (words := disagreement(seed))]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(30, 2030, 100))
+def test_many_random_problems(first: int):
+    wrong = [words for seed in range(first, first + 100) if (words := disagreement(seed))]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("seed", [4, 9])
+def test_counting_gives_what_following_gives(seed: int, monkeypatch: pytest.MonkeyPatch):
+    """Where branches are told apart both ways lead to the same onsets."""
+    whole, frequency = random_problem(seed - 4)
+    model = reduce(whole, frequency / (2 * np.pi), bound=1e-9)
+    followed = onsets_along(model, "p")
+
+    def refuse(*_):
+        raise parametric_onsets.AnalysisError("not today")
+
+    monkeypatch.setattr(parametric_onsets, "solved", refuse)
+    counted = onsets_along(model, "p")
+    assert [o.value for o in counted] == pytest.approx([o.value for o in followed], rel=1e-9)
+    assert "Branches were not followed" in counted.sentence
