@@ -260,7 +260,7 @@ class Family(Smooth):
         """Backward error of an eigenpair λ, x (n,) in the matrices as they are given at μ."""
         return float(self.built(mu).backward_error(np.array([lam]), x[:, None])[0])
 
-    @property
+    @cached_property
     def eliminated(self) -> tuple[Smooth, Elimination] | None:
         """The problem with rigid contact taken out, and how; None where there is none."""
         return None
