@@ -17,6 +17,7 @@ from ..assembled.reduced import Eigenpairs
 from ..quadratic.polish import pairs
 from .basis import AT_REST, GROWS, NOTHING, OnBasis
 from .newton import Root, crossing, meeting, standstill
+from .onsets import growing_roots
 
 GRID = 96
 SMALLEST = 1e-9  # of the range: no interval is halved further
@@ -35,8 +36,8 @@ class _Count:
 
     @property
     def number(self) -> int:
-        """How many grow."""
-        return int(self.growing.sum())
+        """How many roots grow, of which a flutter pair is two."""
+        return growing_roots(self.found.values[self.growing])
 
 
 def counted(source: OnBasis, top: float) -> tuple[list[Root], list[float]]:
@@ -70,7 +71,7 @@ def _changes(source: OnBasis, top: float, low: _Count, high: _Count) -> Iterator
     width = high.t - low.t
     if not differs and not _foretold(low, width, top) and not _foretold(high, -width, top):
         return
-    if width <= SMALLEST or (width <= ALONE and abs(low.number - high.number) == 1):
+    if width <= SMALLEST or (width <= ALONE and _one(low, high)):
         if differs:
             yield low, high
         return
@@ -79,6 +80,13 @@ def _changes(source: OnBasis, top: float, low: _Count, high: _Count) -> Iterator
     middle = _at(source, top, 0.5 * (low.t + high.t))
     yield from _changes(source, top, low, middle)
     yield from _changes(source, top, middle, high)
+
+
+def _one(low: _Count, high: _Count) -> bool:
+    """Whether it is one flutter pair or one divergence that makes the difference."""
+    more, fewer = (high, low) if high.number > low.number else (low, high)
+    change = more.number - fewer.number
+    return change == 1 or (change == 2 and int(more.growing.sum()) == int(fewer.growing.sum()) + 1)
 
 
 def _foretold(at: _Count, step: float, top: float) -> bool:

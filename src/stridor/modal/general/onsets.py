@@ -107,6 +107,12 @@ def unstable(family: Family, values: ComplexArray, top: float) -> BoolArray:
     return (values.real > rounding * np.abs(values)) & (np.abs(values) > AT_REST * top)
 
 
+def growing_roots(values: ComplexArray) -> int:
+    """How many roots grow, of which a flutter pair is two and a motion that diverges one: a pair that meets on the real
+    axis and parts there is no onset."""
+    return int(np.sum(np.where(values.imag > 0, 2, 1)))
+
+
 def ends_of(family: Family, low: float, high: float, top: float) -> tuple[Spectrum, Spectrum]:
     """All modes of the band at both ends, in the full problem."""
     band, least, solver, still = top / (2 * np.pi), -DECAY * top, family.options.solver, family.built(low)
@@ -145,7 +151,7 @@ def solved(
             continue
         enters = None if passage.stabilising else way.entries.after(_concerned(passage), passage.low, np.inf)
         if _is_above(passage, CLEARLY * top) and enters is None:
-            balance += -1 if passage.stabilising else 1
+            balance += (-1 if passage.stabilising else 1) * (1 if passage.kind == "divergence" else 2)
             continue
         if passage.low <= OPENING * (family.high - family.low) and {passage.branch, passage.partner} & began:
             continue
@@ -159,9 +165,10 @@ def solved(
             one = replace(one, onset=replace(one.onset, enters_at=place))
         if not any(_same(one.onset, other.onset, family) for other in found):
             found.append(one)
-    balance += sum(-1 if f.onset.stabilising else 1 for f in found if between[0] <= f.onset.mu <= between[1])
+    inside = (f.onset for f in found if between[0] <= f.onset.mu <= between[1])
+    balance += sum((-1 if o.stabilising else 1) * (1 if o.kind == "divergence" else 2) for o in inside)
     explained = _explained(lost)
-    growing = [int(np.count_nonzero(unstable(family, state.values, top))) for state in (way.low, way.high)]
+    growing = [growing_roots(state.values[unstable(family, state.values, top)]) for state in (way.low, way.high)]
     fast = _throughout(family, (way.low, way.high), ends, top)
     agree = all(
         _agree(family, state, end, top, fast) for state, end in zip((way.low, way.high), ends, strict=True)
