@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
 _LONGEST_SHOWN = 60
 _LONGEST_PLACE = 400
+_LONG_WORD = re.compile(r"\S{400,}")
 _LONGEST_NUMBER = 10_000  # bits of a whole number that is written out
 _MOST_SHOWN = 100  # problems of one error that are printed
 
@@ -36,9 +38,11 @@ class Problem:
         where = self.where
         if len(where) > _LONGEST_PLACE:  # a key may be as long as its file
             where = f"{where[: _LONGEST_PLACE // 4]}…{where[-_LONGEST_PLACE // 4 :]}"
+        # A name read from a file may be as long as its line.
+        accepted = _LONG_WORD.sub(lambda word: f"{word[0][:100]}…{word[0][-100:]}", self.accepted)
         if self.given is None:
-            return f"{where}: {self.accepted}"
-        return f"{where}: {shown(self.given)} – {self.accepted}"
+            return f"{where}: {accepted}"
+        return f"{where}: {shown(self.given)} – {accepted}"
 
 
 class CaseError(StridorError):

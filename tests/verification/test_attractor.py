@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import stridor as st
 from stridor.app.cli import app
 from stridor.errors import AnalysisError, CaseError
-from stridor.temporal.attractor import settled, spread
+from stridor.temporal.attractor import _peaks, settled, spread
 from stridor.temporal.trajectory import ContactStatistics, PhaseResult, Trajectory
 from stridor.view.temporal_tables import contact_table, settled_table
 
@@ -38,12 +38,12 @@ def made(force, status, *, separated: float | None, step: float = 1e-3) -> Traje
 
 
 def pulses(peaks, factor=1.0):
-    """Before the first separation a spike of 1000 N; then for each peak p: open thrice, stick at p/2, slip at p, slip at
-    0.9 p."""
+    """Before the first separation a spike of 1000 N; then for each peak p: open twice, stick at p/2, slip at p, slip at
+    0.9 p, open."""
     force, status = [1000.0, 5.0], [1, 1]
     for p in peaks:
-        force += [0.0, 0.0, 0.0, 0.5 * factor * p, factor * p, 0.9 * factor * p]
-        status += [0, 0, 0, 1, 2, 2]
+        force += [0.0, 0.0, 0.5 * factor * p, factor * p, 0.9 * factor * p, 0.0]
+        status += [0, 0, 1, 2, 2, 0]
     return force, status
 
 
@@ -60,6 +60,15 @@ def test_averages_of_known_pulses_begin_with_the_first_separation():
     # Of 72 sorted values the 36th and 37th are 0 and 5; the fifth and fourth from above are a peak, 190/11, and 0.9 × 20.
     assert averages.quantile_50_normal_force == pytest.approx(2.5)
     assert averages.quantile_95_normal_force == pytest.approx(190 / 11 + 0.45 * (18.0 - 190 / 11))
+
+
+def test_peaks_cut_off_at_the_ends_of_the_record_are_none():
+    """A stretch above the mean whose beginning or end was not recorded may have had a larger force there."""
+    force = np.array([4.0, 0.0, 9.0, 8.0, 0.0, 0.0, 7.0, 0.0, 0.0, 5.0])
+    assert _peaks(force).tolist() == [9.0, 7.0]
+    assert _peaks(force[1:]).tolist() == [9.0, 7.0]
+    assert _peaks(force[:-1]).tolist() == [9.0, 7.0]
+    assert not len(_peaks(np.ones(5)))
 
 
 def test_few_peaks_have_no_mean_and_runs_that_stay_closed_nothing():

@@ -110,10 +110,11 @@ def settled(run: Trajectory) -> dict[str, Settled]:
 
 
 def _peaks(force: Array) -> Array:
-    """The largest value of each whole stretch above the mean."""
-    above = np.concatenate([[False], force > force.mean(), [False]])
-    turns = np.flatnonzero(above[1:] != above[:-1])
-    return np.array([force[a:b].max() for a, b in zip(turns[::2], turns[1::2], strict=True)])
+    """The largest value of each stretch above the mean that begins and ends within the record."""
+    above = force > force.mean()
+    turns = 1 + np.flatnonzero(above[1:] != above[:-1])
+    turns = turns[1 if above[0] else 0 :]
+    return np.array([force[a:b].max() for a, b in zip(turns[::2], turns[1::2], strict=False)])
 
 
 def spread(runs: Sequence[Trajectory], perturbation: float, seed: int) -> Spread:
