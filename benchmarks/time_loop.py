@@ -109,7 +109,7 @@ def main() -> None:
     press = [PhaseSpec("press", 2000 * settings.step, {}, {"clamp": 0.0})]
     simulate(system, press, settings)  # compile, or load from the cache
 
-    plain_steps = 5_000 if args.short else 50_000
+    plain_steps = 2_000 if args.short else 50_000
     load = system.loads["press"]
 
     def plain() -> tuple[float, float]:

@@ -92,6 +92,7 @@ def test_masses_that_the_time_loop_does_not_take(tmp_path: Path, call, mass, exp
     assert f"time loops do not: {expected}" in words
 
 
+@pytest.mark.slow
 def test_a_run_of_matrices_that_friction_only_makes_stiffer_is_fine(tmp_path: Path):
     """μ in symmetric matrices is a number like others."""
     terms = [(ONE, "mass", ""), (SPRINGS, "stiffness", ""), (ONE, "stiffness", "mu")]

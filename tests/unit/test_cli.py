@@ -315,6 +315,7 @@ def test_growth_from_steady_sliding_is_that_of_the_fastest_mode(folder: Path) ->
     assert data["growth_rate"] == pytest.approx(fastest, rel=0.01)
 
 
+@pytest.mark.slow
 def test_weakening_friction_is_taken_at_its_slip_speed(folder: Path) -> None:
     law = 'contacts.A.friction={law="weakening",coefficient=0.05,static_coefficient=0.15,decay_speed=0.02}'
     data = document(stridor("modes", "two-beams.toml", "--json", "--quiet", "--set", law, cwd=folder))
@@ -325,6 +326,7 @@ def test_weakening_friction_is_taken_at_its_slip_speed(folder: Path) -> None:
     assert all(onset["residual"] < 1e-8 for onset in found["onsets"])
 
 
+@pytest.mark.slow
 def test_two_contacts_with_different_friction_still_give_a_report(folder: Path) -> None:
     path = folder / "two-beams.toml"
     text = path.read_text(encoding="utf-8")
@@ -393,6 +395,7 @@ def test_reduce_says_that_it_keeps_damping(folder: Path) -> None:
     assert "note: modal.damped = false does not hold here" in stridor(*words, cwd=folder).stderr
 
 
+@pytest.mark.slow
 def test_what_a_change_would_do(folder: Path) -> None:
     found = document(
         stridor(

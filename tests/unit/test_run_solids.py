@@ -134,6 +134,7 @@ max_frequency_hz = 15e3
 """
 
 
+@pytest.mark.slow
 def test_a_block_slides_over_facets_in_space():
     case = st.loads(IN_SPACE)
     run = st.simulate(case)

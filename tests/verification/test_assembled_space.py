@@ -266,6 +266,7 @@ def test_finite_sliding_on_a_plane_is_small_sliding():
     assert np.abs(small.normal_force - large.normal_force).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_finite_sliding_round_a_cylinder():
     """Without friction a mass in a gutter swings as a pendulum of the gutter's radius, far beyond small angles."""
     from stridor.contact.obstacles import Cylinder

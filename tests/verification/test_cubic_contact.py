@@ -168,6 +168,7 @@ def test_modes_of_a_pad_have_the_stiffness_that_its_pressure_gives():
             assert np.nanmax(found.residual) < 1e-9
 
 
+@pytest.mark.slow
 def test_slopes_follow_the_stiffness_that_changes_with_the_load():
     case, path, step = loads(PAD), "loads.press.pressure", 1e3
     found = st.sensitivities(case, [path], mu=0.4, modes="all", count=2)

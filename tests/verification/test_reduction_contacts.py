@@ -116,6 +116,7 @@ def test_rigid_contact_on_a_slope():
     assert_is_the_full_solve(case, {"mu": (0.0, 0.5)}, 20e3)
 
 
+@pytest.mark.slow
 def test_a_body_between_two_others():
     """Its lower side is the slave of one contact, its upper side the master of another, finer one."""
     case = block("rigid", {
@@ -176,6 +177,7 @@ def test_equilibria_from_one_factorisation(space):
     many.free()
 
 
+@pytest.mark.slow
 def test_prestress_friction_stiffness_and_a_modulus_at_once():
     case = block(1e12, FALLING, SEVERE)
     box = {"mu": (0.1, 0.4), "contact_stiffness": (0.8, 1.25), "materials.steel.young_modulus": (190e9, 210e9)}
