@@ -224,6 +224,7 @@ def test_files_of_abaqus_name_freedoms_and_say_what_they_are(export: Export):
         st.build_system(case.with_({"bodies.block.terms": files}))
 
 
+@pytest.mark.slow
 def test_unsymmetric_terms_beside_contact_are_found_by_the_general_solver(export: Export):
     """A skew part too small to matter takes the other way to the same modes, with penalty and rigid contact."""
     n = len(export.freedoms)

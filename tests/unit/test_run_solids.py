@@ -79,6 +79,7 @@ def test_steady_and_shapes_write_pictures_and_files(case: Path):
     assert "--branch: 999" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_slider_that_really_moves_carries_the_block_over_its_elements():
     text = BLOCK.replace("sliding = { velocity = [1.0, 0.0] }\n", "")
     text = text.replace('fixed = ["x", "y"]', 'fixed = ["x", "y"]\nvelocity = { x = 2.0 }')

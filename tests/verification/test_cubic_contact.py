@@ -156,6 +156,7 @@ def dense(case: st.Case, mu: float) -> np.ndarray:
     return values[np.argsort(values.imag)]
 
 
+@pytest.mark.slow
 def test_modes_of_a_pad_have_the_stiffness_that_its_pressure_gives():
     case = loads(PAD)
     for values in ([0.4], [0.1, 0.3]):  # alone, and along branches with the nodes of 0.4, which all touch

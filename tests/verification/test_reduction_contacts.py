@@ -145,7 +145,8 @@ def test_a_body_between_two_others():
     assert_same_onsets(case, model, 25e3)
 
 
-@pytest.mark.parametrize("stiffness", [pytest.param(1e12, marks=pytest.mark.slow), "rigid"])
+@pytest.mark.slow
+@pytest.mark.parametrize("stiffness", [1e12, "rigid"])
 def test_falling_friction_over_a_surface(stiffness):
     case = block(stiffness, FALLING)
     box = {"mu": (0.0, 0.4)} | ({} if stiffness == "rigid" else {"contact_stiffness": (0.5, 2.0)})
@@ -220,6 +221,7 @@ def test_own_friction_where_it_is_not_varied():
         assert (np.abs(full[:, None] - found).min(axis=1) / np.abs(full)).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_a_law_that_changes_its_shape():
     """How fast friction falls with speed is a number of the case that no matrix has but by steady sliding."""
     case = block("rigid", FALLING)
