@@ -951,7 +951,7 @@ def test_a_mass_matrix_that_is_not_diagonal() -> None:
         st.simulate(case)
     assert str(caught.value) == (
         "bodies: the temporal approach on assembled matrices needs a diagonal mass in every body; write "
-        'mass = "lumped" for beams and solids'
+        'mass = "lumped" for beams and solids, and import lumped mass matrices'
     )
 
 

@@ -109,8 +109,10 @@ def press_twice() -> None:
 
 
 @pytest.fixture
-def listening():
-    """Tests started in the background have Ctrl-C switched off."""
+def listening(monkeypatch):
+    """Tests started in the background have Ctrl-C switched off, and those before may have run the program in this
+    process, which insists on an interrupt until it is heard."""
+    monkeypatch.setattr(interrupts, "_program", interrupts._Program([]))
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
