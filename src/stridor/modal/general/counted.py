@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,10 +21,21 @@ from .newton import Root, crossing, meeting, standstill
 from .onsets import growing_roots
 
 GRID = 96
+ON_IT = 1e-6  # of the range: so near an onset growth may be rounding
 SMALLEST = 1e-9  # of the range: no interval is halved further
 ALONE = 1e-4  # of the range: an interval in which one mode changes is short enough for Newton from here on
 STILL = 1e-3  # of the highest frequency: slower than that may be divergence
 EDGE = 1e-3  # of the highest frequency: modes that come in or leave there are no onsets
+
+
+@dataclass(frozen=True)
+class Counted:
+    """Onsets; how many growing modes pass the highest frequency; agree: whether the growing roots at every value of the
+    grid are those that both say."""
+
+    roots: list[Root]
+    passed: int
+    agree: bool
 
 
 @dataclass(frozen=True)
@@ -40,21 +52,44 @@ class _Count:
         return growing_roots(self.found.values[self.growing])
 
 
-def counted(source: OnBasis, top: float) -> tuple[list[Root], list[float]]:
-    """Onsets up to |λ| = top between t = 0 and 1, and where the number of growing modes changes for no reason found."""
-    roots, open_ends = list[Root](), list[float]()
-    ts = np.linspace(0.0, 1.0, GRID + 1)
-    before = _at(source, top, 0.0)
-    for t in ts[1:]:
-        after = _at(source, top, float(t))
+def counted(source: OnBasis, top: float) -> Counted:
+    """Onsets up to |λ| = top between t = 0 and 1, and whether what grows at each value of the grid is what they say."""
+    roots = list[Root]()
+    passed = list[tuple[float, int]]()
+    grid = [_at(source, top, float(t)) for t in np.linspace(0.0, 1.0, GRID + 1)]
+    for before, after in pairwise(grid):
         for low, high in _changes(source, top, before, after):
             root = _solved(source, top, low, high)
             if root is not None:
-                roots.append(root)
-            elif not _at_edge(low, high, top):
-                open_ends.append(high.t)
-        before = after
-    return roots, open_ends
+                if not any(_same(root, other, top) for other in roots):
+                    roots.append(root)
+            elif _at_edge(low, high, top):
+                passed.append((high.t, high.number - low.number))
+    return Counted(roots, len(passed), _agree(grid, roots, passed))
+
+
+def _same(one: Root, other: Root, top: float) -> bool:
+    near = abs(one.mu - other.mu) <= 1e-8 and abs(one.lam - other.lam) <= 1e-7 * top
+    return near and ends(one) == ends(other)
+
+
+def _agree(grid: list[_Count], roots: list[Root], passed: list[tuple[float, int]]) -> bool:
+    """Whether as many roots grow at each value as at the first, with those that onsets and the highest frequency let in
+    and out in between; values that lie on an onset are not judged."""
+    changes = [(r.mu, (-1 if ends(r) else 1) * (2 if r.lam else 1)) for r in roots]
+    for at in grid:
+        if any(abs(at.t - mu) <= ON_IT for mu, _ in changes):
+            continue
+        said = grid[0].number + sum(change for t, change in changes if 0 < t < at.t)
+        said += sum(change for t, change in passed if t <= at.t)
+        if at.number != said:
+            return False
+    return True
+
+
+def ends(root: Root) -> bool:
+    """Whether growth ends there."""
+    return root.slope < 0 if root.slope is not None else (root.square or 0.0) < 0
 
 
 def _at(source: OnBasis, top: float, t: float) -> _Count:
@@ -137,7 +172,6 @@ def _solved(source: OnBasis, top: float, low: _Count, high: _Count) -> Root | No
     for root in candidates():
         if root is None or not low.t - slack <= root.mu <= high.t + slack:
             continue
-        ends = root.slope < 0 if root.slope is not None else (root.square or 0.0) < 0
-        if ends == stabilising:
+        if ends(root) == stabilising:
             return root
     return None

@@ -19,7 +19,8 @@ from ..onset import Onset
 from ..parametric import ReducedModel
 from ..parametric.basis import expanded
 from ..quadratic import Spectrum
-from .counted import GRID, counted
+from .counted import GRID, Counted, counted
+from .counted import ends as turns
 from .line import Line, OnTerms, of_model
 from .newton import Root, crossing, meeting, standstill
 from .onsets import FINER, ends_of, solved, unstable
@@ -89,41 +90,41 @@ def onsets_along(
     source = OnTerms(line, top, model.projected)
     source.settle()
     ends = ends_of(line, 0.0, 1.0, top)
-    found, complete, by_count = _found(source, ends, top)
+    found, complete, seen = _found(source, ends, top)
     inside = sorted((o for o in found if _counts(o, top)), key=lambda o: (o.mu, o.frequency_hz))
     full = Line(model.problem, parameter, point, Options(solver=solver)) if confirm else None
     tried = [(o, _confirmed(model, source, full, o) if full else _of(line, o, None)) for o in inside]
     onsets = [found for _, found in tried if found is not None]
-    said = _sentence(line, ends, inside, top, complete=complete, by_count=by_count)
+    said = _sentence(line, ends, inside, top, complete=complete, seen=seen)
     if len(onsets) < len(tried):
         lost = ", ".join(f"{line.value(o.mu):.6g} ({o.frequency_hz:.6g} Hz)" for o, found in tried if found is None)
         complete, said = False, f"Not confirmed in the full problem and left out: {parameter} = {lost}. {said}"
     return ParametricOnsets.of(sorted(onsets, key=lambda o: o.value), complete=complete, sentence=said)
 
 
-def _found(source: OnTerms, ends: tuple[Spectrum, Spectrum], top: float) -> tuple[list[Onset], bool, bool]:
-    """Onsets of the reduced problem, whether the modes that grow agree with them, and whether those were counted on a
-    grid instead of following branches."""
+def _found(source: OnTerms, ends: tuple[Spectrum, Spectrum], top: float) -> tuple[list[Onset], bool, Counted | None]:
+    """Onsets of the reduced problem, whether the modes that grow agree with them, and what was counted on a grid where
+    branches were not followed."""
     found: list[Onset] = []
     try:
         for finer in (1, FINER):
             ours, _, complete = solved(source, (0.0, 1.0), ends, top, finer)
             found = [f.onset for f in ours]
             if complete:
-                return found, True, False
+                return found, True, None
     except AnalysisError:
         # Branches cannot be told apart, as where damping is beyond critical. What grows does not depend on that.
         pass
-    roots, left = counted(source, top)
-    if found and (left or len(roots) <= len(found)):
-        return found, False, False
-    return [_as_onset(source, root) for root in roots], not left, True
+    seen = counted(source, top)
+    if found and not seen.agree:
+        return found, False, None
+    return [_as_onset(source, root) for root in seen.roots], seen.agree, seen
 
 
 def _as_onset(source: OnTerms, root: Root) -> Onset:
     return Onset(
         mu=root.mu, frequency_hz=abs(root.lam.imag) / (2 * np.pi), kind="flutter" if root.lam else "divergence",
-        damped=source.family.dissipates, stabilising=_turns(root), branches=(0, 0), residual=root.residual,
+        damped=source.family.dissipates, stabilising=turns(root), branches=(0, 0), residual=root.residual,
         square_root_coefficient=None if root.square is None else float(np.sqrt(abs(root.square))),
         growth_slope=root.slope,
     )  # fmt: skip
@@ -161,7 +162,7 @@ def _confirmed(model: ReducedModel, source: OnTerms, full: Line, onset: Onset) -
     between = max(s - NEAR, 0.0), min(s + NEAR, 1.0)
     for root in _roots(full, s, lam, x, y, between, onset):
         near = root is not None and abs(root.lam - lam) <= NEAR * max(abs(lam), 1e-3 * model.frequency)
-        if near and root is not None and _turns(root) == onset.stabilising:
+        if near and root is not None and turns(root) == onset.stabilising:
             return _of(full, onset, root)
     return None
 
@@ -177,22 +178,19 @@ def _roots(
     yield meeting(full, s, lam, x, y, between)
 
 
-def _turns(root: Root) -> bool:
-    """Whether growth ends there."""
-    return root.slope < 0 if root.slope is not None else (root.square or 0.0) < 0
-
-
 def _sentence(
-    line: Line, ends: tuple[Spectrum, Spectrum], found: Sequence[Onset], top: float, *, complete: bool, by_count: bool,
+    line: Line, ends: tuple[Spectrum, Spectrum], found: Sequence[Onset], top: float, *, complete: bool,
+    seen: Counted | None,
 ) -> str:  # fmt: skip
     first, last = (int(np.count_nonzero(unstable(line, end.values, top))) for end in ends)
     name = line.parameter.name
     low, high = (f"{line.value(s):g}" for s in (0.0, 1.0))
     counts = f"in the reduced model {first} modes grow at {name} = {low} and {last} at {high}"
-    if complete and by_count:
+    if complete and seen is not None:
+        passing = f", {seen.passed} passing the highest frequency while they grow" if seen.passed else ""
         return (
-            f"As many modes grow at each of {GRID + 1} values of {name} as the onsets say: {counts}. Branches were not "
-            "followed; growth that begins and ends again between two of these values may be missing."
+            f"As many modes grow at each of {GRID + 1} values of {name} as the onsets say{passing}: {counts}. Branches "
+            "were not followed; growth that begins and ends again between two of these values may be missing."
         )
     if complete:
         return f"Complete as far as both ends tell: {counts}, as the onsets say."
