@@ -16,6 +16,7 @@ from pathlib import Path
 GIB = 2**30
 # Environment variable: the largest file, and the most that a packed one may unfold to, in GiB.
 VARIABLE = "STRIDOR_READ_LIMIT"
+ZIP = b"PK\x03\x04"
 _SHARE = 4  # of the memory: what is read is turned into numbers while it is still there
 _LEAST = GIB
 # Readers at work, and the limit that was there before the first of them.
@@ -42,6 +43,19 @@ def irregular(path: Path, most: int | None = None) -> str | None:
         how = f"; a larger {VARIABLE} in the environment (GiB) allows it" if most is None else ""
         return f"has {size_words(found.st_size)}, and no more than {size_words(limit)} are read{how}"
     return None
+
+
+def is_reduced_file(path: Path) -> bool:
+    """Whether a file is meant to be a saved model: by its name, or as an archive, which no case file is."""
+    if path.suffix == ".npz":
+        return True
+    try:
+        if irregular(path):
+            return False
+        with path.open("rb") as stream:
+            return stream.read(len(ZIP)) == ZIP
+    except (OSError, ValueError):
+        return False
 
 
 def largest_file() -> int:

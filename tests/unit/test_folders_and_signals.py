@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import stridor as st
-from stridor.case.load import template_text
+from stridor.case import template_text
 from stridor.errors import AnalysisError, CaseError
 from stridor.io import claims
 from stridor.io.atomic import remove_remains, replacing, write_text

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import stridor as st
 from rubbing_block import rubbing_block
 from stridor.app.cli import app
-from stridor.case.load import template_text
+from stridor.case import template_text
 from stridor.errors import CaseError
 from stridor.study.fingerprint import changes_of
 from stridor.temporal.trajectory import Trajectory

@@ -46,10 +46,11 @@ def new(
 @verb(writes=False)
 def check(call: Call) -> None:
     """Validate a case and print the model in words: bodies, contacts, time step against its limit."""
+    loaded = call.case()
+
     from ..study.analyses import describe
     from .output import stdout
 
-    loaded = call.case()
     description = describe(loaded)
     call.warn(description.warnings)
     if call.out is not None:
@@ -72,12 +73,10 @@ def matrices(
 
     A matrix file by itself tells its size, symmetry, definiteness and the rank of what is not symmetric.
     """
-    from ..study.matrix_reports import matrix_reports
-    from .output import print_json, stdout
-
     if call.path.suffix.lower() != ".toml":
         from ..matrices.read import read_matrix
         from ..matrices.report import single_lines
+        from .output import print_json, stdout
 
         lines = single_lines(read_matrix(call.path, name, where="FILE"))
         if call.json:
@@ -85,7 +84,12 @@ def matrices(
         else:
             stdout.print("\n".join([f"{call.path}:", *(f"  {line}" for line in lines)]), markup=False)
         return
-    found = matrix_reports(call.case())
+    case = call.case()
+
+    from ..study.matrix_reports import matrix_reports
+    from .output import print_json, stdout
+
+    found = matrix_reports(case)
     text = [line for name, report in found.items() for line in (f"{name}:", *(f"  {x}" for x in report.lines()))]
     if call.out is not None:
         from ..io.atomic import write_text

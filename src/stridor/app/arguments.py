@@ -78,7 +78,9 @@ class Call:
 
     def case(self) -> Case:
         """The case in the file with overrides, its warnings printed and its folder claimed; settings without effect are
-        told with the results. Raises CaseError."""
+        told with the results. Raises CaseError.
+
+        A verb asks for it before it imports what it computes with: what is wrong with the file is said at once."""
         from ..case import load
 
         own = [] if self.solver is None else [f'modal.solver="{self.solver}"']

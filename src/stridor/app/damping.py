@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from .arguments import Call, pair, verb
@@ -37,11 +37,12 @@ def damping_map(
     ] = "auto",
 ) -> None:
     """The lowest onset over two dampings, and where more damping lowers it."""
+    loaded = call.case()
+
     from ..study.damping_map import damping_map as solve
     from ..view.sensitivity_plots import damping_map as draw
     from .output import progress_bar, stdout
 
-    loaded = call.case()
     ranges = pair(x_range, "--x-range"), pair(y_range, "--y-range")
     chosen: Any = method
     with progress_bar("damping map", quiet=call.quiet) as progress:
@@ -73,7 +74,7 @@ def _show(result: DampingMap) -> None:
     rows: list[list[str]] = []
     for i in range(nx):
         marks = ["".join(letter if where[i, j] else " " for letter, where in lowers) for j in range(ny)]
-        cells = [f"{mu:.6f}" if np.isfinite(mu) else "–" for mu in result.onset_mu[i]]
+        cells = [f"{mu:.6f}" if math.isfinite(mu) else "–" for mu in result.onset_mu[i]]
         rows.append([f"{result.x_values[i]:.4g}", *(f"{c} {m}" for c, m in zip(cells, marks, strict=True))])
     heads = ["x \\ y", *(f"{y:.4g}   " for y in result.y_values)]
     table(f"Lowest onset μ; x: {result.x}, y: {result.y}", heads, rows)
@@ -83,6 +84,8 @@ def _show(result: DampingMap) -> None:
 
 def _words(result: DampingMap) -> list[str]:
     """The lowest and the highest onset, and that without damping."""
+    import numpy as np
+
     low, high = result.mu_range
     known = np.isfinite(result.onset_mu)
     if not known.any():
@@ -104,6 +107,8 @@ def _words(result: DampingMap) -> list[str]:
 
 def _write(path: Path, result: DampingMap) -> Path:
     """One line for each point, all digits, under a line of heads; empty where there is nothing."""
+    import numpy as np
+
     from ..io.atomic import write_text
 
     text = io.StringIO()
@@ -124,7 +129,7 @@ def _write(path: Path, result: DampingMap) -> Path:
     tables = (result.onset_mu, result.frequency_hz, result.slope_x, result.slope_y, result.residual, error)
     for i, j in np.ndindex(result.onset_mu.shape):
         numbers = (float(t[i, j]) for t in tables)
-        cells = (repr(v) if np.isfinite(v) else "" for v in numbers)
+        cells = (repr(v) if math.isfinite(v) else "" for v in numbers)
         lines.writerow([repr(float(result.x_values[i])), repr(float(result.y_values[j])), *cells])
     write_text(path, text.getvalue())
     return path

@@ -22,10 +22,11 @@ def steady(
     ] = None,
 ) -> None:
     """Steady sliding: which nodes touch, resultants of each contact, pressure as pictures and ParaView files."""
+    loaded = call.case()
+
     from ..study.analyses import steady_sliding
     from .pictures import steady_document, write_steady
 
-    loaded = call.case()
     call.check_friction(mu)
     found = steady_sliding(loaded, mu)
     call.warn(found.warnings)
@@ -55,11 +56,12 @@ def shapes(
     gif: Annotated[bool, typer.Option("--gif", help="Also an animated GIF of each.")] = False,
 ) -> None:
     """Shapes of modes: picture, animated page, ParaView file, and where friction feeds them."""
+    loaded = call.case()
+
     from ..study.unit_warnings import resolution_warnings
     from .output import table
     from .pictures import write_shapes
 
-    loaded = call.case()
     call.check_friction(mu)
     call.warn(resolution_warnings(loaded))
     documents = write_shapes(loaded, call.folder, mu=mu, branches=branch or None, gif=gif)
@@ -92,12 +94,13 @@ def modes(
 ) -> None:
     """Complex modes at one or many friction coefficients, branches followed from μ = 0. Every unstable mode of the band
     up to modal.max_frequency_hz is among them."""
+    loaded = call.case()
+
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
     from .output import counting
     from .show_modes import show_modes
 
-    loaded = call.case()
     values = None if mu is None else numbers(mu, "--mu")
     call.check_friction(values)
     call.warn(resolution_warnings(loaded))
@@ -137,11 +140,12 @@ def onsets(
     undamped: Undamped = False,
 ) -> None:
     """Every critical friction coefficient in range: solved, not bracketed."""
+    loaded = call.case()
+
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
     from .show_modes import show_onsets
 
-    loaded = call.case()
     chosen = None if friction_range is None else pair(friction_range, "--range")
     call.check_friction(chosen, "--range")
     call.warn(resolution_warnings(loaded))

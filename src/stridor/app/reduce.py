@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
-import numpy as np
 import typer
 
 from ..errors import CaseError
+from ..reading import is_reduced_file
 from .arguments import INFINITY, Call, numbers, pair, verb
 
 if TYPE_CHECKING:
@@ -73,10 +75,6 @@ def reduce(
     ] = 3,
 ) -> None:
     """Reduce the model once over ranges of its numbers, then solve anywhere in them within milliseconds."""
-    from ..io.left_out import kept_in
-    from ..io.reduced_models import is_reduced_file
-    from ..modal.general import onsets_along
-
     _check_file(save, keep)
     if is_reduced_file(call.path):
         given = {"--box": box, "--set": call.set_, "--max-frequency": max_frequency, "--bound": bound}
@@ -87,6 +85,10 @@ def reduce(
         model = _made(origin, box or [], max_frequency, BOUND if bound is None else bound)
         seconds = sum(model.seconds.values())
         call.say(f"{model.problem.size} freedoms reduced to {model.size} in {seconds:.2f} s")
+
+    from ..io.left_out import kept_in
+    from ..modal.general import onsets_along
+
     for note in getattr(model.problem, "notes", ()):
         call.say(f"note: {note}")
     files = [] if save is None else [_saved(model, save, origin, keep)]
@@ -116,13 +118,16 @@ def reduce(
 
 def _check_file(save: Path | None, keep: str | None) -> None:
     """Before hours of work: that the model will find its place."""
-    from ..io.left_out import KEEPS
-
     if save is not None and save.suffix != ".npz":
         raise CaseError("--save", str(save), "a name that ends in .npz")
-    if keep is not None and keep not in KEEPS:
+    if keep is None:
+        return
+
+    from ..io.left_out import KEEPS
+
+    if keep not in KEEPS:
         raise CaseError("--keep", keep, f"one of {', '.join(KEEPS)}")
-    if keep is not None and save is None:
+    if save is None:
         raise CaseError("--keep", keep, "goes with --save FILE.npz")
 
 
@@ -200,8 +205,8 @@ def _points(model: ReducedModel, at: list[str], corrections: int, solver: str | 
     values = _values(at, model)
     corrector: Corrector | None = None
     found: list[dict[str, Any]] = []
-    for place in np.ndindex(*(len(v) for v in values.values())):
-        point = {name: v[k] for (name, v), k in zip(values.items(), place, strict=True)}
+    for place in product(*values.values()):
+        point = dict(zip(values, place, strict=True))
         reduced = model.modes(point)
         if corrections and not reduced.passed.all():
             corrector = corrector or Corrector(model, solver=solver)
@@ -233,7 +238,7 @@ def _about(model: ReducedModel) -> dict[str, Any]:
     return {
         "freedoms": model.problem.size,
         "size": model.size,
-        "max_frequency_hz": model.frequency / (2 * np.pi),
+        "max_frequency_hz": model.frequency / (2 * math.pi),
         "bound": model.bound,
         "parameters": [
             {"name": p.name, "low": p.low, "high": p.high, "value": p.value} for p in model.problem.parameters
@@ -313,7 +318,7 @@ def _show_onsets(model: ReducedModel, along: str, onsets: ParametricOnsets, *, c
 
     if not onsets:
         (own,) = (p for p in model.problem.parameters if p.name == along)
-        top = model.frequency / (2 * np.pi)
+        top = model.frequency / (2 * math.pi)
         stdout.print(f"no onset along {along} in {own.low:g} … {own.high:g} up to {top:g} Hz", markup=False)
         stdout.print(f"  {onsets.sentence}", markup=False)
         return

@@ -47,12 +47,13 @@ def simulate(
     ] = 0,
 ) -> None:
     """The temporal approach: explicit dynamics with stick, slip and separation. Ctrl-C keeps what was computed."""
+    loaded = call.case()
+
     from ..io.datasets import load_trajectory, save
     from ..study import analyses
     from ..study.touching import case_decided_by_meshes
     from .output import progress_bar
 
-    loaded = call.case()
     call.check_friction(mu)
     path = call.folder / "simulate.nc"
     if copies and restart is not None:
@@ -142,9 +143,10 @@ def compare(
 
     Each part is kept as soon as it is there; a second call on the same case takes what is finished. Ctrl-C prints it.
     """
+    loaded = call.case()
+
     from ..study import analyses
 
-    loaded = call.case()
     values = None if mu is None else numbers(mu, "--mu")
     call.check_friction(values)
     if critical is not None and only and critical != ("critical" in only):
@@ -189,10 +191,11 @@ def _kept(call: Call, case: Case) -> KeptParts:
 @verb(parts=("figures",))
 def run(call: Call, only: Only = None) -> None:
     """Everything: modes, onsets, simulate, compare, and the report. A second call takes what is finished in time."""
+    loaded = call.case()
+
     from .output import progress_bar, stdout
     from .pipeline import run as run_all
 
-    loaded = call.case()
     with progress_bar("simulate", quiet=call.quiet) as progress:
         outcome = run_all(
             loaded, call.folder, progress=progress, log=call.say, only=only, kept=_kept(call, loaded)

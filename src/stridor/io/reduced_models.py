@@ -29,7 +29,7 @@ from ..modal.parametric.contacts import ContactsProblem
 from ..modal.parametric.contacts_rigid import Elimination
 from ..modal.parametric.factors import Factor, factor_from_json
 from ..modal.parametric.problem import POWERS
-from ..reading import bounded, irregular, size_words
+from ..reading import ZIP, bounded, irregular, size_words
 from ..study.provenance import versions
 from .archive_reader import ArchiveReader, check_unfolded, whole_count
 from .atomic import replacing
@@ -42,7 +42,6 @@ SEAL = "sha256"  # of the header without it, which holds the hashes of all array
 HEADER = "header.json"
 MOST_HEADER = 2**28
 QUICK = 1  # compression: half the time of the usual 6, a tenth larger
-ZIP = b"PK\x03\x04"
 
 _NUMBERS = ("frequency", "constant", "bound", "solves", "whole")
 _ARRAYS = ("vectors", "projected", "right_sketch", "left_sketch")
@@ -101,19 +100,6 @@ def provenance_of(path: str | Path) -> dict[str, Any]:
         texts = {name: None if found[name] is None else str(found[name]) for name in ("title", "case", "case_sha256")}
         by = {str(name): str(version) for name, version in found["versions"].items()}
         return {"analysis": str(found["analysis"]), **texts, "versions": by, "created": str(found["created"])}
-
-
-def is_reduced_file(path: Path) -> bool:
-    """Whether a file is meant to be a saved model: by its name, or as an archive, which no case file is."""
-    if path.suffix == ".npz":
-        return True
-    try:
-        if irregular(path):
-            return False
-        with path.open("rb") as stream:
-            return stream.read(len(ZIP)) == ZIP
-    except (OSError, ValueError):
-        return False
 
 
 # -- writing ----------------------------------------------------------------------------------------------------------

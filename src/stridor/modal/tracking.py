@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from ..errors import AnalysisError
 from ..typing import BoolArray, ComplexArray, IntArray
@@ -128,7 +128,7 @@ class Tracker:
                 continue
             moved = (mu - old.mu) * np.where(np.isfinite(old.tangents), old.tangents, 0.0)
             predicted = old.roots + np.where(np.abs(moved) < 1e-3 * np.abs(old.roots), moved, 0.0)
-            rows, columns = linear_sum_assignment(np.abs(predicted[upper, None] - found))
+            rows, columns = scipy.optimize.linear_sum_assignment(np.abs(predicted[upper, None] - found))
             roots = np.array(old.roots)
             roots[upper[rows]] = found[columns]
             roots[lower] = np.conj(roots[twin_of])

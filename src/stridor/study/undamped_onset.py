@@ -16,8 +16,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import scipy
 import scipy.sparse as sp
-from scipy.optimize import brentq
 
 from ..direct import factorise
 from ..errors import AnalysisError
@@ -125,7 +125,7 @@ def _located(along: _Undamped, passage: Passage) -> tuple[float, float] | None:
 
     if not square(passage.low) > 0 > square(passage.high):
         return None
-    t = float(brentq(square, passage.low, passage.high, xtol=1e-13 * (along.high - along.low)))
+    t = float(scipy.optimize.brentq(square, passage.low, passage.high, xtol=1e-13 * (along.high - along.low)))
     x = float(pair(t)[0].real)
     return (t, x) if 0 < -x <= along.frequency**2 else None
 

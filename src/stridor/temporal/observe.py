@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-import scipy.signal as ss
+import scipy  # its module signal takes half a second, and is loaded when it is used
 
 from ..typing import Array, ComplexArray, Sparse
 
@@ -74,7 +74,7 @@ class LineShape:
     window: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        self.window = ss.get_window("hann", self.count)
+        self.window = scipy.signal.get_window("hann", self.count)
 
     def see(self, time: float, velocity: Array) -> None:
         """Add this instant."""

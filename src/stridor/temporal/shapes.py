@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy.signal as ss
+import scipy  # its module signal takes half a second, and is loaded when it is used
 
 from ..contact.interface import Rows
 from ..system import System
@@ -60,7 +60,7 @@ def operating_shape(
     if part.interrupted:
         raise KeyboardInterrupt
     velocity = part.velocity - part.velocity.mean(axis=0)
-    weights = ss.get_window("hann", len(part.time))
+    weights = scipy.signal.get_window("hann", len(part.time))
     turned = weights * np.exp(-2j * np.pi * frequency_hz * part.time)
     shape = np.einsum("t,twd->wd", turned, velocity) * 2 / weights.sum()
     where = {name: k for k, name in enumerate(part.watch_names)}

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its module signal takes half a second, and is loaded when it is used
 import scipy.linalg as sl
-import scipy.signal as ss
 
 from ..typing import Array, ComplexArray
 
@@ -61,7 +61,7 @@ _WIDTH = {"hann": 2.0, "boxcar": 1.21, "blackmanharris": 2.72, "flattop": 4.59} 
 def spectrum(signal: Array, sampling: float, *, window: str = "hann") -> Spectrum:
     """Amplitude spectrum of a real signal (k,) sampled every ``sampling`` [s], its mean taken off."""
     count = len(signal)
-    weights = ss.get_window(window, count)
+    weights = scipy.signal.get_window(window, count)
     values = np.abs(np.fft.rfft((signal - np.mean(signal)) * weights)) * 2 / weights.sum()
     spacing = 1.0 / (count * sampling)
     return Spectrum(np.fft.rfftfreq(count, sampling), values, window, spacing, _WIDTH.get(window, 2.0) * spacing)
@@ -81,7 +81,7 @@ def spectrogram(signal: Array, sampling: float, *, resolution_hz: float, window:
     """Short-time spectra with three quarters of overlap; resolution_hz sets the length of a piece."""
     size = int(min(len(signal), max(16, round(1.0 / (resolution_hz * sampling)))))
     hop = max(1, size // 4)
-    weights = ss.get_window(window, size)
+    weights = scipy.signal.get_window(window, size)
     pieces = np.lib.stride_tricks.sliding_window_view(signal, size)[::hop]
     values = np.abs(np.fft.rfft((pieces - pieces.mean(axis=1, keepdims=True)) * weights, axis=1))
     return Spectrogram(
@@ -95,7 +95,8 @@ def spectrogram(signal: Array, sampling: float, *, resolution_hz: float, window:
 def dominant_frequencies(spec: Spectrum, *, count: int = 5, floor: float = 1e-2) -> Array:
     """Frequencies [Hz] of the largest separate lines, strongest first, down to ``floor`` of the strongest."""
     apart = max(1, round(2 * spec.bandwidth_hz / spec.resolution_hz))
-    peaks, _ = ss.find_peaks(spec.amplitude, distance=apart, height=floor * float(spec.amplitude.max(initial=0.0)))
+    least = floor * float(spec.amplitude.max(initial=0.0))
+    peaks, _ = scipy.signal.find_peaks(spec.amplitude, distance=apart, height=least)
     strongest = peaks[np.argsort(spec.amplitude[peaks])[::-1]][:count]
     return np.array([_interpolated(spec.frequency_hz, spec.amplitude, int(k)) for k in strongest])
 
@@ -104,11 +105,11 @@ def envelope(signal: Array, sampling: float, frequency_hz: float, *, periods: fl
     """Time [s] and amplitude of the line at ``frequency_hz``, by demodulation over ``periods`` of it."""
     size = int(max(8, round(periods / (frequency_hz * sampling))))
     size = min(size, max(len(signal) // 3, 8))
-    weights = ss.get_window("hann", size)
+    weights = scipy.signal.get_window("hann", size)
     weights = weights / weights.sum() * 2
     time = np.arange(len(signal)) * sampling
     turned = (signal - np.mean(signal)) * np.exp(-2j * np.pi * frequency_hz * time)
-    values = np.abs(ss.fftconvolve(turned, weights, mode="valid"))
+    values = np.abs(scipy.signal.fftconvolve(turned, weights, mode="valid"))
     hop = max(1, size // 10)
     return (np.arange(len(values)) * sampling + size * sampling / 2)[::hop], values[::hop]
 
@@ -180,8 +181,8 @@ def low_passed(signal: Array, sampling: float, max_frequency_hz: float) -> Array
     # Kaiser's rule: (A − 8)/(2.285 Δω) taps for A dB over a transition of Δω.
     taps = int((STOP_DECIBELS - 8) / (2.285 * 2 * np.pi * 0.25 * max_frequency_hz * sampling)) | 1
     taps = min(taps, (len(signal) // 3) | 1)
-    low_pass = ss.firwin(taps, 1.125 * max_frequency_hz, window=STOP_BAND, fs=1.0 / sampling)
-    return np.asarray(ss.fftconvolve(signal - np.mean(signal), low_pass, mode="valid"))
+    low_pass = scipy.signal.firwin(taps, 1.125 * max_frequency_hz, window=STOP_BAND, fs=1.0 / sampling)
+    return np.asarray(scipy.signal.fftconvolve(signal - np.mean(signal), low_pass, mode="valid"))
 
 
 def components(signal: Array, sampling: float, *, max_frequency_hz: float, order: int = 80) -> Components:

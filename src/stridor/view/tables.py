@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from ..typing import Array
 
@@ -120,5 +120,5 @@ def assigned(cost: Array, limit: float) -> dict[int, int]:
     """Row → column with the least sum of costs, where having no partner costs ``limit``."""
     rows, columns = cost.shape
     padded = np.hstack([cost, np.full((rows, rows), limit)])
-    chosen, partners = linear_sum_assignment(padded)
+    chosen, partners = scipy.optimize.linear_sum_assignment(padded)
     return {int(i): int(j) for i, j in zip(chosen, partners, strict=True) if j < columns and cost[i, j] <= limit}

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ...errors import CaseError
 from ...system import System
@@ -215,7 +215,7 @@ def _root(call: Callable[[float], float], low: float, high: float) -> float | No
     if at_low * at_high > 0 or not np.isfinite(at_low * at_high):
         return None
     try:
-        return float(brentq(call, low, high, xtol=1e-14 * max(high, 1e-3), rtol=1e-14, maxiter=200))
+        return float(scipy.optimize.brentq(call, low, high, xtol=1e-14 * max(high, 1e-3), rtol=1e-14, maxiter=200))
     except RuntimeError:  # a jump, not a zero: two modes have changed places
         return None
 

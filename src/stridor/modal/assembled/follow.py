@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from ...typing import Array, BoolArray, ComplexArray, IntArray
 from .reduced import Eigenpairs, Reduced
@@ -117,7 +117,7 @@ def matched(reduced: Reduced, old: State, found: Eigenpairs, named: int, *, sure
         return None if surely else np.argmin(distance, axis=1)
     # Of two real values at the same distance the one that grows.
     scale = float(np.abs(found.coordinate).max(initial=1.0))
-    rows, columns = linear_sum_assignment(distance / scale - 1e-9 * found.coordinate.real / scale)
+    rows, columns = scipy.optimize.linear_sum_assignment(distance / scale - 1e-9 * found.coordinate.real / scale)
     place = np.zeros(len(distance), dtype=np.int64)
     place[rows] = columns
     if not surely:

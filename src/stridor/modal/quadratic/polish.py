@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 import scipy.linalg as sl
-import scipy.optimize as so
 
 from ...direct import SingularMatrix, factorise
 from ...typing import Array, ComplexArray, IntArray
@@ -79,7 +79,8 @@ def pairs(a: ComplexArray, b: ComplexArray, near: float = np.inf) -> tuple[IntAr
     away = np.abs(a[:, None] - b[None, :])
     # What is too far costs more than all others together, so that it never displaces a pair that belongs together.
     far = away > near
-    rows, columns = so.linear_sum_assignment(np.where(far, (near if np.isfinite(near) else 0.0) * (len(a) + 1), away))
+    dear = (near if np.isfinite(near) else 0.0) * (len(a) + 1)
+    rows, columns = scipy.optimize.linear_sum_assignment(np.where(far, dear, away))
     kept = ~far[rows, columns]
     return np.asarray(rows)[kept], np.asarray(columns)[kept]
 

@@ -7,14 +7,14 @@ import tomllib
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import CaseError
 from ..reading import irregular
-from .model import Case
 from .outsized import deep_line, outsized
-from .overrides import override
-from .points import choice
+
+if TYPE_CHECKING:
+    from .model import Case
 
 LARGEST = 2**24  # bytes of a case file; what is large lies in files of its own
 _POSITION = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\s*$")
@@ -60,6 +60,9 @@ def loads(
         raise CaseError(source, None, f"not valid TOML: {_readable(error)}") from None
     if not data and not overrides:
         raise CaseError(source, None, "empty; a case needs at least one table [bodies.NAME]")
+    from .model import Case  # half a second, which a file that is none does not wait for
+    from .overrides import override
+
     problems = override(data, overrides)
     problems = problems or outsized(data)
     if problems:
@@ -111,6 +114,8 @@ def templates() -> list[str]:
 def template_text(name: str) -> str:
     """The commented text of a template. Raises CaseError for a name that is not one of `templates()`."""
     if name not in templates():
+        from .points import choice
+
         raise CaseError("template", name, f"no such template{choice(name, templates(), 'there are')}")
     return (resources.files("stridor.case") / "templates" / f"{name}.toml").read_text(encoding="utf-8")
 
