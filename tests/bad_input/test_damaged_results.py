@@ -7,8 +7,6 @@ import itertools
 import os
 import shutil
 import socket
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +16,7 @@ import pytest
 import xarray as xr
 
 import stridor as st
+from program import stridor
 from rubbing_block import rubbing_block
 from stridor.agreement.comparison import Agreement, Comparison
 from stridor.agreement.perturbation import Perturbation
@@ -367,8 +366,7 @@ def test_the_command_line_tells_a_damaged_file(files, tmp_path):
     with h5py.File(path, "r+") as file:
         file["restart_state_segment"][...] = 10**9
     (tmp_path / "bench.toml").write_text(case("beams").text)
-    command = [sys.executable, "-m", "stridor.app.cli", "simulate", "bench.toml", "--restart", str(path)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    done = stridor("simulate", "bench.toml", "--restart", str(path), cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     assert "(restart_state_segment changed); compute it again" in done.stderr
     assert "Traceback" not in done.stderr

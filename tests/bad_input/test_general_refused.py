@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +10,7 @@ import pytest
 
 import stridor as st
 from matrix_cases import matrix_case
+from program import stridor
 from stridor.study.analyses import structured
 
 pytestmark = pytest.mark.bad_input
@@ -109,17 +107,12 @@ def test_too_large_for_full_solves(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_the_verbs_say_it_in_one_line(tmp_path: Path):
-    def stridor(*words: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "stridor.app.cli", words[0], "case.toml", *words[1:]]
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, env=environment)
-
     model(tmp_path)
-    done = stridor("simulate")
+    done = stridor("simulate", "case.toml", cwd=tmp_path)
     assert done.returncode == 1
     assert done.stderr.startswith("stridor: simulate: factors of imported matrices depend on mu")
     assert done.stderr.count("\n") == 1
-    done = stridor("onsets", "--json")
+    done = stridor("onsets", "case.toml", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["onsets"][0]["mu"] == pytest.approx(0.75, rel=1e-12)
     assert json.loads(done.stdout)["completeness"].startswith("Complete")

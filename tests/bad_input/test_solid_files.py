@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import numpy as np
 import pytest
 
 import stridor as st
+from program import stridor
 from stridor.case import Case, load
 from stridor.errors import CaseError
 from stridor.mesh import shapes
@@ -461,13 +460,6 @@ def test_a_file_of_too_many_freedoms(folder: Path, monkeypatch: pytest.MonkeyPat
 
 def test_the_command_line_says_the_same(folder: Path) -> None:
     (folder / "case.toml").write_text(PLANE.replace("FILE", "none.msh"))
-    done = subprocess.run(
-        [sys.executable, "-m", "stridor.app.cli", "check", "case.toml"],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    done = stridor("check", "case.toml", cwd=folder)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == f"stridor: bodies.slider.file: '{shown_path(folder / 'none.msh')}' – no such file\n"

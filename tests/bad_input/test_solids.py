@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import random
 import re
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -14,6 +12,7 @@ import numpy as np
 import pytest
 
 import stridor as st
+from program import stridor
 from stridor.case import loads, template_text
 from stridor.errors import AnalysisError, CaseError, StridorError
 from stridor.system import build_system
@@ -1003,12 +1002,6 @@ def test_a_body_that_flies_is_simulated() -> None:
 
 
 # -- the command line ----------------------------------------------------------------------------------------------------
-
-
-def stridor(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "stridor.app.cli", *words], cwd=cwd, capture_output=True, text=True, timeout=300, check=False
-    )
 
 
 def test_the_command_line_says_the_same(tmp_path: Path) -> None:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import stridor as st
+from program import stridor
 from rubbing_block import rubbing_block
 
 BLOCK = rubbing_block(
@@ -36,17 +34,6 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("solids") / "block.toml"
     path.write_text(BLOCK, encoding="utf-8")
     return path
-
-
-def stridor(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "stridor.app.cli", *words],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-    )
 
 
 def test_everything_ends_in_a_report(case: Path):

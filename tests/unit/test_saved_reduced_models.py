@@ -19,6 +19,7 @@ import pytest
 import scipy.sparse as sp
 
 import stridor as st
+from program import stridor
 from stridor.app.cli import main
 from stridor.case import template_text
 from stridor.io import reduced_models
@@ -447,11 +448,6 @@ def test_arrays_are_compressed_where_it_pays(content):
 
 
 # -- the command line -------------------------------------------------------------------------------------------------
-def stridor(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "stridor.app.cli", *words]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, check=False)
-
-
 def test_from_the_command_line_and_back(case, tmp_path):
     (tmp_path / "bench.toml").write_text(case.text)
     box = ("--box", "mu=0:0.3", "--box", "contact_stiffness=0.5:2", "--max-frequency", "20e3")

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 import stridor as st
+from program import stridor
 from solid_cases import case, slider
 from stridor.case import template_text
 from stridor.study import damping_full, damping_map, damping_reduced
@@ -228,8 +227,7 @@ def test_the_command_prints_a_table_and_writes_one(block, tmp_path):
         "--points", "2", "--method", "reduced", "--set", "modal.friction_range=[0,0.3]", "--set",
         "modal.max_frequency_hz=20e3",
     ]  # fmt: skip
-    command = [sys.executable, "-m", "stridor.app.cli", *words]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = stridor(*words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[0] == f"Lowest onset μ; x: {X}, y: {Y}"

@@ -124,21 +124,24 @@ def lay_out(
     """Phases in steps. A factor not named stays as in the phase before; before the first phase loads, velocities and
     distances are zero, and what the first phase does not name is one. places (p,): 1 where a motion is a distance."""
     stretches: list[Stretch] = []
-    load, velocity, place = np.zeros(len(loads)), np.zeros(len(supports)), np.zeros(len(supports))
-    is_place = np.zeros(len(supports)) if places is None else places
+    # Each is the next phase's default: without their types the checker takes half a minute to infer them in circles.
+    load: Array = np.zeros(len(loads))
+    velocity: Array = np.zeros(len(supports))
+    place: Array = np.zeros(len(supports))
+    is_place: Array = np.zeros(len(supports)) if places is None else places
     time, first = 0.0, 0
     for number, phase in enumerate(phases):
-        default_load = np.ones(len(loads)) if number == 0 else load
-        default_velocity = np.ones(len(supports)) if number == 0 else velocity
-        next_load = np.array(
+        default_load: Array = np.ones(len(loads)) if number == 0 else load
+        default_velocity: Array = np.ones(len(supports)) if number == 0 else velocity
+        next_load: Array = np.array(
             [phase.loads.get(name, d) for name, d in zip(loads, default_load, strict=True)], dtype=float
         )
-        next_velocity = np.array(
+        next_velocity: Array = np.array(
             [phase.velocities.get(name, d) for name, d in zip(supports, default_velocity, strict=True)],
             dtype=float,
         )
-        default_place = np.ones(len(supports)) if number == 0 else place
-        next_place = is_place * np.array(
+        default_place: Array = np.ones(len(supports)) if number == 0 else place
+        next_place: Array = is_place * np.array(
             [phase.displacements.get(_owner(name), d) for name, d in zip(supports, default_place, strict=True)],
             dtype=float,
         )

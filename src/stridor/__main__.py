@@ -1,0 +1,5 @@
+"""`python -m stridor`: the program."""
+
+from .app.entry import main
+
+main()
