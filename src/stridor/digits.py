@@ -28,6 +28,20 @@ def hertz(value: float, digits: int = 6) -> str:
     return f"{value:.{digits}g} Hz"
 
 
+def measured(value: float, decimals: int, digits: int = 3) -> str:
+    """A number with so many decimals, and with more where a small one would keep fewer than so many digits.
+
+    For quantities whose units may be any: 3199.75 is 3199.8 with one decimal, 0.1591549 is 0.159, 0.0 is 0.0.
+    """
+    size = abs(value)
+    if size == 0.0 or not math.isfinite(value):
+        return fixed(value, decimals)
+    places = max(digits - 1 - math.floor(math.log10(size)), decimals)
+    if size < min(WRITTEN_OUT[0], 10.0**-decimals) or size >= WRITTEN_OUT[1]:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{places}f}"
+
+
 def fixed(value: float, decimals: int) -> str:
     """A number with so many decimals; never a negative zero."""
     text = f"{value:.{decimals}f}"

@@ -198,7 +198,7 @@ def test_dollars_in_names_begin_no_formula(tmp_path: Path) -> None:
     drawing().savefig(tmp_path / "figure.svg")
 
 
-PROGRAM = [sys.executable, "-m", "stridor.app.cli"]
+PROGRAM = [sys.executable, "-m", "stridor"]
 
 
 def test_sigterm_ends_a_run_like_ctrl_c(tmp_path: Path) -> None:
@@ -313,6 +313,8 @@ def test_a_signal_at_the_very_end_leaves_the_exit_code(
 
 BEGINS = """
 import os, signal, sys
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # tests in the background of a shell inherit none
 
 
 class Early:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -25,7 +26,9 @@ from benches import paper_case
 from stridor.temporal.signals import spectrogram
 from stridor.view import BodyModes, FrictionCurve, NamedShape, ReportInputs, write_report
 from stridor.view import report as report_module
+from stridor.view.modal_tables import onset_tables
 from stridor.view.report import sections, tidy
+from stridor.view.tables import quantity
 from stridor.view.words import verdict
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -242,3 +245,25 @@ def test_chapters_without_content_are_not_there():
 
 def test_numbers_keep_their_units_on_one_line():
     assert tidy("at μ = 0.1, 8641 Hz (2 s)") == "at μ\u00a0=\u00a00.1, 8641\u00a0Hz (2\u00a0s)"
+
+
+def test_a_model_without_units_keeps_its_digits() -> None:
+    """Frequencies and rates of a minimal model are tenths: neither the verdict nor a table may round them to nothing."""
+    small, onsets = sweep(), found_onsets()
+    modes = replace(small, eigenvalues=small.eigenvalues * 1e-5)
+    first = replace(onsets.onsets[0], frequency_hz=0.15915494, mu=0.75)
+    inputs = full_inputs(
+        modes=modes, damped_sweep=modes, damped_onsets=replace(onsets, onsets=(first,)), undamped_onsets=None,
+        undamped_sweep=None, trajectory=None, agreement=None,
+    )  # fmt: skip
+    said = verdict(inputs)
+    frequencies = modes.frequency_hz[modes.at(0.1)][modes.unstable[modes.at(0.1)]]
+    assert f"{frequencies[0]:.3g}" in said.headline + said.paragraph
+    assert "0.159 Hz" in said.paragraph
+    for text in (said.headline, said.paragraph):
+        assert not re.search(r"\b0 Hz|\b0 1/s|−0\b|-0\b", text), text
+    cells = [cell for table in onset_tables(inputs) for row in table.rows for cell in row.cells]
+    assert "0.159" in cells
+    assert quantity(-0.0) == "0.0"
+    assert quantity(3199.75) == "3199.8"
+    assert quantity(-2.5e-7) == "−2.50e−07"

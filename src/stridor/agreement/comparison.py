@@ -33,6 +33,7 @@ from .shapes import by_body, modal_assurance, mode_shape
 
 T = TypeVar("T")
 PARTS = ("growth", "run", "critical")
+LEAST_PERIODS = 4.0  # of the dominant line, over which growth is fitted
 NEAR = 0.05  # of the frequency: within it an unstable mode responds
 
 
@@ -341,7 +342,8 @@ def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float |
     """Dominant frequency [Hz] of the last phase and the growth of that line.
 
     Taken from the velocity of the first watched point (what a body radiates follows velocity); without a
-    watched point from the slip speed of the first contact. The spectrum is that of the second half.
+    watched point from the slip speed of the first contact. The spectrum is that of the second half. No growth is
+    given where it could be fitted over less than LEAST_PERIODS of that line.
     """
     if not run.phases or not len(run.time):
         return None, None
@@ -359,4 +361,6 @@ def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float |
     frequency, amplitude = spec.peak(above_hz=2 * spec.bandwidth_hz)
     if amplitude == 0.0:
         return None, None
-    return frequency, growth(filtered, run.sampling, frequency)
+    fitted = growth(filtered, run.sampling, frequency)
+    # A rate from part of a period is the start of the motion, not its growth.
+    return frequency, fitted if (fitted.end - fitted.start) * frequency >= LEAST_PERIODS else None

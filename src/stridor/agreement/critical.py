@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..digits import measured
 from ..errors import AnalysisError
 from ..modal.assembled import Options
 from ..modal.growing import modes_of_band, onsets_of_band, refuted
@@ -67,7 +68,7 @@ def critical_friction(
         middle = (low + high) / 2
         low, high = (low, middle) if grows(middle) else (middle, high)
         if progress is not None:
-            progress(f"critical μ between {low:.5f} and {high:.5f}")
+            progress(f"critical μ between {measured(low, 5)} and {measured(high, 5)}")
     return (low + high) / 2, (low, high)
 
 
@@ -123,7 +124,7 @@ def _in_time(
     except AnalysisError as error:
         return Critical(modal, why=str(error))
     if modal is None:
-        why = f"growth begins at {temporal:.5f} in time, and the modes have no onset in {friction_range}"
+        why = f"growth begins at {measured(temporal, 5)} in time, and the modes have no onset in {friction_range}"
         inside = friction_range[0] <= temporal <= friction_range[1]
         return Critical(None, temporal, last, False if inside else None, why)
     return Critical(modal, temporal, last, abs(modal - temporal) <= max(tolerance, GOOD_CRITICAL * modal))
@@ -152,6 +153,6 @@ def _without_change(
     found = modes_of_band(system, list(ends), 1.02 * limit, options=options)
     grow = [bool(np.any(row)) for row in found.unstable & (found.frequency_hz <= limit)]
     if modal is not None and not grow[0] and grow[1]:
-        begins = f"by the modes growth begins at {modal:.5f} between them"
+        begins = f"by the modes growth begins at {measured(modal, 5)} between them"
         return Critical(modal, agrees=False, why=f"{error}; {begins}")
     return Critical(modal, why=str(error))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..digits import readable
+from ..digits import measured, readable
 from ..modal.growing import refuted
 from ..temporal.signals import Growth
 from .perturbation import Perturbation
@@ -185,7 +185,7 @@ def overall(comparisons: Sequence[Comparison], critical: Critical, *, interrupte
     parts = [c.verdict for c in comparisons]
     answers = [c.agrees for c in comparisons]
     if critical.modal is not None and critical.temporal is not None:
-        parts.append(f"critical μ {critical.modal:.5f} modal, {critical.temporal:.5f} temporal")
+        parts.append(f"critical μ {measured(critical.modal, 5)} modal, {measured(critical.temporal, 5)} temporal")
     elif critical.agrees is False:
         parts.append(f"critical μ: {critical.why}")
     if critical.agrees is not None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..digits import measured
 from .arguments import Call, pair, verb
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def _show(result: DampingMap) -> None:
     rows: list[list[str]] = []
     for i in range(nx):
         marks = ["".join(letter if where[i, j] else " " for letter, where in lowers) for j in range(ny)]
-        cells = [f"{mu:.6f}" if math.isfinite(mu) else "–" for mu in result.onset_mu[i]]
+        cells = [measured(mu, 6) if math.isfinite(mu) else "–" for mu in result.onset_mu[i]]
         rows.append([f"{result.x_values[i]:.4g}", *(f"{c} {m}" for c, m in zip(cells, marks, strict=True))])
     heads = ["x \\ y", *(f"{y:.4g}   " for y in result.y_values)]
     table(f"Lowest onset μ; x: {result.x}, y: {result.y}", heads, rows)
@@ -94,7 +95,7 @@ def _words(result: DampingMap) -> list[str]:
     for word, pick in (("lowest", np.nanargmin), ("highest", np.nanargmax)):
         i, j = (int(k) for k in np.unravel_index(int(pick(result.onset_mu)), result.onset_mu.shape))
         lines.append(
-            f"{word}: μ = {result.onset_mu[i, j]:.9g} at {result.frequency_hz[i, j]:.2f} Hz, "
+            f"{word}: μ = {result.onset_mu[i, j]:.9g} at {measured(result.frequency_hz[i, j], 2)} Hz, "
             f"x = {result.x_values[i]:.4g}, y = {result.y_values[j]:.4g}"
         )
     if not known.all():

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..case import Case
+from ..digits import measured
 from ..errors import CaseError
 from ..io.atomic import replacing, write_text
 from ..io.vtk import write_vtk
@@ -61,7 +62,7 @@ def _write_one(system: System, modes: ComplexModes, column: int, folder: Path, *
     vector = modes.right[0, column]
     branch, frequency = int(modes.branch[column]), float(modes.frequency_hz[0, column])
     growth = float(modes.growth_rate[0, column])
-    stem = f"mode-{branch}-{frequency:.0f}Hz"
+    stem = f"mode-{branch}-{measured(frequency, 0)}Hz"
     figure = mode_shape(system, vector, frequency_hz=frequency, growth_rate=growth)
     files = [folder / f"{stem}.png", folder / f"{stem}.html"]
     with replacing(files[0]) as temporary:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..agreement import Store, modal_assurance
 from ..case import Case
+from ..digits import measured
 from ..errors import StridorError
 from ..io.atomic import write_text
 from ..io.datasets import load_trajectory, save
@@ -53,7 +54,9 @@ class Outcome:
             return "; ".join(self.everything.onsets_damped.at_start_words)
         if first is None:
             return "no onset in range"
-        return f"modal onset at μ = {first.mu:.5f}, {first.frequency_hz:.1f} Hz; no comparison was made"
+        return (
+            f"modal onset at μ = {measured(first.mu, 5)}, {measured(first.frequency_hz, 1)} Hz; no comparison was made"
+        )
 
     def to_json(self) -> dict[str, Any]:
         """The documents of all verbs under their names, and where the report is."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+from ..digits import measured
 from ..errors import CaseError
 from ..reading import is_reduced_file
 from .arguments import INFINITY, Call, numbers, pair, verb
@@ -302,8 +303,8 @@ def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
             rows.append(
                 [
                     *(f"{v:.6g}" for v in point["point"].values()),
-                    f"{mode['frequency_hz']:.3f}",
-                    f"{mode['growth_rate']:.4f}",
+                    measured(mode["frequency_hz"], 3),
+                    measured(mode["growth_rate"], 4),
                     f"{mode['error']:.1e}",
                     f"{mode['residual']:.1e}",
                     ", ".join(words for words, so in remarks.items() if so),
@@ -326,7 +327,7 @@ def _show_onsets(model: ReducedModel, along: str, onsets: ParametricOnsets, *, c
     rows = [
         [
             f"{o.value:.9g}",
-            f"{o.frequency_hz:.3f}",
+            measured(o.frequency_hz, 3),
             o.kind,
             "stable" if o.stabilising else "unstable",
             "" if o.residual is None else f"{o.residual:.1e}",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..digits import measured
 from .output import stdout, table
 
 
@@ -13,8 +14,8 @@ def show_run(summary: dict[str, Any]) -> None:
         [
             phase["name"],
             name,
-            f"{c['max_normal_force']:.2f}",
-            f"{c['max_slip_speed']:.4f}",
+            measured(c["max_normal_force"], 2),
+            measured(c["max_slip_speed"], 4),
             f"{100 * c['stick_fraction']:.1f}",
             f"{100 * c['slip_fraction']:.1f}",
             f"{100 * c['separation_fraction']:.1f}" + (", kept closed" if c.get("kept_closed") else ""),
@@ -28,8 +29,8 @@ def show_run(summary: dict[str, Any]) -> None:
     if summary["dominant_frequency_hz"] is not None:
         state = "saturated" if summary["saturated"] else "not saturated"
         rate = summary["growth_rate"]
-        growth = "nowhere exponential growth" if rate is None else f"growth {rate:.1f} 1/s where exponential"
-        stdout.print(f"last phase: {summary['dominant_frequency_hz']:.1f} Hz dominates, {growth}, {state}")
+        growth = "nowhere exponential growth" if rate is None else f"growth {measured(rate, 1)} 1/s where exponential"
+        stdout.print(f"last phase: {measured(summary['dominant_frequency_hz'], 1)} Hz dominates, {growth}, {state}")
     else:
         stdout.print("last phase: too few records for a dominant frequency, or nothing vibrates")
     for change in summary["changed"]:
@@ -70,7 +71,8 @@ def _show_settled(summary: dict[str, Any]) -> None:
         columns += [f"mean of {copies['runs']}", "± one run"]
         for name, found in spread.items():
             low, high = found["largest_normal_force"]
-            said.append(f"contact {name}: largest recorded N from {low:.2f} to {high:.2f} N over {copies['runs']} runs")
+            ends = f"{measured(low, 2)} to {measured(high, 2)} N"
+            said.append(f"contact {name}: largest recorded N from {ends} over {copies['runs']} runs")
     table("after the first separation in the last phase", columns, rows)
     for line in said:
         stdout.print(line, markup=False)
@@ -82,7 +84,7 @@ def _show_settled(summary: dict[str, Any]) -> None:
 
 
 def _figure(value: float | None, factor: float) -> str:
-    return "–" if value is None else f"{factor * value:.2f}"
+    return "–" if value is None else measured(factor * value, 2)
 
 
 def show_steady(document: dict[str, Any]) -> None:
@@ -113,20 +115,20 @@ def show_steady(document: dict[str, Any]) -> None:
 def show_agreement(document: dict[str, Any]) -> None:
     """Both approaches side by side, critical friction, verdict."""
 
-    def number(value: float | None, form: str) -> str:
-        return "–" if value is None else format(value, form)
+    def shown(value: float | None, decimals: int) -> str:
+        return "–" if value is None else measured(value, decimals)
 
     rows = [
         [
             f"{c['mu']:g}",
-            number(c["modal"]["frequency_hz"], ".2f"),
-            number(c["temporal"]["frequency_hz"], ".2f"),
-            number(c["modal"]["growth_rate"], ".2f"),
-            number(c["temporal"]["growth_rate"], ".2f"),
+            shown(c["modal"]["frequency_hz"], 2),
+            shown(c["temporal"]["frequency_hz"], 2),
+            shown(c["modal"]["growth_rate"], 2),
+            shown(c["temporal"]["growth_rate"], 2),
             f"{100 * c['growth_rate_error']:.2f}",
-            number(c["growth_mac"], ".3f"),
-            number(c["temporal"]["dominant_frequency_hz"], ".1f"),
-            number(c["mac"], ".3f"),
+            shown(c["growth_mac"], 3),
+            shown(c["temporal"]["dominant_frequency_hz"], 1),
+            shown(c["mac"], 3),
         ]
         for c in document["comparisons"]
     ]
@@ -145,8 +147,8 @@ def show_agreement(document: dict[str, Any]) -> None:
         table("modal against temporal", columns, rows)
     if document["critical_mu_modal"] is not None:
         stdout.print(
-            f"critical μ: {document['critical_mu_modal']:.6f} modal, "
-            f"{number(document['critical_mu_temporal'], '.6f')} temporal"
+            f"critical μ: {measured(document['critical_mu_modal'], 6)} modal, "
+            f"{shown(document['critical_mu_temporal'], 6)} temporal"
         )
     for note in document["notes"]:
         stdout.print(f"note: {note}", markup=False)

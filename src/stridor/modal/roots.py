@@ -63,11 +63,13 @@ class Spectrum:
     def tangents(self, lam: ComplexArray, mu: float) -> ComplexArray:
         """dλ/dμ (k,) along the branches through the roots λ (k,)."""
         value, by_lambda, by_mu = self.evaluate(lam, mu)
-        if value.shape[1] == 1:
-            return -by_mu[:, 0, 0] / by_lambda[:, 0, 0]
-        left, right = _null_vectors(value)
-        top = np.einsum("ki,kij,kj->k", left, by_mu, right)
-        return -top / np.einsum("ki,kij,kj->k", left, by_lambda, right)
+        # Infinite at a double root and on a pole, which whoever follows branches looks for.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if value.shape[1] == 1:
+                return -by_mu[:, 0, 0] / by_lambda[:, 0, 0]
+            left, right = _null_vectors(value)
+            top = np.einsum("ki,kij,kj->k", left, by_mu, right)
+            return -top / np.einsum("ki,kij,kj->k", left, by_lambda, right)
 
     def null_vectors(self, lam: ComplexArray, mu: float) -> tuple[ComplexArray, ComplexArray]:
         """Left and right null vectors (k, q) of T at the roots λ (k,)."""

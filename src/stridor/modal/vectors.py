@@ -31,16 +31,23 @@ def expand(spectrum: Spectrum, lam: ComplexArray, forces: ComplexArray) -> Compl
     for block in modes.real:
         stop = start + len(block.freedoms)
         drive = _real_times_complex(projections[:, start:stop].T, forces.T)
-        drive /= lam * lam + np.multiply.outer(block.damping, lam) + block.stiffness[:, None]
+        drive /= _not_zero(lam * lam + np.multiply.outer(block.damping, lam) + block.stiffness[:, None], lam * lam)
         u[block.freedoms] = _real_times_complex(block.vectors, drive)
         start = stop
     start = 0
     for general in modes.general:
         stop = start + len(general.poles)
         drive = general_rows[:, start:stop].T @ forces.T
-        u[general.freedoms] = general.vectors @ (drive / (lam - general.poles[:, None]))
+        u[general.freedoms] = general.vectors @ (drive / _not_zero(lam - general.poles[:, None], lam))
         start = stop
-    return u / np.linalg.norm(u, axis=0)
+    return u / np.maximum(np.linalg.norm(u, axis=0), 1e-300)
+
+
+def _not_zero(difference: ComplexArray, size: ComplexArray) -> ComplexArray:
+    """Differences (j, k) with those that are zero at the rounding of their terms' ``size`` (k,): on a pole the mode
+    that belongs to it is the shape, not NaN."""
+    least = np.maximum(np.finfo(float).eps * np.abs(size), 1e-300)
+    return np.where(difference == 0.0, least, difference)
 
 
 def _real_times_complex(real: Array, values: ComplexArray) -> ComplexArray:

@@ -27,6 +27,7 @@ from .analyses import BodyModes, Description, RunSummary
 T = TypeVar("T")
 Log = Callable[[str], None]
 CURVE_POINTS = 8001
+COUPLED = "in contact without friction"
 ZOOM = 2.5  # the sweep around the first onset reaches this many times its μ
 
 
@@ -75,8 +76,9 @@ class _Clock:
         self.log = log
         self.seconds: dict[str, float] = {}
 
-    def __call__(self, name: str, call: Callable[[], T]) -> T:
-        self.log(name)
+    def __call__(self, name: str, call: Callable[[], T], what: str = "") -> T:
+        """The result of the call, its time kept under ``name``; ``what`` of that it is, said with the name."""
+        self.log(f"{name}: {what}" if what else name)
         started = time.perf_counter()
         try:
             return call()
@@ -158,15 +160,16 @@ def compute_everything(
     limit = case.modal.max_frequency_hz
     mus = np.linspace(*case.modal.friction_range, case.modal.sweep_points)
     bodies = analyses.body_modes(case)
-    coupled = clock("modes", lambda: analyses.modes(case, 0.0, max_frequency_hz=limit, damped=False))
-    bare = clock("modes", lambda: analyses.modes(case, mus, max_frequency_hz=limit, damped=False))
-    damped = clock("modes", lambda: analyses.modes(case, mus, max_frequency_hz=limit, damped=True))
+    coupled = clock("modes", lambda: analyses.modes(case, 0.0, max_frequency_hz=limit, damped=False), COUPLED)
+    sweep = f"{len(mus)} friction coefficients from {mus[0]:g} to {mus[-1]:g}"
+    bare = clock("modes", lambda: analyses.modes(case, mus, max_frequency_hz=limit, damped=False), f"{sweep}, undamped")
+    damped = clock("modes", lambda: analyses.modes(case, mus, max_frequency_hz=limit, damped=True), f"{sweep}, damped")
     keep("modes", damped)
-    onsets_bare = clock("onsets", lambda: analyses.onsets(case, damped=False))
-    onsets_damped = clock("onsets", lambda: analyses.onsets(case, damped=True))
+    onsets_bare = clock("onsets", lambda: analyses.onsets(case, damped=False), "undamped")
+    onsets_damped = clock("onsets", lambda: analyses.onsets(case, damped=True), "damped")
     keep("onsets", onsets_damped)
-    zooms = clock("modes", lambda: _zooms(case, onsets_bare))
-    curve = clock("onsets", lambda: _curve(case))
+    zooms = clock("modes", lambda: _zooms(case, onsets_bare), "around the first onset")
+    curve = clock("onsets", lambda: _curve(case), "friction over frequency")
     run = temporal.run()
     summary = analyses.summarise(case, run)
     agreement, notes = None, list[str]()
@@ -174,7 +177,7 @@ def compute_everything(
     if not run.interrupted:
         agreement = _or_note(lambda: temporal.compare(run), notes, "no comparison")
         if agreement is None or not agreement.interrupted:
-            operating, shape, shape_mode = clock("compare", lambda: _shapes(case, system, run, summary))
+            operating, shape, shape_mode = clock("compare", lambda: _shapes(case, system, run, summary), "shapes")
     return Everything(
         case=case,
         system=system,
@@ -210,11 +213,17 @@ def _large(
     notes: list[str] = []
     limit = case.modal.max_frequency_hz
     description = clock("check", lambda: analyses.describe(case))
-    steady = clock("check", lambda: _or_note(lambda: analyses.steady_sliding(case), notes, "no steady sliding"))
-    bodies = clock("modes", lambda: analyses.body_modes(case))
-    coupled = clock("modes", lambda: analyses.modes(case, 0.0, max_frequency_hz=limit, damped=False))
+    steady = clock(
+        "check", lambda: _or_note(lambda: analyses.steady_sliding(case), notes, "no steady sliding"), "steady sliding"
+    )
+    bodies = clock("modes", lambda: analyses.body_modes(case), "of the bodies alone")
+    coupled = clock("modes", lambda: analyses.modes(case, 0.0, max_frequency_hz=limit, damped=False), COUPLED)
     mus = np.linspace(*case.modal.friction_range, case.modal.sweep_points)
-    sweep = clock("modes", lambda: analyses.modes(case, mus, max_frequency_hz=limit))
+    sweep = clock(
+        "modes",
+        lambda: analyses.modes(case, mus, max_frequency_hz=limit),
+        f"{len(mus)} friction coefficients from {mus[0]:g} to {mus[-1]:g}",
+    )
     keep("modes", sweep)
     found = clock("onsets", lambda: analyses.onsets(case))
     keep("onsets", found)
@@ -222,7 +231,7 @@ def _large(
     own = (
         None
         if mu is None
-        else clock("modes", lambda: analyses.modes(case, mu, max_frequency_hz=limit, vectors="right"))
+        else clock("modes", lambda: analyses.modes(case, mu, max_frequency_hz=limit, vectors="right"), f"at μ = {mu:g}")
     )
     vector, mode, energy = (None, None, None) if own is None else _squealing(system, own)
     run = temporal.run()

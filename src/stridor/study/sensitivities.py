@@ -11,6 +11,7 @@ import numpy as np
 
 from ..case import Case
 from ..case.overrides import split_path
+from ..digits import measured
 from ..errors import AnalysisError, CaseError
 from ..modal.assembled import Options
 from ..modal.complex_modes import ComplexModes, undamped
@@ -241,7 +242,7 @@ def _divergence(result: Sensitivities) -> list[str]:
     told: list[str] = []
     away = result.exceptional_distance
     for b, branch in enumerate(result.branch):
-        name = f"mode {branch} ({result.frequency_hz[b]:.1f} Hz)"
+        name = f"mode {branch} ({measured(result.frequency_hz[b], 1)} Hz)"
         condition = f"condition number {result.condition[b]:.3g}"
         near = [k for k in range(len(result.parameters)) if away[k, b] < NEAR]
         if near:
@@ -360,7 +361,7 @@ class Linearised:
         """A mode with its vectors; None, and a warning, where it has no derivatives."""
         if column not in self._solved:
             lam = complex(self.eigenvalues[column])
-            name = f"mode {self.modes.branch[column]} ({lam.imag / (2 * np.pi):.1f} Hz)"
+            name = f"mode {self.modes.branch[column]} ({measured(lam.imag / (2 * np.pi), 1)} Hz)"
             try:
                 if self.gap(column) <= REPEATED * abs(lam):
                     raise AnalysisError("two eigenvalues are equal, and derivatives belong to neither")

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..agreement import Comparison, Perturbation
+from ..digits import measured
 from ..modal.complex_modes import ComplexModes
 from ..temporal.signals import Components, low_passed
 from .style import BLUE, VERMILION, extrema, legend_above, panel, styled, zero_line
@@ -90,7 +91,7 @@ def perturbation_growth(
             "--",
             color=VERMILION,
             linewidth=2.0,
-            label=f"modal growth rate, {modal_growth_rate:.1f} 1/s",
+            label=f"modal growth rate, {measured(modal_growth_rate, 1)} 1/s",
         )
     size = float(np.abs(band).max())
     ax.set_ylim(size / 1e3, 10 * size)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
+from ..digits import measured
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset
 from . import plots
@@ -94,9 +95,10 @@ def _undamped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> I
     yield ReportFigure(
         "frequency-pair",
         f"Frequencies of modes {a} and {b}, without damping",
-        f"The two modes come together as friction grows and meet at μ = {onset.mu:.5f}, {onset.frequency_hz:.1f} Hz; "
+        "The two modes come together as friction grows and meet at "
+        f"μ = {measured(onset.mu, 5)}, {measured(onset.frequency_hz, 1)} Hz; "
         "beyond it they share one frequency and one of them grows (marked).",
-        f"Frequencies of modes {a} and {b} over friction, merging at {onset.mu:.4f}.",
+        f"Frequencies of modes {a} and {b} over friction, merging at {measured(onset.mu, 4)}.",
         plots.frequency_branches(modes, onset.branches, onsets=onsets),
     )
     yield ReportFigure(
@@ -104,7 +106,7 @@ def _undamped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> I
         f"Imaginary part of the frequencies of modes {a} and {b}, without damping",
         "For motion written as exp(jωt), a negative imaginary part of ω grows: Im ω = −Re λ. Below the onset both are "
         "real; beyond it the pair opens as the square root of μ − μc.",
-        f"Imaginary parts of modes {a} and {b}, zero up to {onset.mu:.4f}, then opening like a square root.",
+        f"Imaginary parts of modes {a} and {b}, zero up to {measured(onset.mu, 4)}, then opening like a square root.",
         plots.growth_branches(modes, onset.branches, imaginary_frequency=True),
     )
 
@@ -112,7 +114,11 @@ def _undamped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> I
 def _damped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> Iterator[ReportFigure]:
     a, b = onset.branches
     crossing = next((o for o in _damped(inputs) if set(o.branches) == {a, b}), None)
-    where = f" Growth begins at μ = {crossing.mu:.5f}, at {crossing.frequency_hz:.1f} Hz." if crossing else ""
+    where = (
+        f" Growth begins at μ = {measured(crossing.mu, 5)}, at {measured(crossing.frequency_hz, 1)} Hz."
+        if crossing
+        else ""
+    )
     yield ReportFigure(
         "damped-frequency-pair",
         f"Frequencies of modes {a} and {b}, with structural damping",
@@ -202,8 +208,8 @@ def _spectra(inputs: ReportInputs) -> Iterator[ReportFigure]:
         yield ReportFigure(
             "spectrum",
             f"Spectrum of {inputs.spectra_of.split(' over ')[0]}",
-            f"Of {inputs.spectra_of}; {spec.window} window, bins every {spec.resolution_hz:.1f} Hz, a line is "
-            f"{spec.bandwidth_hz:.1f} Hz wide at −6 dB. 0 dB is an amplitude of 1 {inputs.spectra_unit}. "
+            f"Of {inputs.spectra_of}; {spec.window} window, bins every {measured(spec.resolution_hz, 1)} Hz, a line is "
+            f"{measured(spec.bandwidth_hz, 1)} Hz wide at −6 dB. 0 dB is an amplitude of 1 {inputs.spectra_unit}. "
             "Dotted: the dominant frequency and its multiples.",
             f"Amplitude spectra of {', '.join(inputs.spectra)}.",
             plots.spectrum_plot(
@@ -218,8 +224,8 @@ def _spectra(inputs: ReportInputs) -> Iterator[ReportFigure]:
         yield ReportFigure(
             "spectrogram",
             "Spectrogram",
-            f"Of the {inputs.spectrogram_of}; resolution {content.resolution_hz:.0f} Hz. How the tone builds up, and "
-            "its multiples with it.",
+            f"Of the {inputs.spectrogram_of}; resolution {measured(content.resolution_hz, 0)} Hz. How the tone builds "
+            "up, and its multiples with it.",
             "Spectrum over time as a colour map.",
             plots.spectrogram_plot(
                 content,
@@ -241,8 +247,9 @@ def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigu
     if window.separation_fraction:
         shares.append(f"{100 * window.separation_fraction:.0f} % separation")
     caption = (
-        f"Contact {name} over three periods ({window.reason}): normal force up to {window.max_normal_force:.1f} N, "
-        f"slip speed up to {window.max_slip_speed:.3f} m/s, {', '.join(shares)}."
+        f"Contact {name} over three periods ({window.reason}): normal force up to "
+        f"{measured(window.max_normal_force, 1)} N, slip speed up to {measured(window.max_slip_speed, 3)} m/s, "
+        f"{', '.join(shares)}."
     )
     if window.stick_fraction:
         caption += " Where it sticks, slave and master move together, though not evenly: both vibrate."
@@ -314,20 +321,20 @@ def _shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     if operating is not None:
         yield ReportFigure(
             "operating-shape",
-            f"Velocity of the bodies at {operating.frequency_hz:.0f} Hz, in time",
+            f"Velocity of the bodies at {measured(operating.frequency_hz, 0)} Hz, in time",
             "The line at the dominant frequency taken out of the velocity of every node. Arrows: velocities; thin "
             "lines: a quarter of a period later; dotted: at rest.",
-            f"Velocity shape of the bodies at {operating.frequency_hz:.0f} Hz from the run in time.",
+            f"Velocity shape of the bodies at {measured(operating.frequency_hz, 0)} Hz from the run in time.",
             plots.mode_shape(system, operating.shape, velocity=True),
         )
     if mode is not None and system.lines:
-        growth = f", growth rate {mode.growth_rate:.0f} 1/s" if mode.growth_rate is not None else ""
+        growth = f", growth rate {measured(mode.growth_rate, 0)} 1/s" if mode.growth_rate is not None else ""
         yield ReportFigure(
             "unstable-mode",
-            f"The mode at {mode.frequency_hz:.0f} Hz",
+            f"The mode at {measured(mode.frequency_hz, 0)} Hz",
             f"Displacements{growth}, drawn where the motion is largest and, thin, a quarter of a period later: "
             "the mode is complex, the bodies do not move in phase.",
-            f"Deformed bodies in the mode at {mode.frequency_hz:.0f} Hz.",
+            f"Deformed bodies in the mode at {measured(mode.frequency_hz, 0)} Hz.",
             plots.mode_shape(system, mode.shape),
         )
     if operating is not None and mode is not None:
@@ -341,8 +348,8 @@ def _shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             plots.shapes_side_by_side(
                 system,
                 [
-                    (f"run, {operating.frequency_hz:.0f} Hz", operating.shape, True),
-                    (f"mode, {mode.frequency_hz:.0f} Hz", mode.shape, False),
+                    (f"run, {measured(operating.frequency_hz, 0)} Hz", operating.shape, True),
+                    (f"mode, {measured(mode.frequency_hz, 0)} Hz", mode.shape, False),
                 ],
             ),
         )

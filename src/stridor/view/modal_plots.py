@@ -10,6 +10,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ..digits import measured
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..typing import Array, BoolArray
@@ -217,7 +218,7 @@ def _mark_onset(ax: Axes, onset: Onset, y: float, x: float | None = None, *, bes
     at = (onset.mu if x is None else x, y)
     ax.plot(*at, "D", color=INK, ms=4.5, zorder=4)
     ax.annotate(
-        f"μ = {onset.mu:.4f}\n{onset.frequency_hz:.0f} Hz",
+        f"μ = {measured(onset.mu, 4)}\n{measured(onset.frequency_hz, 0)} Hz",
         at,
         xytext=(8, -8) if beside else (0, 7),
         textcoords="offset points",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..case.schema import ReferenceFrequency, ReferenceOnset
-from ..digits import readable
+from ..digits import measured, readable
 from ..modal.complex_modes import UNSTABLE_RELATIVE, ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..typing import Array
@@ -17,6 +17,7 @@ from .tables import (
     number,
     paired,
     percent,
+    quantity,
     same_as_printed,
     significant,
 )
@@ -62,7 +63,7 @@ def coupled_table(frequencies: Array, printed: tuple[ReferenceFrequency, ...], o
     meets: dict[int, str] = {}
     for onset in reversed(onsets.onsets if onsets is not None else ()):
         for branch in onset.branches:
-            meets[branch] = f"μ = {onset.mu:.4f}, {onset.frequency_hz:.0f} Hz"
+            meets[branch] = f"μ = {measured(onset.mu, 4)}, {measured(onset.frequency_hz, 0)} Hz"
     rows: list[Row] = []
     for i, j in paired(frequencies, [p.frequency_hz for p in printed]):
         first = (str(i + 1) if i is not None else "", meets.get(i + 1, "") if i is not None else "")
@@ -82,11 +83,11 @@ def _frequency_row(
 ) -> Row:
     if printed is None:
         note = "not printed in the source" if compared else ""
-        return Row((*first, number(computed, 1), "", "", note), "new" if compared else "")
+        return Row((*first, quantity(computed, 1), "", "", note), "new" if compared else "")
     fraction = difference(computed, printed.frequency_hz) if computed is not None else None
     mark = " ▲" if is_far(fraction) else ""
     note = printed.note if computed is not None else "; ".join(filter(None, [printed.note, "not computed"]))
-    cells = (number(computed, 1), significant(printed.frequency_hz, 8), percent(fraction) + mark, note)
+    cells = (quantity(computed, 1), significant(printed.frequency_hz, 8), percent(fraction) + mark, note)
     return Row((*first, *cells), "far" if mark or computed is None else "")
 
 
@@ -120,10 +121,10 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
         rows.append(
             Row(
                 (
-                    number(onset.mu, 5),
+                    quantity(onset.mu, 5),
                     significant(other.mu, 8) if other else "",
                     remark,
-                    number(onset.frequency_hz, 1),
+                    quantity(onset.frequency_hz, 1),
                     significant(other.frequency_hz, 8) if other else "",
                     percent(f_diff),
                     f"{onset.branches[0]} and {onset.branches[1]}"
@@ -191,13 +192,13 @@ def _solutions(found: list[Onset]) -> Table:
         exceptional = ""
         if point is not None:
             sign = "+" if point.imag >= 0 else "−"
-            exceptional = f"{number(point.real, 7)} {sign} {significant(abs(point.imag), 2)} j"
+            exceptional = f"{quantity(point.real, 7)} {sign} {significant(abs(point.imag), 2)} j"
         rows.append(
             Row(
                 (
                     "damped" if onset.damped else "undamped",
-                    number(onset.mu, 10),
-                    number(onset.frequency_hz, 4),
+                    quantity(onset.mu, 10),
+                    quantity(onset.frequency_hz, 4),
                     significant(onset.residual, 2),
                     significant(onset.square_root_coefficient, 5),
                     significant(onset.growth_slope, 4),

@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 
+from ..digits import measured
 from ..study.countermeasures import Countermeasures
 from ..study.damping_map import DampingMap
 from ..study.sensitivities import Sensitivities
@@ -32,7 +33,7 @@ def sensitivity_bars(result: Sensitivities, *, ax: Axes | None = None) -> Figure
     height = 0.8 / max(modes, 1)
     for b in range(modes):
         at = np.arange(len(shown)) - 0.4 + (b + 0.5) * height
-        label = f"mode {result.branch[b]}, {result.frequency_hz[b]:.0f} Hz"
+        label = f"mode {result.branch[b]}, {measured(result.frequency_hz[b], 0)} Hz"
         ax.barh(at, result.growth_per_percent[shown, b], height, color=COLOURS[b % len(COLOURS)], label=label)
     _names(ax, [result.parameters[k] for k in shown])
     ax.axvline(0.0, color=INK, linewidth=0.8)

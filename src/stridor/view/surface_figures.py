@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..digits import measured
 from . import plots
 from .figures import ReportFigure
 from .inputs import ReportInputs
@@ -22,13 +23,11 @@ def shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     if any(solid.cells.keys() - {"vertex"} for solid in system.solids):
         yield ReportFigure(
             "mode",
-            f"The mode at {shape.frequency_hz:.1f} Hz",
+            f"The mode at {measured(shape.frequency_hz, 1)} Hz",
             f"At the friction of the case this mode {said}. Drawn at the instant of largest motion, exaggerated, "
             "coloured by the displacement.",
-            f"Deformed meshes in the mode at {shape.frequency_hz:.0f} Hz.",
-            plots.solid_mode_shape(
-                system, inputs.shape_vector, frequency_hz=shape.frequency_hz, growth_rate=growth
-            ),
+            f"Deformed meshes in the mode at {measured(shape.frequency_hz, 0)} Hz.",
+            plots.solid_mode_shape(system, inputs.shape_vector, frequency_hz=shape.frequency_hz, growth_rate=growth),
         )
     nodes = system.contact_nodes()
     if inputs.friction_energy is not None and nodes.count > 1:

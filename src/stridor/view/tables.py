@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy
 
+from ..digits import measured
 from ..typing import Array
 
 FAR = 0.005  # a difference beyond this fraction is marked
@@ -55,6 +56,11 @@ def number(value: float | None, digits: int = 1) -> str:
         return ""
     text = f"{value:.{digits}f}"
     return (text if float(text) != 0 else f"{0.0:.{digits}f}").replace("-", "−")
+
+
+def quantity(value: float | None, decimals: int = 1) -> str:
+    """A number with a unit: so many decimals, more where a small one would lose its digits; empty for None."""
+    return "" if value is None or not np.isfinite(value) else measured(value, decimals).replace("-", "−")
 
 
 def significant(value: float | None, digits: int = 4) -> str:

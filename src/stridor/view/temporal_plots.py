@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 
+from ..digits import measured
 from ..temporal.energy import EnergyBalance
 from ..temporal.signals import Spectrogram, Spectrum, low_passed
 from ..temporal.trajectory import Trajectory
@@ -274,11 +275,7 @@ def energy_plot(trajectory: Trajectory, balance: EnergyBalance, *, axes: Sequenc
         ("taken out by damping", works["damping"][step], GREEN, "--"),
         ("taken out by friction", works["friction"][step], VERMILION, "--"),
         ("taken out by impacts", works["contact"][step], PURPLE, "--"),
-        *(
-            (f"put in by {name} forces", works[name][step], ORANGE, "-")
-            for name in ("circulatory",)
-            if name in works
-        ),
+        *((f"put in by {name} forces", works[name][step], ORANGE, "-") for name in ("circulatory",) if name in works),
     )
     for name, values, colour, style in curves:
         above.plot(time, 1e3 * values, style, color=colour, label=name, linewidth=1.3)
@@ -347,5 +344,5 @@ def _mark_harmonics(ax: Axes, fundamental: float, top: float, *, named: bool) ->
     for k in range(1, min(count, 8) + 1):
         ax.axvline(k * fundamental / 1e3, color=GREY, linestyle=":", linewidth=0.9, zorder=1.2)
     if named:
-        note = [Line2D([], [], color=GREY, linestyle=":", label=f"{fundamental:.0f} Hz and its multiples")]
+        note = [Line2D([], [], color=GREY, linestyle=":", label=f"{measured(fundamental, 0)} Hz and its multiples")]
         ax.legend(handles=note, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)

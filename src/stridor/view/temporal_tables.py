@@ -10,7 +10,19 @@ from ..temporal.attractor import settled
 from ..temporal.energy import EnergyBalance
 from ..temporal.trajectory import Trajectory
 from .inputs import ReportInputs
-from .tables import Row, Table, assigned, difference, drop_empty, is_far, number, percent, same_as_printed, significant
+from .tables import (
+    Row,
+    Table,
+    assigned,
+    difference,
+    drop_empty,
+    is_far,
+    number,
+    percent,
+    quantity,
+    same_as_printed,
+    significant,
+)
 from .windows import Window
 
 SAME_MODE = 0.02  # |Δλ|/|λ| within which an identified component is that mode
@@ -26,9 +38,9 @@ def contact_table(trajectory: Trajectory) -> Table:
                 number(100 * s.stick_fraction, 1),
                 number(100 * s.slip_fraction, 1),
                 number(100 * s.separation_fraction, 1) + (", kept closed" if s.kept_closed else ""),
-                number(s.max_normal_force, 1),
-                number(s.max_tangential_force, 2),
-                number(s.max_slip_speed, 4),
+                quantity(s.max_normal_force, 1),
+                quantity(s.max_tangential_force, 2),
+                quantity(s.max_slip_speed, 4),
                 significant(s.first_stick, 5),
                 significant(s.first_separation, 5),
             )
@@ -73,10 +85,10 @@ def settled_table(trajectory: Trajectory) -> Table | None:
                 name,
                 significant(part.since, 5),
                 str(part.peaks),
-                number(part.averages.mean_peak_normal_force, 1),
-                number(part.averages.quantile_05_normal_force, 1),
-                number(part.averages.quantile_50_normal_force, 1),
-                number(part.averages.quantile_95_normal_force, 1),
+                quantity(part.averages.mean_peak_normal_force, 1),
+                quantity(part.averages.quantile_05_normal_force, 1),
+                quantity(part.averages.quantile_50_normal_force, 1),
+                quantity(part.averages.quantile_95_normal_force, 1),
                 number(100 * part.averages.stick_fraction, 1),
                 number(100 * part.averages.slip_fraction, 1),
                 number(100 * part.averages.separation_fraction, 1),
@@ -116,7 +128,7 @@ def energy_table(balance: EnergyBalance) -> Table:
         ("stored at the end as motion", balance.kinetic, -1),
         ("stored at the end as deformation", balance.elastic, -1),
     )
-    rows = [Row((name, number(1e3 * value, 4))) for name, value, _ in entries]
+    rows = [Row((name, quantity(1e3 * value, 4))) for name, value, _ in entries]
     missing = sum(sign * value for _, value, sign in entries)
     rows.append(Row(("missing at the end", significant(1e3 * missing, 2)), "good" if balance.closes else "bad"))
     caption = (
@@ -153,8 +165,8 @@ def agreement_table(comparison: Comparison) -> Table:
             Row(
                 (
                     "dominant frequency of the full run [Hz]",
-                    number(mode, 1),
-                    number(heard, 1),
+                    quantity(mode, 1),
+                    quantity(heard, 1),
                     percent(error),
                     "an unstable mode responds" if mode is not None else "no unstable mode within 5 %",
                 )
@@ -163,7 +175,7 @@ def agreement_table(comparison: Comparison) -> Table:
     if comparison.run_growth is not None:
         fitted = comparison.run_growth
         state = "saturated" if fitted.saturated else "not saturated"
-        rows.append(Row(("growth fitted in the full run [1/s]", "", number(fitted.rate, 1), "", state)))
+        rows.append(Row(("growth fitted in the full run [1/s]", "", quantity(fitted.rate, 1), "", state)))
     if comparison.mac is not None and comparison.responding is not None:
         rows.append(
             Row(
@@ -205,7 +217,7 @@ def agreed(name: str, modal: float, temporal: float, limit: float) -> Row:
     """One quantity by both approaches, judged by a relative limit."""
     error = (temporal - modal) / abs(modal) if modal else None
     good = error is not None and abs(error) <= limit
-    return Row((name, number(modal, 1), number(temporal, 1), percent(error, 3), _judged(good)), _kind(good))
+    return Row((name, quantity(modal, 1), quantity(temporal, 1), percent(error, 3), _judged(good)), _kind(good))
 
 
 def _judged(good: bool) -> str:
@@ -222,10 +234,10 @@ def critical_row(agreement: Agreement) -> Row | None:
     if modal is None and temporal is None:
         return None
     if modal is None or temporal is None:
-        return Row(("critical friction coefficient", number(modal, 5), number(temporal, 5), "", ""))
+        return Row(("critical friction coefficient", quantity(modal, 5), quantity(temporal, 5), "", ""))
     width = agreement.bracket[1] - agreement.bracket[0] if agreement.bracket else 0.0
     good = abs(modal - temporal) <= max(width, GOOD_CRITICAL * modal)
-    cells = ("critical friction coefficient", number(modal, 5), number(temporal, 5), percent(temporal / modal - 1))
+    cells = ("critical friction coefficient", quantity(modal, 5), quantity(temporal, 5), percent(temporal / modal - 1))
     return Row((*cells, _judged(good)), _kind(good))
 
 
@@ -243,11 +255,11 @@ def identified_table(comparison: Comparison, modes: ComplexModes, max_frequency_
         rows.append(
             Row(
                 (
-                    number(mode.imag / (2 * np.pi), 1),
-                    number(seen.imag / (2 * np.pi), 1) if seen is not None else "",
+                    quantity(mode.imag / (2 * np.pi), 1),
+                    quantity(seen.imag / (2 * np.pi), 1) if seen is not None else "",
                     percent(seen.imag / mode.imag - 1, 3) if seen is not None else "",
-                    number(mode.real, 1),
-                    number(seen.real, 1) if seen is not None else "",
+                    quantity(mode.real, 1),
+                    quantity(seen.real, 1) if seen is not None else "",
                     "" if seen is not None else "not seen in the signal",
                 ),
                 "unstable" if mode.real > 0 else "",

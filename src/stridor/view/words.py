@@ -8,6 +8,7 @@ import numpy as np
 
 from ..agreement import GOOD_FREQUENCY, GOOD_GROWTH
 from ..case.schema import Load
+from ..digits import measured
 from ..study.fingerprint import changes_of
 from .body_words import body_words, contact_words
 from .inputs import ReportInputs
@@ -42,7 +43,7 @@ def verdict(inputs: ReportInputs) -> Verdict:
     answering = _answering(inputs)
     frequency = max(growing, key=_growth_of)[0] if answering is None else answering
     may = "squeals" if answering is not None or agrees else "may squeal"
-    return Verdict(f"It {may}{at}, at {frequency:.0f} Hz", paragraph, squeals, agrees)
+    return Verdict(f"It {may}{at}, at {measured(frequency, 0)} Hz", paragraph, squeals, agrees)
 
 
 def _growth_of(pair: tuple[float, float]) -> float:
@@ -79,7 +80,9 @@ def _modal_sentence(growing: list[tuple[float, float]] | None, at: str) -> str:
         return ""
     if not growing:
         return f"Steady sliding{at} is stable: no mode in the range of frequencies grows."
-    named = [f"{f:.0f} Hz (growth {g:.0f} 1/s)" for f, g in sorted(growing, key=_growth_of, reverse=True)]
+    named = [
+        f"{measured(f, 0)} Hz (growth {measured(g, 0)} 1/s)" for f, g in sorted(growing, key=_growth_of, reverse=True)
+    ]
     modes = "one mode grows" if len(named) == 1 else f"{len(named)} modes grow"
     return f"Steady sliding{at} is unstable: {modes}, {_listed(named)}."
 
@@ -101,7 +104,7 @@ def _onset_sentence(inputs: ReportInputs) -> str:
         return f"No friction coefficient between {low:g} and {high:g} makes it unstable up to {_khz(inputs)}."
     damping = "" if onsets.damped else " (without damping)"
     more = sum(1 for o in onsets.onsets if not o.stabilising) - 1
-    text = f"It becomes unstable from μ = {first.mu:.4f} on, at {first.frequency_hz:.0f} Hz{damping}"
+    text = f"It becomes unstable from μ = {measured(first.mu, 4)} on, at {measured(first.frequency_hz, 0)} Hz{damping}"
     if more:
         text += f"; {more} more onset{'s follow' if more > 1 else ' follows'} up to μ = {high:g}"
     return text + "."
@@ -134,7 +137,7 @@ def _run_sentence(inputs: ReportInputs) -> str:
         )
     text += f"{'s' if len(shares) > 1 else ''} {_listed(shares)}"
     if inputs.dominant_hz is not None:
-        text += f"; the dominant frequency is {inputs.dominant_hz:.0f} Hz"
+        text += f"; the dominant frequency is {measured(inputs.dominant_hz, 0)} Hz"
     changed = changes_of(run)
     if changed:
         text += f". In its middle the model was changed ({'; '.join(changed)}): it is no run of one model"
@@ -150,13 +153,14 @@ def _agreement_sentence(inputs: ReportInputs) -> str:
         if len(c.unstable_hz) and c.perturbation.grows and not c.agrees:
             modal, seen = c.modal_eigenvalue, c.perturbation
             said = (
-                f"at μ = {c.mu:g} both find growth, but at {modal.imag / (2 * np.pi):.0f} Hz with {modal.real:.0f} 1/s "
-                f"by the modes and at {seen.frequency_hz:.0f} Hz with {seen.growth_rate:.0f} 1/s in time"
+                f"at μ = {c.mu:g} both find growth, but at {measured(modal.imag / (2 * np.pi), 0)} Hz with "
+                f"{measured(modal.real, 0)} 1/s by the modes and at {measured(seen.frequency_hz, 0)} Hz with "
+                f"{measured(seen.growth_rate, 0)} 1/s in time"
             )
         elif len(c.unstable_hz) and c.perturbation.grows:
             said = (
-                f"at μ = {c.mu:g} both find growth at {c.perturbation.frequency_hz:.0f} Hz, with rates of "
-                f"{c.modal_eigenvalue.real:.0f} and {c.perturbation.growth_rate:.0f} 1/s"
+                f"at μ = {c.mu:g} both find growth at {measured(c.perturbation.frequency_hz, 0)} Hz, with rates of "
+                f"{measured(c.modal_eigenvalue.real, 0)} and {measured(c.perturbation.growth_rate, 0)} 1/s"
             )
         elif c.agrees:
             said = f"at μ = {c.mu:g} both find steady sliding stable"
