@@ -79,7 +79,7 @@ def test_every_verb_is_silent(tmp_path: Path, template: str, changes: list[str],
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=900,
         check=False,
         env={**os.environ, "MPLBACKEND": "agg", "OPENBLAS_NUM_THREADS": "1"},
     )

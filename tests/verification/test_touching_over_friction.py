@@ -1,20 +1,31 @@
-"""Sweeps and onsets hold the nodes that touch at one μ: said where steady sliding elsewhere has others."""
+"""Each μ has the nodes that touch in its own steady sliding, whatever else is asked for; onsets too.
+
+The block is pressed on a slider and held above: friction at its foot turns it, so that its nodes open one after the
+other as μ grows. The truth is the answer for one μ alone, and a count on a fine grid of them.
+"""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import stridor as st
 from rubbing_block import rubbing_block
+from stridor.modal.growing import growing_modes
+from stridor.modal.joined import ALIKE, jumps, matched
+from stridor.sliding.stretches import stretches
+from stridor.sliding.surfaces import steady_sliding_nodes
+from stridor.system import build_system
 
 pytestmark = pytest.mark.verification
 
-BAND = "max_frequency_hz = 20e3\nfriction_range = [0.0, {end}]"
+BAND = "max_frequency_hz = {band}\nfriction_range = [0.0, {end}]"
 
 
-def block(end: float, coefficient: float = 0.4) -> st.Case:
-    made = st.loads(rubbing_block(BAND.format(end=end)))
+def block(end: float, coefficient: float = 0.4, band: float = 20e3) -> st.Case:
+    made = st.loads(rubbing_block(BAND.format(end=end, band=band)))
     return made.with_({"contacts.face.friction.coefficient": coefficient})
 
 
@@ -22,19 +33,74 @@ def touching(case: st.Case, mu: float) -> int:
     return int(st.steady_sliding(case, mu).active.sum())
 
 
-def test_other_nodes_at_another_friction_are_told() -> None:
+def listed(found: st.ComplexModes, row: int) -> np.ndarray:
+    values = found.eigenvalues[row]
+    return np.sort_complex(values[found.in_band[row]])
+
+
+def same_on_a_grid(case: st.Case, low: float, high: float, count: int) -> list[float]:
+    """μ at which the nodes that touch are others than just below it, found by trying many; to half a step."""
+    system, grid = build_system(case), np.linspace(low, high, count)
+    active = [steady_sliding_nodes(system, mu=float(mu)).active for mu in grid]
+    return [0.5 * (a + b) for a, b, x, y in zip(grid, grid[1:], active, active[1:], strict=False) if np.any(x != y)]
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.2, 0.4])
+def test_changes_are_where_many_equilibria_see_them(coefficient: float) -> None:
+    case = block(0.45, coefficient)
+    found = stretches(build_system(case), 0.0, 0.45)
+    seen = same_on_a_grid(case, 0.0, 0.45, 451)
+    assert len(seen) >= 2
+    np.testing.assert_allclose([s.low for s in found[1:]], seen, atol=0.51e-3)
+    system = build_system(case)
+    for before, after in pairwise(found):
+        # Enclosed to 1e-9: on both sides close by touch as many as said.
+        for s, mu in ((before, before.high - 2e-9), (after, after.low + 2e-9)):
+            assert int(steady_sliding_nodes(system, mu=mu).active.sum()) == s.touching
+
+
+def test_modes_at_a_friction_do_not_depend_on_the_others() -> None:
     case = block(0.4, coefficient=0.0)
-    here, there = touching(case, 0.0), touching(case, 0.4)
-    assert there < here
-    swept, alone = st.modes(case, [0.0, 0.4]), st.modes(case, 0.4)
-    # The held nodes are stiffer than those that are left.
-    assert swept.frequency_hz[1, 0] > 1.01 * alone.frequency_hz[0, 0]
+    rng = np.random.default_rng(5)
+    mus = np.append(rng.uniform(0.0, 0.45, 9), [0.0, 0.45])
+    assert len({touching(case, float(mu)) for mu in mus}) >= 3
+    swept = st.modes(case, mus)
+    for row, mu in enumerate(mus):
+        alone = st.modes(case, float(mu))
+        np.testing.assert_allclose(listed(swept, row), listed(alone, 0), rtol=1e-8)
+        assert swept.mu[row] == mu
+    assert np.all(swept.residual[np.isfinite(swept.residual)] < 1e-9)
     (note,) = swept.notes
-    assert note.startswith(f"The {here} of 6 contact nodes that touch in steady sliding at the case's own friction")
-    assert f"at μ = 0.4 {here - there} of them open" in note
-    assert "at μ = 0 " not in note
-    assert alone.notes == ()
-    assert f"at μ = 0.4 {here - there} of them open" in st.onsets(case).notes[0]
+    assert note.startswith("Of the 6 contact nodes other ones touch in steady sliding as friction grows: 6 between μ = ")
+    # Branches keep their numbers over a change: nothing jumps further than a node's stiffness moves it.
+    order = np.argsort(mus)
+    size = np.abs(swept.eigenvalues[order])
+    steps = np.abs(np.diff(swept.eigenvalues[order], axis=0)) / size[1:]
+    assert np.nanmax(steps[:, np.isfinite(size).all(axis=0)]) < 0.25
+
+
+def test_vectors_and_interruptions_come_through() -> None:
+    case = block(0.4, coefficient=0.0)
+    swept = st.modes(case, [0.0, 0.3, 0.4], vectors=True)
+    alone = st.modes(case, 0.3, vectors=True)
+    assert swept.right is not None
+    assert alone.right is not None
+    assert swept.left is not None
+    k = int(np.nanargmin(np.abs(swept.eigenvalues[1] - alone.eigenvalues[0, 0])))
+    one, two = swept.right[1, k], alone.right[0, 0]
+    assert abs(np.vdot(one, two)) / np.linalg.norm(one) / np.linalg.norm(two) == pytest.approx(1.0, abs=1e-8)
+    calls: list[int] = []
+
+    def stop(at: int, of: int) -> None:
+        calls.append(at)
+        if at == 2:
+            raise KeyboardInterrupt
+
+    part = st.modes(case, [0.0, 0.3, 0.4], progress=stop)
+    assert part.interrupted
+    assert part.planned == 3
+    np.testing.assert_allclose(listed(part, 0), listed(swept, 0), rtol=1e-8)
+    assert set(part.mu) < {0.0, 0.3, 0.4}
 
 
 def test_nothing_is_told_where_the_same_nodes_touch() -> None:
@@ -46,15 +112,22 @@ def test_nothing_is_told_where_the_same_nodes_touch() -> None:
     np.testing.assert_allclose(found.eigenvalues[1], st.modes(case, values[1]).eigenvalues[0], rtol=1e-8)
 
 
-def test_a_friction_without_steady_sliding_is_told() -> None:
+def test_a_friction_without_steady_sliding_has_no_modes() -> None:
     # Friction at its foot turns the block, 2 cm wide and held 2 cm above: beyond μ = 1/2 nothing keeps it down.
     case = block(0.4, coefficient=0.2)
     with pytest.raises(st.AnalysisError):
         st.steady_sliding(case, 0.6)
-    assert "at μ = 0.6 there is no steady sliding" in st.modes(case, [0.0, 0.6]).notes[0]
+    found = st.modes(case, [0.6, 0.0])
+    assert not np.any(np.isfinite(found.eigenvalues[0]))
+    assert np.any(np.isfinite(found.eigenvalues[1]))
+    assert found.completeness[0].startswith("Not checked: steady sliding")
+    (said,) = [note for note in found.notes if "nothing was solved" in note]
+    assert float(said.split("μ = ")[1].split(" ")[0]) == pytest.approx(0.5, abs=0.01)
+    with pytest.raises(st.AnalysisError):
+        st.modes(case, [0.6, 0.7])
 
 
-def test_where_in_a_range_there_is_no_equilibrium_is_told() -> None:
+def test_onsets_end_where_steady_sliding_does() -> None:
     """A falling law asks for the equilibrium at each μ; the block tips over from about 0.5 on."""
     case = block(1.0).with_(
         {
@@ -63,8 +136,72 @@ def test_where_in_a_range_there_is_no_equilibrium_is_told() -> None:
             },
         }
     )  # fmt: skip
-    with pytest.raises(st.AnalysisError, match=r"can move freely .*; that is at μ = \d.*, of the range") as told:
-        st.onsets(case)
-    named = float(str(told.value).split("μ = ")[-1].split(",")[0])
-    with pytest.raises(st.AnalysisError):
-        st.steady_sliding(case, named)
+    found = st.onsets(case)
+    assert found.friction_range[1] == pytest.approx(0.5, abs=0.01)
+    assert any("nothing was solved" in note for note in found.notes)
+
+
+def growing(case: st.Case, mu: float) -> int:
+    """How many modes grow at one μ with its own nodes, in the full problem."""
+    return len(growing_modes(build_system(case), mu, case.modal.max_frequency_hz, touching_at=mu).values)
+
+
+def random_block(seed: int) -> st.Case:
+    """A block of other sizes, materials and loads on the slider: most open some nodes, many squeal."""
+    rng = np.random.default_rng(seed)
+    divisions = [int(rng.integers(2, 7)), int(rng.integers(2, 5))]
+    width, height = rng.uniform(0.012, 0.03), rng.uniform(0.008, 0.03)
+    end = min(0.45 * width / height, 1.2)
+    made = block(end, 0.0, band=float(rng.choice([8e3, 15e3, 25e3])))
+    return made.with_(
+        {
+            "bodies.block.mesh.size": [width, height],
+            "bodies.block.mesh.corner": [-width / 2, 0.0],
+            "bodies.block.mesh.divisions": divisions,
+            "bodies.block.points.crown": [0.0, height],
+            "bodies.block.damping.mass": float(rng.choice([0.0, 20.0, 200.0])),
+            "bodies.block.damping.stiffness": float(rng.choice([0.0, 1e-9, 1e-7])),
+            "materials.pad.young_modulus": float(10 ** rng.uniform(8.5, 10)),
+            "contacts.face.stiffness": float(10 ** rng.uniform(10.5, 13)),
+            "loads.press.pressure": float(10 ** rng.uniform(4, 6)),
+            "bodies.slider.sliding.velocity": [float(rng.choice([-1.0, 1.0])), 0.0],
+        }
+    )
+
+
+def wrong(seed: int, count: int = 25) -> str:
+    """What the onsets of a random block say otherwise than modes at single μ; "" where nothing."""
+    case = random_block(seed)
+    try:
+        found = st.onsets(case)
+    except st.AnalysisError as error:
+        return f"{seed}: {error}"
+    low, high = found.friction_range
+    if "NOT COMPLETE" in found.completeness:
+        return ""  # said
+    for mu in np.linspace(low, high, count)[1:-1]:
+        if any(abs(o.mu - mu) < 1e-6 for o in found.onsets):
+            continue
+        said = len(found.at_start) + sum(-1 if o.stabilising else 1 for o in found.onsets if o.mu < mu)
+        if said != (seen := growing(case, float(mu))):
+            return f"{seed}: {seen} grow at μ = {mu:.6g}, and by the onsets {said} ({[o.mu for o in found.onsets]})"
+    return ""
+
+
+def test_onsets_say_what_modes_at_single_frictions_do() -> None:
+    assert [said for seed in range(6) if (said := wrong(seed))] == []
+
+
+@pytest.mark.slow
+def test_onsets_of_many_random_blocks() -> None:
+    assert [said for seed in range(6, 300) if (said := wrong(seed, 41))] == []
+
+
+def test_modes_are_matched_by_their_nearness_alone() -> None:
+    before = np.array([-1 + 100j, 2 + 200j, np.nan + 1j * np.nan])
+    after = np.array([3 + 201j, -1 + 100.5j, 5 + 400j])
+    assert sorted(matched(before, after)) == [(0, 1), (1, 0)]
+    assert jumps([2 + 200j], [3 + 201j]) == ([], [])
+    assert jumps([2 + 200j], [3 + 300j]) == ([3 + 300j], [2 + 200j])
+    far = 100j * (1 + 2 * ALIKE)
+    assert jumps([], [far]) == ([far], [])

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import AnalysisError
 from ..modal.assembled import Options
 from ..modal.complex_modes import ComplexModes
-from ..modal.growing import modes_of_band
+from ..modal.over_friction import modes_of_band
 from ..sliding import full_motion
 from ..system import System
 from ..temporal.observe import Snapshots

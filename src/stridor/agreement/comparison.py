@@ -15,7 +15,8 @@ import numpy as np
 
 from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
-from ..modal.growing import doubt, modes_of_band
+from ..modal.growing import doubt
+from ..modal.over_friction import modes_of_band
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape

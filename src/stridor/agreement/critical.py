@@ -10,7 +10,8 @@ import numpy as np
 from ..digits import measured
 from ..errors import AnalysisError
 from ..modal.assembled import Options
-from ..modal.growing import modes_of_band, onsets_of_band, refuted
+from ..modal.growing import refuted
+from ..modal.over_friction import modes_of_band, onsets_of_band
 from ..system import System
 from ..temporal.simulate import Settings
 from .assembled import turns

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import AnalysisError
-from ..modal.growing import modes_of_band
+from ..modal.over_friction import modes_of_band
 from ..sliding import full_motion, slip_speeds
 from ..system import System
 from ..temporal.observe import MOST_INSTANTS

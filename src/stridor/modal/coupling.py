@@ -109,13 +109,13 @@ def _blocks(a: ComplexArray, b: ComplexArray, c: ComplexArray, d: ComplexArray) 
 
 
 def couple(system: System, *, mu: float | None = None) -> tuple[Coupling, tuple[str, ...]]:
-    """Coupling of the contacts that touch in steady sliding at ``mu`` (default: the laws' own), and
-    the names of those that do not. Without loads every contact counts as touching."""
+    """Coupling of the contacts that touch in steady sliding at `System.touching_at`, else at ``mu``, else at the
+    laws' own coefficients, and the names of those that do not. Without loads every contact counts as touching."""
     open_names: tuple[str, ...] = ()
     velocities = full_motion(system)
     system = system.in_place()
     if system.contacts and system.loads:
-        steady = steady_sliding(system, mu=mu)
+        steady = steady_sliding(system, mu=mu if system.touching_at is None else system.touching_at)
         require_pressed(system, steady.normal_force)
         # A contact that only rounding presses is not closed, unless it is kept so.
         kept = np.array([c.closed for c in system.contacts], dtype=bool)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .assembled.problem import problem_of
 from .assembled.steady import Options
 from .assembled.whole import quadratic_of
-from .complex_modes import ComplexModes, Progress, complex_modes, undamped
+from .complex_modes import ComplexModes, complex_modes, undamped
 from .general.basis import AT_REST, GROWS, NOTHING
 from .onsets import Onsets, onsets
 from .quadratic import band_modes
@@ -134,46 +133,6 @@ def unconfirmed(found: Growing, listed: ComplexArray, unstable: BoolArray) -> in
     mine = mine[mine.imag <= top * (1 - SAME)]
     ours, _ = pairs(mine, found.values, NEAR * top)
     return len(mine) - len(ours)
-
-
-def modes_of_band(
-    system: System,
-    mu: float | Sequence[float] | Array,
-    max_frequency_hz: float,
-    *,
-    damped: bool = True,
-    vectors: bool | Literal["right"] = False,
-    own: float | None = None,
-    options: Options | None = None,
-    progress: Progress | None = None,
-) -> ComplexModes:
-    """Every mode of a band at the friction coefficients ``mu``, as `complex_modes` follows them and `checked_modes`
-    completes them. Whatever says something about which modes grow takes this list. Raises as `complex_modes` does."""
-    options = options or Options()
-    found = complex_modes(
-        system, mu, max_frequency_hz=max_frequency_hz, damped=damped, vectors=vectors,
-        friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
-        progress=progress,
-    )  # fmt: skip
-    # Matrices without structure are solved in full as it is, and say what speaks for that.
-    return found if found.completeness else checked_modes(system, found, max_frequency_hz, own=own, options=options)
-
-
-def onsets_of_band(
-    system: System,
-    friction_range: tuple[float, float],
-    max_frequency_hz: float,
-    *,
-    damped: bool = True,
-    options: Options | None = None,
-) -> Onsets:
-    """Every onset in a range of μ, as `onsets` solves them and `checked_onsets` completes them. Raises as `onsets`."""
-    options = options or Options()
-    found = onsets(
-        system, friction_range, max_frequency_hz=max_frequency_hz, damped=damped,
-        friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
-    )  # fmt: skip
-    return found if found.completeness else checked_onsets(system, found, damped=damped, options=options)
 
 
 def doubt(completeness: str) -> str:

@@ -7,13 +7,17 @@ from math import pi
 from typing import Any, Literal
 
 from ..digits import fixed, readable
+from ..typing import ComplexArray, IntArray
+
+Branches = tuple[IntArray, ComplexArray]
 
 
 @dataclass(frozen=True)
 class Onset:
     """One critical friction coefficient.
 
-    mu, frequency_hz: where; kind: flutter (two modes meet) or divergence (a mode at zero frequency);
+    mu, frequency_hz: where; kind: flutter (two modes meet), divergence (a mode at zero frequency) or contact (from
+    this μ on other nodes touch, and a mode grows with them that did not before, or the other way round);
     damped: with or without C; stabilising: True where growth ends there instead of beginning;
     branches: the two modes that meet, numbered from 1 by frequency at μ = 0.
     square_root_coefficient κ [1/s]: beyond an undamped onset growth opens as κ √(μ − μ_c); with
@@ -25,7 +29,7 @@ class Onset:
 
     mu: float
     frequency_hz: float
-    kind: Literal["flutter", "divergence"]
+    kind: Literal["flutter", "divergence", "contact"]
     damped: bool
     stabilising: bool
     branches: tuple[int, int]
@@ -61,7 +65,8 @@ class Onsets:
     whether anything works on velocities. at_start, at_end: eigenvalues [1/s] that grow in the band at a and at b;
     unexplained: how many of the latter none of the onsets accounts for. completeness: what speaks for there being no
     others, "" where nothing was checked. notes: what else is to be known. contact_state: where contacts may stick, how
-    many nodes stick, slip and are open, and at which μ; it is held over the range.
+    many nodes stick, slip and are open, and at which μ; it is held over the range. followed: numbers and eigenvalues
+    (b,) of the branches at both ends, where branches were followed; saved nowhere.
     """
 
     onsets: tuple[Onset, ...]
@@ -76,6 +81,7 @@ class Onsets:
     notes: tuple[str, ...] = ()
     contact_state: str = ""
     provenance: dict[str, Any] = field(default_factory=dict)
+    followed: tuple[Branches, Branches] | None = field(default=None, repr=False, compare=False)
 
     @property
     def first(self) -> Onset | None:

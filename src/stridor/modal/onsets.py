@@ -21,7 +21,7 @@ from .bordered import Bordered
 from .complex_modes import UNSTABLE_RELATIVE, grows, prepare, undamped
 from .coupling import Coupling
 from .histories import Change, Entries, reported, unexplained
-from .onset import Onset, Onsets
+from .onset import Branches, Onset, Onsets
 from .roots import Spectrum
 from .tracking import State, Tracker
 
@@ -130,7 +130,17 @@ def onsets(
             np.flatnonzero(_inside(tracker.origin, np.inf)).tolist(),
             changes,
         ),
+        followed=(_numbered(start, spectrum, order), _numbered(end, spectrum, order)),
     )
+
+
+def _numbered(state: State, spectrum: Spectrum, order: dict[int, int]) -> Branches:
+    """Numbers and eigenvalues (b,) of the branches at one μ, twins in the lower half plane left out."""
+    known = [k for k in range(len(state.roots)) if int(state.branch[k]) in order and state.roots[k].imag >= 0]
+    numbers = [order[int(state.branch[k])] for k in known]
+    fixed = sorted(set(range(1, len(order) + len(spectrum.fixed) + 1)) - set(order.values()))
+    unseen = spectrum.fixed[np.argsort(np.abs(spectrum.fixed.imag), kind="stable")]
+    return np.array(numbers + fixed, dtype=np.int64), np.concatenate([state.roots[known], unseen])
 
 
 def _inside(roots: ComplexArray, top: float) -> BoolArray:

@@ -81,13 +81,16 @@ def steady_sliding_nodes(
     load_factors: Mapping[str, float] | None = None,
     motion_factors: Array | None = None,
     guess: BoolArray | None = None,
+    held: BoolArray | None = None,
     solver: str | None = None,
 ) -> SurfaceSliding:
     """Solve the steady sliding equilibrium of every contact, over points and over surfaces.
 
     mu replaces the friction coefficient of every contact; load_factors default to one for every load,
     motion_factors (p,) to one for every support. guess (m,): nodes that are likely to touch, as `active` of a
-    solution at another coefficient, which saves most of the steps. solver is that of `direct.factorise`.
+    solution at another coefficient, which saves most of the steps. held (m,): the nodes that touch, whichever the signs
+    of their forces and of the others' gaps: what small motions about another μ hold, smooth in μ. solver is that of
+    `direct.factorise`.
     A system with load steps is taken through them, and factors can only be those of the last. Raises AnalysisError
     where a contact does not slide or would change its gap, where no contact carries load, and where the structure is
     not held.
@@ -116,7 +119,7 @@ def steady_sliding_nodes(
         push = sp.csr_array(nodes.normal + nodes.along(rubbing)) if rubs else nodes.normal
         equilibrium = Equilibrium(system, nodes, push, force, symmetric=symmetric, solver=solver)
         try:
-            state, tried = settle(equilibrium, guess)
+            state, tried = settle(equilibrium, guess) if held is None else (equilibrium.solve(held), 1)
         except SingularMatrix as error:
             raise AnalysisError(_loose(system, nodes, error.motion)) from error
         iterations += tried
@@ -136,7 +139,7 @@ def steady_sliding_nodes(
     if twice := redundant(system, nodes, touches & (nodes.compliance == 0.0)):
         raise AnalysisError(twice)
     active = state.active & ((state.normal_force > 0.0) | nodes.kept)
-    if nodes.count and not active.any():
+    if nodes.count and not active.any() and held is None:
         raise AnalysisError(
             f"no contact carries load in steady sliding at {words_of_friction(coefficient)} (contacts: "
             f"{', '.join(nodes.names)}): "
@@ -147,7 +150,8 @@ def steady_sliding_nodes(
             )
         )
     # What pulls by rounding does not pull.
-    normal = np.where(nodes.kept, state.normal_force, np.maximum(state.normal_force, 0.0))
+    own = nodes.kept if held is None else np.ones(nodes.count, dtype=bool)
+    normal = np.where(own, state.normal_force, np.maximum(state.normal_force, 0.0))
     friction = rubbing * normal[:, None]
     if rubs:
         sense = sign[:, None] * sense

@@ -37,7 +37,7 @@ from .fingerprint import changes_of, check_restart, fingerprint
 from .pressed import require_pressed_in_time
 from .provenance import provenance
 from .settings import phases_of, settings_of
-from .touching import LOOKS, decided_by_meshes, held_elsewhere
+from .touching import decided_by_meshes
 
 __all__ = [
     "BodyModes",
@@ -90,12 +90,12 @@ def modes(
     band = max_frequency_hz or case.modal.max_frequency_hz
     system = None if _varies_with_friction(case) else build_system(case)
     own = own_friction(case) if case.contacts else None
-    if system is None or system.general:
+    if system is None:
         from ..modal.assembled import Options
         from ..modal.general import general_modes
 
         result = general_modes(
-            _system_at(case, system),
+            lambda mu: build_system(case, mu),
             values,
             count=None,
             max_frequency_hz=band,
@@ -111,10 +111,9 @@ def modes(
         )
     if max_frequency_hz is None:
         result = result.lowest(case.modal.modes if count is None else count)
-    notes = (*result.notes, *(() if system is None else taken_as_closed(system)))
+    notes = (*result.notes, *(held_by_factors(case, own) if system is None else taken_as_closed(system)))
     if check and system is not None:
         single = float(result.mu[0]) if len(result.mu) == 1 else None
-        notes = (*notes, *held_elsewhere(system, result.mu, _solver(case)))
         notes = (*notes, *decided_by_meshes(system, single, _solver(case)))
     seconds = time.perf_counter() - started
     return replace(result, notes=notes, provenance=provenance(case, "modes", seconds, damped=damped))
@@ -134,7 +133,7 @@ def _followed_modes(
 ) -> ComplexModes:
     """Modes followed from μ = 0, and checked."""
     from ..modal.assembled import Options
-    from ..modal.growing import modes_of_band
+    from ..modal.over_friction import modes_of_band
 
     settings = _modal_options(case)
     if not check:
@@ -151,13 +150,15 @@ def _varies_with_friction(case: Case) -> bool:
     return MU in case.factor_names
 
 
-def _system_at(case: Case, system: System | None) -> Callable[[float], System]:
-    """The system at a μ: always ``system`` unless that is None."""
-
-    def at(mu: float) -> System:
-        return build_system(case, mu) if system is None else system
-
-    return at
+def held_by_factors(case: Case, own: float | None) -> tuple[str, ...]:
+    """What is said where factors of matrices depend on μ and there are contacts beside them."""
+    if not case.contacts:
+        return ()
+    at = "at the lowest μ" if own is None else f"at μ = {own:g}"
+    return (
+        f"Factors of imported matrices depend on mu: the contact nodes that touch in steady sliding {at} are held at "
+        "every μ where several are asked for.",
+    )
 
 
 def structured(case: Case, what: str, mu: float | None = None) -> System:
@@ -260,12 +261,12 @@ def onsets(
     limit = max_frequency_hz or case.modal.max_frequency_hz
     damped = case.modal.damped if damped is None else damped
     system = None if _varies_with_friction(case) else build_system(case)
-    if system is None or system.general:
+    if system is None:
         from ..modal.assembled import Options
         from ..modal.general import general_onsets
 
         result = general_onsets(
-            _system_at(case, system),
+            lambda mu: build_system(case, mu),
             between,
             max_frequency_hz=limit,
             damped=damped,
@@ -274,16 +275,16 @@ def onsets(
         )
     else:
         from ..modal.assembled import Options
-        from ..modal.growing import onsets_of_band
+        from ..modal.over_friction import onsets_of_band
 
         settings = _modal_options(case)
         if check:
             result = onsets_of_band(system, between, limit, damped=damped, options=Options(**settings))
         else:
             result = solve_onsets(system, between, max_frequency_hz=limit, damped=damped, **settings)
-    notes = (*result.notes, *(() if system is None else taken_as_closed(system)))
+    own = own_friction(case) if system is None and case.contacts else None
+    notes = (*result.notes, *(held_by_factors(case, own) if system is None else taken_as_closed(system)))
     if check and system is not None:
-        notes = (*notes, *held_elsewhere(system, np.linspace(*result.friction_range, LOOKS), _solver(case)))
         notes = (*notes, *decided_by_meshes(system, solver=_solver(case)))
     return replace(result, notes=notes, provenance=provenance(case, "onsets", time.perf_counter() - started))
 

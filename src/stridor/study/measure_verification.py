@@ -9,7 +9,8 @@ import numpy as np
 from ..contact.surfaces import SurfaceContact
 from ..modal.assembled import NotPositive, complex_modes_assembled
 from ..modal.complex_modes import ComplexModes
-from ..modal.growing import checked_modes, doubt, modes_of_band
+from ..modal.growing import checked_modes, doubt
+from ..modal.over_friction import modes_of_band
 from ..system import System
 from ..typing import ComplexArray
 from .contact_edges import edge_rows

@@ -13,6 +13,7 @@ from ..case import Case
 from ..case.expression import parse_expression
 from ..case.matrix_checks import MU
 from ..errors import CaseError
+from ..sliding.stretches import elsewhere_words, stretches
 from ..system import System, build_system
 from ..system.imported import Share
 from ..system.shares import system_shares
@@ -77,7 +78,11 @@ def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> Co
     )
     solver = None if settings.solver == "auto" else settings.solver
     problem = contacts_problem(family, options=Options(settings.friction_damping, settings.prestress, solver))
-    return problem if settings.damped else replace(problem, notes=(*problem.notes, DAMPED))
+    notes = problem.notes if settings.damped else (*problem.notes, DAMPED)
+    friction = next((p for p in parameters if p.name == FRICTION), None)
+    if friction is not None and numbers.own.contact_nodes().count:
+        notes = (*notes, *elsewhere_words(stretches(numbers.own, friction.low, friction.high, solver=solver)))
+    return replace(problem, notes=notes)
 
 
 def _parameters(case: Case, box: Mapping[str, tuple[float, float]]) -> tuple[Parameter, ...]:

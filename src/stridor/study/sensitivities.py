@@ -16,7 +16,8 @@ from ..errors import AnalysisError, CaseError
 from ..modal.assembled import Options
 from ..modal.complex_modes import ComplexModes, undamped
 from ..modal.derivatives import Mode, Terms, by_compliance, by_friction, hold, rate_of, solve_mode, terms_of
-from ..modal.growing import doubt, modes_of_band
+from ..modal.growing import doubt
+from ..modal.over_friction import modes_of_band
 from ..system import System, build_system
 from ..typing import Array, ComplexArray, IntArray
 from .analyses import own_friction

@@ -115,7 +115,8 @@ class System:
     point [N/m³]. general: why its matrices, imported ones, are not all symmetric with a positive definite mass, as all
     others are; "" where they are. holders: contact → paths of the supports and ties at its nodes. load_steps: the way
     to the static equilibrium, with stick and partial slip; empty where all contacts slide as the motions have them.
-    placed: whether it is what `in_place` has made of another.
+    placed: whether it is what `in_place` has made of another. touching_at: the μ of the steady sliding whose nodes
+    touch in its modes, whichever μ these are of; None where whoever asks for modes says.
     """
 
     mass: Sparse
@@ -139,6 +140,7 @@ class System:
     load_steps: tuple[LoadStep, ...] = ()
     placed: bool = False
     contact_cubic: Mapping[str, float] = field(default_factory=dict)
+    touching_at: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness"):
@@ -194,6 +196,10 @@ class System:
             self, loads=loads, contacts=contacts, surfaces=surfaces, cubic=cubic, placed=True,
             stress_stiffness=None if stresses is None else partial(stresses, place=place),
         )  # fmt: skip
+
+    def touching(self, mu: float | None) -> System:
+        """The system in whose modes those nodes touch that do so in steady sliding at ``mu`` (None: as it is)."""
+        return self if mu is None else replace(self, touching_at=mu)
 
     def contact_nodes(self) -> ContactNodes:
         """Every contact, point or surface, as one list of slave nodes: points first, then surfaces in order."""

@@ -16,7 +16,7 @@ import scipy
 from ...errors import CaseError
 from ...system import System
 from ...threads import one_thread_if_small
-from ...typing import BoolArray, ComplexArray
+from ...typing import BoolArray, ComplexArray, IntArray
 from ..complex_modes import UNSTABLE_RELATIVE, grows, undamped
 from ..histories import Change, Entries, reported, unexplained
 from ..onset import Onset, Onsets
@@ -90,7 +90,13 @@ def onsets_assembled(
         at_end=tuple(way.end.values[_inside(way.end, top)].tolist()),
         contact_state=problem.contact_state,
         unexplained=unexplained(np.flatnonzero(_inside(way.end, top)), way.from_start, changes),
+        followed=(_numbered(way.start), _numbered(way.end)),
     )
+
+
+def _numbered(state: State) -> tuple[IntArray, ComplexArray]:
+    """Numbers and eigenvalues (b,) of the branches at one μ."""
+    return np.arange(1, len(state.place) + 1), state.values
 
 
 def _inside(state: State, top: float) -> BoolArray:
@@ -101,7 +107,7 @@ def _inside(state: State, top: float) -> BoolArray:
 @dataclass(frozen=True)
 class _Way:
     """Branches over the range: states at both ends, changes of stability, entries into the band, and the branches that
-    grow at μ = 0."""
+    grow at its low end."""
 
     start: State
     end: State
@@ -111,7 +117,7 @@ class _Way:
 
 
 def _way(reduced: Reduced, between: tuple[float, float], top: float) -> _Way:
-    """What following sees from μ = 0 to the end of the range."""
+    """What following sees in the range; from μ = 0 up to it branches are only brought their names."""
     passages: list[Passage] = []
     entries = Entries(top)
 
@@ -119,9 +125,10 @@ def _way(reduced: Reduced, between: tuple[float, float], top: float) -> _Way:
         passages.extend(crossings(old, new) if reduced.problem.damped else meetings(reduced, old, new))
         entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.place)))
 
-    follower = Follower(reduced, longest=between[1] / 30, watch=watch)
-    first = np.flatnonzero(grows(follower.state.values, top)).tolist()
+    follower = Follower(reduced, longest=max(between[0] / 4, between[1] / 30))
     start = follower.advance(between[0])
+    first = np.flatnonzero(grows(start.values, top)).tolist()
+    follower.longest, follower.watch = between[1] / 30, watch
     return _Way(start, follower.advance(between[1]), passages, entries, first)
 
 

@@ -83,11 +83,13 @@ def refuse_stick(system: System, what: str) -> None:
 
 
 def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver: str | None) -> Touching:
-    """The nodes that carry load in steady sliding at ``mu``; all of them where the system has no loads.
+    """The nodes that carry load in steady sliding at `System.touching_at`, else at ``mu``, else at the laws' own
+    coefficients; all of them where the system has no loads.
 
     Raises AnalysisError where there is no steady sliding, or nothing that presses.
     """
     system = system.in_place()
+    mu = mu if system.touching_at is None else system.touching_at
     if (system.loads or system.load_steps) and nodes.count:
         steady = steady_sliding_nodes(system, mu=mu, solver=solver)
         require_pressed(system, steady.normal_force)
@@ -151,7 +153,7 @@ class Steadiness:
     def terms(self, mu: float) -> tuple[Array | None, Sparse | None, Sparse | None]:
         """Weakening d (m,) [N s/m], damping (n, n) and stiffness (n, n) at ``mu``, None where there is none."""
         try:
-            steady = steady_sliding_nodes(self.system, mu=mu, solver=self.solver)
+            steady = steady_sliding_nodes(self.system, mu=mu, held=self._held, solver=self.solver)
         except AnalysisError as error:
             raise AnalysisError(f"{error}; that is at μ = {mu:g}, of the range that was asked for") from error
         weakening = damping = None
@@ -172,6 +174,15 @@ class Steadiness:
             change = self._hardening(mu, steady.normal_force)
             stiffness = change if stiffness is None else sp.csr_array(stiffness + change)
         return weakening, damping, stiffness
+
+    @property
+    def _held(self) -> BoolArray | None:
+        """The nodes (m,) that touch at every μ, where the system says so: of a stretch of μ in which they do."""
+        if self.system.touching_at is None or self.system.load_steps:
+            return None
+        held = np.zeros(self.nodes.count, dtype=bool)
+        held[self.touching] = True
+        return held
 
     def _hardening(self, mu: float, normal_force: Array) -> Sparse:
         """What contact at ``mu`` is stiffer than the layer, (N + μS)ᵀ Δk N (n, n)."""

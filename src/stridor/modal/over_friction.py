@@ -1,0 +1,199 @@
+"""Modes and onsets of a band over the friction coefficient: what says which modes grow takes these lists.
+
+Nodes of a contact open and close as friction grows. Each μ has those that touch in its own steady sliding, so that the
+modes at a μ do not depend on which others were asked for, and an onset is solved with the nodes that touch there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from typing import Literal
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..sliding.stretches import Stretch, stretch_words, stretches
+from ..system import System
+from ..typing import Array, ComplexArray, IntArray
+from .assembled.steady import Options
+from .complex_modes import ComplexModes, Progress, complex_modes
+from .growing import UNCHECKED, checked_modes, checked_onsets, growing_modes
+from .joined import Border, joined_modes, joined_onsets, rows_of
+from .onsets import Onsets, onsets
+
+
+def modes_of_band(
+    system: System,
+    mu: float | Sequence[float] | Array,
+    max_frequency_hz: float,
+    *,
+    damped: bool = True,
+    vectors: bool | Literal["right"] = False,
+    own: float | None = None,
+    options: Options | None = None,
+    progress: Progress | None = None,
+) -> ComplexModes:
+    """Every mode of a band at the friction coefficients ``mu``, as `complex_modes` follows them and `checked_modes`
+    completes them, each with the nodes that touch at its μ. Whatever says something about which modes grow takes this
+    list. At a μ where there is no steady sliding among others where there is, all is NaN. Raises as `complex_modes`."""
+    options = options or Options()
+    values = np.atleast_1d(np.asarray(mu, dtype=float))
+
+    def followed(held: System, at: Array, tell: Progress | None) -> ComplexModes:
+        return complex_modes(
+            held, at, max_frequency_hz=max_frequency_hz, damped=damped, vectors=vectors,
+            friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
+            progress=tell,
+        )  # fmt: skip
+
+    def checked(held: System, found: ComplexModes) -> ComplexModes:
+        # Matrices without structure are solved in full as it is, and say what speaks for that.
+        return found if found.completeness else checked_modes(held, found, max_frequency_hz, own=own, options=options)
+
+    if len(values) < 2 or not (np.all(np.isfinite(values)) and np.all(values >= 0)):
+        return checked(system, followed(system, values, progress))
+    over = stretches(system, float(values.min()), float(values.max()), solver=options.solver)
+    parts = _parts(over, values)
+    if len(parts) == 1 and not parts[0][0].reason:
+        held = parts[0][0].of(system)
+        return checked(held, followed(held, values, progress))
+    return _modes_of_parts(system, values, parts, over, followed, checked, progress)
+
+
+def _parts(over: tuple[Stretch, ...], values: Array) -> list[tuple[Stretch, IntArray]]:
+    """The stretches with friction coefficients in them, and the places of these in ``values`` (k,)."""
+    inner = np.array([s.low for s in over[1:]])
+    which = np.searchsorted(inner, values, side="right")
+    return [(s, places) for k, s in enumerate(over) if len(places := np.flatnonzero(which == k))]
+
+
+def _modes_of_parts(
+    system: System,
+    values: Array,
+    parts: list[tuple[Stretch, IntArray]],
+    over: tuple[Stretch, ...],
+    followed: Callable[[System, Array, Progress | None], ComplexModes],
+    checked: Callable[[System, ComplexModes], ComplexModes],
+    progress: Progress | None,
+) -> ComplexModes:
+    """Modes of every stretch with its own touching nodes, joined."""
+    solid = [(s, places) for s, places in parts if not s.reason]
+    if not solid:
+        raise AnalysisError(parts[0][0].reason)
+    found: list[ComplexModes] = []
+    borders: list[Border] = []
+    order: list[int] = []
+    left: tuple[IntArray, ComplexArray] | None = None
+    stopped = False
+    for k, (stretch, places) in enumerate(solid):
+        # Both sides of a border are solved at its μ as well, so that branches are known again beyond it.
+        ends = [s.low for s, _ in (solid[k : k + 1] if k else []) + solid[k + 1 : k + 2]]
+        held, done = stretch.of(system), len(order)
+
+        def tell(at: int, of: int, done: int = done) -> None:
+            if progress is not None:
+                progress(min(done + at, len(values)), len(values))
+
+        whole = followed(held, np.append(values[places], ends), tell)
+        if whole.planned is not None:
+            # What follows is missing too; rows of borders are no results.
+            rows = [r for r, mu in enumerate(whole.mu) if mu in values[places]]
+            keep = [int(places[np.flatnonzero(values[places] == whole.mu[r])[0]]) for r in rows]
+            stopped, own = True, rows_of(whole, rows)
+        else:
+            keep, own = places.tolist(), rows_of(whole, range(len(places)))
+        sides = [(whole.branch, whole.eigenvalues[len(places) + e]) for e in range(len(ends))] if not stopped else []
+        if k and left is not None:
+            if not sides:
+                break
+            borders.append(Border(stretch.low, left, sides[0]))
+        left = sides[-1] if sides else None
+        found.append(checked(held, replace(own, planned=None)))
+        order += keep
+        if stopped:
+            break
+    result = joined_modes(found, borders, np.array(order, dtype=np.int64))
+    planned = len(values) if stopped or len(order) < sum(len(p) for _, p in solid) else None
+    result = replace(result, planned=planned, notes=(*result.notes, *stretch_words(over)))
+    return result if planned is not None else _with_empty(result, values, parts)
+
+
+def _with_empty(modes: ComplexModes, values: Array, parts: list[tuple[Stretch, IntArray]]) -> ComplexModes:
+    """With rows of NaN at the μ where there is no steady sliding."""
+    empty = {int(k): s.reason for s, places in parts if s.reason for k in places}
+    if not empty:
+        return modes
+    solid = [k for k in range(len(values)) if k not in empty]
+
+    def wide(block: ComplexArray) -> ComplexArray:
+        result = np.full((len(values), *block.shape[1:]), complex(np.nan, np.nan))
+        result[solid] = block
+        return result
+
+    told = dict(zip(solid, modes.completeness or ("",) * len(solid), strict=True))
+    return replace(
+        modes,
+        mu=values,
+        eigenvalues=wide(modes.eigenvalues),
+        residual=wide(modes.residual + 0j).real,
+        right=None if modes.right is None else wide(modes.right),
+        left=None if modes.left is None else wide(modes.left),
+        completeness=tuple(told.get(k) or f"{UNCHECKED}: {empty[k]}." for k in range(len(values))),
+    )
+
+
+def onsets_of_band(
+    system: System,
+    friction_range: tuple[float, float],
+    max_frequency_hz: float,
+    *,
+    damped: bool = True,
+    options: Options | None = None,
+) -> Onsets:
+    """Every onset in a range of μ, as `onsets` solves them and `checked_onsets` completes them, each with the nodes
+    that touch at its μ; where these change, growth may set in or end at once (kind "contact"). Raises as `onsets`."""
+    options = options or Options()
+
+    def solved(held: System, between: tuple[float, float]) -> Onsets:
+        found = onsets(
+            held, between, max_frequency_hz=max_frequency_hz, damped=damped,
+            friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
+        )  # fmt: skip
+        return found if found.completeness else checked_onsets(held, found, damped=damped, options=options)
+
+    low, high = (float(v) for v in friction_range)
+    if not (0 <= low < high and np.isfinite(high)):
+        return solved(system, friction_range)
+    over = stretches(system, low, high, solver=options.solver)
+    if len(over) == 1 and not over[0].reason:
+        return solved(over[0].of(system), (low, high))
+    solid = [s for s in over if not s.reason]
+    if not solid:
+        raise AnalysisError(over[0].reason)
+    parts = [(s, solved(s.of(system), (s.low, s.high))) for s in solid]
+
+    def border(k: int) -> Border:
+        mu = parts[k + 1][0].low
+        sides = parts[k][1].followed, parts[k + 1][1].followed
+        if sides[0] is not None and sides[1] is not None:
+            return Border(mu, sides[0][1], sides[1][0])
+        before, after = (
+            complex_modes(
+                s.of(system), [mu], max_frequency_hz=max_frequency_hz, damped=damped, **asdict(options)
+            )
+            for s in (parts[k][0], parts[k + 1][0])
+        )
+        return Border(mu, (before.branch, before.eigenvalues[0]), (after.branch, after.eigenvalues[0]))
+
+    def residual(stretch: Stretch, mu: float, lam: complex) -> float:
+        try:
+            found = growing_modes(
+                stretch.of(system), mu, max_frequency_hz, touching_at=None, damped=damped, options=options
+            )
+        except AnalysisError:
+            return np.nan
+        return float(found.residual[int(np.argmin(np.abs(found.values - lam)))]) if len(found.values) else np.nan
+
+    found = joined_onsets(parts, (low, solid[-1].high), border, residual)
+    return replace(found, notes=(*found.notes, *stretch_words(over)))

@@ -1,0 +1,220 @@
+"""Which nodes touch over the friction coefficient: stretches of μ in which they are the same.
+
+Friction redistributes the pressure, so that nodes of a surface open and close as μ grows. Between two such changes the
+equilibrium is that of one linear problem and its forces and gaps are smooth in μ: where the first of them runs out is
+foreseen by a straight line through the last two, and enclosed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..system import System
+from ..typing import Array, BoolArray
+from .surfaces import SurfaceSliding, steady_sliding_nodes
+
+LOOKS = 9  # equilibria over a range, of small models
+FEWER = 3  # of larger ones
+SMALL = 8000  # freedoms
+WIDTH = 1e-9  # of the largest μ: how closely a change is enclosed
+WIDTH_OF_NONE = 1e-3  # where there is no equilibrium on one side, which costs far more to find out
+MOST = 60  # stretches
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Friction coefficients from low to high at which the same nodes touch.
+
+    at: a μ whose steady sliding has them, None where they are those of the case's own friction. touching: how many of
+    ``nodes`` they are. reason: why there is no steady sliding, "" where there is.
+    """
+
+    low: float
+    high: float
+    at: float | None
+    touching: int = 0
+    nodes: int = 0
+    reason: str = ""
+
+    def of(self, system: System) -> System:
+        """The system whose modes hold these nodes."""
+        return system.touching(self.at)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """Steady sliding at one μ: which nodes touch and which of those kept closed pull, as ``key``; None without any."""
+
+    mu: float
+    key: bytes | None
+    found: SurfaceSliding | None
+    reason: str = ""
+
+
+def stretches(system: System, low: float, high: float, *, solver: str | None = None) -> tuple[Stretch, ...]:
+    """The stretches that make up the friction coefficients from ``low`` to ``high``, in order.
+
+    One, without a look, where nothing can change: no loads, every contact kept closed, or contacts that may stick,
+    whose state is held (`System.load_steps`). A set that comes and goes between two looks that agree is not seen.
+    Raises AnalysisError for more than MOST.
+    """
+    nodes = system.contact_nodes()
+    if not nodes.count or not system.loads or system.load_steps or bool(np.all(nodes.kept)):
+        return (Stretch(low, high, None),)
+    search = _Search(system, solver)
+    own = search.own()
+    if own is None:
+        return (Stretch(low, high, None),)  # what there is to say, the modes say
+    count = LOOKS if system.size <= SMALL else FEWER
+    looks = [search.at(float(mu)) for mu in np.unique(np.linspace(low, high, count))]
+    pieces = [looks[0]]
+    borders: list[float] = []
+    for before, after in pairwise(looks):
+        for border, beyond in search.changes(before, after):
+            borders.append(border)
+            pieces.append(beyond)
+            if len(pieces) > MOST:
+                raise AnalysisError(
+                    f"more than {MOST} times between μ = {low:g} and {high:g} do contact nodes open or close; take a "
+                    "smaller range of μ"
+                )
+    ends = [low, *borders, high]
+    return tuple(
+        Stretch(
+            a, b, None if piece.key == own else piece.mu,
+            0 if piece.found is None else int(piece.found.active.sum()), nodes.count, piece.reason,
+        )
+        for (a, b), piece in zip(pairwise(ends), pieces, strict=True)
+    )  # fmt: skip
+
+
+def stretch_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
+    """A sentence on what touches where, and one on where there is no steady sliding; () where nothing changes."""
+    told: list[str] = []
+    solid = [s for s in found if not s.reason]
+    if len(solid) > 1:
+        parts = [f"{s.touching} between μ = {s.low:.6g} and {s.high:.6g}" for s in solid]
+        told.append(
+            f"Of the {solid[0].nodes} contact nodes other ones touch in steady sliding as friction grows: "
+            f"{', '.join(parts)}. Every μ has its own."
+        )
+    told += [f"Between μ = {s.low:.4g} and {s.high:.4g} nothing was solved: {s.reason}." for s in found if s.reason]
+    return tuple(told)
+
+
+def elsewhere_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
+    """A sentence where a model that holds the nodes of the case's own friction has others than steady sliding."""
+    others = [s for s in found if s.at is not None or s.reason]
+    if not others:
+        return ()
+    own = next((s for s in found if s not in others), None)
+    held = "The nodes" if own is None else f"The {own.touching} of {own.nodes} contact nodes"
+    where = ", ".join(
+        f"{s.low:.4g} to {s.high:.4g} ({'no steady sliding' if s.reason else f'{s.touching} touch'})" for s in others
+    )
+    return (
+        f"{held} that touch at the case's own friction are held at every μ of the model; steady sliding has others at "
+        f"μ = {where}. Modes there are other ones: `stridor modes` and `stridor onsets` have them.",
+    )
+
+
+class _Search:
+    """Equilibria by μ, each solved once, the nearest known one as its first guess."""
+
+    def __init__(self, system: System, solver: str | None) -> None:
+        self._system, self._solver = system, solver
+        self._known: dict[float, _Look] = {}
+        self._guess: BoolArray | None = None
+
+    def own(self) -> bytes | None:
+        """The key of the laws' own coefficients; None where there is no steady sliding."""
+        try:
+            found = steady_sliding_nodes(self._system, solver=self._solver)
+        except AnalysisError:
+            return None
+        self._guess = found.active
+        return _key(found)
+
+    def at(self, mu: float) -> _Look:
+        """Steady sliding at ``mu``."""
+        if mu not in self._known:
+            try:
+                found = steady_sliding_nodes(self._system, mu=mu, guess=self._near(mu), solver=self._solver)
+            except AnalysisError as error:
+                self._known[mu] = _Look(mu, None, None, str(error))
+            else:
+                self._known[mu] = _Look(mu, _key(found), found)
+        return self._known[mu]
+
+    def _near(self, mu: float) -> BoolArray | None:
+        solved = [look for look in self._known.values() if look.found is not None]
+        if not solved:
+            return self._guess
+        nearest = min(solved, key=lambda look: abs(look.mu - mu)).found
+        assert nearest is not None
+        return nearest.active
+
+    def changes(self, low: _Look, high: _Look) -> Iterator[tuple[float, _Look]]:
+        """Each μ between two looks from which on other nodes touch, and a look beyond it that shows which."""
+        width = WIDTH if None not in (low.key, high.key) else WIDTH_OF_NONE
+        foreseen: float | None = None
+        while low.key != high.key:
+            span = high.mu - low.mu
+            if span <= width * max(high.mu, 1e-3):
+                yield 0.5 * (low.mu + high.mu), high
+                return
+            before, foreseen = foreseen, self._foreseen(low, high)
+            for mu in _probes(low.mu, high.mu, foreseen, before):
+                look = self.at(mu)
+                if look.key == low.key:
+                    low = look
+                elif look.key == high.key:
+                    high = look
+                else:
+                    yield from self.changes(low, look)
+                    low, foreseen = look, None
+                    break
+
+    def _foreseen(self, low: _Look, high: _Look) -> float | None:
+        """Where the first force or gap of either set runs out, on lines through its two nearest looks; None unknown."""
+        for edge in (low, high):
+            others = [k for k in self._known.values() if k.key == edge.key and k.mu != edge.mu]
+            if edge.found is None or not others:
+                continue
+            other = min(others, key=lambda k: abs(k.mu - edge.mu))
+            assert other.found is not None
+            here, there = _margin(edge.found), _margin(other.found)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                at = edge.mu - here * (edge.mu - other.mu) / (here - there)
+            inside = at[(at > low.mu) & (at < high.mu)]
+            if len(inside):
+                return float(inside.min() if edge is low else inside.max())
+        return None
+
+
+def _probes(low: float, high: float, foreseen: float | None, before: float | None) -> Iterator[float]:
+    """Where to look next, low < μ < high: on both sides of what is foreseen, the closer the better that was."""
+    span = high - low
+    if foreseen is None:
+        yield 0.5 * (low + high)
+        return
+    doubt = 0.05 * span if before is None else 4.0 * abs(foreseen - before)
+    doubt = min(max(doubt, 0.25 * WIDTH * high), 0.2 * span)
+    yield min(max(foreseen - doubt, low + 0.02 * span), high - 0.02 * span) if foreseen - doubt > low else low + doubt
+    yield foreseen + doubt if foreseen + doubt < high else high - doubt
+
+
+def _key(found: SurfaceSliding) -> bytes:
+    """What modes hold of steady sliding: who touches, and which way friction goes where a kept contact pulls."""
+    pulls = found.active & (found.normal_force < 0.0)
+    return np.concatenate([found.active, pulls]).tobytes()
+
+
+def _margin(found: SurfaceSliding) -> Array:
+    """What may run out, per node (m,): the normal force where it touches, the gap where it is open."""
+    return np.where(found.active, found.normal_force, found.gap)
