@@ -260,6 +260,15 @@ def test_what_is_held_is_said():
     assert note.endswith("of 7 touching nodes would lift off; the reduced model holds the nodes that touch in the case as it is.")
 
 
+def test_what_is_held_is_said_without_steady_terms_too():
+    """Springs and Coulomb's law ask for no steady state at any μ, and yet other nodes touch at another."""
+    case = block(1e12)
+    assert not parametric_problem(case, {"mu": (0.0, 0.1)}).notes
+    (note,) = parametric_problem(case, {"mu": (0.0, 1.2)}).notes
+    assert "contact nodes that touch at the case's own friction are held at every μ of the model" in note
+    assert "to 1.2 (" in note
+
+
 def test_what_reduced_models_of_contacts_refuse():
     rigid, falling = block("rigid"), block(1e12, FALLING)
     for case, box, message in (

@@ -80,7 +80,8 @@ def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> Co
     problem = contacts_problem(family, options=Options(settings.friction_damping, settings.prestress, solver))
     notes = problem.notes if settings.damped else (*problem.notes, DAMPED)
     friction = next((p for p in parameters if p.name == FRICTION), None)
-    if friction is not None and numbers.own.contact_nodes().count:
+    # Where steady states are solved for, the problem has told of what it holds.
+    if friction is not None and numbers.own.contact_nodes().count and not problem.notes:
         notes = (*notes, *elsewhere_words(stretches(numbers.own, friction.low, friction.high, solver=solver)))
     return replace(problem, notes=notes)
 
