@@ -45,13 +45,13 @@ def same_on_a_grid(case: st.Case, low: float, high: float, count: int) -> list[f
     return [0.5 * (a + b) for a, b, x, y in zip(grid, grid[1:], active, active[1:], strict=False) if np.any(x != y)]
 
 
-@pytest.mark.parametrize("coefficient", [0.0, 0.2, 0.4])
+@pytest.mark.parametrize("coefficient", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
 def test_changes_are_where_many_equilibria_see_them(coefficient: float) -> None:
     case = block(0.45, coefficient)
     found = stretches(build_system(case), 0.0, 0.45)
-    seen = same_on_a_grid(case, 0.0, 0.45, 451)
+    seen = same_on_a_grid(case, 0.0, 0.45, 151)
     assert len(seen) >= 2
-    np.testing.assert_allclose([s.low for s in found[1:]], seen, atol=0.51e-3)
+    np.testing.assert_allclose([s.low for s in found[1:]], seen, atol=1.51e-3)
     system = build_system(case)
     for before, after in pairwise(found):
         # Enclosed to 1e-9: on both sides close by touch as many as said.
@@ -62,7 +62,7 @@ def test_changes_are_where_many_equilibria_see_them(coefficient: float) -> None:
 def test_modes_at_a_friction_do_not_depend_on_the_others() -> None:
     case = block(0.4, coefficient=0.0)
     rng = np.random.default_rng(5)
-    mus = np.append(rng.uniform(0.0, 0.45, 9), [0.0, 0.45])
+    mus = np.append(rng.uniform(0.0, 0.45, 5), [0.0, 0.45])
     assert len({touching(case, float(mu)) for mu in mus}) >= 3
     swept = st.modes(case, mus)
     for row, mu in enumerate(mus):
@@ -131,6 +131,8 @@ def test_onsets_end_where_steady_sliding_does() -> None:
     """A falling law asks for the equilibrium at each μ; the block tips over from about 0.5 on."""
     case = block(1.0).with_(
         {
+            "bodies.block.mesh.divisions": [3, 2],
+            "bodies.slider.mesh.divisions": [10, 1],
             "contacts.face.friction": {
                 "law": "hyperbolic", "coefficient": 0.2, "static_coefficient": 0.6, "delta": 2.0,
             },
@@ -169,7 +171,7 @@ def random_block(seed: int) -> st.Case:
     )
 
 
-def wrong(seed: int, count: int = 25) -> str:
+def wrong(seed: int, count: int = 12) -> str:
     """What the onsets of a random block say otherwise than modes at single μ; "" where nothing."""
     case = random_block(seed)
     try:
@@ -189,12 +191,12 @@ def wrong(seed: int, count: int = 25) -> str:
 
 
 def test_onsets_say_what_modes_at_single_frictions_do() -> None:
-    assert [said for seed in range(6) if (said := wrong(seed))] == []
+    assert [said for seed in (1, 5) if (said := wrong(seed))] == []
 
 
 @pytest.mark.slow
 def test_onsets_of_many_random_blocks() -> None:
-    assert [said for seed in range(6, 300) if (said := wrong(seed, 41))] == []
+    assert [said for seed in range(300) if (said := wrong(seed, 41))] == []
 
 
 def test_modes_are_matched_by_their_nearness_alone() -> None:
