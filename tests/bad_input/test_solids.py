@@ -1068,11 +1068,12 @@ def mutated(text: str, dice: random.Random) -> str:
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of numbers at the edge of their range
-def test_no_slip_of_an_editor_makes_a_traceback() -> None:
+@pytest.mark.parametrize("seeds", [range(100), pytest.param(range(100, 400), marks=pytest.mark.slow)], ids=str)
+def test_no_slip_of_an_editor_makes_a_traceback(seeds: range) -> None:
     base = coarse_template()
     assert st.describe(loads(base)).data["degrees_of_freedom"] > 0
     described = 0
-    for seed in range(300):
+    for seed in seeds:
         with contextlib.suppress(StridorError):
             try:
                 case = loads(mutated(base, random.Random(seed)))
@@ -1081,4 +1082,4 @@ def test_no_slip_of_an_editor_makes_a_traceback() -> None:
             except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
                 pytest.fail(f"seed {seed}: {type(error).__name__}: {error}")
             described += 1
-    assert described > 20  # some slips do no harm
+    assert described > len(seeds) // 15  # some slips do no harm

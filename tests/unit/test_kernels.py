@@ -291,7 +291,7 @@ def test_the_note_stays_out_of_documents_and_of_quiet_runs(tmp_path):
         "TMPDIR": str(tmp_path),
     }  # fmt: skip
     case = PACKAGE / "case" / "templates" / "two-beams.toml"
-    words = ("-m", "stridor", "modes", case, "--mu", "0.1", "--out", tmp_path)
+    words = ("-m", "stridor", "check", case, "--out", tmp_path)
     printed, noted = python(*words, "--json", environment=environment)
     assert json.loads(printed)
     assert [line.startswith("note: ") for line in noted.splitlines()].count(True) == 1

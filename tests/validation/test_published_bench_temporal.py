@@ -116,6 +116,7 @@ def test_reversed_velocity_decays():
     assert result.phases[1].contacts["A"].separation_fraction == 0.0
 
 
+@pytest.mark.slow
 def test_lean_and_velocity_reversed_together_grow_again():
     """Only the sign of V sin β matters."""
     changes = {"bodies__beam1__angle_deg": 95.0, "supports__clamp__velocity__x": -0.02}

@@ -311,8 +311,13 @@ def test_friction_the_other_way_is_another_problem(tmp_path: Path):
     assert all(abs(o.mu - r.mu) > 1e-2 for o in other.onsets for r in right.onsets)
 
 
-@pytest.mark.parametrize("damped", [True, False])
-@pytest.mark.parametrize("stiffness", [1e12, "rigid"])
+@pytest.mark.parametrize(
+    ("stiffness", "damped"),
+    [
+        *((1e12, False), ("rigid", True)),
+        *(pytest.param(*p, marks=pytest.mark.slow) for p in ((1e12, True), ("rigid", False))),
+    ],
+)
 def test_contact_that_stridor_makes_of_imported_surfaces(tmp_path: Path, stiffness: float | str, damped: bool):
     """Friction of the contact and a factor with mu in one: that is too small to matter. Where damping is the same all
     over and contact rigid, modes meet exactly, and which is which beyond is a matter of taste that both share."""

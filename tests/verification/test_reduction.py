@@ -218,14 +218,14 @@ def test_onsets_along_any_parameter_are_those_of_the_full_problem(model):
         assert found
         (own,) = (p for p in model.problem.parameters if p.name == name)
         growing = []
-        for value in np.linspace(own.low, own.high, 41):
+        points = np.linspace(own.low, own.high, 21)
+        for value in points:
             exact = eigenvalues(model.problem, {**fixed, name: value})
             growing.append(int(np.sum((exact.real > 1e-9) & (np.abs(exact) < model.frequency))))
         # Between two points of the grid as many modes turn unstable as onsets say.
         for low, high, before, after in zip(
-            np.linspace(own.low, own.high, 41)[:-1], np.linspace(own.low, own.high, 41)[1:], growing[:-1], growing[1:],
-            strict=True,
-        ):  # fmt: skip
+            points[:-1], points[1:], growing[:-1], growing[1:], strict=True
+        ):
             inside = [o for o in found if low < o.value <= high]
             assert sum(-1 if o.stabilising else 1 for o in inside) == after - before
         for onset in found:

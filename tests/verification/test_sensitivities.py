@@ -120,8 +120,13 @@ BEAMS = ["mu", "contacts.A.friction.coefficient", "materials.steel.young_modulus
 BEAMS += ["bodies.beam1.thickness", "bodies.beam1.width"]
 
 
-@pytest.mark.parametrize("stiffness", [1e9, "rigid"])
-@pytest.mark.parametrize("damped", [True, False])
+@pytest.mark.parametrize(
+    ("stiffness", "damped"),
+    [
+        *((1e9, True), ("rigid", False)),
+        *(pytest.param(*p, marks=pytest.mark.slow) for p in ((1e9, False), ("rigid", True))),
+    ],
+)
 def test_two_beams(stiffness, damped):
     model = paper_case(
         contacts__A__stiffness=stiffness, bodies__beam1__elements=6, bodies__beam2__elements=18,
