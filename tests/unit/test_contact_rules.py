@@ -1,0 +1,128 @@
+"""Small rules of contact on shapes whose answers are plain: which segment is found, and what quadrature rules integrate."""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+import pytest
+
+from stridor.contact.curve import Curve
+from stridor.contact.pieces import _affine, _composite, _fine_triangle, _frames
+from stridor.mesh.facets import reference_nodes
+
+
+def rectangle(length: float, height: float) -> Curve:
+    """Its sides in order 0 (below), 1 (right), 2, 3, one facet each, all corners sharp."""
+    points = np.array([[0.0, 0.0], [length, 0.0], [length, height], [0.0, height]])
+    return Curve.from_facets(points, {"line": np.array([[0, 1], [1, 2], [2, 3], [3, 0]])}, where="rectangle")
+
+
+def side_of(curve: Curve, found: int) -> int:
+    """The side by the middle of the segment found: 0 below, 1 right, 2 above, 3 left."""
+    middle = curve.positions[curve.stencils[found, 1:3]].mean(axis=0)
+    size = curve.positions.max(axis=0)
+    return int(np.argmin([middle[1], size[0] - middle[0], size[1] - middle[1], middle[0]]))
+
+
+@pytest.mark.parametrize("tall", [False, True])
+def test_a_long_side_is_found_though_the_middle_of_a_short_one_is_nearer(tall: bool) -> None:
+    size = np.array([4.0, 1.0])
+    off = np.array([[0.2, -0.3], [3.8, -0.3], [0.2, 1.3], [3.8, 1.3]])
+    sides = [0, 0, 2, 2]
+    if tall:
+        size, off, sides = size[::-1], off[:, ::-1], [3, 3, 1, 1]
+    curve = rectangle(*size)
+    found = curve.locate(off)
+    assert found.gap == pytest.approx(np.full(4, 0.3), rel=1e-12)
+    assert [side_of(curve, k) for k in found.facet] == sides
+    assert found.inside.all()
+
+
+def test_a_point_right_off_the_end_of_a_side_belongs_to_that_side_and_not_to_the_corner() -> None:
+    # Nearest to all of these is a corner, of one side on the line and of the other beyond its end.
+    curve = rectangle(2.0, 1.0)
+    off = np.array([[2.0, -0.2], [2.2, 0.0], [2.2, 1.0], [2.0, 1.2], [0.0, 1.2], [-0.2, 1.0], [-0.2, 0.0], [0.0, -0.2]])
+    found = curve.locate(off)
+    assert [side_of(curve, k) for k in found.facet] == [0, 1, 1, 2, 2, 3, 3, 0]
+    assert found.gap == pytest.approx(np.full(8, 0.2))
+    assert found.normal == pytest.approx((off - found.point) / 0.2)
+
+
+def test_off_a_corner_the_gap_is_the_distance_from_it() -> None:
+    curve = rectangle(2.0, 1.0)
+    off = np.array([[2.3, -0.4], [-0.3, 1.4]])
+    found = curve.locate(off)
+    assert found.gap == pytest.approx([0.5, 0.5])
+    assert found.normal == pytest.approx(np.array([[0.6, -0.8], [-0.6, 0.8]]))
+    assert found.inside.all()
+
+
+@pytest.mark.parametrize("turn", range(5))
+def test_every_corner_is_broken_and_wherever_the_numbering_begins(turn: int) -> None:
+    angle = 2 * np.pi * (np.arange(5) + turn) / 5
+    points = np.column_stack([np.cos(angle), np.sin(angle)])
+    cells = np.stack([np.arange(5), (np.arange(5) + 1) % 5], axis=1)
+    curve = Curve.from_facets(points, {"line": cells}, where="pentagon")
+    assert sorted(curve.nodes[curve.corners]) == [0, 1, 2, 3, 4]
+    out = 1.5 * points
+    found = curve.locate(out)
+    assert found.gap == pytest.approx(np.full(5, 0.5))
+    assert found.normal == pytest.approx(points)
+    # At a corner itself it is that of one of its sides.
+    at = curve.locate(points)
+    assert np.sum(at.normal * points, axis=1) == pytest.approx(np.full(5, np.cos(np.pi / 5)))
+    assert at.gap == pytest.approx(np.zeros(5), abs=1e-15)
+
+
+# -- rules of quadrature -----------------------------------------------------------------------------------------------
+
+
+def moments(place, weight, degree: int) -> dict[tuple[int, ...], float]:
+    dimension = place.shape[1]
+    return {
+        power: float(weight @ np.prod(place ** np.array(power), axis=1))
+        for power in np.ndindex(*[degree + 1] * dimension) if sum(power) <= degree
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "degree"), [("line", 1), ("line3", 3), ("quad", 2), ("quad8", 3)])
+def test_the_fine_rule_of_lines_and_squares_is_exact(kind: str, degree: int) -> None:
+    place, weight = _composite(kind)
+    for power, value in moments(place, weight, degree).items():
+        assert value == pytest.approx(np.prod([1 / (p + 1) for p in power]), rel=1e-13), power
+    assert place.min() > 0
+    assert place.max() < 1
+    # In sixteenths of a square and quarters of a line equally many points.
+    cell = np.floor(4 * place).astype(int) @ [1, 4][: place.shape[1]]
+    assert len(set(np.bincount(cell))) == 1
+    assert len(np.bincount(cell)) == 4 ** place.shape[1]
+
+
+@pytest.mark.parametrize("rule", ["triangle", "triangle6", 2, 4])
+def test_the_fine_rule_of_triangles_is_exact(rule) -> None:
+    place, weight = _fine_triangle(rule) if isinstance(rule, int) else _composite(rule)
+    degree = {"triangle": 2, "triangle6": 4}.get(rule, 2 * rule - 2 if isinstance(rule, int) else 0)
+    for (a, b), value in moments(place, weight, degree).items():
+        assert value == pytest.approx(factorial(a) * factorial(b) / factorial(a + b + 2), rel=1e-12), (a, b)
+    assert place.min() > 0
+    assert place.sum(axis=1).max() < 1
+
+
+def test_frames_lie_in_their_facets_with_the_normal_outward() -> None:
+    triangle = np.array([[[0, 0, 1], [2, 0, 1], [0, 3, 1]]], dtype=float)
+    square = np.array([[[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]]], dtype=float)
+    for corners, normal in ((triangle, [0, 0, 1]), (square, [1, 0, 0])):
+        frame = _frames(corners)[0]
+        assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-14)
+        assert np.cross(frame[0], frame[1]) == pytest.approx(frame[2])
+        assert frame[2] == pytest.approx(normal)
+
+
+@pytest.mark.parametrize("kind", ["triangle6", "quad", "quad8", "quad9"])
+def test_facets_are_even_where_they_are_images_without_distortion(kind: str) -> None:
+    places = reference_nodes(kind)
+    flat = 0.5 + places @ np.array([[2.0, 0.5, 0.0], [0.3, 1.0, 1.0]])
+    bent = flat.copy()
+    bent[-1 if kind != "quad" else 2] += [0, 0, 1e-6]
+    assert _affine(kind, np.stack([flat, bent, 1e-6 * flat])).tolist() == [True, False, True]

@@ -1,0 +1,282 @@
+"""Which contact nodes change between two tries, by hand: what of a state contradicts its assumptions, how badly, and how
+many of those are let change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from stridor.contact.multipliers import OPEN, SLIP, STICK
+from stridor.errors import AnalysisError
+from stridor.sliding import points, surfaces
+from stridor.sliding.equilibrium import NEWTON_STEPS, ContactRows, Equilibrium, State, changed, settle
+from stridor.sliding.redundant import closed, redundant
+from stridor.sliding.stick_slip import Frictional, Loading, StickSlip, _Change, increments_of
+from stridor.system.load_steps import LoadStep
+
+
+def nodes_like(count: int, directions: int) -> StickSlip:
+    """A search whose nodes have nothing but their number: enough for what looks at states only."""
+    search = object.__new__(StickSlip)
+    search.nodes = SimpleNamespace(count=count, directions=directions)
+    search.movable = np.ones(count, dtype=bool)
+    return search
+
+
+def loading(m: int, t: int, *, force=(10.0,), mu=0.5, sticking=0.6) -> Loading:
+    return Loading(np.array(force), np.zeros(0), np.zeros((m, t)), np.full(m, mu), np.full(m, sticking))
+
+
+def frictional(status, *, normal=None, friction=None, direction=None, position=None, gap=None, t=1) -> Frictional:
+    m = len(status)
+    vectors = [np.zeros((m, t)) if v is None else np.array(v, dtype=float).reshape(m, t)
+               for v in (friction, direction, position)]  # fmt: skip
+    return Frictional(
+        displacement=np.zeros(0), normal_force=np.zeros(m) if normal is None else np.array(normal, dtype=float),
+        friction=vectors[0], status=np.array(status), direction=vectors[1], position=vectors[2],
+        gap=np.zeros(m) if gap is None else np.array(gap, dtype=float), travel=np.zeros(0),
+    )  # fmt: skip
+
+
+# -- normal contact alone ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("care", "active", "pulled", "closing", "left"),
+    [
+        (0, [0, 1, 2, 3, 4], [3, 1, 4, 2], [6, 5, 7], [0, 5, 6, 7]),  # all at once
+        (1, [0, 1, 2, 3, 4], [3, 1, 4, 2], [6, 5, 7], [0]),  # letting go alone
+        (2, [0, 1, 2, 3, 4], [3, 1, 4, 2], [6, 5, 7], [0, 2, 4]),  # and half of the worst
+        (3, [0, 2, 3, 4, 5], [3, 4], [6, 1, 7], [0, 1, 2, 3, 4, 5]),  # the first in the list, whichever its kind
+        (3, [0, 2, 3, 4, 5], [4, 2], [6, 7], [0, 3, 4, 5]),
+    ],
+)
+def test_fewer_nodes_change_the_more_care_is_taken(care, active, pulled, closing, left) -> None:
+    touching = np.isin(np.arange(8), active)
+    following = changed(touching, np.array(pulled), np.array(closing), care)
+    assert list(np.flatnonzero(following)) == left
+    assert list(np.flatnonzero(touching)) == active
+
+
+def test_without_any_that_pull_the_careful_take_in() -> None:
+    active, none = np.zeros(4, dtype=bool), np.zeros(0, dtype=np.int64)
+    assert list(np.flatnonzero(changed(active, none, np.array([2, 0, 3]), 1))) == [0, 2, 3]
+    assert list(np.flatnonzero(changed(active, none, np.array([2, 0, 3]), 2))) == [0, 2]
+    assert list(np.flatnonzero(changed(active, none, np.array([2, 1, 3]), 3))) == [1]
+
+
+# -- friction: what contradicts a state --------------------------------------------------------------------------------
+
+
+def test_each_contradiction_is_found_and_weighed() -> None:
+    # pulls, would close, is beyond its limit, slips the way friction pushes; and two that are as they should be.
+    before = frictional([STICK] * 6, position=[0, 0, 0, 1e-6, 0, 0])
+    state = frictional(
+        [STICK, OPEN, STICK, SLIP, STICK, SLIP], normal=[-2, 0, 5, 4, 5, 4], friction=[0, 0, -4, 2, 3, 2],
+        direction=[0, 0, 0, 1, 0, 1], position=[0, 2e-6, 0, 3e-6, 0, -4e-6], gap=[0, -5e-7, 0, 0, 2e-6, 0],
+    )  # fmt: skip
+    change = nodes_like(6, 1)._violations(before, loading(6, 1), state)
+    way = 4e-6 + 1e-6
+    assert change.severity == pytest.approx([2 / 10, 5e-7 / 2e-6, (4 - 0.6 * 5) / 10, 2e-6 / way, 0, 0])
+    assert list(change.target) == [OPEN, SLIP, SLIP, STICK, STICK, SLIP]
+    assert list(change.by_normal) == [True, True, False, False, False, False]
+    # Friction opposes what the closing node has slipped and goes on as it was where a node lets go.
+    assert list(change.direction[:, 0]) == [0, -1, -1, 1, 0, 1]
+    assert change.any
+
+
+def test_a_node_that_would_close_sticks_where_it_sank_in_further_than_it_slid() -> None:
+    before = frictional([OPEN] * 3)
+    state = frictional([OPEN] * 3, position=[5e-7, 7e-7, 0], gap=[-1e-6, -1e-6, -1e-6])
+    search = nodes_like(3, 1)
+    search.movable[2] = False
+    change = search._violations(before, loading(3, 1), state)
+    assert list(change.target) == [STICK, SLIP, OPEN]
+    assert list(change.severity) == [1, 1, 0]
+
+
+def test_nothing_contradicts_a_state_that_is_right_but_for_rounding() -> None:
+    before = frictional([STICK] * 3)
+    state = frictional(
+        [STICK, SLIP, OPEN], normal=[-1e-12, 4, 0], friction=[0, 2, 0], direction=[0, 1, 0],
+        position=[0, 1e-18, 1e-6], gap=[0, 0, 1e-6],
+    )  # fmt: skip
+    assert not nodes_like(3, 1)._violations(before, loading(3, 1), state).any
+    none = frictional([])
+    assert not nodes_like(0, 1)._violations(none, loading(0, 1), none).any
+
+
+def test_what_a_motion_drives_is_not_turned_round() -> None:
+    before = frictional([SLIP] * 2)
+    state = frictional([SLIP] * 2, normal=[4, 4], direction=[1, 1], friction=[2, 2], position=[1e-6, 1e-6])
+    load = replace(loading(2, 1), driven=np.array([[1.0], [0.0]]))
+    change = nodes_like(2, 1)._violations(before, load, state)
+    assert change.severity == pytest.approx([0, 1])
+    assert list(change.target) == [SLIP, STICK]
+
+
+@pytest.mark.parametrize(
+    ("care", "chosen"),
+    [(0, [0, 1, 2, 3, 5]), (1, [0, 2, 3]), (2, [2, 3]), (3, [0])],
+)
+def test_the_changes_of_stick_and_slip_are_the_fewer_the_more_care(care: int, chosen: list[int]) -> None:
+    severity = np.array([0.1, 0.9, 0.5, 0.3, 0.0, 0.2])
+    change = _Change(
+        np.array([OPEN, SLIP, STICK, OPEN, SLIP, STICK]), np.arange(10.0, 16.0)[:, None], severity,
+        np.array([True, False, True, True, True, False]),
+    )  # fmt: skip
+    state = frictional([7] * 6, direction=np.arange(6.0))
+    status, direction = change.applied(state, care)
+    assert list(np.flatnonzero(status != 7)) == chosen
+    assert list(np.flatnonzero(direction[:, 0] >= 10)) == chosen
+    assert list(status[chosen]) == list(change.target[chosen])
+    assert list(state.status) == [7] * 6
+
+
+def test_friction_in_space_turns_against_the_slip() -> None:
+    # Slipped by (3, 4) µm; held across and not moved; sticks; driven.
+    before = frictional([SLIP] * 4, t=2)
+    status = [SLIP, SLIP, STICK, SLIP]
+    state = frictional(
+        status, normal=[8, 4, 4, 4], friction=[[-4, 0], [0, -1.6], [1, 0], [0, 2]],
+        direction=[[-1, 0], [1, 0], [1, 0], [0, 1]], position=[[3e-6, 4e-6], [0, 0], [1e-6, 0], [0, 1e-6]], t=2,
+    )  # fmt: skip
+    load = replace(loading(4, 2), driven=np.array([[0, 0], [0, 0], [0, 0], [0, 1.0]]))
+    missed, direction, across = nodes_like(4, 2)._turn(before, load, state)
+    assert direction == pytest.approx(np.array([[-0.6, -0.8], [0, -1], [1, 0], [0, 1]]))
+    assert across == pytest.approx([5e-6 / 4, 0, 0, 0])
+    # Of node 0 friction misses 4 N along (−0.6, −0.8) by (−1.6, 3.2); of node 1 its limit of 2 N by 0.4.
+    assert missed == pytest.approx(np.hypot(1.6, 3.2) / 4)
+
+
+def test_increments_share_the_way_from_step_to_step() -> None:
+    steps = (
+        LoadStep(loads={"a": 2.0, "b": 1.0}, velocities=np.zeros(0), increments=2, duration=None),
+        LoadStep(loads={"a": 3.0}, velocities=np.zeros(0), increments=1, duration=0.5),
+    )
+    assert increments_of(steps, ("a", "b")) == [
+        (0, {"a": 1.0, "b": 0.5}, 0.0),
+        (0, {"a": 2.0, "b": 1.0}, 0.0),
+        (1, {"a": 3.0, "b": 1.0}, 0.5),
+    ]
+
+
+# -- bounds ------------------------------------------------------------------------------------------------------------
+
+
+def contact(name: str) -> SimpleNamespace:
+    return SimpleNamespace(name=name, closed=False, gap=0.0, normal_row=np.ones(1), compliance=1.0)
+
+
+@pytest.mark.parametrize(("tries", "settles"), [(9, True), (10, True), (11, False)])
+def test_points_are_given_four_tries_each_and_two_more(monkeypatch, tries: int, settles: bool) -> None:
+    # Two contacts of which the first pulls again and again, and is found closing by its gap in between.
+    asked = 0
+
+    def solve(system, force, mu, sense, active):
+        nonlocal asked
+        asked += 1
+        again = asked < tries
+        normal = np.where(active, 1.0, 0.0)
+        if again and active[0]:
+            normal[0] = -1.0
+        return np.array([-1.0 if again and not active[0] else 0.0]), normal, 0.0
+
+    monkeypatch.setattr(points, "_solve", solve)
+    monkeypatch.setattr(points, "_twice", lambda system, active: "")
+    system = SimpleNamespace(contacts=[contact("A"), contact("B")], size=1)
+    given = (system, np.zeros(1), np.full(2, 0.3), np.ones(2), np.ones(2))
+    if settles:
+        points._active_set(*given)
+        assert asked == tries
+    else:
+        with pytest.raises(AnalysisError, match="the set of touching contacts does not settle"):
+            points._active_set(*given)
+        assert asked == 4 * 2 + 2
+
+
+@pytest.mark.parametrize(("size", "held"), [(2.9e6, True), (3.1e6, False)])
+def test_a_body_that_moves_a_million_times_its_size_is_loose(monkeypatch, size: float, held: bool) -> None:
+    # A bar of 3 m far from the origin: its extent counts, not where it is.
+    bar = SimpleNamespace(points=np.array([[50.0, 10.0], [53.0, 10.5]]))
+    system = SimpleNamespace(lines=(), solids=(bar,))
+    monkeypatch.setattr(surfaces, "_loose", lambda *given: "it is loose")
+    state = State(np.zeros(0, dtype=bool), np.array([0.0, -size]), np.zeros(0), np.zeros(0))
+    if held:
+        surfaces._require_held(system, None, state, 1e-9)
+        with pytest.raises(AnalysisError, match="it is loose"):
+            surfaces._require_held(system, None, state, 2e-8)
+    else:
+        with pytest.raises(AnalysisError, match="it is loose"):
+            surfaces._require_held(system, None, state, 1e-9)
+
+
+def hardening(cubic: tuple[float, ...], *, gap=(0.0, 0.0)) -> Equilibrium:
+    """Two masses on springs of 100 N/m, each pressed with 1 N on a contact of 1 mm/N."""
+    system = SimpleNamespace(
+        size=2, stiffness=sp.csr_array(np.diag([100.0, 100.0])), cubic=None, general=False,
+    )  # fmt: skip
+    rows = ContactRows(
+        sp.csr_array(np.eye(2)), np.array(gap), np.full(2, 1e-3), np.array(cubic), np.zeros(2, dtype=bool)
+    )
+    return Equilibrium(system, rows, rows.normal, np.full(2, -1.0), symmetric=True, solver=None)
+
+
+def test_what_hardens_but_does_not_touch_needs_no_second_step() -> None:
+    away = hardening((1e9, 0.0), gap=(0.1, 0.0))
+    state, _ = settle(away, np.array([False, True]))
+    assert state.displacement == pytest.approx([-1 / 100, -1 / 1100])
+    assert away.factorisations == 1
+
+
+def test_contact_that_hardens_balances_its_load() -> None:
+    touching = hardening((1e9, 0.0))
+    state, _ = settle(touching)
+    u = state.displacement[0]
+    assert 100 * u - 1e3 * -u - 1e9 * (-u) ** 3 == pytest.approx(-1.0, rel=1e-9)
+    assert state.normal_force[0] == pytest.approx(1e3 * -u + 1e9 * (-u) ** 3, rel=1e-9)
+    assert state.displacement[1] == pytest.approx(-1 / 1100)
+
+
+def test_springs_that_find_no_equilibrium_are_given_sixty_steps(monkeypatch) -> None:
+    stuck = hardening((1e9, 0.0))
+    monkeypatch.setattr(Equilibrium, "_settled", lambda *given: False)
+    with pytest.raises(AnalysisError, match="find no equilibrium in 60 steps"):
+        stuck.solve(np.ones(2, dtype=bool))
+    assert stuck.factorisations == NEWTON_STEPS == 60
+
+
+# -- forces that cannot be told apart ----------------------------------------------------------------------------------
+
+
+def rigid_rows(rows: list[list[float]]) -> SimpleNamespace:
+    return SimpleNamespace(
+        normal=sp.csr_array(np.array(rows)), owner=np.arange(len(rows)), names=[f"c{k}" for k in range(len(rows))]
+    )
+
+
+def test_the_contacts_in_a_dependence_are_named_and_the_others_not(monkeypatch) -> None:
+    # Rows 0, 1 and 3 in two freedoms: one follows from the others. Row 2 shares a freedom with row 4 and is free of it.
+    nodes = rigid_rows([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [1, 1, 0, 0], [0, 0, 1, 1]])
+    said = redundant(SimpleNamespace(holders={}), nodes, np.ones(5, dtype=bool))
+    assert "1 of the 5 conditions of rigid contact follows from the others" in said
+    assert [name in said for name in nodes.names] == [True, True, False, True, False]
+    assert redundant(SimpleNamespace(holders={}), nodes, np.array([True, True, True, False, True])) == ""
+
+
+def test_rows_that_share_freedoms_without_following_from_one_another_are_let_through() -> None:
+    # Every freedom is met twice, so that none is a row's own, but three rows in three freedoms are independent.
+    nodes = rigid_rows([[1, 1, 0], [0, 1, 1], [1, 0, 1]])
+    assert redundant(SimpleNamespace(holders={}), nodes, np.ones(3, dtype=bool)) == ""
+    twice = rigid_rows([[1, 1, 0], [0, 1, 1], [1, 0, 1], [1, 2, 1]])
+    assert "1 of the 4 conditions" in redundant(SimpleNamespace(holders={}), twice, np.ones(4, dtype=bool))
+
+
+def test_a_node_within_rounding_of_the_surface_touches() -> None:
+    active = np.array([False, False, True])
+    found = closed(active, np.array([1e-13, 1e-6, 1e-3]), np.array([1e-3]))
+    assert list(found) == [True, False, True]

@@ -1,0 +1,69 @@
+"""Filter and fit of signals: lengths, stop band and fitted span by their own rules."""
+
+import numpy as np
+import pytest
+
+from stridor.temporal.signals import STOP_DECIBELS, components, growth, low_passed
+
+SAMPLING, BAND = 2e-6, 20e3
+
+
+@pytest.mark.parametrize(("band", "sampling"), [(20e3, 2e-6), (5e3, 2e-6), (8e3, 5e-6)])
+def test_the_filter_is_as_long_as_its_transition_asks_for(band: float, sampling: float) -> None:
+    # Kaiser (1974): N ≥ (A − 8)/(2.285 Δω) with Δω = 2π (1.25 − 1) f Δt; what the filter is filled with is cut off.
+    signal = np.cos(np.arange(20_000.0))
+    taps = len(signal) - len(low_passed(signal, sampling, band)) + 1
+    wanted = (STOP_DECIBELS - 8) / (2.285 * 2 * np.pi * 0.25 * band * sampling)
+    assert taps % 2 == 1
+    assert wanted - 1 <= taps <= wanted + 1
+
+
+def test_the_filter_keeps_the_band_and_nothing_beyond_a_quarter_more() -> None:
+    time = np.arange(20_000) * SAMPLING
+    inside = low_passed(np.cos(2 * np.pi * BAND * time), SAMPLING, BAND)
+    outside = low_passed(np.cos(2 * np.pi * 1.25 * BAND * time), SAMPLING, BAND)
+    assert np.abs(inside).max() == pytest.approx(1.0, abs=1e-6)
+    assert np.abs(outside).max() < 1e-7
+
+
+def test_a_short_signal_gets_a_filter_of_a_third_of_it() -> None:
+    signal = np.cos(0.1 * np.arange(300.0))
+    assert len(low_passed(signal, SAMPLING, BAND)) == 300 - 101 + 1
+
+
+def test_a_signal_without_anything_above_the_band_is_left_alone() -> None:
+    signal = np.cos(0.1 * np.arange(300.0))
+    assert low_passed(signal, SAMPLING, 0.36 / SAMPLING) is signal
+    assert low_passed(signal[:63], SAMPLING, BAND) is not None
+    assert len(low_passed(signal[:63], SAMPLING, BAND)) == 63
+
+
+@pytest.mark.parametrize("rate", [300.0, -300.0])
+def test_growth_that_goes_on_is_fitted_over_the_whole_signal(rate: float) -> None:
+    time = np.arange(20_000) * 1e-6
+    fitted = growth(np.exp(rate * time) * np.cos(2 * np.pi * 5e3 * time), 1e-6, 5e3)
+    assert not fitted.saturated
+    # Twenty periods (4 ms) make one value, at their middle; the plateau is the median of the last quarter.
+    assert fitted.start == pytest.approx(2e-3, abs=5e-4)
+    last_quarter = 2e-3 + 16e-3 * 7 / 8
+    late = last_quarter + np.log(0.95) / rate if rate > 0 else 18e-3
+    assert fitted.end == pytest.approx(late, abs=6e-4)
+
+
+def test_growth_into_a_plateau_is_fitted_up_to_half_of_it() -> None:
+    time = np.arange(60_000) * 1e-6
+    size = np.minimum(1e-3 * np.exp(400.0 * time), 1.0)
+    fitted = growth(size * np.cos(2 * np.pi * 5e3 * time), 1e-6, 5e3)
+    assert fitted.saturated
+    assert fitted.end == pytest.approx(np.log(500.0) / 400.0, abs=1e-3)
+    assert fitted.rate == pytest.approx(400.0, rel=5e-3)
+    assert fitted.amplitude == pytest.approx(1.0, rel=1e-3)
+
+
+def test_two_lines_of_one_frequency_apart_in_decay_are_both_found() -> None:
+    time = np.arange(8000) * SAMPLING
+    signal = np.exp(-40.0 * time) * np.cos(2 * np.pi * 3e3 * time)
+    signal += 0.3 * np.exp(25.0 * time) * np.cos(2 * np.pi * 3.4e3 * time + 0.4)
+    found = components(signal, SAMPLING, max_frequency_hz=BAND)
+    assert found.eigenvalues == pytest.approx([-40 + 6e3j * np.pi, 25 + 6.8e3j * np.pi], abs=0.05)
+    assert found.fastest == pytest.approx(25 + 6.8e3j * np.pi, abs=0.05)
