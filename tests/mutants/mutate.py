@@ -63,6 +63,37 @@ import os
 if os.environ.get("STRIDOR_MUTANT"):
     KernelCache.save_overload = lambda self, sig, data: None
 '''
+# What is written in instructions of the machine has none as plain Python: stand-ins, in the copy, for the kernels around
+# it. Faults in it are tried with everything compiled afresh.
+STAND_INS = {
+    "temporal/borrow.py": '''
+
+if __import__("os").environ.get("NUMBA_DISABLE_JIT"):
+
+    def borrow(array):
+        return array
+''',
+    "temporal/assembled/lanes.py": '''
+
+
+def _in_python(d):
+    def rows(ptr, col, val, x, y, lo, hi):
+        for i in range(lo, hi):
+            at = slice(i * LANES[d], i * LANES[d] + d)
+            total = val[ptr[i]].reshape(d, d) @ x[at]
+            for p in range(ptr[i] + 1, ptr[i + 1]):
+                to = slice(col[p] * LANES[d], col[p] * LANES[d] + d)
+                total = total + val[p].reshape(d, d) @ x[to]
+                y[to] += val[p].reshape(d, d).T @ x[at]
+            y[at] += total
+
+    return rows
+
+
+if __import__("os").environ.get("NUMBA_DISABLE_JIT"):
+    rows2, rows3 = _in_python(2), _in_python(3)
+''',
+}
 
 
 @dataclass(frozen=True)
@@ -90,6 +121,7 @@ class Cover:
     tests: tuple[str, ...]
     compiled: bool
     weight: float
+    afresh: bool = False
 
 
 def operators() -> dict[str, Any]:
@@ -117,7 +149,10 @@ def covers() -> list[Cover]:
     """What covering.toml holds; the first entry that names a module is its own."""
     with open(HERE / "covering.toml", "rb") as file:
         return [
-            Cover(tuple(e["modules"]), tuple(e["tests"]), bool(e.get("compiled", False)), float(e.get("weight", 1.0)))
+            Cover(
+                tuple(e["modules"]), tuple(e["tests"]), bool(e.get("compiled", False)), float(e.get("weight", 1.0)),
+                bool(e.get("afresh", False)),
+            )
             for e in tomllib.load(file)["cover"]
         ]
 
@@ -234,6 +269,9 @@ def copy_tree() -> None:
         file.write(SAME_KERNELS.format(digest=sources_digest()))
     with open(TREE / "src/stridor/kernels/store.py", "a", encoding="utf-8") as file:
         file.write(READ_ONLY)
+    for name, text in STAND_INS.items():
+        with open(TREE / "src/stridor" / name, "a", encoding="utf-8") as file:
+            file.write(text)
 
 
 def child(cover: Cover, log: Path, tests: tuple[str, ...], limit: float) -> None:
@@ -244,12 +282,13 @@ def child(cover: Cover, log: Path, tests: tuple[str, ...], limit: float) -> None
     os.dup2(handle, 2)
     os.chdir(TREE)
     os.environ["PYTHONPATH"] = str(TREE / "src")
-    os.environ["STRIDOR_CACHE_DIR"] = str(BUILD / "kernels")
+    os.environ["STRIDOR_CACHE_DIR"] = str(BUILD / ("afresh" if cover.afresh else "kernels"))
+    shutil.rmtree(BUILD / "afresh", ignore_errors=True)
     sys.path.insert(0, str(TREE / "src"))
     if limit:
         os.environ["STRIDOR_MUTANT"] = "1"
         resource.setrlimit(resource.RLIMIT_CPU, (int(limit) + 1, int(limit) + 6))
-    if not cover.compiled:
+    if not (cover.compiled or cover.afresh):
         os.environ["NUMBA_DISABLE_JIT"] = "1"
         importlib.import_module("numba.core.config").DISABLE_JIT = True
     code = 99
@@ -287,7 +326,8 @@ def plain_seconds(cover: Cover, tests: tuple[str, ...]) -> float:
     """CPU seconds of the tests without a fault, measured once for each state of the sources. Exits where one fails."""
     path = BUILD / "plain.json"
     known: dict[str, float] = json.loads(path.read_text()) if path.exists() else {}
-    key = " ".join([sources_digest()[:16], str(cover.compiled), *(tests or cover.tests)])
+    how = "afresh" if cover.afresh else str(cover.compiled)
+    key = " ".join([sources_digest()[:16], how, *(tests or cover.tests)])
     if key not in known:
         end, spent = run_tests(cover, 0.0, BUILD / "plain.log", tests)
         print(f"{end:9s}{spent:6.1f} s  without a fault: {' '.join(cover.modules)}", flush=True)

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from stridor.contact.curve import Curve
+from stridor.contact.facet_search import _solve as place_on_facet
+from stridor.contact.facets import FacetSurface
 from stridor.contact.pieces import _affine, _composite, _fine_triangle, _frames
 from stridor.mesh.facets import reference_nodes
 
@@ -75,6 +77,66 @@ def test_every_corner_is_broken_and_wherever_the_numbering_begins(turn: int) -> 
     assert at.gap == pytest.approx(np.zeros(5), abs=1e-15)
 
 
+def on_facet(corners, normals, slave):
+    """Whether equations were solved, and ξ, η and the gap."""
+    corners, normals = np.array(corners, dtype=float), np.array(normals, dtype=float)
+    facet = np.arange(4)
+    if len(corners) == 3:
+        facet[3] = -1
+    place = np.zeros(3)
+    found = place_on_facet(np.array(slave, dtype=float), corners, facet, normals, place, np.zeros((3, 4)), np.zeros((6, 3)))
+    return found, place
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
+@pytest.mark.parametrize(("tilt", "regular"), [(1.0, True), (1e-9, True), (1e-12, False), (0.0, False)])
+def test_a_facet_whose_normals_lie_in_it_has_no_place(order, tilt: float, regular: bool) -> None:
+    # Along N from the middle; whichever way sides and normal point, N counts against the sizes of both tangents.
+    turn = np.eye(3)[list(order)]
+    for sides in (np.array([[2.0, 0, 0], [0, 3, 0]]), np.array([[0.0, 3, 0], [2, 0, 0]])):
+        corners = np.array([[0, 0, 0], sides[0], sides[0] + sides[1], sides[1]]) @ turn
+        normals = np.tile(np.array([1.0, 1.0, tilt]) @ turn, (4, 1))
+        found, place = on_facet(corners, normals, corners.mean(axis=0))
+        assert found is regular
+        if regular:
+            assert place == pytest.approx([0.5, 0.5, 0], abs=1e-6)
+
+
+def test_places_on_a_triangle_and_a_square() -> None:
+    up = [[0, 0, 2.0]] * 4
+    found, place = on_facet([[0, 0, 0], [4, 0, 0], [0, 2, 0]], up[:3], [1, 0.5, 0.25])
+    assert found
+    assert place == pytest.approx([0.25, 0.25, 0.25])
+    found, place = on_facet([[0, 0, 0], [4, 0, 0], [4, 2, 0], [0, 2, 0]], up, [3, 0.5, -0.25])
+    assert found
+    assert place == pytest.approx([0.75, 0.25, -0.25])
+
+
+CUBE = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
+FACES = np.array([[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]])
+OUT = np.repeat(np.eye(3), 2, axis=0) * np.tile([[-1.0], [1.0]], (3, 1))
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-15, -1e-3, 0.2])
+def test_within_a_face_the_normal_is_that_of_the_face_whatever_edges_it_has(off: float) -> None:
+    box = FacetSurface.from_facets(CUBE, {"quad": FACES}, where="box")
+    for aside in (0.0, 0.3):
+        slaves = 0.5 + OUT * (0.5 + off) + aside * np.roll(OUT, 1, axis=1)
+        found = box.locate(slaves)
+        assert found.inside.all()
+        assert found.normal == pytest.approx(OUT, abs=1e-12)
+        assert found.gap == pytest.approx(np.full(6, off), abs=1e-12)
+
+
+def test_off_sharp_edges_the_normal_leads_away_from_them() -> None:
+    box = FacetSurface.from_facets(CUBE, {"quad": FACES}, where="box")
+    slaves = np.array([[1.3, 0.5, 1.4], [-0.3, -0.4, 0.25], [0.5, 1.3, -0.4]])
+    found = box.locate(slaves)
+    assert found.inside.all()
+    assert found.gap == pytest.approx(np.full(3, 0.5))
+    assert found.normal == pytest.approx(np.array([[0.6, 0, 0.8], [-0.6, -0.8, 0], [0, 0.6, -0.8]]))
+
+
 # -- rules of quadrature -----------------------------------------------------------------------------------------------
 
 
@@ -112,7 +174,9 @@ def test_the_fine_rule_of_triangles_is_exact(rule) -> None:
 def test_frames_lie_in_their_facets_with_the_normal_outward() -> None:
     triangle = np.array([[[0, 0, 1], [2, 0, 1], [0, 3, 1]]], dtype=float)
     square = np.array([[[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]]], dtype=float)
-    for corners, normal in ((triangle, [0, 0, 1]), (square, [1, 0, 0])):
+    # Of a warped one the normal is that of both diagonals.
+    warped = np.array([[[0, 0, 0], [1, 0, 0.4], [1, 1, 0], [0, 1, 0.4]]], dtype=float)
+    for corners, normal in ((triangle, [0, 0, 1]), (square, [1, 0, 0]), (warped, [0, 0, 1])):
         frame = _frames(corners)[0]
         assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-14)
         assert np.cross(frame[0], frame[1]) == pytest.approx(frame[2])

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from stridor.contact.multipliers import OPEN, SLIP, STICK
 from stridor.errors import AnalysisError
-from stridor.sliding import points, surfaces
+from stridor.sliding import history, points, surfaces
 from stridor.sliding.equilibrium import NEWTON_STEPS, ContactRows, Equilibrium, State, changed, settle
 from stridor.sliding.redundant import closed, redundant
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip, _Change, increments_of
@@ -280,3 +280,33 @@ def test_a_node_within_rounding_of_the_surface_touches() -> None:
     active = np.array([False, False, True])
     found = closed(active, np.array([1e-13, 1e-6, 1e-3]), np.array([1e-3]))
     assert list(found) == [True, False, True]
+
+
+# -- what moves --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("named", [history._moved, lambda system, motion: surfaces._moved_most(system, np.abs(motion[:4]))])
+def test_what_moves_most_is_named(named) -> None:
+    system = SimpleNamespace(
+        size=4, lines=(SimpleNamespace(name="beam", freedoms=np.array([0])),),
+        solids=(SimpleNamespace(name="block", freedoms=np.array([[1, 2]])),), dof_names=("beam.x", "", "", "mass.x"),
+    )  # fmt: skip
+    assert named(system, np.array([-3.0, 1, 2, 0, 99])) == "body beam"
+    assert named(system, np.array([1.0, 1, -2, 0, 99])) == "body block"
+    assert named(system, np.array([1.0, 1, -2, -3, 99])) == "mass.x"
+    system.dof_names = ()
+    assert named(system, np.array([1.0, 1, -2, -3, 99])) == "freedom 3"
+
+
+def test_where_what_moves_is_not_known_the_structure_is_named() -> None:
+    assert history._moved(SimpleNamespace(), None) == "the structure"
+
+
+def test_forces_alone_that_move_are_contact_that_holds_twice() -> None:
+    system = SimpleNamespace(size=2, lines=(), solids=(), dof_names=("a", "b"))
+    nodes = SimpleNamespace(names=("A", "B"))
+    said = history._unheld(system, nodes, "steady.steps.1", np.array([1e-7, 0, 0.5, -0.5]))
+    assert said.startswith("static equilibrium, steady.steps.1: contact holds the same freedoms twice (contacts: A, B)")
+    assert "a slides or moves freely" in history._unheld(system, nodes, "here", np.array([1e-6, 0, 0.5, -0.5]))
+    assert "b slides or moves freely" in history._unheld(system, nodes, "here", np.array([0, 1.0]))
+    assert "the structure slides or moves freely" in history._unheld(system, nodes, "here", None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,6 +16,7 @@ from stridor.case import loads
 from stridor.contact.multipliers import SLIP, STICK, solve_kept
 from stridor.laws import Coulomb
 from stridor.modal.assembled.refine import TOLERANCE  # to which modes are found
+from stridor.sliding import surfaces
 from stridor.temporal.energy import energy_balance
 from stridor.view.temporal_tables import contact_table
 
@@ -73,6 +76,25 @@ def test_statics_of_a_mass_that_is_drawn_off(stiffness):
         assert steady.displacement[0] == pytest.approx(4.0 / 800.0, rel=1e-12)
     with pytest.raises(st.AnalysisError, match="no equilibrium: body block can move freely"):
         st.steady_sliding(block(10.0, stiffness="1e6", closed="false"))
+
+
+@pytest.mark.parametrize("stiffness", ['"rigid"', "1e6"])
+def test_signs_that_never_settle_are_told_with_what_may_help(stiffness, monkeypatch):
+    """Rigid contact may be given a stiffness; what has one already is not told to."""
+    signs = [1.0]
+
+    def alternating(equilibrium, guess):
+        signs.append(-signs[-1])
+        state, tried = plain(equilibrium, guess)
+        return replace(state, normal_force=signs[-1] * np.abs(state.normal_force)), tried
+
+    plain = surfaces.settle
+    monkeypatch.setattr(surfaces, "settle", alternating)
+    with pytest.raises(st.AnalysisError, match=f"pull does not settle in {surfaces.SIGN_CHANGES} steps") as caught:
+        st.steady_sliding(block(10.0, stiffness=stiffness))
+    assert len(signs) == 1 + surfaces.SIGN_CHANGES
+    help_ = "lower the friction coefficient" + (" or give them a finite stiffness" if "rigid" in stiffness else "")
+    assert str(caught.value).endswith(help_)
 
 
 def test_frequencies_do_not_depend_on_the_sign_of_the_load():

@@ -120,6 +120,20 @@ def test_two_freedoms_in_closed_form(tmp_path: Path):
     assert np.abs(found.real).max() < 1e-9
 
 
+@pytest.mark.parametrize("between", [0.0, 0.07])
+def test_the_balance_closes_with_damping_of_the_stiffness_and_between_freedoms(tmp_path: Path, between: float):
+    """Damping that acts on the older velocity meets the skew forces in the powers of each step."""
+    symmetric = np.array([[6.0, 1.0], [1.0, 4.0]])
+    skew = np.array([[0.0, 1.5], [-1.5, 0.0]])
+    damping = 0.05 * symmetric + between * np.array([[1.0, -1.0], [-1.0, 1.0]]) + 0.4 * TURN
+    run, q = marched(imported(tmp_path, symmetric + skew, damping), 0.02, 1.0)
+    assert energy_balance(run).error < 1e-13
+    # ∫ vᵀ C v of what was marched, by the trapezoidal rule: to second order in the step.
+    v = 0.5 * (q[:, :-1] + q[:, 1:])
+    power = np.einsum("is,ij,js->s", v, damping, v)
+    assert run.works["damping"][-1] == pytest.approx(0.02 * power.sum(), rel=0.03)
+
+
 def test_gyroscopic_forces_do_not_let_the_highest_mode_grow(tmp_path: Path):
     """Near the limit of the step, where lagged or extrapolated velocities would blow up."""
     system = imported(tmp_path, np.diag([9.0, 4.0]), 0.2 * TURN)
