@@ -85,7 +85,7 @@ def on_facet(corners, normals, slave):
         facet[3] = -1
     place = np.zeros(3)
     found = place_on_facet(np.array(slave, dtype=float), corners, facet, normals, place, np.zeros((3, 4)), np.zeros((6, 3)))
-    return found, place
+    return bool(found), place
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
