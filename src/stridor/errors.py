@@ -45,6 +45,11 @@ class Problem:
         return f"{where}: {shown(self.given)} – {accepted}"
 
 
+class FollowingError(AnalysisError):
+    """Branches of modes cannot be followed from μ = 0, or the basis that they are followed on does not settle: the
+    eigenvalues at a μ do not depend on it."""
+
+
 class CaseError(StridorError):
     """Bad input. `problems` holds everything found wrong, and str() is one line for each.
 

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import scipy.sparse as sp
 
-from ..errors import AnalysisError, CaseError
+from ..errors import AnalysisError, CaseError, FollowingError
 from ..system import System
 from ..system.uncoupled import uncoupled_modes
 from ..threads import one_thread_if_small
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .backward_error import BackwardError
 from .coupling import Coupling, couple
+from .quadratic.find import WHOLE
 from .refinement import refine
 from .roots import Spectrum, spectrum_of
 from .tracking import Tracker
@@ -247,6 +248,12 @@ def complex_modes(
             if max_frequency_hz is None:
                 raise
             return _as_general(system, values, None, max_frequency_hz, damped, vectors, options, progress)
+        except FollowingError as error:
+            if max_frequency_hz is None or system.size > WHOLE:
+                raise
+            return _as_general(
+                system, values, None, max_frequency_hz, damped, vectors, options, progress, str(error)
+            )
     whole = system
     if not damped:
         system = undamped(system)
@@ -261,7 +268,12 @@ def complex_modes(
     tracker = Tracker(spectrum, limit)
     start, fixed = tracker.origin, spectrum.fixed
     require_memory(len(values), len(start) + len(fixed), system.size if vectors else 0)
-    values, followed, planned = _followed(tracker, values, progress)
+    try:
+        values, followed, planned = _followed(tracker, values, progress)
+    except FollowingError as error:
+        if max_frequency_hz is None or system.size > WHOLE:
+            raise
+        return _as_general(whole, values, None, max_frequency_hz, damped, vectors, options, progress, str(error))
     every = np.concatenate([start, fixed])
     columns = np.argsort(np.abs(every.imag), kind="stable")
     number = np.empty(len(columns), dtype=np.int64)
@@ -311,8 +323,9 @@ def _as_general(
     vectors: bool | Literal["right"],
     options: Options,
     progress: Progress | None,
+    unfollowed: str = "",
 ) -> ComplexModes:
-    """Modes of matrices of any structure."""
+    """Modes of matrices of any structure; unfollowed: why branches are not followed, where that was tried."""
     from .general import general_modes
 
     return general_modes(
@@ -324,6 +337,7 @@ def _as_general(
         vectors=vectors,
         options=options,
         progress=progress,
+        unfollowed=unfollowed,
     )
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy
 
-from ..errors import AnalysisError
+from ..errors import AnalysisError, FollowingError
 from ..typing import BoolArray, ComplexArray, IntArray
 from .roots import Spectrum, dense_roots, frictionless_roots, polish
 
@@ -148,7 +148,7 @@ class Tracker:
                 "with friction no longer determines the motion (Painlevé's paradox); stay below, or give the "
                 "contact a stiffness"
             )
-        raise AnalysisError(
+        raise FollowingError(
             f"branches cannot be told apart near μ = {old.mu:.9g}: three or more modes "
             "merge there; split the range or change a parameter slightly"
         )

@@ -10,7 +10,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ...direct import factorise
-from ...errors import AnalysisError
+from ...errors import AnalysisError, FollowingError
 from ...typing import Array, BoolArray, ComplexArray, IntArray, Sparse
 from .problem import ContactProblem, times, tiny
 from .reduced import Eigenpairs, Reduced
@@ -113,7 +113,7 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
                 reduced.keep(found.right[:, wanted(reduced, found)])
     stuck = [mu for mu in (*stuck, *pending) if worst[mu] > BELIEVED]
     if stuck:
-        raise AnalysisError(
+        raise FollowingError(
             f"the modes at μ = {stuck[0]:g} do not settle: a backward error of {worst[stuck[0]]:.1e} is left; ask for "
             "fewer modes, a lower modal.max_frequency_hz or smaller friction coefficients"
         )

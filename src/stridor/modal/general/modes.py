@@ -51,15 +51,16 @@ def general_modes(
     options: Options | None = None,
     own: float | None = None,
     progress: Progress | None = None,
+    unfollowed: str = "",
 ) -> ComplexModes:
     """Modes at the friction coefficients ``mu`` up to max_frequency_hz, of them the ``count`` lowest (None: all) and
     whatever else is unstable.
 
     system_at gives the system at a μ, on which its matrices may depend; own is the μ at which the touching nodes of
     contacts are found if several are asked for (None: the lowest). Numbers of modes are those of branches followed from
-    μ = 0; where these cannot be told apart they count by frequency at each μ, and completeness says so. Where a branch
-    is beyond the band there is NaN. Raises CaseError for friction coefficients that are none, AnalysisError where
-    contacts do not slide or eigenvalues do not settle.
+    μ = 0; where these cannot be told apart, or ``unfollowed`` says why they were not, they count by frequency at each
+    μ, and completeness says so. Where a branch is beyond the band there is NaN. Raises CaseError for friction
+    coefficients that are none, AnalysisError where contacts do not slide or eigenvalues do not settle.
     """
     values = np.atleast_1d(np.asarray(mu, dtype=float))
     if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)) or np.any(values < 0):
@@ -69,7 +70,7 @@ def general_modes(
     family = _family(system_at, values, options or Options(), damped=damped, own=own)
     top = searched(family.built(float(values.max())), 2 * np.pi * max_frequency_hz)
     values, found, planned = _each(family, values, top, progress, vectors=vectors)
-    numbers = numbered(family, values, [f.values for f in found], top)
+    numbers = numbered(family, values, [f.values for f in found], top, unfollowed)
     table = _table(family, values, found, numbers, damped=damped, vectors=vectors)
     table = replace(table, max_frequency_hz=max_frequency_hz, planned=planned)
     return table if count is None else table.lowest(count)

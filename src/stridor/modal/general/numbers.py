@@ -30,9 +30,11 @@ class Numbers:
     sentence: str
 
 
-def numbered(family: SystemFamily, mu: Array, values: list[ComplexArray], top: float) -> Numbers:
+def numbered(
+    family: SystemFamily, mu: Array, values: list[ComplexArray], top: float, unfollowed: str = ""
+) -> Numbers:
     """Numbers of eigenvalues (k,) sorted by frequency at each of the friction coefficients ``mu``; 0 for those that say
-    nothing new, of ±ε that rounding makes of a motion as a whole."""
+    nothing new, of ±ε that rounding makes of a motion as a whole. unfollowed: why nothing is to be followed."""
     plain = [_by_frequency(v, top) for v in values]
     if not float(mu.max()) > 0:
         return Numbers(plain, "")
@@ -41,9 +43,11 @@ def numbered(family: SystemFamily, mu: Array, values: list[ComplexArray], top: f
     if not family.depends:
         return Numbers(plain, "")
     try:
-        return _followed(family, mu, values, top)
+        if not unfollowed:
+            return _followed(family, mu, values, top)
     except AnalysisError as error:
-        return Numbers(plain, f" Numbers count by frequency at each μ, since branches were not followed: {error}.")
+        unfollowed = str(error)
+    return Numbers(plain, f" Numbers count by frequency at each μ, since branches were not followed: {unfollowed}.")
 
 
 def _by_frequency(values: ComplexArray, top: float) -> IntArray:

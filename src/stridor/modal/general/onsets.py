@@ -320,7 +320,7 @@ def _sentence(
     said = f"as the onsets say{_across(grow[1] - grow[0] - 2 * begins + len(found), top)}"
     told = f"{len(way.low.place)} branches were followed from μ = {family.low:g}{how}"
     both = all(end.completeness.complete for end in ends)
-    counted = "by QZ" if ends[1].factorisations == 0 else "in discs that cover the band"
+    counted = "by QZ" if ends[1].completeness.sentence.startswith("Complete: QZ") else "in discs that cover the band"
     if ends[1].completeness.counted is not None:
         counted += ", counted by the argument principle"
     anew = f"All modes up to {top / (2 * np.pi):g} Hz at both ends were found anew in the full problem ({counted})"

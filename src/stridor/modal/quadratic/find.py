@@ -22,6 +22,9 @@ from .problem import Quadratic
 from .region import BORDER, MARGIN, PAD, Disc, Region, cells, remaining, uncovered
 from .search import BLOCK, Found, Search, TooClose
 
+WHOLE = 600  # freedoms up to which all eigenvalues are found at once where a few discs do not do
+CROWDED = 1e-8  # backward error that does for what lies as dense as overdamped modes do about −1/α₂
+FEW_SHIFTS = 4  # discs after which they do not
 DENSE = 60  # freedoms up to which all eigenvalues are found at once
 COUNTED = 1500  # and up to which the argument principle counts them unasked: it takes about a hundred determinants
 BASIS_BYTES = 1.5e9  # of the Krylov basis of one shift
@@ -93,9 +96,17 @@ def find_modes(
     run.counting = problem.size <= COUNTED if count is None else count
     if problem.size <= DENSE:
         sides, evidence = run.dense(endless=not math.isfinite(region.re_max))
+        values, right, y = run.chosen(sides)
     else:
-        sides, evidence = run.sparse()
-    values, right, y = run.chosen(sides)
+        try:
+            sides, evidence = run.sparse()
+            values, right, y = run.chosen(sides)
+        except (_CrowdedError, UnsettledError):
+            if problem.size > WHOLE:
+                raise
+            run.region, run.tolerance = region.bounded(), max(tolerance, CROWDED)
+            sides, evidence = run.dense(endless=not math.isfinite(region.re_max))
+            values, right, y = run.chosen(sides)
     order = np.lexsort((values.real, values.imag))
     values, right, y = values[order], right[:, order], None if y is None else y[:, order]
     undamped = undamped_count(problem, region, solver=solver) if hint else None
@@ -105,6 +116,14 @@ def find_modes(
         None if y is None else problem.transposed.backward_error(values, y), evidence(undamped),
         run.factorisations, run.solves, time.perf_counter() - started, run.memory,
     )  # fmt: skip
+
+
+class UnsettledError(AnalysisError):
+    """Eigenvectors do not reach the tolerance."""
+
+
+class _CrowdedError(Exception):
+    """A small problem that discs take longer for than QZ does: overdamped, or with many modes about the axis."""
 
 
 @dataclass
@@ -182,6 +201,9 @@ class _Run:
         self._count_solves()
         discs = tuple(site.disc for site in self.sites)
         covered = not uncovered(self.region, list(discs))
+        if not (covered and missing in (None, 0)) and self.problem.size <= WHOLE:
+            self._release()
+            raise _CrowdedError
         searches = [s for site in self.sites for s in site.searches]
         looks = sum(s.looks for s in searches) + (len(self.sites) if self.left else 0)
         later = sum(s.later for s in searches)
@@ -226,6 +248,9 @@ class _Run:
             cell = pending.pop(0)
             if not uncovered(cell, [site.disc for site in self.sites]):
                 continue
+            if len(self.sites) >= FEW_SHIFTS and self.problem.size <= WHOLE:
+                self._release()
+                raise _CrowdedError
             if len(self.sites) >= SHIFTS:
                 raise AnalysisError(
                     f"{len(self.sites)} factorisations do not get through the region; ask for a narrower one"
@@ -233,6 +258,12 @@ class _Run:
             site = self._visit(cell, cell.shift())
             if not site.disc.covers(cell):
                 pending = remaining(cell, [s.disc for s in self.sites]) + pending
+
+    def _release(self) -> None:
+        """Free what the discs hold."""
+        self._count_solves()
+        for site in self.sites:
+            site.factor.free()
 
     def _visit(self, cell: Region, shift: complex) -> _Site:
         """One factorisation, and all it gives."""
@@ -335,7 +366,7 @@ class _Run:
         bad = np.flatnonzero(~(error <= self.tolerance))
         if len(bad):
             shown = ", ".join(f"{v:.6g}" for v in values[bad[:3]])
-            raise AnalysisError(
+            raise UnsettledError(
                 f"{len(bad)} {which} eigenvectors do not reach a backward error of {self.tolerance:g}: "
                 f"λ = {shown} 1/s, the worst leaves {error[bad].max():.1e}"
             )

@@ -1,0 +1,84 @@
+"""Damping beyond critical: the eigenvalues at a μ do not depend on whether branches can be followed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stridor as st
+from benches import paper_case
+from stridor.errors import FollowingError
+from stridor.modal import complex_modes as following
+from stridor.modal.assembled.problem import problem_of
+from stridor.modal.assembled.steady import Options
+from stridor.modal.assembled.whole import quadratic_of
+from stridor.modal.quadratic import find
+from stridor.modal.quadratic.dense import all_modes
+from stridor.modal.quadratic.region import Region
+from stridor.modal.tracking import Tracker
+from stridor.system import build_system
+
+pytestmark = pytest.mark.verification
+
+
+def bench(damping: float, elements: tuple[int, int] = (6, 9)) -> st.Case:
+    """The two-beam bench, damped in proportion to its stiffness [s]."""
+    return paper_case().with_(
+        {
+            "bodies.beam1.damping.stiffness": damping,
+            "bodies.beam2.damping.stiffness": damping,
+            "bodies.beam1.elements": elements[0],
+            "bodies.beam2.elements": elements[1],
+        }
+    )
+
+
+def dense(case: st.Case, mu: float) -> np.ndarray:
+    """All eigenvalues (k,) with Im λ ≥ 0 up to the band's end, by QZ."""
+    problem = problem_of(build_system(case), mu, Options(), damped=True)
+    values = all_modes(quadratic_of(problem, mu))[0]
+    return values[(values.imag >= 0) & (values.imag <= 2 * np.pi * case.modal.max_frequency_hz)]
+
+
+def growing(values: np.ndarray) -> np.ndarray:
+    return np.sort_complex(values[values.real > 1e-9 * np.abs(values)])
+
+
+def lost(self: Tracker, mu: float) -> None:
+    raise FollowingError("branches cannot be told apart")
+
+
+@pytest.mark.parametrize("damping", [1e-6, 1e-5, 1e-4])
+def test_modes_without_branches(damping: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = bench(damping)
+    monkeypatch.setattr(Tracker, "advance", lost)
+    found = st.modes(case, [0.3, 0.9], max_frequency_hz=case.modal.max_frequency_hz)
+    for row, mu in enumerate(found.mu):
+        here = found.eigenvalues[row][found.unstable[row]]
+        np.testing.assert_allclose(np.sort_complex(here), growing(dense(case, float(mu))), rtol=1e-8)
+        assert "branches were not followed: branches cannot be told apart" in found.completeness[row]
+
+
+def test_beyond_what_is_affordable_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Tracker, "advance", lost)
+    monkeypatch.setattr(following, "WHOLE", 10)
+    with pytest.raises(FollowingError, match="told apart"):
+        st.modes(bench(1e-6), 0.9, max_frequency_hz=20e3)
+
+
+def test_small_problems_that_discs_do_not_get_through_are_solved_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = bench(1e-5, (10, 20))
+    whole = quadratic_of(problem_of(build_system(case), 0.9, Options(), damped=True), 0.9)
+    region = Region.band(0.0, case.modal.max_frequency_hz, above=-1.2e5)
+    discs = monkeypatch.context
+    with discs() as alone:
+        alone.setattr(find, "WHOLE", 0)
+        by_discs = find.find_modes(whole, Region.band(0.0, case.modal.max_frequency_hz, above=-9e4))
+    monkeypatch.setattr(find, "FEW_SHIFTS", 0)
+    by_qz = find.find_modes(whole, region)
+    assert by_qz.completeness.sentence.startswith("Complete: QZ")
+    assert by_discs.completeness.complete
+    light = by_discs.values[by_discs.values.real > -9e4]
+    near = np.abs(light[:, None] - by_qz.values).min(axis=1)
+    assert np.all(near <= 1e-7 * np.abs(light))
+    assert by_qz.residual.max() <= find.CROWDED
