@@ -143,9 +143,12 @@ def test_onsets_end_where_steady_sliding_does() -> None:
     assert any("nothing was solved" in note for note in found.notes)
 
 
-def growing(case: st.Case, mu: float) -> int:
-    """How many modes grow at one μ with its own nodes, in the full problem."""
-    return len(growing_modes(build_system(case), mu, case.modal.max_frequency_hz, touching_at=mu).values)
+def growing(case: st.Case, mu: float) -> tuple[int, int]:
+    """How many modes grow at one μ with its own nodes, in the full problem, and how many are on the axis to rounding:
+    of these an onset may have begun the growth, or a following one will."""
+    found = growing_modes(build_system(case), mu, case.modal.max_frequency_hz, touching_at=mu)
+    every = np.concatenate([found.values, found.beside])
+    return len(found.values), int(np.count_nonzero(np.abs(every.real) <= 1e-7 * np.abs(every)))
 
 
 def random_block(seed: int) -> st.Case:
@@ -185,7 +188,8 @@ def wrong(seed: int, count: int = 12) -> str:
         if any(abs(o.mu - mu) < 1e-6 for o in found.onsets):
             continue
         said = len(found.at_start) + sum(-1 if o.stabilising else 1 for o in found.onsets if o.mu < mu)
-        if said != (seen := growing(case, float(mu))):
+        seen, unsure = growing(case, float(mu))
+        if abs(said - seen) > unsure:
             return f"{seed}: {seen} grow at μ = {mu:.6g}, and by the onsets {said} ({[o.mu for o in found.onsets]})"
     return ""
 
