@@ -186,7 +186,12 @@ def alone(bench: Path) -> np.ndarray:
 
 @needs_mpi
 @pytest.mark.parametrize(
-    ("words", "processes"), [("bench.toml --solver slepc", 2), ("asks.toml", 2), ("bench.toml --solver slepc", None)]
+    ("words", "processes"),
+    [
+        pytest.param("bench.toml --solver slepc", 2, marks=pytest.mark.slow),  # the next test starts it so, too
+        ("asks.toml", 2),
+        ("bench.toml --solver slepc", None),
+    ],
 )
 def test_a_bench_with_contact_has_the_modes_of_the_default_solver(bench: Path, alone, words: str, processes: int | None):
     done = stridor("modes", *words.split(), "--mu", "0.4", "--json", cwd=bench.parent, processes=processes)

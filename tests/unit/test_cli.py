@@ -210,7 +210,7 @@ def test_run_writes_a_self_contained_report(folder: Path) -> None:
         "--set",
         "modal.max_frequency_hz=20e3",
         "--set",
-        "modal.sweep_points=21",
+        "modal.sweep_points=7",
         "--set",
         "comparison.critical=false",
     ]
