@@ -111,6 +111,17 @@ def test_nodes_with_numbers_that_cannot_be(name, number, words, tmp_path):
     assert words in message
 
 
+@pytest.mark.parametrize("section", ["$Nodes", "$Elements"])
+def test_a_block_of_less_than_nothing(section, tmp_path):
+    """The reader of blocks went back by as many lines as it had come, for ever."""
+    lines = NEW.split("\n")
+    at = lines.index(section) + 2
+    lines[at] = " ".join([*lines[at].split()[:3], "-1"])
+    message = told(tmp_path / "new.msh", "\n".join(lines))
+    assert message.startswith(f"new.msh, line {at + 1}: ")
+    assert "a block of -1" in message
+
+
 @pytest.mark.parametrize("form", ["gmsh22", "gmsh"])
 @pytest.mark.parametrize("number", [-1, -5, 7])
 def test_binary_files(form, number, tmp_path):

@@ -63,18 +63,19 @@ def _check_text(file: Path, data: bytes, sections: dict[bytes, int], *, old: boo
             raise CaseError(f"{file.name}, line {number + offset}", text, accepted)
 
         try:
-            rows = _rows_22(lines) if old else _rows_41(lines, nodes=section == b"Nodes")
+            rows = _rows_22(lines) if old else _rows_41(lines, refuse, nodes=section == b"Nodes")
             for offset, words, kind in rows:
                 take(offset, words, kind, known, refuse)
         except (ValueError, IndexError):
             return  # the reader says what is no number
         if section == b"Nodes" and known and (highest := max(known)) > max(_ALWAYS, _SPARSE * len(known)):
-            for offset, words, kind in _rows_22(lines) if old else _rows_41(lines, nodes=True):
+            for offset, words, kind in _rows_22(lines) if old else _rows_41(lines, refuse, nodes=True):
                 if kind is not None and int(words[0]) == highest:
                     refuse(offset, f"node {highest} among {len(known)} nodes: number them closer to one another")
 
 
 Rows = list[tuple[int, list[bytes], int | None]]
+Refuse = Callable[[int, str], NoReturn]
 
 
 def _rows_22(lines: list[bytes]) -> Rows:
@@ -82,20 +83,19 @@ def _rows_22(lines: list[bytes]) -> Rows:
     return [(offset, line.split(), 0) for offset, line in enumerate(lines) if offset and line.strip()]
 
 
-def _rows_41(lines: list[bytes], *, nodes: bool) -> Rows:
+def _rows_41(lines: list[bytes], refuse: Refuse, *, nodes: bool) -> Rows:
     """Lines with numbers of nodes of format 4.1, with their offsets and types of elements."""
     rows: Rows = []
     held = [(offset, words) for offset, line in enumerate(lines) if (words := line.split())]
     at = 1
     while at < len(held):
         count, kind = int(held[at][1][3]), int(held[at][1][2])
+        if count < 0:
+            refuse(held[at][0], f"a block of {count} {'nodes' if nodes else 'elements'}; there are none or some")
         at += 1
         rows += [(offset, words, 0 if nodes else -kind) for offset, words in held[at : at + count]]
         at += count * (2 if nodes else 1)
     return rows
-
-
-Refuse = Callable[[int, str], NoReturn]
 
 
 def _take_node(offset: int, words: list[bytes], kind: int | None, known: set[int], refuse: Refuse) -> None:
