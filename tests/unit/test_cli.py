@@ -308,6 +308,26 @@ def test_import_stays_light() -> None:
     assert done.stdout.strip() == "[]"
 
 
+MISSING = """
+import sys
+from stridor.app.entry import main
+try:
+    main()
+except SystemExit as end:
+    heavy = ("numba", "matplotlib", "numpy", "scipy", "xarray", "stridor.case.model")
+    print(end.code, [m for m in heavy if m in sys.modules])
+"""
+
+
+@pytest.mark.parametrize("words", ["check", "onsets", "run", "matrices", "reduce --box mu=0:1"])
+def test_a_file_that_is_not_there_is_told_before_anything_heavy_is_imported(tmp_path: Path, words: str) -> None:
+    verb, *more = words.split()
+    command = [sys.executable, "-c", MISSING, verb, "none.toml", *more]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == "2 []\n"
+    assert done.stderr == "stridor: none.toml: no such file\n"
+
+
 def test_growth_from_steady_sliding_is_that_of_the_fastest_mode(folder: Path) -> None:
     sets = [
         *("--set", "temporal.initial=steady-sliding", "--set", "temporal.perturbation=2e-7"),
