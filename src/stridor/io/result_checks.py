@@ -49,7 +49,7 @@ _ONSETS = {
     "part": _PART,
     "mu": _Rule(("onset",)),
     "frequency_hz": _Rule(("onset",), low=0.0),
-    "residual": _Rule(("onset",), low=0.0),
+    "residual": _Rule(("onset",), low=0.0, missing=True),
     "square_root_coefficient": _Rule(("onset",), missing=True),
     "growth_slope": _Rule(("onset",), missing=True),
     "kind": _Rule(("onset",), "O"),
