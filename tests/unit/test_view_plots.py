@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache
 
 import matplotlib as mpl
@@ -259,3 +260,17 @@ def test_figures_are_loaded_only_when_asked_for():
     code = "import sys, stridor, stridor.view; print('matplotlib' in sys.modules, 'jinja2' in sys.modules)"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert said.split() == ["False", "False"]
+
+
+def test_sweeps_are_drawn_where_some_friction_has_no_modes() -> None:
+    """Beyond the last μ with steady sliding, and beside a mode that is listed at one μ alone, there is NaN."""
+    whole = sweep()
+    eigenvalues = whole.eigenvalues.copy()
+    eigenvalues[-1] = complex(np.nan, np.nan)
+    eigenvalues[1:, 0] = complex(np.nan, np.nan)
+    holes = replace(whole, eigenvalues=eigenvalues)
+    for draw in (plots.root_locus, plots.frequency_branches, plots.growth_branches):
+        figure = draw(holes)
+        assert np.all(np.isfinite([ax.get_ylim() for ax in figure.axes]))
+    assert not holes.unstable[-1].any()
+    assert len(holes.order(len(holes.mu) - 1)) == 0

@@ -192,7 +192,8 @@ def _columns(modes: ComplexModes, branches: Sequence[int] | None) -> list[int]:
 def _top(modes: ComplexModes, max_frequency_hz: float | None) -> float:
     if max_frequency_hz is not None:
         return max_frequency_hz
-    return 1.03 * float(modes.frequency_hz.max(initial=1.0))
+    known = modes.frequency_hz[np.isfinite(modes.frequency_hz)]  # where a branch is not known there is NaN
+    return 1.03 * float(known.max(initial=1.0))
 
 
 def _friction_axis(ax: Axes, modes: ComplexModes) -> None:
