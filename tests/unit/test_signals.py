@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.signal import windows
 
+from stridor.temporal import signals
 from stridor.temporal.signals import STOP_DECIBELS, components, growth, low_passed
 
 SAMPLING, BAND = 2e-6, 20e3
@@ -67,3 +69,13 @@ def test_two_lines_of_one_frequency_apart_in_decay_are_both_found() -> None:
     found = components(signal, SAMPLING, max_frequency_hz=BAND)
     assert found.eigenvalues == pytest.approx([-40 + 6e3j * np.pi, 25 + 6.8e3j * np.pi], abs=0.05)
     assert found.fastest == pytest.approx(25 + 6.8e3j * np.pi, abs=0.05)
+
+
+@pytest.mark.parametrize("window", ["hann", "boxcar", "blackmanharris", "flattop"])
+def test_lines_are_as_wide_as_the_window_makes_them(window: str) -> None:
+    """The width at half the amplitude, in bins, of the window's own transform, found by padding it with zeros."""
+    n, padding = 512, 256
+    size = np.abs(np.fft.fft(windows.get_window(window, n), n * padding))
+    half = int(np.argmax(size < 0.5 * size[0]))
+    at = half - 1 + (size[half - 1] - 0.5 * size[0]) / (size[half - 1] - size[half])
+    assert signals._WIDTH[window] == pytest.approx(2 * at / padding, rel=0.01)

@@ -55,7 +55,7 @@ def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:
     return float(frequency[k] + shift * (frequency[1] - frequency[0]))
 
 
-_WIDTH = {"hann": 2.0, "boxcar": 1.21, "blackmanharris": 2.72, "flattop": 4.59}  # −6 dB width in bins
+_WIDTH = {"hann": 2.0, "boxcar": 1.21, "blackmanharris": 2.67, "flattop": 4.59}  # −6 dB width in bins
 
 
 def spectrum(signal: Array, sampling: float, *, window: str = "hann") -> Spectrum:
