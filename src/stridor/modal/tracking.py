@@ -150,7 +150,8 @@ class Tracker:
             )
         raise FollowingError(
             f"branches cannot be told apart near μ = {old.mu:.9g}: three or more modes "
-            "merge there; split the range or change a parameter slightly"
+            "merge there; split the range or change a parameter slightly; `stridor modes --mu` solves each "
+            "friction coefficient on its own"
         )
 
     def _try(self, mu: float) -> State | None:
