@@ -252,7 +252,7 @@ def complex_modes(
             if max_frequency_hz is None or system.size > WHOLE:
                 raise
             return _as_general(
-                system, values, None, max_frequency_hz, damped, vectors, options, progress, str(error)
+                system, values, None, max_frequency_hz, damped, vectors, options, progress, _short(error)
             )
     whole = system
     if not damped:
@@ -273,7 +273,7 @@ def complex_modes(
     except FollowingError as error:
         if max_frequency_hz is None or system.size > WHOLE:
             raise
-        return _as_general(whole, values, None, max_frequency_hz, damped, vectors, options, progress, str(error))
+        return _as_general(whole, values, None, max_frequency_hz, damped, vectors, options, progress, _short(error))
     every = np.concatenate([start, fixed])
     columns = np.argsort(np.abs(every.imag), kind="stable")
     number = np.empty(len(columns), dtype=np.int64)
@@ -312,6 +312,11 @@ def complex_modes(
         max_frequency_hz=max_frequency_hz,
         planned=planned,
     )
+
+
+def _short(error: FollowingError) -> str:
+    """What is the matter, without the advice, which is for those who get no answer."""
+    return str(error).partition(";")[0]
 
 
 def _as_general(
