@@ -13,11 +13,12 @@ import pytest
 
 import stridor as st
 from rubbing_block import rubbing_block
+from stridor.modal import over_friction
 from stridor.modal.growing import growing_modes
 from stridor.modal.joined import ALIKE, jumps, matched
 from stridor.sliding.stretches import stretches
 from stridor.sliding.surfaces import steady_sliding_nodes
-from stridor.system import build_system
+from stridor.system import System, build_system
 
 pytestmark = pytest.mark.verification
 
@@ -101,6 +102,24 @@ def test_vectors_and_interruptions_come_through() -> None:
     assert part.planned == 3
     np.testing.assert_allclose(listed(part, 0), listed(swept, 0), rtol=1e-8)
     assert set(part.mu) < {0.0, 0.3, 0.4}
+
+
+def test_an_interruption_before_a_stretch_has_anything_keeps_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    case, calls = block(0.4, coefficient=0.0), list[float]()
+    plain = over_friction.complex_modes
+
+    def interrupted(system: System, mu: object, **options: object) -> st.ComplexModes:
+        calls.append(0.0)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return plain(system, mu, **options)
+
+    monkeypatch.setattr(over_friction, "complex_modes", interrupted)
+    part = st.modes(case, [0.0, 0.1, 0.4])
+    assert len(calls) == 2
+    assert part.planned == 3
+    assert 0.0 in part.mu
+    assert 0.4 not in part.mu
 
 
 def test_nothing_is_told_where_the_same_nodes_touch() -> None:

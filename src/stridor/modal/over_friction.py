@@ -95,7 +95,12 @@ def _modes_of_parts(
             if progress is not None:
                 progress(min(done + at, len(values)), len(values))
 
-        whole = followed(held, np.append(values[places], ends), tell)
+        try:
+            whole = followed(held, np.append(values[places], ends), tell)
+        except KeyboardInterrupt:
+            if not found:
+                raise
+            break  # before the first μ of this stretch: what the others have stays
         if whole.planned is not None:
             # What follows is missing too; rows of borders are no results.
             rows = [r for r, mu in enumerate(whole.mu) if mu in values[places]]
