@@ -16,6 +16,7 @@ from rubbing_block import rubbing_block
 from stridor.modal import over_friction
 from stridor.modal.growing import growing_modes
 from stridor.modal.joined import ALIKE, jumps, matched
+from stridor.sliding import stretches as finding
 from stridor.sliding.stretches import stretches
 from stridor.sliding.surfaces import steady_sliding_nodes
 from stridor.system import System, build_system
@@ -78,6 +79,20 @@ def test_modes_at_a_friction_do_not_depend_on_the_others() -> None:
     size = np.abs(swept.eigenvalues[order])
     steps = np.abs(np.diff(swept.eigenvalues[order], axis=0)) / size[1:]
     assert np.nanmax(steps[:, np.isfinite(size).all(axis=0)]) < 0.25
+
+
+def test_many_changes_are_taken_in_equal_stretches_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = block(0.45, coefficient=0.0)
+    exact = st.modes(case, [0.0, 0.2, 0.45])
+    monkeypatch.setattr(finding, "MOST", 1)
+    found = stretches(build_system(case), 0.0, 0.45)
+    assert len(found) == finding.EQUAL
+    assert max(s.others for s in found) >= 1
+    for s in found:
+        assert s.touching == touching(case, 0.5 * (s.low + s.high))
+    swept = st.modes(case, [0.0, 0.2, 0.45])
+    assert any("12 equal stretches" in note for note in swept.notes)
+    np.testing.assert_allclose(listed(swept, 0), listed(exact, 0), rtol=1e-8)
 
 
 def test_vectors_and_interruptions_come_through() -> None:

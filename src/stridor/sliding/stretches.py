@@ -23,7 +23,8 @@ FEWER = 3  # of larger ones
 SMALL = 8000  # freedoms
 WIDTH = 1e-9  # of the largest μ: how closely a change is enclosed
 WIDTH_OF_NONE = 1e-3  # where there is no equilibrium on one side, which costs far more to find out
-MOST = 60  # stretches
+MOST = 40  # changes of single nodes; where there are more, each is small, and stretches of equal length do
+EQUAL = 12  # of them
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,8 @@ class Stretch:
     """Friction coefficients from low to high at which the same nodes touch.
 
     at: a μ whose steady sliding has them, None where they are those of the case's own friction. touching: how many of
-    ``nodes`` they are. reason: why there is no steady sliding, "" where there is.
+    ``nodes`` they are. reason: why there is no steady sliding, "" where there is. others: how many nodes are others at
+    one end or the other, of stretches that were cut where nothing changes; 0 of all that are exact.
     """
 
     low: float
@@ -40,6 +42,7 @@ class Stretch:
     touching: int = 0
     nodes: int = 0
     reason: str = ""
+    others: int = 0
 
     def of(self, system: System) -> System:
         """The system whose modes hold these nodes."""
@@ -60,8 +63,8 @@ def stretches(system: System, low: float, high: float, *, solver: str | None = N
     """The stretches that make up the friction coefficients from ``low`` to ``high``, in order.
 
     One, without a look, where nothing can change: no loads, every contact kept closed, or contacts that may stick,
-    whose state is held (`System.load_steps`). A set that comes and goes between two looks that agree is not seen.
-    Raises AnalysisError for more than MOST.
+    whose state is held (`System.load_steps`). A set that comes and goes between two looks that agree is not seen. Where
+    more than MOST nodes open or close, the range is cut into EQUAL parts, each with the nodes of its middle.
     """
     nodes = system.contact_nodes()
     if not nodes.count or not system.loads or system.load_steps or bool(np.all(nodes.kept)):
@@ -72,6 +75,8 @@ def stretches(system: System, low: float, high: float, *, solver: str | None = N
         return (Stretch(low, high, None),)  # what there is to say, the modes say
     count = LOOKS if system.size <= SMALL else FEWER
     looks = [search.at(float(mu)) for mu in np.unique(np.linspace(low, high, count))]
+    if sum(_different(a, b) for a, b in pairwise(looks)) > MOST:
+        return _equal(search, low, high, nodes.count)
     pieces = [looks[0]]
     borders: list[float] = []
     for before, after in pairwise(looks):
@@ -79,10 +84,7 @@ def stretches(system: System, low: float, high: float, *, solver: str | None = N
             borders.append(border)
             pieces.append(beyond)
             if len(pieces) > MOST:
-                raise AnalysisError(
-                    f"more than {MOST} times between μ = {low:g} and {high:g} do contact nodes open or close; take a "
-                    "smaller range of μ"
-                )
+                return _equal(search, low, high, nodes.count)
     ends = [low, *borders, high]
     return tuple(
         Stretch(
@@ -93,11 +95,29 @@ def stretches(system: System, low: float, high: float, *, solver: str | None = N
     )  # fmt: skip
 
 
+def _equal(search: _Search, low: float, high: float, count: int) -> tuple[Stretch, ...]:
+    """Stretches of equal length with the nodes that touch in the middle of each."""
+    edges = np.linspace(low, high, EQUAL + 1)
+    result: list[Stretch] = []
+    for a, b in pairwise(edges.tolist()):
+        middle, ends = search.at(0.5 * (a + b)), (search.at(a), search.at(b))
+        touching = 0 if middle.found is None else int(middle.found.active.sum())
+        others = max(_different(middle, end) for end in ends)
+        result.append(Stretch(a, b, middle.mu, touching, count, middle.reason, others))
+    return tuple(result)
+
+
 def stretch_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
     """A sentence on what touches where, and one on where there is no steady sliding; () where nothing changes."""
     told: list[str] = []
     solid = [s for s in found if not s.reason]
-    if len(solid) > 1:
+    if (most := max((s.others for s in solid), default=0)) > 0:
+        told.append(
+            f"More than {MOST} of the {solid[0].nodes} contact nodes open or close between μ = {found[0].low:.6g} and "
+            f"{found[-1].high:.6g}: in each of {len(found)} equal stretches of μ those touch that do so in its middle, "
+            f"and up to {most} are others at its ends. Modes there are other ones: ask for one μ, or a smaller range."
+        )
+    elif len(solid) > 1:
         parts = [f"{s.touching} between μ = {s.low:.6g} and {s.high:.6g}" for s in solid]
         told.append(
             f"Of the {solid[0].nodes} contact nodes other ones touch in steady sliding as friction grows: "
@@ -207,6 +227,13 @@ def _probes(low: float, high: float, foreseen: float | None, before: float | Non
     doubt = min(max(doubt, 0.25 * WIDTH * high), 0.2 * span)
     yield min(max(foreseen - doubt, low + 0.02 * span), high - 0.02 * span) if foreseen - doubt > low else low + doubt
     yield foreseen + doubt if foreseen + doubt < high else high - doubt
+
+
+def _different(one: _Look, other: _Look) -> int:
+    """How many nodes touch at one of two μ alone; none are counted where there is no steady sliding at either."""
+    if one.found is None or other.found is None:
+        return 0
+    return int(np.count_nonzero(one.found.active != other.found.active))
 
 
 def _key(found: SurfaceSliding) -> bytes:
