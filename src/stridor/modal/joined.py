@@ -204,4 +204,5 @@ def _told(parts: Sequence[tuple[Stretch, Onsets]]) -> str:
     if not any(found.completeness for _, found in parts):
         return ""
     said = [f"({s.low:.6g} to {s.high:.6g}) {found.completeness or 'Not checked.'}" for s, found in parts]
-    return f"{len(parts)} stretches of μ, in each of which the same nodes touch. {' '.join(said)}"
+    held = "with the nodes of its middle" if any(s.others for s, _ in parts) else "with the nodes that touch there"
+    return f"{len(parts)} stretches of μ, each {held}. {' '.join(said)}"

@@ -53,7 +53,7 @@ def modes_of_band(
 
     if len(values) < 2 or not (np.all(np.isfinite(values)) and np.all(values >= 0)):
         return checked(system, followed(system, values, progress))
-    over = stretches(system, float(values.min()), float(values.max()), solver=options.solver)
+    over = stretches(system, float(values.min()), float(values.max()), at=values, solver=options.solver)
     parts = _parts(over, values)
     if len(parts) == 1 and not parts[0][0].reason:
         held = parts[0][0].of(system)
@@ -200,5 +200,5 @@ def onsets_of_band(
             return np.nan
         return float(found.residual[int(np.argmin(np.abs(found.values - lam)))]) if len(found.values) else np.nan
 
-    found = joined_onsets(parts, (low, solid[-1].high), border, residual)
+    found = joined_onsets(parts, (solid[0].low, solid[-1].high), border, residual)
     return replace(found, notes=(*found.notes, *stretch_words(over)))

@@ -7,7 +7,7 @@ foreseen by a straight line through the last two, and enclosed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -59,8 +59,11 @@ class _Look:
     reason: str = ""
 
 
-def stretches(system: System, low: float, high: float, *, solver: str | None = None) -> tuple[Stretch, ...]:
-    """The stretches that make up the friction coefficients from ``low`` to ``high``, in order.
+def stretches(
+    system: System, low: float, high: float, *, at: Sequence[float] | Array = (), solver: str | None = None
+) -> tuple[Stretch, ...]:
+    """The stretches that make up the friction coefficients from ``low`` to ``high``, in order. at (k,): μ between them
+    whose own nodes have to be right; they are looked at whatever the others show, up to LOOKS of them.
 
     One, without a look, where nothing can change: no loads, every contact kept closed, or contacts that may stick,
     whose state is held (`System.load_steps`). A set that comes and goes between two looks that agree is not seen. Where
@@ -74,7 +77,8 @@ def stretches(system: System, low: float, high: float, *, solver: str | None = N
     if own is None:
         return (Stretch(low, high, None),)  # what there is to say, the modes say
     count = LOOKS if system.size <= SMALL else FEWER
-    looks = [search.at(float(mu)) for mu in np.unique(np.linspace(low, high, count))]
+    asked = np.asarray(at if len(at) <= LOOKS else (), dtype=float)
+    looks = [search.at(float(mu)) for mu in np.unique(np.append(np.linspace(low, high, count), asked))]
     if sum(_different(a, b) for a, b in pairwise(looks)) > MOST:
         return _equal(search, low, high, nodes.count)
     pieces = [looks[0]]
@@ -121,7 +125,7 @@ def stretch_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
         parts = [f"{s.touching} between μ = {s.low:.6g} and {s.high:.6g}" for s in solid]
         told.append(
             f"Of the {solid[0].nodes} contact nodes other ones touch in steady sliding as friction grows: "
-            f"{', '.join(parts)}. Every μ has its own."
+            f"{', '.join(parts)}. Each μ is solved with those of its stretch."
         )
     told += [f"Between μ = {s.low:.4g} and {s.high:.4g} nothing was solved: {s.reason}." for s in found if s.reason]
     return tuple(told)
