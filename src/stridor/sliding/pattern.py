@@ -57,7 +57,7 @@ def unexplained_patterns(system: System, normal_force: Array, gap: Array, active
         if by_mesh:
             yield by_mesh
             continue
-        pressure = np.where(loaded, normal_force[mine], 0.0) / nodes.area[mine]
+        pressure = normal_force[mine] / nodes.area[mine]
         open_amid = _open_amid(around, loaded, pressure, nodes.gap[mine], gap[mine])
         if open_amid:
             yield (
