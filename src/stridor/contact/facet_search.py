@@ -76,11 +76,11 @@ def nearest_edges(
 
 @njit(cache=True)
 def _fill_shape(triangle: bool, x: float, y: float, shape: Array) -> None:  # pragma: no cover - compiled
-    """Values (row 0) and derivatives (rows 1, 2) of the four corner functions."""
+    """Values (row 0) and derivatives (rows 1, 2) of the corner functions, three of a triangle, else four."""
     if triangle:
-        shape[0, 0], shape[0, 1], shape[0, 2], shape[0, 3] = 1.0 - x - y, x, y, 0.0
-        shape[1, 0], shape[1, 1], shape[1, 2], shape[1, 3] = -1.0, 1.0, 0.0, 0.0
-        shape[2, 0], shape[2, 1], shape[2, 2], shape[2, 3] = -1.0, 0.0, 1.0, 0.0
+        shape[0, 0], shape[0, 1], shape[0, 2] = 1.0 - x - y, x, y
+        shape[1, 0], shape[1, 1], shape[1, 2] = -1.0, 1.0, 0.0
+        shape[2, 0], shape[2, 1], shape[2, 2] = -1.0, 0.0, 1.0
     else:
         shape[0, 0], shape[0, 1], shape[0, 2], shape[0, 3] = (1.0 - x) * (1.0 - y), x * (1.0 - y), x * y, (1.0 - x) * y
         shape[1, 0], shape[1, 1], shape[1, 2], shape[1, 3] = y - 1.0, 1.0 - y, y, -y
