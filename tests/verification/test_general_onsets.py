@@ -386,14 +386,21 @@ def test_systems_by_hand_take_the_same_way(tmp_path: Path):
 
 
 def test_an_onset_that_gets_lost_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """The count at both ends is of another solver; without the onset it does not agree."""
+    """What branches lose is enclosed by counting; what Newton does not find then is told, with where it is."""
     model = matrix_case(tmp_path, minimal(), 1.0)
     with monkeypatch.context() as patch:
-        patch.setattr(general.onsets, "located", lambda *_: None)
+        patch.setattr(general.branches, "located", lambda *_: None)
+        found = st.onsets(model)
+        assert [o.mu for o in found.onsets] == pytest.approx([0.75], rel=1e-12)
+        assert found.onsets[0].branches == (0, 0)
+        assert found.completeness.startswith("As many roots grow at each of 97 values of μ as the onsets say: 0 modes grow")
+        patch.setattr(general.counted._Search, "_solved", lambda *_: None)
         found = st.onsets(model)
     assert not found.onsets
-    assert found.completeness.startswith(
-        "Not complete: 0 modes grow at μ = 0 and 1 at μ = 1, found in the full problem, but growth begins at 0 onsets"
+    assert not found.complete
+    assert found.completeness == (
+        "Not complete: 0 modes grow at μ = 0 and 1 at μ = 1, found in the full problem, but between μ = 0.75 and 0.760417 "
+        "the number of growing roots changes by +2, and by the onsets by +0."
     )
     assert st.onsets(model).completeness.startswith("Complete")
     document = st.onsets(model).to_json()

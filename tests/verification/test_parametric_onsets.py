@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from stridor.modal.general import counted, onsets_along, parametric_onsets
+from stridor.errors import AnalysisError
+from stridor.modal.general import counted, onsets_along, search
 from stridor.modal.parametric import Parameter, ParametricProblem, Term, reduce
 from stridor.modal.parametric.factors import CONSTANT, Product
 from stridor.typing import Array, ComplexArray
@@ -147,7 +148,7 @@ def test_many_random_problems(first: int):
 
 
 def refuse(*_):
-    raise parametric_onsets.AnalysisError("not today")
+    raise AnalysisError("not today")
 
 
 @pytest.mark.parametrize("seed", [4, 9])
@@ -156,26 +157,26 @@ def test_counting_gives_what_following_gives(seed: int, monkeypatch: pytest.Monk
     whole, frequency = random_problem(seed - 4)
     model = reduce(whole, frequency / (2 * np.pi), bound=1e-9)
     followed = onsets_along(model, "p")
-    monkeypatch.setattr(parametric_onsets, "solved", refuse)
+    monkeypatch.setattr(search, "solved", refuse)
     alone = onsets_along(model, "p")
     assert [o.value for o in alone] == pytest.approx([o.value for o in followed], rel=1e-9)
-    assert "Branches were not followed" in alone.sentence
+    assert "branches not followed: not today" in alone.sentence
 
 
 def test_counting_that_loses_an_onset_is_not_called_whole(monkeypatch: pytest.MonkeyPatch):
     whole, frequency = random_problem(9)
     model = reduce(whole, frequency / (2 * np.pi), bound=1e-9)
-    monkeypatch.setattr(parametric_onsets, "solved", refuse)
+    monkeypatch.setattr(search, "solved", refuse)
     found = onsets_along(model, "p")
     assert found.complete
-    assert "Branches were not followed" in found.sentence
-    solve, seen = counted._solved, []
+    assert "branches not followed: not today" in found.sentence
+    solve, seen = counted._Search._solved, []
 
     def forgetful(*given):
         seen.append(given)
         return None if len(seen) == 2 else solve(*given)
 
-    monkeypatch.setattr(counted, "_solved", forgetful)
+    monkeypatch.setattr(counted._Search, "_solved", forgetful)
     fewer = onsets_along(model, "p")
     assert len(fewer) < len(found)
     assert not fewer.complete

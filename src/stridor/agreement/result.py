@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..digits import measured, readable
-from ..modal.growing import refuted
+from ..modal.onset import refuted
 from ..temporal.signals import Growth
 from .perturbation import Perturbation
 

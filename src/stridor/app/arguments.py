@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..io.datasets import Result
 P = ParamSpec("P")
 INFINITY = float("inf")
+INCOMPLETE = 3  # exit code: what was checked says that something may be missing from what was printed
 
 CaseFile = Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML).", show_default=False)]
 Set = Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from ..digits import readable
-from .arguments import Call, Undamped, numbers, one_of, pair, verb
+from .arguments import INCOMPLETE, Call, Undamped, numbers, one_of, pair, verb
 
 WORTH_A_BAR = 20  # friction coefficients
 INTERRUPTED = 130  # exit code
@@ -153,8 +153,10 @@ def onsets(
     call.keep(result, "onsets.nc")
     if call.json:
         call.document(result.to_json())
-        return
-    show_onsets(result)
+    else:
+        show_onsets(result)
+    if not result.complete:
+        raise typer.Exit(INCOMPLETE)
 
 
 VERBS = {"steady": steady, "shapes": shapes, "modes": modes, "onsets": onsets}

@@ -15,7 +15,7 @@ import typer
 from ..digits import measured
 from ..errors import CaseError
 from ..reading import is_reduced_file
-from .arguments import INFINITY, Call, numbers, pair, verb
+from .arguments import INCOMPLETE, INFINITY, Call, numbers, pair, verb
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -108,13 +108,15 @@ def reduce(
         if onsets is not None:
             document |= {"completeness": onsets.sentence, "complete": onsets.complete}
         call.document(document | {"files": [str(f) for f in files]})
-        return
-    if points:
-        _show_modes(model, points)
-    if along is not None and onsets is not None:
-        _show_onsets(model, along, onsets, confirmed=confirm)
-    if not (at or along or save):
-        call.say("next: --at mu=0.3 for modes, --onsets mu for onsets, --save model.npz to keep the model")
+    else:
+        if points:
+            _show_modes(model, points)
+        if along is not None and onsets is not None:
+            _show_onsets(model, along, onsets, confirmed=confirm)
+        if not (at or along or save):
+            call.say("next: --at mu=0.3 for modes, --onsets mu for onsets, --save model.npz to keep the model")
+    if onsets is not None and not onsets.complete:
+        raise typer.Exit(INCOMPLETE)
 
 
 def _check_file(save: Path | None, keep: str | None) -> None:
@@ -261,6 +263,7 @@ def _onset(onset: ParametricOnset) -> dict[str, Any]:
         "stabilising": onset.stabilising,
         "residual": onset.residual,
         "reduced_value": onset.reduced_value,
+        "enters_band_at": onset.enters_at,
     }
 
 
@@ -329,10 +332,12 @@ def _show_onsets(model: ReducedModel, along: str, onsets: ParametricOnsets, *, c
             f"{o.value:.9g}",
             measured(o.frequency_hz, 3),
             o.kind,
-            "stable" if o.stabilising else "unstable",
+            "stable" if o.stabilising else "unstable" if o.enters_at is None else "unstable *",
             "" if o.residual is None else f"{o.residual:.1e}",
         ]
         for o in onsets
     ]
     table(f"Onsets along {along}, {how}", [along, "frequency [Hz]", "kind", "turns", "residual"], rows)
+    for line in onsets.from_above_words(model.frequency / (2 * math.pi)):
+        stdout.print(f"  {line}", markup=False)
     stdout.print(f"  {onsets.sentence}", markup=False)

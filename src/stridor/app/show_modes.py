@@ -99,7 +99,7 @@ def _onset(onset: Onset) -> list[str]:
         fixed(onset.mu, 10),
         readable(onset.frequency_hz, digits=7, decimals=3),
         onset.kind,
-        f"{onset.branches[0]} + {onset.branches[1]}" if onset.kind == "flutter" else str(onset.branches[0]),
+        onset.branch_words(" + "),
         "ends" if onset.stabilising else "begins" if onset.enters_at is None else "begins *",
         "" if onset.square_root_coefficient is None else f"{onset.square_root_coefficient:.5g}",
         "" if onset.growth_slope is None else f"{onset.growth_slope:.4g}",

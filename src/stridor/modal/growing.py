@@ -24,6 +24,7 @@ from .assembled.steady import Options
 from .assembled.whole import quadratic_of
 from .complex_modes import ComplexModes, complex_modes, undamped
 from .general.basis import AT_REST, GROWS, NOTHING
+from .onset import refuted
 from .onsets import Onsets, onsets
 from .quadratic import band_modes
 from .quadratic.polish import pairs
@@ -35,7 +36,6 @@ BESIDE = 1e-3  # of the band: how much faster than that modes may decay that are
 NEAR = 1e-3  # of the band: eigenvalues further apart are not the same mode
 SAME = 1e-6  # of |λ|: what two ways of solving leave of one eigenvalue
 UNCHECKED = "Not checked"
-REFUTED = ("NOT COMPLETE", "NOT CONFIRMED", "INCOMPLETE", "Not complete")
 WIDER = (1.4, 2.0)  # times the band: from where branches are followed that are missing in it
 
 
@@ -138,11 +138,6 @@ def unconfirmed(found: Growing, listed: ComplexArray, unstable: BoolArray) -> in
 def doubt(completeness: str) -> str:
     """What is said of a list of modes or onsets where it is not known to hold everything; empty where it is."""
     return completeness if UNCHECKED in completeness or refuted(completeness) else ""
-
-
-def refuted(completeness: str) -> bool:
-    """Whether the search in the full problem has not borne out a list, or was not complete itself."""
-    return any(word in completeness for word in REFUTED)
 
 
 def checked_modes(

@@ -19,7 +19,7 @@ class Onset:
     mu, frequency_hz: where; kind: flutter (two modes meet), divergence (a mode at zero frequency) or contact (from
     this μ on other nodes touch, and a mode grows with them that did not before, or the other way round);
     damped: with or without C; stabilising: True where growth ends there instead of beginning;
-    branches: the two modes that meet, numbered from 1 by frequency at μ = 0.
+    branches: the two modes that meet, numbered from 1 by frequency at μ = 0; (0, 0) where branches were not followed.
     square_root_coefficient κ [1/s]: beyond an undamped onset growth opens as κ √(μ − μ_c); with
     damping it belongs to the exceptional point at the complex μ ``exceptional_mu`` close by (None if
     none was found). growth_slope d Re λ/dμ [1/s] (None undamped, where it is infinite).
@@ -38,6 +38,12 @@ class Onset:
     growth_slope: float | None
     exceptional_mu: complex | None = None
     enters_at: float | None = None
+
+    def branch_words(self, between: str) -> str:
+        """The modes that meet, or the one that diverges; a dash where branches were not followed."""
+        if not any(self.branches):
+            return "–"
+        return between.join(str(b) for b in (self.branches if self.kind == "flutter" else self.branches[:1]))
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, as `stridor onsets --json` prints them."""
@@ -106,11 +112,15 @@ class Onsets:
     def from_above_words(self) -> list[str]:
         """Onsets above the band whose mode comes into it, a line each."""
         return [
-            f"* μ = {fixed(o.mu, 6)} begins at {readable(o.frequency_hz)} Hz, above the band up to "
-            f"{self.max_frequency_hz:g} Hz, and enters it at μ ≈ {o.enters_at:.3g}"
+            from_above("μ", fixed(o.mu, 6), o.frequency_hz, self.max_frequency_hz, o.enters_at)
             for o in self.onsets
             if o.enters_at is not None
         ]
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing that was checked says that onsets are missing, or that what was checked with is not whole."""
+        return not refuted(self.completeness)
 
     def to_json(self) -> dict[str, Any]:
         """The document that `stridor onsets --json` prints."""
@@ -125,8 +135,25 @@ class Onsets:
             "damped": self.damped,
             "open_contacts": list(self.open_contacts),
             **({"completeness": self.completeness} if self.completeness else {}),
+            "complete": self.complete,
             **({"notes": list(self.notes)} if self.notes else {}),
         }
+
+
+REFUTED = ("NOT COMPLETE", "NOT CONFIRMED", "INCOMPLETE", "Not complete")
+
+
+def refuted(completeness: str) -> bool:
+    """Whether the search in the full problem has not borne out a list, or was not complete itself."""
+    return any(word in completeness for word in REFUTED)
+
+
+def from_above(name: str, value: str, frequency_hz: float, max_frequency_hz: float, enters_at: float) -> str:
+    """What is said of an onset above the band whose mode comes into it."""
+    return (
+        f"* {name} = {value} begins at {readable(frequency_hz)} Hz, above the band up to {max_frequency_hz:g} Hz, and "
+        f"enters it at {name} ≈ {enters_at:.3g}"
+    )
 
 
 def _by_growth(lam: complex) -> float:

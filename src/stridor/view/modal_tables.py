@@ -127,9 +127,7 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
                     quantity(onset.frequency_hz, 1),
                     significant(other.frequency_hz, 8) if other else "",
                     percent(f_diff),
-                    f"{onset.branches[0]} and {onset.branches[1]}"
-                    if onset.kind == "flutter"
-                    else str(onset.branches[0]),
+                    onset.branch_words(" and "),
                     "" if onset.kind == "flutter" else onset.kind,
                     _remark(onset),
                     other.note if other else "",

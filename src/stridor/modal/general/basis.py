@@ -28,6 +28,8 @@ from .family import MU, ROLES, Family, Smooth
 DENSE = 60  # unknowns up to which the matrices are their own reduced model
 WHOLE = 6000  # and up to which branches are followed by full solves where there is none
 BEYOND = 1.3  # times the band: what full solves look for, since branches are followed up to 1.25 of it
+NEARBY = 1.02  # times the band, where growth in it is all that matters
+BESIDE = 1e-3  # of the highest angular frequency: and how fast what may grow next decays
 DECAY = 0.5  # of the highest angular frequency: modes that decay faster are not looked for
 AT_REST = 1e-5  # of the band: slower than that is a motion as a whole
 NOTHING = 1e-7  # of |λ|: growth of a reversible problem that is rounding; it opens as a square root
@@ -218,12 +220,13 @@ class Held(Projected):
 
 
 class Whole(Along):
-    """The family solved in full at every μ asked for."""
+    """The family solved in full at every μ asked for. beside: for what grows or is near that alone."""
 
     whole = True
 
-    def __init__(self, family: Family, frequency: float) -> None:
+    def __init__(self, family: Family, frequency: float, *, beside: bool = False) -> None:
         super().__init__(family, frequency, family.freedoms, damped=not family.still)
+        self._reach, self._decay = (NEARBY, BESIDE) if beside else (BEYOND, DECAY)
 
     def vectors(self, z: ComplexArray, mu: float, *, left: bool = False) -> ComplexArray:
         """The very vectors."""
@@ -233,8 +236,8 @@ class Whole(Along):
         """All eigenpairs at ``mu`` up to beyond the band."""
         if mu not in self._known:
             there = self.family.low + mu
-            problem, top = self.family.at(there), BEYOND * self.frequency / (2 * np.pi)
-            region = Region.band(0.0, top, above=-DECAY * self.frequency)
+            problem, top = self.family.at(there), self._reach * self.frequency / (2 * np.pi)
+            region = Region.band(0.0, top, above=-self._decay * self.frequency)
             found = find_modes(problem, region, left=True, solver=self.family.options.solver, count=False)
             assert found.left is not None, "asked for"
             change = self.family.slopes(there)

@@ -1,13 +1,14 @@
-"""Onsets without following branches: where the number of growing modes changes, enclosed by halving.
+"""Onsets without following branches: where the number of growing roots changes, enclosed by halving.
 
 Branches that damping beyond critical tangles on the real axis cannot always be told apart; what grows at a value can.
-Between neighbours on a grid the growing modes are counted; where the numbers differ, or where slopes say that a mode
-crosses the axis between them, the interval is halved until one mode changes in it, and Newton solves for it.
+Between neighbours on a grid the growing roots up to |λ| = ω_max are counted; where the numbers differ, or where slopes
+say that a mode crosses the axis between them, the interval is halved until one mode changes in it, and Newton solves
+for it in the full problem. A mode that passes |λ| = ω_max while it grows is no onset, and is told.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,27 +16,60 @@ import numpy as np
 
 from ...typing import BoolArray, ComplexArray
 from ..assembled.reduced import Eigenpairs
+from ..onset import Onset
 from ..quadratic.polish import pairs
-from .basis import AT_REST, GROWS, NOTHING, OnBasis
+from .basis import AT_REST, GROWS, Along
+from .growth import growing_roots, unstable
 from .newton import Root, crossing, meeting, standstill
-from .onsets import growing_roots
 
-GRID = 96
+GRID = {False: 96, True: 24}  # intervals to begin with, on a basis and by full solves
 ON_IT = 1e-6  # of the range: so near an onset growth may be rounding
 SMALLEST = 1e-9  # of the range: no interval is halved further
 ALONE = 1e-4  # of the range: an interval in which one mode changes is short enough for Newton from here on
 STILL = 1e-3  # of the highest frequency: slower than that may be divergence
 EDGE = 1e-3  # of the highest frequency: modes that come in or leave there are no onsets
+ALIKE = 1e-7  # of the highest frequency: onsets at one value whose frequencies are no further apart are one
+
+
+@dataclass(frozen=True)
+class Passing:
+    """A growing mode λ [1/s] that passes the highest frequency at ``mu``; roots: by how many more grow below it."""
+
+    mu: float
+    lam: complex
+    roots: int
+
+
+@dataclass(frozen=True)
+class Lack:
+    """Growing roots that change by ``seen`` between two values while onsets say ``said``."""
+
+    low: float
+    high: float
+    seen: int
+    said: int
 
 
 @dataclass(frozen=True)
 class Counted:
-    """Onsets; how many growing modes pass the highest frequency; agree: whether the growing roots at every value of the
-    grid are those that both say."""
+    """Growing roots at each value (μ, number) of a grid, onsets solved between them, and what passes the highest
+    frequency."""
 
-    roots: list[Root]
-    passed: int
-    agree: bool
+    grid: tuple[tuple[float, int], ...]
+    onsets: tuple[Onset, ...]
+    passing: tuple[Passing, ...]
+
+    def lacking(self, onsets: Sequence[Onset]) -> list[Lack]:
+        """Between which values these onsets do not say what is counted; values that lie on an onset are not judged."""
+        width = self.grid[-1][0] - self.grid[0][0]
+        judged = [(mu, n) for mu, n in self.grid if all(abs(o.mu - mu) > ON_IT * width for o in onsets)]
+        lacks: list[Lack] = []
+        for (low, before), (high, after) in pairwise(judged):
+            said = sum(roots_of(o) for o in onsets if low < o.mu < high)
+            said += sum(p.roots for p in self.passing if low < p.mu <= high)
+            if after - before != said:
+                lacks.append(Lack(low, high, after - before, said))
+        return lacks
 
 
 @dataclass(frozen=True)
@@ -52,39 +86,9 @@ class _Count:
         return growing_roots(self.found.values[self.growing])
 
 
-def counted(source: OnBasis, top: float) -> Counted:
-    """Onsets up to |λ| = top between t = 0 and 1, and whether what grows at each value of the grid is what they say."""
-    roots = list[Root]()
-    passed = list[tuple[float, int]]()
-    grid = [_at(source, top, float(t)) for t in np.linspace(0.0, 1.0, GRID + 1)]
-    for before, after in pairwise(grid):
-        for low, high in _changes(source, top, before, after):
-            root = _solved(source, top, low, high)
-            if root is not None:
-                if not any(_same(root, other, top) for other in roots):
-                    roots.append(root)
-            elif _at_edge(low, high, top):
-                passed.append((high.t, high.number - low.number))
-    return Counted(roots, len(passed), _agree(grid, roots, passed))
-
-
-def _same(one: Root, other: Root, top: float) -> bool:
-    near = abs(one.mu - other.mu) <= 1e-8 and abs(one.lam - other.lam) <= 1e-7 * top
-    return near and ends(one) == ends(other)
-
-
-def _agree(grid: list[_Count], roots: list[Root], passed: list[tuple[float, int]]) -> bool:
-    """Whether as many roots grow at each value as at the first, with those that onsets and the highest frequency let in
-    and out in between; values that lie on an onset are not judged."""
-    changes = [(r.mu, (-1 if ends(r) else 1) * (2 if r.lam else 1)) for r in roots]
-    for at in grid:
-        if any(abs(at.t - mu) <= ON_IT for mu, _ in changes):
-            continue
-        said = grid[0].number + sum(change for t, change in changes if 0 < t < at.t)
-        said += sum(change for t, change in passed if t <= at.t)
-        if at.number != said:
-            return False
-    return True
+def roots_of(onset: Onset) -> int:
+    """By how many more roots grow beyond an onset."""
+    return (-1 if onset.stabilising else 1) * (1 if onset.kind == "divergence" else 2)
 
 
 def ends(root: Root) -> bool:
@@ -92,29 +96,115 @@ def ends(root: Root) -> bool:
     return root.slope < 0 if root.slope is not None else (root.square or 0.0) < 0
 
 
-def _at(source: OnBasis, top: float, t: float) -> _Count:
-    found = source.eigenpairs(t)
-    values = found.values
-    least = NOTHING if source.family.reversible else GROWS
-    grows = (values.real > least * np.abs(values)) & (np.abs(values) > AT_REST * top) & (np.abs(values) <= top)
-    return _Count(t, found, grows)
+def counted(source: Along, between: tuple[float, float], top: float) -> Counted:
+    """Onsets up to |λ| = top [1/s] in a range of the family, and what was counted on the way."""
+    return _Search(source, between, top).all()
 
 
-def _changes(source: OnBasis, top: float, low: _Count, high: _Count) -> Iterator[tuple[_Count, _Count]]:
-    """Intervals in which the growing modes change by one, those that slopes foretell included."""
-    differs = low.number != high.number
-    width = high.t - low.t
-    if not differs and not _foretold(low, width, top) and not _foretold(high, -width, top):
-        return
-    if width <= SMALLEST or (width <= ALONE and _one(low, high)):
-        if differs:
-            yield low, high
-        return
-    if width <= ALONE and not differs:
-        return
-    middle = _at(source, top, 0.5 * (low.t + high.t))
-    yield from _changes(source, top, low, middle)
-    yield from _changes(source, top, middle, high)
+def number_at(source: Along, mu: float, top: float) -> int:
+    """How many roots grow at one value with |λ| up to top."""
+    found = source.eigenpairs(mu - source.family.low)
+    return growing_roots(found.values[_growing(source, found, top)])
+
+
+def _growing(source: Along, found: Eigenpairs, top: float) -> BoolArray:
+    return unstable(source.family, found.values, top) & (np.abs(found.values) <= top)
+
+
+class _Search:
+    """A search between two values, t = μ − the family's low end."""
+
+    def __init__(self, source: Along, between: tuple[float, float], top: float) -> None:
+        self.source, self.top = source, top
+        self.start = source.family.low
+        self.low, self.high = between[0] - self.start, between[1] - self.start
+        self.width = self.high - self.low
+
+    def all(self) -> Counted:
+        """The grid from end to end, and what changes in it."""
+        grid = [self._at(float(t)) for t in np.linspace(self.low, self.high, GRID[self.source.whole] + 1)]
+        onsets, passing = list[Onset](), list[Passing]()
+        for before, after in pairwise(grid):
+            for low, high in self._changes(before, after):
+                root = self._solved(low, high)
+                if root is not None:
+                    onset = _as_onset(self.source, root)
+                    if not any(self._same(onset, other) for other in onsets):
+                        onsets.append(onset)
+                elif (lam := self._at_edge(low, high)) is not None:
+                    passing.append(Passing(self.start + high.t, lam, high.number - low.number))
+        return Counted(tuple((self.start + c.t, c.number) for c in grid), tuple(onsets), tuple(passing))
+
+    def _same(self, one: Onset, other: Onset) -> bool:
+        near = abs(one.mu - other.mu) <= 1e-8 * self.width and one.stabilising == other.stabilising
+        return near and 2 * np.pi * abs(one.frequency_hz - other.frequency_hz) <= ALIKE * self.top
+
+    def _at(self, t: float) -> _Count:
+        found = self.source.eigenpairs(t)
+        return _Count(t, found, _growing(self.source, found, self.top))
+
+    def _changes(self, low: _Count, high: _Count) -> Iterator[tuple[_Count, _Count]]:
+        """Intervals in which the growing modes change by one, those that slopes foretell included."""
+        differs, width = low.number != high.number, high.t - low.t
+        if not differs and not self._foretold(low, width) and not self._foretold(high, -width):
+            return
+        if width <= SMALLEST * self.width or (width <= ALONE * self.width and _one(low, high)):
+            if differs:
+                yield low, high
+            return
+        if width <= ALONE * self.width and not differs:
+            return
+        middle = self._at(0.5 * (low.t + high.t))
+        yield from self._changes(low, middle)
+        yield from self._changes(middle, high)
+
+    def _foretold(self, at: _Count, step: float) -> bool:
+        """Whether a mode would cross the axis within a step if it were straight."""
+        lam, ahead = at.found.values, at.found.values + step * _rates(at.found)
+        inside = (np.abs(lam) <= self.top) & (np.abs(lam) > AT_REST * self.top) & np.isfinite(ahead)
+        off = np.abs(lam.real) > GROWS * np.abs(lam)
+        return bool(np.any(inside & off & ((lam.real > 0) != (ahead.real > 0))))
+
+    def _at_edge(self, low: _Count, high: _Count) -> complex | None:
+        """The growing mode that passes the highest frequency between two values, if that is what changes."""
+        for one in (low, high):
+            values = one.found.values
+            near = (np.abs(np.abs(values) / self.top - 1.0) <= EDGE) & (values.real > 0)
+            if near.any():
+                return complex(values[np.flatnonzero(near)[0]])
+        return None
+
+    def _solved(self, low: _Count, high: _Count) -> Root | None:
+        """The onset in an interval in which one mode begins or ceases to grow; None where none is found."""
+        family, top = self.source.family, self.top
+        more, fewer = (high, low) if high.number > low.number else (low, high)
+        mine, others = np.flatnonzero(more.growing), np.flatnonzero(fewer.growing)
+        known, _ = pairs(more.found.values[mine], fewer.found.values[others], 1e-2 * top)
+        fresh = np.setdiff1d(np.arange(len(mine)), known)
+        if not len(fresh):
+            fresh = np.arange(len(mine))
+        place = int(mine[fresh[np.argmin(more.found.values[mine[fresh]].real)]])
+        lam, mu = complex(more.found.values[place]), self.start + more.t
+        x, y = (
+            self.source.vectors(v[:, [place]], more.t, left=left)[:, 0]
+            for v, left in ((more.found.right, False), (more.found.left, True))
+        )
+        between = (self.start + low.t, self.start + high.t)
+        slack = 1e-6 * self.width + 2 * (high.t - low.t)
+
+        def candidates() -> Iterator[Root | None]:
+            if abs(lam.imag) <= STILL * top:
+                yield standstill(family, mu, x, y, between)
+            if not family.reversible:
+                yield crossing(family, mu, lam, x, y, between)
+            yield meeting(family, mu, lam, x, y, between)
+
+        for root in candidates():
+            if root is None or not between[0] - slack <= root.mu <= between[1] + slack:
+                continue
+            if ends(root) == (more is low):
+                return root
+        return None
 
 
 def _one(low: _Count, high: _Count) -> bool:
@@ -122,13 +212,6 @@ def _one(low: _Count, high: _Count) -> bool:
     more, fewer = (high, low) if high.number > low.number else (low, high)
     change = more.number - fewer.number
     return change == 1 or (change == 2 and int(more.growing.sum()) == int(fewer.growing.sum()) + 1)
-
-
-def _foretold(at: _Count, step: float, top: float) -> bool:
-    """Whether a mode would cross the axis within a step if it were straight."""
-    lam, ahead = at.found.values, at.found.values + step * _rates(at.found)
-    inside = (np.abs(lam) <= top) & (np.abs(lam) > AT_REST * top) & np.isfinite(ahead)
-    return bool(np.any(inside & (np.abs(lam.real) > GROWS * np.abs(lam)) & ((lam.real > 0) != (ahead.real > 0))))
 
 
 def _rates(found: Eigenpairs) -> ComplexArray:
@@ -139,39 +222,11 @@ def _rates(found: Eigenpairs) -> ComplexArray:
     return rates
 
 
-def _at_edge(low: _Count, high: _Count, top: float) -> bool:
-    """Whether what changes is a mode that passes the highest frequency while it grows."""
-    return any(
-        bool(np.any((np.abs(np.abs(one.found.values) / top - 1.0) <= EDGE) & (one.found.values.real > 0)))
-        for one in (low, high)
-    )
-
-
-def _solved(source: OnBasis, top: float, low: _Count, high: _Count) -> Root | None:
-    """The onset in an interval in which one mode begins or ceases to grow; None where none is found."""
-    family = source.family
-    more, fewer = (high, low) if high.number > low.number else (low, high)
-    mine, others = np.flatnonzero(more.growing), np.flatnonzero(fewer.growing)
-    known, _ = pairs(more.found.values[mine], fewer.found.values[others], 1e-2 * top)
-    fresh = np.setdiff1d(np.arange(len(mine)), known)
-    if not len(fresh):
-        fresh = np.arange(len(mine))
-    place = int(mine[fresh[np.argmin(more.found.values[mine[fresh]].real)]])
-    lam = complex(more.found.values[place])
-    x, y = more.found.right[:, place], more.found.left[:, place]
-    between = (low.t, high.t)
-    slack = 1e-6 + 2 * (high.t - low.t)
-    stabilising = more is low
-    def candidates() -> Iterator[Root | None]:
-        if abs(lam.imag) <= STILL * top:
-            yield standstill(family, more.t, x, y, between)
-        if not family.reversible:
-            yield crossing(family, more.t, lam, x, y, between)
-        yield meeting(family, more.t, lam, x, y, between)
-
-    for root in candidates():
-        if root is None or not low.t - slack <= root.mu <= high.t + slack:
-            continue
-        if ends(root) == stabilising:
-            return root
-    return None
+def _as_onset(source: Along, root: Root) -> Onset:
+    """Of branches that were not followed: they have no numbers."""
+    return Onset(
+        mu=root.mu, frequency_hz=abs(root.lam.imag) / (2 * np.pi), kind="flutter" if root.lam else "divergence",
+        damped=source.family.dissipates, stabilising=ends(root), branches=(0, 0), residual=root.residual,
+        square_root_coefficient=None if root.square is None else float(np.sqrt(abs(root.square))),
+        growth_slope=root.slope,
+    )  # fmt: skip

@@ -17,6 +17,7 @@ from .family import Family
 BEYOND = 1.1  # modes above the band may meet inside it
 STEPS = {False: 30, True: 12}  # over the range at least, on a basis and by full solves
 MOST_STEPS = {False: 1500, True: 200}
+ENOUGH = {False: 400, True: 60}  # where what grows can be counted instead
 SMALLEST = 1.01e-9  # step at which the follower goes on whatever it sees
 EXACTLY = 1e-10  # of the range: how far off the real axis two modes may meet that meet on it
 
@@ -38,20 +39,23 @@ def follower(
     source: Along,
     *,
     finer: int = 1,
+    most: int | None = None,
     watch: Callable[[State, State], None] | None = None,
     unsure: Callable[[float], None],
 ) -> Follower:
     """Follows all branches of a source from where they get their numbers.
 
-    finer: by how much its longest steps are shorter. unsure is called with μ where branches cannot be told apart, equal
-    ones aside. Raises AnalysisError on the way where that takes too many steps.
+    finer: by how much its longest steps are shorter; most: how many of them it may take, finer times that. unsure is
+    called with μ where branches cannot be told apart, equal ones aside. Raises AnalysisError where that takes
+    too many steps.
     """
     family, steps = source.family, 0
+    most = MOST_STEPS[source.whole] if most is None else most
 
     def seen(old: State, new: State) -> None:
         nonlocal steps
         steps += 1
-        if steps > finer * MOST_STEPS[source.whole]:
+        if steps > finer * most:
             raise AnalysisError(f"{steps} steps lead no further than to {_untold(family.low + new.mu)}")
         if new.mu - old.mu <= SMALLEST and not _surely(source, old, new):
             unsure(family.low + new.mu)
@@ -74,7 +78,7 @@ def surely(source: Along) -> Follower:
 
 
 def _untold(mu: float) -> str:
-    return f"mu = {mu:.6g}, where branches cannot be told apart; take a smaller range of mu or a lower max_frequency_hz"
+    return f"mu = {mu:.6g}, where branches cannot be told apart"
 
 
 def _agree_on_names(family: Family, old: State, new: State) -> None:
@@ -109,7 +113,7 @@ def followed(source: Along, low: float, high: float, top: float, finer: int = 1)
         passages.extend(meetings(source, old, new) if family.reversible else crossings(old, new))
         entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.place)))
 
-    way = follower(source, finer=finer, watch=watch, unsure=unsure.append)
+    way = follower(source, finer=finer, most=ENOUGH[source.whole], watch=watch, unsure=unsure.append)
     first = way.advance(low - family.low)
     return Followed(source, first, way.advance(high - family.low), tuple(passages), entries, tuple(unsure))
 

@@ -1,0 +1,21 @@
+"""What counts as growth: one decision for everything that counts modes or roots of matrices of any structure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...typing import BoolArray, ComplexArray
+from .basis import AT_REST, GROWS, NOTHING
+from .family import Family
+
+
+def unstable(family: Family, values: ComplexArray, top: float) -> BoolArray:
+    """Which grow beyond rounding (k,); motions as a whole, at no frequency to speak of, do not count."""
+    rounding = NOTHING if family.reversible else GROWS
+    return (values.real > rounding * np.abs(values)) & (np.abs(values) > AT_REST * top)
+
+
+def growing_roots(values: ComplexArray) -> int:
+    """How many roots grow, of which a flutter pair is two and a motion that diverges one: a pair that meets on the real
+    axis and parts there is no onset."""
+    return int(np.sum(np.where(values.imag > 0, 2, 1)))

@@ -1,0 +1,157 @@
+"""The one search for onsets of a family: branches followed where they can be, growing roots counted where not.
+
+What counts is that at every value looked at as many roots grow as the onsets say. Followed branches are held against
+a count at both ends, in the full problem, and between every two onsets; where they fail that, or cannot be followed,
+the growing roots are counted on a grid and the onsets enclosed between its values (`counted`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import AnalysisError
+from ..onset import Onset
+from ..quadratic import Spectrum
+from .basis import WHOLE, Along, Whole
+from .branches import Found, solved
+from .counted import ALIKE, ON_IT, Counted, Lack, Passing, counted, number_at, roots_of
+from .family import Family
+from .follow import Followed
+from .growth import growing_roots, unstable
+
+FINER = 6  # times as many steps where the count at the ends does not agree
+EVEN = 8  # values at which followed branches are held against a count, beside those between the onsets
+ON_EDGE = 1e-6  # of the highest frequency: modes so near it may count on one side only
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Onsets in ascending order; complete: whether as many roots grow wherever that was looked at as they say.
+
+    way: the branches, where following them led to all. seen: what was counted instead; lacks: where that and the
+    onsets differ. why: what kept branches from being followed, if anything did.
+    """
+
+    onsets: tuple[Onset, ...]
+    complete: bool
+    way: Followed | None = None
+    seen: Counted | None = None
+    lacks: tuple[Lack, ...] = ()
+    why: str = ""
+
+    @property
+    def passing(self) -> tuple[Passing, ...]:
+        """Growing modes that pass the highest frequency, where that was counted."""
+        return () if self.seen is None else self.seen.passing
+
+
+def search(
+    family: Family, make: Sequence[Callable[[], Along]], between: tuple[float, float],
+    ends: tuple[Spectrum, Spectrum], top: float,
+) -> Answer:  # fmt: skip
+    """Every onset of a family in a range up to the angular frequency top [1/s].
+
+    make: sources of eigenpairs, each tried where the one before it does not do. ends: all modes of the band at both
+    ends, found in the full problem. Raises AnalysisError where there is no source, nor one by full solves.
+    """
+    source, best, why = None, None, ""
+    for number, way_to in enumerate(make):
+        try:
+            source = way_to()
+            # Where every step is a full solve, a count costs less than finer steps.
+            for finer in (1, FINER)[number > 0 : 1 if source.whole else 2]:
+                found, way, complete = solved(source, between, ends, top, finer)
+                best = Answer(_wanted(found, between, top), complete, way)
+                if complete:
+                    break
+        except AnalysisError as error:
+            why = str(error)
+            break
+        if best is not None and best.complete:
+            break
+    if best is not None and best.complete and _borne_out(best, between, top):
+        return best
+    seen = counted(_beside(family, source, top, why), between, top)
+    return _counted_answer(family, best, seen, ends, top, why)
+
+
+def _wanted(found: Sequence[Found], between: tuple[float, float], top: float) -> tuple[Onset, ...]:
+    """Those of the range in the band, or above it and leading into it."""
+    low, high = between
+    inside = [
+        f.onset for f in found
+        if low <= f.onset.mu <= high and (_in_band(f.onset, top) or f.onset.enters_at is not None)
+    ]  # fmt: skip
+    return tuple(sorted(inside, key=_place))
+
+
+def _place(onset: Onset) -> tuple[float, float]:
+    return onset.mu, onset.frequency_hz
+
+
+def _in_band(onset: Onset, top: float) -> bool:
+    return 2 * np.pi * onset.frequency_hz <= top * (1 + 1e-12)
+
+
+def _borne_out(answer: Answer, between: tuple[float, float], top: float) -> bool:
+    """Whether as many roots grow between every two of the onsets as they say."""
+    assert answer.way is not None, "of followed branches"
+    source = answer.way.source
+    if source.whole:
+        return True  # they were solved in full at every step
+    onsets = [o for o in answer.onsets if _in_band(o, top)]
+    (low, high), places = between, sorted({o.mu for o in answer.onsets})
+    middles = [0.5 * (a + b) for a, b in zip([low, *places], [*places, high], strict=True)]
+    tried = sorted({low, high, *middles, *np.linspace(low, high, EVEN + 2)[1:-1].tolist()})
+    grid = [(mu, number_at(source, mu, top)) for mu in tried]
+    return not Counted(tuple(grid), (), ()).lacking(onsets)
+
+
+def _beside(family: Family, source: Along | None, top: float, why: str) -> Along:
+    """What the growing roots are counted on: the basis that branches were followed on, else full solves for what is
+    near the axis alone."""
+    if source is not None and not source.whole:
+        return source
+    if family.size > WHOLE:
+        raise AnalysisError(why or f"the problem has {family.size} unknowns, and no reduced model")
+    return Whole(family, top, beside=True)
+
+
+def _counted_answer(
+    family: Family, best: Answer | None, seen: Counted, ends: tuple[Spectrum, Spectrum], top: float, why: str
+) -> Answer:
+    """The list of onsets that what was counted bears out: of branches, of the count, or of both."""
+    followed = () if best is None else best.onsets
+    entering = tuple(o for o in followed if not _in_band(o, top))
+    inside = tuple(o for o in followed if _in_band(o, top))
+    width = seen.grid[-1][0] - seen.grid[0][0]
+    both = (*inside, *(o for o in seen.onsets if not any(_same(o, other, width, top) for other in inside)))
+    onsets, way = both, None
+    if followed and not seen.lacking(inside):
+        onsets, way = inside, best.way if best is not None else None
+    elif not seen.lacking(seen.onsets):
+        onsets = seen.onsets
+    lacks = seen.lacking(onsets)
+    agree = _ends_agree(family, seen, ends, top)
+    every = tuple(sorted((*onsets, *entering), key=_place))
+    return Answer(every, not lacks and agree, way, seen, tuple(lacks), why)
+
+
+def _same(one: Onset, other: Onset, width: float, top: float) -> bool:
+    near = abs(one.mu - other.mu) <= 1e-8 * width and roots_of(one) == roots_of(other)
+    return near and 2 * np.pi * abs(one.frequency_hz - other.frequency_hz) <= ALIKE * top
+
+
+def _ends_agree(family: Family, seen: Counted, ends: tuple[Spectrum, Spectrum], top: float) -> bool:
+    """Whether as many roots were counted at both ends as the full problem has there."""
+    for (mu, number), end in zip((seen.grid[0], seen.grid[-1]), ends, strict=True):
+        if any(abs(o.mu - mu) <= ON_IT for o in seen.onsets):
+            continue
+        size = np.abs(end.values)
+        slack = 2 * int(np.count_nonzero(np.abs(size - top) <= ON_EDGE * top))
+        if abs(number - growing_roots(end.values[unstable(family, end.values, top) & (size <= top)])) > slack:
+            return False
+    return True

@@ -1,0 +1,115 @@
+"""What is said of a list of onsets: whether as many roots grow as they say, and how that was found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..quadratic import Spectrum
+from .basis import Projected
+from .counted import Passing
+from .family import Family
+from .growth import unstable
+from .search import Answer
+
+MOST = 4  # places that are named one by one
+
+
+def sentence(
+    family: Family, answer: Answer, ends: tuple[Spectrum, Spectrum], top: float, name: str,
+    value: Callable[[float], float], where: str = "",
+) -> str:  # fmt: skip
+    """What speaks for these onsets being all, or where they are not. name: of the parameter, value(μ) what it is there;
+    top [1/s]: the end of the band; where: what was searched, if not the full problem."""
+    first, last = (int(np.count_nonzero(unstable(family, end.values, top))) for end in ends)
+    low, high = (f"{value(mu):g}" for mu in _between(family, answer))
+    numbers = f"{_modes(first)} at {name} = {low} and {last} at {name} = {high}"
+    if where:
+        numbers = f"{where} {numbers}"
+    passing = _passing(answer.passing, name, value)
+    if not answer.complete:
+        numbers += "" if where else ", found in the full problem"
+        return f"Not complete: {numbers}, but {_lacking(answer, name, value)}.{passing}"
+    if answer.way is None:
+        assert answer.seen is not None, "what else would have led to it"
+        how = f"As many roots grow at each of {len(answer.seen.grid)} values of {name} as the onsets say"
+        why = f": {answer.why}" if answer.why else ""
+        return (
+            f"{how}: {numbers}.{passing} Onsets were enclosed by that count, and branches not followed{why}; growth "
+            "that begins and ends again between two of these values may be missing."
+        )
+    begins = sum(not o.stabilising for o in answer.onsets)
+    said = f"as the onsets say{_across(last - first - 2 * begins + len(answer.onsets), top)}"
+    told = _followed(answer, name, value)
+    both = all(end.completeness.complete for end in ends)
+    if not both:
+        unsure = next(end.completeness.sentence for end in ends if not end.completeness.complete)
+        return f"{told}; {numbers}, {said}.{passing} {unsure}"
+    counted = "by QZ" if ends[1].completeness.sentence.startswith("Complete: QZ") else "in discs that cover the band"
+    if ends[1].completeness.counted is not None:
+        counted += ", counted by the argument principle"
+    whole = where or "in the full problem"
+    anew = f"All modes up to {top / (2 * np.pi):g} Hz at both ends were found anew {whole} ({counted})"
+    return f"Complete as far as both ends tell: {numbers}, {said}.{passing} {told}. {anew}."
+
+
+def _between(family: Family, answer: Answer) -> tuple[float, float]:
+    if answer.seen is not None:
+        return answer.seen.grid[0][0], answer.seen.grid[-1][0]
+    assert answer.way is not None, "what else would have led to it"
+    return family.low + answer.way.low.mu, family.low + answer.way.high.mu
+
+
+def _followed(answer: Answer, name: str, value: Callable[[float], float]) -> str:
+    way = answer.way
+    assert way is not None, "asked for where branches led to all"
+    source = way.source
+    how = {True: ", solved in full at every step", False: " on the matrices themselves"}[source.whole]
+    if isinstance(source, Projected) and source.model is not None:
+        how = f" on a reduced model of {source.model.size} unknowns"
+    told = f"{len(way.low.place)} branches were followed from {name} = {value(source.family.low):g}{how}"
+    if way.unsure:
+        at = ", ".join(f"{value(mu):.6g}" for mu in way.unsure[:3])
+        told += f" (which is which was not clear at {name} = {at}: numbers beyond may be exchanged)"
+    return told
+
+
+def _lacking(answer: Answer, name: str, value: Callable[[float], float]) -> str:
+    """Where what is counted is not what the onsets say."""
+    if not answer.lacks:
+        return "what was counted there is not the same"
+    places = [
+        f"between {name} = {value(lack.low):.6g} and {value(lack.high):.6g} the number of growing roots changes by "
+        f"{lack.seen:+d}, and by the onsets by {lack.said:+d}"
+        for lack in answer.lacks[:MOST]
+    ]
+    more = len(answer.lacks) - len(places)
+    return "; ".join([*places, *([f"and in {more} more places"] if more else [])])
+
+
+def _passing(passing: tuple[Passing, ...], name: str, value: Callable[[float], float]) -> str:
+    """Modes that come into the band or leave it while they grow."""
+    if not passing:
+        return ""
+    told = [
+        f"1 {'comes into the band' if p.roots > 0 else 'leaves the band'} at {name} ≈ {value(p.mu):.4g} "
+        f"({abs(p.lam.imag) / (2 * np.pi):.6g} Hz, +{p.lam.real:.4g} 1/s)"
+        for p in passing[:MOST]
+    ]
+    more = f"; {len(passing) - MOST} more do one or the other" if len(passing) > MOST else ""
+    return f" Of the growing modes {'; '.join(told)}{more}."
+
+
+def _across(count: int, top: float) -> str:
+    """Words for modes that cross the border of the band while they grow."""
+    if not count:
+        return ""
+    limit = f"{top / (2 * np.pi):g} Hz"
+    if count > 0:
+        return f" but for {count} whose growth began above {limit}"
+    return f" but for {-count} that went on growing above {limit}"
+
+
+def _modes(count: int) -> str:
+    return f"{count} mode grows" if count == 1 else f"{count} modes grow"

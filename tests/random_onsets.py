@@ -1,0 +1,222 @@
+"""Random problems for the search for onsets, and what is true of them: dense eigenvalues on a fine grid.
+
+Beams with one to three contacts, on nodes and between them, elastic and rigid; masses under a belt; matrices of other
+programs, symmetric, gyroscopic, circulatory, without damping, lightly damped and overdamped; columns under end loads
+that follow in part. The truth is the number of growing roots at every value, by `scipy.linalg.eig` alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import scipy.linalg as sl
+
+import stridor as st
+from benches import Slave, bench, by_hand, full_eigenvalues
+from matrix_cases import matrix_case
+from stridor.modal.complex_modes import undamped
+from stridor.modal.over_friction import onsets_of_band
+from stridor.system import System
+
+KINDS = ("beams", "belt", "column", "symmetric", "gyroscopic", "circulatory", "both", "overdamped")
+GRID = 60
+FAINT = 1e-6  # of |λ|: growth that either side may take for rounding
+STILL = 1e-4  # of the band: motions as a whole are no slower than that
+NEAR_EDGE = 0.02  # of the band
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A problem over one number in [low, high] and the band up to top [1/s]."""
+
+    name: str
+    low: float
+    high: float
+    top: float
+    solve: Callable[[Path], st.Onsets]
+    eigenvalues: Callable[[float], np.ndarray]
+
+
+def random_problem(seed: int) -> Problem:
+    """One of the kinds, each in turn."""
+    kind = KINDS[seed % len(KINDS)]
+    rng = np.random.default_rng([seed, 7])
+    make = {"beams": _beams, "belt": _belt, "column": _column}.get(kind, _imported)
+    return make(f"{kind} {seed}", rng)
+
+
+def _of_system(name: str, system: System, high: float, top: float, *, damped: bool) -> Problem:
+    truth = system if damped else undamped(system)
+    return Problem(
+        name, 0.0, high, top,
+        lambda _: onsets_of_band(system, (0.0, high), top / (2 * np.pi), damped=damped),
+        lambda mu: full_eigenvalues(truth, mu),
+    )  # fmt: skip
+
+
+def _beams(name: str, rng: np.random.Generator) -> Problem:
+    """Slaves on a clamped master, small enough for many."""
+    count = int(rng.integers(1, 4))
+    places = (np.arange(count) + rng.uniform(0.3, 0.9, count)) / count
+    damping = (float(rng.choice([0.0, 50.0, 300.0])), float(rng.choice([0.0, 1e-8, 1e-6])))
+    elements = int(rng.integers(6, 10))
+    slaves = [
+        Slave(
+            # Some on a node of the master, some between.
+            place=float(np.round(p * elements) / elements) if rng.random() < 0.3 and p * elements > 0.6 else float(p),
+            lean_deg=float(rng.uniform(-25, 25)), length=float(rng.uniform(0.03, 0.07)), elements=3,
+            damping=(damping[0] * float(rng.uniform(0.2, 3.0)), damping[1]), end="clamped",
+            stiffness="rigid" if rng.random() < 0.3 else float(10 ** rng.uniform(6, 10)),
+        )
+        for p in places
+    ]  # fmt: skip
+    # Without loads all contacts count as touching.
+    system = replace(bench(*slaves, elements=elements, damping=damping, length=0.05 + 0.05 * count), loads={})
+    damped = bool(rng.random() < 0.8)
+    return _of_system(name, system, float(rng.uniform(0.3, 0.9)), 2 * np.pi * float(rng.uniform(10e3, 60e3)), damped=damped)
+
+
+def _belt(name: str, rng: np.random.Generator) -> Problem:
+    """Masses under a belt, a contact each to three of them; damping light, heavy or none."""
+    n, m = int(rng.integers(3, 10)), int(rng.integers(1, 4))
+    shapes = rng.standard_normal((n, n))
+    stiffness = shapes.T @ np.diag(np.exp(rng.uniform(-1.0, 2.5, n))) @ shapes
+    mass = np.diag(rng.uniform(0.5, 2.0, n))
+    rows = rng.standard_normal((n, n))
+    kind = rng.integers(4)
+    damping = (
+        np.zeros((n, n)),
+        0.02 * mass + 1e-3 * stiffness,
+        float(rng.uniform(0.01, 0.5)) * rows.T @ rows,
+        float(rng.uniform(1.0, 10.0)) * rows.T @ rows,
+    )[kind]
+    normal, tangent = rng.standard_normal((2, m, n))
+    contact = np.exp(rng.uniform(0, 4, m))
+    contact[rng.random(m) < 0.2] = np.inf
+    system = by_hand(mass, damping, stiffness, normal, tangent, contact)
+    top = float(rng.uniform(0.4, 3.0)) * np.sqrt(np.linalg.norm(stiffness, 2) / 0.5)
+    return _of_system(name, system, float(rng.uniform(0.3, 1.2)), top, damped=True)
+
+
+def _of_matrices(name: str, terms: list, high: float, top: float) -> Problem:
+    def eigenvalues(p: float) -> np.ndarray:
+        n = len(terms[0][0])
+        total = {role: np.zeros((n, n)) for role in ("mass", "damping", "stiffness")}
+        for matrix, role, factor in terms:
+            total[role] += (p if factor else 1.0) * matrix
+        inverse = np.linalg.inv(total["mass"])
+        state = np.block(
+            [[np.zeros((n, n)), np.eye(n)], [-inverse @ total["stiffness"] / top**2, -inverse @ total["damping"] / top]]
+        )
+        return sl.eigvals(state) * top
+
+    def solve(folder: Path) -> st.Onsets:
+        return st.onsets(matrix_case(folder, terms, top / (2 * np.pi), (0.0, high)))
+
+    return Problem(name, 0.0, high, top, solve, eigenvalues)
+
+
+def _column(name: str, rng: np.random.Generator) -> Problem:
+    """A cantilever of EI = ρA = L = 1 whose end load follows in part, on n elements; damping of mass and stiffness."""
+    n = int(rng.integers(3, 8))
+    mass, stiffness, load = column(n, float(rng.uniform(0.0, 1.1)))
+    terms = [(mass, "mass", ""), (stiffness, "stiffness", ""), (load, "stiffness", "mu")]
+    outer, inner = float(rng.choice([0.0, 0.1, 1.0, 8.0])), float(rng.choice([0.0, 0.0, 1e-4, 1e-2]))
+    if outer or inner:
+        terms.append((outer * mass + inner * stiffness, "damping", ""))
+    return _of_matrices(name, terms, float(rng.choice([10.0, 25.0, 70.0, 150.0])), float(rng.uniform(50.0, 400.0)))
+
+
+def column(n: int, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M, K and what a unit of end load adds to the stiffness (2n, 2n); share: how much of it follows (1: Beck)."""
+    h = 1.0 / n
+    bending = np.array(
+        [[12, 6 * h, -12, 6 * h], [6 * h, 4 * h * h, -6 * h, 2 * h * h], [-12, -6 * h, 12, -6 * h],
+         [6 * h, 2 * h * h, -6 * h, 4 * h * h]]
+    ) / h**3  # fmt: skip
+    inertia = h / 420 * np.array(
+        [[156, 22 * h, 54, -13 * h], [22 * h, 4 * h * h, 13 * h, -3 * h * h], [54, 13 * h, 156, -22 * h],
+         [-13 * h, -3 * h * h, -22 * h, 4 * h * h]]
+    )  # fmt: skip
+    geometric = 1 / (30 * h) * np.array(
+        [[36, 3 * h, -36, 3 * h], [3 * h, 4 * h * h, -3 * h, -h * h], [-36, -3 * h, 36, -3 * h],
+         [3 * h, -h * h, -3 * h, 4 * h * h]]
+    )  # fmt: skip
+    size = 2 * (n + 1)
+    mass, stiffness, load = np.zeros((3, size, size))
+    for e in range(n):
+        part = slice(2 * e, 2 * e + 4)
+        mass[part, part] += inertia
+        stiffness[part, part] += bending
+        load[part, part] -= geometric
+    load[-2, -1] += share  # the end turns the load along
+    return mass[2:, 2:], stiffness[2:, 2:], load[2:, 2:]
+
+
+def _imported(name: str, rng: np.random.Generator) -> Problem:
+    kind = name.split()[0]
+    n = int(rng.integers(6, 61)) if rng.random() < 0.25 else int(rng.integers(6, 20))
+    scale = (3.0 if kind == "overdamped" else 0.3) / np.sqrt(n)  # strong enough for growth against such damping
+
+    def skew() -> np.ndarray:
+        a = scale * rng.standard_normal((n, n))
+        return a - a.T
+
+    mass = np.diag(rng.uniform(0.5, 2.0, n))
+    turn, root = np.linalg.qr(rng.standard_normal((n, n)))[0], np.sqrt(np.diag(mass))
+    stiffness = root[:, None] * (turn @ np.diag(rng.uniform(0.3, 3.0, n) ** 2) @ turn.T) * root
+    terms = [(mass, "mass", ""), (stiffness, "stiffness", "")]
+    damping = 3.0 if kind == "overdamped" else float(rng.choice([0.0, 1e-3, 0.02, 0.3]))
+    if damping:
+        alone = np.diag(rng.uniform(0.0, 1.0, n))
+        terms.append((damping * (alone if rng.random() < 0.5 else 0.3 * (mass + stiffness)), "damping", ""))
+    if kind == "symmetric":
+        half = scale * rng.standard_normal((n, n))
+        load = half @ half.T
+        terms.append((-load * rng.uniform(0.5, 3.0) / np.linalg.eigvalsh(load)[-1], "stiffness", "mu"))
+    if kind in ("circulatory", "both", "overdamped"):
+        terms.append((skew() if rng.random() < 0.5 else scale * rng.standard_normal((n, n)), "stiffness", "mu"))
+    if kind in ("gyroscopic", "both"):
+        terms.append((skew(), "damping", "mu" if rng.random() < 0.5 or kind == "gyroscopic" else ""))
+    return _of_matrices(name, terms, float(rng.uniform(0.5, 2.0)), float(rng.uniform(2.2, 12.0)))
+
+
+def disagreement(problem: Problem, folder: Path) -> tuple[str, str]:
+    """What the onsets say otherwise than the eigenvalues at some value, and why there is no whole answer; "" for
+    neither. Not judged are values where a growing mode is near the end of the band or growth may be rounding."""
+    try:
+        found = problem.solve(folder)
+    except st.AnalysisError as error:
+        return "", f"{problem.name}: {error}"
+    if not found.complete:
+        return "", f"{problem.name}: {found.completeness}"
+    base: int | None = None
+    crossed = False
+    inside = [o for o in found.onsets if 2 * np.pi * o.frequency_hz <= problem.top]
+    before = 0.0
+    for p in np.linspace(problem.low, problem.high, GRID + 1)[1:-1] + 1.234e-5 * (problem.high - problem.low):
+        values = problem.eigenvalues(float(p))
+        values = values[np.abs(values) > STILL * problem.top]
+        size = np.abs(values)
+        grows = values.real > FAINT * size
+        if np.any(grows & (np.abs(size / problem.top - 1.0) < NEAR_EDGE)):
+            crossed = True  # one may pass it here
+            continue
+        if np.any((np.abs(values.real) <= 30 * FAINT * size) & (values.real > 1e-9 * size) & (size <= problem.top)):
+            continue
+        count = int(np.sum(grows & (size <= problem.top)))
+        said = sum(_roots(o) for o in inside if o.mu < p)
+        if base is None or (crossed and not any(before < o.mu < p for o in inside)):
+            base = count - said
+        crossed, before = False, float(p)
+        if count - said != base:
+            onsets = [(round(o.mu, 6), o.kind, "-" if o.stabilising else "+", round(o.frequency_hz, 4)) for o in found.onsets]
+            return f"{problem.name}: {count} roots grow at {p:.6g}, onsets say {said + base}: {onsets} {found.completeness}", ""
+    return "", ""
+
+
+def _roots(onset: st.Onset) -> int:
+    return (-1 if onset.stabilising else 1) * (1 if onset.kind == "divergence" else 2)
