@@ -17,11 +17,20 @@ from scipy.spatial import cKDTree
 from stridor.contact import facets as facets_module
 from stridor.contact import pairing, pieces, ties
 from stridor.contact.clipping import common_triangles
-from stridor.contact.coupling import SlaveFacets, _areas, _dual, _point_weights, _shares, _values_of_basis, collocated
+from stridor.contact.coupling import (
+    SlaveFacets,
+    _areas,
+    _dual,
+    _point_weights,
+    _shares,
+    _values_of_basis,
+    collocated,
+    coupled,
+)
 from stridor.contact.curve import Curve
 from stridor.contact.facet_search import edge_place, nearest_edges, shape_of
 from stridor.contact.facets import FacetSurface
-from stridor.contact.interface import Rows
+from stridor.contact.interface import Rows, pair
 from stridor.contact.interpolation import _segments, _settled, element_weights
 from stridor.contact.master import Location
 from stridor.contact.nodes import ContactNodes, approach, stack
@@ -455,6 +464,22 @@ def test_places_in_the_plane_are_inverted_where_there_are_any(kind: str) -> None
     folded[3] = flat[3] * [1.0, 0.0]
     good = pieces._inverted(kind, folded, owner, target)[2]
     assert list(good) == [True, True, True, False, True]
+
+
+@pytest.mark.parametrize("kind", ["quad", "quad8", "triangle6"])
+def test_whatever_is_called_found_is_the_place_of_its_target(kind: str) -> None:
+    """On facets bent and folded at random, and targets anywhere: a place on the facet, whose image is the target."""
+    rng = np.random.default_rng(24)
+    flat = np.stack([bent(kind, rng, by=0.25)[:, :2] for _ in range(400)])
+    target = rng.random((400, 2)) @ np.array([[1.2, 0.2], [-0.3, 0.9]])
+    place, slope, good = pieces._inverted(kind, flat, np.arange(400), target)
+    assert 20 < good.sum() < 380
+    values, slopes = shape_functions(kind, place[good])
+    assert np.einsum("qr,qre->qe", values, flat[good]) == pytest.approx(target[good], abs=1e-8)
+    assert place[good].min() > -1e-6
+    assert place[good].max() < 1 + 1e-6
+    tangents = np.einsum("aqr,qre->qea", slopes, flat[good])
+    assert slope[good] == pytest.approx(np.abs(np.linalg.det(tangents)), rel=1e-6)
 
 
 def hat(nodes: np.ndarray, k: int, x: np.ndarray) -> np.ndarray:
@@ -977,3 +1002,126 @@ def test_facets_round_the_edge_of_a_boundary_take_no_part() -> None:
         tilted[4:, 0] += math.tan(math.radians(lean))
         kept, _, _ = pairing._opposed({"quad": block}, tilted, np.arange(6), flat.locate(tilted))
         assert len(kept["quad"]) == 1 + faces
+
+
+# -- edges, tolerances and lines ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("turn", [12.0, 30.0])
+@pytest.mark.parametrize("height", [0.4, -0.4])
+def test_over_the_rim_of_a_curved_surface_twice_the_angle_of_its_facets_is_forgiven(turn: float, height: float) -> None:
+    """Two facets that turn by an angle: the normal of the first turns by half of it to their common edge, so that
+    over the rim a slave may be beyond by 2 |n − n₀| = 4 sin(angle/4) of its height."""
+    c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    points = np.array([[-1, 0, 0], [0, 0, 0], [c, 0, -s], [-1, 1, 0], [0, 1, 0], [c, 1, -s]])
+    roof = FacetSurface.from_facets(points, {"quad": np.array([[0, 1, 4, 3], [1, 2, 5, 4]])}, where="roof")
+    allowed = 4 * math.sin(math.radians(turn) / 4) * abs(height)
+    for part, inside in ((0.0, True), (0.97, True), (1.03, False)):
+        found = roof.locate(np.array([[-1 - part * allowed, 0.5, height]]))
+        assert found.inside[0] == inside, part
+        assert found.point[0] == pytest.approx([-1, 0.5, 0], abs=1e-9)
+        assert found.gap[0] == pytest.approx(height)
+    # A flat one forgives nothing.
+    sheet = FacetSurface.from_facets(points[[0, 1, 3, 4]], {"quad": np.array([[0, 1, 3, 2]])}, where="sheet")
+    assert not sheet.locate(np.array([[-1 - 1e-5, 0.5, height]])).inside[0]
+
+
+def test_curved_slaves_may_seem_to_overlap_by_their_chords_and_corners_by_rounding() -> None:
+    flat = Flat(np.zeros(2), np.array([0.0, 1.0]))
+    at = np.array([[100.0, 0.0], [103.0, 4.0]])
+    rounding = 1e-9 * 5 + 1e-12 * 103
+    for turn, height in ((39.0, None), (41.0, 0.0), (0.0, 0.0)):
+        c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+        normals = np.array([[0.0, 1.0], [s, c]])
+        expected = abs((normals[1] - normals[0]) @ (at[1] - at[0])) / 8 if height is None else height
+        assert pairing.overlap_tolerance(at, normals, flat) == pytest.approx(1.5 * expected + rounding, rel=1e-12)
+    assert pairing.overlap_tolerance(at[:1], np.array([[0.0, 1.0]]), flat) == pytest.approx(1e-10)
+    bowl: Any = SimpleNamespace(chord_height=2e-3)
+    assert pairing.overlap_tolerance(at[:1], np.array([[0.0, 1.0]]), bowl) == pytest.approx(3e-3 + 1e-10)
+
+
+@pytest.mark.parametrize("kind", ["triangle6", "quad", "quad8", "quad9"])
+def test_meshes_that_match_are_coupled_node_to_node(kind: str) -> None:
+    points, quads = flat_grid(3, up=True)
+    places = reference_nodes(kind)
+    cells, nodes = [], np.zeros((0, 3))
+    corners = [q[c] for q in quads for c in ([[0, 1, 2], [0, 2, 3]] if kind == "triangle6" else [[0, 1, 2, 3]])]
+    for cell in corners:
+        values, _ = shape_functions("triangle" if kind == "triangle6" else "quad", places)
+        nodes = np.concatenate([nodes, values @ points[cell]])
+        cells.append(np.arange(len(nodes) - len(places), len(nodes)))
+    nodes, inverse = np.unique(np.round(nodes, 12), axis=0, return_inverse=True)
+    block = inverse.ravel()[np.array(cells)]
+    master = FacetSurface.from_facets(nodes, {kind: block}, where="m")
+    turned = {"triangle6": [0, 2, 1, 5, 4, 3], "quad": [0, 3, 2, 1], "quad8": [0, 3, 2, 1, 7, 6, 5, 4], "quad9": [0, 3, 2, 1, 7, 6, 5, 4, 8]}
+    facets = SlaveFacets.of(nodes, {kind: block[:, turned[kind]]}, np.arange(len(nodes)))
+    found = coupled(facets, nodes, np.ones(len(nodes)), master.locate(nodes), master)
+    assert found.master.toarray() == pytest.approx(found.slave.toarray(), abs=1e-9)
+    assert np.abs(found.master.data).min() > 1e-11
+    assert found.area.sum() == pytest.approx(1.0)
+    assert found.gap == pytest.approx(np.zeros(len(nodes)), abs=1e-12)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_point_is_paired_with_the_line_below_it(side: int) -> None:
+    """A line of five nodes on a parabola: gap, normal and rows are those of the nearest point of its spline."""
+    rng = np.random.default_rng(23)
+    x = np.array([0.0, 0.3, 0.7, 1.0, 1.4])
+    line = np.column_stack([x, 0.1 * x**2])
+    n, p = 14, 2
+    slave = Rows(sp.csr_array(rng.normal(size=(2, n))), rng.normal(size=(2, p)))
+    master = Rows(sp.csr_array(rng.normal(size=(10, n))), rng.normal(size=(10, p)))
+
+    def paired(at):
+        return pair("c", slave=slave, slave_position=np.array(at), master=master, master_positions=line, side=side,
+                    stiffness=4e3, law=Coulomb(0.2))  # fmt: skip
+
+    for at in ([0.1, 0.2], [0.5, 0.1], [0.85, -0.2], [1.3, 0.4]):
+        found = paired(at)
+        assert found is not None
+        k, xi = found.segment, found.xi
+        # Hermite with slopes from the neighbours, one-sided at the ends.
+        chord = np.linalg.norm(np.diff(line, axis=0), axis=1)
+
+        def slope(j, k=k, chord=chord):
+            if j == 0 or j == 4:
+                return line[k + 1] - line[k]
+            return chord[k] * (line[j + 1] - line[j - 1]) / (chord[j - 1] + chord[j])
+
+        def spline(t, k=k, slope=slope):
+            return (line[k] * (1 + 2 * t) * (1 - t) ** 2 + slope(k) * t * (1 - t) ** 2 + line[k + 1] * t**2 * (3 - 2 * t)
+                    + slope(k + 1) * t**2 * (t - 1))  # fmt: skip
+
+        point, along = spline(xi), (spline(xi + 1e-6) - spline(xi - 1e-6)) / 2e-6
+        along /= np.linalg.norm(along)
+        assert abs((np.array(at) - point) @ along) < 1e-8
+        assert found.tangent == pytest.approx(side * along, abs=1e-8)
+        assert found.normal == pytest.approx(side * np.array([-along[1], along[0]]), abs=1e-8)
+        assert found.gap == pytest.approx(found.normal @ (np.array(at) - point))
+        # Weights by moving one node at a time; the rows are slave minus master.
+        weights, basis = np.zeros(5), np.eye(5)
+        for j in range(5):
+            saved = line.copy()
+            line[:] = np.column_stack([basis[j], np.zeros(5)])
+            weights[j] = (line[k] * (1 + 2 * xi) * (1 - xi) ** 2 + slope(k) * xi * (1 - xi) ** 2
+                          + line[k + 1] * xi**2 * (3 - 2 * xi) + slope(k + 1) * xi**2 * (xi - 1))[0]  # fmt: skip
+            line[:] = saved
+        for direction, row, lift in (
+            (found.normal, found.normal_row, found.normal_lift), (found.tangent, found.tangent_row, found.tangent_lift),
+        ):  # fmt: skip
+            below = np.kron(weights, direction)
+            assert row == pytest.approx(slave.free.T @ direction - master.free.T @ below)
+            assert lift == pytest.approx(slave.lift.T @ direction - master.lift.T @ below)
+        assert found.compliance == pytest.approx(1 / 4e3)
+        assert (found.side, found.name, found.sliding, found.closed) == (side, "c", "small", False)
+    # Within rounding of a node it is that node; beyond an end there is nothing.
+    for off in (0.4e-9, -0.4e-9):
+        flat = line * [1, 0]
+        found = pair("c", slave=slave, slave_position=np.array([0.7 + 0.3 * off, 0.2]), master=master, master_positions=flat,
+                     side=side, stiffness=np.inf, law=Coulomb(0.2))  # fmt: skip
+        assert found is not None
+        assert found.xi in (0.0, 1.0)
+        assert found.normal_row == pytest.approx(slave.free.T @ found.normal - master.free.toarray()[4:6].T @ found.normal)
+        assert found.compliance == 0.0
+    assert paired([-0.01, 0.0]) is None
+    assert paired([1.45, 0.2]) is None

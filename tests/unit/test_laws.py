@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 
 from stridor.laws import Coulomb, FrictionLaw, Hyperbolic, StaticKinetic, Tabulated, Weakening
+from stridor.laws.damping import Rayleigh
+from stridor.laws.elasticity import Material, RectangularSection
 from stridor.laws.packed import HEAD, KIND, KINETIC, LINEAR, POINTS, STICKING, coefficient_at
 
 
@@ -61,3 +63,51 @@ def test_columns_of_a_packed_table_are_as_described():
     row = Tabulated((0.0, 1.0, 3.0), (0.5, 0.3, 0.4), static_coefficient=0.6).numbers
     assert (row[KIND], row[STICKING], row[KINETIC], row[POINTS]) == (LINEAR, 0.6, 0.4, 3.0)
     assert row[HEAD:] == (0.0, 1.0, 3.0, 0.5, 0.3, 0.4, 0.0, 0.0, 0.0)
+
+
+def test_a_body_without_damping_has_none_at_any_frequency():
+    for omega in (1e-3, 1.0, 1e6):
+        assert Rayleigh().damping_ratio(omega) == 0.0
+        # ζ = (α/ω + βω)/2
+        assert Rayleigh(mass=3.0).damping_ratio(omega) == pytest.approx(1.5 / omega)
+        assert Rayleigh(stiffness=4e-6).damping_ratio(omega) == pytest.approx(2e-6 * omega)
+        assert Rayleigh(3.0, 4e-6).damping_ratio(omega) == pytest.approx(1.5 / omega + 2e-6 * omega)
+
+
+def test_sections_and_materials_as_written():
+    section = RectangularSection(width=0.2, thickness=0.03)
+    assert section.area == pytest.approx(6e-3)
+    assert section.second_moment == pytest.approx(0.2 * 2.7e-5 / 12)
+    assert Material(2e11, 7800.0).poisson_ratio == 0.3
+
+
+@pytest.mark.parametrize(
+    ("law", "zero"),
+    [
+        (StaticKinetic(0.3, 0.4), StaticKinetic(0.0, 0.1)),
+        (Weakening(0.2, 0.5, 0.05), Weakening(0.0, 0.1, 1e-300)),
+        (Hyperbolic(0.2, 0.5, 30.0), Hyperbolic(0.0, 0.1, 1e308)),
+        (Tabulated((0.0, 1.0), (0.4, 0.2), static_coefficient=0.6), Tabulated((0.0, 1.0), (0.1, 0.0), static_coefficient=0.1)),
+    ],
+)
+def test_a_law_is_scaled_as_a_whole_to_its_coefficient_at_a_speed(law: FrictionLaw, zero: FrictionLaw):
+    for speed in (0.0, 0.02, 0.5, -0.5):
+        scaled = law.scaled(0.7, speed)
+        assert scaled.sliding(speed) == pytest.approx(0.7)
+        factor = 0.7 / law.sliding(speed)
+        assert scaled.sticking == pytest.approx(factor * law.sticking)
+        for other in (0.0, 0.1, 0.9):
+            assert scaled.sliding(other) == pytest.approx(factor * law.sliding(other))
+            assert scaled.slope(other) == pytest.approx(factor * law.slope(other))
+    # Where it is zero at the speed no factor will do: μ is its coefficient, and the stick limit stays unless lower.
+    for mu, sticking in ((0.05, 0.1), (0.3, 0.3)):
+        at = zero.scaled(mu, 1e10)
+        assert (at.sliding(1e10), at.sticking) == (pytest.approx(mu), sticking)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [StaticKinetic(0.0, 0.0), Weakening(0.0, 0.0, 0.1), Hyperbolic(0.0, 0.0, 3.0), Tabulated((0.0, 1.0), (0.0, 0.0))],
+)
+def test_a_law_that_is_zero_everywhere_becomes_coulombs(law: FrictionLaw):
+    assert law.scaled(0.2, 0.5) == Coulomb(0.2)
