@@ -3,6 +3,7 @@ integrals by their closed form, bases by what they have to do; and the words of 
 
 from __future__ import annotations
 
+import inspect
 import math
 from dataclasses import replace
 from itertools import pairwise
@@ -32,7 +33,7 @@ from stridor.contact.facet_search import edge_place, nearest_edges, shape_of
 from stridor.contact.facets import FacetSurface
 from stridor.contact.interface import Rows, pair
 from stridor.contact.interpolation import _segments, _settled, element_weights
-from stridor.contact.master import Location
+from stridor.contact.master import Location, MasterSurface
 from stridor.contact.nodes import ContactNodes, approach, stack
 from stridor.contact.obstacles import Cylinder, Flat
 from stridor.contact.surfaces import _along, frames, operators
@@ -729,6 +730,52 @@ def test_beyond_the_edge_of_a_sheet_the_nearest_point_of_its_edge_is_given() -> 
     assert found.gap == pytest.approx(slaves[:, 2])
     for off, inside in ((0.9e-6, True), (1.5e-6, False)):  # of a facet, a third of the sheet
         assert sheet.locate(np.array([[1 + off / 3, 0.4, 0.1]])).inside[0] == inside
+
+
+def box(size, parts) -> tuple[np.ndarray, np.ndarray]:
+    """A box about the origin whose sides are cut into parts along each axis."""
+    every: list[np.ndarray] = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for sign in (-1.0, 1.0):
+            x, y = (np.linspace(-0.5, 0.5, parts[k] + 1) * size[k] for k in (u, v))
+            for i in range(parts[u]):
+                for j in range(parts[v]):
+                    quad = np.zeros((4, 3))
+                    quad[:, axis] = 0.5 * sign * size[axis]
+                    quad[:, u], quad[:, v] = x[[i, i + 1, i + 1, i]], y[[j, j, j + 1, j + 1]]
+                    every.append(quad if sign > 0 else quad[::-1])
+    nodes, inverse = np.unique(np.round(np.concatenate(every), 9), axis=0, return_inverse=True)
+    return nodes, inverse.reshape(-1, 4)
+
+
+@pytest.mark.parametrize(
+    ("size", "parts"), [((5.0, 3.0, 0.2), (1, 1, 1)), ((5.0, 5.5, 0.1), (1, 1, 2)), ((4.0, 4.0, 0.1), (3, 5, 1))]
+)
+def test_over_a_large_facet_beside_narrow_ones_a_slave_is_over_the_large_one(size, parts) -> None:
+    """The distance from a plate is known everywhere, from its faces, edges and corners, and right at its faces."""
+    nodes, quads = box(size, parts)
+    plate = FacetSurface.from_facets(nodes, {"quad": quads}, where="plate")
+    rng = np.random.default_rng(25)
+    half = 0.5 * np.array(size)
+    slaves = (rng.random((4000, 3)) - 0.5) * (np.array(size) + 0.6)
+    rim = np.abs(slaves[:400, :2]) / half[:2]
+    slaves[:400, :2] *= ((1 - 1e-3 * rng.random((400, 1))) / rim.max(axis=1, keepdims=True))  # near the rim of a face
+    slaves[:400, 2] = half[2] * np.sign(slaves[:400, 2]) + 1e-5 * (rng.random(400) - 0.5)
+    found = plate.locate(slaves)
+    beyond = np.abs(slaves) - half
+    outside = beyond.max(axis=1) > 0
+    distance = np.where(outside, np.linalg.norm(np.maximum(beyond, 0.0), axis=1), beyond.max(axis=1))
+    assert found.gap == pytest.approx(distance, abs=1e-9)
+    assert found.inside.all()
+    assert found.normal[:400] == pytest.approx(np.outer(np.sign(slaves[:400, 2]), [0, 0, 1.0]), abs=1e-9)
+
+
+def test_all_masters_are_asked_in_the_same_way() -> None:
+    asked = [p.replace(annotation=p.empty) for p in inspect.signature(MasterSurface.locate).parameters.values()]
+    for kind in (Flat, Cylinder, Curve, FacetSurface):
+        own = inspect.signature(kind.locate).parameters.values()
+        assert [p.replace(annotation=p.empty) for p in own] == asked
 
 
 @pytest.mark.parametrize("turn", [39.0, 41.0])

@@ -180,7 +180,8 @@ class FacetSurface:
         return found[0], found[1], found[2]
 
     def _nearest_facets(self, slaves: Array, current: Array) -> IntArray:
-        """Facets (m, q) to begin with: those whose centre, or points between centre and edges, are nearest."""
+        """Facets (m, q) to begin with: those whose centre, or points between centre and edges, are nearest, and both at
+        the nearest sharp edge, over which no search goes: beside narrow ones a large one's centre is far."""
         valid = self.facets >= 0
         middles = 0.5 * (current[self.facets] + current[np.take_along_axis(self.facets, _following(self.facets), 1)])
         centres = np.sum(current[self.facets] * valid[..., None], axis=1) / valid.sum(axis=1, keepdims=True)
@@ -190,7 +191,11 @@ class FacetSurface:
         owner = np.concatenate([each, beside])
         count = min(CANDIDATES, len(owner))
         nearest = np.asarray(cKDTree(samples).query(slaves, k=count)[1], dtype=np.int64)
-        return owner[nearest.reshape(len(slaves), count)]
+        starts = owner[nearest.reshape(len(slaves), count)]
+        if not self.sharp.any():
+            return starts
+        facet, _, edge, _ = self._beside(slaves, current, [self.sharp])
+        return np.column_stack([starts, facet, self.neighbours[facet, edge]])
 
     def _location(
         self, slaves: Array, current: Array, normals: Array, facet: IntArray, place: Array, inside: BoolArray
