@@ -41,6 +41,9 @@ from stridor.errors import CaseError
 from stridor.laws import Coulomb, StaticKinetic, Tabulated, Weakening
 from stridor.mesh.facets import quadrature, reference_nodes, shape_functions
 
+# What NumPy warns of is a fault here, whatever comes of it.
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
+
 KINDS = ("triangle", "quad", "triangle6", "quad8", "quad9")
 
 

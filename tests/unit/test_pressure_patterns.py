@@ -17,6 +17,9 @@ from stridor.mesh.facets import reference_nodes
 from stridor.sliding import pattern
 from stridor.sliding.pattern import OUTLINES, _alternates, _neighbours, _open_amid, left_by_facets, unexplained_patterns
 
+# What NumPy warns of is a fault here, whatever comes of it.
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
+
 
 @pytest.mark.parametrize("force", [0.0, 1.0])
 def test_a_contact_that_touches_without_force_has_no_pattern_and_no_warning(force):

@@ -25,6 +25,9 @@ from stridor.sliding.stick_slip import Frictional, Loading, StickSlip
 from stridor.sliding.stretches import Stretch, _different, _Look, _probes, _Search
 from stridor.sliding.surfaces import SurfaceSliding
 
+# What NumPy warns of is a fault here, whatever comes of it.
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
+
 # -- stick and slip ----------------------------------------------------------------------------------------------------
 
 
@@ -726,6 +729,7 @@ def test_stretches_in_words() -> None:
         "μ = 0.31 and 0.5. Each μ is solved with those of its stretch.",
     )
     assert words((one, none)) == ("Between μ = 0.5 and 0.9 nothing was solved: it tips over.",)
+    assert words((none,)) == ("Between μ = 0.5 and 0.9 nothing was solved: it tips over.",)
     assert len(words((one, two, none))) == 2
     parts = (replace(one, others=3), replace(two, others=4))
     assert words(parts) == (
@@ -738,4 +742,5 @@ def test_stretches_in_words() -> None:
         "has others at μ = 0.31 to 0.5 (5 touch), 0.5 to 0.9 (no steady sliding). Modes there are other ones: `stridor "
         "modes` and `stridor onsets` have them.",
     )
+    assert "others at μ = 0.5 to 0.9 (no steady sliding). Modes" in elsewhere((none,))[0]
     assert elsewhere((two,))[0].startswith("The nodes that touch at the case's own friction are held")

@@ -19,6 +19,9 @@ from stridor.sliding import history, points, stick_slip, surfaces
 from stridor.sliding.stick_slip import LIMIT, Frictional, Loading, StickRows, StickSlip, _Change
 from stridor.system.load_steps import LoadStep
 
+# What NumPy warns of is a fault here, whatever comes of it.
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
+
 # -- rows that hold ----------------------------------------------------------------------------------------------------
 
 
