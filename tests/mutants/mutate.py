@@ -1,6 +1,6 @@
 """The tests of the tests: small faults are put into a copy of the sources, one at a time, and a test must fail.
 
-    make mutants        or        python tests/mutants/mutate.py [--sample 60] [--seed 1] [--minutes 60] [--report]
+    make mutants        or        python tests/mutants/mutate.py [--sample 35] [--seed 1] [--minutes 60] [--report]
 
 The faults (mutants) are those of cosmic-ray; the sample, which tests meet which module, and what was found out about
 survivors are ours: covering.toml and equivalent.toml beside this file. Every answer is kept at once in one line of
@@ -402,7 +402,7 @@ def report(drawn: list[Mutant], total: Counter[str]) -> int:
 
 def main() -> int:
     text = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    text.add_argument("--sample", type=int, default=60, help="how many places to draw in each package")
+    text.add_argument("--sample", type=int, default=35, help="how many places to draw in each package")
     text.add_argument("--seed", type=int, default=1)
     text.add_argument("--minutes", type=float, default=60.0, help="start no other mutant after this time")
     text.add_argument("--only", default="", help="modules that begin so, as in contact/ or laws/friction.py")

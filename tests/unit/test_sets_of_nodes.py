@@ -276,10 +276,14 @@ def test_rows_that_share_freedoms_without_following_from_one_another_are_let_thr
     assert "1 of the 4 conditions" in redundant(SimpleNamespace(holders={}), twice, np.ones(4, dtype=bool))
 
 
-def test_a_node_within_rounding_of_the_surface_touches() -> None:
+@pytest.mark.parametrize("size", [1.0, 1e-9, 1e9])
+def test_a_node_within_rounding_of_the_surface_touches(size: float) -> None:
     active = np.array([False, False, True])
-    found = closed(active, np.array([1e-13, 1e-6, 1e-3]), np.array([1e-3]))
-    assert list(found) == [True, False, True]
+    for largest in ({"gap": 1e-3, "way": 1e-5}, {"gap": 1e-5, "way": -1e-3}):  # whichever is larger
+        gap = np.array([0.9e-12, -1.1e-12, largest["gap"]]) * size
+        assert list(closed(active, gap, np.array([largest["way"], 0.0]) * size)) == [True, False, True]
+    assert list(closed(active[:1], np.zeros(1), np.zeros(0))) == [True]
+    assert list(closed(active[:1], np.array([size]), np.zeros(0))) == [False]
 
 
 # -- what moves --------------------------------------------------------------------------------------------------------

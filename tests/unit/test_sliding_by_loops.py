@@ -321,14 +321,15 @@ def test_resultants_are_sums_over_the_nodes_of_each_contact(d: int) -> None:
 
 
 @pytest.mark.parametrize("d", [2, 3])
-def test_balance_is_the_work_left_in_rigid_motions(d: int) -> None:
+@pytest.mark.parametrize(("size", "large"), [(1.0, 1.0), (1e-9, 1e-6), (1e7, 1e3)])
+def test_balance_is_the_work_left_in_rigid_motions(d: int, size: float, large: float) -> None:
     """A free body of three points: what is left of forces over their sum along each axis, and of moments about its
     middle, over the sum of their sizes."""
     rng = np.random.default_rng(12)
-    at = rng.normal(size=(4, d))
+    at = large * rng.normal(size=(4, d))
     solid = SimpleNamespace(points=at, rows=SimpleNamespace(free=sp.csr_array(np.eye(4 * d))))
     free: Any = SimpleNamespace(lines=(), solids=(solid,), stiffness=sp.csr_array((4 * d, 4 * d)))
-    load, contact = rng.normal(size=(2, 4 * d))
+    load, contact = size * rng.normal(size=(2, 4 * d))
     found = balance(free, load, contact)
     both, sizes = (load + contact).reshape(4, d), (np.abs(load) + np.abs(contact)).reshape(4, d)
     assert found.force_error == pytest.approx(max(np.abs(both.sum(axis=0)) / sizes.sum(axis=0)))
@@ -339,7 +340,13 @@ def test_balance_is_the_work_left_in_rigid_motions(d: int) -> None:
         turns.append(abs(work) / sum(abs(about[i, a]) * sizes[i, b] + abs(about[i, b]) * sizes[i, a] for i in range(4)))
     assert found.moment_error == pytest.approx(max(turns))
     # A motion that strains the structure is held by it; so is one in which nothing moves.
-    springs = np.diag([1.0] + [0.0] * (4 * d - 1))
+    for strain, held in ((0.9e-9, False), (1.1e-9, True)):  # of the stiffest, between two points along the second axis
+        springs = np.zeros((4 * d, 4 * d))
+        springs[1, 1], springs[1, 1 + d], springs[0, 0] = size, -size, strain * size
+        free.stiffness = sp.csr_array(springs)
+        errors = np.abs(both.sum(axis=0)) / sizes.sum(axis=0)
+        assert balance(free, load, contact).force_error == pytest.approx(max(errors[1:] if held else errors))
+    springs = np.diag([size] + [0.0] * (4 * d - 1))
     free.stiffness = sp.csr_array(springs)
     assert balance(free, load, contact).force_error == pytest.approx(max(np.abs(both.sum(axis=0)[1:]) / sizes.sum(axis=0)[1:]))
     solid.rows.free = sp.csr_array((4 * d, 4 * d))
