@@ -289,6 +289,86 @@ def test_residual_is_the_largest_imbalance_over_the_largest_force() -> None:
         assert found.residual(given) == pytest.approx(max(map(abs, imbalance)) / max(terms), rel=1e-12)
 
 
+def pressed(rng, *, stiff: float, size: float, mu: float = 0.2) -> Any:
+    """Six freedoms, four nodes of which two are rigid, one is soft and one nearly rigid, and a load, in given units."""
+    n, m = 6, 4
+    root = rng.normal(size=(n, n))
+    stiffness = stiff * (root @ root.T + np.eye(n))
+    normal, tangent = rng.normal(size=(m, n)), mu * rng.normal(size=(m, n))
+    compliance = np.array([0.0, 0.3, 1e-13, 0.0]) / stiff
+    gap = size / stiff * rng.normal(size=m)
+    return stiffness, normal, normal + tangent, compliance, gap, size * rng.normal(size=n)
+
+
+def by_all_sets(stiffness, normal, push, compliance, gap, force) -> list[tuple[Any, Any, Any]]:
+    """Displacement, forces and gaps of every set of touching nodes that is right: N ≥ 0 on it, g ≥ 0 elsewhere."""
+    right = []
+    n, m = len(force), len(gap)
+    for number in range(2**m):
+        on = [k for k in range(m) if number >> k & 1]
+        matrix, side = np.zeros((n + len(on), n + len(on))), np.zeros(n + len(on))
+        scale = np.abs(stiffness).max()
+        matrix[:n, :n], side[:n] = stiffness / scale, force / scale
+        for j, k in enumerate(on):
+            matrix[:n, n + j], matrix[n + j, :n] = -push[k], normal[k]
+            matrix[n + j, n + j], side[n + j] = compliance[k] * scale, -gap[k]
+        answer = np.linalg.solve(matrix, side)
+        forces = np.zeros(m)
+        forces[on] = answer[n:] * scale
+        open_by = gap + normal @ answer[:n]
+        if (forces >= 0).all() and all(open_by[k] >= 0 for k in range(m) if k not in on):
+            right.append((answer[:n], forces, open_by))
+    return right
+
+
+@pytest.mark.parametrize(("stiff", "size"), [(1.0, 1.0), (1e11, 1e-3), (1e-9, 1e-8), (1e7, 1e6)])
+def test_equilibria_are_those_that_trying_all_sets_finds(stiff: float, size: float) -> None:
+    rng = np.random.default_rng(15)
+    tried = 0
+    for _ in range(25):
+        stiffness, normal, push, compliance, gap, force = given = pressed(rng, stiff=stiff, size=size)
+        right = by_all_sets(*given)
+        if len(right) != 1:
+            continue
+        tried += 1
+        u, forces, open_by = right[0]
+        system: Any = SimpleNamespace(stiffness=sp.csr_array(stiffness), cubic=None, size=6, general=False)
+        rows = equilibrium.ContactRows(sp.csr_array(normal), gap, compliance, np.zeros(4), np.zeros(4, dtype=bool))
+        solver = equilibrium.Equilibrium(system, rows, sp.csr_array(push), force, symmetric=False, solver=None)
+        for guess in (None, rng.random(4) < 0.5):
+            state, steps = settle(solver, guess)
+            assert state.displacement == pytest.approx(u, rel=1e-7, abs=1e-9 * np.abs(u).max())
+            assert state.normal_force == pytest.approx(forces, rel=1e-6, abs=1e-9 * size)
+            assert state.gap == pytest.approx(open_by, abs=1e-9 * np.abs(u).max())
+            assert solver.residual(state) < 1e-12
+            assert steps < 12
+        contacts = [
+            SimpleNamespace(
+                name=f"c{k}", gap=gap[k], normal_row=normal[k], tangent_row=push[k] - normal[k], compliance=compliance[k],
+                closed=False,
+            )
+            for k in range(4)
+        ]  # fmt: skip
+        nodes = SimpleNamespace(normal=sp.csr_array(normal), owner=np.arange(4), names=tuple("abcd"))
+        system = SimpleNamespace(
+            contacts=contacts, lines=(), size=6, stiffness=sp.csr_array(stiffness), contact_nodes=lambda nodes=nodes: nodes,
+            holders={},
+        )  # fmt: skip
+        asked = system, force, np.full(4, 0.5), np.full(4, 2.0), np.ones(4)
+        if not forces.any():
+            with pytest.raises(AnalysisError, match="no contact carries load in steady sliding at μ = 0"):
+                points._active_set(*asked)
+            continue
+        try:
+            points_say = points._active_set(*asked)
+        except AnalysisError as error:  # it changes all that contradict at once, which need not end
+            assert "does not settle" in str(error)  # noqa: PT017
+            continue
+        assert points_say.displacement == pytest.approx(u, rel=1e-7, abs=1e-9 * np.abs(u).max())
+        assert points_say.normal_force == pytest.approx(forces, rel=1e-6, abs=1e-9 * size)
+    assert tried > 15
+
+
 # -- resultants and balance --------------------------------------------------------------------------------------------
 
 
