@@ -325,7 +325,7 @@ def by_all_sets(stiffness, normal, push, compliance, gap, force) -> list[tuple[A
 def test_equilibria_are_those_that_trying_all_sets_finds(stiff: float, size: float) -> None:
     rng = np.random.default_rng(15)
     tried = 0
-    for _ in range(25):
+    for _ in range(12):
         stiffness, normal, push, compliance, gap, force = given = pressed(rng, stiff=stiff, size=size)
         right = by_all_sets(*given)
         if len(right) != 1:
@@ -366,7 +366,7 @@ def test_equilibria_are_those_that_trying_all_sets_finds(stiff: float, size: flo
             continue
         assert points_say.displacement == pytest.approx(u, rel=1e-7, abs=1e-9 * np.abs(u).max())
         assert points_say.normal_force == pytest.approx(forces, rel=1e-6, abs=1e-9 * size)
-    assert tried > 15
+    assert tried > 6
 
 
 # -- resultants and balance --------------------------------------------------------------------------------------------
