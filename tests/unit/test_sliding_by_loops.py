@@ -124,6 +124,16 @@ def test_directions_turn_towards_the_slip_of_each_node_by_itself(size: float) ->
         assert missed == pytest.approx(worst / largest, rel=1e-12)
 
 
+@pytest.mark.parametrize("t", [1, 2])
+def test_where_no_force_acts_nothing_contradicts_and_nothing_turns(t: int) -> None:
+    search, old, new, load = random_state(np.random.default_rng(10), 30, t, size=0.0)
+    assert not search._violations(old, load, new).any
+    missed, direction, across = search._turn(old, load, new)
+    assert missed == 0.0
+    assert not across.any()
+    assert direction.shape == new.direction.shape
+
+
 def test_what_rounding_moves_has_not_slipped() -> None:
     # Of the way that nodes have gone altogether, before as well, 1e-11 is rounding.
     none = np.zeros(0)
@@ -287,6 +297,11 @@ def test_residual_is_the_largest_imbalance_over_the_largest_force() -> None:
                 + sum(abs(push[k, i] * normal[k]) for k in range(m))
             )  # fmt: skip
         assert found.residual(given) == pytest.approx(max(map(abs, imbalance)) / max(terms), rel=1e-12)
+    still = equilibrium.Equilibrium(
+        SimpleNamespace(stiffness=sp.csr_array(stiffness), cubic=None, size=n), nodes, sp.csr_array(push), np.zeros(n),
+        symmetric=False, solver=None,
+    )  # fmt: skip
+    assert still.residual(State(np.ones(m, dtype=bool), np.zeros(n), np.zeros(m), np.zeros(m))) == 0.0
 
 
 def pressed(rng, *, stiff: float, size: float, mu: float = 0.2) -> Any:
