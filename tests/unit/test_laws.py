@@ -111,3 +111,17 @@ def test_a_law_is_scaled_as_a_whole_to_its_coefficient_at_a_speed(law: FrictionL
 )
 def test_a_law_that_is_zero_everywhere_becomes_coulombs(law: FrictionLaw):
     assert law.scaled(0.2, 0.5) == Coulomb(0.2)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "monotone-cubic"])
+def test_at_the_ends_of_a_table_the_slope_is_the_mean_of_both_sides(interpolation):
+    """Beyond its ends a table is constant: half the slope of its first or last piece there, all of it at rest."""
+    table = Tabulated((0.5, 1.0), (0.4, 0.2), interpolation)
+    for speed, mu, slope in ((0.1, 0.4, 0.0), (0.5, 0.4, -0.2), (0.75, 0.3, -0.4), (1.0, 0.2, -0.2), (1.1, 0.2, 0.0)):
+        assert table.sliding(speed) == pytest.approx(mu)
+        assert table.slope(speed) == pytest.approx(slope)
+    at_rest = Tabulated((0.0, 1.0, 3.0), (0.4, 0.2, 0.1), interpolation)
+    assert at_rest.slope(0.0) == pytest.approx(at_rest.slope(1e-9), abs=1e-8)
+    assert at_rest.slope(0.0) < -0.15
+    if interpolation == "linear":
+        assert at_rest.slope(1.0) == pytest.approx(0.5 * (-0.2 - 0.05))
