@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -82,3 +84,20 @@ def test_small_problems_that_discs_do_not_get_through_are_solved_whole(monkeypat
     near = np.abs(light[:, None] - by_qz.values).min(axis=1)
     assert np.all(near <= 1e-7 * np.abs(light))
     assert by_qz.residual.max() <= find.CROWDED
+
+
+@pytest.mark.parametrize(("first", "second", "number"), [(1e-5, 1e-5, 0), (1e-5, 1e-7, 5), (1e-4, 1e-7, 6)])
+def test_onsets_without_branches(first: float, second: float, number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many modes grow at every μ of a grid as the onsets say."""
+    case = bench(first, (6, 12)).with_({"bodies.beam2.damping.stiffness": second})
+    monkeypatch.setattr(Tracker, "advance", lost)
+    found = st.onsets(case)
+    assert found.complete
+    assert "sought along the imaginary axis" in found.completeness
+    assert "not followed: branches cannot be told apart." in found.completeness
+    assert len(found.onsets) == number
+    assert all(o.residual < 1e-12 and o.branches == (0, 0) for o in found.onsets)
+    for mu in np.linspace(0.0, 1.0, 12)[1:]:
+        said = sum(-1 if o.stabilising else 1 for o in found.onsets if o.mu < mu)
+        assert len(growing(dense(case, float(mu)))) == said
+    json.dumps(found.to_json())

@@ -12,12 +12,14 @@ from typing import Literal
 
 import numpy as np
 
-from ..errors import AnalysisError
+from ..errors import AnalysisError, FollowingError
 from ..sliding.stretches import Stretch, stretch_words, stretches
 from ..system import System
 from ..typing import Array, ComplexArray, IntArray
 from .assembled.steady import Options
 from .complex_modes import ComplexModes, Progress, complex_modes
+from .general import general_onsets
+from .general.basis import WHOLE
 from .growing import UNCHECKED, checked_modes, checked_onsets, growing_modes
 from .joined import Border, joined_modes, joined_onsets, rows_of
 from .onsets import Onsets, onsets
@@ -161,11 +163,29 @@ def onsets_of_band(
     options = options or Options()
 
     def solved(held: System, between: tuple[float, float]) -> Onsets:
-        found = onsets(
-            held, between, max_frequency_hz=max_frequency_hz, damped=damped,
-            friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
-        )  # fmt: skip
-        return found if found.completeness else checked_onsets(held, found, damped=damped, options=options)
+        try:
+            found = onsets(
+                held, between, max_frequency_hz=max_frequency_hz, damped=damped,
+                friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
+            )  # fmt: skip
+        except FollowingError as error:
+            if held.size > WHOLE:
+                raise
+            return unfollowed(held, between, str(error).partition(";")[0])
+        if not found.completeness:
+            found = checked_onsets(held, found, damped=damped, options=options)
+        if found.complete or held.size > WHOLE:
+            return found
+        try:
+            other = unfollowed(held, between, "")
+        except AnalysisError:
+            return found
+        return other if other.complete else found
+
+    def unfollowed(held: System, between: tuple[float, float], why: str) -> Onsets:
+        return general_onsets(
+            lambda _: held, between, max_frequency_hz=max_frequency_hz, damped=damped, options=options, unfollowed=why
+        )
 
     low, high = (float(v) for v in friction_range)
     if not (0 <= low < high and np.isfinite(high)):

@@ -414,13 +414,8 @@ def _quadratic(
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """x = λ and right and left vectors of (x²M + xC + K) z = 0, shifted and inverted at x = frequency; ``upper`` leaves
     out the lower half plane."""
-    mass, damping = frequency**2 * mass, frequency * damping
+    companion, factor = _companion(mass, damping, stiffness, frequency)
     r = len(mass)
-    factor = _factor(mass + damping + stiffness)
-    companion = np.zeros((2 * r, 2 * r), dtype=stiffness.dtype)
-    companion[:r, :r] = -sl.lu_solve(factor, damping + 2 * mass)
-    companion[:r, r:] = -sl.lu_solve(factor, mass)
-    companion[r:, :r] = np.eye(r)
     theta, left, right = sl.eig(companion, left=True, right=True)
     with np.errstate(all="ignore"):
         x = frequency * (1 + 1 / theta)
@@ -428,6 +423,33 @@ def _quadratic(
     chosen = np.flatnonzero(chosen & (x.imag >= 0) if upper else chosen)
     z = np.where(np.abs(theta[chosen]) > 1, right[:r, chosen], right[r:, chosen])
     return x[chosen], z, _transposed_solve(factor, left[:r, chosen].conj())
+
+
+def eigenvalues(mass: Array, damping: Array, stiffness: Array, frequency: float) -> ComplexArray:
+    """All finite λ (k,) of (λ²M + λC + K) z = 0, without damping one of each ±λ, shifted and inverted at λ = frequency:
+    those of about that size are as good as can be, whatever else there is. The mass need not be regular."""
+    if not np.any(damping):
+        shift = frequency**2
+        theta = sl.eigvals(sl.lu_solve(_factor(stiffness + shift * mass), shift * mass))
+        with np.errstate(all="ignore"):
+            squares: ComplexArray = shift - shift / theta
+        return upper_root(squares[np.isfinite(squares)])
+    theta = sl.eigvals(_companion(mass, damping, stiffness, frequency)[0])
+    with np.errstate(all="ignore"):
+        values: ComplexArray = frequency * (1 + 1 / theta)
+    return values[np.isfinite(values)]
+
+
+def _companion(mass: Array, damping: Array, stiffness: Array, frequency: float) -> tuple[Array, tuple[Array, Array]]:
+    """The matrix (2r, 2r) whose eigenvalues are θ = 1/(λ/frequency − 1), and the factors of P(frequency)."""
+    mass, damping = frequency**2 * mass, frequency * damping
+    r = len(mass)
+    factor = _factor(mass + damping + stiffness)
+    companion = np.zeros((2 * r, 2 * r), dtype=stiffness.dtype)
+    companion[:r, :r] = -sl.lu_solve(factor, damping + 2 * mass)
+    companion[:r, r:] = -sl.lu_solve(factor, mass)
+    companion[r:, :r] = np.eye(r)
+    return companion, factor
 
 
 def _transposed_solve(factor: tuple[Any, Any], right: Any) -> Any:

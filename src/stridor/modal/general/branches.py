@@ -7,15 +7,19 @@ anew, in the full problem and by another method: as many roots must grow there a
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...typing import ComplexArray
 from ..assembled.critical import exceptional_point, pair_near
 from ..assembled.follow import State
 from ..assembled.passages import Passage
+from ..assembled.reduced import eigenvalues
 from ..onset import Onset
-from ..quadratic import Spectrum, band_modes
+from ..quadratic import Region, Spectrum, band_modes
+from ..quadratic.find import Completeness
 from ..quadratic.polish import groups, pairs
 from .basis import AT_REST, DECAY, NOTHING, Along, Held, Projected, by_lambda
 from .family import Family
@@ -45,6 +49,28 @@ def ends_of(family: Family, low: float, high: float, top: float) -> tuple[Spectr
         band_modes(still, band, above=least, still=still, left=True, solver=solver),
         band_modes(family.built(high), band, above=least, still=still, left=False, solver=solver),
     )
+
+
+def whole_ends(family: Family, low: float, high: float, top: float) -> tuple[Spectrum, Spectrum]:
+    """The same of small problems, by QR and without vectors: whatever else there may be, overdamped modes above all."""
+    started, found = time.perf_counter(), list[Spectrum]()
+    region = Region.band(0.0, top / (2 * np.pi), above=-DECAY * top).bounded()
+    said = f"Complete: QR computes all eigenvalues of {family.size} freedoms at once."
+    for mu in (low, high):
+        values = all_values(family, mu, top)
+        values = values[(values.imag >= 0) & (values.imag <= top) & (values.real >= -DECAY * top)]
+        nothing, zero = np.zeros((0, len(values)), dtype=complex), np.zeros(len(values))
+        found.append(Spectrum(
+            values, nothing, None, zero, None, Completeness(True, said, region), 0, 0,
+            time.perf_counter() - started, 0,
+        ))  # fmt: skip
+    return found[0], found[1]
+
+
+def all_values(family: Family, mu: float, top: float) -> ComplexArray:
+    """All finite eigenvalues at μ of a small problem, best those of the size of top."""
+    problem = family.built(mu)
+    return eigenvalues(problem.mass.toarray(), problem.damping.toarray(), problem.stiffness.toarray(), top)
 
 
 def solved(

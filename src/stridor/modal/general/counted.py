@@ -19,6 +19,7 @@ from ..assembled.reduced import Eigenpairs
 from ..onset import Onset
 from ..quadratic.polish import pairs
 from .basis import AT_REST, GROWS, Along
+from .family import Family
 from .growth import growing_roots, unstable
 from .newton import Root, crossing, meeting, standstill
 
@@ -26,6 +27,7 @@ GRID = {False: 96, True: 24}  # intervals to begin with, on a basis and by full 
 ON_IT = 1e-6  # of the range: so near an onset growth may be rounding
 SMALLEST = 1e-9  # of the range: no interval is halved further
 ALONE = 1e-4  # of the range: an interval in which one mode changes is short enough for Newton from here on
+SLOWEST = 1e-8  # of the highest frequency: growth slower than that is rounding
 STILL = 1e-3  # of the highest frequency: slower than that may be divergence
 EDGE = 1e-3  # of the highest frequency: modes that come in or leave there are no onsets
 ALIKE = 1e-7  # of the highest frequency: onsets at one value whose frequencies are no further apart are one
@@ -108,7 +110,9 @@ def number_at(source: Along, mu: float, top: float) -> int:
 
 
 def _growing(source: Along, found: Eigenpairs, top: float) -> BoolArray:
-    return unstable(source.family, found.values, top) & (np.abs(found.values) <= top)
+    # Where nothing moves as a whole what is slow is a divergence that has just begun.
+    still = AT_REST if source.at_rest else SLOWEST
+    return unstable(source.family, found.values, top, still) & (np.abs(found.values) <= top)
 
 
 class _Search:
@@ -128,7 +132,7 @@ class _Search:
             for low, high in self._changes(before, after):
                 root = self._solved(low, high)
                 if root is not None:
-                    onset = _as_onset(self.source, root)
+                    onset = as_onset(self.source.family, root)
                     if not any(self._same(onset, other) for other in onsets):
                         onsets.append(onset)
                 elif (lam := self._at_edge(low, high)) is not None:
@@ -161,7 +165,7 @@ class _Search:
     def _foretold(self, at: _Count, step: float) -> bool:
         """Whether a mode would cross the axis within a step if it were straight."""
         lam, ahead = at.found.values, at.found.values + step * _rates(at.found)
-        inside = (np.abs(lam) <= self.top) & (np.abs(lam) > AT_REST * self.top) & np.isfinite(ahead)
+        inside = (np.abs(lam) <= self.top) & (np.abs(lam) > SLOWEST * self.top) & np.isfinite(ahead)
         off = np.abs(lam.real) > GROWS * np.abs(lam)
         return bool(np.any(inside & off & ((lam.real > 0) != (ahead.real > 0))))
 
@@ -222,11 +226,11 @@ def _rates(found: Eigenpairs) -> ComplexArray:
     return rates
 
 
-def _as_onset(source: Along, root: Root) -> Onset:
+def as_onset(family: Family, root: Root) -> Onset:
     """Of branches that were not followed: they have no numbers."""
     return Onset(
-        mu=root.mu, frequency_hz=abs(root.lam.imag) / (2 * np.pi), kind="flutter" if root.lam else "divergence",
-        damped=source.family.dissipates, stabilising=ends(root), branches=(0, 0), residual=root.residual,
+        mu=float(root.mu), frequency_hz=abs(root.lam.imag) / (2 * np.pi), kind="flutter" if root.lam else "divergence",
+        damped=family.dissipates, stabilising=ends(root), branches=(0, 0), residual=root.residual,
         square_root_coefficient=None if root.square is None else float(np.sqrt(abs(root.square))),
         growth_slope=root.slope,
     )  # fmt: skip

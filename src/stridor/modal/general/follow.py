@@ -17,7 +17,7 @@ from .family import Family
 BEYOND = 1.1  # modes above the band may meet inside it
 STEPS = {False: 30, True: 12}  # over the range at least, on a basis and by full solves
 MOST_STEPS = {False: 1500, True: 200}
-ENOUGH = {False: 400, True: 60}  # where what grows can be counted instead
+ENOUGH = {False: 240, True: 60}  # where what grows can be counted instead; twice as many where steps are finer
 SMALLEST = 1.01e-9  # step at which the follower goes on whatever it sees
 EXACTLY = 1e-10  # of the range: how far off the real axis two modes may meet that meet on it
 
@@ -45,17 +45,17 @@ def follower(
 ) -> Follower:
     """Follows all branches of a source from where they get their numbers.
 
-    finer: by how much its longest steps are shorter; most: how many of them it may take, finer times that. unsure is
+    finer: by how much its longest steps are shorter; most: how many steps it may take. unsure is
     called with μ where branches cannot be told apart, equal ones aside. Raises AnalysisError where that takes
     too many steps.
     """
     family, steps = source.family, 0
-    most = MOST_STEPS[source.whole] if most is None else most
+    most = finer * MOST_STEPS[source.whole] if most is None else most
 
     def seen(old: State, new: State) -> None:
         nonlocal steps
         steps += 1
-        if steps > finer * most:
+        if steps > most:
             raise AnalysisError(f"{steps} steps lead no further than to {_untold(family.low + new.mu)}")
         if new.mu - old.mu <= SMALLEST and not _surely(source, old, new):
             unsure(family.low + new.mu)
@@ -113,7 +113,8 @@ def followed(source: Along, low: float, high: float, top: float, finer: int = 1)
         passages.extend(meetings(source, old, new) if family.reversible else crossings(old, new))
         entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.place)))
 
-    way = follower(source, finer=finer, most=ENOUGH[source.whole], watch=watch, unsure=unsure.append)
+    most = ENOUGH[source.whole] * min(finer, 2)
+    way = follower(source, finer=finer, most=most, watch=watch, unsure=unsure.append)
     first = way.advance(low - family.low)
     return Followed(source, first, way.advance(high - family.low), tuple(passages), entries, tuple(unsure))
 

@@ -9,10 +9,11 @@ from .basis import AT_REST, GROWS, NOTHING
 from .family import Family
 
 
-def unstable(family: Family, values: ComplexArray, top: float) -> BoolArray:
-    """Which grow beyond rounding (k,); motions as a whole, at no frequency to speak of, do not count."""
+def unstable(family: Family, values: ComplexArray, top: float, still: float = AT_REST) -> BoolArray:
+    """Which grow beyond rounding (k,); motions as a whole, up to ``still`` of the highest frequency top [1/s], do not
+    count."""
     rounding = NOTHING if family.reversible else GROWS
-    return (values.real > rounding * np.abs(values)) & (np.abs(values) > AT_REST * top)
+    return (values.real > rounding * np.abs(values)) & (np.abs(values) > still * top)
 
 
 def growing_roots(values: ComplexArray) -> int:

@@ -31,6 +31,8 @@ SETTLED = 1e-13
 ON_AXIS = 1e-12 if np.finfo(np.longdouble).eps < 1e-18 else 1e-9
 BELIEVED = 1e-10  # backward error
 STALLED = 0.5  # of the smallest step so far: a longer one is made of rounding
+IDLE = 3
+ROUNDING = 1e-10  # |Re λ| / |λ| that may be left of slow modes of stiff structures
 FLAT = 1e-9  # dRe λ/dμ times the range, over |λ|, below which friction has no say in it
 
 
@@ -68,14 +70,21 @@ class _Steps:
 
     enough: float  # steps as short as this may end in rounding
     shortest: float = np.inf
+    idle: int = 0  # steps since then that brought nothing
     kept: tuple[float, float, _Point] | None = None
 
     def end(self, step: float, omega: float, mu: float, here: _Point) -> bool:
         """Take in a step from (ω, μ); whether it is made of rounding, so that there is nothing to be gained."""
         stalled = step > STALLED * self.shortest
+        self.idle = self.idle + 1 if stalled else 0
         if step < self.shortest:
             self.shortest, self.kept = step, (omega, mu, here)
-        return stalled and self.shortest <= self.enough
+        return stalled and (self.shortest <= self.enough or self.done)
+
+    @property
+    def done(self) -> bool:
+        """Whether stiff springs leave no more than this: steps so short that they repeat are rounding's own."""
+        return self.idle >= IDLE and self.shortest <= ROUNDING
 
 
 class Border:
@@ -154,7 +163,7 @@ def crossing(
         if off <= 0.1 * ON_AXIS and abs(change) <= SETTLED * max(abs(mu), family.high - family.low):
             break
         mu, omega = min(max(mu + change, family.low), family.high), omega + turn
-    if steps.kept is None or steps.shortest > ON_AXIS:
+    if steps.kept is None or (steps.shortest > ON_AXIS and not steps.done):
         return None
     omega, mu, here = steps.kept
     slope = float((-here.by_mu / here.by_lam).real)

@@ -15,11 +15,11 @@ from ..onset import Onsets
 from ..quadratic import Spectrum
 from ..quadratic.reach import searched
 from .basis import AT_REST, Along, Projected, along, whole_or_raise
-from .branches import ends_of
+from .branches import ends_of, whole_ends
 from .family import family_of
 from .follow import BEYOND
 from .growth import unstable
-from .search import search
+from .search import SMALL, search
 from .words import sentence
 
 WIDER = 1.6  # times the band: from where branches are followed if those from a little above it are not all
@@ -35,12 +35,14 @@ def general_onsets(
     damped: bool = True,
     options: Options | None = None,
     own: float | None = None,
+    unfollowed: str | None = None,
 ) -> Onsets:
     """Every critical μ in ``friction_range`` with a frequency up to ``max_frequency_hz``.
 
     system_at gives the system at a μ, on which its matrices may depend; own is the μ at which the touching nodes of
-    contacts are found (None: the low end of the range). Raises CaseError for an empty range or no frequency,
-    AnalysisError where nothing depends on μ or branches cannot be followed.
+    contacts are found (None: the low end of the range). unfollowed: why branches are not to be followed ("": because
+    they have led to no whole answer), None where they are. Raises CaseError for an empty range or no frequency,
+    AnalysisError where nothing depends on μ, or the problem is too large for full solves where there is no other way.
     """
     low, high = (float(v) for v in friction_range)
     if not (0 <= low < high and np.isfinite(high)):
@@ -60,15 +62,16 @@ def general_onsets(
         at = f"mu = {low if own is None else own:g}"
         said = f"No contact carries load in steady sliding at {at}, where contacts are held, so nothing depends on mu."
         return replace(result, completeness=said)
-    ends = ends_of(family, low, high, top)
+    small = unfollowed is not None and family.size <= SMALL
+    ends = (whole_ends if small else ends_of)(family, low, high, top)
     at_start, at_end = (tuple(end.values[unstable(family, end.values, top)].tolist()) for end in ends)
     result = replace(result, at_start=at_start, at_end=at_end)
 
     def source(beyond: float) -> Along:
         return _checked(along(family, beyond * top), ends, top)
 
-    make = [lambda: source(BEYOND), lambda: source(WIDER)]
-    answer = search(family, make, (low, high), ends, top)
+    make = [lambda: source(BEYOND), lambda: source(WIDER)] if unfollowed is None else []
+    answer = search(family, make, (low, high), ends, top, unfollowed or "")
     said = sentence(family, answer, ends, top, "μ", float)
     return replace(result, onsets=answer.onsets, completeness=said)
 

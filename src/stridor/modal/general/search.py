@@ -15,15 +15,17 @@ import numpy as np
 from ...errors import AnalysisError
 from ..onset import Onset
 from ..quadratic import Spectrum
-from .basis import WHOLE, Along, Whole
-from .branches import Found, solved
-from .counted import ALIKE, ON_IT, Counted, Lack, Passing, counted, number_at, roots_of
+from .axis import walked
+from .basis import DENSE, WHOLE, Along, Whole, along
+from .branches import Found, all_values, solved
+from .counted import ALIKE, ON_IT, Counted, Lack, Passing, as_onset, counted, number_at, roots_of
 from .family import Family
-from .follow import Followed
+from .follow import BEYOND, Followed
 from .growth import growing_roots, unstable
 
 FINER = 6  # times as many steps where the count at the ends does not agree
 EVEN = 8  # values at which followed branches are held against a count, beside those between the onsets
+SMALL = 600  # unknowns up to which all eigenvalues are found at once
 ON_EDGE = 1e-6  # of the highest frequency: modes so near it may count on one side only
 
 
@@ -32,7 +34,8 @@ class Answer:
     """Onsets in ascending order; complete: whether as many roots grow wherever that was looked at as they say.
 
     way: the branches, where following them led to all. seen: what was counted instead; lacks: where that and the
-    onsets differ. why: what kept branches from being followed, if anything did.
+    onsets differ. why: what kept branches from being followed, if anything did. walked: at how many ω the imaginary
+    axis was looked at, where that led to the onsets (`axis`).
     """
 
     onsets: tuple[Onset, ...]
@@ -41,6 +44,7 @@ class Answer:
     seen: Counted | None = None
     lacks: tuple[Lack, ...] = ()
     why: str = ""
+    walked: int = 0
 
     @property
     def passing(self) -> tuple[Passing, ...]:
@@ -50,14 +54,15 @@ class Answer:
 
 def search(
     family: Family, make: Sequence[Callable[[], Along]], between: tuple[float, float],
-    ends: tuple[Spectrum, Spectrum], top: float,
+    ends: tuple[Spectrum, Spectrum], top: float, why: str = "",
 ) -> Answer:  # fmt: skip
     """Every onset of a family in a range up to the angular frequency top [1/s].
 
     make: sources of eigenpairs, each tried where the one before it does not do. ends: all modes of the band at both
-    ends, found in the full problem. Raises AnalysisError where there is no source, nor one by full solves.
+    ends, found in the full problem. why: what keeps branches from being followed, where nothing is made. Raises
+    AnalysisError where there is no source, nor one by full solves.
     """
-    source, best, why = None, None, ""
+    source, best = None, None
     for number, way_to in enumerate(make):
         try:
             source = way_to()
@@ -74,6 +79,10 @@ def search(
             break
     if best is not None and best.complete and _borne_out(best, between, top):
         return best
+    if source is None or source.whole:
+        answer = _walked(family, between, ends, top, why)
+        if answer is not None:
+            return answer
     seen = counted(_beside(family, source, top, why), between, top)
     return _counted_answer(family, best, seen, ends, top, why)
 
@@ -103,11 +112,47 @@ def _borne_out(answer: Answer, between: tuple[float, float], top: float) -> bool
     if source.whole:
         return True  # they were solved in full at every step
     onsets = [o for o in answer.onsets if _in_band(o, top)]
-    (low, high), places = between, sorted({o.mu for o in answer.onsets})
-    middles = [0.5 * (a + b) for a, b in zip([low, *places], [*places, high], strict=True)]
-    tried = sorted({low, high, *middles, *np.linspace(low, high, EVEN + 2)[1:-1].tolist()})
-    grid = [(mu, number_at(source, mu, top)) for mu in tried]
+    grid = [(mu, number_at(source, mu, top)) for mu in _places(answer.onsets, between)]
     return not Counted(tuple(grid), (), ()).lacking(onsets)
+
+
+def _places(onsets: Sequence[Onset], between: tuple[float, float]) -> list[float]:
+    """Where growing roots are counted: both ends, between every two onsets, and some in equal distances."""
+    (low, high), places = between, sorted({o.mu for o in onsets})
+    middles = [0.5 * (a + b) for a, b in zip([low, *places], [*places, high], strict=True)]
+    return sorted({low, high, *middles, *np.linspace(low, high, EVEN + 2)[1:-1].tolist()})
+
+
+def _walked(
+    family: Family, between: tuple[float, float], ends: tuple[Spectrum, Spectrum], top: float, why: str
+) -> Answer | None:
+    """Onsets found along the imaginary axis, where as many roots grow between every two of them as they say; None where
+    that does not apply or they are not all."""
+    walk = walked(family, between, top, ends[0].values)
+    if walk is None:
+        return None
+    onsets = tuple(sorted((as_onset(family, root) for root in walk.roots), key=_place))
+    number = _number_by(family, top)
+    grid = tuple((mu, number(mu)) for mu in _places(onsets, between))
+    seen = Counted(grid, onsets, ())
+    if seen.lacking(onsets) or not _ends_agree(family, seen, ends, top):
+        return None
+    inside = tuple(o for o in onsets if between[0] <= o.mu <= between[1])
+    return Answer(inside, True, None, seen, (), why, walk.values)
+
+
+def _number_by(family: Family, top: float) -> Callable[[float], int]:
+    """How many roots grow at a μ, counted in the full problem."""
+    if family.size > SMALL:
+        source = Whole(family, top, beside=True)
+        return lambda mu: number_at(source, mu, top)
+
+    def number(mu: float) -> int:
+        values = all_values(family, mu, top)
+        values = values[(values.imag >= 0) & (np.abs(values) <= top)]
+        return growing_roots(values[unstable(family, values, top)])
+
+    return number
 
 
 def _beside(family: Family, source: Along | None, top: float, why: str) -> Along:
@@ -115,9 +160,13 @@ def _beside(family: Family, source: Along | None, top: float, why: str) -> Along
     near the axis alone."""
     if source is not None and not source.whole:
         return source
+    if family.size <= DENSE and family.form is not None:
+        return along(family, BEYOND * top)
     if family.size > WHOLE:
         raise AnalysisError(why or f"the problem has {family.size} unknowns, and no reduced model")
-    return Whole(family, top, beside=True)
+    source = Whole(family, top, beside=True)
+    source.settle()
+    return source
 
 
 def _counted_answer(

@@ -35,6 +35,11 @@ def sentence(
         assert answer.seen is not None, "what else would have led to it"
         how = f"As many roots grow at each of {len(answer.seen.grid)} values of {name} as the onsets say"
         why = f": {answer.why}" if answer.why else ""
+        if answer.walked:
+            return (
+                f"{how}: {numbers}. Onsets were sought along the imaginary axis, at {answer.walked} frequencies up to "
+                f"{top / (2 * np.pi):g} Hz, and branches not followed{why}."
+            )
         return (
             f"{how}: {numbers}.{passing} Onsets were enclosed by that count, and branches not followed{why}; growth "
             "that begins and ends again between two of these values may be missing."

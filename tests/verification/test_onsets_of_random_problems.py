@@ -1,0 +1,114 @@
+"""Onsets of random problems of every kind against the number of growing eigenvalues on a fine grid: none may be wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import random_onsets
+from random_onsets import KINDS, disagreement, random_problem
+from stridor.modal.assembled.steady import Options
+from stridor.modal.general import branches, counted, general_onsets, search
+from stridor.modal.general.axis import _Walk
+from stridor.modal.onset import Onsets
+from stridor.system import System
+
+pytestmark = pytest.mark.verification
+
+EACH = 60  # problems in each run
+MANY = 2000  # and weekly
+UNANSWERED = 0.03  # share at most of which it may be said that the answer is not whole
+
+
+def judged(seeds: Iterable[int], folder: Path, *, small: bool = False) -> tuple[list[str], list[str]]:
+    """What is wrong, and what is said not to be whole."""
+    wrong, said = list[str](), list[str]()
+    for seed in seeds:
+        words, refused = disagreement(random_problem(seed, small=small), folder)
+        wrong += [words] if words else []
+        said += [refused] if refused else []
+    return wrong, said
+
+
+@pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
+def test_some(kind: int, tmp_path: Path) -> None:
+    seeds = range(kind, EACH, len(KINDS))
+    wrong, said = judged(seeds, tmp_path, small=True)
+    assert not wrong, "\n".join(wrong)
+    assert not said, "\n".join(said)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(EACH, EACH + MANY, 100))
+def test_many(first: int, tmp_path: Path) -> None:
+    wrong, said = judged(range(first, first + 100), tmp_path)
+    assert not wrong, "\n".join(wrong)
+    assert len(said) <= UNANSWERED * 100, "\n".join(said)
+
+
+def along_the_axis(system: System, between: tuple[float, float], hz: float, *, damped: bool = True) -> Onsets:
+    return general_onsets(
+        lambda _: system, between, max_frequency_hz=hz, damped=damped, options=Options(), unfollowed="not asked for"
+    )
+
+
+AXIS = [1, 16, 25, 32, 33, 48]
+MORE = [pytest.param(range(k, k + 100), marks=pytest.mark.slow) for k in range(0, 2000, 100)]
+
+
+@pytest.mark.parametrize("seeds", [AXIS, *MORE], ids=lambda seeds: f"from {seeds[0]}")
+def test_without_following_branches(seeds: Iterable[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Contacts sought along the imaginary axis: the same truth."""
+    monkeypatch.setattr(random_onsets, "onsets_of_band", along_the_axis)
+    contacts = [seed for seed in seeds if KINDS[seed % len(KINDS)] in ("beams", "belt")]
+    wrong, said = judged(contacts, tmp_path)
+    assert not wrong, "\n".join(wrong)
+    assert len(said) <= UNANSWERED * 100 * len(contacts) / 25, "\n".join(said)
+
+
+def test_both_ways_lead_to_the_same_onsets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = random_problem(41)
+    followed = problem.solve(tmp_path)
+    monkeypatch.setattr(random_onsets, "onsets_of_band", along_the_axis)
+    walked = random_problem(41).solve(tmp_path)
+    assert len(followed.onsets) >= 3
+    assert "sought along the imaginary axis" in walked.completeness
+    np.testing.assert_allclose([o.mu for o in walked.onsets], [o.mu for o in followed.onsets], rtol=1e-9)
+    np.testing.assert_allclose(
+        [o.frequency_hz for o in walked.onsets], [o.frequency_hz for o in followed.onsets], rtol=1e-9
+    )
+
+
+def test_an_axis_that_is_not_walked_closely_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An onset that the walk loses is missing in the count; the range is counted through instead."""
+    monkeypatch.setattr(random_onsets, "onsets_of_band", along_the_axis)
+    whole = random_problem(41).solve(tmp_path)
+    crossed = _Walk._crossed
+
+    def blind(self, one, other):
+        return [c for c in crossed(self, one, other) if abs(c[1] - whole.onsets[0].mu) > 0.02]
+
+    monkeypatch.setattr(_Walk, "_crossed", blind)
+    again = random_problem(41).solve(tmp_path)
+    assert again.complete
+    assert "imaginary axis" not in again.completeness
+    np.testing.assert_allclose([o.mu for o in again.onsets], [o.mu for o in whole.onsets], rtol=1e-9)
+
+
+def test_the_truth_tells_a_wrong_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With every third onset lost on the way and no count held against them the comparison must see it."""
+    monkeypatch.setattr(search, "_borne_out", lambda *_: True)
+    monkeypatch.setattr(branches, "_agree", lambda *_: True)
+    solved = search.solved
+
+    def losing(*given):
+        found, way, _ = solved(*given)
+        return found[::3], way, True
+
+    monkeypatch.setattr(search, "solved", losing)
+    monkeypatch.setattr(counted.Counted, "lacking", lambda *_: [])
+    wrong, _ = judged(range(2, 42, 8), tmp_path, small=True)
+    assert wrong
