@@ -354,6 +354,27 @@ def test_freedoms_are_laid_out_once_each_and_rows_go_with_them() -> None:
     assert stored.ptr[-1] == len(stored.val) - 1
 
 
+def test_freedoms_of_a_node_lie_together_where_they_are_its_own_alone() -> None:
+    # Node 0 moves by freedoms 4 and 1; node 1 follows 4 in part and 3 at another scale; node 2 is held along x.
+    rows = np.zeros((6, 6))
+    rows[0, 4] = rows[1, 1] = rows[5, 2] = 1.0
+    rows[2, 4], rows[2, 0], rows[3, 3] = 1.0, 0.5, 2.0
+    solid = SimpleNamespace(points=np.zeros((3, 2)), rows=SimpleNamespace(free=sp.csr_array(rows)))
+    again = SimpleNamespace(points=np.zeros((1, 2)), rows=SimpleNamespace(free=sp.csr_array(np.eye(6)[[1, 5]])))
+    system: Any = SimpleNamespace(size=6, solids=(solid, again))
+    group, inside, width = storage._groups(system, sp.csr_array((6, 6)))
+    assert width == 2
+    assert list(zip(group.tolist(), inside.tolist(), strict=True)) == [(3, 0), (0, 1), (1, 1), (3, 1), (0, 0), (2, 1)]
+    # Bodies in space beside bodies in the plane make blocks of three, and what no body has comes last.
+    block = SimpleNamespace(points=np.zeros((1, 3)), rows=SimpleNamespace(free=sp.csr_array(np.eye(12)[[6, 7, 8]])))
+    plane = SimpleNamespace(points=np.zeros((1, 2)), rows=SimpleNamespace(free=sp.csr_array(np.eye(12)[[0, 1]])))
+    system = SimpleNamespace(size=12, solids=(block, plane))
+    group, inside, width = storage._groups(system, sp.csr_array((12, 12)))
+    assert width == 3
+    assert group.tolist() == [1, 1, 2, 2, 2, 3, 0, 0, 0, 3, 3, 4]
+    assert inside.tolist() == [0, 1, 0, 1, 2, 0, 0, 1, 2, 1, 2, 0]
+
+
 def test_two_threads_share_the_blocks_of_large_structures_alone() -> None:
     ptr = np.array([0, 3, 5, 6, 8, 10])
     col = np.array([0, 1, 3, 1, 2, 2, 3, 4, 4, 4])
