@@ -7,6 +7,7 @@ import pytest
 
 from stridor.errors import CaseError
 from stridor.fe.beam import BeamElement, BeamMesh
+from stridor.fe.elements import _order
 from stridor.fe.solid import assemble_solid
 from stridor.laws.elasticity import Material
 from stridor.mesh.model import Mesh
@@ -65,6 +66,15 @@ def test_meshes_that_do_not_fit_are_refused_with_what_does(changes, model: str, 
         assemble_solid(mesh, Material(1.0, 1.0), model=model)  # type: ignore[arg-type]
     assert said in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
+
+
+def test_nodes_are_found_among_those_of_the_library_or_it_is_said() -> None:
+    own = np.array([[0.0, 0], [1, 0], [0, 1]])
+    assert list(_order(own, own[[2, 0, 1]] + 0.9e-9)) == [1, 2, 0]
+    moved, twice = own + np.array([[0.0, 0], [0, 1.1e-9], [0, 0]]), own[[0, 1, 1]]
+    for given, library in ((own, moved), (own, np.concatenate([own, own[:1] + 5])), (own, own[:2]), (twice, own), (own, twice)):
+        with pytest.raises(RuntimeError, match="the finite element library has moved the nodes of its reference element"):
+            _order(given, library)
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.inf, np.nan])
