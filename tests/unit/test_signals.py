@@ -62,6 +62,15 @@ def test_growth_into_a_plateau_is_fitted_up_to_half_of_it() -> None:
     assert fitted.amplitude == pytest.approx(1.0, rel=1e-3)
 
 
+@pytest.mark.parametrize(("last", "saturated"), [(0.9, True), (1.2, True), (1.3, False), (2.0, False)])
+def test_what_still_rises_by_a_quarter_has_not_saturated(last: float, saturated: bool) -> None:
+    time = np.arange(60_000) * 1e-6
+    size = np.select([time < 0.015, time < 0.03, time < 0.045], [0.01, 0.3, 1.0], last)
+    fitted = growth(size * np.cos(2 * np.pi * 5e3 * time), 1e-6, 5e3)
+    assert fitted.amplitude == pytest.approx(last, rel=1e-3)
+    assert fitted.saturated is saturated
+
+
 def test_two_lines_of_one_frequency_apart_in_decay_are_both_found() -> None:
     time = np.arange(8000) * SAMPLING
     signal = np.exp(-40.0 * time) * np.cos(2 * np.pi * 3e3 * time)
