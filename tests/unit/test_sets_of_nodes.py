@@ -215,15 +215,15 @@ def test_a_body_that_moves_a_million_times_its_size_is_loose(monkeypatch, size: 
             surfaces._require_held(system, None, state, 1e-9)
 
 
-def hardening(cubic: tuple[float, ...], *, gap=(0.0, 0.0)) -> Equilibrium:
-    """Two masses on springs of 100 N/m, each pressed with 1 N on a contact of 1 mm/N."""
+def hardening(cubic: tuple[float, ...], *, gap=(0.0, 0.0), load: float = 1.0) -> Equilibrium:
+    """Two masses on springs of 100 N/m, each pressed with 1 N, or another load, on a contact of 1 mm/N."""
     system = SimpleNamespace(
         size=2, stiffness=sp.csr_array(np.diag([100.0, 100.0])), cubic=None, general=False,
     )  # fmt: skip
     rows = ContactRows(
         sp.csr_array(np.eye(2)), np.array(gap), np.full(2, 1e-3), np.array(cubic), np.zeros(2, dtype=bool)
     )
-    return Equilibrium(system, rows, rows.normal, np.full(2, -1.0), symmetric=True, solver=None)
+    return Equilibrium(system, rows, rows.normal, np.full(2, -load), symmetric=True, solver=None)
 
 
 def test_what_hardens_but_does_not_touch_needs_no_second_step() -> None:
@@ -233,13 +233,14 @@ def test_what_hardens_but_does_not_touch_needs_no_second_step() -> None:
     assert away.factorisations == 1
 
 
-def test_contact_that_hardens_balances_its_load() -> None:
-    touching = hardening((1e9, 0.0))
-    state, _ = settle(touching)
+@pytest.mark.parametrize("load", [1.0, 1e-12, 1e6])
+def test_contact_that_hardens_balances_its_load(load: float) -> None:
+    cubic = 1e9 / load**2  # the same in other units
+    state, _ = settle(hardening((cubic, 0.0), load=load))
     u = state.displacement[0]
-    assert 100 * u - 1e3 * -u - 1e9 * (-u) ** 3 == pytest.approx(-1.0, rel=1e-9)
-    assert state.normal_force[0] == pytest.approx(1e3 * -u + 1e9 * (-u) ** 3, rel=1e-9)
-    assert state.displacement[1] == pytest.approx(-1 / 1100)
+    assert 100 * u - 1e3 * -u - cubic * (-u) ** 3 == pytest.approx(-load, rel=1e-9)
+    assert state.normal_force[0] == pytest.approx(1e3 * -u + cubic * (-u) ** 3, rel=1e-9)
+    assert state.displacement[1] == pytest.approx(-load / 1100)
 
 
 def test_springs_that_find_no_equilibrium_are_given_sixty_steps(monkeypatch) -> None:
