@@ -34,7 +34,7 @@ def message(call, *arguments, **options) -> str:
 def test_nothing_depends_on_friction(tmp_path: Path):
     expected = (
         "nothing here depends on the friction coefficient: no factor of a matrix has mu in it and there are no contacts; "
-        "`stridor reduce --onsets NAME` solves for onsets along other parameters"
+        "`stridor onsets CASE --along NAME` solves for onsets along other parameters"
     )
     assert message(st.onsets, model(tmp_path, factor="")) == expected
     assert message(st.onsets, model(tmp_path, factor="0*mu")) == expected
@@ -99,7 +99,9 @@ def test_a_run_of_matrices_that_friction_only_makes_stiffer_is_fine(tmp_path: Pa
 
 
 def test_too_large_for_full_solves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("stridor.modal.general.basis.WHOLE", 1)
+    for module in ("basis", "search"):
+        monkeypatch.setattr(f"stridor.modal.general.{module}.WHOLE", 1)
+    monkeypatch.setattr("stridor.modal.general.search.DENSE", 1)
     assert message(st.onsets, model(tmp_path, factor="sqrt(mu)")) == (
         "no reduced model over mu can be made of these matrices (the matrices are no smooth functions of mu), and "
         "following modes by full solves is not tried with 2 unknowns, more than 1; take `stridor modes` at several mu"

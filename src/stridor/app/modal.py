@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from ..digits import readable
+from ..errors import CaseError
+from .along import MU, document_along, range_along, show_onsets_along
 from .arguments import INCOMPLETE, Call, Undamped, numbers, one_of, pair, verb
 
+if TYPE_CHECKING:
+    from ..case import Case
+
+NOT_ALONG = {
+    "--range": "their range is that of --between",
+    "--undamped": "they are sought with the damping of the case; set that to zero",
+}
 WORTH_A_BAR = 20  # friction coefficients
 INTERRUPTED = 130  # exit code
 
@@ -138,9 +147,34 @@ def onsets(
         ),
     ] = None,
     undamped: Undamped = False,
+    along: Annotated[
+        str | None,
+        typer.Option(
+            "--along",
+            metavar="NAME",
+            help="Along another number than μ: one of [parameters], contact_stiffness, or a number's path.",
+        ),
+    ] = None,
+    between: Annotated[
+        str | None,
+        typer.Option("--between", metavar="low:high", help="Its range [default: that of the parameter in the case]."),
+    ] = None,
 ) -> None:
-    """Every critical friction coefficient in range: solved, not bracketed."""
+    """Every critical friction coefficient in range, or critical value of another number: solved, not bracketed."""
     loaded = call.case()
+    if along is not None or between is not None:
+        name = MU if along is None else along
+        of_friction = name == MU and MU not in loaded.parameters
+        if of_friction and friction_range is None:
+            friction_range = between
+        elif of_friction:
+            raise CaseError("--between", between, "is the range of --along; --range has that of μ already")
+        else:
+            given = {"--range": friction_range, "--undamped": undamped or not loaded.modal.damped}
+            for option in [option for option, value in given.items() if value]:
+                raise CaseError(option, None, f"is not for onsets along {name}: {NOT_ALONG[option]}")
+            _onsets_along(call, loaded, name, None if between is None else pair(between, "--between"), max_frequency)
+            return
 
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
@@ -156,6 +190,30 @@ def onsets(
     else:
         show_onsets(result)
     if not result.complete:
+        raise typer.Exit(INCOMPLETE)
+
+
+def _onsets_along(
+    call: Call, case: Case, name: str, between: tuple[float, float] | None, max_frequency: float | None
+) -> None:
+    """Onsets along a number of the case: sought on a model reduced over its range, each solved in the full problem."""
+    from ..modal.general import onsets_along
+    from ..study.asked import require_frequency
+    from ..study.reduced import reduced_model
+    from ..study.unit_warnings import resolution_warnings
+
+    chosen = range_along(case, name, between)
+    require_frequency(max_frequency)
+    call.warn(resolution_warnings(case))
+    model = reduced_model(case, {name: chosen}, max_frequency_hz=max_frequency)
+    found = onsets_along(model, name, solver=None if call.solver in (None, "auto") else call.solver)
+    if call.json:
+        call.document(document_along(model, name, found))
+    else:
+        for note in getattr(model.problem, "notes", ()):
+            call.say(f"note: {note}")
+        show_onsets_along(model, name, found, confirmed=True)
+    if not found.complete:
         raise typer.Exit(INCOMPLETE)
 
 

@@ -15,11 +15,12 @@ import typer
 from ..digits import measured
 from ..errors import CaseError
 from ..reading import is_reduced_file
+from .along import onset_document, show_onsets_along
 from .arguments import INCOMPLETE, INFINITY, Call, numbers, pair, verb
 
 if TYPE_CHECKING:
     from ..case import Case
-    from ..modal.general import ParametricOnset, ParametricOnsets
+    from ..modal.general import ParametricOnsets
     from ..modal.parametric import CorrectedModes, ReducedModel, ReducedModes
     from ..typing import Array
 
@@ -104,7 +105,7 @@ def reduce(
     if along is not None:
         onsets = onsets_along(model, along, _first(at or [], model, along), confirm=confirm, solver=chosen)
     if call.json:
-        document = _about(model) | {"modes": points, "onsets": [_onset(o) for o in onsets or ()]}
+        document = _about(model) | {"modes": points, "onsets": [onset_document(o) for o in onsets or ()]}
         if onsets is not None:
             document |= {"completeness": onsets.sentence, "complete": onsets.complete}
         call.document(document | {"files": [str(f) for f in files]})
@@ -112,7 +113,7 @@ def reduce(
         if points:
             _show_modes(model, points)
         if along is not None and onsets is not None:
-            _show_onsets(model, along, onsets, confirmed=confirm)
+            show_onsets_along(model, along, onsets, confirmed=confirm)
         if not (at or along or save):
             call.say("next: --at mu=0.3 for modes, --onsets mu for onsets, --save model.npz to keep the model")
     if onsets is not None and not onsets.complete:
@@ -251,22 +252,6 @@ def _about(model: ReducedModel) -> dict[str, Any]:
     }
 
 
-def _onset(onset: ParametricOnset) -> dict[str, Any]:
-    return {
-        "parameter": onset.parameter,
-        "value": onset.value,
-        "point": dict(onset.point),
-        "frequency_hz": onset.frequency_hz,
-        "kind": onset.kind,
-        "growth_slope": onset.growth_slope,
-        "square_root_coefficient": onset.square_root_coefficient,
-        "stabilising": onset.stabilising,
-        "residual": onset.residual,
-        "reduced_value": onset.reduced_value,
-        "enters_band_at": onset.enters_at,
-    }
-
-
 def _write(path: Path, model: ReducedModel, document: list[dict[str, Any]]) -> Path:
     """One line for each mode of each point, all digits, under a line of heads."""
     from ..io.atomic import write_text
@@ -315,29 +300,3 @@ def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
             )
     heads = [*(p.name for p in model.problem.parameters), "frequency [Hz]", "growth [1/s]", "error", "residual", ""]
     table("Modes of the reduced model", heads, rows)
-
-
-def _show_onsets(model: ReducedModel, along: str, onsets: ParametricOnsets, *, confirmed: bool) -> None:
-    from .output import stdout, table
-
-    if not onsets:
-        (own,) = (p for p in model.problem.parameters if p.name == along)
-        top = model.frequency / (2 * math.pi)
-        stdout.print(f"no onset along {along} in {own.low:g} … {own.high:g} up to {top:g} Hz", markup=False)
-        stdout.print(f"  {onsets.sentence}", markup=False)
-        return
-    how = "confirmed in the full model" if confirmed else "of the reduced model alone: its file has no full matrices"
-    rows = [
-        [
-            f"{o.value:.9g}",
-            measured(o.frequency_hz, 3),
-            o.kind,
-            "stable" if o.stabilising else "unstable" if o.enters_at is None else "unstable *",
-            "" if o.residual is None else f"{o.residual:.1e}",
-        ]
-        for o in onsets
-    ]
-    table(f"Onsets along {along}, {how}", [along, "frequency [Hz]", "kind", "turns", "residual"], rows)
-    for line in onsets.from_above_words(model.frequency / (2 * math.pi)):
-        stdout.print(f"  {line}", markup=False)
-    stdout.print(f"  {onsets.sentence}", markup=False)

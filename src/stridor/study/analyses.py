@@ -181,7 +181,7 @@ def structured(case: Case, what: str, mu: float | None = None) -> System:
     if system.general and what == "run" and not case.contacts:
         raise AnalysisError(
             "run: there are no contacts and no factor of a matrix has mu in it, so there is no onset to solve for; "
-            "what works here is `stridor modes`, `stridor simulate` and `stridor reduce --onsets NAME`"
+            "what works here is `stridor modes`, `stridor simulate` and `stridor onsets --along NAME`"
         )
     return system
 

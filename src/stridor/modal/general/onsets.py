@@ -57,7 +57,7 @@ def general_onsets(
         if not family.open_contacts:
             raise AnalysisError(
                 "nothing here depends on the friction coefficient: no factor of a matrix has mu in it and there are no "
-                "contacts; `stridor reduce --onsets NAME` solves for onsets along other parameters"
+                "contacts; `stridor onsets CASE --along NAME` solves for onsets along other parameters"
             )
         at = f"mu = {low if own is None else own:g}"
         said = f"No contact carries load in steady sliding at {at}, where contacts are held, so nothing depends on mu."

@@ -46,7 +46,7 @@ def sentence(
         )
     begins = sum(not o.stabilising for o in answer.onsets)
     said = f"as the onsets say{_across(last - first - 2 * begins + len(answer.onsets), top)}"
-    told = _followed(answer, name, value)
+    told = _followed(answer, name, value, where)
     both = all(end.completeness.complete for end in ends)
     if not both:
         unsure = next(end.completeness.sentence for end in ends if not end.completeness.complete)
@@ -66,11 +66,12 @@ def _between(family: Family, answer: Answer) -> tuple[float, float]:
     return family.low + answer.way.low.mu, family.low + answer.way.high.mu
 
 
-def _followed(answer: Answer, name: str, value: Callable[[float], float]) -> str:
+def _followed(answer: Answer, name: str, value: Callable[[float], float], where: str) -> str:
     way = answer.way
     assert way is not None, "asked for where branches led to all"
     source = way.source
     how = {True: ", solved in full at every step", False: " on the matrices themselves"}[source.whole]
+    how = "" if where else how
     if isinstance(source, Projected) and source.model is not None:
         how = f" on a reduced model of {source.model.size} unknowns"
     told = f"{len(way.low.place)} branches were followed from {name} = {value(source.family.low):g}{how}"
