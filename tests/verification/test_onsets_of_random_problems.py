@@ -18,7 +18,7 @@ from stridor.system import System
 
 pytestmark = pytest.mark.verification
 
-EACH = 60  # problems in each run
+EACH = 48  # problems in each run
 MANY = 2000  # and weekly
 UNANSWERED = 0.03  # share at most of which it may be said that the answer is not whole
 
