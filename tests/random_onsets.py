@@ -17,7 +17,6 @@ import scipy.linalg as sl
 import stridor as st
 from benches import Slave, bench, by_hand, full_eigenvalues
 from matrix_cases import matrix_case
-from stridor.modal.complex_modes import undamped
 from stridor.modal.over_friction import onsets_of_band
 from stridor.system import System
 
@@ -50,7 +49,7 @@ def random_problem(seed: int, *, small: bool = False) -> Problem:
 
 
 def _of_system(name: str, system: System, high: float, top: float, *, damped: bool) -> Problem:
-    truth = system if damped else undamped(system)
+    truth = system if damped else system.undamped()
     return Problem(
         name, 0.0, high, top,
         lambda _: onsets_of_band(system, (0.0, high), top / (2 * np.pi), damped=damped),

@@ -106,7 +106,7 @@ def test_a_heavy_mass_on_a_rigid_floor(band: float) -> None:
 
 def test_what_does_not_settle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stridor.modal.assembled.modes.searched", lambda _, top: top)
-    monkeypatch.setattr("stridor.modal.complex_modes.WHOLE", 0)  # too large for the answer in full
+    monkeypatch.setattr("stridor.modal.source.WHOLE", 0)  # too large for the answer in full
     with pytest.raises(st.AnalysisError, match=r"do not settle: a backward error of .* lower modal.max_frequency_hz"):
         st.modes(floor("max_frequency_hz = 1e6"), 0.1)
     assert refine.BELIEVED < 1e-6

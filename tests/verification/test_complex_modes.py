@@ -14,8 +14,9 @@ from stridor import build_system
 from stridor.laws import Weakening
 from stridor.modal.assembled import complex_modes_assembled
 from stridor.modal.backward_error import BackwardError
-from stridor.modal.complex_modes import complex_modes, prepare, undamped
+from stridor.modal.complex_modes import complex_modes
 from stridor.modal.coupling import couple
+from stridor.modal.receptance_modes import prepare
 from stridor.sliding import steady_sliding
 from stridor.system import System
 
@@ -59,7 +60,7 @@ def test_eigenvalues_match_the_full_pencil(system, damped):
     mu = np.array([0.0, 0.1, 0.45])
     modes = complex_modes(system, mu, max_frequency_hz=30e3, damped=damped)
     assert modes.residual.max() < 1e-9
-    reference = system if damped else undamped(system)
+    reference = system if damped else system.undamped()
     for row, m in enumerate(mu):
         dense = full_eigenvalues(reference, m)
         # The dense answer's error is relative to the largest eigenvalue (undamped: to its square).
@@ -182,7 +183,7 @@ def mac_order(system, mu) -> np.ndarray:
 
 
 def test_branches_do_not_swap():
-    system = undamped(bench(Slave(lean_deg=8.0)))
+    system = bench(Slave(lean_deg=8.0)).undamped()
     mu = np.linspace(0, 0.05, 201)
     modes = complex_modes(system, mu, count=12, damped=False)
     crossing = np.argsort(modes.frequency_hz[-1])

@@ -12,7 +12,7 @@ import scipy.linalg as sl
 from scipy.optimize import minimize_scalar
 
 from benches import Slave, bench, by_hand, full_eigenvalues, growing
-from stridor.modal.complex_modes import complex_modes, undamped
+from stridor.modal.complex_modes import complex_modes
 from stridor.modal.onsets import onsets
 from stridor.system import System
 
@@ -179,14 +179,14 @@ def random_bench(seed: int) -> System:
         length=float(rng.uniform(0.04, 0.08)),
         elements=4, stiffness=float(10 ** rng.uniform(6, 10)),
     )  # fmt: skip
-    return undamped(bench(slave, elements=7))
+    return bench(slave, elements=7).undamped()
 
 
 # Growth that begins and ends again, once within a thousandth of μ.
 BUBBLE = Slave(place=0.5032441, lean_deg=10.178183, length=0.07440715, elements=4, stiffness=2.69258829e9)
 
 
-@pytest.mark.parametrize("system", [*map(random_bench, range(5)), undamped(bench(BUBBLE, elements=7))],
+@pytest.mark.parametrize("system", [*map(random_bench, range(5)), bench(BUBBLE, elements=7).undamped()],
                          ids=[*map(str, range(5)), "bubble"])  # fmt: skip
 def test_onsets_are_the_extrema_of_the_receptance_curve(system):
     limit, top = 2 * np.pi * 30e3, 1.5
@@ -217,7 +217,7 @@ def test_paper_like_bench_against_counts_of_unstable_modes(damped):
     system = bench(Slave(lean_deg=9, damping=(50, 1e-7)), elements=10)
     answer = onsets(system, (0.0, 0.9), max_frequency_hz=30e3, damped=damped)
     assert len(answer.onsets) >= 3
-    case = system if damped else undamped(system)
+    case = system if damped else system.undamped()
     edges = [0.0, *(o.mu for o in answer.onsets), 0.9]
     expected = 0
     for k, (low, high) in enumerate(pairwise(edges)):
@@ -238,7 +238,7 @@ def growth_near(system: System, mu: float, omega: float) -> float:
 
 
 def test_growth_opens_with_the_square_root():
-    system = undamped(bench(Slave(lean_deg=12)))
+    system = bench(Slave(lean_deg=12)).undamped()
     for o in onsets(system, (0.0, 1.0), max_frequency_hz=20e3, damped=False).onsets:
         sign = -1 if o.stabilising else 1
         ratios = []
@@ -274,7 +274,7 @@ def test_damping_moves_the_exceptional_point_off_the_real_axis():
 
 def test_restabilisation_is_found():
     """Growth of a pair that ends again at a higher μ: just below it grows, just above it does not."""
-    case = undamped(bench(Slave(place=0.8, lean_deg=25.0, end="clamped", length=0.06)))
+    case = bench(Slave(place=0.8, lean_deg=25.0, end="clamped", length=0.06)).undamped()
     ended = [o for o in onsets(case, (0.0, 1.5), max_frequency_hz=30e3).onsets if o.stabilising]
     assert len(ended) == 3
     for o in ended:
@@ -284,7 +284,7 @@ def test_restabilisation_is_found():
 
 
 def test_a_growing_real_root_that_returns_to_zero_is_a_stabilising_divergence():
-    case = undamped(bench(Slave(place=0.8, lean_deg=25.0, end="clamped", length=0.06)))
+    case = bench(Slave(place=0.8, lean_deg=25.0, end="clamped", length=0.06)).undamped()
     found = [o for o in onsets(case, (0.0, 3.0), max_frequency_hz=30e3).onsets if o.kind == "divergence"]
     assert [(o.stabilising, o.frequency_hz) for o in found] == [(True, 0.0)]
     contact = case.contacts[0]
@@ -312,9 +312,8 @@ def test_damped_divergence_lies_where_the_static_curve_says():
 
 def test_two_contacts():
     """No curve here; the determinant's double roots against bisection on dense growth."""
-    system = undamped(
-        bench(Slave(place=0.5, lean_deg=10), Slave(place=0.85, lean_deg=18, length=0.06), elements=8)
-    )
+    slaves = Slave(place=0.5, lean_deg=10), Slave(place=0.85, lean_deg=18, length=0.06)
+    system = bench(*slaves, elements=8).undamped()
     found = onsets(system, (0.0, 0.6), max_frequency_hz=25e3, damped=False).onsets
     assert found
     for o in found:

@@ -10,10 +10,10 @@ import pytest
 
 import random_onsets
 from random_onsets import KINDS, disagreement, random_problem
-from stridor.modal.assembled.steady import Options
 from stridor.modal.general import branches, counted, general_onsets, search
 from stridor.modal.general.axis import _Walk
 from stridor.modal.onset import Onsets
+from stridor.modal.options import Options
 from stridor.system import System
 
 pytestmark = pytest.mark.verification

@@ -10,10 +10,10 @@ import pytest
 import stridor as st
 from benches import paper_case
 from stridor.errors import FollowingError
-from stridor.modal import complex_modes as following
+from stridor.modal import source as following
 from stridor.modal.assembled.problem import problem_of
-from stridor.modal.assembled.steady import Options
 from stridor.modal.assembled.whole import quadratic_of
+from stridor.modal.options import Options
 from stridor.modal.quadratic import find
 from stridor.modal.quadratic.dense import all_modes
 from stridor.modal.quadratic.region import Region

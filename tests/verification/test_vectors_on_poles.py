@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benches import paper_case
-from stridor.modal.complex_modes import prepare
+from stridor.modal.receptance_modes import prepare
 from stridor.modal.vectors import expand
 from stridor.system import build_system
 

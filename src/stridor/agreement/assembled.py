@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import AnalysisError
-from ..modal.assembled import Options
 from ..modal.complex_modes import ComplexModes
+from ..modal.options import Options
 from ..modal.over_friction import modes_of_band
 from ..sliding import full_motion
 from ..system import System

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..digits import measured
 from ..errors import AnalysisError
-from ..modal.assembled import Options
 from ..modal.onset import refuted
+from ..modal.options import Options
 from ..modal.over_friction import modes_of_band, onsets_of_band
 from ..system import System
 from ..temporal.simulate import Settings

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import logging
 import os
 import tempfile
@@ -45,6 +46,14 @@ Solver = Annotated[
         help="Sparse direct solver: mumps, pardiso, superlu; slepc for all processes of mpiexec [default: the case's].",
     ),
 ]
+Source = Annotated[
+    str | None,
+    typer.Option(
+        "--source",
+        metavar="NAME",
+        help="Where eigenpairs come from: receptance, krylov, full [default: modal.source, what suits the model].",
+    ),
+]
 Undamped = Annotated[bool, typer.Option("--undamped", help="Leave structural damping out.")]
 
 
@@ -77,14 +86,15 @@ class Call:
         if self.writes or self.out is not None:
             self.stack.enter_context(claimed(self.folder, self.parts))
 
-    def case(self) -> Case:
+    def case(self, source: str | None = None) -> Case:
         """The case in the file with overrides, its warnings printed and its folder claimed; settings without effect are
-        told with the results. Raises CaseError.
+        told with the results. source: another modal.source. Raises CaseError.
 
         A verb asks for it before it imports what it computes with: what is wrong with the file is said at once."""
         from ..case import load
 
-        own = [] if self.solver is None else [f'modal.solver="{self.solver}"']
+        named = {"solver": self.solver, "source": source}
+        own = [f"modal.{key}={json.dumps(name)}" for key, name in named.items() if name is not None]
         case = load(self.path, [*(self.set_ or ()), *own])
         if self.solver is not None and self.solver != "auto":
             os.environ["STRIDOR_SOLVER"] = self.solver

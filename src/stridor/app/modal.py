@@ -9,7 +9,7 @@ import typer
 from ..digits import readable
 from ..errors import CaseError
 from .along import MU, document_along, range_along, show_onsets_along
-from .arguments import INCOMPLETE, Call, Undamped, numbers, one_of, pair, verb
+from .arguments import INCOMPLETE, Call, Source, Undamped, numbers, one_of, pair, verb
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 NOT_ALONG = {
     "--range": "their range is that of --between",
     "--undamped": "they are sought with the damping of the case; set that to zero",
+    "--source": "they are sought on a reduced model and in the full problem",
 }
 WORTH_A_BAR = 20  # friction coefficients
 INTERRUPTED = 130  # exit code
@@ -100,10 +101,11 @@ def modes(
         str, typer.Option("--sort", metavar="frequency|growth", help="What comes first: lowest or fastest growing.")
     ] = "frequency",
     undamped: Undamped = False,
+    source: Source = None,
 ) -> None:
     """Complex modes at one or many friction coefficients, branches followed from μ = 0. Every unstable mode of the band
     up to modal.max_frequency_hz is among them."""
-    loaded = call.case()
+    loaded = call.case(source=source)
 
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
@@ -159,9 +161,10 @@ def onsets(
         str | None,
         typer.Option("--between", metavar="low:high", help="Its range [default: that of the parameter in the case]."),
     ] = None,
+    source: Source = None,
 ) -> None:
     """Every critical friction coefficient in range, or critical value of another number: solved, not bracketed."""
-    loaded = call.case()
+    loaded = call.case(source=source)
     if along is not None or between is not None:
         name = MU if along is None else along
         of_friction = name == MU and MU not in loaded.parameters
@@ -170,7 +173,11 @@ def onsets(
         elif of_friction:
             raise CaseError("--between", between, "is the range of --along; --range has that of μ already")
         else:
-            given = {"--range": friction_range, "--undamped": undamped or not loaded.modal.damped}
+            given = {
+                "--range": friction_range,
+                "--undamped": undamped or not loaded.modal.damped,
+                "--source": source,
+            }
             for option in [option for option, value in given.items() if value]:
                 raise CaseError(option, None, f"is not for onsets along {name}: {NOT_ALONG[option]}")
             _onsets_along(call, loaded, name, None if between is None else pair(between, "--between"), max_frequency)

@@ -168,6 +168,8 @@ def _modes(result: ComplexModes) -> Any:
         data.attrs["completeness"] = json.dumps(result.completeness)
     if result.contact_state:
         data.attrs["contact_state"] = result.contact_state
+    if result.source:
+        data.attrs["source"] = result.source
     if result.notes:
         data.attrs["notes"] = json.dumps(result.notes)
     data.attrs["damped"] = int(result.damped)
@@ -209,6 +211,8 @@ def _onsets(result: Onsets) -> Any:
         data.attrs["completeness"] = result.completeness
     if result.contact_state:
         data.attrs["contact_state"] = result.contact_state
+    if result.source:
+        data.attrs["source"] = result.source
     if result.notes:
         data.attrs["notes"] = json.dumps(result.notes)
     return data

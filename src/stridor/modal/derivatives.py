@@ -28,9 +28,9 @@ from ..errors import AnalysisError, CaseError
 from ..sliding import steady_sliding_nodes
 from ..system import System
 from ..typing import Array, BoolArray, ComplexArray, IntArray, Sparse
-from .assembled import Options
 from .assembled.problem import times, tiny
 from .assembled.steady import contact_rows, steadiness, touching_nodes
+from .options import Options
 
 STEPS = 14
 SETTLED = 1e-14  # relative change of λ at which the iteration ends

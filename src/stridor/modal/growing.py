@@ -11,7 +11,7 @@ axis. What counts at a μ is every mode of the band there, wherever it began. It
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -20,15 +20,16 @@ from ..system import System
 from ..threads import one_thread_if_small
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .assembled.problem import problem_of
-from .assembled.steady import Options
 from .assembled.whole import quadratic_of
-from .complex_modes import ComplexModes, complex_modes, undamped
+from .complex_modes import complex_modes
 from .general.basis import AT_REST, GROWS, NOTHING
 from .onset import refuted
 from .onsets import Onsets, onsets
+from .options import Options
 from .quadratic import band_modes
 from .quadratic.polish import pairs
 from .quadratic.reach import searched
+from .results import ComplexModes
 
 AFFORDABLE = 60_000  # unknowns up to which the full problem is solved unasked
 ROWS = 5  # friction coefficients up to which every one is checked, of more the ends and the case's own
@@ -78,7 +79,7 @@ def growing_modes(
     where contacts do not slide or the search does not settle.
     """
     options = options or Options()
-    problem = problem_of(system if damped else undamped(system), touching_at, options, damped=damped)
+    problem = problem_of(system if damped else system.undamped(), touching_at, options, damped=damped)
     whole = quadratic_of(problem, mu)
     top = searched(whole, 2 * np.pi * max_frequency_hz)
     found = band_modes(
@@ -207,7 +208,7 @@ def checked_onsets(
         try:
             found = onsets(
                 system, found.friction_range, max_frequency_hz=found.max_frequency_hz, damped=damped, follow=wider,
-                friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
+                **asdict(options),
             )  # fmt: skip
         except AnalysisError:
             break
@@ -280,7 +281,7 @@ def _followed_from(
         more = complex_modes(
             system, modes.mu, max_frequency_hz=wider * max_frequency_hz, damped=modes.damped,
             vectors=False if modes.right is None else True if modes.left is not None else "right",
-            friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
+            **asdict(options),
         )  # fmt: skip
     except AnalysisError:
         return None

@@ -14,8 +14,8 @@ from scipy.optimize import linear_sum_assignment
 
 from ..sliding.stretches import Stretch
 from ..typing import Array, ComplexArray, IntArray
-from .complex_modes import ComplexModes
 from .onset import Onset, Onsets
+from .results import ComplexModes
 
 ALIKE = 0.1  # of |λ|: how far a mode may jump where a node opens or closes
 
@@ -126,6 +126,7 @@ def joined_modes(parts: Sequence[ComplexModes], borders: Sequence[Border], order
         right=stacked("right", lacks),
         left=stacked("left", lacks),
         open_contacts=tuple(n for n in parts[0].open_contacts if all(n in part.open_contacts for part in parts)),
+        source=" and ".join(sorted({part.source for part in parts})),
         completeness=tuple(told[k] for k in back) if any(told) else (),
     )
 
@@ -159,6 +160,7 @@ def joined_onsets(
         at_end=last.at_end,
         unexplained=sum(found.unexplained for _, found in parts),
         damped=any(found.damped for _, found in parts),
+        source=" and ".join(sorted({found.source for _, found in parts})),
         open_contacts=tuple(n for n in first.open_contacts if all(n in f.open_contacts for _, f in parts)),
         completeness=_told(parts),
     )

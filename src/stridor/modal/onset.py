@@ -73,6 +73,7 @@ class Onsets:
     others, "" where nothing was checked. notes: what else is to be known. contact_state: where contacts may stick, how
     many nodes stick, slip and are open, and at which μ; it is held over the range. followed: numbers and eigenvalues
     (b,) of the branches at both ends, where branches were followed; saved nowhere.
+    source: where the eigenpairs come from, a name of `modal.source`.
     """
 
     onsets: tuple[Onset, ...]
@@ -87,6 +88,7 @@ class Onsets:
     notes: tuple[str, ...] = ()
     contact_state: str = ""
     provenance: dict[str, Any] = field(default_factory=dict)
+    source: str = ""
     followed: tuple[Branches, Branches] | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -133,6 +135,7 @@ class Onsets:
             "friction_range": list(self.friction_range),
             "max_frequency_hz": self.max_frequency_hz,
             "damped": self.damped,
+            **({"source": self.source} if self.source else {}),
             "open_contacts": list(self.open_contacts),
             **({"completeness": self.completeness} if self.completeness else {}),
             "complete": self.complete,

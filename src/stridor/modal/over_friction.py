@@ -16,13 +16,15 @@ from ..errors import AnalysisError, FollowingError
 from ..sliding.stretches import Stretch, stretch_words, stretches
 from ..system import System
 from ..typing import Array, ComplexArray, IntArray
-from .assembled.steady import Options
-from .complex_modes import ComplexModes, Progress, complex_modes
+from .complex_modes import complex_modes
 from .general import general_onsets
 from .general.basis import WHOLE
 from .growing import UNCHECKED, checked_modes, checked_onsets, growing_modes
 from .joined import Border, joined_modes, joined_onsets, rows_of
 from .onsets import Onsets, onsets
+from .options import Options
+from .results import ComplexModes, Progress
+from .source import SOURCES
 
 
 def modes_of_band(
@@ -45,8 +47,7 @@ def modes_of_band(
     def followed(held: System, at: Array, tell: Progress | None) -> ComplexModes:
         return complex_modes(
             held, at, max_frequency_hz=max_frequency_hz, damped=damped, vectors=vectors,
-            friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
-            progress=tell,
+            progress=tell, **asdict(options),
         )  # fmt: skip
 
     def checked(held: System, found: ComplexModes) -> ComplexModes:
@@ -165,16 +166,15 @@ def onsets_of_band(
     def solved(held: System, between: tuple[float, float]) -> Onsets:
         try:
             found = onsets(
-                held, between, max_frequency_hz=max_frequency_hz, damped=damped,
-                friction_damping=options.friction_damping, prestress=options.prestress, solver=options.solver,
-            )  # fmt: skip
+                held, between, max_frequency_hz=max_frequency_hz, damped=damped, **asdict(options)
+            )
         except FollowingError as error:
-            if held.size > WHOLE:
+            if held.size > WHOLE or options.source is not None:
                 raise
             return unfollowed(held, between, str(error).partition(";")[0])
         if not found.completeness:
             found = checked_onsets(held, found, damped=damped, options=options)
-        if found.complete or held.size > WHOLE:
+        if found.complete or held.size > WHOLE or options.source is not None:
             return found
         try:
             other = unfollowed(held, between, "")
@@ -183,9 +183,10 @@ def onsets_of_band(
         return other if other.complete else found
 
     def unfollowed(held: System, between: tuple[float, float], why: str) -> Onsets:
-        return general_onsets(
+        found = general_onsets(
             lambda _: held, between, max_frequency_hz=max_frequency_hz, damped=damped, options=options, unfollowed=why
         )
+        return replace(found, source=SOURCES[-1].name)
 
     low, high = (float(v) for v in friction_range)
     if not (0 <= low < high and np.isfinite(high)):

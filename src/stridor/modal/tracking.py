@@ -17,6 +17,7 @@ import scipy
 
 from ..errors import AnalysisError, FollowingError
 from ..typing import BoolArray, ComplexArray, IntArray
+from .meeting import beyond
 from .roots import Spectrum, dense_roots, frictionless_roots, polish
 
 CLOSE = 0.25  # a correction may be this fraction of the distance to the next root
@@ -190,7 +191,19 @@ class Tracker:
         if not self._accept(old, roots, implied, predicted, pairs, splits):
             return None
         branch = np.concatenate([old.branch, np.array(origins, dtype=np.int64)])
-        return State(mu, roots, implied, self._tangents(roots, mu), branch)
+        tangents = self._tangents(roots, mu)
+        for i, j in pairs:
+            if j < 0:
+                continue
+            told = beyond(
+                (old.roots[i], old.roots[j]), (old.tangents[i], old.tangents[j]), (roots[i], roots[j]),
+                (tangents[i], tangents[j]), step,
+            )  # fmt: skip
+            if told is not None and not told.sure:
+                return None
+            if told is not None and told.exchanged:
+                roots[[i, j]], tangents[[i, j]] = roots[[j, i]], tangents[[j, i]]
+        return State(mu, roots, implied, tangents, branch)
 
     def _extrapolated(self, old: State, step: float, predicted: ComplexArray) -> ComplexArray:
         """The cubic through the last two states and their tangents, where it does not reach too far."""

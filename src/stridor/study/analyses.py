@@ -15,8 +15,12 @@ from ..case import Case
 from ..case.matrix_checks import MU
 from ..errors import AnalysisError, CaseError, Problem
 from ..modal.complex_modes import ComplexModes, complex_modes
+from ..modal.general import general_modes, general_onsets
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
+from ..modal.over_friction import modes_of_band, onsets_of_band
+from ..modal.receptance_modes import prepare
+from ..modal.source import require_full
 from ..sliding import full_motion, slip_speeds, taken_as_closed
 from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
@@ -34,6 +38,7 @@ from .asked import require_frequency, require_friction
 from .body_modes import BodyModes, body_modes
 from .description import Description, describe
 from .fingerprint import changes_of, check_restart, fingerprint
+from .options import options_of
 from .pressed import require_pressed_in_time
 from .provenance import provenance
 from .settings import phases_of, settings_of
@@ -91,9 +96,7 @@ def modes(
     system = None if _varies_with_friction(case) else build_system(case)
     own = own_friction(case) if case.contacts else None
     if system is None:
-        from ..modal.assembled import Options
-        from ..modal.general import general_modes
-
+        require_full(options_of(case).source)
         result = general_modes(
             lambda mu: build_system(case, mu),
             values,
@@ -101,7 +104,7 @@ def modes(
             max_frequency_hz=band,
             damped=damped,
             vectors=vectors,
-            options=Options(**_modal_options(case)),
+            options=options_of(case),
             own=own,
             progress=progress,
         )
@@ -114,7 +117,7 @@ def modes(
     notes = (*result.notes, *(held_by_factors(case, own) if system is None else taken_as_closed(system)))
     if check and system is not None:
         single = float(result.mu[0]) if len(result.mu) == 1 else None
-        notes = (*notes, *decided_by_meshes(system, single, _solver(case)))
+        notes = (*notes, *decided_by_meshes(system, single, options_of(case).solver))
     seconds = time.perf_counter() - started
     return replace(result, notes=notes, provenance=provenance(case, "modes", seconds, damped=damped))
 
@@ -132,16 +135,13 @@ def _followed_modes(
     progress: Progress | None,
 ) -> ComplexModes:
     """Modes followed from μ = 0, and checked."""
-    from ..modal.assembled import Options
-    from ..modal.over_friction import modes_of_band
-
-    settings = _modal_options(case)
+    options = options_of(case)
     if not check:
         return complex_modes(
-            system, values, max_frequency_hz=band, damped=damped, vectors=vectors, progress=progress, **settings
+            system, values, max_frequency_hz=band, damped=damped, vectors=vectors, progress=progress, **asdict(options)
         )
     return modes_of_band(
-        system, values, band, damped=damped, vectors=vectors, own=own, options=Options(**settings), progress=progress
+        system, values, band, damped=damped, vectors=vectors, own=own, options=options, progress=progress
     )
 
 
@@ -184,21 +184,6 @@ def structured(case: Case, what: str, mu: float | None = None) -> System:
             "what works here is `stridor modes`, `stridor simulate` and `stridor onsets --along NAME`"
         )
     return system
-
-
-def _modal_options(case: Case) -> dict[str, Any]:
-    """What only large models and surfaces ask for."""
-    settings = case.modal
-    return {
-        "friction_damping": settings.friction_damping,
-        "prestress": settings.prestress,
-        "solver": _solver(case),
-    }
-
-
-def _solver(case: Case) -> str | None:
-    """The sparse direct solver that the case names."""
-    return None if case.modal.solver == "auto" else case.modal.solver
 
 
 def steady_sliding(case: Case, mu: float | None = None) -> SurfaceSliding:
@@ -262,30 +247,25 @@ def onsets(
     damped = case.modal.damped if damped is None else damped
     system = None if _varies_with_friction(case) else build_system(case)
     if system is None:
-        from ..modal.assembled import Options
-        from ..modal.general import general_onsets
-
+        require_full(options_of(case).source)
         result = general_onsets(
             lambda mu: build_system(case, mu),
             between,
             max_frequency_hz=limit,
             damped=damped,
-            options=Options(**_modal_options(case)),
+            options=options_of(case),
             own=own_friction(case) if case.contacts else None,
         )
     else:
-        from ..modal.assembled import Options
-        from ..modal.over_friction import onsets_of_band
-
-        settings = _modal_options(case)
+        options = options_of(case)
         if check:
-            result = onsets_of_band(system, between, limit, damped=damped, options=Options(**settings))
+            result = onsets_of_band(system, between, limit, damped=damped, options=options)
         else:
-            result = solve_onsets(system, between, max_frequency_hz=limit, damped=damped, **settings)
+            result = solve_onsets(system, between, max_frequency_hz=limit, damped=damped, **asdict(options))
     own = own_friction(case) if system is None and case.contacts else None
     notes = (*result.notes, *(held_by_factors(case, own) if system is None else taken_as_closed(system)))
     if check and system is not None:
-        notes = (*notes, *decided_by_meshes(system, solver=_solver(case)))
+        notes = (*notes, *decided_by_meshes(system, solver=options_of(case).solver))
     return replace(result, notes=notes, provenance=provenance(case, "onsets", time.perf_counter() - started))
 
 
@@ -556,7 +536,6 @@ def friction_curve(case: Case, frequency_hz: Array) -> Array:
     if len(system.contacts) != 1 or system.assembled:
         raise CaseError("contacts", len(system.contacts), "one contact: μ(ω) is a single curve only then")
     bare = replace(system, damping=0 * system.damping)
-    from ..modal.complex_modes import prepare
 
     spectrum, coupling, _ = prepare(bare)
     h, _ = spectrum.receptance(2j * np.pi * np.asarray(frequency_hz, dtype=float))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from ..case import Case
 from ..errors import AnalysisError
-from ..modal.assembled import Options
 from ..modal.assembled.steady import touching_nodes
 from ..modal.derivatives import Held, Mode, Terms, by_friction, rate_of, solve_mode, terms_of
 from ..modal.onsets import Onset, onsets
+from ..modal.options import Options
 from ..system import System, build_system
-from .sensitivities import number_at, options_of
+from .options import options_of
+from .sensitivities import number_at
 
 NOWHERE = (float("nan"), float("nan"))
 
@@ -73,9 +74,7 @@ def lowest_onset(
         mu_range,
         max_frequency_hz=max_frequency_hz,
         damped=damped,
-        friction_damping=options.friction_damping,
-        prestress=options.prestress,
-        solver=options.solver,
+        **asdict(options),
     ).first
 
 

@@ -24,8 +24,8 @@ from ..modal.parametric.model import ReducedModes
 from ..system import System, build_system
 from ..typing import Array, Sparse
 from .damping_full import FullSearch, LowestOnset
+from .options import options_of
 from .reduced import reduced_model
-from .sensitivities import options_of
 from .undamped_onset import undamped_onset
 
 FRICTION = "mu"

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from ..contact.surfaces import SurfaceContact
-from ..modal.assembled import NotPositive, complex_modes_assembled
 from ..modal.complex_modes import ComplexModes
-from ..modal.growing import checked_modes, doubt
+from ..modal.growing import doubt
 from ..modal.over_friction import modes_of_band
+from ..modal.unfit import Unfit
 from ..system import System
 from ..typing import ComplexArray
 from .contact_edges import edge_rows
@@ -50,12 +51,11 @@ def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequenc
 def _solved(system: System, linear: Linearised, band: float) -> ComplexModes:
     """The modes of the band of a changed system, and what was checked of them."""
     damped, options = linear.modes.damped, linear.options
-    try:
-        # The sparse path for small systems too: a mass at one node leaves their complete basis no proportional damping.
-        found = complex_modes_assembled(system, linear.mu, max_frequency_hz=band, damped=damped, options=options)
-    except NotPositive:
-        return modes_of_band(system, linear.mu, band, damped=damped, options=options)
-    return checked_modes(system, found, band, options=options)
+    if options.source is None and not system.general:
+        # Sparse matrices for small systems too: a mass at one node leaves their complete basis no proportional damping.
+        with suppress(Unfit):
+            return modes_of_band(system, linear.mu, band, damped=damped, options=replace(options, source="krylov"))
+    return modes_of_band(system, linear.mu, band, damped=damped, options=options)
 
 
 def _changed(linear: Linearised, measure: Measure) -> System:

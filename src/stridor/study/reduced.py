@@ -57,7 +57,7 @@ def reduced_model(
 
 def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> ContactsProblem:
     """The matrices of a case as sums of terms in the numbers of a box, as `reduced_model` takes it."""
-    from ..modal.assembled import Options
+    from ..modal.options import Options
     from ..modal.parametric.contacts import FRICTION, STIFFNESS, Family, contacts_problem
 
     parameters = _parameters(case, box)

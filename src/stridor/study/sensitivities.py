@@ -13,15 +13,16 @@ from ..case import Case
 from ..case.overrides import split_path
 from ..digits import measured
 from ..errors import AnalysisError, CaseError
-from ..modal.assembled import Options
-from ..modal.complex_modes import ComplexModes, undamped
+from ..modal.complex_modes import ComplexModes
 from ..modal.derivatives import Mode, Terms, by_compliance, by_friction, hold, rate_of, solve_mode, terms_of
 from ..modal.growing import doubt
+from ..modal.options import Options
 from ..modal.over_friction import modes_of_band
 from ..system import System, build_system
 from ..typing import Array, ComplexArray, IntArray
 from .analyses import own_friction
 from .asked import require_frequency
+from .options import options_of
 from .provenance import provenance
 
 NEAR = 0.05  # relative change of a number within which an exceptional point is told of
@@ -296,7 +297,7 @@ class Linearised:
         modes = modes_of_band(system, value, band, damped=damped, options=options)
         if max_frequency_hz is None:
             modes = modes.lowest(settings.modes if count is None else count)
-        return Linearised(case, system if damped else undamped(system), value, modes, options)
+        return Linearised(case, system if damped else system.undamped(), value, modes, options)
 
     def value(self, path: str) -> float:
         """The number at a path. Raises CaseError where there is none."""
@@ -330,7 +331,7 @@ class Linearised:
     def built(self, case: Case) -> System:
         """The system of a varied case, with or without damping as this one."""
         system = build_system(case)
-        return system if self.modes.damped else undamped(system)
+        return system if self.modes.damped else system.undamped()
 
     def columns(self, choice: Choice) -> list[int]:
         """Columns of the modes chosen. Raises CaseError for numbers that no branch has."""
@@ -378,13 +379,6 @@ class Linearised:
         found = self.mode(column)
         assert found is not None, "asked for after `mode` said so"
         return found
-
-
-def options_of(case: Case) -> Options:
-    """The effects of the steady state that the case's [modal] counts."""
-    settings = case.modal
-    solver = None if settings.solver == "auto" else settings.solver
-    return Options(settings.friction_damping, settings.prestress, solver)
 
 
 def _contact_of(case: Case, path: str) -> str | None:

@@ -1,6 +1,7 @@
 """Settings that a case gives and that change nothing on the path its analyses take: told, one line each.
 
-- modal.solver, --solver: beams in point contacts, whose modes are dense
+- modal.solver, --solver: beams in point contacts, whose modes are dense unless modal.source says otherwise
+- modal.source: `steady`, `reduce`, `simulate`, `compare`
 - modal.friction_damping: but for contact over nodes in space; `compare`, which has it as the time loop has
 - modal.prestress: but for assembled matrices with meshed solids; `compare`, `simulate`
 - modal.damped = false: `simulate`, `compare`
@@ -68,6 +69,7 @@ def _given(case: Case, solver: str | None) -> bool:
     return (
         solver is not None
         or modal.solver != "auto"
+        or modal.source != "auto"
         or modal.friction_damping
         or modal.prestress
         or not modal.damped
@@ -90,9 +92,14 @@ def _of_comparison(case: Case, verb: str) -> Iterator[str]:
 
 
 def _of_modes(case: Case, path: _Path, verb: str, solver: str | None) -> Iterator[str]:
-    if path.points and (solver is not None or case.modal.solver != "auto"):
+    dense = path.points and case.modal.source in ("auto", "receptance")
+    if dense and (solver is not None or case.modal.solver != "auto"):
         what = "modal.solver" if solver is None else "--solver"
         yield f"{what} has no effect: beams in point contacts are solved by dense methods"
+    if case.modal.source != "auto" and verb in ("steady", "reduce", "simulate", "compare"):
+        yield f"modal.source has no effect on {verb}: it acts on modes and onsets"
+    elif case.modal.source != "auto" and verb == "run":
+        yield "modal.source acts on modes and onsets only: the comparison takes what suits the model"
     if case.modal.friction_damping and verb != "simulate":
         if path.points or case.dimension < 3:
             yield "modal.friction_damping has no effect: friction turns with the slip in space only, over nodes"

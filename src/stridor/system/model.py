@@ -159,13 +159,33 @@ class System:
         return connected_components(self.mass, self.damping, self.stiffness)
 
     @property
+    def beyond_points(self) -> str:
+        """Why it is no structure with a few point contacts on a complete basis of modes; "" where it is."""
+        if self.general:
+            return self.general
+        if self.surfaces:
+            return "there is contact over surfaces"
+        if self.load_steps:
+            return "contacts may stick"
+        if self.cubic is not None or self.contact_cubic:
+            return "there are cubic springs"
+        if self.size > COMPLETE_BASIS_LIMIT:
+            return f"{self.size} freedoms are too many for a complete basis, which has up to {COMPLETE_BASIS_LIMIT}"
+        return ""
+
+    @property
     def assembled(self) -> bool:
-        """Whether it is computed with on the assembled sparse matrices: contact over surfaces, forces beyond the
-        linear, contacts that may stick, unsymmetric matrices, or too many freedoms for the complete basis that point
-        contacts use."""
-        beyond = self.cubic is not None or bool(self.contact_cubic)
-        beyond = beyond or bool(self.general)
-        return bool(self.surfaces or self.load_steps) or beyond or self.size > COMPLETE_BASIS_LIMIT
+        """Whether it is computed with on the assembled sparse matrices."""
+        return bool(self.beyond_points)
+
+    def undamped(self) -> System:
+        """The same system without structural damping (paper eq. 5)."""
+        motion = replace(
+            self.motion,
+            damping=np.zeros_like(self.motion.damping),
+            damping_own=np.zeros_like(self.motion.damping_own),
+        )
+        return replace(self, damping=sp.csr_array(self.damping.shape), motion=motion)
 
     def in_place(self, factors: Array | None = None) -> System:
         """The system with everything that a prescribed distance presses away in its place, as the statics and the modes

@@ -30,12 +30,12 @@ grows at a few μ. The set of touching nodes is that of steady sliding at one μ
 frictionless modes is checked by Sylvester's law of inertia.
 """
 
+from ..options import Options
 from .critical import onsets_assembled
 from .direct_modes import DirectModes, direct_modes
 from .energy import FrictionEnergy, friction_energy
 from .modes import complex_modes_assembled
 from .shifted import NotPositive
-from .steady import Options
 
 __all__ = [
     "DirectModes",

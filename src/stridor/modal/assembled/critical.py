@@ -17,10 +17,11 @@ from ...errors import CaseError
 from ...system import System
 from ...threads import one_thread_if_small
 from ...typing import BoolArray, ComplexArray, IntArray
-from ..complex_modes import UNSTABLE_RELATIVE, grows, undamped
 from ..histories import Change, Entries, reported, unexplained
 from ..onset import Onset, Onsets
+from ..options import Options
 from ..quadratic.reach import searched
+from ..results import UNSTABLE_RELATIVE, grows
 from .follow import Follower, State, halves
 from .local import Surroundings, axis_crossing, double_eigenvalue
 from .modes import samples
@@ -29,7 +30,6 @@ from .problem import problem_of
 from .reduced import Eigenpairs, Reduced
 from .refine import BELIEVED, Band, projected, settle
 from .shifted import real_columns
-from .steady import Options
 from .whole import quadratic_of
 
 FOLLOW = 1.1  # times the band: from where branches are followed
@@ -61,7 +61,7 @@ def onsets_assembled(
     if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     if not damped:
-        system = undamped(system)
+        system = system.undamped()
     problem = problem_of(system, None, options or Options(), damped=damped, frictions=np.linspace(0.0, high, 50))
     if not problem.nodes:
         return Onsets((), (low, high), max_frequency_hz, problem.damped, problem.open_contacts)

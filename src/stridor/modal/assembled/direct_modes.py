@@ -13,10 +13,9 @@ from ...direct import factorise
 from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...typing import Array, ComplexArray
-from ..complex_modes import undamped
+from ..options import Options
 from .problem import ContactProblem, problem_of, times
 from .reduced import upper_root
-from .steady import Options
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ def direct_modes(
     """
     if not shift_hz > 0:
         raise CaseError("shift_hz", shift_hz, "a positive frequency in Hz")
-    problem = problem_of(system if damped else undamped(system), mu, options or Options(), damped=damped)
+    problem = problem_of(system if damped else system.undamped(), mu, options or Options(), damped=damped)
     omega = 2 * np.pi * shift_hz
     lam, u, p = (_damped if problem.damped else _undamped)(problem, mu, omega, count)
     order = np.argsort(lam.imag, kind="stable")

@@ -11,9 +11,9 @@ from ...direct import factorise
 from ...errors import CaseError
 from ...system import System
 from ...typing import Array, ComplexArray, Sparse
-from ..complex_modes import ComplexModes, undamped
+from ..options import Options
+from ..results import ComplexModes
 from .problem import ContactProblem, problem_of, times
-from .steady import Options
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def friction_energy(
     lam, u, mu = complex(modes.eigenvalues[row, mode]), modes.right[row, mode][:, None], float(modes.mu[row])
     if lam.imag == 0.0:
         raise CaseError("mode", mode, "this mode does not oscillate; give one with a frequency")
-    used = system if modes.damped else undamped(system)
+    used = system if modes.damped else system.undamped()
     problem = problem_of(used, mu if len(modes.mu) == 1 else None, options or Options(), damped=modes.damped)
     p = contact_forces(problem, lam, u, mu)
     extras = problem.at(mu)

@@ -14,10 +14,14 @@ import numpy as np
 import scipy
 
 from ...typing import Array, BoolArray, ComplexArray, IntArray
+from ..meeting import beyond
 from .reduced import Eigenpairs, Reduced
 
 CLEAR = 0.3  # an eigenvalue is the predicted one if it is this much nearer than any other
 ALIKE = 0.5  # and its shape has at least this much in common
+STRAIGHT = 0.1  # of the difference of two values: how far off a straight line they may be and count as crossing
+COINCIDENT = 1e-6  # of an eigenvalue: as near as modes are when rounding may exchange them
+ASIDE = 0.83  # of a step that ends where modes coincide
 SMALLEST_STEP = 1e-9
 NARROW = 1e-5  # step over μ below which two values that pass each other beside zero count as having met
 ROUNDING = 1e-9
@@ -56,7 +60,7 @@ class Follower:
     """Follows branches, numbered by frequency at μ = 0, towards larger μ in steps up to ``longest``.
 
     watch, where given, is called with each accepted pair of neighbouring states. Only the first ``named`` branches (all
-    by default) must be beyond doubt at every step.
+    by default) must be beyond doubt at every step. unit: what of another parameter compares with one of μ.
     """
 
     def __init__(
@@ -66,8 +70,9 @@ class Follower:
         longest: float = 0.05,
         named: int | None = None,
         watch: Callable[[State, State], None] | None = None,
+        unit: float = 1.0,
     ) -> None:
-        self.reduced = reduced
+        self.reduced, self.unit = reduced, unit
         self.longest, self.watch = longest, watch
         found = reduced.eigenpairs(0.0)
         followed = np.flatnonzero(np.abs(found.values) <= FOLLOWED * reduced.frequency)
@@ -82,7 +87,7 @@ class Follower:
         follower = cls.__new__(cls)
         follower.reduced, follower.state = reduced, state
         follower.named = len(state.place)
-        follower.longest, follower.watch, follower._step = np.inf, None, np.inf
+        follower.longest, follower.watch, follower._step, follower.unit = np.inf, None, np.inf, 1.0
         return follower
 
     def advance(self, mu: float) -> State:
@@ -93,16 +98,30 @@ class Follower:
             # No sliver is left over for rounding to make.
             step = left if left <= 1.01 * step else step
             found = self.reduced.eigenpairs(mu if step == left else self.state.mu + step)
+            if step < left and _coincide(self.state, found):
+                # Where modes cross or meet they are known least: a little before it they tell which is which.
+                step *= ASIDE
+                found = self.reduced.eigenpairs(self.state.mu + step)
             place = matched(self.reduced, self.state, found, self.named, surely=step > SMALLEST_STEP)
             if place is None:
                 self._step = step / 4
                 continue
-            new = State(found, place)
+            new = _named(self.state, State(found, place), self.unit)
+            if new is None:
+                self._step = step / 4
+                continue
             if self.watch is not None:
                 self.watch(self.state, new)
             self.state = new
             self._step = max(self._step, 2 * step)
         return self.state
+
+
+def _coincide(old: State, found: Eigenpairs) -> bool:
+    """Whether modes that were apart all but coincide in the next state."""
+    mine, theirs = (np.sort_complex(x) for x in (old.coordinate, found.coordinate))
+    near = [int(np.count_nonzero(np.abs(np.diff(x)) <= COINCIDENT * np.abs(x[1:]))) for x in (mine, theirs)]
+    return near[1] > near[0]
 
 
 def matched(reduced: Reduced, old: State, found: Eigenpairs, named: int, *, surely: bool = True) -> IntArray | None:
@@ -132,6 +151,55 @@ def matched(reduced: Reduced, old: State, found: Eigenpairs, named: int, *, sure
         j, place[i], place[j] = pair
         clear[i] = clear[j] = True
     return place if len(np.unique(place)) == len(place) else None
+
+
+def _named(old: State, new: State, unit: float) -> State | None:
+    """The new state with the names that are a matter of taste given by rule, so that rounding has no say; None where
+    the step is too long to tell.
+
+    Of two modes that meet the first grows beyond (`meeting`). A mode that falls apart on the real axis is the one of
+    its halves that grows faster.
+    """
+    place = new.place.copy()
+    was, now = old.coordinate, new.coordinate
+    alone = (was.imag != 0) & (now.imag == 0)
+    if np.any(alone) and len(new.found.coordinate) > len(place):
+        free = np.setdiff1d(np.flatnonzero(new.found.coordinate.imag == 0), place)
+        for i in np.flatnonzero(alone):
+            if not len(free):
+                break
+            middle = (was[i] + (new.mu - old.mu) * old.tangents[i]).real
+            halves_to = 0.5 * (now[i] + new.found.coordinate[free]).real
+            k = int(np.argmin(np.abs(halves_to - middle)))
+            if new.found.coordinate[free[k]].real > now[i].real:
+                place[i], free[k] = free[k], place[i]
+    # Without damping pairs are matched by rule already.
+    if np.all(was == old.values) and not _agreed(old, new, place, unit):
+        return None
+    return State(new.found, place)
+
+
+def _agreed(old: State, new: State, place: IntArray, unit: float) -> bool:
+    """Exchange, in ``place``, damped modes that have met or passed one another where they bear each other's names;
+    False where a shorter step must tell."""
+    x, slopes, x_to, slopes_to = old.coordinate, old.tangents, new.coordinate, new.tangents
+    sure = True
+    for i in range(len(x_to) - 1):
+        distance = np.abs(x_to - x_to[i])
+        distance[i] = np.inf
+        j = int(np.argmin(distance))
+        if j <= i:
+            continue
+        told = beyond(
+            (x[i], x[j]), (slopes[i], slopes[j]), (x_to[i], x_to[j]), (slopes_to[i], slopes_to[j]),
+            new.mu - old.mu, unit,
+        )  # fmt: skip
+        if told is None:
+            continue
+        sure &= told.sure
+        if told.exchanged:
+            place[[i, j]] = place[[j, i]]
+    return sure
 
 
 def _clear(reduced: Reduced, old: State, found: Eigenpairs, place: IntArray, distance: Array) -> BoolArray:
@@ -181,7 +249,25 @@ def _as_pair(old: State, found: Eigenpairs, i: int, place: IntArray, clear: Bool
     if i > j and _turned(new_square, square):
         half = -half
     first = int(np.argmin(np.abs(found.coordinate[both] - new_mean - half)))
+    if (new_square * square.conjugate()).real > 0 and _crossed(old, found, (i, j), both[[first, 1 - first]]):
+        first = 1 - first
     return j, int(both[first]), int(both[1 - first])
+
+
+def _crossed(old: State, found: Eigenpairs, branches: tuple[int, int], both: IntArray) -> bool:
+    """Whether two branches, of which the first would go to both[0], have exchanged their order instead: their
+    difference then runs straight through zero, which its slopes at both ends say. Shapes do not: where friction couples
+    two modes one way only, they are one shape there."""
+    i, j = branches
+    before = complex(old.coordinate[i] - old.coordinate[j])
+    after = complex(found.coordinate[both[0]] - found.coordinate[both[1]])
+    slopes = complex(old.tangents[i] - old.tangents[j]), complex(found.tangents[both[0]] - found.tangents[both[1]])
+    if not np.all(np.isfinite(slopes)):
+        return False
+    step = found.mu - old.mu
+    kept = abs(before + step * (slopes[0] + slopes[1]) / 2 - after)
+    exchanged = abs(before + step * (slopes[0] - slopes[1]) / 2 + after)
+    return exchanged <= STRAIGHT * abs(before) and kept > 4 * exchanged
 
 
 def halves(first: complex, second: complex) -> tuple[complex, complex]:

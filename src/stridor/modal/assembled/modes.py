@@ -12,13 +12,13 @@ from ...errors import CaseError
 from ...system import System
 from ...threads import one_thread_if_small
 from ...typing import Array, BoolArray
-from ..complex_modes import ComplexModes, Progress, require_memory, undamped
+from ..options import Options
 from ..quadratic.reach import searched
+from ..results import ComplexModes, Progress, require_memory
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
 from .refine import BELIEVED, MARGIN, Band, left_vectors, projected, settle
-from .steady import Options
 from .whole import quadratic_of
 
 SAMPLES = 7
@@ -50,7 +50,7 @@ def complex_modes_assembled(
     if max_frequency_hz is not None and not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     if not damped:
-        system = undamped(system)
+        system = system.undamped()
     single = float(values.max()) if len(values) == 1 else None
     problem = problem_of(system, single, options or Options(), damped=damped, frictions=values)
     top = float(values.max())

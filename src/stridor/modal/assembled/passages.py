@@ -51,11 +51,12 @@ def crossings(old: State, new: State) -> list[Passage]:
             start = -STILL * scale
         marks = [0.0, *_turns(start, end, *slopes), 1.0]
         rates = [_cubic(start, end, *slopes, mark) for mark in marks]
-        for (a, b), (first, second) in zip(pairwise(marks), pairwise(rates), strict=True):
-            if first * second < 0:
-                low, high = old.mu + a * step, old.mu + b * step
-                partner = _neighbour(new, i)
-                found.append(Passage("crossing", low, high, i, partner, first > 0, (0j, 0j), old))
+        passed = [k for k in range(len(marks) - 1) if rates[k] * rates[k + 1] < 0]
+        for k in passed:
+            # One that is alone lies somewhere in the step: where the cubic turns is not known to the last.
+            a, b = (0.0, 1.0) if len(passed) == 1 else (marks[k], marks[k + 1])
+            low, high = old.mu + a * step, old.mu + b * step
+            found.append(Passage("crossing", low, high, i, _neighbour(new, i), rates[k] > 0, (0j, 0j), old))
     return found
 
 

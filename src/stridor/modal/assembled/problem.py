@@ -12,8 +12,9 @@ import scipy.sparse as sp
 from ...errors import AnalysisError
 from ...system import System
 from ...typing import Array, ComplexArray, IntArray, Sparse
+from ..options import Options
 from ..quadratic.problem import times
-from .steady import Options, Steadiness, contact_rows, steadiness, touching_nodes
+from .steady import Steadiness, contact_rows, steadiness, touching_nodes
 
 CHUNK = 64  # columns worked on at a time
 

@@ -16,7 +16,7 @@ from .problem import ContactProblem, times, tiny
 from .reduced import Eigenpairs, Reduced
 from .shifted import Shifted, frictionless_modes, modes_below, real_columns, shift_for
 
-TOLERANCE = 2e-9  # backward error at which an eigenpair counts as found
+TOLERANCE = 2e-11  # backward error at which an eigenpair counts as found: eigenvalues are right to 1e-9 then
 LARGEST_REST = 1e-4  # and what it may leave of the lumped inertia forces
 BELIEVED = 1e-8  # backward error above which the answer is refused
 SWEEPS = 40

@@ -15,19 +15,7 @@ from ...sliding.stick_slip import StickRows
 from ...sliding.surfaces import STILL
 from ...system import System
 from ...typing import Array, BoolArray, IntArray, Sparse
-
-
-@dataclass(frozen=True)
-class Options:
-    """Which effects of the steady state count beside the friction law's slope, which always does.
-
-    friction_damping: vibration across the slip turns the friction force by δẇ/|v|, which damps (space only).
-    prestress: the geometric stiffness that the steady stresses make. solver: that of `direct.factorise`.
-    """
-
-    friction_damping: bool = False
-    prestress: bool = False
-    solver: str | None = None
+from ..options import Options
 
 
 @dataclass(frozen=True)

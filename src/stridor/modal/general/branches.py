@@ -101,6 +101,7 @@ def solved(
             one = replace(one, onset=replace(one.onset, enters_at=place))
         if not any(_same(one.onset, other.onset, family) for other in found):
             found.append(one)
+    found = without_crossings(found)
     inside = (f.onset for f in found if between[0] <= f.onset.mu <= between[1])
     balance += sum((-1 if o.stabilising else 1) * (1 if o.kind == "divergence" else 2) for o in inside)
     explained = _explained(lost)
@@ -110,6 +111,25 @@ def solved(
         _agree(family, state, end, top, fast) for state, end in zip((way.low, way.high), ends, strict=True)
     )
     return found, way, agree and explained and growing[1] - growing[0] == balance
+
+
+def without_crossings(found: list[Found]) -> list[Found]:
+    """Without undamped modes that cross: rounding makes them meet and part again at one place, and grow in between by
+    no more than rounding, κ√Δμ at most."""
+    crossings: set[int] = set()
+    for k, one in enumerate(found):
+        for m, other in enumerate(found):
+            begins, ends = one.onset, other.onset
+            if begins.stabilising or not ends.stabilising or begins.branches != ends.branches:
+                continue
+            sizes = begins.square_root_coefficient, ends.square_root_coefficient
+            if m in crossings or sizes[0] is None or sizes[1] is None:
+                continue
+            grows = max(sizes) * np.sqrt(max(ends.mu - begins.mu, 0.0))
+            if ends.mu >= begins.mu and grows <= NOTHING * 2 * np.pi * begins.frequency_hz:
+                crossings |= {k, m}
+                break
+    return [one for k, one in enumerate(found) if k not in crossings]
 
 
 def _concerned(passage: Passage) -> tuple[int, ...]:

@@ -23,8 +23,8 @@ from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...typing import Array, ComplexArray, Sparse
 from ..assembled.problem import ContactProblem, problem_of
-from ..assembled.steady import Options
 from ..assembled.whole import quadratic_of
+from ..options import Options
 from ..parametric import Parameter, ParametricProblem, Term
 from ..parametric.contacts_rigid import Elimination, eliminate
 from ..parametric.problem import Role

@@ -8,18 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import AnalysisError
-from ..assembled.follow import Follower, State, halves
+from ..assembled.follow import Follower, State
 from ..assembled.passages import Passage, crossings, meetings
 from ..histories import Entries
 from .basis import Along
-from .family import Family
 
 BEYOND = 1.1  # modes above the band may meet inside it
 STEPS = {False: 30, True: 12}  # over the range at least, on a basis and by full solves
 MOST_STEPS = {False: 1500, True: 200}
 ENOUGH = {False: 240, True: 60}  # where what grows can be counted instead; twice as many where steps are finer
 SMALLEST = 1.01e-9  # step at which the follower goes on whatever it sees
-EXACTLY = 1e-10  # of the range: how far off the real axis two modes may meet that meet on it
 
 
 @dataclass(frozen=True)
@@ -59,13 +57,11 @@ def follower(
             raise AnalysisError(f"{steps} steps lead no further than to {_untold(family.low + new.mu)}")
         if new.mu - old.mu <= SMALLEST and not _surely(source, old, new):
             unsure(family.low + new.mu)
-        if not family.reversible:
-            _agree_on_names(family, old, new)
         if watch is not None:
             watch(old, new)
 
     longest = (family.high - family.low) / (finer * STEPS[source.whole])
-    return Follower(source, longest=longest, watch=seen)
+    return Follower(source, longest=longest, watch=seen, unit=family.high - family.low)
 
 
 def surely(source: Along) -> Follower:
@@ -79,27 +75,6 @@ def surely(source: Along) -> Follower:
 
 def _untold(mu: float) -> str:
     return f"mu = {mu:.6g}, where branches cannot be told apart"
-
-
-def _agree_on_names(family: Family, old: State, new: State) -> None:
-    """Which branch is which beyond a μ where two damped modes meet exactly is a matter of taste, and rounding shall not
-    have it: the first grows, and where they part it has the higher frequency, as without damping."""
-    for i in range(len(new.place)):
-        distance = np.abs(new.values - new.values[i])
-        distance[i] = np.inf
-        j = int(np.argmin(distance))
-        if j <= i or len(distance) < 2:
-            continue
-        before, after = (halves(s.coordinate[i], s.coordinate[j])[1] for s in (old, new))
-        if (after * before.conjugate()).real >= 0:
-            continue
-        # How far beside the real axis the straight line between them passes zero, in terms of μ.
-        aside = abs((after * before.conjugate()).imag) / abs(after - before) ** 2 * (new.mu - old.mu)
-        first, second = new.values[i], new.values[j]
-        wrong = first.real < second.real if after.real > 0 else first.imag < second.imag
-        if aside <= EXACTLY * (family.high - family.low) and wrong:
-            # In place: the follower goes on from here.
-            new.place[[i, j]] = new.place[[j, i]]
 
 
 def followed(source: Along, low: float, high: float, top: float, finer: int = 1) -> Followed:

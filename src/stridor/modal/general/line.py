@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...typing import Array, ComplexArray, Sparse
-from ..assembled.steady import Options
+from ..options import Options
 from ..parametric import Parameter, ParametricProblem, ReducedModel, Term
 from ..parametric.dense import assembled
 from ..quadratic import Quadratic

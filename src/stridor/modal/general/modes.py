@@ -20,10 +20,10 @@ import numpy as np
 from ...errors import CaseError
 from ...system import System
 from ...typing import Array, ComplexArray
-from ..assembled.steady import Options
-from ..complex_modes import ComplexModes, Progress, require_memory
+from ..options import Options
 from ..quadratic import band_modes
 from ..quadratic.reach import searched
+from ..results import ComplexModes, Progress, require_memory
 from .basis import DECAY, NOTHING
 from .family import SystemFamily, family_of
 from .numbers import Numbers, numbered

@@ -10,8 +10,8 @@ import numpy as np
 from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...threads import one_thread
-from ..assembled.steady import Options
 from ..onset import Onsets
+from ..options import Options
 from ..quadratic import Spectrum
 from ..quadratic.reach import searched
 from .basis import AT_REST, Along, Projected, along, whole_or_raise

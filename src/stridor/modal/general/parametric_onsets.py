@@ -13,8 +13,8 @@ import numpy as np
 from ...errors import CaseError
 from ...threads import one_thread
 from ...typing import ComplexArray
-from ..assembled.steady import Options
 from ..onset import Onset, from_above
+from ..options import Options
 from ..parametric import ReducedModel
 from ..parametric.basis import expanded
 from .branches import ends_of

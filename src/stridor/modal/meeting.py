@@ -1,0 +1,66 @@
+"""Which branch is which beyond a place where two modes meet, for whoever follows branches.
+
+The mean a and the squared half difference b of two eigenvalues are smooth in μ where the two are not. Between two μ the
+cubic through b and its slopes at both ends says where b is zero: at a complex μ as a rule. Then √b goes on along one
+side of that zero and the names with it. Where the zero lies on the real axis, or nearer to it than ``MET``, the two
+meet, and what is which beyond is a matter of taste: the first grows, and where they part it has the higher frequency.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+MET = 1e-6  # of μ: how far off the real axis modes may meet that count as meeting on it
+FAINT = 1e-12  # of the largest coefficient: one that says nothing
+KNOWN = 1e-3  # of a step: how well the cubic knows how far off the axis its zero is
+SHORT = 1e-4  # of μ: steps in which it is known to better than MET
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """What becomes of two branches over a step: exchanged, whether the two are to be exchanged; sure: whether the step
+    is short enough to say so."""
+
+    exchanged: bool
+    sure: bool
+
+
+def beyond(
+    old: tuple[complex, complex], old_slopes: tuple[complex, complex], new: tuple[complex, complex],
+    new_slopes: tuple[complex, complex], step: float, unit: float = 1.0,
+) -> Beyond | None:  # fmt: skip
+    """Whether two eigenvalues that a step of μ takes from ``old`` to ``new`` bear their names rightly; None where they
+    neither meet nor pass one another.
+
+    The slopes are those over μ of each at both ends. unit: what of another parameter compares with one of μ.
+    """
+    before, after = ((pair[0] - pair[1]) / 2 for pair in (old, new))
+    square, square_to = before**2, after**2
+    if not (square_to * square.conjugate()).real < 0:
+        return None
+    slope, slope_to = before * (old_slopes[0] - old_slopes[1]), after * (new_slopes[0] - new_slopes[1])
+    if not (np.isfinite(slope) and np.isfinite(slope_to)):
+        return None
+    zeros = _zeros(square, square_to, step * slope, step * slope_to)
+    between = zeros[(zeros.real > -0.5) & (zeros.real < 1.5)]
+    aside = float(np.abs(between.imag).min(initial=np.inf)) * step
+    sure = step <= SHORT * unit or aside > max(MET * unit, KNOWN * step)
+    if aside <= max(MET * unit, 0.0 if sure else KNOWN * step):
+        # √b is the growth of one and the decay of the other where it is more real than not.
+        opening = square_to.real > 0
+        return Beyond(bool(after.real < 0 if opening else after.imag < 0), sure)
+    angle = float(np.sum(np.angle((1 - zeros) / (0 - zeros))))
+    going_on = before / abs(before) * np.exp(0.5j * angle)
+    return Beyond(bool((after * np.conj(going_on)).real < 0), sure)
+
+
+def _zeros(start: complex, end: complex, first: complex, second: complex) -> np.ndarray:
+    """Zeros over the step, from 0 to 1, of the cubic through two values and slopes."""
+    cubic = 2 * start - 2 * end + first + second
+    square = -3 * start + 3 * end - 2 * first - second
+    coefficients = np.array([cubic, square, first, start])
+    faint = np.abs(coefficients) <= FAINT * np.abs(coefficients).max()
+    leading = int(np.argmin(faint))
+    return np.roots(coefficients[leading:])

@@ -1,0 +1,205 @@
+"""Complex modes by receptance: few contact nodes on a complete basis, branches followed from μ = 0."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..system import System
+from ..system.uncoupled import uncoupled_modes
+from ..typing import Array, ComplexArray, IntArray
+from .backward_error import BackwardError
+from .coupling import Coupling, couple
+from .refinement import refine
+from .results import ComplexModes, Progress, require_memory
+from .roots import Spectrum, spectrum_of
+from .tracking import Tracker
+from .unfit import Unfit
+from .vectors import expand, fixed_vectors, modal_coordinates
+
+CHUNK = 256
+DOUBTFUL = 1e-11  # backward errors above it are refined on the assembled matrices
+
+
+def prepare(system: System, *, mu: float | None = None) -> tuple[Spectrum, Coupling, tuple[str, ...]]:
+    """Spectrum of a system with the contacts that touch in steady sliding at ``mu``."""
+    coupling, open_contacts = couple(system, mu=mu)
+    modes = uncoupled_modes(coupling.system)
+    return spectrum_of(coupling, modes), coupling, open_contacts
+
+
+def modes_by_receptance(
+    system: System,
+    values: Array,
+    *,
+    count: int,
+    max_frequency_hz: float | None,
+    damped: bool,
+    vectors: bool | Literal["right"],
+    progress: Progress | None,
+) -> ComplexModes:
+    """Modes at the friction coefficients values (k,), as `complex_modes` gives them.
+
+    Raises Unfit for a structure whose basis is not complete or whose stiffness is not positive, FollowingError where
+    branches cannot be told apart, AnalysisError where contacts do not slide or nothing oscillates.
+    """
+    if not damped:
+        system = system.undamped()
+    spectrum, coupling, open_contacts = prepare(system, mu=float(values.max()) if len(values) == 1 else None)
+    if spectrum.modes.indefinite or (spectrum.unseen and coupling.contacts):
+        raise Unfit(unfit_words(spectrum), max_frequency_hz or _limit(spectrum, count, None) / (2 * np.pi))
+    limit = _limit(spectrum, count, max_frequency_hz)
+    if not limit > 0.0:
+        raise AnalysisError("nothing in the system oscillates: it has no stiffness at all")
+    tracker = Tracker(spectrum, limit)
+    start, fixed = tracker.origin, spectrum.fixed
+    require_memory(len(values), len(start) + len(fixed), system.size if vectors else 0)
+    values, followed, planned = _followed(tracker, values, progress)
+    every = np.concatenate([start, fixed])
+    columns = np.argsort(np.abs(every.imag), kind="stable")
+    number = np.empty(len(columns), dtype=np.int64)
+    number[columns] = np.arange(1, len(columns) + 1)
+    if max_frequency_hz is None:
+        columns = columns[:count]
+    else:
+        top = 2 * np.pi * max_frequency_hz
+        lowest = np.concatenate([followed.imag.min(axis=0), fixed.imag])
+        columns = columns[(every.imag[columns] <= top) | (np.abs(lowest[columns]) <= top)]
+    moving = np.flatnonzero(columns < len(start))
+    still = np.flatnonzero(columns >= len(start))
+    eigenvalues = np.empty((len(values), len(columns)), dtype=complex)
+    eigenvalues[:, moving] = followed[:, columns[moving]]
+    eigenvalues[:, still] = fixed[columns[still] - len(start)]
+    judge = BackwardError(coupling)
+    residual = np.zeros((len(values), len(columns)))
+    shapes = np.zeros((2, len(values), len(columns), system.size if vectors else 0), dtype=complex)
+    constant = fixed_vectors(spectrum)[:, columns[still] - len(start)].astype(complex)
+    residual[:, still] = _judge_fixed(judge, spectrum, eigenvalues[0, still], constant, values)
+    if vectors:
+        shapes[0][:, still] = constant.T
+        for row, m in enumerate(values):
+            shapes[1][row, still] = _left_of_fixed(coupling, eigenvalues[0, still], constant, float(m)).T
+    part = _pairs(spectrum, judge, eigenvalues[:, moving], values, shapes if vectors else None, moving)
+    eigenvalues[:, moving], residual[:, moving] = part
+    return ComplexModes(
+        mu=values,
+        eigenvalues=eigenvalues,
+        branch=number[columns],
+        residual=residual,
+        damped=damped,
+        right=shapes[0] if vectors else None,
+        left=shapes[1] if vectors else None,
+        open_contacts=open_contacts,
+        max_frequency_hz=max_frequency_hz,
+        planned=planned,
+    )
+
+
+def _followed(
+    tracker: Tracker, values: Array, progress: Progress | None
+) -> tuple[Array, ComplexArray, int | None]:
+    """μ (k,), roots (k, b), and how many μ there were to be where it was interrupted."""
+    start, asked = tracker.origin, len(values)
+    followed = np.zeros((asked, len(start)), dtype=complex)
+    done = np.zeros(asked, dtype=bool)
+    try:
+        for at, k in enumerate(np.argsort(values, kind="stable"), start=1):
+            followed[k] = tracker.advance(float(values[k])).roots[: len(start)]
+            done[k] = True
+            if progress is not None:
+                progress(at, asked)
+    except KeyboardInterrupt:
+        if not done.any():
+            raise
+    if done.all():
+        return values, followed, None
+    return values[done], followed[done], asked
+
+
+def _judge_fixed(
+    judge: BackwardError, spectrum: Spectrum, lam: ComplexArray, vectors: ComplexArray, mu: Array
+) -> Array:
+    """Backward errors (k, b) of the modes that no contact sees: the same at every μ."""
+    if not len(lam):
+        return np.zeros((len(mu), 0))
+    return np.broadcast_to(judge(lam, vectors, 0.0), (len(mu), len(lam)))
+
+
+def _left_of_fixed(coupling: Coupling, lam: ComplexArray, right: ComplexArray, mu: float) -> ComplexArray:
+    """Left vectors (n, b) of modes that no contact sees.
+
+    Friction works on the modes' tangential motion, so the left vectors do meet the contacts.
+    """
+    left = np.array(right)
+    for k in range(len(lam)):
+        left[:, k] = refine(coupling, complex(lam[k]), right[:, k], right[:, k], mu)[2]
+    return left
+
+
+def _pairs(
+    spectrum: Spectrum,
+    judge: BackwardError,
+    eigenvalues: ComplexArray,
+    mu: Array,
+    shapes: ComplexArray | None,
+    columns: IntArray,
+) -> tuple[ComplexArray, Array]:
+    """Eigenvalues and backward errors (k, b); right and left vectors go to ``columns`` of ``shapes``.
+
+    All pairs of the sweep are one list, worked through in pieces that stay in the cache.
+    """
+    count = eigenvalues.shape[1]
+    if not count:
+        return eigenvalues, np.zeros(eigenvalues.shape)
+    lam, each = eigenvalues.ravel(), np.repeat(mu, count)
+    forces = [modal_coordinates(spectrum, row, float(m)) for row, m in zip(eigenvalues, mu, strict=True)]
+    push, pull = (np.concatenate([f[side] for f in forces]) for side in (0, 1))
+    errors = np.zeros(len(lam))
+    for start in range(0, len(lam), CHUNK):
+        part = np.arange(start, min(start + CHUNK, len(lam)))
+        right = expand(spectrum, lam[part], push[part])
+        errors[part] = judge(lam[part], right, each[part])
+        doubtful = np.flatnonzero(~(errors[part] < DOUBTFUL))
+        chosen = np.arange(len(part)) if shapes is not None else doubtful
+        left = np.zeros_like(right)
+        if len(chosen):
+            left[:, chosen] = expand(spectrum, lam[part[chosen]], pull[part[chosen]])
+        for k in doubtful:
+            at = part[k]
+            value, x, y = refine(
+                spectrum.coupling, complex(lam[at]), right[:, k], left[:, k], float(each[at])
+            )
+            error = float(judge(np.array([value]), x[:, None], each[at])[0])
+            if error < errors[at] or not np.isfinite(errors[at]):
+                errors[at], lam[at], right[:, k], left[:, k] = error, value, x, y
+        if shapes is not None:
+            shapes[0, part // count, columns[part % count]] = right.T
+            shapes[1, part // count, columns[part % count]] = left.T
+    return lam.reshape(eigenvalues.shape), errors.reshape(eigenvalues.shape)
+
+
+def _limit(spectrum: Spectrum, count: int, max_frequency_hz: float | None) -> float:
+    """|λ| [1/s] up to which roots must be followed."""
+    if max_frequency_hz is not None:
+        return 2 * np.pi * max_frequency_hz
+    # Interlacing: m contacts shift the k-th frequency by at most m places.
+    poles = np.sort(np.sqrt(np.abs(spectrum.modes.stiffness)))
+    if spectrum.modes.general:
+        poles = np.sort(np.concatenate([poles, np.abs(spectrum.modes.poles[spectrum.modes.poles.imag >= 0])]))
+    place = count + spectrum.coupling.contacts
+    if place < len(poles):
+        return float(poles[place]) * (1 + 1e-9)
+    # All of them: contact springs raise the highest frequency by no more than they are stiff.
+    soft = spectrum.coupling.compliance > 0
+    normal = spectrum.receptance.real[0::2][soft]
+    added = np.sum((normal**2).sum(axis=1) / spectrum.coupling.compliance[soft])
+    return float(np.sqrt(poles[-1] ** 2 + added)) * (1 + 1e-9)
+
+
+def unfit_words(spectrum: Spectrum) -> str:
+    """Why roots of the receptance are not sought."""
+    if spectrum.modes.indefinite:
+        return "a motion of the structure has a stiffness that is not positive"
+    return "modes of the structure that no contact sees have no stiffness to tell them by"

@@ -1,0 +1,308 @@
+"""Onsets of instability by receptance, solved: the μ at which an eigenvalue reaches the imaginary axis.
+
+Branches are followed over the range and every passage into or out of instability is enclosed; then
+Newton solves for it on the assembled matrices. Undamped flutter is a double root, T = ∂T/∂λ = 0 in
+the bordered sense; a damped onset is a simple root λ = jω; divergence is λ = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..system import System
+from ..typing import BoolArray, ComplexArray
+from .backward_error import BackwardError
+from .bordered import Bordered
+from .coupling import Coupling
+from .histories import Change, Entries, reported, unexplained
+from .onset import Branches, Onset, Onsets
+from .receptance_modes import prepare, unfit_words
+from .results import UNSTABLE_RELATIVE, grows
+from .roots import Spectrum
+from .tracking import State, Tracker
+from .unfit import Unfit
+
+NARROWINGS = 8
+BELIEVED = 1e-8  # backward error above which a solved onset is no onset
+
+
+@dataclass(frozen=True)
+class _Event:
+    """A passage between two followed states: guesses for μ and λ, and who is concerned."""
+
+    mu: float
+    root: complex
+    branch: int
+    partner: int
+    stabilising: bool
+    double: bool
+    index: int
+    old: State
+    new: State
+
+
+def onsets_by_receptance(
+    system: System,
+    friction_range: tuple[float, float],
+    *,
+    max_frequency_hz: float,
+    damped: bool,
+    follow: float,
+) -> Onsets:
+    """Every critical μ in ``friction_range``, as `onsets` gives them; follow: branches are followed that start up to so
+    many times the band. Raises Unfit and FollowingError as `modes_by_receptance`."""
+    low, high = friction_range
+    if not damped:
+        system = system.undamped()
+    spectrum, coupling, open_contacts = prepare(system)
+    if (spectrum.modes.indefinite or spectrum.unseen) and coupling.contacts:
+        raise Unfit(unfit_words(spectrum), max_frequency_hz)
+    has_damping = bool(np.abs(system.damping).max() > 0) or coupling.sloped
+    top = 2 * np.pi * max_frequency_hz
+    if not coupling.contacts:
+        fixed = _growing(spectrum.fixed, top)
+        return Onsets((), (low, high), max_frequency_hz, has_damping, open_contacts, at_start=fixed, at_end=fixed)
+    events: list[_Event] = []
+    entries = Entries(top)
+    # Roots that start above the band may meet inside it; follow some beyond.
+    tracker = Tracker(spectrum, top * follow)
+
+    def watch(old: State, new: State) -> None:
+        count = len(old.roots)
+        events.extend(_passages(spectrum, old, new, has_damping))
+        entries.watch((old.mu, new.mu), old.roots, new.roots[:count], new.branch[:count])
+
+    tracker.watch = watch
+    start = tracker.advance(low)
+    end = tracker.advance(high)
+    order = _numbering(spectrum, tracker.origin)
+    judge = BackwardError(coupling)
+    changes = [
+        Change(event.mu, _concerned(event), _located(spectrum, judge, event, order, has_damping)) for event in events
+    ]
+    return Onsets(
+        tuple(reported(changes, entries, (low, high), max_frequency_hz)),
+        (low, high),
+        max_frequency_hz,
+        has_damping,
+        open_contacts,
+        at_start=_growing(np.concatenate([start.roots, spectrum.fixed]), top),
+        at_end=_growing(np.concatenate([end.roots, spectrum.fixed]), top),
+        unexplained=unexplained(
+            end.branch[_inside(end.roots, top)].tolist(),
+            np.flatnonzero(_inside(tracker.origin, np.inf)).tolist(),
+            changes,
+        ),
+        followed=(_numbered(start, spectrum, order), _numbered(end, spectrum, order)),
+    )
+
+
+def _numbered(state: State, spectrum: Spectrum, order: dict[int, int]) -> Branches:
+    """Numbers and eigenvalues (b,) of the branches at one μ, twins in the lower half plane left out."""
+    known = [k for k in range(len(state.roots)) if int(state.branch[k]) in order and state.roots[k].imag >= 0]
+    numbers = [order[int(state.branch[k])] for k in known]
+    fixed = sorted(set(range(1, len(order) + len(spectrum.fixed) + 1)) - set(order.values()))
+    unseen = spectrum.fixed[np.argsort(np.abs(spectrum.fixed.imag), kind="stable")]
+    return np.array(numbers + fixed, dtype=np.int64), np.concatenate([state.roots[known], unseen])
+
+
+def _inside(roots: ComplexArray, top: float) -> BoolArray:
+    """Which roots (k,) grow with a frequency up to top [1/s], twins in the lower half plane left out."""
+    return grows(roots, top if np.isfinite(top) else 0.0) & (roots.imag >= 0) & (roots.imag <= top)
+
+
+def _growing(roots: ComplexArray, top: float) -> tuple[complex, ...]:
+    return tuple(roots[_inside(roots, top)].tolist())
+
+
+def _concerned(event: _Event) -> tuple[int, ...]:
+    """The branches that a passage is of: both that meet, else the one that crosses."""
+    return (event.branch, event.partner) if event.double and event.partner >= 0 else (event.branch,)
+
+
+def _numbering(spectrum: Spectrum, roots: ComplexArray) -> dict[int, int]:
+    """Tracked root → mode number from 1 by frequency at μ = 0, modes that no contact sees included."""
+    everything = np.concatenate([roots, spectrum.fixed])
+    rank = np.argsort(np.argsort(np.abs(everything.imag), kind="stable"), kind="stable")
+    return {k: int(rank[k]) + 1 for k in range(len(roots))}
+
+
+def _passages(spectrum: Spectrum, old: State, new: State, has_damping: bool) -> list[_Event]:
+    """Enclosed changes of stability between two neighbouring states."""
+    step = new.mu - old.mu
+    events: list[_Event] = []
+    for i in range(len(old.roots)):
+        a, b = old.roots[i], new.roots[i]
+        if has_damping:
+            for fraction, stabilising in _axis_crossings(
+                a.real, b.real, old.tangents[i].real * step, new.tangents[i].real * step
+            ):
+                mu = old.mu + fraction * step
+                events.append(
+                    _Event(
+                        mu,
+                        a + fraction * (b - a),
+                        int(new.branch[i]),
+                        _named(new, _nearest(new.roots, i, b)),
+                        stabilising,
+                        False,
+                        i,
+                        old,
+                        new,
+                    )
+                )
+            continue
+        was, now = _grows(a), _grows(b)
+        if was == now:
+            continue
+        j = _partner(old, new, i)
+        first = ((a - old.roots[j]) / 2) ** 2 if j >= 0 else a**2
+        second = ((b - new.roots[j]) / 2) ** 2 if j >= 0 else b**2
+        fraction = float(np.clip((first / (first - second)).real, 0.0, 1.0)) if first != second else 0.5
+        means = ((a + old.roots[j]) / 2, (b + new.roots[j]) / 2) if j >= 0 else (0.0, 0.0)
+        middle = (1 - fraction) * means[0] + fraction * means[1]
+        at = old.mu + fraction * step
+        events.append(_Event(at, complex(middle), int(new.branch[i]), _named(new, j), was, True, i, old, new))
+    return events
+
+
+def _grows(root: complex) -> bool:
+    return bool(abs(root.real) > UNSTABLE_RELATIVE * abs(root))
+
+
+def _named(state: State, i: int) -> int:
+    return int(state.branch[i]) if i >= 0 else -1
+
+
+def _nearest(roots: ComplexArray, i: int, root: complex) -> int:
+    distance = np.abs(roots - root)
+    distance[i] = np.inf
+    j = int(np.argmin(distance)) if len(roots) > 1 else i
+    # A root nearer to its own conjugate than to any other diverges rather than flutters.
+    return -1 if 2 * abs(root.imag) < distance[j] else j
+
+
+def _partner(old: State, new: State, i: int) -> int:
+    """The root that shares the coalescence: i's conjugate twin mirrored, i.e. equal frequency after it."""
+    split = new if _grows(new.roots[i]) else old
+    if abs(split.roots[i].imag) < 1e-9 * abs(split.roots[i]):
+        return -1
+    distance = np.abs(split.roots + np.conj(split.roots[i]))
+    distance[i] = np.inf
+    distance[len(old.roots) :] = np.inf
+    return int(np.argmin(distance))
+
+
+def _axis_crossings(start: float, end: float, slope0: float, slope1: float) -> list[tuple[float, bool]]:
+    """Zeros in (0, 1] of the cubic through real parts and slopes at both ends; True: stabilising.
+
+    The cubic sees a root that grows and decays again inside one step.
+    """
+    c3 = 2 * start - 2 * end + slope0 + slope1
+    c2 = -3 * start + 3 * end - 2 * slope0 - slope1
+    if start * end > 0 and min(abs(start), abs(end)) > abs(slope0) + abs(slope1):
+        return []
+    # Beside a coalescence slopes explode and the cubic overshoots; keep it within reason there.
+    if max(abs(slope0), abs(slope1)) > 20 * max(abs(end - start), 1e-300) and start * end < 0:
+        return [(start / (start - end), start > 0)]
+    found: list[tuple[float, bool]] = []
+    for root in np.roots([c3, c2, slope0, start]):
+        if abs(root.imag) < 1e-12 and 0 < root.real <= 1:
+            slope = 3 * c3 * root.real**2 + 2 * c2 * root.real + slope0
+            found.append((float(root.real), bool(slope < 0)))
+    return sorted(found)
+
+
+def _located(
+    spectrum: Spectrum, judge: BackwardError, event: _Event, order: dict[int, int], has_damping: bool
+) -> Onset | None:
+    """The onset inside an enclosed passage; where Newton strays, the passage is enclosed more closely."""
+    for _ in range(NARROWINGS):
+        onset = _solve(spectrum.coupling, judge, event, order, has_damping)
+        if onset is not None:
+            reach = 0.5 * (event.new.mu - event.old.mu) + 1e-9
+            near = event.old.mu - reach <= onset.mu <= event.new.mu + reach
+            here = event.double or abs(2 * np.pi * onset.frequency_hz - abs(event.root.imag)) <= _distance(event)
+            if near and here and onset.residual <= BELIEVED:
+                return onset
+        closer = _narrowed(spectrum, event, has_damping)
+        if closer is None:
+            return None
+        event = closer
+    return None
+
+
+def _distance(event: _Event) -> float:
+    """How far an onset's ω may lie from the guess: what the root moves over the passage, and some more."""
+    moved = abs(event.new.roots[event.index] - event.old.roots[event.index])
+    return 2.0 * moved + 1e-6 * abs(event.root) + 1e-3
+
+
+def _narrowed(spectrum: Spectrum, event: _Event, has_damping: bool) -> _Event | None:
+    """The same passage between states a quarter as far apart or closer, None where it is gone."""
+    inner: list[_Event] = []
+    tracker = Tracker.resumed(spectrum, event.old)
+    tracker.watch = lambda old, new: inner.extend(_passages(spectrum, old, new, has_damping))
+    width = event.new.mu - event.old.mu
+    try:
+        for part in (0.25, 0.5, 0.75, 1.0):
+            tracker.advance(event.old.mu + part * width)
+    except AnalysisError:
+        return None
+    same = [e for e in inner if e.index == event.index and e.stabilising == event.stabilising]
+    return min(same, key=lambda e: abs(e.mu - event.mu), default=None)
+
+
+def _solve(
+    coupling: Coupling, judge: BackwardError, event: _Event, order: dict[int, int], has_damping: bool
+) -> Onset | None:
+    """Newton on the assembled matrices from an enclosed passage; None where it was no passage."""
+    bordered = Bordered(coupling, event.root if abs(event.root) > 0 else 0j, event.mu)
+    partner = order[event.partner] if event.partner >= 0 else order[event.branch]
+    branches = (min(order[event.branch], partner), max(order[event.branch], partner))
+    root: float | None = None
+    slope: float | None = None
+    exceptional: complex | None = None
+    if not event.double:
+        answer = bordered.crossing(event.root, event.mu)
+        if answer is None:
+            return None
+        omega, mu, slope = answer
+        lam = 1j * omega
+        kind: Literal["flutter", "divergence"] = (
+            "divergence" if abs(omega) < 1e-6 * max(abs(event.root), 1.0) else "flutter"
+        )
+        near = None if kind == "divergence" else bordered.double_root(lam, mu, real=False)
+        if near is not None and abs(near[1] - mu) < 0.5 * max(mu, 1e-3):
+            exceptional, root = complex(near[1]), near[2]
+        stabilising = slope < 0
+    elif event.partner < 0:
+        mu = bordered.static(event.mu)
+        if mu is None:
+            return None
+        lam, kind, stabilising = 0j, "divergence", event.stabilising
+        root = bordered.divergence_coefficient(mu)
+    else:
+        double = bordered.double_root(event.root, event.mu, real=True)
+        if double is None:
+            return None
+        lam, mu, root = 1j * double[0].imag, float(np.real(double[1])), double[2]
+        kind, stabilising = "flutter", event.stabilising
+    vector = bordered.vector(lam, mu)
+    residual = float(judge(np.array([lam]), vector[:, None], mu)[0])
+    return Onset(
+        mu=float(mu),
+        frequency_hz=abs(lam.imag) / (2 * np.pi),
+        kind=kind,
+        damped=has_damping,
+        stabilising=bool(stabilising),
+        branches=branches,
+        residual=residual,
+        square_root_coefficient=root,
+        growth_slope=slope,
+        exceptional_mu=exceptional,
+    )

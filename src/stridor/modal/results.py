@@ -1,0 +1,183 @@
+"""What the modal approach gives: complex modes at one or many μ."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import CaseError
+from ..typing import Array, BoolArray, ComplexArray, IntArray
+
+MOST_BYTES = 4e9  # of eigenvalues and vectors held at one time
+UNSTABLE_RELATIVE = 1e-9  # of |λ|: below it a real part is rounding
+LEAST = 1e-5  # of the band: what |λ| is taken to be at least for that
+BORDER = 1e-12  # of the band: what rounding may put a mode outside by
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class ComplexModes:
+    """Modes over μ (k,), one column per branch (b,).
+
+    eigenvalues λ (k, b) [1/s]: growth rate + j angular frequency. branch (b,) numbers the modes from
+    1 by frequency at μ = 0. residual (k, b): componentwise backward error in the assembled matrices.
+    right, left (k, b, n) unit vectors where asked for, else None. damped: whether C was used.
+    open_contacts: contacts that carry no load in steady sliding and so take no part. completeness: of matrices without
+    structure, for each μ what speaks for no mode of the band being missed, and what the numbers are if branches could
+    not be followed; of all others which of these μ were checked in the full problem. Where a branch is not known there
+    is NaN. max_frequency_hz: the end of the band, None where modes were counted; ``held`` (k,): how many modes of the
+    band there are at each μ, where not all of them are kept here. notes: what else is to be known. planned: how many μ
+    were asked for, where it was interrupted before the last. contact_state: where contacts may stick, how many nodes
+    stick, slip and are open, and at which μ; they do so at every μ of the list. source: where the eigenpairs come from,
+    a name of `modal.source`.
+    """
+
+    mu: Array
+    eigenvalues: ComplexArray
+    branch: IntArray
+    residual: Array
+    damped: bool
+    right: ComplexArray | None = None
+    left: ComplexArray | None = None
+    open_contacts: tuple[str, ...] = ()
+    completeness: tuple[str, ...] = ()
+    contact_state: str = ""
+    provenance: dict[str, Any] = field(default_factory=dict)
+    max_frequency_hz: float | None = None
+    held: IntArray | None = None
+    notes: tuple[str, ...] = ()
+    planned: int | None = None
+    source: str = ""
+
+    @property
+    def frequency_hz(self) -> Array:
+        """Im λ / 2π (k, b)."""
+        return self.eigenvalues.imag / (2 * np.pi)
+
+    @property
+    def growth_rate(self) -> Array:
+        """Re λ (k, b) [1/s], positive when unstable."""
+        return self.eigenvalues.real
+
+    @property
+    def damping_ratio(self) -> Array:
+        """−Re λ/|λ| (k, b)."""
+        size = np.abs(self.eigenvalues)
+        return -np.divide(self.eigenvalues.real, size, out=np.zeros_like(size), where=size > 0)
+
+    @property
+    def unstable(self) -> BoolArray:
+        """Whether Re λ > 0 beyond rounding (k, b)."""
+        return grows(self.eigenvalues, self._top)
+
+    @property
+    def _top(self) -> float:
+        """The highest angular frequency [1/s] that matters, which says what is none."""
+        if self.max_frequency_hz is not None:
+            return 2 * np.pi * self.max_frequency_hz
+        size = np.abs(self.eigenvalues)
+        return float(size[np.isfinite(size)].max(initial=0.0))
+
+    @property
+    def in_band(self) -> BoolArray:
+        """Whether a mode is known at a μ and of a frequency of the band (k, b)."""
+        known = np.isfinite(self.eigenvalues)
+        if self.max_frequency_hz is None:
+            return known
+        return known & (self.frequency_hz <= self.max_frequency_hz * (1 + BORDER))
+
+    @property
+    def total(self) -> IntArray:
+        """How many modes of the band there are at each μ (k,), kept here or not."""
+        return self.in_band.sum(axis=1) if self.held is None else self.held
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether friction coefficients that were asked for are missing."""
+        return self.planned is not None
+
+    def chosen(self, columns: IntArray) -> ComplexModes:
+        """These columns (c,) alone."""
+        return replace(
+            self,
+            eigenvalues=self.eigenvalues[:, columns],
+            branch=self.branch[columns],
+            residual=self.residual[:, columns],
+            right=None if self.right is None else self.right[:, columns],
+            left=None if self.left is None else self.left[:, columns],
+        )
+
+    def lowest(self, count: int) -> ComplexModes:
+        """The ``count`` branches of lowest number, and every other one that is unstable in the band at some μ."""
+        unstable = np.any(self.unstable & self.in_band, axis=0)
+        first = np.arange(len(self.branch)) < count
+        return replace(self.chosen(np.flatnonzero(first | unstable)), held=self.total)
+
+    def order(self, row: int, sort: Literal["frequency", "growth"] = "frequency") -> IntArray:
+        """Columns of the modes of the band at one μ, by frequency, or the fastest growing first."""
+        inside = np.flatnonzero(self.in_band[row])
+        keys = self.frequency_hz[row, inside] if sort == "frequency" else -self.growth_rate[row, inside]
+        return inside[np.argsort(keys, kind="stable")]
+
+    def at(self, mu: float) -> int:
+        """Row of the μ nearest to ``mu``."""
+        return int(np.argmin(np.abs(self.mu - mu)))
+
+    def to_json(
+        self, *, sort: Literal["frequency", "growth"] = "frequency", unstable: bool = False
+    ) -> dict[str, Any]:
+        """The document that `stridor modes --json` prints; ``unstable``: of these modes alone."""
+        rows: list[list[dict[str, Any]]] = []
+        marks, ratio = self.unstable, self.damping_ratio
+        for k in range(len(self.mu)):
+            rows.append(
+                [
+                    {
+                        "frequency_hz": float(self.frequency_hz[k, b]),
+                        "growth_rate": float(self.growth_rate[k, b]),
+                        "damping_ratio": float(ratio[k, b]),
+                        "unstable": bool(marks[k, b]),
+                        "residual": float(self.residual[k, b]),
+                        "branch": int(self.branch[b]),
+                    }
+                    for b in self.order(k, sort)
+                    if marks[k, b] or not unstable
+                ]
+            )
+        return {
+            "mu": [float(m) for m in self.mu],
+            "modes": rows,
+            "unstable_modes": np.sum(marks & self.in_band, axis=1).tolist(),
+            "modes_in_band": self.total.tolist(),
+            "max_frequency_hz": self.max_frequency_hz,
+            "damped": self.damped,
+            **({"source": self.source} if self.source else {}),
+            "open_contacts": list(self.open_contacts),
+            **({"completeness": list(self.completeness)} if self.completeness else {}),
+            **({"contact_state": self.contact_state} if self.contact_state else {}),
+            **({"notes": list(self.notes)} if self.notes else {}),
+            **({"interrupted_of": self.planned} if self.planned is not None else {}),
+        }
+
+
+def grows(values: ComplexArray, top: float) -> BoolArray:
+    """Whether Re λ > 0 beyond rounding, of a problem whose highest frequency of interest is top [1/s]."""
+    with np.errstate(invalid="ignore"):
+        return values.real > UNSTABLE_RELATIVE * np.maximum(np.abs(values), LEAST * top)
+
+
+def require_memory(rows: int, columns: int, freedoms: int = 0) -> None:
+    """Raise CaseError where modes at that many μ, with vectors of so many freedoms, take more memory than there is to
+    be had."""
+    needed = 64.0 * rows * columns + 32.0 * rows * columns * freedoms
+    if needed > MOST_BYTES:
+        fits = int(rows * MOST_BYTES / needed)
+        raise CaseError(
+            "mu", f"{rows} friction coefficients",
+            f"at most {fits} of them: with {columns} modes each takes {needed / rows / 1e3:.3g} kB, all of them "
+            f"{needed / 1e9:.3g} GB of {MOST_BYTES / 1e9:g} GB; take fewer, or a lower modal.max_frequency_hz",
+        )  # fmt: skip

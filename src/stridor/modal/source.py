@@ -1,0 +1,218 @@
+"""Where eigenpairs come from: sources that differ in cost, never in meaning.
+
+- receptance: few point contacts on a complete basis of the structure without them. The fastest.
+- krylov: sparse symmetric matrices that stand without friction, on a basis enriched until it is right.
+- full: any matrices, searched region by region. The slowest, and the one that takes everything.
+
+`sources_for` names those that take a system, the fastest first; where one turns out not to serve, the next is asked. A
+source asked for by name is the only one. That all give the same is tested (`test_source_agreement`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol, TypeVar
+
+from ..errors import AnalysisError, CaseError, FollowingError
+from ..system import System
+from ..typing import Array
+from .assembled import NotPositive, complex_modes_assembled, onsets_assembled
+from .general import general_modes, general_onsets
+from .onset import Onsets
+from .options import Options
+from .quadratic.find import WHOLE
+from .receptance_modes import modes_by_receptance
+from .receptance_onsets import onsets_by_receptance
+from .results import ComplexModes, Progress
+from .unfit import Unfit
+
+Answer = TypeVar("Answer", ComplexModes, Onsets)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of a source: the band (None: as many branches as ``count``), whether C is used, what is kept.
+
+    follow: branches are followed that start up to so many times the band. unfollowed: why they were not, where another
+    source tried.
+    """
+
+    max_frequency_hz: float | None
+    damped: bool
+    options: Options
+    count: int | None = 20
+    vectors: bool | Literal["right"] = False
+    progress: Progress | None = None
+    follow: float = 1.1
+    unfollowed: str = ""
+
+    @property
+    def band_hz(self) -> float:
+        """The end of the band [Hz]. Raises CaseError where branches are counted instead."""
+        if self.max_frequency_hz is None:
+            raise CaseError("max_frequency_hz", None, "missing – modes are sought in a band")
+        return self.max_frequency_hz
+
+
+class EigenSource(Protocol):
+    """Whoever gives the eigenpairs of a band over μ, and the onsets between."""
+
+    @property
+    def name(self) -> str:
+        """The word a user chooses it by."""
+        ...
+
+    def refuses(self, system: System) -> str:
+        """Why it does not take a system, as far as can be seen without computing; "" if it does."""
+        ...
+
+    def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
+        """Modes at values (k,) of μ. Raises Unfit and FollowingError where another source may serve."""
+        ...
+
+    def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
+        """Onsets between two μ. Raises Unfit where another source may serve."""
+        ...
+
+
+class Receptance:
+    """Roots of the contacts' receptance."""
+
+    name = "receptance"
+
+    def refuses(self, system: System) -> str:
+        """See `EigenSource`."""
+        return system.beyond_points
+
+    def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
+        """See `EigenSource`."""
+        return modes_by_receptance(
+            system, values, count=asked.count or 20, max_frequency_hz=asked.max_frequency_hz, damped=asked.damped,
+            vectors=asked.vectors, progress=asked.progress,
+        )  # fmt: skip
+
+    def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
+        """See `EigenSource`."""
+        return onsets_by_receptance(
+            system, friction_range, max_frequency_hz=asked.band_hz, damped=asked.damped, follow=asked.follow
+        )
+
+
+class Krylov:
+    """Frictionless modes and enrichment on one symmetric factorisation."""
+
+    name = "krylov"
+
+    def refuses(self, system: System) -> str:
+        """See `EigenSource`."""
+        return system.general
+
+    def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
+        """See `EigenSource`."""
+        try:
+            return complex_modes_assembled(
+                system, values, count=asked.count or 20, max_frequency_hz=asked.max_frequency_hz, damped=asked.damped,
+                vectors=asked.vectors, options=asked.options, progress=asked.progress,
+            )  # fmt: skip
+        except NotPositive as error:
+            raise Unfit(str(error), asked.max_frequency_hz) from error
+
+    def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
+        """See `EigenSource`."""
+        try:
+            return onsets_assembled(
+                system, friction_range, max_frequency_hz=asked.band_hz, damped=asked.damped, options=asked.options,
+                follow=asked.follow,
+            )  # fmt: skip
+        except NotPositive as error:
+            raise Unfit(str(error), asked.max_frequency_hz) from error
+
+
+class Full:
+    """The region search, matrices of any structure."""
+
+    name = "full"
+
+    def refuses(self, system: System) -> str:
+        """See `EigenSource`."""
+        return ""
+
+    def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
+        """See `EigenSource`."""
+        if asked.max_frequency_hz is None and system.general:
+            raise CaseError("max_frequency_hz", None, f"missing – {system.general}: modes are sought in a band")
+        return general_modes(
+            lambda _: system, values, count=asked.count, max_frequency_hz=asked.band_hz, damped=asked.damped,
+            vectors=asked.vectors, options=asked.options, progress=asked.progress, unfollowed=asked.unfollowed,
+        )  # fmt: skip
+
+    def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
+        """See `EigenSource`."""
+        return general_onsets(
+            lambda _: system, friction_range, max_frequency_hz=asked.band_hz, damped=asked.damped,
+            options=asked.options,
+        )  # fmt: skip
+
+
+SOURCES: tuple[EigenSource, ...] = (Receptance(), Krylov(), Full())
+
+
+def sources_for(system: System, name: str | None = None) -> tuple[EigenSource, ...]:
+    """The sources that take a system, the fastest first; with a name that one alone.
+
+    Raises CaseError for a name that none has, AnalysisError where the named one does not take the system.
+    """
+    if name is None:
+        # What turned out not to suit receptances is known to suit any matrices alone.
+        first = next(source for source in SOURCES if not source.refuses(system))
+        return (first,) if first is SOURCES[-1] else (first, SOURCES[-1])
+    chosen = next((source for source in SOURCES if source.name == name), None)
+    if chosen is None:
+        names = ", ".join(source.name for source in SOURCES)
+        raise CaseError("source", name, f"one of {names}, or none for what suits")
+    if why := chosen.refuses(system):
+        raise AnalysisError(f"source {name}: {why}; {_others(system)}")
+    return (chosen,)
+
+
+def require_full(name: str | None) -> None:
+    """Raise AnalysisError for a source by name that takes no matrices which depend on μ."""
+    if name not in (None, SOURCES[-1].name):
+        raise AnalysisError(
+            f"source {name}: factors of imported matrices depend on mu; leave it out, or take {SOURCES[-1].name}"
+        )
+
+
+def answered(
+    system: System, asked: Asked, ask: Callable[[EigenSource, Asked], Answer], *, without_following: bool
+) -> Answer:
+    """The answer of the first source that serves.
+
+    without_following: whether a source that follows no branches is asked where they cannot be told apart.
+    """
+    *first, last = sources_for(system, asked.options.source)
+    for source in first:
+        try:
+            return replace(ask(source, asked), source=source.name)
+        except Unfit as error:
+            band = asked.max_frequency_hz
+            if band is None and error.band_hz is None:
+                raise
+            count = asked.count if band is None else None
+            asked = replace(asked, count=count, max_frequency_hz=band or error.band_hz)
+        except FollowingError as error:
+            if not without_following or asked.max_frequency_hz is None or system.size > WHOLE:
+                raise
+            # What is the matter, without the advice, which is for those who get no answer.
+            asked = replace(asked, count=None, unfollowed=str(error).partition(";")[0])
+    try:
+        return replace(ask(last, asked), source=last.name)
+    except Unfit as error:
+        raise Unfit(f"source {last.name}: {error}; {_others(system)}") from error
+
+
+def _others(system: System) -> str:
+    """What to ask for instead of a source that does not serve."""
+    fit = [source.name for source in SOURCES if not source.refuses(system)]
+    return f"leave it out for what suits, or take {' or '.join(fit[-1:])}"

@@ -1,0 +1,126 @@
+"""Sources of eigenpairs differ in cost, never in meaning: the same modes, onsets and branch names from each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse.linalg as sla
+
+import stridor as st
+from benches import Slave, bench, paper_case
+from rubbing_block import rubbing_block
+from stridor.case import template_text
+from stridor.modal.options import Options
+from stridor.modal.over_friction import modes_of_band, onsets_of_band
+from stridor.modal.source import SOURCES, sources_for
+from stridor.system import System, build_system
+
+pytestmark = pytest.mark.verification
+
+SAME_MU, SAME_ROOT = 1e-10, 1e-9  # of an onset; of the eigenvalues, relative
+BAND = 20e3
+NAMES = [source.name for source in SOURCES]
+
+
+def two_beams(damped: bool, stiffness: float | str) -> st.Case:
+    case = paper_case(contacts__A__stiffness=stiffness)
+    if damped:
+        return case
+    return case.with_({f"bodies.{name}.damping": {"mass": 0.0, "stiffness": 0.0} for name in case.bodies})
+
+
+def pad_on_disc() -> st.Case:
+    """The brake of the examples, as coarse as its parts allow."""
+    changes = {"disc": [4, 48, 1], "lining": [4, 8, 1], "plate": [3, 6, 1]}
+    return st.loads(template_text("pad-on-disc")).with_(
+        {f"bodies.{name}.mesh.divisions": divisions for name, divisions in changes.items()}
+    )
+
+
+def rounding(system: System) -> float:
+    """What ten roundings of K may change in λ²/2 of any mode, ε ω²/2 of the fastest one each (Weyl): of the lowest modes
+    of fine meshes that is more than 1e-9."""
+    highest = sla.eigsh(system.stiffness.tocsc(), 1, system.mass.tocsc(), which="LM", return_eigenvectors=False)[0]
+    return 5.0 * np.finfo(float).eps * float(highest)
+
+
+def answers(system: System, names: Sequence[str], band: float, end: float) -> dict[str, st.Onsets]:
+    return {name: onsets_of_band(system, (0.0, end), band, options=Options(source=name)) for name in names}
+
+
+def pairs(found: st.ComplexModes, row: int) -> np.ndarray:
+    """Eigenvalues of the band at one μ by the numbers of their branches."""
+    values = found.eigenvalues[row, found.in_band[row]]
+    return values[np.argsort(found.branch[found.in_band[row]])]
+
+
+def assert_same(system: System, names: Sequence[str], *, band: float = BAND, end: float = 1.0) -> int:
+    """Onsets, their branches, eigenvalues and branches' names of every source are those of the first; how many onsets
+    there are."""
+    first, *others = names
+    solved = answers(system, names, band, end)
+    mus = [0.25 * end, end]
+    listed = {name: modes_of_band(system, mus, band, options=Options(source=name)) for name in names}
+    for name in others:
+        mine, theirs = ([o for o in solved[n].onsets if o.enters_at is None] for n in (first, name))
+        assert [(o.kind, o.stabilising, o.branches) for o in mine] == [
+            (o.kind, o.stabilising, o.branches) for o in theirs
+        ], (name, solved[first].completeness, solved[name].completeness)
+        np.testing.assert_allclose([o.mu for o in mine], [o.mu for o in theirs], rtol=0, atol=SAME_MU, err_msg=name)
+        np.testing.assert_allclose([o.frequency_hz for o in mine], [o.frequency_hz for o in theirs], rtol=SAME_ROOT)
+        for row in range(len(mus)):
+            ours, away = (listed[n].branch[listed[n].in_band[row]].tolist() for n in (first, name))
+            # The full search also lists the other half of a mode that has fallen apart on the real axis.
+            halves = [b for b in away if b not in ours]
+            assert sorted(ours) == sorted(b for b in away if b not in halves), (name, mus[row])
+            columns = np.isin(listed[name].branch, halves)
+            assert np.all(listed[name].eigenvalues[row, columns].imag == 0.0)
+            here, there = pairs(listed[first], row), pairs(listed[name].chosen(np.flatnonzero(~columns)), row)
+            off = np.abs(here - there) / (SAME_ROOT * np.abs(here) + rounding(system) / np.abs(here))
+            assert off.max(initial=0.0) <= 1.0, (name, mus[row], here[np.argmax(off)], there[np.argmax(off)])
+    assert all(solved[name].source == listed[name].source == name for name in names)
+    return len(solved[first].onsets)
+
+
+ALL = [(damped, stiffness) for damped in (True, False) for stiffness in (1e10, 1e8, "rigid")]
+FAST = [(True, "rigid"), (False, 1e8)]
+
+
+@pytest.mark.parametrize(
+    ("damped", "stiffness"), [pytest.param(*c, marks=() if c in FAST else pytest.mark.slow) for c in ALL]
+)
+def test_two_beams_by_every_source(damped, stiffness):
+    assert assert_same(build_system(two_beams(damped, stiffness)), NAMES) >= 3
+
+
+@pytest.mark.parametrize("seed", [3, *(pytest.param(s, marks=pytest.mark.slow) for s in range(20) if s != 3)])
+def test_random_benches_by_every_source(seed):
+    """One to three beams on a master, on nodes and between them, rigid and elastic contacts mixed."""
+    random = np.random.default_rng(seed)
+    slaves = [
+        Slave(
+            place=place, lean_deg=random.uniform(2.0, 12.0), length=random.uniform(0.03, 0.06),
+            thickness=random.uniform(1e-3, 2e-3), stiffness=random.choice([1e7, 1e9, np.inf]),
+            end=random.choice(["guided", "clamped"]),
+        )
+        for place in np.sort(random.uniform(0.3, 0.9, size=1 + seed % 3))
+    ]  # fmt: skip
+    slaves = [replace(s, stiffness="rigid" if np.isinf(s.stiffness) else float(s.stiffness), end=str(s.end)) for s in slaves]
+    assert_same(bench(*slaves), NAMES, end=0.8)
+
+
+@pytest.mark.slow
+def test_solids_by_every_source_that_takes_them():
+    """A block rubbing along a slider, eight nodes of contact over a surface."""
+    text = rubbing_block("max_frequency_hz = 15e3\nfriction_range = [0.0, 0.8]")
+    system = build_system(st.loads(text))
+    assert [source.name for source in sources_for(system)] == ["krylov", "full"]
+    assert_same(system, NAMES[1:], band=15e3, end=0.4)
+
+
+@pytest.mark.slow
+def test_pad_on_disc_by_every_source_that_takes_it():
+    assert assert_same(build_system(pad_on_disc()), NAMES[1:], band=7e3, end=0.5) >= 1
