@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..typing import ComplexArray
+
 MET = 1e-6  # of μ: how far off the real axis modes may meet that count as meeting on it
 FAINT = 1e-12  # of the largest coefficient: one that says nothing
 KNOWN = 1e-3  # of a step: how well the cubic knows how far off the axis its zero is
@@ -56,11 +58,11 @@ def beyond(
     return Beyond(bool((after * np.conj(going_on)).real < 0), sure)
 
 
-def _zeros(start: complex, end: complex, first: complex, second: complex) -> np.ndarray:
+def _zeros(start: complex, end: complex, first: complex, second: complex) -> ComplexArray:
     """Zeros over the step, from 0 to 1, of the cubic through two values and slopes."""
     cubic = 2 * start - 2 * end + first + second
     square = -3 * start + 3 * end - 2 * first - second
     coefficients = np.array([cubic, square, first, start])
     faint = np.abs(coefficients) <= FAINT * np.abs(coefficients).max()
     leading = int(np.argmin(faint))
-    return np.roots(coefficients[leading:])
+    return np.asarray(np.roots(coefficients[leading:]), dtype=complex)

@@ -122,10 +122,10 @@ def without_crossings(found: list[Found]) -> list[Found]:
             begins, ends = one.onset, other.onset
             if begins.stabilising or not ends.stabilising or begins.branches != ends.branches:
                 continue
-            sizes = begins.square_root_coefficient, ends.square_root_coefficient
-            if m in crossings or sizes[0] is None or sizes[1] is None:
+            opens, closes = begins.square_root_coefficient, ends.square_root_coefficient
+            if m in crossings or opens is None or closes is None:
                 continue
-            grows = max(sizes) * np.sqrt(max(ends.mu - begins.mu, 0.0))
+            grows = max(opens, closes) * np.sqrt(max(ends.mu - begins.mu, 0.0))
             if ends.mu >= begins.mu and grows <= NOTHING * 2 * np.pi * begins.frequency_hz:
                 crossings |= {k, m}
                 break
