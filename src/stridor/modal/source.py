@@ -215,4 +215,4 @@ def answered(
 def _others(system: System) -> str:
     """What to ask for instead of a source that does not serve."""
     fit = [source.name for source in SOURCES if not source.refuses(system)]
-    return f"leave it out for what suits, or take {' or '.join(fit[-1:])}"
+    return f"leave it out for what suits, or take {' or '.join(fit)}"
