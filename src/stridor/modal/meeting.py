@@ -15,6 +15,7 @@ import numpy as np
 from ..typing import ComplexArray
 
 MET = 1e-6  # of μ: how far off the real axis modes may meet that count as meeting on it
+AT_IT = 1e-5  # of μ: how near a step may end to a meeting and be said to end there
 FAINT = 1e-12  # of the largest coefficient: one that says nothing
 KNOWN = 1e-3  # of a step: how well the cubic knows how far off the axis its zero is
 SHORT = 1e-4  # of μ: steps in which it is known to better than MET
@@ -40,10 +41,12 @@ def beyond(
     """
     before, after = ((pair[0] - pair[1]) / 2 for pair in (old, new))
     square, square_to = before**2, after**2
-    if not (square_to * square.conjugate()).real < 0:
-        return None
     slope, slope_to = before * (old_slopes[0] - old_slopes[1]), after * (new_slopes[0] - new_slopes[1])
     if not (np.isfinite(slope) and np.isfinite(slope_to)):
+        return None
+    # A step that ended where they meet has left the names to the next.
+    from_there = abs(square) <= AT_IT * unit * abs(slope) and abs(square) < abs(square_to)
+    if not ((square_to * square.conjugate()).real < 0 or from_there):
         return None
     zeros = _zeros(square, square_to, step * slope, step * slope_to)
     between = zeros[(zeros.real > -0.5) & (zeros.real < 1.5)]
@@ -54,7 +57,7 @@ def beyond(
         opening = square_to.real > 0
         return Beyond(bool(after.real < 0 if opening else after.imag < 0), sure)
     angle = float(np.sum(np.angle((1 - zeros) / (0 - zeros))))
-    going_on = before / abs(before) * np.exp(0.5j * angle)
+    going_on = before / max(abs(before), 1e-300) * np.exp(0.5j * angle)
     return Beyond(bool((after * np.conj(going_on)).real < 0), sure)
 
 
