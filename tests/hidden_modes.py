@@ -37,6 +37,12 @@ def entering_block() -> st.Case:
     return st.loads(slider.replace("coefficient = 0.4", f"coefficient = {MU_OF_BLOCK}") + BLOCK)
 
 
+def hidden_block() -> st.Case:
+    """The same with more damping of the faster of the two, so that they do not meet and the one from above grows; where
+    they meet the other does, by rule, and is no hidden one."""
+    return entering_block().with_({"bodies.block.damping": {"mass": 2.0, "stiffness": 1e-6}})
+
+
 def entering_points() -> System:
     """Five oscillators, damped a little unevenly, under three compliant point contacts."""
     normal = [[-1.0, 1.0, -1.1, 0.5, 0.2], [0.5, -0.9, 0.6, 2.4, -1.9], [2.4, -0.4, 0.7, -1.3, -1.7]]

@@ -11,7 +11,7 @@ import scipy.linalg as sl
 
 import stridor as st
 from benches import by_hand, full_eigenvalues
-from hidden_modes import HZ_OF_POINTS, MU_OF_BLOCK, MU_OF_POINTS, entering_block, entering_points
+from hidden_modes import HZ_OF_POINTS, MU_OF_BLOCK, MU_OF_POINTS, entering_points, hidden_block
 from matrix_cases import matrix_case
 from rubbing_block import rubbing_block
 from stridor.modal.assembled import Options
@@ -80,14 +80,14 @@ def test_a_mode_of_point_contacts_that_enters_the_band_is_found(hz: float, told:
 
 
 def test_a_mode_of_a_meshed_body_that_enters_the_band_is_found():
-    case = entering_block()
+    case = hidden_block()
     dense = dense_of_meshed(case, MU_OF_BLOCK, touching_at=MU_OF_BLOCK)
     grown = must_be_there(dense, 2 * np.pi * case.modal.max_frequency_hz)
     assert len(grown) == 1
-    assert st.modes(case, [0.0, MU_OF_BLOCK]).total.tolist() == [1, 2]  # else nothing enters
+    assert not st.modes(case, MU_OF_BLOCK, check=False).unstable.any()  # else this tests nothing
     found = st.modes(case, MU_OF_BLOCK)
     assert found.eigenvalues[found.unstable] == pytest.approx(grown, rel=1e-7)
-    assert found.completeness[0].startswith("Checked: 1 mode grows")
+    assert "1 of which starts above it" in found.completeness[0]
 
 
 # -- point contacts ----------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stridor as st
-from hidden_modes import MU_OF_BLOCK, entering_block
+from hidden_modes import MU_OF_BLOCK, entering_block, hidden_block
 from stridor.agreement import critical as bisecting
 from stridor.agreement.perturbation import Perturbation
 from stridor.agreement.result import judge, likeness
@@ -78,9 +78,9 @@ def test_sensitivities_are_those_of_the_mode_that_entered_the_band(case: st.Case
     assert not found.warnings
 
 
-def test_sensitivities_say_that_modes_were_not_checked(case: st.Case, monkeypatch: pytest.MonkeyPatch):
+def test_sensitivities_say_that_modes_were_not_checked(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(growing, "growing_modes", failing)
-    found = st.sensitivities(case, ["mu"])
+    found = st.sensitivities(hidden_block(), ["mu"])
     assert not len(found.branch)
     assert found.warnings[0] == "modes at μ = 1.1: Not checked: the search does not settle."
     assert found.warnings[1].startswith("no mode is unstable")
