@@ -413,3 +413,36 @@ def test_scaling_a_law_that_is_zero():
     assert Tabulated((0.0, 1.0), (0.0, 0.0)).scaled(0.2, 0.02) == Coulomb(0.2)
     assert Tabulated((0.0, 1.0), (0.5, 0.0)).scaled(0.2, 2.0) == StaticKinetic(0.2, 0.5)
     assert Weakening(0.0, 0.5, 1e-5).scaled(0.2, 1.0) == Weakening(0.2, 0.5, 1e-5)
+
+
+# -- made in Python ------------------------------------------------------------------------------------------
+
+
+def test_case_of_tables_is_that_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bench: Case):
+    monkeypatch.chdir(tmp_path)
+    rod = {"type": "beam", "material": "steel", "start": np.zeros(2), "end": (1, 0), "width": 0.01, "thickness": 0.01}
+    steel = {"steel": bench.materials["steel"]}
+    case = Case(materials=steel, bodies={"rod": {**rod, "elements": np.int64(4), "angle_deg": None}}, modal=None)
+    assert (case.bodies["rod"].elements, case.materials) == (4, steel)
+    assert loads(case.to_toml()) == case
+    short = Case(matrices=[{"file": Path("m.mtx"), "role": "mass"}])
+    assert short == loads('[[matrices]]\nfile = "m.mtx"\nrole = "mass"')
+    assert short.with_({"bodies.matrices.terms.0.file": "k.mtx"}).bodies["matrices"].terms[0].file == str(tmp_path / "k.mtx")
+    monkeypatch.chdir("/")
+    assert loads(short.to_toml()) == short
+
+
+def test_tables_that_no_file_could_hold():
+    within: dict[str, object] = {}
+    within["a"] = within
+    for tables, told in (
+        ({}, "bodies: missing – give tables [bodies.NAME], at least one"),
+        ({"bodies": {1: {}}}, "bodies: 1 – a key of a table must be a text"),
+        ({"bodies": {"rod": {None: 1}}}, "bodies.rod: a key of a table must be a text"),
+        ({"bodies": within}, f"bodies{'.a' * 20}: nested too deeply; at most 20 tables or lists in each other"),
+        ({"matrices": 3}, "matrices: 3 – must be a table with a list of terms, or that list, [[matrices]]"),
+        ({"bodies": [1]}, "bodies: [1] – must be tables [bodies.NAME], at least one"),
+    ):
+        with pytest.raises(CaseError) as error:
+            Case(**tables)
+        assert str(error.value) == told

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BaseModel, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from ..errors import CaseError, Problem
 from .bodies import BeamBody, MatrixBody
 from .checks import Parts, problems_between, slave_side
 from .expression import parse_expression
 from .fields import Name
+from .given import as_written, plain
 from .matrix_checks import MU
 from .messages import problems_of
 from .oddities import oddities
@@ -43,8 +44,10 @@ from .schema import (
 class Case(Table):
     """Bodies, what holds and loads them, where they slide, and the settings of the analyses. SI units.
 
-    Frozen; varied by copy with `with_`. Made by `load`, `loads` or `Case.checked`, which raise CaseError with
-    every problem found; the class itself raises pydantic's ValidationError for values of the wrong kind.
+    Case(bodies={…}, contacts={…}, …) takes the tables of a case file (docs/case-file.md) as dictionaries and lists,
+    with NumPy numbers and arrays and paths where they are handy; None is as left out, and relative paths of meshes and
+    matrices start at the working directory. Frozen; varied by copy with `with_`, written with `to_toml`. Raises
+    CaseError with every problem found, in the words and with the places that `load` and `loads` give.
     """
 
     title: str = Field(default="", description="a text")
@@ -73,16 +76,20 @@ class Case(Table):
     comparison: Comparison = Field(default=Comparison(), description="a table [comparison]")
     reference: Reference | None = Field(default=None, description="a table [reference]")
 
-    @classmethod
-    def checked(cls, data: Mapping[str, Any]) -> Case:
-        """The case that data, as read from TOML, describe. Raises CaseError with every problem found."""
+    def __init__(self, /, **tables: Any) -> None:
+        data = as_written(tables)
         try:
-            return cls.model_validate(data)
+            super().__init__(**data)
         except ValidationError as error:
-            found = problems_of(error, data, cls)
+            found = problems_of(error, data, type(self))
             told = {problem.where for problem in found}
             between = [problem for problem in problems_between(_sound(data, error)) if problem.where not in told]
             raise CaseError.many(_in_file_order([*found, *between])) from None
+
+    @classmethod
+    def checked(cls, data: Mapping[str, Any]) -> Case:
+        """The case that data, as read from TOML, describe. Raises CaseError with every problem found."""
+        return cls(**data)
 
     @model_validator(mode="after")
     def _fits_together(self) -> Case:
@@ -117,7 +124,7 @@ class Case(Table):
         data = self._data()
         problems: list[Problem] = []
         for path, value in {**(changes or {}), **more}.items():
-            problems.extend(apply(data, split_path(path), _plain(value)))
+            problems.extend(apply(data, split_path(path), plain(value, path)))
         if problems:
             raise CaseError.many(problems)
         return Case.checked(data)
@@ -258,16 +265,3 @@ def _in_file_order(problems: list[Problem]) -> list[Problem]:
         return order.index(head) if head in order else -1
 
     return sorted(problems, key=place)
-
-
-def _plain(value: object) -> object:
-    """NumPy scalars and arrays, tuples and tables as TOML would give them."""
-    if isinstance(value, BaseModel):
-        return value.model_dump(mode="json", exclude_unset=True, exclude_none=True)
-    if hasattr(value, "tolist"):
-        return cast("Any", value).tolist()
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in cast("Mapping[str, object]", value).items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in cast("list[object]", value)]
-    return value

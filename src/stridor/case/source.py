@@ -7,11 +7,11 @@ import tomllib
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..errors import CaseError
 from ..reading import irregular
-from .outsized import deep_line, outsized
+from .outsized import deep_line
 
 if TYPE_CHECKING:
     from .model import Case
@@ -60,49 +60,18 @@ def loads(
         raise CaseError(source, None, f"not valid TOML: {_readable(error)}") from None
     if not data and not overrides:
         raise CaseError(source, None, "empty; a case needs at least one table [bodies.NAME]")
-    from .model import Case  # half a second, which a file that is none does not wait for
+    from .given import as_written  # half a second, which a file that is none does not wait for
+    from .model import Case
     from .overrides import override
 
-    problems = override(data, overrides)
-    problems = problems or outsized(data)
-    if problems:
+    if problems := override(data, overrides):
         raise CaseError.many(problems)
-    _spell_out(data)
-    _resolve_files(data, folder or Path.cwd())
-    return Case.checked(data)
+    return Case.checked(as_written(data, folder))
 
 
 def _readable(error: ValueError) -> str:
     said = str(error)
     return "a whole number has thousands of digits" if "digits" in said else said
-
-
-def _spell_out(data: dict[str, Any]) -> None:
-    """[matrices], or a list [[matrices]] of its terms, as the body called matrices that it stands for."""
-    if "matrices" not in data:
-        return
-    short = data.pop("matrices")
-    bodies = data.setdefault("bodies", {})
-    if not isinstance(short, dict | list):
-        raise CaseError("matrices", short, "must be a table with a list of terms, or that list, [[matrices]]")
-    if not isinstance(bodies, dict) or "matrices" in bodies:
-        accepted = "stands for [bodies.matrices], which the case has as well; remove one of them"
-        raise CaseError("matrices", None, accepted)
-    table: Any = short if isinstance(short, dict) else {"terms": short}
-    bodies["matrices"] = {"type": "matrices", **table}
-
-
-def _resolve_files(data: dict[str, Any], folder: Path) -> None:
-    """Paths of files made absolute, so that a case means the same wherever it is saved."""
-    bodies = data.get("bodies")
-    for body in bodies.values() if isinstance(bodies, dict) else ():
-        if isinstance(body, dict):
-            terms = body.get("terms")
-            tables: list[Any] = [body, *(terms if isinstance(terms, list) else [])]
-            for table in tables:
-                for key in ("file", "labels", "mesh"):
-                    if isinstance(table, dict) and isinstance(table.get(key), str) and table[key]:
-                        table[key] = str(folder / table[key])
 
 
 def templates() -> list[str]:
