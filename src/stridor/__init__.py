@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from .study.copies import perturbed_copies
     from .study.countermeasures import rank_countermeasures
     from .study.damping_map import damping_map
+    from .study.pencil import pencil
     from .study.reduced import reduced_model
     from .study.sensitivities import sensitivities
     from .system import System, build_system
@@ -60,6 +61,7 @@ _HOMES = {
     "modes": ".study.analyses",
     "onsets": ".study.analyses",
     "open_dataset": ".io.datasets",
+    "pencil": ".study.pencil",
     "perturbed_copies": ".study.copies",
     "plot": ".view",
     "rank_countermeasures": ".study.countermeasures",
@@ -95,6 +97,7 @@ __all__ = [
     "modes",
     "onsets",
     "open_dataset",
+    "pencil",
     "perturbed_copies",
     "plot",
     "rank_countermeasures",

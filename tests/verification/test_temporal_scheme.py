@@ -16,7 +16,7 @@ from benches import Slave, bench, paper_case
 from marching import one_phase, paper_scheme, points_of, rod, run
 from stridor.errors import AnalysisError, CaseError
 from stridor.system import System, build_system
-from stridor.system.model import Constraint, Structure, constrain
+from stridor.system.motion import Constraint, Structure, constrain
 from stridor.temporal.beta2 import step_limit
 from stridor.temporal.schedule import PhaseSpec, lay_out
 from stridor.temporal.simulate import Settings, simulate

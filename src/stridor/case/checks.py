@@ -10,6 +10,7 @@ import math
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Literal
 
 from ..errors import CaseError, Problem
 from .bodies import AnyBody, BeamBody, MassBody, MatrixBody, SolidBody
@@ -210,13 +211,10 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
     pairs: dict[frozenset[str], str] = {}
     for name, contact in parts.contacts.items():
         where = f"contacts.{name}"
-        yield from _friction_problems(f"{where}.friction", contact.friction)
+        yield from law_problems(where, contact.friction, contact.stiffness, contact.cubic)
         if contact.interference and contact.sliding == "finite":
             accepted = 'needs sliding = "small": finite sliding finds the gaps anew from the places of the nodes'
             yield Problem(f"{where}.interference", contact.interference, accepted)
-        if contact.cubic and contact.stiffness == "rigid":
-            accepted = "nothing – rigid contact has no approach to take the cube of; give the contact a stiffness"
-            yield Problem(f"{where}.cubic", contact.cubic, accepted)
         pair = frozenset((contact.slave, contact.master))
         if pair in pairs:
             accepted = f"slides on {contact.master} in contacts.{pairs[pair]} already"
@@ -259,6 +257,16 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
         if contact.side is not None and not isinstance(master, BeamBody):
             accepted = "only a beam has sides; a boundary and an obstacle know theirs"
             yield Problem(f"{where}.side", contact.side, accepted)
+
+
+def law_problems(
+    where: str, friction: Friction, stiffness: float | Literal["rigid"], cubic: float
+) -> Iterator[Problem]:
+    """What does not fit together of the laws of a contact."""
+    yield from _friction_problems(f"{where}.friction", friction)
+    if cubic and stiffness == "rigid":
+        accepted = "nothing – rigid contact has no approach to take the cube of; give the contact a stiffness"
+        yield Problem(f"{where}.cubic", cubic, accepted)
 
 
 def _friction_problems(where: str, friction: Friction) -> Iterator[Problem]:

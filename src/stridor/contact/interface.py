@@ -82,6 +82,7 @@ def pair(
     stiffness: float,
     law: FrictionLaw,
     sliding: Literal["small", "finite"] = "small",
+    closed: bool = False,
 ) -> Contact | None:
     """Project the slave on the master line and build the operators; None where it is beyond an end."""
     chords = np.linalg.norm(np.diff(master_positions, axis=0), axis=1)
@@ -142,4 +143,5 @@ def pair(
         stiffness=stiffness,
         law=law,
         sliding=sliding,
+        closed=closed,
     )

@@ -14,17 +14,17 @@ from ..case.schema import Load, SteadyStep
 from ..contact.interface import Rows
 from ..errors import CaseError
 from ..fe.solid import stress_stiffness
-from ..matrices.report import definiteness
 from ..mesh.boundary import require_boundary
 from ..mesh.facets import facet_areas, pressure_load, traction_load
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody, build_bodies
 from .body_loads import body_load
+from .given_matrices import general_reason
 from .holders import holders_of
-from .imported import is_symmetric
 from .links import Links, links_of
 from .load_steps import LoadStep
-from .model import CubicSprings, Line, PrescribedMotion, Solid, Structure, System, constrain, place_name
+from .model import CubicSprings, Line, Solid, System
+from .motion import PrescribedMotion, Structure, constrain, place_name
 from .pairs import is_point_on_line, point_contact, surface_contact
 from .supports import Tied, constraints_of, tie_matrix
 from .view import View
@@ -85,7 +85,7 @@ def build_system(case: Case, mu: float | None = None) -> System:
         initial_velocity=_initial(case, view, "initial_velocity"),
         initial_displacement=_initial(case, view, "initial_displacement"),
         stress_stiffness=_stress_stiffness(case, view),
-        general=_general(mass, damping, stiffness) if case.imported else "",
+        general=general_reason(mass, damping, stiffness) if case.imported else "",
         holders=holders_of(case, view, contacts, surfaces),
         load_steps=_load_steps(case, motion),
         contact_cubic={name: contact.cubic for name, contact in case.contacts.items() if contact.cubic},
@@ -103,17 +103,6 @@ def _load_steps(case: Case, motion: PrescribedMotion) -> tuple[LoadStep, ...]:
         factors = np.array([velocities[name] for name in motion.names])
         found.append(LoadStep(dict(loads), factors, step.duration, step.increments))
     return tuple(found)
-
-
-def _general(mass: Sparse, damping: Sparse, stiffness: Sparse) -> str:
-    """What of imported matrices needs the solver for matrices without structure, "" where nothing does."""
-    for matrix, what in ((mass, "mass"), (damping, "damping"), (stiffness, "stiffness")):
-        if not is_symmetric(matrix):
-            return f"the {what} matrix is not symmetric"
-    without = int(np.count_nonzero(mass.diagonal() <= 0.0))
-    if without:
-        return f"{without} freedoms have no mass" if without > 1 else "1 freedom has no mass"
-    return "" if definiteness(mass)[0] == "positive definite" else "the mass matrix is not positive definite"
 
 
 def _structure(bodies: Mapping[str, BuiltBody], links: Links, tied: Tied | None) -> Structure:

@@ -109,7 +109,7 @@ def load_shares(case: Case, name: str, body: MatrixBody, mu: float | None = None
         mine = [k for k, share in enumerate(terms.shares) if share.role == role]
         if all(is_symmetric(moved[k]) for k in mine):
             for k in mine:
-                moved[k] = _cleaned(moved[k])
+                moved[k] = cleaned(moved[k])
     return tuple(replace(share, matrix=matrix) for share, matrix in zip(terms.shares, moved, strict=True))
 
 
@@ -132,7 +132,7 @@ def _placed(case: Case, name: str, body: MatrixBody, mu: float | None) -> tuple[
         zero = "the mass is zero" + (" where 1e36 in the stiffness does not hold it" if len(held) else "")
         raise CaseError(f"{where}.terms", None, f"{zero}; without a mass nothing vibrates")
     points = np.full((len(numbers), body.dimension), np.nan) if mesh is None else mesh.points
-    mass, damping, stiffness = (_cleaned(m) for m in matrices)
+    mass, damping, stiffness = (cleaned(m) for m in matrices)
     found = Imported(mass, damping, stiffness, points, numbers, np.flatnonzero(~present), tuple(extra), mesh)
     _check_points(where, body, found, terms.labels, present)
     return found, terms, place
@@ -324,7 +324,7 @@ def _present(matrices: list[Sparse]) -> BoolArray:
     return found
 
 
-def _cleaned(matrix: Sparse) -> Sparse:
+def cleaned(matrix: Sparse) -> Sparse:
     """A matrix that is symmetric up to rounding as one that is."""
     return sp.csr_array((matrix + matrix.T) / 2) if is_symmetric(matrix) else matrix
 

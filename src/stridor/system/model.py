@@ -10,17 +10,16 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ..contact.interface import Contact, Rows
 from ..contact.nodes import ContactNodes, stack
 from ..contact.surfaces import SurfaceContact
-from ..direct import factorise
-from ..errors import AnalysisError
 from ..fe.assembly import connected_components
 from ..typing import Array, IntArray, Sparse
+from .given_matrices import contacts_given, general_reason, points_given, square_matrices, vectors_given
 from .load_steps import LoadStep
+from .motion import PrescribedMotion
 
 COMPLETE_BASIS_LIMIT = 2500
 
@@ -59,45 +58,6 @@ class CubicSprings:
     rows: Rows
     coefficient: Array
     stretch: Array | float = 0.0
-
-
-@dataclass(frozen=True)
-class PrescribedMotion:
-    """Supports that move with a given velocity, condensed on one scalar each.
-
-    With u = w + L x_p, where L (n, p) is the static answer to the support's motion, the equations in
-    w are those of the structure at rest loaded by −M_L ẍ_p − C_L ẋ_p. names (p,); lift L (n, p);
-    mass M_L = M L + M_fp (n, p), damping C_L likewise; mass_own, damping_own, stiffness_own (p, p)
-    are the energies' own parts. Unit factor means the velocity written in the case [m/s, rad/s].
-
-    place (p,): 1 where a column is no velocity but a distance, reached at factor one and kept [m, rad]: a support
-    pressed away, the interference of a contact; () where there is none.
-    """
-
-    names: tuple[str, ...]
-    lift: Array
-    mass: Array
-    damping: Array
-    mass_own: Array
-    damping_own: Array
-    stiffness_own: Array
-    place: tuple[float, ...] = ()
-
-    @property
-    def places(self) -> Array:
-        """Factors (p,) of the columns where everything is in its place: 1 for distances, 0 for velocities."""
-        return np.array(self.place) if self.place else np.zeros(len(self.names))
-
-    @property
-    def full(self) -> Array:
-        """Factors (p,) of full velocity: 0 for distances."""
-        return 1.0 - self.places
-
-    @staticmethod
-    def none(size: int) -> PrescribedMotion:
-        """No moving support, for a system of ``size`` freedoms."""
-        empty, own = np.zeros((size, 0)), np.zeros((0, 0))
-        return PrescribedMotion((), empty, empty, empty, own, own, own)
 
 
 @dataclass(frozen=True)
@@ -147,6 +107,50 @@ class System:
             object.__setattr__(self, name, sp.csr_array(getattr(self, name)))
         if self.motion is None:  # pyright: ignore[reportUnnecessaryComparison]
             object.__setattr__(self, "motion", PrescribedMotion.none(self.size))
+
+    @classmethod
+    def from_matrices(
+        cls,
+        mass: object,
+        damping: object,
+        stiffness: object,
+        *,
+        contacts: Mapping[str, Mapping[str, object]] | None = None,
+        loads: Mapping[str, object] | None = None,
+        points: Mapping[str, object] | None = None,
+    ) -> System:
+        """The system of matrices M, C (None: zero), K (n, n), NumPy or SciPy sparse, of any structure.
+
+        contacts: NAME → table with normal and tangent, the rows (n,) that give the relative displacement slave − master
+        along the contact's normal (positive opens) and its tangent, or their weights by freedom, {3: 1.0, 7: −1.0};
+        stiffness [N/m] or "rigid"; friction, a table as in a case file; slip [m/s] of the slave against the master
+        along the tangent in steady sliding (default 1; friction opposes its sign); gap [m], cubic [N/m³] and closed as
+        in a case. Springs of contacts are no part of K. loads: name → force vector (n,) [N]; without any, every contact
+        is taken as closed. points: name → rows (2, n) of displacements along x and y that a run can watch.
+
+        It is all that `modes`, `onsets` and `simulate` of the layers below need:
+
+            block = System.from_matrices(
+                np.eye(2), None, [[20.0, 4.0], [4.0, 15.0]],
+                contacts={"belt": {"normal": [0, 1], "tangent": [1, 0], "stiffness": 10.0,
+                                   "friction": {"law": "coulomb", "coefficient": 0.3}}},
+            )
+            complex_modes(block, mu=0.3), onsets(block, (0.0, 1.0), max_frequency_hz=10.0)
+
+        In time, [phases].velocities knows the slip of all contacts as "sliding". Raises CaseError with what is wrong
+        where.
+        """
+        m, c, k = square_matrices(mass, damping, stiffness)
+        size = m.shape[0]
+        built, cubic = contacts_given(contacts, size)
+        motion = PrescribedMotion.none(size)
+        if built:
+            column, own = np.zeros((size, 1)), np.zeros((1, 1))
+            motion = PrescribedMotion(("sliding",), column, column, column, own, own, own)
+        return cls(
+            m, c, k, built, vectors_given("loads", loads, size), motion, points_given(points, size, len(motion.names)),
+            dof_names=tuple(f"freedom {k}" for k in range(size)), general=general_reason(m, c, k), contact_cubic=cubic,
+        )  # fmt: skip
 
     @property
     def size(self) -> int:
@@ -263,145 +267,3 @@ def _point_nodes(contact: Contact) -> ContactNodes:
         tangents=contact.tangent[None, None, :],
         closed=(contact.closed,),
     )
-
-
-@dataclass(frozen=True)
-class Structure:
-    """All freedoms before supports are applied: what bodies give. Matrices (N, N) csr."""
-
-    mass: Sparse
-    damping: Sparse
-    stiffness: Sparse
-
-
-@dataclass(frozen=True)
-class Constraint:
-    """A support: freedoms held (indices in the structure) and their velocity at factor one."""
-
-    name: str
-    freedoms: tuple[int, ...]
-    velocity: tuple[float, ...]
-    displacement: tuple[float, ...] = ()
-
-    @property
-    def moves(self) -> bool:
-        """Whether a velocity is prescribed."""
-        return any(v != 0.0 for v in self.velocity)
-
-
-@dataclass(frozen=True)
-class Column:
-    """A prescribed motion of supports: what its held freedoms do at factor one, and whether that is a distance."""
-
-    name: str
-    freedoms: tuple[int, ...]
-    values: tuple[float, ...]
-    place: float
-
-
-def columns(constraints: list[Constraint]) -> list[Column]:
-    """The motions that supports prescribe: velocities, then distances."""
-    moving = [Column(c.name, c.freedoms, c.velocity, 0.0) for c in constraints if c.moves]
-    away = [c for c in constraints if any(c.displacement)]
-    return [*moving, *(Column(place_name("supports", c.name), c.freedoms, c.displacement, 1.0) for c in away)]
-
-
-def place_name(table: str, name: str) -> str:
-    """Name of the motion of a support's displacement or a contact's interference."""
-    return f"{table}.{name}.{'displacement' if table == 'supports' else 'interference'}"
-
-
-def constrain(
-    structure: Structure,
-    constraints: list[Constraint],
-    dropped: IntArray | None = None,
-    translations: Array | None = None,
-) -> tuple[IntArray, PrescribedMotion]:
-    """Free freedoms (n,) and the prescribed motions of a structure held by ``constraints``.
-
-    dropped: freedoms that follow others and are no unknowns of their own. translations (N, d): what all freedoms do as
-    everything moves along each axis by one; where a support carries a body along so, no rounding bends it.
-    """
-    total = structure.mass.shape[0]
-    held = np.zeros(total, dtype=bool)
-    if dropped is not None:
-        held[dropped] = True
-    for c in constraints:
-        held[list(c.freedoms)] = True
-    free = np.flatnonzero(~held)
-    moving = columns(constraints)
-    if not moving:
-        return free, PrescribedMotion.none(len(free))
-    selection, rigid = np.zeros((total, len(moving))), np.zeros((total, len(moving)))
-    for column, c in enumerate(moving):
-        selection[list(c.freedoms), column] = c.values
-        if translations is not None:
-            velocity = np.linalg.lstsq(translations[list(c.freedoms)], np.array(c.values), rcond=None)[0]
-            rigid[:, column] = translations @ velocity
-    lift = _static_lift(structure, free, selection, rigid)
-    whole = selection.copy()
-    whole[free] = lift
-
-    def coupled(matrix: Sparse) -> tuple[Array, Array]:
-        product = matrix @ whole
-        return product[free], whole.T @ product
-
-    mass, mass_own = coupled(structure.mass)
-    damping, damping_own = coupled(structure.damping)
-    stiffness_own = whole.T @ (structure.stiffness @ whole)
-    # A rigid motion strains nothing; what is left is rounding of entries as large as EA/h.
-    scale = np.abs(structure.stiffness).max() * np.abs(whole).max() ** 2
-    stiffness_own[np.abs(stiffness_own) < 1e-13 * scale] = 0.0
-    names = tuple(c.name for c in moving)
-    place = tuple(c.place for c in moving)
-    return free, PrescribedMotion(names, lift, mass, damping, mass_own, damping_own, stiffness_own, place)
-
-
-DENSE_LIFT = 3000
-
-
-def _answer(block: Sparse, load: Array) -> Array:
-    """Least-norm answer of a semidefinite block; large ones are held by faint springs instead."""
-    symmetric = float(np.abs(sp.csr_array(block - block.T).data).max(initial=0.0)) <= 1e-12 * np.abs(block).max()
-    if block.shape[0] > DENSE_LIFT:
-        faint = sp.diags_array(1e-9 * block.diagonal())
-        factor = factorise(sp.csr_array(block + faint), symmetric=symmetric)
-        answer = factor.solve(load)
-        for _ in range(3):
-            answer = answer + factor.solve(load - block @ answer)
-        return answer
-    dense = block.toarray()
-    if not symmetric:
-        return np.linalg.lstsq(dense, load, rcond=1e-12)[0]
-    try:
-        held = sl.cho_factor(dense)
-        answer = sl.cho_solve(held, load)
-        return answer + sl.cho_solve(held, load - dense @ answer)
-    except sl.LinAlgError:
-        return np.linalg.lstsq(dense, load, rcond=1e-12)[0]
-
-
-def _static_lift(structure: Structure, free: IntArray, selection: Array, rigid: Array) -> Array:
-    """L with K_ff L = −K_fp: the static answer, of least norm where the structure is free to move.
-
-    rigid (N, p): translations that may be it. Where one balances to rounding it is taken, as a solve would only add
-    rounding times the condition of K, which for slender solids is enough to open and close a gap.
-    """
-    stiffness = sp.csr_array(structure.stiffness)
-    load = -(stiffness @ selection)[free]
-    inner = sp.csr_array(stiffness[free][:, free])
-    lift = np.zeros_like(load)
-    for part in connected_components(inner):
-        block, right, answer = sp.csr_array(inner[part][:, part]), load[part], rigid[free[part]]
-        loaded = np.any(right, axis=0)
-        unbalanced = np.abs(block @ answer - right).max(axis=0)
-        bent = np.flatnonzero(loaded & (unbalanced > 1e-12 * np.abs(right).max(axis=0)))
-        if len(bent):
-            answer[:, bent] = _answer(block, right[:, bent])
-            if np.linalg.norm(block @ answer[:, bent] - right[:, bent]) > 1e-6 * np.linalg.norm(right[:, bent]):
-                raise AnalysisError(
-                    "a moving support cannot be followed statically: its motion loads a mechanism that "
-                    "nothing holds; fix more freedoms of that body"
-                )
-        lift[part] = np.where(loaded, answer, 0.0)
-    return lift

@@ -21,7 +21,7 @@ from ..mesh.boundary import require_boundary
 from ..mesh.facets import nodal_areas, nodal_normals
 from ..mesh.model import Blocks
 from ..typing import Array
-from .model import place_name
+from .motion import place_name
 from .supports import master_surface
 from .view import View, point_position
 
@@ -47,6 +47,7 @@ def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Co
         stiffness=np.inf if contact.stiffness == "rigid" else float(contact.stiffness),
         law=contact.friction.law_object(),
         sliding=contact.sliding,
+        closed=contact.closed,
     )
     if built is None:
         raise CaseError(
@@ -55,9 +56,7 @@ def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Co
             f"the point ({position[0]:g}, {position[1]:g}) m lies beyond the ends of {contact.master}; "
             "move a body so that the slave faces the master line",
         )
-    return replace(
-        built, normal_lift=_overlapping(view, name, contact, built.normal_lift), closed=contact.closed
-    )
+    return replace(built, normal_lift=_overlapping(view, name, contact, built.normal_lift))
 
 
 def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> SurfaceContact:

@@ -23,7 +23,7 @@ from ..mesh.facets import nodal_normals
 from ..mesh.model import Mesh
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .bodies import BuiltBody
-from .model import Constraint
+from .motion import Constraint
 from .view import nearest_node
 
 _DIRECTIONS = {"x": 0, "y": 1, "z": 2}

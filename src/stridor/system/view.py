@@ -12,7 +12,7 @@ from ..case.points import PointRef
 from ..contact.interface import Rows
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody
-from .model import Constraint, PrescribedMotion, columns
+from .motion import Constraint, PrescribedMotion, columns
 
 
 @dataclass(frozen=True)

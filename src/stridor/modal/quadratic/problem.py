@@ -27,6 +27,10 @@ class Quadratic:
         """Number of freedoms n."""
         return int(self.mass.shape[0])
 
+    def matrices(self) -> tuple[Sparse, Sparse, Sparse]:
+        """M, D and K, csr."""
+        return self.mass, self.damping, self.stiffness
+
     @cached_property
     def transposed(self) -> Quadratic:
         """The problem whose right vectors are the left ones of this."""
