@@ -19,7 +19,7 @@ WATCH = ("beam1.tip", "beam1@0.025", "beam2@0.1", "beam2.end")
 
 def march(sliding=0.05, **changes):
     system = build_system(paper_case(**changes))
-    settings = Settings(step=2e-8, record_every=25, watch=WATCH)
+    settings = Settings(step=2e-8, record_every=25, watch=WATCH, contact="rigid")
     return simulate(system, [PRESS, PhaseSpec("slide", sliding, {}, {"clamp": 1.0})], settings)
 
 

@@ -83,12 +83,13 @@ def perturb(
 ) -> Perturbation:
     """March a small perturbation of steady sliding and take its fastest component.
 
-    It starts with every mode of rigid contact up to ``max_frequency_hz`` in equal measure, 1e-5 of the
+    It starts with every mode, of contact as it is in time, up to ``max_frequency_hz`` in equal measure, 1e-5 of the
     slip speed in all, so that frequencies out of range, which may grow faster, start from nothing; the
     time scheme alone decides what becomes of them. It is used as long as it stays below 2 % of the slip
     speed, where friction is still linear. shape: also how nodes move in the fastest component. Raises AnalysisError
     without steady sliding, KeyboardInterrupt where Ctrl-C cuts the run.
     """
+    system = settings.system(system)
     if system.assembled:
         from .assembled import perturb_assembled
 
@@ -100,8 +101,7 @@ def perturb(
         raise AnalysisError("a perturbation of steady sliding needs contacts that slide")
     speed = float(np.abs(steady).min())
     # The reference configuration, as the modes have it, whatever the full run does (docs/case-file.md).
-    contacts = tuple(replace(c, stiffness=np.inf, sliding="small") for c in system.contacts)
-    rigid = replace(system, contacts=contacts)
+    system = replace(system, contacts=tuple(replace(c, sliding="small") for c in system.contacts))
     start = replace(
         settings,
         initial="steady-sliding",
@@ -110,14 +110,14 @@ def perturb(
         record_every=_every(settings, max_frequency_hz),
     )
     rows = node_rows(system, WATCHED if shape else 0)
-    watched, names = watching(rigid, rows)
+    watched, names = watching(system, rows)
     run = whole(
         simulate(
             watched,
             [PhaseSpec("perturbed", duration or PERTURBATION_DURATION, {}, {})],
             replace(start, watch=names if shape else ()),
             mu=mu,
-            disturbance=_band_limited(rigid, mu, PERTURBATION * speed, max_frequency_hz),
+            disturbance=_band_limited(system, mu, PERTURBATION * speed, max_frequency_hz),
         )
     )
     signal = linear_part(run, steady)

@@ -389,6 +389,9 @@ class Temporal(Table):
     path: Literal["auto", "modal", "nodal"] = Field(
         default="auto", description='"auto", "modal" or "nodal", the unknowns of the time loop'
     )
+    contact: Literal["as given", "rigid"] = Field(
+        default="as given", description='"as given" or "rigid", the stiffness of contacts in time'
+    )
     watch: tuple[str, ...] = Field(default=(), description=f"a list of points, each {POINT[8:]}")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -40,6 +40,11 @@ class SurfaceContact:
     location: Location
     nodes: ContactNodes
     facets: SlaveFacets | None = None
+
+    def rigid(self) -> SurfaceContact:
+        """The same contact without compliance."""
+        nodes = replace(self.nodes, compliance=np.zeros(self.nodes.count))
+        return replace(self, stiffness_per_area=np.inf, nodes=nodes)
 
 
 def frames(normal: Array, preferred: Array | None = None) -> Array:

@@ -15,4 +15,4 @@ def phases_of(case: Case) -> list[PhaseSpec]:
 def settings_of(case: Case) -> Settings:
     """The temporal settings of a case."""
     t = case.temporal
-    return Settings(t.step, t.beta2, t.record_every, t.path, t.initial, t.perturbation, tuple(t.watch))
+    return Settings(t.step, t.beta2, t.record_every, t.path, t.initial, t.perturbation, tuple(t.watch), t.contact)

@@ -7,8 +7,7 @@
 - modal.damped = false: `simulate`, `compare`
 - temporal.path: assembled matrices in time
 - comparison.bracket, comparison.tolerance: without critical friction
-- contacts.NAME.stiffness, a number: beams in point contacts in time, which are rigid there (`simulate`); `compare` and
-  `run` use it in the modes alone, which is told as well
+- temporal.contact = "rigid": where every contact is rigid; where it acts, contacts.NAME.stiffness on `simulate`
 - materials.NAME.poisson_ratio: of beams only
 
 A setting that stays at its default is not told of, nor one of an approach that the verb does not take.
@@ -74,7 +73,7 @@ def _given(case: Case, solver: str | None) -> bool:
         or modal.prestress
         or not modal.damped
         or case.temporal.path != "auto"
-        or any(contact.stiffness != "rigid" for contact in case.contacts.values())
+        or case.temporal.contact != "as given"
     )
 
 
@@ -123,9 +122,9 @@ def _of_time(case: Case, path: _Path, verb: str) -> Iterator[str]:
         return
     if path.assembled and case.temporal.path != "auto":
         yield f"temporal.path = {case.temporal.path!r} has no effect: assembled matrices have one path"
-    if not path.assembled:
-        for name, contact in case.contacts.items():
-            if contact.stiffness != "rigid" and verb == "simulate":
-                yield f"contacts.{name}.stiffness has no effect in time: point contacts of beams are rigid there"
-            elif contact.stiffness != "rigid":
-                yield f"contacts.{name}.stiffness acts on modes and onsets only: in time point contacts are rigid"
+    if case.temporal.contact == "rigid":
+        springs = [name for name, contact in case.contacts.items() if contact.stiffness != "rigid"]
+        if not springs:
+            yield 'temporal.contact = "rigid" has no effect: no contact has a stiffness'
+        elif verb == "simulate":
+            yield from (f'contacts.{name}.stiffness has no effect in time: temporal.contact = "rigid"' for name in springs)

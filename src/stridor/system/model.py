@@ -225,6 +225,12 @@ class System:
         """The system in whose modes those nodes touch that do so in steady sliding at ``mu`` (None: as it is)."""
         return self if mu is None else replace(self, touching_at=mu)
 
+    def with_rigid_contacts(self) -> System:
+        """The same system with every contact rigid, points and surfaces."""
+        contacts = tuple(replace(c, stiffness=np.inf) for c in self.contacts)
+        surfaces = tuple(s.rigid() for s in self.surfaces)
+        return replace(self, contacts=contacts, surfaces=surfaces, contact_cubic={})
+
     def contact_nodes(self) -> ContactNodes:
         """Every contact, point or surface, as one list of slave nodes: points first, then surfaces in order."""
         parts = [_point_nodes(c) for c in self.contacts] + [s.nodes for s in self.surfaces]

@@ -62,6 +62,7 @@ def lent_contacts(x: ContactArrays) -> ContactArrays:  # pragma: no cover - comp
         borrow(x.slave),
         borrow(x.side),
         borrow(x.kept),
+        borrow(x.compliance),
     )
 
 
@@ -117,6 +118,7 @@ def lent_scratch(x: Scratch) -> Scratch:  # pragma: no cover - compiled
         borrow(x.slopes),
         borrow(x.nodes),
         borrow(x.delta),
+        borrow(x.earlier),
         borrow(x.buffer),
     )
 

@@ -288,6 +288,7 @@ def _machine(
         slopes=np.zeros(4),
         nodes=np.zeros((4, 2)),
         delta=np.zeros(m),
+        earlier=np.zeros(m),
         buffer=np.zeros(1),
     )
     padded = np.ascontiguousarray(np.vstack([values, np.zeros((1, size))]))

@@ -42,6 +42,7 @@ class ContactArrays(NamedTuple):
     slave: Array  # (m, 2) reference position
     side: Array
     kept: IntArray  # (m,) 1 where the contact is kept closed
+    compliance: Array  # (m,) [m/N], 1/K_c, zero of rigid contact
 
 
 class ModalArrays(NamedTuple):
@@ -139,6 +140,7 @@ def row_table(system: System) -> RowTable:
         slave=np.array([c.slave_position for c in system.contacts]).reshape(-1, 2),
         side=np.array([float(c.side) for c in system.contacts]),
         kept=np.array([int(c.closed) for c in system.contacts], dtype=np.int64),
+        compliance=np.array([c.compliance for c in system.contacts], dtype=float),
     )
     return RowTable(
         free=sp.csr_array(sp.vstack([empty, *free])),

@@ -17,7 +17,8 @@ from .machine import MODAL_LIMIT
 @dataclass(frozen=True)
 class Settings:
     """How to march: step Δt [s] (None: `StepLimit.share` of the limit), β2 in [0.5, 1], steps between
-    records, path, initial state, perturbation [m/s] of the slip speed (steady sliding only), watched points."""
+    records, path, initial state, perturbation [m/s] of the slip speed (steady sliding only), watched points. contact
+    "rigid" takes contact stiffness out of the time loop, as the paper has it; "as given" leaves it in."""
 
     step: float | None = None
     beta2: float = 0.5
@@ -26,6 +27,11 @@ class Settings:
     initial: Literal["rest", "steady-sliding"] = "rest"
     perturbation: float = 0.0
     watch: tuple[str, ...] = ()
+    contact: Literal["as given", "rigid"] = "as given"
+
+    def system(self, system: System) -> System:
+        """The system that the time loop takes."""
+        return system.with_rigid_contacts() if self.contact == "rigid" else system
 
 
 def not_finite(time: float, phase: str, step: float) -> str:

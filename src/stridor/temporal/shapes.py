@@ -36,6 +36,7 @@ def operating_shape(
     the line is summed up while the run goes on, over a third of the periods, and meshed bodies have shapes too. Raises
     KeyboardInterrupt where Ctrl-C cuts the run.
     """
+    system = settings.system(system)
     if system.assembled:
         return _assembled_shape(system, phases, settings, trajectory, frequency_hz, mu, periods / 3)
     points = dict(system.points)

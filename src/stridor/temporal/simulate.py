@@ -69,6 +69,7 @@ def simulate(
     motion blows up or a slave leaves its master line; what was computed is then in the error's ``trajectory``.
     """
     settings = settings_of_restart(settings or Settings(), restart)
+    system = settings.system(system)
     check_inputs(
         system,
         phases,

@@ -3,6 +3,9 @@
 Order within step n: the free prediction of every row at t_{n+1} is at hand; the contacts are solved
 for the forces at t_n; works and extrema are accumulated with velocities at t_n; a record is kept
 when due; then one pass adds the forces, completes u_{n+1} and predicts t_{n+2}.
+
+A contact spring K_c stretches the gap equation: (g_{n+1} + g_{n−1})/2 + N/K_c is what is zero where N is not, centred,
+so that it neither damps nor limits the step (docs/theory-temporal.md).
 """
 
 from __future__ import annotations
@@ -72,6 +75,7 @@ class Scratch(NamedTuple):
     slopes: Array
     nodes: Array
     delta: Array
+    earlier: Array  # (m,) gap at t_{n−1} of compliant contacts
     buffer: Array
 
 
@@ -172,6 +176,8 @@ def _solve_all(
         _, on_line = _local_weights(c, contacts, state, scratch)
         if not on_line:
             return c
+        if contacts.compliance[c] > 0.0:
+            scratch.earlier[c] = _gap_before(c, contacts, scheme, state, scratch)
     largest = 0.0
     sweeps = 0
     for c in range(count):
@@ -186,6 +192,9 @@ def _solve_all(
             gap, slip, w_nn, w_nt, w_tt = _local_problem(c, base, width, contacts, compliance, state, scratch)
             # Free of this contact's own present forces.
             old_n, old_t = state.normal[c], state.tangential[c]
+            if contacts.compliance[c] > 0.0:
+                gap += scratch.earlier[c] + 2.0 * contacts.compliance[c] * old_n
+                w_nn += 2.0 * contacts.compliance[c]
             gap -= w_nn * old_n + w_nt * old_t
             slip -= w_nt * old_n + w_tt * old_t
             law, stuck = contacts.friction[c], state.status[c] == _STICK
@@ -216,6 +225,33 @@ def _solve_all(
 
 
 @njit(cache=True, inline="always")
+def _reference(c: int, a: int, contacts: ContactArrays, state: LoopState) -> float:  # pragma: no cover - compiled
+    """Coordinate [m] of row a of a finite-sliding contact in the reference configuration."""
+    if a < 2:
+        return contacts.slave[c, a]
+    node = state.segment[c] - 1 + (a - 2) // 2
+    start = contacts.nodes_at[c]
+    if 0 <= node < contacts.nodes_at[c + 1] - start:
+        return contacts.nodes[start + node, a % 2]
+    return 0.0
+
+
+@njit(cache=True, inline="always")
+def _gap_before(
+    c: int, contacts: ContactArrays, scheme: Scheme, state: LoopState, scratch: Scratch
+) -> float:  # pragma: no cover - compiled
+    """Gap [m] at t_{n−1} of a compliant contact, along the normal of now: rows less Δt q."""
+    base = contacts.base[c]
+    if contacts.kind[c] != _FINITE:
+        return contacts.gap[c] + state.value[base] - scheme.step * state.rate[base]
+    gap = 0.0
+    for a in range(10):
+        before = state.value[base + a] - scheme.step * state.rate[base + a]
+        gap += scratch.shape[c, a] * (_reference(c, a, contacts, state) + before)
+    return gap
+
+
+@njit(cache=True, inline="always")
 def _local_problem(
     c: int,
     base: int,
@@ -231,17 +267,8 @@ def _local_problem(
         slip = scratch.place[base + 1] - state.value[base + 1]
         return gap, slip, compliance[base, base], compliance[base, base + 1], compliance[base + 1, base + 1]
     gap = slip = 0.0
-    start = contacts.nodes_at[c]
-    count = contacts.nodes_at[c + 1] - start
     for a in range(width):
-        reference = 0.0
-        if a < 2:
-            reference = contacts.slave[c, a]
-        else:
-            node = state.segment[c] - 1 + (a - 2) // 2
-            if 0 <= node < count:
-                reference = contacts.nodes[start + node, a % 2]
-        gap += scratch.shape[c, a] * (reference + scratch.place[base + a])
+        gap += scratch.shape[c, a] * (_reference(c, a, contacts, state) + scratch.place[base + a])
         slip += scratch.slide[c, a] * (scratch.place[base + a] - state.value[base + a])
     w_nn = w_nt = w_tt = 0.0
     for a in range(width):

@@ -50,11 +50,8 @@ def initial_state(
     system, fields, state = machine.system, machine.fields, machine.state
     if settings.initial == "steady-sliding":
         stretch = schedule.stretches[0]
-        # The loop's contacts are rigid whatever K_c the modal approach uses: an equilibrium that rests on
-        # the spring would start with a penetration, and undoing it in one step is a blow.
-        rigid = replace(system, contacts=tuple(replace(c, stiffness=np.inf) for c in system.contacts))
         steady = steady_sliding(
-            rigid.in_place(stretch.places_after),
+            system.in_place(stretch.places_after),
             load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
             motion_factors=stretch.velocities_after,
         )
