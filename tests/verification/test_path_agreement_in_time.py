@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stridor as st
-from benches import paper_case
+from benches import Slave, bench, paper_case
 from rubbing_block import rubbing_block
 from stridor.agreement.perturbation import perturb
 from stridor.modal.over_friction import modes_of_band
@@ -52,6 +52,23 @@ def test_force_histories_are_those_of_one_scheme_on_every_path(stiffness):
             ours, theirs = getattr(run, name), getattr(runs[0], name)
             assert np.abs(theirs).max() > 1.0
             assert ours == pytest.approx(theirs, rel=0, abs=1e-8 * np.abs(theirs).max())
+
+
+def test_contacts_with_springs_that_feel_each_other_are_solved_together_alike():
+    damping = (50.0, 0.0)
+    slaves = [
+        Slave(place=place, stiffness=stiffness, damping=damping)
+        for place, stiffness in ((0.3, SOFT), (0.55, "rigid"), (0.8, 3.0 * SOFT))
+    ]
+    system = bench(*slaves, mass="lumped", damping=damping)
+    phases = [PhaseSpec("slide", 1e-4, {}, {})]
+    modal, nodal = (
+        simulate(system, phases, Settings(step=5e-8, record_every=5, path=path), mu=MU) for path in ("modal", "nodal")
+    )
+    assembled = simulate_assembled(system, phases, Settings(step=5e-8, record_every=5), mu=MU)
+    for run in (nodal, assembled):
+        assert np.abs(run.normal_force).max(axis=0).min() > 1.0
+        assert run.normal_force == pytest.approx(modal.normal_force, rel=0, abs=1e-7 * modal.normal_force.max())
 
 
 def test_finite_sliding_on_a_contact_spring_is_the_same_in_modes_and_on_freedoms():
