@@ -127,4 +127,5 @@ def _of_time(case: Case, path: _Path, verb: str) -> Iterator[str]:
         if not springs:
             yield 'temporal.contact = "rigid" has no effect: no contact has a stiffness'
         elif verb == "simulate":
-            yield from (f'contacts.{name}.stiffness has no effect in time: temporal.contact = "rigid"' for name in springs)
+            for name in springs:
+                yield f'contacts.{name}.stiffness has no effect in time: temporal.contact = "rigid"'
