@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from . import view as plot
     from .app.pipeline import run
     from .case import Case, load, loads
-    from .io.datasets import load_trajectory, open_dataset, save, to_dataset
-    from .io.reduced_models import load_reduced, save_reduced
+    from .io.datasets import open, save, to_dataset
     from .study.analyses import (
         body_modes,
         compare,
@@ -55,12 +54,10 @@ _HOMES = {
     "describe": ".study.analyses",
     "friction_curve": ".study.analyses",
     "load": ".case",
-    "load_reduced": ".io.reduced_models",
-    "load_trajectory": ".io.datasets",
     "loads": ".case",
     "modes": ".study.analyses",
     "onsets": ".study.analyses",
-    "open_dataset": ".io.datasets",
+    "open": ".io.datasets",
     "pencil": ".study.pencil",
     "perturbed_copies": ".study.copies",
     "plot": ".view",
@@ -68,7 +65,6 @@ _HOMES = {
     "reduced_model": ".study.reduced",
     "run": ".app.pipeline",
     "save": ".io.datasets",
-    "save_reduced": ".io.reduced_models",
     "sensitivities": ".study.sensitivities",
     "simulate": ".study.analyses",
     "steady_sliding": ".study.analyses",
@@ -91,12 +87,10 @@ __all__ = [
     "describe",
     "friction_curve",
     "load",
-    "load_reduced",
-    "load_trajectory",
     "loads",
     "modes",
     "onsets",
-    "open_dataset",
+    "open",
     "pencil",
     "perturbed_copies",
     "plot",
@@ -104,7 +98,6 @@ __all__ = [
     "reduced_model",
     "run",
     "save",
-    "save_reduced",
     "sensitivities",
     "simulate",
     "steady_sliding",

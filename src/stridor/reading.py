@@ -47,13 +47,16 @@ def irregular(path: Path, most: int | None = None) -> str | None:
 
 def is_reduced_file(path: Path) -> bool:
     """Whether a file is meant to be a saved model: by its name, or as an archive, which no case file is."""
-    if path.suffix == ".npz":
-        return True
+    return path.suffix == ".npz" or starts_with(path, ZIP)
+
+
+def starts_with(path: Path, mark: bytes) -> bool:
+    """Whether a file begins with these bytes; not where there is none that can be read."""
     try:
         if irregular(path):
             return False
         with path.open("rb") as stream:
-            return stream.read(len(ZIP)) == ZIP
+            return stream.read(len(mark)) == mark
     except (OSError, ValueError):
         return False
 

@@ -20,6 +20,7 @@ import scipy.io
 import stridor as st
 from stridor.case import template_text
 from stridor.errors import CaseError
+from stridor.io.result_files import open_results
 from stridor.matrices.labels import read_labels
 from stridor.matrices.read import read_matrix
 from stridor.mesh.files import read_mesh
@@ -100,8 +101,8 @@ READERS = {
     "vtk": (read_mesh, ".vtk"),
     "vtu": (read_mesh, ".vtu"),
     "labels": (read_labels, ""),
-    "results": (st.open_dataset, ".nc"),
-    "reduced": (st.load_reduced, ".npz"),
+    "results": (open_results, ".nc"),
+    "reduced": (st.open, ".npz"),
     **{s: (read_matrix, f".{s}") for s in ("mtx", "mat", "npz", "npy", "pch", "op4", "hb", "sti", "mtx.gz")},
 }
 

@@ -20,7 +20,9 @@ from program import stridor
 from rubbing_block import rubbing_block
 from stridor.agreement.comparison import Agreement, Comparison
 from stridor.agreement.perturbation import Perturbation
-from stridor.io.result_files import accept, damage_told
+from stridor.io.datasets import load_trajectory
+from stridor.io.reduced_models import load_reduced
+from stridor.io.result_files import accept, damage_told, open_results
 from stridor.io.seals import seal
 from stridor.temporal import simulate as engine
 from stridor.temporal.assembled import march
@@ -238,7 +240,7 @@ def files(tmp_path_factory) -> dict[str, Path]:
 def loaded(path: Path):
     """What is said of a file, None where it is read."""
     try:
-        found = st.load_trajectory(path) if path.name.startswith(("beams", "solids")) else st.open_dataset(path)
+        found = st.open(path)
     except st.CaseError as error:
         message = str(error)
     else:
@@ -306,14 +308,14 @@ def test_files_cut_short_or_with_other_bytes(kind, files, tmp_path):
         path.write_bytes(content[: max(9, int(share * len(content)))])
         assert "cut short" in loaded(path)[1]
     rng = np.random.default_rng(11)
-    original = st.open_dataset(files[kind])
+    original = open_results(files[kind])
     for _ in range(8):
         data = bytearray(content)
         place = int(rng.integers(len(data)))
         data[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(bytes(data))
         if not loaded(path)[1]:
-            assert st.open_dataset(path).identical(original)
+            assert open_results(path).identical(original)
 
 
 def test_files_that_are_no_files(tmp_path):
@@ -327,7 +329,7 @@ def test_files_that_are_no_files(tmp_path):
     listening.bind("socket")
     os.chdir(where)
     try:
-        for read in (st.open_dataset, st.load_trajectory, st.load_reduced):
+        for read in (st.open, open_results, load_trajectory, load_reduced):
             for name, words in (
                 (tmp_path / "folder", "is a folder"),
                 (tmp_path / "pipe", "a pipe"),

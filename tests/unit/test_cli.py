@@ -190,7 +190,7 @@ def test_interruption_keeps_what_was_computed_and_a_restart_ends_alike(folder: P
         assert code == 130
     assert code == 130, log
     assert "go on with --restart" in log
-    part = st.load_trajectory(path)
+    part = st.open(path)
     assert part.interrupted
     assert 0 < part.steps < part.planned_steps
     short = [w.replace("=40.0", f"={(part.steps + 20_000) * 4e-7 - 0.002:.7f}") for w in long]
@@ -198,7 +198,7 @@ def test_interruption_keeps_what_was_computed_and_a_restart_ends_alike(folder: P
     assert done.returncode == 0, done.stderr
     whole = stridor("simulate", "two-beams.toml", "--quiet", "--out", "whole", *short, cwd=folder)
     assert whole.returncode == 0, whole.stderr
-    one, two = (st.load_trajectory(folder / name / "simulate.nc") for name in ("on", "whole"))
+    one, two = (st.open(folder / name / "simulate.nc") for name in ("on", "whole"))
     assert np.array_equal(one.normal_force, two.normal_force)
     assert np.array_equal(one.displacement, two.displacement)
     assert one.phases == two.phases

@@ -9,6 +9,8 @@ import pytest
 
 import stridor as st
 from stridor.io.atomic import replacing, write_text
+from stridor.io.datasets import load_trajectory
+from stridor.io.result_files import open_results
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +31,7 @@ def case() -> st.Case:
 
 def test_modes_round_trip(case: st.Case, tmp_path: Path) -> None:
     modes = st.modes(case, [0.0, 0.1], count=6, vectors=True)
-    data = st.open_dataset(st.save(modes, tmp_path / "modes.nc"))
+    data = st.open(st.save(modes, tmp_path / "modes.nc"))
     assert data["frequency"].dims == ("mu", "branch")
     assert data["frequency"].attrs["units"] == "Hz"
     assert data["growth_rate"].attrs["units"] == "1/s"
@@ -42,7 +44,7 @@ def test_modes_round_trip(case: st.Case, tmp_path: Path) -> None:
 
 def test_onsets_file_holds_what_is_missing_as_nan(case: st.Case, tmp_path: Path) -> None:
     found = st.onsets(case, (0.0, 1.0), max_frequency_hz=20e3, damped=False)
-    data = st.open_dataset(st.save(found, tmp_path / "onsets.nc"))
+    data = st.open(st.save(found, tmp_path / "onsets.nc"))
     assert len(data["mu"]) == len(found.onsets) > 0
     assert np.isnan(data["growth_slope"].values).all()
     assert list(data["kind"].values) == [o.kind for o in found.onsets]
@@ -51,12 +53,12 @@ def test_onsets_file_holds_what_is_missing_as_nan(case: st.Case, tmp_path: Path)
 def test_no_onsets_is_a_file_too(case: st.Case, tmp_path: Path) -> None:
     found = st.onsets(case, (0.0, 1e-3), max_frequency_hz=5e3)
     assert found.onsets == ()
-    assert len(st.open_dataset(st.save(found, tmp_path / "onsets.nc"))["mu"]) == 0
+    assert len(st.open(st.save(found, tmp_path / "onsets.nc"))["mu"]) == 0
 
 
 def test_trajectory_round_trip_is_exact(case: st.Case, tmp_path: Path) -> None:
     run = st.simulate(case)
-    back = st.load_trajectory(st.save(run, tmp_path / "run.nc"))
+    back = st.open(st.save(run, tmp_path / "run.nc"))
     for name in ("time", "normal_force", "status", "velocity", "kinetic"):
         assert np.array_equal(getattr(back, name), getattr(run, name)), name
     assert back.phases == run.phases
@@ -94,10 +96,41 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "other.nc"
     path.write_bytes(content)
     with pytest.raises(st.CaseError, match="a results file written by stridor"):
-        st.open_dataset(path)
+        st.open(path)
 
 
 def test_a_modes_file_is_no_trajectory(case: st.Case, tmp_path: Path) -> None:
     path = st.save(st.modes(case, 0.1, count=3), tmp_path / "modes.nc")
     with pytest.raises(st.CaseError, match="a file of `stridor simulate`"):
-        st.load_trajectory(path)
+        load_trajectory(path)
+
+
+def test_one_way_in_tells_by_the_content(case: st.Case, tmp_path: Path) -> None:
+    run = st.simulate(case)
+    model = st.reduced_model(case, {"mu": (0.0, 0.2)}, max_frequency_hz=2e3)
+    names = ("plain", "run.npz", "model.nc")  # no name says what is in a file
+    back = [st.open(st.save(thing, tmp_path / name)) for thing, name in zip((run, run, model), names, strict=True)]
+    assert [type(thing) for thing in back] == [type(run), type(run), type(model)]
+    assert np.array_equal(back[1].normal_force, run.normal_force)
+    assert np.array_equal(back[2].vectors, model.vectors)
+    modes = st.modes(case, 0.1, count=3)
+    assert st.open(st.save(modes, tmp_path / "modes")).identical(open_results(tmp_path / "modes"))
+
+
+@pytest.mark.bad_input
+def test_what_cannot_be_saved_or_opened(case: st.Case, tmp_path: Path) -> None:
+    modes = st.modes(case, 0.1, count=3)
+    for given, told in (
+        ({"keep": "all"}, "keep: 'all' – goes with a reduced model; results are kept whole, and hold their case"),
+        ({"case": case}, "case: goes with a reduced model; results are kept whole, and hold their case"),
+    ):
+        with pytest.raises(st.CaseError) as error:
+            st.save(modes, tmp_path / "modes.nc", **given)
+        assert str(error.value) == told
+    for thing in (case, None, st.to_dataset(modes)):
+        with pytest.raises(st.CaseError, match=r"^result: 'a \w+' – complex modes, onsets, a trajectory or an agreement"):
+            st.save(thing, tmp_path / "nothing.nc")
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "empty.npz").touch()
+    with pytest.raises(st.CaseError, match="no reduced model; give a file of st.save"):
+        st.open(tmp_path / "empty.npz")

@@ -136,7 +136,7 @@ SAVE = """
 import sys, resource
 import stridor as st
 from stridor.errors import AnalysisError
-run = st.load_trajectory(sys.argv[1])
+run = st.open(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
 try:
     st.save(run, "out/simulate.nc")
@@ -161,14 +161,14 @@ def test_a_limit_on_file_sizes_is_a_message_and_no_crash(run_file: Path, tmp_pat
 
 
 def test_what_is_written_through_a_stream_is_what_was_given(run_file: Path, tmp_path: Path) -> None:
-    run = st.load_trajectory(run_file)
-    again = st.load_trajectory(st.save(run, tmp_path / "again.nc"))
+    run = st.open(run_file)
+    again = st.open(st.save(run, tmp_path / "again.nc"))
     assert np.array_equal(again.normal_force, run.normal_force)
     assert again.phases == run.phases
 
 
 def test_a_run_without_records_in_its_last_phase_is_summed_up(run_file: Path) -> None:
-    run = st.load_trajectory(run_file)
+    run = st.open(run_file)
     from dataclasses import replace
 
     last = run.phases[-1]
@@ -229,7 +229,7 @@ def test_sigterm_ends_a_run_like_ctrl_c(tmp_path: Path) -> None:
     assert "Traceback" not in log
     assert not lock.exists()
     if (tmp_path / "case.out" / "simulate.nc").exists():
-        assert st.load_trajectory(tmp_path / "case.out" / "simulate.nc").interrupted
+        assert st.open(tmp_path / "case.out" / "simulate.nc").interrupted
 
 
 SWALLOWED = """

@@ -15,6 +15,7 @@ from rubbing_block import rubbing_block
 from stridor.app.cli import app
 from stridor.case import template_text
 from stridor.errors import CaseError
+from stridor.io.result_files import open_results
 from stridor.study.fingerprint import changes_of
 from stridor.temporal.trajectory import Trajectory
 from stridor.view.words import _run_sentence
@@ -51,7 +52,7 @@ def part(case: st.Case, tmp_path_factory: pytest.TempPathFactory) -> Trajectory:
 
         run = st.simulate(case, progress=late)
     assert 1000 < run.steps < run.planned_steps
-    return st.load_trajectory(st.save(run, tmp_path_factory.mktemp("part") / "simulate.nc"))
+    return st.open(st.save(run, tmp_path_factory.mktemp("part") / "simulate.nc"))
 
 
 OTHERS = {
@@ -135,10 +136,10 @@ def test_changed_is_recorded_everywhere(case, part, change, words, tmp_path) -> 
     on = st.simulate(other, restart=part, changed=True)
     assert changes_of(on) == [f"at t = {part.steps * part.step:.6g} s {words}"]
     assert st.summarise(other, on).to_json()["changed"] == changes_of(on)
-    data = st.open_dataset(st.save(on, tmp_path / "on.nc"))
+    data = open_results(st.save(on, tmp_path / "on.nc"))
     assert json.loads(data.attrs["changed"]) == changes_of(on)
     # Read again and gone on with, it is still told.
-    again = st.load_trajectory(tmp_path / "on.nc")
+    again = st.open(tmp_path / "on.nc")
     assert changes_of(st.simulate(other, restart=again)) == changes_of(on)
     plain = st.simulate(case, restart=part)
     assert np.array_equal(on.normal_force[: len(part.time)], part.normal_force)
@@ -229,7 +230,7 @@ def test_the_program(case: st.Case, part: Trajectory, tmp_path: Path) -> None:
         done = call(*words)
         assert isinstance(done.exception, CaseError), words
         assert told in str(done.exception)
-    assert st.load_trajectory(kept).steps == part.steps
+    assert st.open(kept).steps == part.steps
     done = call(*more, "--mu", "0.3", "--changed")
     assert done.exit_code == 0, done.output
     assert "mu: not given → 0.3" in json.loads(done.stdout)["changed"][0]

@@ -45,7 +45,7 @@ def test_everything_ends_in_a_report(case: Path):
     assert outcome.everything.agreement is not None
     assert outcome.everything.agreement.verdict.startswith("agree")
     assert outcome.everything.summary.energy.error < 1e-9
-    again = st.load_trajectory(outcome.report.parent / "simulate.nc")
+    again = st.open(outcome.report.parent / "simulate.nc")
     assert again.nodes is not None
     assert (again.nodes.normal_force == outcome.everything.run.nodes.normal_force).all()
 

@@ -48,7 +48,7 @@ def model(case):
 
 @pytest.fixture(scope="module")
 def content(model, case, tmp_path_factory) -> bytes:
-    return st.save_reduced(model, tmp_path_factory.mktemp("saved") / "model.npz", case=case).read_bytes()
+    return st.save(model, tmp_path_factory.mktemp("saved") / "model.npz", case=case).read_bytes()
 
 
 def alike(one, other) -> None:
@@ -96,8 +96,8 @@ def array_with(name: str, array, **how):
 
 # -- round trips ------------------------------------------------------------------------------------------------------
 def test_a_model_comes_back_to_the_last_bit(model, case, tmp_path):
-    path = st.save_reduced(model, tmp_path / "model.npz", case=case)
-    back = st.load_reduced(path)
+    path = st.save(model, tmp_path / "model.npz", case=case)
+    back = st.open(path)
     alike(model, back)
     # Every field there is, those of problem and terms included: a new one must be saved too.
     for one in fields(model):
@@ -120,13 +120,13 @@ def test_a_model_comes_back_to_the_last_bit(model, case, tmp_path):
 
 
 def test_the_file_says_where_it_comes_from(model, case, tmp_path):
-    found = provenance_of(st.save_reduced(model, tmp_path / "model.npz", case=case))
+    found = provenance_of(st.save(model, tmp_path / "model.npz", case=case))
     assert found["title"] == case.title
     assert st.loads(found["case"]) == case
     assert len(found["case_sha256"]) == 64
     assert found["versions"]["stridor"]
     assert provenance_of(st.save(model, tmp_path / "plain.npz"))["case"] is None
-    again = st.save_reduced(model, tmp_path / "again.npz", case=found)
+    again = st.save(model, tmp_path / "again.npz", case=found)
     assert provenance_of(again) == found
 
 
@@ -137,7 +137,7 @@ def test_rigid_contact_comes_back(case, tmp_path):
     made = replace(made, problem=replace(made.problem, notes=("two nodes would open",)))
     modes = made.modes([0.2])
     for keep in ("all", "shapes"):
-        back = st.load_reduced(st.save_reduced(made, tmp_path / "model.npz", keep=keep))
+        back = st.open(st.save(made, tmp_path / "model.npz", keep=keep))
         assert back.problem.notes == made.problem.notes
         for side in (False, True):
             one, other = (m.expand(m.modes([0.2]), left=side) for m in (made, back))
@@ -147,7 +147,7 @@ def test_rigid_contact_comes_back(case, tmp_path):
                 one, other = (m.problem.displacements(v) for m, v in ((made, one), (back, other)))
             assert np.array_equal(one, other)
             assert len(one) == st.build_system(rigid).size == made.problem.size + 1
-    back = st.load_reduced(st.save_reduced(made, tmp_path / "model.npz", keep="eigenvalues"))
+    back = st.open(st.save(made, tmp_path / "model.npz", keep="eigenvalues"))
     assert np.array_equal(back.modes([0.2]).values, modes.values)
 
 
@@ -163,8 +163,8 @@ def test_formulas_and_integers_come_back(tmp_path):
     )
     problem = ParametricProblem(terms, (Parameter("k", 1.0, 2.0, 1.5),))
     made = reduce(problem, 0.1)
-    path = st.save_reduced(made, tmp_path / "model.npz")
-    back = st.load_reduced(path)
+    path = st.save(made, tmp_path / "model.npz")
+    back = st.open(path)
     for k in (1.0, 1.31):
         assert np.array_equal(back.modes([k]).values, made.modes([k]).values)
         assert (back.problem.at([k]).stiffness != made.problem.at([k]).stiffness).nnz == 0
@@ -182,7 +182,7 @@ def test_patterns_in_common_are_written_once(model, content):
 # -- smaller files ----------------------------------------------------------------------------------------------------
 def test_what_is_left_out_is_said_when_it_is_missed(model, content, tmp_path):
     small, smallest = (
-        st.load_reduced(st.save_reduced(model, tmp_path / f"{keep}.npz", keep=keep)) for keep in ("shapes", "eigenvalues")
+        st.open(st.save(model, tmp_path / f"{keep}.npz", keep=keep)) for keep in ("shapes", "eigenvalues")
     )
     sizes = [len(content), *((tmp_path / f"{keep}.npz").stat().st_size for keep in ("shapes", "eigenvalues"))]
     assert sizes == sorted(sizes, reverse=True)
@@ -208,11 +208,11 @@ def test_what_is_left_out_is_said_when_it_is_missed(model, content, tmp_path):
         smallest.expand(modes)
     assert [kept_in(m) for m in (model, small, smallest)] == ["all", "shapes", "eigenvalues"]
     with pytest.raises(st.CaseError, match=r"keep: 'all' – the model holds no more than 'eigenvalues' itself"):
-        st.save_reduced(smallest, tmp_path / "more.npz")
+        st.save(smallest, tmp_path / "more.npz")
     with pytest.raises(st.CaseError, match="keep: 'some' – one of all, shapes, eigenvalues"):
-        st.save_reduced(model, tmp_path / "more.npz", keep="some")
+        st.save(model, tmp_path / "more.npz", keep="some")
     assert not (tmp_path / "more.npz").exists()
-    alike(model, st.load_reduced(st.save_reduced(small, tmp_path / "less.npz", keep="eigenvalues")))
+    alike(model, st.open(st.save(small, tmp_path / "less.npz", keep="eigenvalues")))
 
 
 # -- what cannot be saved ---------------------------------------------------------------------------------------------
@@ -239,7 +239,7 @@ def test_functions_of_ones_own_are_refused(model, tmp_path, factor, name):
     terms = (*model.problem.terms[:-1], replace(model.problem.terms[-1], factor=factor))
     other = replace(model, problem=replace(model.problem, terms=terms))
     with pytest.raises(st.CaseError, match=rf"terms\[{len(terms) - 1}\]\.factor: .*{name}.*only factors that are data"):
-        st.save_reduced(other, tmp_path / "model.npz")
+        st.save(other, tmp_path / "model.npz")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -249,15 +249,15 @@ def test_a_field_that_the_format_does_not_know_is_not_dropped(model, tmp_path):
         more: float = 0.0
 
     wider = Wider(**{f.name: getattr(model, f.name) for f in fields(model)})
-    st.save_reduced(wider, tmp_path / "model.npz")
+    st.save(wider, tmp_path / "model.npz")
     with pytest.raises(st.CaseError, match=r"model\.more: files of format 2 cannot hold it"):
-        st.save_reduced(replace(wider, more=1.0), tmp_path / "model.npz")
+        st.save(replace(wider, more=1.0), tmp_path / "model.npz")
 
 
 # -- files that are none ----------------------------------------------------------------------------------------------
 def refused(path: Path, words: str) -> None:
     with pytest.raises(st.CaseError) as caught:
-        st.load_reduced(path)
+        st.open(path)
     message = str(caught.value)
     assert words in message
     assert message.startswith(f"file: {str(path)!r}"[:20])
@@ -269,7 +269,7 @@ def test_foreign_files(tmp_path, content):
     refused(tmp_path / "missing.npz", "no such file")
     refused(tmp_path, "is a folder; must be a file")
     np.savez(path, a=np.zeros(3))
-    refused(path, "no reduced model; give a file of st.save_reduced")
+    refused(path, "no reduced model; give a file of st.save")
     for data in (b"", b"title = 'a case'\n", pickle.dumps({"a": 1}), b"PK\x03\x04" + bytes(300)):
         path.write_bytes(data)
         refused(path, "no reduced model")
@@ -311,7 +311,7 @@ def test_a_changed_model_is_told_whatever_was_changed(tmp_path, content, model):
         refused(rewritten(content, path, header_with(**change)), "(its header changed)")
     not_finite = np.full((n, r), np.nan)
     refused(rewritten(content, path, array_with("vectors", not_finite), seal=True), "vectors holds values that are not")
-    alike(model, st.load_reduced(rewritten(content, path, lambda members: None)))
+    alike(model, st.open(rewritten(content, path, lambda members: None)))
 
 
 class Bomb:
@@ -394,7 +394,7 @@ def test_flipped_bytes_are_found_or_harmless(tmp_path, content, model):
         data[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(bytes(data))
         try:
-            back = st.load_reduced(path)
+            back = st.open(path)
         except st.CaseError:
             found += 1
         else:  # a date or an attribute of the archive's own
@@ -436,7 +436,7 @@ def test_a_kill_in_the_middle_leaves_the_old_file(tmp_path, content):
 def test_a_folder_that_cannot_be(model, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(st.AnalysisError, match="cannot write"):
-        st.save_reduced(model, tmp_path / "file" / "model.npz")
+        st.save(model, tmp_path / "file" / "model.npz")
 
 
 def test_arrays_are_compressed_where_it_pays(content):

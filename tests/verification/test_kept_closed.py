@@ -224,7 +224,7 @@ def test_statistics_say_that_it_is_kept_closed(tmp_path):
     table = contact_table(run)
     assert table.rows[0].cells[table.heads.index("separation [%]")] == "0.0, kept closed"
     assert "cannot separate" in table.caption
-    again = st.load_trajectory(st.save(run, tmp_path / "run.nc"))
+    again = st.open(st.save(run, tmp_path / "run.nc"))
     assert again.phases[0].contacts["rub"].kept_closed
 
 

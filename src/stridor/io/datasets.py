@@ -10,17 +10,20 @@ from typing import Any
 import numpy as np
 
 from ..agreement import Agreement
+from ..case import Case
 from ..errors import CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..modal.parametric import ReducedModel
+from ..reading import is_reduced_file, starts_with
 from ..study.fingerprint import changes_of
 from ..temporal.node_history import NodeHistory
 from ..temporal.trajectory import STATUS, ContactStatistics, PhaseResult, Trajectory
 from ..typing import ComplexArray
 from .atomic import replacing
-from .reduced_models import save_reduced
-from .result_files import FORMAT, damage_told, open_results
+from .left_out import Keep
+from .reduced_models import load_reduced, save_reduced
+from .result_files import FORMAT, HDF5, damage_told, open_results
 from .seals import seal
 from .streams import NotedErrors
 
@@ -28,23 +31,38 @@ Result = ComplexModes | Onsets | Trajectory | Agreement
 
 
 def to_dataset(result: Result) -> Any:
-    """xarray.Dataset of a result; units in attributes, case and provenance embedded as text."""
-    if isinstance(result, ComplexModes):
-        return _modes(result)
-    if isinstance(result, Onsets):
-        return _onsets(result)
-    if isinstance(result, Trajectory):
-        return _trajectory(result)
-    return _agreement(result)
+    """xarray.Dataset of a result; units in attributes, case and provenance embedded as text. Raises CaseError for what is
+    none."""
+    kinds = {ComplexModes: _modes, Onsets: _onsets, Trajectory: _trajectory, Agreement: _agreement}
+    for kind, written in kinds.items():
+        if isinstance(result, kind):
+            return written(result)
+    accepted = "complex modes, onsets, a trajectory or an agreement; reduced models are no datasets, but can be saved"
+    raise CaseError("result", f"a {type(result).__name__}", accepted)
 
 
-def save(result: Result | ReducedModel, path: str | Path) -> Path:
-    """Write a result to ``path`` (.nc) by way of a temporary file; a reduced model as `save_reduced` does (.npz).
+def save(
+    result: Result | ReducedModel,
+    path: str | Path,
+    *,
+    case: Case | Mapping[str, Any] | None = None,
+    keep: Keep | None = None,
+) -> Path:
+    """Write a result (.nc) or a reduced model (.npz) to ``path`` by way of a temporary file; `open` reads it.
 
-    Raises AnalysisError on a full disk.
+    Of reduced models alone, case: what it was made of, for the file to say so, or what `provenance_of` said of the file
+    it was read from. keep: "all" (None); "shapes" leaves the full matrices out, and with them what is solved in the full
+    problem (`verified`, `Corrector`, backward errors, confirmed onsets); "eigenvalues" leaves the basis out too, and with
+    it vectors on the full model.
+
+    Raises CaseError for what is no result, and factors that are plain functions; AnalysisError where the file cannot be
+    written.
     """
     if isinstance(result, ReducedModel):
-        return save_reduced(result, path)
+        return save_reduced(result, path, case=case, keep=keep or "all")
+    if keep is not None or case is not None:
+        name, given = ("case", None) if keep is None else ("keep", keep)
+        raise CaseError(name, given, "goes with a reduced model; results are kept whole, and hold their case")
     dataset = seal(to_dataset(result))
     target = Path(path)
     with replacing(target) as temporary:
@@ -56,17 +74,29 @@ def save(result: Result | ReducedModel, path: str | Path) -> Path:
     return target
 
 
-def open_dataset(path: str | Path) -> Any:
-    """xarray.Dataset of a file written by ``save``. Raises CaseError where it is none, or is not as it was written."""
-    return open_results(path)
+def open(path: str | Path) -> Any:
+    """What is in a file that `save` or a command wrote, by its content: a Trajectory with the state that a restart
+    needs, a ReducedModel whose modes are the same to the last bit, or of other results the xarray.Dataset of `to_dataset`.
+
+    Raises CaseError for files that are none, damaged, changed since, or of a newer format.
+    """
+    target = Path(path)
+    if is_reduced_file(target) and not starts_with(target, HDF5):
+        return load_reduced(target)
+    data = open_results(target)
+    return _trajectory_in(data, target) if data.attrs["analysis"] == "simulate" else data
 
 
 def load_trajectory(path: str | Path) -> Trajectory:
-    """Trajectory from a file written by ``save``, with the state that a restart needs."""
-    data = open_dataset(path)
+    """The trajectory in a file written by ``save``. Raises CaseError where it is none."""
+    data = open_results(path)
     if data.attrs.get("analysis") != "simulate":
         raise CaseError("file", str(path), "a file of `stridor simulate`")
-    with damage_told(Path(path)):
+    return _trajectory_in(data, Path(path))
+
+
+def _trajectory_in(data: Any, path: Path) -> Trajectory:
+    with damage_told(path):
         return _run_of(data)
 
 

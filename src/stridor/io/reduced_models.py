@@ -56,15 +56,7 @@ def save_reduced(
     case: Case | Mapping[str, Any] | None = None,
     keep: Keep = "all",
 ) -> Path:
-    """Write a reduced model to ``path`` (.npz) by way of a temporary file.
-
-    case: what it was made of, for the file to say so, or what `provenance_of` said of the file it was read from. keep:
-    "all"; "shapes" leaves the full matrices out, and with them what is solved in the full problem (`verified`,
-    `Corrector`, backward errors, confirmed onsets); "eigenvalues" leaves the basis out too, and with it vectors on the
-    full model.
-
-    Raises CaseError for factors that are plain functions, AnalysisError where the file cannot be written.
-    """
+    """Write a reduced model to ``path`` (.npz) by way of a temporary file, as `datasets.save` says."""
     if keep not in KEEPS:
         raise CaseError("keep", keep, f"one of {', '.join(KEEPS)}")
     lost = kept_in(model)
@@ -82,10 +74,7 @@ def save_reduced(
 
 
 def load_reduced(path: str | Path) -> ReducedModel:
-    """The reduced model in a file written by ``save_reduced``; its modes are the same to the last bit.
-
-    Raises CaseError for files that are none, cut short, damaged or of a newer format.
-    """
+    """The reduced model in a file written by ``save_reduced``. Raises as `datasets.open`."""
     target = Path(path)
     with _opened(target) as (archive, header):
         return _model(archive, header)
@@ -245,7 +234,7 @@ def _know_every_field(model: ReducedModel) -> None:
 @contextlib.contextmanager
 def _opened(path: Path) -> Generator[tuple[zipfile.ZipFile, dict[str, Any]], None, None]:
     """The archive and its header. Raises CaseError for what is no reduced model that this version can read."""
-    foreign = CaseError("file", str(path), "no reduced model; give a file of st.save_reduced or stridor reduce --save")
+    foreign = CaseError("file", str(path), "no reduced model; give a file of st.save or stridor reduce --save")
     try:
         if reason := irregular(path):
             raise CaseError("file", str(path), reason)

@@ -17,7 +17,7 @@ from .seals import CONTENTS, broken
 
 FORMAT = "stridor results 1"
 _KIND = "stridor results "
-_HDF5 = b"\x89HDF\r\n\x1a\n"
+HDF5 = b"\x89HDF\r\n\x1a\n"
 _FOREIGN = "no results of stridor; give a results file written by stridor (netCDF-4/HDF5)"
 # What is written is not packed; a file that another tool has packed may unfold to so much.
 _UNQUESTIONED, _TIMES = 2**28, 50
@@ -94,13 +94,13 @@ def _look_at(path: Path) -> None:
         if reason := irregular(path):
             raise CaseError("file", str(path), reason)
         with path.open("rb") as stream:
-            start = stream.read(len(_HDF5))
+            start = stream.read(len(HDF5))
     except FileNotFoundError:
         raise CaseError("file", str(path), "no such file") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise CaseError("file", str(path), f"cannot be read: {reason}") from error
-    if start != _HDF5:
+    if start != HDF5:
         raise CaseError("file", str(path), _FOREIGN)
 
 
