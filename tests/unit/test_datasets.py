@@ -132,5 +132,5 @@ def test_what_cannot_be_saved_or_opened(case: st.Case, tmp_path: Path) -> None:
             st.save(thing, tmp_path / "nothing.nc")
     assert not list(tmp_path.iterdir())
     (tmp_path / "empty.npz").touch()
-    with pytest.raises(st.CaseError, match="no reduced model; give a file of st.save"):
+    with pytest.raises(st.CaseError, match=r"no reduced model; give a file of st\.save"):
         st.open(tmp_path / "empty.npz")

@@ -31,12 +31,11 @@ Result = ComplexModes | Onsets | Trajectory | Agreement
 
 
 def to_dataset(result: Result) -> Any:
-    """xarray.Dataset of a result; units in attributes, case and provenance embedded as text. Raises CaseError for what is
-    none."""
-    kinds = {ComplexModes: _modes, Onsets: _onsets, Trajectory: _trajectory, Agreement: _agreement}
-    for kind, written in kinds.items():
-        if isinstance(result, kind):
-            return written(result)
+    """xarray.Dataset of a result; units in attributes, case and provenance embedded as text. Raises CaseError for what
+    is none."""
+    kinds: dict[type, Any] = {ComplexModes: _modes, Onsets: _onsets, Trajectory: _trajectory, Agreement: _agreement}
+    if type(result) in kinds:
+        return kinds[type(result)](result)
     accepted = "complex modes, onsets, a trajectory or an agreement; reduced models are no datasets, but can be saved"
     raise CaseError("result", f"a {type(result).__name__}", accepted)
 
@@ -50,10 +49,10 @@ def save(
 ) -> Path:
     """Write a result (.nc) or a reduced model (.npz) to ``path`` by way of a temporary file; `open` reads it.
 
-    Of reduced models alone, case: what it was made of, for the file to say so, or what `provenance_of` said of the file
-    it was read from. keep: "all" (None); "shapes" leaves the full matrices out, and with them what is solved in the full
-    problem (`verified`, `Corrector`, backward errors, confirmed onsets); "eigenvalues" leaves the basis out too, and with
-    it vectors on the full model.
+    Of reduced models alone, case: what it was made of, for the file to say so, or what `provenance_of` said of the
+    file it was read from. keep: "all" (None); "shapes" leaves the full matrices out, and with them what is solved in
+    the full problem (`verified`, `Corrector`, backward errors, confirmed onsets); "eigenvalues" leaves the basis out
+    too, and with it vectors on the full model.
 
     Raises CaseError for what is no result, and factors that are plain functions; AnalysisError where the file cannot be
     written.
@@ -76,7 +75,7 @@ def save(
 
 def open(path: str | Path) -> Any:
     """What is in a file that `save` or a command wrote, by its content: a Trajectory with the state that a restart
-    needs, a ReducedModel whose modes are the same to the last bit, or of other results the xarray.Dataset of `to_dataset`.
+    needs, a ReducedModel whose modes are the same to the last bit, or of other results the dataset of `to_dataset`.
 
     Raises CaseError for files that are none, damaged, changed since, or of a newer format.
     """
