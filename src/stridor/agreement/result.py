@@ -10,6 +10,7 @@ import numpy as np
 
 from ..digits import measured, readable
 from ..modal.onset import refuted
+from ..notebook import html_table
 from ..temporal.signals import Growth
 from .perturbation import Perturbation
 
@@ -96,6 +97,23 @@ class Agreement:
     def agree(self) -> bool | None:
         """Whether all that was compared agrees, None where that is not decided."""
         return True if self.verdict.startswith(AGREE) else False if self.verdict.startswith(DISAGREE) else None
+
+    def _repr_html_(self) -> str:
+        heads = ("μ", "modes [Hz]", "[1/s]", "in time [Hz]", "[1/s]", "verdict")
+        rows = [
+            (
+                f"{c.mu:g}",
+                *(
+                    readable(x)
+                    for lam in (c.modal_eigenvalue, c.perturbation.eigenvalue)
+                    for x in (lam.imag / (2 * np.pi), lam.real)
+                ),
+                c.verdict,
+            )
+            for c in self.comparisons
+        ]
+        cut = "interrupted: what is here is whole" if self.interrupted else ""
+        return html_table(self.verdict, heads, rows, (cut, *self.notes))
 
     def to_json(self) -> dict[str, Any]:
         """The document that `stridor compare --json` prints: the first μ at the top, all in comparisons."""

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from ..errors import CaseError, Problem
+from ..notebook import html_table
 from .bodies import BeamBody, MatrixBody
 from .checks import Parts, problems_between, slave_side
 from .expression import parse_expression
@@ -103,6 +104,18 @@ class Case(Table):
     def warnings(self) -> list[str]:
         """One line for each value that is allowed but probably not meant (units, digits)."""
         return list(oddities(self))
+
+    def _repr_html_(self) -> str:
+        rows = [(name, f"{body.type} {getattr(body, 'material', None) or ''}") for name, body in self.bodies.items()]
+        rows += [
+            (name, f"{c.slave} on {c.master}, {stiffness}, {c.friction.law} μ = {c.friction.coefficient:g}")
+            for name, c in self.contacts.items()
+            for stiffness in (c.stiffness if isinstance(c.stiffness, str) else f"stiffness {c.stiffness:g}",)
+        ]
+        others = ("supports", "loads", "ties", "springs", "dashpots")
+        rest = [(table, ", ".join(getattr(self, table))) for table in others]
+        rest.append(("phases", ", ".join(f"{phase.name} {phase.duration:g} s" for phase in self.phases)))
+        return html_table(f"Case {self.title}", ("", "what it is"), rows, (f"{name}: {of}" for name, of in rest if of))
 
     @property
     def text(self) -> str:

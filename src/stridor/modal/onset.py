@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from math import pi
 from typing import Any, Literal
 
-from ..digits import fixed, readable
+from ..digits import fixed, hertz, readable
+from ..notebook import html_table
 from ..typing import ComplexArray, IntArray
 
 Branches = tuple[IntArray, ComplexArray]
@@ -90,6 +91,22 @@ class Onsets:
     provenance: dict[str, Any] = field(default_factory=dict)
     source: str = ""
     followed: tuple[Branches, Branches] | None = field(default=None, repr=False, compare=False)
+
+    def _repr_html_(self) -> str:
+        heads = ("μ", "frequency [Hz]", "what", "modes", "growth", "slope [1/s]", "residual")
+        rows = [
+            (
+                fixed(o.mu, 6), readable(o.frequency_hz), o.kind, o.branch_words(", "),
+                "ends" if o.stabilising else "begins", "" if o.growth_slope is None else readable(o.growth_slope, 4),
+                f"{o.residual:.0e}",
+            )
+            for o in self.onsets
+        ]  # fmt: skip
+        low, high = self.friction_range
+        many = f"{len(self.onsets) or 'No'} onset{'' if len(self.onsets) == 1 else 's'}"
+        title = f"{many} for μ from {low:g} to {high:g}, up to {hertz(self.max_frequency_hz)}"
+        lines = (*self.at_start_words, *self.from_above_words, self.completeness, self.contact_state, *self.notes)
+        return html_table(title, heads, rows, lines)
 
     @property
     def first(self) -> Onset | None:

@@ -8,7 +8,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..digits import readable
 from ..errors import CaseError
+from ..notebook import html_table
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 
 MOST_BYTES = 4e9  # of eigenvalues and vectors held at one time
@@ -99,6 +101,38 @@ class ComplexModes:
     def interrupted(self) -> bool:
         """Whether friction coefficients that were asked for are missing."""
         return self.planned is not None
+
+    def _repr_html_(self) -> str:
+        marks = self.unstable & self.in_band
+        if len(self.mu) == 1:
+            heads = ("mode", "frequency [Hz]", "growth [1/s]", "damping ratio", "", "residual")
+            ratio = self.damping_ratio
+            rows = [
+                (
+                    int(self.branch[b]), readable(self.frequency_hz[0, b]), readable(self.growth_rate[0, b], 4),
+                    readable(ratio[0, b], 4), "unstable" if marks[0, b] else "", f"{self.residual[0, b]:.0e}",
+                )
+                for b in self.order(0)
+            ]  # fmt: skip
+            return html_table(f"Complex modes at μ = {self.mu[0]:g}", heads, rows, self._told)
+        growth = np.where(marks, self.growth_rate, -np.inf)
+        fastest = growth.argmax(axis=1) if marks.size else np.zeros(len(self.mu), dtype=np.int64)
+        rows = [
+            (
+                f"{mu:g}", self.total[k], int(marks[k].sum()),
+                readable(self.frequency_hz[k, b]) if marks[k].any() else "",
+                readable(self.growth_rate[k, b], 4) if marks[k].any() else "",
+            )
+            for k, (mu, b) in enumerate(zip(self.mu, fastest, strict=True))
+        ]  # fmt: skip
+        heads = ("μ", "modes", "unstable", "the fastest [Hz]", "[1/s]")
+        return html_table(f"Complex modes at {len(self.mu)} friction coefficients", heads, rows, self._told)
+
+    @property
+    def _told(self) -> list[str]:
+        """What is to be known beside the numbers, a line each."""
+        cut = [] if self.planned is None else [f"interrupted: {len(self.mu)} of {self.planned} friction coefficients"]
+        return [*cut, *self.completeness, self.contact_state, *self.notes]
 
     def chosen(self, columns: IntArray) -> ComplexModes:
         """These columns (c,) alone."""

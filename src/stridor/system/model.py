@@ -16,6 +16,7 @@ from ..contact.interface import Contact, Rows
 from ..contact.nodes import ContactNodes, stack
 from ..contact.surfaces import SurfaceContact
 from ..fe.assembly import connected_components
+from ..notebook import html_table
 from ..typing import Array, IntArray, Sparse
 from .given_matrices import contacts_given, general_reason, points_given, square_matrices, vectors_given
 from .load_steps import LoadStep
@@ -151,6 +152,14 @@ class System:
             m, c, k, built, vectors_given("loads", loads, size), motion, points_given(points, size, len(motion.names)),
             dof_names=tuple(f"freedom {k}" for k in range(size)), general=general_reason(m, c, k), contact_cubic=cubic,
         )  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        matrices = (("mass", self.mass), ("damping", self.damping), ("stiffness", self.stiffness))
+        rows: list[tuple[str, str]] = [(f"{name} matrix", f"{matrix.nnz} entries") for name, matrix in matrices]
+        rows += [(f"contact {c.name}", f"a point, stiffness {c.stiffness:g}, gap {c.gap:g} m") for c in self.contacts]
+        rows += [(f"contact {s.name}", f"{s.nodes.count} nodes") for s in self.surfaces]
+        lines = (f"loads: {', '.join(self.loads)}", f"motions: {', '.join(self.motion.names)}", self.general)
+        return html_table(f"System of {self.size} freedoms", ("", "what it is"), rows, lines)
 
     @property
     def size(self) -> int:

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..digits import readable
+from ..notebook import html_table
 from ..typing import Array, IntArray
 from .node_history import NodeHistory
 
@@ -88,6 +90,20 @@ class Trajectory:
     state: Mapping[str, Array] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
     nodes: NodeHistory | None = None
+
+    def _repr_html_(self) -> str:
+        heads = ("phase", "contact", "stick", "slip", "separation", "largest N [N]", "largest slip speed [m/s]")
+        rows = [
+            (
+                p.name, name, f"{c.stick_fraction:.1%}", f"{c.slip_fraction:.1%}", f"{c.separation_fraction:.1%}",
+                readable(c.max_normal_force, 4), readable(c.max_slip_speed, 4),
+            )
+            for p in self.phases
+            for name, c in p.contacts.items()
+        ]  # fmt: skip
+        cut = f"interrupted: {self.steps} of {self.planned_steps} steps" if self.interrupted else ""
+        lines = (cut, f"{len(self.time)} records every {self.sampling:g} s, path {self.path}")
+        return html_table(f"Run of {self.steps} steps of {self.step:g} s", heads, rows, lines)
 
     @property
     def sampling(self) -> float:
