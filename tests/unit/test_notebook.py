@@ -89,6 +89,9 @@ def test_numbers_are_those_of_the_result(shown: dict[str, object]) -> None:
     assert cells(shown["run"])[1][2:] == ["25.0%", "50.0%", "25.0%", "40.12", "0.3000"]
     assert "interrupted: 20 of 30 steps" in shown["run"]._repr_html_()
     assert cells(shown["agreement"])[1][:5] == ["0.1", "8642.11", "637.000", "8626.20", "600.000"]
+    assert ["contact A", "a point, stiffness 1e+10, gap 0 m"] in cells(shown["system"])
+    rigid = replace(shown["system"], contacts=(replace(shown["system"].contacts[0], stiffness=np.inf),))
+    assert ["contact A", "a point, rigid, gap 0 m"] in cells(rigid)
     assert ["A", "beam1.tip on beam2, stiffness 1e+10, coulomb μ = 0.1"] in cells(shown["case"])
 
 

@@ -156,7 +156,11 @@ class System:
     def _repr_html_(self) -> str:
         matrices = (("mass", self.mass), ("damping", self.damping), ("stiffness", self.stiffness))
         rows: list[tuple[str, str]] = [(f"{name} matrix", f"{matrix.nnz} entries") for name, matrix in matrices]
-        rows += [(f"contact {c.name}", f"a point, stiffness {c.stiffness:g}, gap {c.gap:g} m") for c in self.contacts]
+        rows += [
+            (f"contact {c.name}", f"a point, {stiffness}, gap {c.gap:g} m")
+            for c in self.contacts
+            for stiffness in (f"stiffness {c.stiffness:g}" if c.compliance else "rigid",)
+        ]
         rows += [(f"contact {s.name}", f"{s.nodes.count} nodes") for s in self.surfaces]
         lines = (f"loads: {', '.join(self.loads)}", f"motions: {', '.join(self.motion.names)}", self.general)
         return html_table(f"System of {self.size} freedoms", ("", "what it is"), rows, lines)
