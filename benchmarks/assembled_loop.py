@@ -21,13 +21,13 @@ from stridor.contact.nodes import ContactNodes
 from stridor.laws import Coulomb
 from stridor.system import System
 from stridor.system.model import PrescribedMotion
-from stridor.temporal.assembled.machine import Machine, assembled_machine
-from stridor.temporal.assembled.products import add_rows, advance
-from stridor.temporal.assembled.results import buffers
-from stridor.temporal.assembled.storage import lay_out_freedoms, upper_blocks
 from stridor.temporal.beta2 import scheme
 from stridor.temporal.schedule import PhaseSpec, lay_out
 from stridor.temporal.settings import Settings
+from stridor.temporal.steppers.sparse.machine import Machine, assembled_machine
+from stridor.temporal.steppers.sparse.products import add_rows, advance
+from stridor.temporal.steppers.sparse.records import buffers
+from stridor.temporal.steppers.sparse.storage import lay_out_freedoms, upper_blocks
 
 YOUNG, POISSON, DENSITY, EDGE = 200e9, 0.3, 7800.0, 1e-3
 BATCH = 4

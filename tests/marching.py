@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import scipy.signal
 import scipy.sparse as sp
 
@@ -15,8 +16,20 @@ from stridor.fe.beam import BeamElement, BeamMesh
 from stridor.laws import Coulomb
 from stridor.system import System
 from stridor.system.model import PrescribedMotion
+from stridor.temporal import march
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.simulate import Settings, simulate
+
+
+def simulate_assembled(system: System, phases, settings=None, **options):
+    """The march on assembled matrices, whatever suits the system."""
+    return simulate(system, phases, replace(settings or Settings(), path="assembled"), **options)
+
+
+def in_chunks(patch: pytest.MonkeyPatch, steps: int) -> None:
+    """Every march in chunks of so many steps, told after each."""
+    patch.setattr(march.Pace, "begin", lambda _: steps)
+    patch.setattr(march, "TOLD_SECONDS", -1.0)
 
 
 def touch(normal, tangent, *, gap=0.0, slip=0.0, law=None, name="A", motions=0) -> Contact:

@@ -24,10 +24,15 @@ STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP
 
 @dataclass(eq=False)
 class Held:
-    """A block that is not to be interrupted in its middle: whether an end was asked for, whether that was met."""
+    """A block that is not to be interrupted in its middle: whether an end was asked for, whether that was met.
+
+    ending: what it has is on its way out and is not to be lost; late: an end was asked for after that.
+    """
 
     asked: bool = False
     met: bool = False
+    ending: bool = False
+    late: bool = False
 
 
 @dataclass
@@ -99,9 +104,11 @@ def held() -> Generator[Held]:
         _program.blocks.remove(block)
         if before is not None:
             signal.signal(signal.SIGINT, before)
-    if block.asked and not block.met:
+    if block.late or (block.asked and not block.met):
         if _program.blocks:
             _program.blocks[-1].asked = True
+        elif block.late:
+            _insist()
         else:
             _raise()
 
@@ -136,6 +143,9 @@ def _handle(number: int, frame: FrameType | None) -> None:
     if block is not None and not (block.asked or block.met):
         block.asked = True
         return
+    if block is not None and block.ending and not block.late:
+        block.late = True
+        return
     _raise()
 
 
@@ -147,11 +157,16 @@ def _again(number: int, frame: FrameType | None) -> None:
 
 def _raise() -> None:
     """KeyboardInterrupt, and again later should it be dropped by a callback."""
+    _insist()
+    raise KeyboardInterrupt
+
+
+def _insist() -> None:
+    """KeyboardInterrupt soon, in a program."""
     if _program.installed:
         _program.pending = True
         if hasattr(signal, "setitimer"):
             signal.setitimer(signal.ITIMER_REAL, AGAIN_SECONDS, AGAIN_SECONDS)
-    raise KeyboardInterrupt
 
 
 def _stop_insisting() -> None:

@@ -16,6 +16,7 @@ import pytest
 import xarray as xr
 
 import stridor as st
+from marching import in_chunks
 from program import stridor
 from rubbing_block import rubbing_block
 from stridor.agreement.comparison import Agreement, Comparison
@@ -24,8 +25,6 @@ from stridor.io.datasets import load_trajectory
 from stridor.io.reduced_models import load_reduced
 from stridor.io.result_files import accept, damage_told, open_results
 from stridor.io.seals import seal
-from stridor.temporal import simulate as engine
-from stridor.temporal.assembled import march
 from stridor.temporal.signals import Components
 
 pytestmark = pytest.mark.bad_input
@@ -70,11 +69,10 @@ def result(kind: str):
 
     if kind == "beams":
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(engine, "CHUNK", 700)
+            in_chunks(patch, 700)
             return st.simulate(case(kind), progress=stop)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(march, "TOLD_SECONDS", 0.0)
-        patch.setattr(march.Pace, "begin", lambda _: 10)
+        in_chunks(patch, 10)
         return st.simulate(case(kind), progress=stop)
 
 

@@ -66,14 +66,14 @@ if os.environ.get("STRIDOR_MUTANT"):
 # What is written in instructions of the machine has none as plain Python: stand-ins, in the copy, for the kernels around
 # it. Faults in it are tried with everything compiled afresh.
 STAND_INS = {
-    "temporal/borrow.py": '''
+    "temporal/steppers/modal/borrow.py": '''
 
 if __import__("os").environ.get("NUMBA_DISABLE_JIT"):
 
     def borrow(array):
         return array
 ''',
-    "temporal/assembled/lanes.py": '''
+    "temporal/steppers/sparse/lanes.py": '''
 
 
 def _in_python(d):

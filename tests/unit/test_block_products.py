@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from stridor.temporal.assembled.lanes import LANES
-from stridor.temporal.assembled.products import add_rows
-from stridor.temporal.assembled.storage import LINE, Layout, aligned_zeros, upper_blocks
+from stridor.temporal.steppers.sparse.lanes import LANES
+from stridor.temporal.steppers.sparse.products import add_rows
+from stridor.temporal.steppers.sparse.storage import LINE, Layout, aligned_zeros, upper_blocks
 
 
 def _symmetric(blocks: int, width: int, seed: int) -> sp.csr_array:

@@ -15,19 +15,20 @@ import scipy.sparse as sp
 
 from stridor.errors import AnalysisError, CaseError
 from stridor.laws import Coulomb, Tabulated, Weakening
+from stridor.laws.friction import friction_rows
 from stridor.laws.packed import HEAD
 from stridor.system import System
-from stridor.temporal import attractor, beta2, inputs, saved, settings, signals, sketch, start
-from stridor.temporal.assembled import damping, limit, renewal, storage
-from stridor.temporal.assembled import machine as assembled_machine
-from stridor.temporal.assembled import start as assembled_start
-from stridor.temporal.assembled.node_table import sliding_directions
+from stridor.temporal import attractor, beta2, inputs, restart, saved, settings, signals, sketch
 from stridor.temporal.beta2 import StepLimit, scheme
 from stridor.temporal.energy import EnergyBalance
-from stridor.temporal.operators import _band_factor, friction_rows, nodal_arrays
 from stridor.temporal.schedule import PhaseSpec, lay_out
 from stridor.temporal.settings import Settings
 from stridor.temporal.sketch import Part
+from stridor.temporal.steppers.modal import ModalStepper, start
+from stridor.temporal.steppers.modal.operators import _band_factor, nodal_arrays
+from stridor.temporal.steppers.sparse import damping, limit, renewal, storage
+from stridor.temporal.steppers.sparse import machine as assembled_machine
+from stridor.temporal.steppers.sparse.node_table import sliding_directions
 
 # What NumPy warns of is a fault here, whatever comes of it.
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
@@ -669,53 +670,34 @@ def test_sketches_tell_models_apart_beyond_rounding() -> None:
 
 
 def run_before(**changes) -> Any:
-    state = {"settings": np.array([1e-6, 0.5, 50.0]), "model": np.array([1.0, 2.0])}
-    given = {"path": "assembled", "state": state, "step": 2e-6, "beta2": 0.6, "record_every": 50, "watch_names": ("tip",)}
+    state = {"settings": np.array([1e-6, 0.5, 50.0]), "model": np.array([1.0, 2.0]), "counters": np.array([7])}
+    given = {"path": "assembled", "state": state, "step": 2e-6, "beta2": 0.6, "record_every": 50, "watch_names": ("tip",), "steps": 7}
     return SimpleNamespace(**(given | changes))
 
 
-def machine_of(path: str, step: float = 1e-6, b2: float = 0.5) -> Any:
-    return SimpleNamespace(scheme=scheme(step, b2), path=path, system=SimpleNamespace(contact_nodes=lambda: None))
-
-
-def accepted(*given: object) -> None:
-    raise LookupError
-
-
-def refused_by(march: str, before: Any, *, step=1e-6, b2=0.5, every=50, watch=("tip",), join=True, monkeypatch) -> str:
-    """What either march says of a state, "" where it takes it; what follows the scheme and the records is left out."""
-    given = Settings(record_every=every, watch=watch)
+def refused_by(path: str, before: Any, *, step=1e-6, b2=0.5, every=50, watch=("tip",), join=True) -> str:
+    """What is said of a state, "" where it is taken; the stepper has no arrays and no parts of its own."""
+    stepper: Any = SimpleNamespace(
+        scheme=scheme(step, b2), path=path, parts=[Part("mass", np.array([1.0]), 2.0)], check=lambda restart: None,
+        state=dict, bounds=dict, counted=("counters", 0),
+    )  # fmt: skip
     try:
-        if march == "assembled":
-            monkeypatch.setattr(assembled_start, "check_model", lambda *given, **named: None)
-            monkeypatch.setattr(assembled_start, "_check_state", lambda *given: None)
-            assembled_start.check_restart(machine_of(march, step, b2), before, given, (), join=join, changed=False)
-        else:
-            for name, stand_in in (("sketch", ()), ("check_model", None), ("differing", ())):
-                monkeypatch.setattr(start, name, lambda *given, stand_in=stand_in, **named: stand_in)
-            monkeypatch.setattr(start, "STATE_FIELDS", ())
-            machine = machine_of(march, step, b2)
-            machine.state = SimpleNamespace(_fields=())
-            monkeypatch.setattr(start, "check_arrays", accepted)
-            monkeypatch.setattr(start, "_bounds", lambda machine: {})
-            start.restore(machine, before, given, None, join=join, changed=False)  # type: ignore[arg-type]
+        restart.check_restart(stepper, before, Settings(record_every=every, watch=watch), join=join, changed=False)
     except CaseError as error:
         return str(error)
-    except LookupError:
-        return ""
     return ""
 
 
 @pytest.mark.parametrize("march", ["assembled", "modal", "nodal"])
-def test_a_state_of_another_scheme_or_record_is_refused(march: str, monkeypatch) -> None:
+def test_a_state_of_another_scheme_or_record_is_refused(march: str) -> None:
     own = {"path": march}
-    assert refused_by(march, run_before(**own), monkeypatch=monkeypatch) == ""
+    assert refused_by(march, run_before(**own)) == ""
     other = "nodal" if march != "nodal" else "modal"
     for before, named in (
         (run_before(path=other), {}), (run_before(**own), {"step": 1.1e-6}), (run_before(**own), {"b2": 0.7}),
         (run_before(**own, state={}), {}),
     ):  # fmt: skip
-        said = refused_by(march, before, monkeypatch=monkeypatch, **named)
+        said = refused_by(march, before, **named)
         assert f"restart: 'step 2e-06 s, beta2 0.6, path {before.path}' – a state of the same scheme: step " in said
         assert said.endswith(f"{named.get('step', 1e-6):g} s, beta2 {named.get('b2', 0.5):g}, path {march}")
     for before, named, words in (
@@ -724,21 +706,21 @@ def test_a_state_of_another_scheme_or_record_is_refused(march: str, monkeypatch)
         (run_before(**own), {"watch": ()}, "'a record every 50 steps of tip' – the same records as before (here every 50 steps of no points), or join=False"),
         (run_before(**own, watch_names=("a", "b")), {"watch": ("a", "c")}, "'a record every 50 steps of a, b' – the same records as before (here every 50 steps of a, c), or join=False"),
     ):  # fmt: skip
-        assert words in refused_by(march, before, monkeypatch=monkeypatch, **named)
-        assert refused_by(march, before, monkeypatch=monkeypatch, join=False, **named) == ""
+        assert words in refused_by(march, before, **named)
+        assert refused_by(march, before, join=False, **named) == ""
 
 
 def test_another_model_is_refused_by_its_parts() -> None:
     parts = [Part("mass", np.array([1.0]), 1.0), Part("load P", np.array([2.0]), 2.0)]
     before: Any = SimpleNamespace(state={"model": sketch.packed(parts)})
-    start.check_model(parts, before, changed=False)
+    restart._check_model(parts, before, changed=False)
     others = [replace(parts[0], numbers=np.array([1.1])), replace(parts[1], numbers=np.array([2.5]))]
     with pytest.raises(CaseError, match=r"a state of the same model; these differ: mass; load P$"):
-        start.check_model(others, before, changed=False)
-    start.check_model(others, before, changed=True)
+        restart._check_model(others, before, changed=False)
+    restart._check_model(others, before, changed=True)
     for changed in (False, True):
         with pytest.raises(CaseError, match="a state of the same model: this one has other freedoms, loads or contacts"):
-            start.check_model(parts[:1], before, changed=changed)
+            restart._check_model(parts[:1], before, changed=changed)
 
 
 def test_supports_may_change_their_speed_and_not_their_direction() -> None:
@@ -750,10 +732,10 @@ def test_supports_may_change_their_speed_and_not_their_direction() -> None:
 
     before: Any = SimpleNamespace(state={"model": sketch.packed(parts_of([3.0, 4.0], [1.0, 0.0]))})
     for now, ratio in (([3.0, 4.0], 1.0), ([6.0, 8.0], 2.0), ([-1.5, -2.0], -0.5), ([3.0, 4.0 + 1e-6], 1.0)):
-        assert start.motion_ratio(parts_of(now, [1.0, 0.0]), before, ("belt", "jaw")) == pytest.approx([ratio, 1.0], rel=1e-6)
+        assert restart.motion_ratio(parts_of(now, [1.0, 0.0]), before, ("belt", "jaw")) == pytest.approx([ratio, 1.0], rel=1e-6)
     for now in ([4.0, 3.0], [6.0, 8.1]):
         with pytest.raises(CaseError, match=r"^restart: 'supports.belt' – the same direction: the way that it has gone so far"):
-            start.motion_ratio(parts_of(now, [1.0, 0.0]), before, ("belt", "jaw"))
+            restart.motion_ratio(parts_of(now, [1.0, 0.0]), before, ("belt", "jaw"))
 
 
 def test_bounds_of_a_state_are_those_of_its_arrays() -> None:
@@ -762,7 +744,8 @@ def test_bounds_of_a_state_are_those_of_its_arrays() -> None:
         table=SimpleNamespace(contacts=contacts), contacts=2, table_values=np.zeros((9, 3)),
         state=SimpleNamespace(segment=np.array([1, 2])),
     )  # fmt: skip
-    found = start._bounds(machine)
+    stepper: Any = SimpleNamespace(machine=machine)
+    found = ModalStepper.bounds(stepper)
     # A contact that does not slide far stays in its segment; six nodes make segments 0 to 4.
     assert [list(x) for x in found["state_segment"]] == [[0, 0], [1, 4]]
     assert found["state_active"] == (0, 8)
@@ -779,7 +762,7 @@ def test_forcing_of_the_first_step_has_the_accelerations_of_the_supports(b2: flo
     given = scheme(0.1, b2)
     for done, before in ((2, 0.5), (7, 3.0), (7, 3.0 * (1 + 1e-15)), (0, 0.0)):
         state = SimpleNamespace(counters=np.array([done]), motion=np.array([[9.0], [before]]))
-        load, minus_a, minus_v = start._coefficients(SimpleNamespace(scheme=given, state=state), schedule)  # type: ignore[arg-type]
+        load, minus_a, minus_v = start.coefficients(SimpleNamespace(scheme=given, state=state), schedule)  # type: ignore[arg-type]
         rate = schedule.motion_increments(done, 1)[0, 0] / 0.1
         assert load == pytest.approx(schedule.load_factors(done, 1)[0, 0])
         assert minus_a == pytest.approx(-2 * (rate - before) / (0.1 * given.s) if done < 7 else 0.0, abs=0 if done == 7 else 1e-12)

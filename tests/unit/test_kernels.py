@@ -173,8 +173,8 @@ def kept(top: Path, name: str, *, place: str, sources: str, days: float = 0.0, p
     made = top / name
     made.mkdir(parents=True)
     (made / ABOUT).write_text(json.dumps({"program": program, "place": place, "sources": sources}))
-    (made / "temporal.kernel.run_modal-134-b516bdc7.py311.nbi").write_bytes(b"1")
-    (made / "temporal.kernel.run_modal-134-b516bdc7.py311.0123456789abcdef.nbc").write_bytes(b"2")
+    (made / "temporal.steppers.modal.kernel.run_modal-134-b516bdc7.py311.nbi").write_bytes(b"1")
+    (made / "temporal.steppers.modal.kernel.run_modal-134-b516bdc7.py311.0123456789abcdef.nbc").write_bytes(b"2")
     then = time.time() - days * 86400.0
     os.utime(made / ABOUT, (then, then))
     return made
@@ -320,9 +320,9 @@ import numpy as np
 
 from stridor.kernels import njit
 from stridor.temporal.beta2 import scheme
-from stridor.temporal.layout import Fields, ModalRows
-from stridor.temporal.modal_path import modal_pass
-from stridor.temporal.operators import ModalArrays
+from stridor.temporal.steppers.modal.layout import Fields, ModalRows
+from stridor.temporal.steppers.modal.modal_path import modal_pass
+from stridor.temporal.steppers.modal.operators import ModalArrays
 
 
 @njit(cache=True)

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from marching import one_phase, points_of
+from marching import one_phase, points_of, simulate_assembled
 from stridor.system import System
-from stridor.temporal.assembled import simulate_assembled
 from stridor.temporal.settings import Settings
 from stridor.temporal.simulate import simulate
 

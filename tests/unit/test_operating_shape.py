@@ -39,9 +39,9 @@ def test_a_known_motion_on_assembled_matrices_is_given_back(monkeypatch, interru
             shapes.operating_shape(*given, mu=0.4)
         return
     found = shapes.operating_shape(*given, mu=0.4)
-    # 24 looks at a period of 2000 steps, over a third of 120 periods.
+    # 24 looks at a period of 2000 steps, over 60 periods.
     assert asked["every"] == 83
-    assert asked["duration"] == pytest.approx(40 / FREQUENCY)
+    assert asked["duration"] == pytest.approx(60 / FREQUENCY)
     assert (asked["mu"], asked["join"]) == (0.4, False)
-    assert asked["settings"] == replace(given[2], step=STEP, record_every=80_000, watch=())
+    assert asked["settings"] == replace(given[2], step=STEP, record_every=120_000, watch=())
     assert found["block"] == pytest.approx(np.array([[1.0, 2j], [1 - 1j, 0]]), abs=2e-4)

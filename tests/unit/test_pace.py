@@ -2,7 +2,7 @@
 
 import pytest
 
-from stridor.temporal.assembled.pace import CHUNK_SECONDS, LONGEST_CHUNK, RETRY_CHUNKS, TRIAL_STEPS, Pace
+from stridor.temporal.pace import CHUNK_SECONDS, LONGEST_CHUNK, RETRY_CHUNKS, TRIAL_STEPS, Pace
 
 
 def after(pace: Pace, steps: int, *, one: float, both: float) -> tuple[int, bool]:

@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import stridor as st
+from marching import in_chunks
 from rubbing_block import rubbing_block
 from stridor.app.cli import app
 from stridor.case import template_text
@@ -44,7 +45,7 @@ def case() -> st.Case:
 def part(case: st.Case, tmp_path_factory: pytest.TempPathFactory) -> Trajectory:
     """Stopped in the second phase, and read from its file."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stridor.temporal.simulate.CHUNK", 1200)
+        in_chunks(patch, 1200)
 
         def late(done: int, planned: int) -> None:
             if done > 1000:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stridor.system import System
-from stridor.temporal.assembled.damping import split_damping
+from stridor.temporal.steppers.sparse.damping import split_damping
 
 ROW = np.array([[2.0, -1, 0], [-1, 3, -2], [0, -2, 2]]) * 1e6
 

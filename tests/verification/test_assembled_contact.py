@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from marching import block_on_belt, one_phase, points_of, rod, touch
+from marching import block_on_belt, one_phase, points_of, rod, simulate_assembled, touch
 from stridor.laws import Coulomb, StaticKinetic
 from stridor.system import System
-from stridor.temporal.assembled import simulate_assembled, step_limit_assembled
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.settings import Settings
+from stridor.temporal.steppers.sparse import step_limit_assembled
 
 pytestmark = pytest.mark.verification
 

@@ -10,19 +10,20 @@ import pytest
 import scipy.sparse as sp
 
 from benches import Slave, bench
-from marching import belt_motion, one_phase, points_of, rod, touch
+from marching import belt_motion, one_phase, points_of, rod, simulate_assembled, touch
 from stridor.contact.interface import Rows
 from stridor.errors import AnalysisError, CaseError
 from stridor.laws import Coulomb, Tabulated, Weakening
 from stridor.system import System
 from stridor.system.model import CubicSprings
-from stridor.temporal.assembled import simulate_assembled, step_limit_assembled, storage
-from stridor.temporal.assembled.damping import split_damping
 from stridor.temporal.beta2 import step_limit
 from stridor.temporal.energy import energy_balance
+from stridor.temporal.march import March
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.settings import Settings
 from stridor.temporal.simulate import simulate
+from stridor.temporal.steppers.sparse import step_limit_assembled, storage
+from stridor.temporal.steppers.sparse.damping import split_damping
 
 pytestmark = pytest.mark.verification
 
@@ -124,7 +125,7 @@ def test_storage_changes_nothing(width, threads, monkeypatch):
 
 def test_threads_change_no_digit(monkeypatch):
     """Two parts at once or one after the other: the same numbers."""
-    from stridor.temporal.assembled.machine import Machine
+    from stridor.temporal.steppers.sparse.machine import Machine
 
     monkeypatch.setattr(storage, "THREADED_FREEDOMS", 0)
     system = chain(300, stiffness_damping=0.02)
@@ -177,9 +178,9 @@ def test_limit_of_one_freedom_with_lagged_damping(beta2, lag):
 
 
 def _march_unchecked(system, step, beta2, steps):
-    from stridor.temporal.assembled.machine import assembled_machine
-    from stridor.temporal.assembled.products import advance
     from stridor.temporal.beta2 import scheme
+    from stridor.temporal.steppers.sparse.machine import assembled_machine
+    from stridor.temporal.steppers.sparse.products import advance
 
     machine = assembled_machine(system, scheme(step, beta2), system.contact_nodes())
     machine.fields.u[machine.layout.place] = [1.0, -1.0]
@@ -377,18 +378,16 @@ def test_restart_goes_on_to_the_last_digit():
 
 
 def test_interrupt_keeps_what_was_computed(monkeypatch):
-    from stridor.temporal.assembled.march import _Run
-
     system = two_slaves()
     whole = simulate_assembled(system, PHASES, Settings(record_every=1))
-    inner = _Run._advance
+    inner = March._advance
 
-    def once(self, size):
-        if self.machine.done:
+    def once(self, pace):
+        if self.stepper.done:
             raise KeyboardInterrupt
-        inner(self, size)
+        return inner(self, pace)
 
-    monkeypatch.setattr(_Run, "_advance", once)
+    monkeypatch.setattr(March, "_advance", once)
     cut = simulate_assembled(system, PHASES, Settings(record_every=1))
     assert cut.interrupted
     assert 0 < cut.steps == len(cut.time)

@@ -11,7 +11,7 @@ import pytest
 import scipy.integrate
 import scipy.sparse as sp
 
-from marching import one_phase
+from marching import one_phase, simulate_assembled
 from stridor.contact.interface import Rows
 from stridor.contact.obstacles import Flat
 from stridor.contact.pairing import pair_surface
@@ -19,11 +19,10 @@ from stridor.errors import AnalysisError
 from stridor.laws import Coulomb, Hyperbolic, StaticKinetic, Tabulated, Weakening
 from stridor.system import System
 from stridor.system.model import PrescribedMotion
-from stridor.temporal.assembled import simulate_assembled
-from stridor.temporal.assembled.disc import solve_disc
-from stridor.temporal.assembled.renewal import take_over
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.settings import Settings
+from stridor.temporal.steppers.sparse.disc import solve_disc
+from stridor.temporal.steppers.sparse.renewal import take_over
 
 pytestmark = pytest.mark.verification
 
@@ -302,7 +301,7 @@ def test_finite_sliding_round_a_cylinder():
 
 def test_leaving_the_master_ends_the_run(monkeypatch):
     """A node beyond an edge: what, where, when, what to do, and the motion up to there."""
-    from stridor.temporal.assembled import renewal
+    from stridor.temporal.steppers.sparse import renewal
 
     system = finite(floor(masses(), positions=[[0.0, 0, 0]], freedoms=[[0, 1, 2]], law=Coulomb(0.0)))
     system = replace(system, initial_velocity=np.array([1.0, 0.0, 0.0]))

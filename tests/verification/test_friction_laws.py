@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from marching import block_on_belt, one_phase, run
+from marching import block_on_belt, one_phase, run, simulate_assembled
 from stridor import build_system, modes, onsets
 from stridor.case import loads
 from stridor.laws import Hyperbolic, Tabulated, Weakening
-from stridor.temporal.assembled.march import simulate_assembled
 from stridor.temporal.simulate import Settings
 
 pytestmark = pytest.mark.verification

@@ -11,13 +11,11 @@ from types import FrameType
 import numpy as np
 import pytest
 
-import stridor.temporal.assembled.march as assembled
-import stridor.temporal.simulate as engine
 from benches import Slave, bench
+from marching import in_chunks, simulate_assembled
 from stridor import interrupts
 from stridor.errors import CaseError
 from stridor.laws import Coulomb
-from stridor.temporal.assembled import simulate_assembled
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.settings import Settings
 from stridor.temporal.simulate import simulate
@@ -48,8 +46,7 @@ class Arranged:
             self.system = replace(self.system, contacts=contacts)
         path = kind if kind in ("modal", "nodal") else "auto"
         self.settings = Settings(step=STEP, record_every=3, path=path, watch=("base.end",))
-        monkeypatch.setattr(engine, "CHUNK", CHUNK)
-        monkeypatch.setattr(assembled.Pace, "begin", lambda _: CHUNK)
+        in_chunks(monkeypatch, CHUNK)
         self.call = simulate_assembled if kind == "assembled" else simulate
 
     def run(self, **more):
@@ -172,7 +169,6 @@ def test_stopped_at_every_chunk_and_taken_up_each_time(kind, monkeypatch):
             seen.append(done)
             raise KeyboardInterrupt
 
-        monkeypatch.setattr(assembled, "TOLD_SECONDS", -1.0)
         part = way.run(restart=part, progress=stop)
         assert part.steps == seen[0]
         if part.steps == whole.steps:
@@ -224,7 +220,6 @@ def test_a_changed_load_acts_from_the_restart_on(kind, monkeypatch):
     def stop(done, planned):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(assembled, "TOLD_SECONDS", -1.0)
     part = way.run(progress=stop)
     whole = way.run()
     half = replace(way.system, loads={k: 0.5 * v for k, v in way.system.loads.items()})

@@ -9,12 +9,12 @@ import pytest
 
 import stridor as st
 from benches import Slave, bench, paper_case
+from marching import simulate_assembled
 from rubbing_block import rubbing_block
 from stridor.agreement.perturbation import perturb
 from stridor.modal.over_friction import modes_of_band
 from stridor.sliding import steady_sliding
 from stridor.system import System, build_system
-from stridor.temporal.assembled import simulate_assembled
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.settings import Settings
 from stridor.temporal.simulate import simulate

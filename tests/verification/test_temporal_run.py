@@ -7,9 +7,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-import stridor.temporal.simulate as engine
 from benches import Slave, bench
-from marching import block_on_belt, one_phase, rod, run
+from marching import block_on_belt, in_chunks, one_phase, rod, run
 from stridor.errors import CaseError
 from stridor.laws import StaticKinetic
 from stridor.system import System
@@ -201,7 +200,7 @@ def test_restart_is_bit_for_bit(path, sliding, beta2, part):
 
     stop = round(part * whole.steps)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(engine, "CHUNK", stop)
+        in_chunks(patch, stop)
         first = simulate(system, PHASES, settings, progress=Stop())
     assert first.interrupted
     assert 0 < first.steps < whole.steps
@@ -230,7 +229,7 @@ def test_restart_remembers_that_a_contact_sticks(path, monkeypatch):
     start = (np.zeros(2), np.array([0.2, 0.0]), np.zeros(2))
     whole = simulate(system, one_phase(5.0), settings, disturbance=start)
     assert whole.tangential_force[1750, 0] == pytest.approx(0.35, abs=1e-3)
-    monkeypatch.setattr(engine, "CHUNK", 1750)
+    in_chunks(monkeypatch, 1750)
 
     def stop(done, planned):
         raise KeyboardInterrupt
@@ -262,7 +261,7 @@ def test_restart_refuses_another_scheme_or_model():
 
 
 def test_interruption_keeps_what_was_computed(monkeypatch):
-    monkeypatch.setattr(engine, "CHUNK", 100)
+    in_chunks(monkeypatch, 100)
     calls = []
 
     def progress(done, planned):
@@ -285,7 +284,7 @@ def test_interruption_keeps_what_was_computed(monkeypatch):
 
 
 def test_checkpoints_are_readable_trajectories(monkeypatch):
-    monkeypatch.setattr(engine, "CHUNK", 150)
+    in_chunks(monkeypatch, 150)
     seen = []
     system = bench(Slave(), velocity=1.0)
     settings = Settings(record_every=5)
@@ -305,7 +304,7 @@ def test_checkpoints_are_readable_trajectories(monkeypatch):
 def test_chunks_do_not_matter(monkeypatch):
     system = bench(Slave(), velocity=1.0)
     whole = simulate(system, PHASES, Settings(record_every=2))
-    monkeypatch.setattr(engine, "CHUNK", 37)
+    in_chunks(monkeypatch, 37)
     assert np.array_equal(whole.normal_force, simulate(system, PHASES, Settings(record_every=2)).normal_force)
 
 

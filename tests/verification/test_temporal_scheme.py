@@ -11,7 +11,6 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-import stridor.temporal.simulate as engine
 from benches import Slave, bench, paper_case
 from marching import one_phase, paper_scheme, points_of, rod, run
 from stridor.errors import AnalysisError, CaseError
@@ -20,6 +19,7 @@ from stridor.system.motion import Constraint, Structure, constrain
 from stridor.temporal.beta2 import step_limit
 from stridor.temporal.schedule import PhaseSpec, lay_out
 from stridor.temporal.simulate import Settings, simulate
+from stridor.temporal.steppers.modal import stepper as engine
 
 pytestmark = pytest.mark.verification
 

@@ -21,8 +21,10 @@ from ..sliding import full_motion
 from ..system import System
 from ..temporal.observe import Snapshots
 from ..temporal.schedule import PhaseSpec
+from ..temporal.settings import Settings, choose_step
 from ..temporal.signals import components
-from ..temporal.simulate import Settings, simulate
+from ..temporal.simulate import simulate
+from ..temporal.steppers.sparse import step_limit_assembled
 from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
 from .perturbation import LINEAR, PERTURBATION, Perturbation, whole
@@ -110,9 +112,6 @@ def _march(
     slowest, fastest = float(np.abs(lam.imag).min()), float(np.abs(lam.imag).max())
     step = settings.step
     if step is None:
-        from ..temporal.assembled import step_limit_assembled
-        from ..temporal.settings import choose_step
-
         step = choose_step(step_limit_assembled(system, settings.beta2), settings)
     every = max(1, int(2 * np.pi / fastest / SAMPLES / step))
     start = replace(

@@ -386,8 +386,8 @@ class Temporal(Table):
         default=0.0,
         description="a number >= 0 [m/s], an extra slip speed of the slave points at the start",
     )
-    path: Literal["auto", "modal", "nodal"] = Field(
-        default="auto", description='"auto", "modal" or "nodal", the unknowns of the time loop'
+    path: Literal["auto", "modal", "nodal", "assembled"] = Field(
+        default="auto", description='"auto", "modal", "nodal" or "assembled", the unknowns of the time loop'
     )
     contact: Literal["as given", "rigid"] = Field(
         default="as given", description='"as given" or "rigid", the stiffness of contacts in time'

@@ -6,10 +6,14 @@ Nothing is regularised: at zero speed the tangential force is anything up to `st
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
-from .packed import CONSTANT, CUBIC, EXPONENTIAL, HYPERBOLIC, LINEAR, coefficient_at, monotone_slopes
+import numpy as np
+
+from ..typing import Array
+from .packed import CONSTANT, CUBIC, EXPONENTIAL, HEAD, HYPERBOLIC, LINEAR, coefficient_at, monotone_slopes
 
 
 class FrictionLaw(Protocol):
@@ -269,3 +273,12 @@ def _factor(mu: float, present: float) -> float | None:
         return None
     factor = mu / present
     return factor if math.isfinite(factor) else None
+
+
+def friction_rows(laws: Sequence[FrictionLaw]) -> Array:
+    """Laws (c, k) as rows of numbers (`laws.packed`), filled up with zeros to one width."""
+    rows = [law.numbers for law in laws]
+    table = np.zeros((len(rows), max((len(row) for row in rows), default=HEAD)))
+    for filled, row in zip(table, rows, strict=True):
+        filled[: len(row)] = row
+    return table

@@ -25,12 +25,11 @@ from ..sliding import full_motion, slip_speeds, taken_as_closed
 from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
 from ..temporal.attractor import settled
-from ..temporal.beta2 import step_limit
 from ..temporal.energy import EnergyBalance, energy_balance
 from ..temporal.inputs import unfit_in_time
 from ..temporal.settings import Settings
 from ..temporal.signals import Growth, components
-from ..temporal.simulate import Checkpoint, Progress
+from ..temporal.simulate import Checkpoint, Progress, plan
 from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
@@ -358,7 +357,7 @@ def _check_extent(case: Case, system: System) -> None:
         for c in system.contacts
         if c.gap < -1e-9 and case.temporal.initial == "rest" and not system.assembled
     ]
-    limit = step_limit(system, case.temporal.beta2)
+    _, _, limit = plan(system, settings_of(case))
     step = case.temporal.step or limit.share * limit.step
     steps = sum(p.duration for p in case.phases) / step
     size = 8.0 * (6 * len(system.contacts) + 6 * len(system.surfaces) + 6 * len(case.temporal.watch) + 8)

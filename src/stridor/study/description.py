@@ -19,8 +19,9 @@ from ..mesh.quality import edge_lengths, pieces
 from ..sliding import steady_sliding
 from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
 from ..system import System, build_system
-from ..temporal.beta2 import step_limit
 from ..temporal.inputs import unfit_in_time
+from ..temporal.settings import choose_step
+from ..temporal.simulate import plan
 from .matrix_reports import matrix_reports
 from .pressed import unpressed
 from .settings import settings_of
@@ -172,16 +173,9 @@ def _law_words(friction: Friction) -> str:
 
 def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     """The time step against its limit, and how the time loop will go; added to the data."""
-    from ..temporal.settings import choose_path, choose_step
-
     settings = settings_of(case)
-    limit = step_limit(system, settings.beta2)
+    path, reason, limit = plan(system, settings)
     step = choose_step(limit, settings)
-    if system.assembled:
-        path, reason = "assembled", "sparse matrices, every slave node a contact"
-    else:
-        _, reason = choose_path(system, settings)
-        path = "modal" if reason.startswith("complete") else "nodal"
     steps = sum(round(p.duration / step) for p in case.phases)
     data |= {"step": step, "step_limit": limit.step, "limiting_body": limit.body, "path": path, "steps": steps}
     return [

@@ -69,10 +69,6 @@ def step_limit(system: System, beta2: float) -> StepLimit:
 
     Damping can only raise it (equal for β2 = 1/2), so the undamped frequency is used.
     """
-    if system.assembled:
-        from .assembled import step_limit_assembled
-
-        return step_limit_assembled(system, beta2)
     worst, body = 0.0, "the system"
     for part in system.components:
         mass = system.mass[part][:, part].toarray()

@@ -13,8 +13,7 @@ import numpy as np
 
 from ..errors import CaseError
 from ..typing import Array
-from .schedule import Schedule
-from .stage import (
+from .columns import (
     FIRST_OPEN,
     FIRST_STICK,
     MAX_NORMAL,
@@ -24,6 +23,7 @@ from .stage import (
     SLIP_STEPS,
     STICK_STEPS,
 )
+from .schedule import Schedule
 from .trajectory import ContactStatistics, PhaseResult, Trajectory
 
 

@@ -9,9 +9,7 @@ import numpy as np
 
 from ..errors import CaseError
 from ..system import System
-from ..system.uncoupled import UncoupledModes, uncoupled_modes
 from .beta2 import StepLimit
-from .machine import MODAL_LIMIT
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class Settings:
     step: float | None = None
     beta2: float = 0.5
     record_every: int = 50
-    path: Literal["auto", "modal", "nodal"] = "auto"
+    path: Literal["auto", "modal", "nodal", "assembled"] = "auto"
     initial: Literal["rest", "steady-sliding"] = "rest"
     perturbation: float = 0.0
     watch: tuple[str, ...] = ()
@@ -56,22 +54,3 @@ def choose_step(limit: StepLimit, settings: Settings) -> float:
             'step, coarser elements or mass = "lumped"',
         )
     return settings.step
-
-
-def choose_path(system: System, settings: Settings) -> tuple[UncoupledModes | None, str]:
-    """Complete modal basis where it is exact and affordable, else None; and the reason in words."""
-    if settings.path == "nodal":
-        return None, "asked for"
-    largest = max(len(part) for part in system.components)
-    if settings.path == "auto" and system.size > MODAL_LIMIT:
-        return None, f"{system.size} freedoms are too many for a complete modal basis"
-    if largest > MODAL_LIMIT:
-        raise CaseError("temporal.path", "modal", f"a body of {largest} freedoms is too large; take nodal")
-    modes = uncoupled_modes(system)
-    if modes.proportional:
-        return modes, "complete modal basis: damping is proportional in every component, the scheme is the same"
-    if settings.path == "modal":
-        raise CaseError(
-            "temporal.path", "modal", "damping is not proportional, so modes stay coupled; take nodal or auto"
-        )
-    return None, "damping is not proportional in every component"

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..kernels import njit
-from ..typing import Array, IntArray
-from .beta2 import Scheme
-from .layout import FAST, Fields, ModalRows
+from ....kernels import njit
+from ....typing import Array, IntArray
+from ...arithmetic import FAST
+from ...beta2 import Scheme
+from .layout import Fields, ModalRows
 from .operators import ModalArrays
 
 _unsigned: Any = np.uint64

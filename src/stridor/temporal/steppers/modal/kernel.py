@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels import njit
-from ..typing import Array
-from .beta2 import Scheme
+from ....kernels import njit
+from ....typing import Array
+from ...arithmetic import CAREFUL, FAST
+from ...beta2 import Scheme
+from ...columns import DAMPING, REC_GAP, REC_NORMAL, REC_PLACE, REC_SLIP, REC_STATUS, REC_TANGENTIAL
 from .borrow import borrow
-from .layout import CAREFUL, FAST, Fields, ModalRows, NodalRows, Record
+from .layout import Fields, ModalRows, NodalRows, Record
 from .lending import (
     lent_contacts,
     lent_fields,
@@ -29,22 +31,7 @@ from .lending import (
 from .modal_path import complete_modal, modal_constant, modal_energies, modal_pass
 from .nodal_path import complete_nodal, nodal_constant, nodal_energies, nodal_pass
 from .operators import ContactArrays, ModalArrays, NodalArrays
-from .stage import (
-    DAMPING,
-    REC_GAP,
-    REC_NORMAL,
-    REC_PLACE,
-    REC_SLIP,
-    REC_STATUS,
-    REC_TANGENTIAL,
-    Forcing,
-    LoopState,
-    Scratch,
-    accumulate,
-    advance_rows,
-    contact_stage,
-    forces_of,
-)
+from .stage import Forcing, LoopState, Scratch, accumulate, advance_rows, contact_stage, forces_of
 
 DONE, NEW_ROWS, OFF_LINE, NOT_FINITE = range(4)
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ...contact.nodes import ContactNodes
-from ...contact.surfaces import SurfaceContact
-from ...errors import AnalysisError, CaseError
-from ...system import System
-from ...typing import Array, IntArray, Sparse
-from ..beta2 import Scheme
-from ..inputs import DIAGONAL
-from ..schedule import Schedule
-from ..stage import FIRST_OPEN, FIRST_STICK, STATISTICS
+from ....contact.nodes import ContactNodes
+from ....contact.surfaces import SurfaceContact
+from ....errors import AnalysisError, CaseError
+from ....system import System
+from ....typing import Array, IntArray, Sparse
+from ...beta2 import Scheme
+from ...columns import FIRST_OPEN, FIRST_STICK, STATISTICS
+from ...inputs import DIAGONAL
+from ...schedule import Schedule
 from .damping import SplitDamping, split_damping
 from .forcing import COUNTERS, CUBIC, LOOP_WORKS, SKEW_WORKS, STEPS_DONE, Forcing, LoopState, StepWork
 from .loop import run_steps

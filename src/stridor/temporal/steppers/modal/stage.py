@@ -13,10 +13,25 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ..contact import multipliers, surface
-from ..kernels import njit
-from ..typing import Array, IntArray
-from .beta2 import Scheme
+from ....contact import multipliers, surface
+from ....kernels import njit
+from ....typing import Array, IntArray
+from ...beta2 import Scheme
+from ...columns import (
+    DAMPING,
+    EXTERNAL,
+    FIRST_OPEN,
+    FIRST_STICK,
+    FRICTION,
+    MAX_NORMAL,
+    MAX_SPEED,
+    MAX_TANGENTIAL,
+    NORMAL,
+    OPEN_STEPS,
+    SLIP_STEPS,
+    STICK_STEPS,
+    SUPPORT,
+)
 from .operators import FINITE, ContactArrays
 
 _STICK, _SLIP = multipliers.STICK, multipliers.SLIP
@@ -29,15 +44,6 @@ _spline_weights = njit(cache=True)(surface.spline_weights)
 SWEEP_LIMIT = 500
 SWEEP_TOLERANCE = 1e-12
 
-# Columns of the statistics kept per contact at every step.
-STICK_STEPS, SLIP_STEPS, OPEN_STEPS, MAX_NORMAL, MAX_SPEED, MAX_TANGENTIAL, FIRST_STICK, FIRST_OPEN = range(8)
-STATISTICS = 8
-# Works accumulated at every step [J].
-DAMPING, FRICTION, NORMAL, EXTERNAL, SUPPORT = range(5)
-WORKS = 5
-# Columns of a contact record.
-REC_NORMAL, REC_TANGENTIAL, REC_SLIP, REC_GAP, REC_STATUS, REC_PLACE = range(6)
-CONTACT_RECORD = 6
 
 
 class LoopState(NamedTuple):

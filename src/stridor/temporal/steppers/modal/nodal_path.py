@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from ..kernels import njit
-from ..typing import Array, IntArray
-from .beta2 import Scheme
-from .layout import FAST, Fields, NodalRows
+from ....kernels import njit
+from ....typing import Array, IntArray
+from ...arithmetic import FAST
+from ...beta2 import Scheme
+from .layout import Fields, NodalRows
 from .operators import NodalArrays
 
 

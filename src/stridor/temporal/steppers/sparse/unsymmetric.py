@@ -24,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ...kernels import njit
-from ...system import System
-from ...typing import Array, IntArray, Sparse
+from ....kernels import njit
+from ....system import System
+from ....typing import Array, IntArray, Sparse
 from .products import WITH_STIFFNESS, Fields, Structure
 from .storage import Layout, aligned_zeros
 

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ...system import System
-from ...typing import Array, IntArray, Sparse
+from ....system import System
+from ....typing import Array, IntArray, Sparse
 from .lanes import LANES
 
 THREADED_FREEDOMS = 20_000

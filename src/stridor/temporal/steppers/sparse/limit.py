@@ -34,11 +34,11 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from ...errors import AnalysisError
-from ...fe.assembly import connected_components
-from ...system import System
-from ...typing import Array, Sparse
-from ..beta2 import StepLimit, share_of
+from ....errors import AnalysisError
+from ....fe.assembly import connected_components
+from ....system import System
+from ....typing import Array, Sparse
+from ...beta2 import StepLimit, share_of
 from .damping import split_damping
 from .unsymmetric import halves
 

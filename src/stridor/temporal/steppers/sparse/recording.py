@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...kernels import njit
-from ...typing import Array, IntArray
-from ..layout import ENERGY_RECORD
-from ..stage import (
+from ....kernels import njit
+from ....typing import Array, IntArray
+from ...columns import (
     DAMPING,
+    ENERGY_RECORD,
     FIRST_OPEN,
     FIRST_STICK,
     MAX_NORMAL,

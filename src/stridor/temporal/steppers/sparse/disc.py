@@ -18,10 +18,10 @@ from __future__ import annotations
 
 import math
 
-from ...contact.multipliers import OPEN, SINGULAR, SLIP, STICK, coefficient_at
-from ...kernels import njit
-from ...laws import packed
-from ...typing import Array
+from ....contact.multipliers import OPEN, SINGULAR, SLIP, STICK, coefficient_at
+from ....kernels import njit
+from ....laws import packed
+from ....typing import Array
 
 _OPEN, _STICK, _SLIP = OPEN, STICK, SLIP
 _CONSTANT, _STICKING, _KIND, _KINETIC = packed.CONSTANT, packed.STICKING, packed.KIND, packed.KINETIC

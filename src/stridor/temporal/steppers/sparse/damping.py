@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ...system import System
-from ...typing import Array, Sparse
+from ....system import System
+from ....typing import Array, Sparse
 from .unsymmetric import halves
 
 PROPORTIONAL = 1e-10

@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...contact.nodes import ContactNodes, stack
-from ...contact.pairing import repair
-from ...contact.surfaces import SurfaceContact
-from ...system import System
-from ...typing import Array, IntArray
+from ....contact.nodes import ContactNodes, stack
+from ....contact.pairing import repair
+from ....contact.surfaces import SurfaceContact
+from ....system import System
+from ....typing import Array, IntArray
 from .machine import Machine
 
 SLIDE = 1e-3  # of the distance between nodes

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ...contact.nodes import ContactNodes
-from ...typing import Array, BoolArray, IntArray
-from ..operators import friction_rows
+from ....contact.nodes import ContactNodes
+from ....laws.friction import friction_rows
+from ....typing import Array, BoolArray, IntArray
 from .storage import Layout
 
 

@@ -4,16 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..typing import Array, IntArray
-
-# Reassociation lets dot products run in vector registers; NaN and infinity stay honoured, because a
-# run that blows up must be seen.
-FAST = {"reassoc", "contract", "nsz", "arcp"}
-# At the contacts the order of additions stays as written; divisions by constants may become products.
-CAREFUL = {"contract", "nsz", "arcp"}
-
-# Energies of a record [J]: kinetic and elastic at t_{n−1/2}, then the works up to there.
-ENERGY_RECORD = 7
+from ....typing import Array, IntArray
 
 
 class Fields(NamedTuple):

@@ -17,9 +17,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...contact import multipliers
-from ...kernels import njit
-from ...typing import Array, IntArray
+from ....contact import multipliers
+from ....kernels import njit
+from ....typing import Array, IntArray
 from .disc import solve_disc
 from .node_table import NodeTable
 

@@ -18,9 +18,9 @@ stored: exact to rounding, whatever acts. Cubic springs count as stored what was
 
 from __future__ import annotations
 
-from ...kernels import njit
-from ...typing import Array
-from ..stage import DAMPING, FRICTION, NORMAL
+from ....kernels import njit
+from ....typing import Array
+from ...columns import DAMPING, FRICTION, NORMAL
 from .forcing import (
     CIRCULATORY,
     GYROSCOPIC,

@@ -7,7 +7,6 @@ along rows (Rᵀp), so the loop needs rows and nothing about elements.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,13 +14,12 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from ..contact.interface import Contact
-from ..errors import AnalysisError
-from ..laws import FrictionLaw
-from ..laws.packed import HEAD
-from ..system import System
-from ..typing import Array, IntArray, Sparse
-from .beta2 import Scheme
+from ....contact.interface import Contact
+from ....errors import AnalysisError
+from ....laws.friction import friction_rows
+from ....system import System
+from ....typing import Array, IntArray, Sparse
+from ...beta2 import Scheme
 
 SMALL, FINITE = 0, 1
 POINTS_PER_FINITE_CONTACT = 5  # the slave and four master nodes
@@ -87,15 +85,6 @@ class RowTable:
     def auxiliary(self) -> int:
         """Number of rows that carry loads and support couplings."""
         return self.loads + 2 * self.motions
-
-
-def friction_rows(laws: Sequence[FrictionLaw]) -> Array:
-    """Laws (c, k) as rows of numbers (`laws.packed`), filled up with zeros to one width."""
-    rows = [law.numbers for law in laws]
-    table = np.zeros((len(rows), max((len(row) for row in rows), default=HEAD)))
-    for filled, row in zip(table, rows, strict=True):
-        filled[: len(row)] = row
-    return table
 
 
 def row_table(system: System) -> RowTable:

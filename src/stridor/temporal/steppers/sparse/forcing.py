@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...kernels import njit
-from ...typing import Array, IntArray
-from ..stage import DAMPING, EXTERNAL, SUPPORT
+from ....kernels import njit
+from ....typing import Array, IntArray
+from ...columns import DAMPING, EXTERNAL, SUPPORT
 from .products import Fields, Structure
 
 CUBIC = 5  # works[CUBIC]: done on cubic springs

@@ -9,10 +9,12 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from ..system import System
-from ..system.uncoupled import UncoupledModes
-from ..typing import Array, IntArray
-from .beta2 import Scheme
+from ....system import System
+from ....system.uncoupled import UncoupledModes
+from ....typing import Array, IntArray
+from ...beta2 import Scheme
+from ...columns import FIRST_OPEN, FIRST_STICK, STATISTICS, WORKS
+from ...schedule import Schedule
 from .kernel import run_modal, run_nodal
 from .layout import Fields, ModalRows, NodalRows, Record
 from .operators import (
@@ -24,8 +26,7 @@ from .operators import (
     nodal_arrays,
     row_table,
 )
-from .schedule import Schedule
-from .stage import FIRST_OPEN, FIRST_STICK, STATISTICS, WORKS, Forcing, LoopState, Scratch
+from .stage import Forcing, LoopState, Scratch
 
 MODAL_LIMIT = 3000
 LANES = 16

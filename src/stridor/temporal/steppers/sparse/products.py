@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from numba import get_num_threads, prange
 
-from ...kernels import njit
-from ...typing import Array, IntArray
-from ..layout import FAST
+from ....kernels import njit
+from ....typing import Array, IntArray
+from ...arithmetic import FAST
 from .lanes import rows2, rows3
 from .storage import Blocks
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..kernels import njit
+from ....kernels import njit
 from .borrow import borrow
 from .layout import Fields, ModalRows, NodalRows, Record
 from .operators import ContactArrays, ModalArrays, NodalArrays

@@ -1,0 +1,1 @@
+"""Methods of time stepping, each a folder with the contract of `temporal.stepper`."""

@@ -1,0 +1,72 @@
+"""Where a run begins: at rest, or in steady sliding."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from ....errors import CaseError
+from ....sliding import steady_sliding
+from ....system import System
+from ....system.uncoupled import UncoupledModes
+from ....typing import Array
+from ...schedule import Schedule
+from ...settings import Settings
+from ...stepper import Disturbance
+from .machine import Machine
+
+
+def initial_state(
+    machine: Machine,
+    modes: UncoupledModes | None,
+    schedule: Schedule,
+    settings: Settings,
+    disturbance: Disturbance | None = None,
+) -> None:
+    """Put a machine at rest or into steady sliding, disturbed if so asked, and predict its first step."""
+    system, fields, state = machine.system, machine.fields, machine.state
+    if settings.initial == "steady-sliding":
+        stretch = schedule.stretches[0]
+        steady = steady_sliding(
+            system.in_place(stretch.places_after),
+            load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
+            motion_factors=stretch.velocities_after,
+        )
+        velocity = np.zeros(system.size)
+        for contact in system.contacts:
+            velocity += settings.perturbation * _slip_impulse(system, contact.tangent_row)
+        fields.u[:] = machine.coordinates(steady.displacement - system.motion.lift @ stretch.places_after, modes)
+        state.motion[0] = stretch.places_after
+        fields.q[:] = machine.coordinates(velocity, modes)
+        state.motion[1] = stretch.velocities_after
+        state.status[:] = np.where(steady.active, 2, 0)
+        if stretch.ramp_steps:
+            raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
+    if disturbance is not None:
+        displacement, velocity, acceleration = disturbance
+        # q_0 = v_0 − β2 Δt a_0 starts the scheme without a jump (docs/theory-temporal.md).
+        rate = velocity - machine.scheme.beta2 * machine.scheme.step * acceleration
+        fields.u[:] += machine.coordinates(displacement, modes)
+        fields.q[:] += machine.coordinates(rate, modes)
+    machine.repack()
+    machine.free_increment(coefficients(machine, schedule))
+    machine.predict()
+
+
+def _slip_impulse(system: System, tangent_row: Array) -> Array:
+    """Velocity (n,) that an impulse along a contact's tangent gives, one unit of slip speed."""
+    answer = spl.splu(sp.csc_array(system.mass)).solve(tangent_row)
+    return answer / float(tangent_row @ answer)
+
+
+def coefficients(machine: Machine, schedule: Schedule) -> Array:
+    """Forcing coefficients of the next step: loads, −a and −v of the supports."""
+    scheme = machine.scheme
+    done = int(machine.state.counters[0])
+    rate = schedule.motion_increments(done, 1)[0] / scheme.step
+    before = machine.state.motion[1]
+    rate = np.where(np.abs(rate - before) <= 1e-13 * np.abs(before), before, rate)
+    acceleration = -2.0 * (rate - before) / (scheme.step * scheme.s)
+    velocity = -(before + 2.0 * scheme.beta2 * rate) / scheme.s
+    return np.concatenate([schedule.load_factors(done, 1)[0], acceleration, velocity])

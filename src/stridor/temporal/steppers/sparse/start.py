@@ -1,0 +1,82 @@
+"""Where a run on assembled matrices starts: at rest, in motion, or in steady sliding."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....contact.nodes import ContactNodes
+from ....errors import CaseError
+from ....sliding.surfaces import steady_sliding_nodes
+from ....system import System
+from ....typing import Array
+from ...schedule import Schedule
+from ...settings import Settings
+from ...stepper import Disturbance
+from .machine import Machine
+from .node_table import sliding_directions
+
+
+def begin(
+    machine: Machine,
+    schedule: Schedule,
+    settings: Settings,
+    mu: float | None,
+    disturbance: Disturbance | None,
+) -> None:
+    """Put a machine into its initial state.
+
+    At rest: the bodies where and as fast as the system has them. Raises CaseError for a ramp out of steady sliding
+    and what `steady_sliding_nodes` raises.
+    """
+    system = machine.system
+    u, v, a = np.zeros(system.size), np.zeros(system.size), np.zeros(system.size)
+    if settings.initial == "steady-sliding":
+        u, v = _steady(machine, schedule, settings, mu)
+    else:
+        if system.initial_displacement is not None:
+            u = u + system.initial_displacement
+        if system.initial_velocity is not None:
+            v = v + system.initial_velocity
+        # Loads that are there at t = 0 act as at rest: half a step early, which nothing later feels.
+        a = -(system.stiffness @ u + system.damping @ v) / system.mass.diagonal()
+    if disturbance is not None:
+        u, v, a = u + disturbance[0], v + disturbance[1], a + disturbance[2]
+    # q_0 = v_0 − β2 Δt a_0 starts the scheme without a jump (docs/theory-temporal.md).
+    place = machine.layout.place
+    machine.fields.u[place] = u
+    machine.fields.q[place] = v - machine.scheme.beta2 * machine.scheme.step * a
+    machine.show()
+    machine.mark_start()
+
+
+def _steady(machine: Machine, schedule: Schedule, settings: Settings, mu: float | None) -> tuple[Array, Array]:
+    """Displacement and velocity (n,) of steady sliding, with the perturbation of the slip speed."""
+    system, stretch = machine.system, schedule.stretches[0]
+    if stretch.ramp_steps:
+        raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
+    steady = steady_sliding_nodes(
+        system.in_place(stretch.places_after),
+        mu=mu,
+        load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
+        motion_factors=stretch.velocities_after,
+    )
+    # The loop counts from the structure that the distances carry along.
+    machine.state.motion[0] = steady.travel + stretch.places_after
+    machine.state.motion[1] = stretch.velocities_after
+    machine.contacts.force[:, 0] = np.where(steady.active, steady.normal_force, 0.0)
+    machine.contacts.force[:, 1:] = steady.friction_force
+    machine.contacts.status[:] = steady.status
+    velocity = np.zeros(system.size)
+    if settings.perturbation:
+        for contact in range(len(machine.nodes.names)):
+            velocity += settings.perturbation * _slip_impulse(system, machine.nodes, contact)
+    return np.asarray(steady.displacement) - system.motion.lift @ stretch.places_after, velocity
+
+
+def _slip_impulse(system: System, nodes: ContactNodes, contact: int) -> Array:
+    """Velocity (n,) that equal impulses on the nodes of a contact along its sliding give, mean slip speed one."""
+    mine = nodes.select(nodes.owner == contact)
+    along = mine.along(sliding_directions(mine, system.motion.full))
+    answer = (along.T @ np.ones(mine.count)) / system.mass.diagonal()
+    mean = float(np.mean(along @ answer))
+    return answer / mean if mean > 0.0 else answer

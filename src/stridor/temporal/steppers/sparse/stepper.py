@@ -1,0 +1,222 @@
+"""The stepper on assembled sparse matrices, whose contacts are lists of nodes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ....contact.nodes import ContactNodes
+from ....errors import AnalysisError
+from ....system import System
+from ....typing import Array
+from ...beta2 import StepLimit, scheme
+from ...columns import WORK_COLUMNS
+from ...inputs import unfit_in_time
+from ...node_history import NodeHistory
+from ...restart import motion_ratio
+from ...saved import INFINITY, STATUS_RANGE, Bounds
+from ...schedule import Schedule
+from ...settings import Settings, choose_step, not_finite
+from ...sketch import sketch
+from ...stepper import Disturbance
+from ...trajectory import Trajectory
+from .forcing import KEPT, MOST_SWEEPS, STEPS_DONE, UNCONVERGED
+from .limit import step_limit_assembled
+from .loop import NOT_FINITE
+from .machine import Machine, assembled_machine, diagonal_mass
+from .records import SKEW_COLUMNS, buffers, node_history
+from .renewal import node_distances, renew, slides_finitely, steps_to_renewal, take_over
+from .start import begin
+
+# What moves on from step to step, by the part of the machine that holds it.
+SAVED = {
+    "fields": ("u", "q", "shown", "push"),
+    "state": ("works", "statistics", "counters", "motion", "coefficients", "base", "reference"),
+    "contacts": ("force", "status", "offset"),
+}
+
+
+def sparse_stepper(system: System, settings: Settings, mu: float | None) -> SparseStepper:
+    """A system of assembled matrices made ready; mu scales every contact's friction law at its slip speed.
+
+    Raises CaseError for a mass that is not lumped and a step beyond the limit, AnalysisError for matrices that time
+    does not take.
+    """
+    if system.general and (why := unfit_in_time(system)):
+        raise AnalysisError(why)
+    diagonal_mass(system)
+    nodes = system.contact_nodes()
+    if mu is not None:
+        nodes = with_friction(nodes, mu, system.motion.full)
+    limit = step_limit_assembled(system, settings.beta2)
+    machine = assembled_machine(system, scheme(choose_step(limit, settings), settings.beta2), nodes)
+    return SparseStepper(machine, limit)
+
+
+def with_friction(nodes: ContactNodes, mu: float, factors: Array) -> ContactNodes:
+    """The same nodes with every contact's law scaled so that it gives ``mu`` at its mean slip speed, with the
+    motions at these factors (p,)."""
+    speed = np.linalg.norm(nodes.slip_velocity(factors), axis=1)
+    laws = tuple(
+        law.scaled(mu, float(speed[nodes.owner == k].mean() if np.any(nodes.owner == k) else 0.0))
+        for k, law in enumerate(nodes.laws)
+    )
+    return replace(nodes, laws=laws)
+
+
+class SparseStepper:
+    """See `temporal.stepper.Stepper`. Contacts that slide finitely have their rows found again as they go."""
+
+    path = "assembled"
+
+    def __init__(self, machine: Machine, limit: StepLimit) -> None:
+        self.machine, self.limit, self.scheme = machine, limit, machine.scheme
+        self.reason = reason_for(machine.system)
+        self.contact_names, self.closed = machine.nodes.names, machine.nodes.closed
+        self.works = WORK_COLUMNS | (SKEW_COLUMNS if len(machine.unsymmetric.force) else {})
+        self.parts = sketch(machine.system, machine.nodes)
+        self.finite = slides_finitely(machine.system)
+        self.distances = node_distances(machine.system) if self.finite else np.zeros(0)
+        # Of the rows: the step of their next renewal, the first for finite sliding, and the steps since the last.
+        self.renewal = np.array([0, 1])
+        self.renewed_at = np.zeros(machine.system.size + len(machine.system.motion.names))
+
+    @property
+    def system(self) -> System:
+        """What is marched."""
+        return self.machine.system
+
+    @property
+    def done(self) -> int:
+        """Steps done."""
+        return self.machine.done
+
+    @property
+    def statistics(self) -> Array:
+        """Of every step since the phase began (m, 8)."""
+        return self.machine.state.statistics
+
+    @property
+    def recorded(self) -> int:
+        """How many records are filled."""
+        return int(self.machine.state.counters[KEPT])
+
+    @property
+    def sweeps(self) -> tuple[int, int]:
+        """Most in a step, and steps that did not settle."""
+        counters = self.machine.state.counters
+        return int(counters[MOST_SWEEPS]), int(counters[UNCONVERGED])
+
+    @property
+    def counted(self) -> tuple[str, int]:
+        """Where the state has the steps done."""
+        return "state_counters", STEPS_DONE
+
+    @property
+    def threaded(self) -> bool:
+        """Whether the structure is large enough for two threads."""
+        return self.machine.threaded
+
+    def use_threads(self, *, two: bool) -> None:
+        """Take one thread or two."""
+        self.machine.use_threads(two=two)
+
+    def begin(self, schedule: Schedule, settings: Settings, mu: float | None, disturbance: Disturbance | None) -> None:
+        """At rest, in motion or in steady sliding, disturbed if so asked."""
+        begin(self.machine, schedule, settings, mu, disturbance)
+
+    def state(self) -> dict[str, Array]:
+        """What moves on from step to step."""
+        machine = self.machine
+        held: dict[str, Array] = {"renewal": self.renewal, "renewed_at": self.renewed_at}
+        for part, names in SAVED.items():
+            held |= {f"{part}_{name}": getattr(getattr(machine, part), name) for name in names}
+        return held
+
+    def bounds(self) -> Bounds:
+        """What is counted."""
+        return {
+            "contacts_status": STATUS_RANGE,
+            "state_counters": (0, INFINITY),
+            "state_statistics": (-1.0, INFINITY),
+            "renewal": (np.array([0, 1]), INFINITY),
+        }
+
+    def check(self, restart: Trajectory) -> None:
+        """Freedoms are freedoms, whatever the bodies."""
+
+    def resume(self, restart: Trajectory, schedule: Schedule, *, changed: bool) -> None:
+        """Take up a state that was checked."""
+        machine, size = self.machine, self.system.size
+        if self.finite:
+            # Rows as they were last found: first at that displacement, then the state itself.
+            machine.fields.u[machine.layout.place] = restart.state["renewed_at"][:size]
+            machine.state.motion[0] = restart.state["renewed_at"][size:]
+            surfaces, nodes, _ = renew(machine, machine.surfaces)
+            take_over(machine, surfaces, nodes)
+        for name, held in self.state().items():
+            held[:] = restart.state[name]
+        machine.contacts.q[:] = machine.fields.q[machine.table.place]
+        machine.state.counters[STEPS_DONE + 3 :] = 0
+        if changed:
+            ratio = motion_ratio(self.parts, restart, self.system.motion.names)
+            # The places that the supports have reached stay, whatever a unit of their motion is now.
+            machine.state.motion[:] /= ratio
+            self.renewed_at[size:] /= ratio
+            # No number: the next step finds its forces anew.
+            machine.state.coefficients[:] = np.nan
+            machine.show()
+
+    def make_room(self, schedule: Schedule, settings: Settings) -> None:
+        """Room for all records from the present step on."""
+        self.record = buffers(self.machine, schedule, settings)
+        self.machine.run(0, schedule, self.record)
+
+    def advance(self, steps: int, schedule: Schedule, phase: str) -> None:
+        """Up to so many steps, on rows renewed where that is due."""
+        machine = self.machine
+        if self.finite:
+            if self.done >= self.renewal[0]:
+                self._renew(phase)
+            steps = min(steps, int(self.renewal[0]) - self.done)
+        _, code = machine.run(steps, schedule, self.record)
+        if code == NOT_FINITE or not np.isfinite(machine.fields.u.sum() + machine.fields.q.sum()):
+            raise AnalysisError(not_finite(self.done * self.scheme.step, phase, self.scheme.step))
+
+    def _renew(self, phase: str) -> None:
+        machine = self.machine
+        surfaces, nodes, lost = renew(machine, machine.surfaces)
+        if len(lost):
+            at = self.done * self.scheme.step
+            contact = machine.nodes.names[int(machine.nodes.owner[lost[0]])]
+            place = ", ".join(f"{v:.6g}" for v in machine.nodes.position[lost[0]])
+            raise AnalysisError(
+                f"contact {contact}: the slave node at ({place}) left the master surface over an edge at t = {at:.6g} "
+                f"s (phase {phase}); shorten the phase, slow the support down or make the master larger"
+            )
+        take_over(machine, surfaces, nodes)
+        interval = steps_to_renewal(machine, self.distances, int(self.renewal[1]))
+        self.renewal[:] = self.done + interval, interval
+        self.renewed_at[:] = np.concatenate([machine.displacement, machine.state.motion[0]])
+
+    def velocity(self) -> Array:
+        """Velocity (n,) of the freedoms, β2 of a step before the present."""
+        return self.machine.fields.q[self.machine.layout.place]
+
+    def node_history(self, start: int) -> NodeHistory | None:
+        """Histories of the nodes, where there are any."""
+        return node_history(self.machine, self.record, start, self.recorded)
+
+
+def reason_for(system: System) -> str:
+    """Why a system is marched on assembled matrices."""
+    if system.general:
+        return "matrices that are not symmetric: assembled matrices with lumped mass"
+    if system.surfaces:
+        return "contact over surfaces: assembled matrices with lumped mass"
+    if system.cubic is not None:
+        return "cubic springs: assembled matrices with lumped mass"
+    if not system.assembled:
+        return "asked for"
+    return f"{system.size} freedoms are too many for a complete modal basis: assembled matrices with lumped mass"
