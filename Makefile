@@ -4,6 +4,7 @@
 PYTHON ?= python3.13 python3.12 python3.11 python3 python
 JOBS ?= 2
 PYTEST_ARGS ?=
+LANES ?= 1
 
 LOCK := requirements/dev.lock
 BIN := .venv/bin
@@ -39,7 +40,7 @@ mutants: $(STAMP)  ## do the tests notice small faults? (a sample: MUTANTS="--sa
 	  --target build/mutants/tools cosmic-ray==8.7.0
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/mutants/mutate.py $(MUTANTS)
 
-bench: $(STAMP)  ## the benchmarks in short mode
+bench: $(STAMP)  ## the benchmarks in short mode (LANES=2: two at once, which disturb each other)
 	@$(call each_benchmark,--short)
 
 lint: $(STAMP)  ## ruff
@@ -67,10 +68,8 @@ clean:  ## removes what the other targets made, except .venv and demo/
 # -- how it is done ----------------------------------------------------------------------------------------------------
 
 define each_benchmark
-set -e; n=0; for script in benchmarks/[!_]*.py; do \
-  test -f "$$script" || continue; \
-  n=$$((n + 1)); echo "== $$script $(1)"; $(BIN)/python "$$script" $(1); \
-done; test $$n -gt 0 || { echo "no benchmarks found" >&2; exit 1; }
+ls benchmarks/[!_]*.py | BENCH="$(BIN)/python" xargs -P $(LANES) -I{} sh -c \
+  'said=$$($$BENCH {} $(1) 2>&1); code=$$?; printf "== %s %s\n%s\n" {} "$(1)" "$$said"; exit $$code'
 endef
 
 # The first Python that really runs (shims may exist that only complain), is new enough, and can make environments.
