@@ -19,8 +19,8 @@ import stridor as st
 from marching import in_chunks
 from program import stridor
 from rubbing_block import rubbing_block
+from stridor.agreement import Perturbation
 from stridor.agreement.comparison import Agreement, Comparison
-from stridor.agreement.perturbation import Perturbation
 from stridor.io.datasets import load_trajectory
 from stridor.io.reduced_models import load_reduced
 from stridor.io.result_files import accept, damage_told, open_results

@@ -84,22 +84,6 @@ def test_short_spectra_are_told_at_the_middle_of_their_pieces() -> None:
     assert signals.spectrogram(loud[:200], dt, resolution_hz=1.0).time == pytest.approx([0.1])
 
 
-def test_lines_are_listed_by_strength_down_to_a_hundredth_and_apart() -> None:
-    dt, n = 1e-4, 10_000
-    time = np.arange(n) * dt
-    lines = {200.0: 1.0, 700.0: 3.0, 1200.0: 0.5, 1500.0: 0.05, 2000.0: 0.02, 204.5: 0.8}
-    signal = sum(size * np.sin(2 * np.pi * f * time) for f, size in lines.items())
-    spec = signals.spectrum(signal, dt)
-    found = signals.dominant_frequencies(spec, count=9)
-    assert found == pytest.approx([700, 200, 204.5, 1200, 1500], abs=0.3)
-    assert signals.dominant_frequencies(spec, count=2) == pytest.approx([700, 200], abs=0.3)
-    assert len(signals.dominant_frequencies(spec, count=9, floor=5e-3)) == 6
-    # Two widths apart they are two, closer than that the stronger alone.
-    signal = np.sin(2 * np.pi * 200.0 * time) + 0.8 * np.sin(2 * np.pi * 203.0 * time)
-    assert signals.dominant_frequencies(signals.spectrum(signal, dt), count=9) == pytest.approx([200], abs=0.3)
-    assert len(signals.dominant_frequencies(signals.spectrum(np.zeros(64), dt))) == 0
-
-
 def test_an_envelope_has_the_amplitude_at_its_times() -> None:
     dt, f = 1e-4, 500.0
     time = np.arange(20_000) * dt

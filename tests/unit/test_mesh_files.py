@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 
 from stridor.errors import CaseError
 from stridor.mesh import shapes
-from stridor.mesh.boundary import orient_facets
 from stridor.mesh.files import read_mesh, require_boundary, require_nodes
 from stridor.mesh.quality import check_mesh
 
@@ -368,16 +367,6 @@ def test_elements_that_use_missing_nodes_are_refused(tmp_path):
     path = tmp_path / "a.msh"
     path.write_text(gmsh22(path).read_text().replace("4 4 2 2 1 1 3 2 5", "4 4 2 2 1 1 3 2 77"))
     assert refused(path) == "a.msh, line 23: '4 4 2 2 1 1 3 2 77' – uses node 77, which is not defined"
-
-
-def test_facets_are_oriented_outward_or_refused():
-    mesh = shapes.block((0, 0, 0), (1, 1, 1), (2, 2, 2), order=2)
-    top = mesh.boundaries["top"]["quad8"]
-    corner_only = {"quad": top[:, [3, 2, 1, 0]]}
-    found = orient_facets(mesh.cells, mesh.points, corner_only)
-    assert sorted(found["quad8"].tolist()) == sorted(top.tolist())
-    with pytest.raises(ValueError, match="not a side of exactly one cell"):
-        orient_facets(mesh.cells, mesh.points, {"quad": np.array([[0, 1, 2, 3]])})
 
 
 def test_names_with_odd_letters_in_odd_places(two_quads, tmp_path):

@@ -7,8 +7,9 @@ import pytest
 
 from stridor.errors import CaseError
 from stridor.mesh import shapes
+from stridor.mesh.boundary import cell_facets, match_facets
 from stridor.mesh.model import Mesh
-from stridor.mesh.quality import check_mesh, edge_lengths, flip_if_mirrored, pieces, waves
+from stridor.mesh.quality import check_mesh, edge_lengths, pieces, turned_over
 
 
 def problems(mesh) -> list[str]:
@@ -97,12 +98,19 @@ def test_points_and_indices_are_checked_before_anything_is_computed():
     assert problems(stray) == ["bodies.pad: boundary odd: 1 facets are a side of no cell"]
 
 
+def with_turned_cells(mesh):
+    """As the readers of files and the built-in shapes leave a mesh."""
+    cells = turned_over(mesh.cells, mesh.points)
+    every = cell_facets(cells, mesh.points)
+    return replace(mesh, cells=cells, boundaries={n: match_facets(every, f).outer for n, f in mesh.boundaries.items()})
+
+
 @pytest.mark.parametrize(("kind", "order"), [("quad", 1), ("quad", 2), ("quad9", 1), ("triangle", 1), ("triangle", 2)])
 def test_mirrored_plane_meshes_are_turned_over_with_their_facets(kind, order):
     mesh = shapes.annulus((0, 0), 0.5, 1.0, (2, 12), kind=kind, order=order)
     mirrored = replace(mesh, points=mesh.points * [1, -1])
     assert "all" in problems(mirrored)[0]
-    turned = flip_if_mirrored(mirrored)
+    turned = with_turned_cells(mirrored)
     check_mesh(turned, "mesh")
     for name, outward in (("outer", 1), ("inner", -1)):
         (facets,) = turned.boundaries[name].values()
@@ -111,25 +119,25 @@ def test_mirrored_plane_meshes_are_turned_over_with_their_facets(kind, order):
         assert np.all(outward * np.sum(normal * (start + end), axis=1) > 0)
         if facets.shape[1] == 3:
             assert np.all(np.linalg.norm(turned.points[facets[:, 2]] - (start + end) / 2, axis=1) < 0.05)
-    assert flip_if_mirrored(mesh) is mesh
+    assert turned_over(mesh.cells, mesh.points) is mesh.cells
 
 
 def test_a_patch_numbered_the_other_way_is_turned_but_a_fold_is_not():
     mesh = unit_squares()
     cells = mesh.cells["quad"].copy()
     cells[1] = cells[1][::-1]  # clockwise, as its neighbours see too
-    check_mesh(flip_if_mirrored(replace(mesh, cells={"quad": cells})), "mesh")
+    check_mesh(with_turned_cells(replace(mesh, cells={"quad": cells})), "mesh")
     # A node dragged across its neighbours' edge: the triangle beyond is inverted, and in the same sense as the rest.
     triangles = shapes.rectangle((0, 0), (2, 1), (2, 1), kind="triangle")
     folded = moved(triangles, node_at(triangles, 0, 1), (1.5, 0.1))
-    assert flip_if_mirrored(folded) is folded
+    assert turned_over(folded.cells, folded.points) is folded.cells
     assert "1 of 4 cells are inverted" in problems(folded)[0]
 
 
 def test_solid_cells_are_never_turned():
     mesh = shapes.block((0, 0, 0), (1, 1, 1), (1, 1, 1))
     mirrored = replace(mesh, points=mesh.points * [1, 1, -1])
-    assert flip_if_mirrored(mirrored) is mirrored
+    assert turned_over(mirrored.cells, mirrored.points) is mirrored.cells
 
 
 def test_pieces_count_what_shares_no_node():
@@ -149,7 +157,6 @@ def test_edge_lengths_and_elements_per_wavelength():
     assert least == pytest.approx(0.1)
     assert largest == pytest.approx(0.3)
     # 3000 m/s at 1 kHz: 3 m long, ten elements of 0.3 m.
-    assert waves(mesh, 3000.0, 1000.0) == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize(("height", "flat"), [(0.25e-10, True), (0.4e-10, True), (0.6e-10, False), (2.5e-10, False)])

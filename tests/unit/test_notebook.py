@@ -11,8 +11,7 @@ import scipy.linalg
 import scipy.sparse.linalg
 
 import stridor as st
-from stridor.agreement import Agreement, Comparison
-from stridor.agreement.perturbation import Perturbation
+from stridor.agreement import Agreement, Comparison, Perturbation
 from stridor.case import template_text
 from stridor.modal.complex_modes import ComplexModes
 from stridor.modal.onsets import Onset, Onsets

@@ -7,8 +7,8 @@ import pytest
 
 import stridor as st
 from hidden_modes import MU_OF_BLOCK, entering_block, hidden_block
+from stridor.agreement import Perturbation
 from stridor.agreement import critical as bisecting
-from stridor.agreement.perturbation import Perturbation
 from stridor.agreement.result import judge, likeness
 from stridor.errors import AnalysisError
 from stridor.modal import growing

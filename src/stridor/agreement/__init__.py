@@ -3,9 +3,10 @@
 from .comparison import PARTS, compare, dominant_response
 from .critical import critical_friction
 from .kept import Store
-from .perturbation import LINEAR, PERTURBATION, PERTURBATION_DURATION, Perturbation, linear_part, perturb
+from .perturbation import perturb
 from .result import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, Agreement, Comparison
 from .shapes import modal_assurance, mode_shape
+from .small_motion import LINEAR, PERTURBATION, PERTURBATION_DURATION, Perturbation, linear_part
 
 __all__ = [
     "GOOD_CRITICAL",

@@ -27,8 +27,8 @@ from ..temporal.simulate import simulate
 from ..temporal.steppers.sparse import step_limit_assembled
 from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
-from .perturbation import LINEAR, PERTURBATION, Perturbation, whole
 from .shapes import component_shape, snapshots_of
+from .small_motion import LINEAR, PERTURBATION, Perturbation, whole
 
 STARTED = 3  # modes
 PERIODS = 40  # of the slowest of them

@@ -28,9 +28,10 @@ from ..typing import IntArray
 from .assembled import modes_as_in_time, perturb_assembled
 from .critical import compare_critical
 from .kept import Plain, Store, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
-from .perturbation import Perturbation, perturb, whole
+from .perturbation import perturb
 from .result import Agreement, Comparison, Critical, judge, likeness, overall
 from .shapes import by_body, modal_assurance, mode_shape
+from .small_motion import Perturbation, whole
 
 T = TypeVar("T")
 PARTS = ("growth", "run", "critical")

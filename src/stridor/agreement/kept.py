@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..temporal.signals import Components, Growth
-from .perturbation import Perturbation
+from .small_motion import Perturbation
 
 Plain = Mapping[str, Any]
 

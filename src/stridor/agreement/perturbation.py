@@ -1,8 +1,8 @@
-"""Small perturbations of steady sliding, marched in time: λ as the temporal approach shows it."""
+"""Small perturbations of steady sliding, marched in time."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,63 +12,13 @@ from ..sliding import full_motion, slip_speeds
 from ..system import System
 from ..temporal.observe import MOST_INSTANTS
 from ..temporal.schedule import PhaseSpec
-from ..temporal.signals import Components, components
+from ..temporal.signals import components
 from ..temporal.simulate import Settings, simulate
-from ..temporal.trajectory import Trajectory
 from ..threads import one_thread_if_small
 from ..typing import Array
-from .shapes import WATCHED, TimeShape, component_shape, node_rows, watching
-
-PERTURBATION = 1e-5  # of the slip speed, at the start
-LINEAR = 0.02  # of the slip speed: beyond it the perturbation is no longer small
-PERTURBATION_DURATION = 0.03  # s, or this many periods of the lowest frequency of interest
-
-
-@dataclass(frozen=True)
-class Perturbation:
-    """Free vibration about steady sliding at one μ: λ of what grows fastest within the frequency range,
-    the signal (slip speed minus its steady value) [m/s] where it is linear, its sampling [s], and every
-    component found in it. shape: how nodes move in the fastest, None where it was not asked for or cannot be told."""
-
-    mu: float
-    eigenvalue: complex
-    signal: Array
-    sampling: float
-    components: Components
-    shape: TimeShape | None = None
-
-    @property
-    def growth_rate(self) -> float:
-        """Re λ [1/s]."""
-        return self.eigenvalue.real
-
-    @property
-    def frequency_hz(self) -> float:
-        """Im λ / 2π."""
-        return self.eigenvalue.imag / (2 * np.pi)
-
-    @property
-    def grows(self) -> bool:
-        """Whether it is unstable."""
-        return self.eigenvalue.real > 0
-
-
-def whole(run: Trajectory) -> Trajectory:
-    """The run if it came to its end; KeyboardInterrupt where Ctrl-C cut it, since half a signal tells other rates."""
-    if run.interrupted:
-        raise KeyboardInterrupt
-    return run
-
-
-def linear_part(run: Trajectory, steady: Array, *, skip: int = 0) -> Array:
-    """Slip speed minus its steady value (m,) of the contact that moves most, while all of them stay below
-    2 % of it; ``skip`` records at the start, which may hold the spike of a sudden impulse, are left out."""
-    signals = run.slip_speed - steady
-    over = np.flatnonzero(np.any(np.abs(signals) > LINEAR * np.abs(steady), axis=1))
-    last = int(over[0]) if len(over) else len(signals)
-    first = min(last // 8, skip)
-    contact = int(np.argmax(np.abs(signals[first:last]).max(axis=0, initial=0.0)))
-    return signals[first:last, contact]
+from .assembled import perturb_assembled
+from .shapes import WATCHED, component_shape, node_rows, watching
+from .small_motion import PERTURBATION, PERTURBATION_DURATION, Perturbation, linear_part, whole
 
 
 @one_thread_if_small
@@ -91,8 +41,6 @@ def perturb(
     """
     system = settings.system(system)
     if system.assembled:
-        from .assembled import perturb_assembled
-
         return perturb_assembled(
             system, mu, settings=settings, max_frequency_hz=max_frequency_hz, duration=duration, shape=shape
         )

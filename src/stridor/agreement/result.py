@@ -12,7 +12,7 @@ from ..digits import measured, readable
 from ..modal.onset import refuted
 from ..notebook import html_table
 from ..temporal.signals import Growth
-from .perturbation import Perturbation
+from .small_motion import Perturbation
 
 GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
 AGREE, DISAGREE, UNDECIDED = "agree: ", "disagree: ", "not decided: "

@@ -110,14 +110,6 @@ def match_facets(every: CellFacets, given: Blocks) -> Matched:
     )
 
 
-def orient_facets(cells: Blocks, points: Array, facets: Blocks) -> dict[str, IntArray]:
-    """The given facets (f, n) by kind oriented outward. Raises ValueError where one is no outer facet of the cells."""
-    matched = match_facets(cell_facets(cells, points), facets)
-    if matched.inner_count or matched.stray_count:
-        raise ValueError("a facet is not a side of exactly one cell")
-    return matched.outer
-
-
 def require_boundary(mesh: Mesh, name: str, where: str) -> Blocks:
     """Facets of the boundary of that name or, where it names a node set, the outer facets all of whose nodes it holds.
 

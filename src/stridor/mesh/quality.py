@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
@@ -31,22 +29,6 @@ def check_mesh(mesh: Mesh, where: str) -> None:
             problems = [*_cell_problems(mesh, where), *_facet_problems(mesh, where)]
     if problems:
         raise CaseError.many(problems)
-
-
-def flip_if_mirrored(mesh: Mesh) -> Mesh:
-    """The mesh with cells in the plane that are numbered clockwise turned over, and facets oriented anew.
-
-    Turned are patches of cells that agree with each other in their sense, all of them inverted: a program that counts
-    the other way round, or a surface whose normal points away from the reader. A single inverted cell among others
-    of its sense is a fold, which stays for `check_mesh` to refuse; so does everything in space. The facets of
-    boundaries must be sides of one cell each.
-    """
-    cells = turned_over(mesh.cells, mesh.points)
-    if cells is mesh.cells:
-        return mesh
-    every = cell_facets(cells, mesh.points)
-    boundaries = {name: match_facets(every, facets).outer for name, facets in mesh.boundaries.items()}
-    return replace(mesh, cells=cells, boundaries=boundaries)
 
 
 def turned_over(cells: Blocks, points: Array) -> Blocks:
@@ -85,14 +67,6 @@ def edge_lengths(mesh: Mesh) -> tuple[float, float]:
             length = np.linalg.norm(mesh.points[block[:, i]] - mesh.points[block[:, j]], axis=1)
             least, largest = min(least, float(length.min(initial=np.inf))), max(largest, float(length.max(initial=0.0)))
     return least, largest
-
-
-def waves(mesh: Mesh, speed: float, frequency_hz: float) -> float:
-    """Elements per wavelength [-], speed / frequency over the longest edge, for waves of a speed [m/s].
-
-    A quadratic element counts as one: it needs about half as many per wavelength as a linear one.
-    """
-    return speed / (frequency_hz * edge_lengths(mesh)[1])
 
 
 def _index_problems(mesh: Mesh, where: str) -> list[Problem]:

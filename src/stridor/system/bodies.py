@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case import Case
-from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBody
+from ..case.bodies import BeamBody, MassBody, MatrixBody, SolidBody
 from ..errors import CaseError
 from ..fe.assembly import assemble_beam
 from ..fe.beam import DOF_PER_NODE, BeamElement, BeamMesh
@@ -195,8 +195,3 @@ def _refuse_extreme(built: BuiltBody) -> None:
             f"with; check {'its matrices' if imported else 'the units of its lengths, its material and its damping'}"
         )
         raise CaseError(f"bodies.{built.name}", None, accepted)
-
-
-def is_obstacle(case: Case, name: str) -> bool:
-    """Whether a body is rigid and has no freedoms."""
-    return isinstance(case.bodies.get(name), ObstacleBody)

@@ -92,15 +92,6 @@ def spectrogram(signal: Array, sampling: float, *, resolution_hz: float, window:
     )
 
 
-def dominant_frequencies(spec: Spectrum, *, count: int = 5, floor: float = 1e-2) -> Array:
-    """Frequencies [Hz] of the largest separate lines, strongest first, down to ``floor`` of the strongest."""
-    apart = max(1, round(2 * spec.bandwidth_hz / spec.resolution_hz))
-    least = floor * float(spec.amplitude.max(initial=0.0))
-    peaks, _ = scipy.signal.find_peaks(spec.amplitude, distance=apart, height=least)
-    strongest = peaks[np.argsort(spec.amplitude[peaks])[::-1]][:count]
-    return np.array([_interpolated(spec.frequency_hz, spec.amplitude, int(k)) for k in strongest])
-
-
 def envelope(signal: Array, sampling: float, frequency_hz: float, *, periods: float = 20.0) -> tuple[Array, Array]:
     """Time [s] and amplitude of the line at ``frequency_hz``, by demodulation over ``periods`` of it."""
     size = int(max(8, round(periods / (frequency_hz * sampling))))

@@ -54,8 +54,8 @@ class Trajectory:
     status (r, m) 0 separation, 1 stick, 2 slip; displacement, velocity, acceleration (r, w, 2), absolute,
     x and y. kinetic, elastic (r,) [J] half a step before each record; works by name (r,) [J] up to there:
     damping, friction and contact count what is taken out, external and support what is put in.
-    sampling [s] between records; step Δt [s]; path modal or nodal. final holds u, q of all freedoms,
-    state everything a restart needs.
+    sampling [s] between records; step Δt [s]; path modal, nodal or assembled; nodes histories of single contact nodes
+    where the path keeps them; state everything a restart needs.
     """
 
     time: Array
@@ -86,7 +86,6 @@ class Trajectory:
     unconverged_steps: int
     interrupted: bool
     wall_seconds: float
-    body_velocity: Mapping[str, Array] = field(default_factory=dict)
     state: Mapping[str, Array] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
     nodes: NodeHistory | None = None
