@@ -32,12 +32,12 @@ class Beyond:
 
 def beyond(
     old: tuple[complex, complex], old_slopes: tuple[complex, complex], new: tuple[complex, complex],
-    new_slopes: tuple[complex, complex], step: float, unit: float = 1.0,
+    new_slopes: tuple[complex, complex], step: float,
 ) -> Beyond | None:  # fmt: skip
     """Whether two eigenvalues that a step of μ takes from ``old`` to ``new`` bear their names rightly; None where they
     neither meet nor pass one another.
 
-    The slopes are those over μ of each at both ends. unit: what of another parameter compares with one of μ.
+    The slopes are those over μ of each at both ends; another parameter goes from 0 to 1.
     """
     before, after = ((pair[0] - pair[1]) / 2 for pair in (old, new))
     square, square_to = before**2, after**2
@@ -45,14 +45,14 @@ def beyond(
     if not (np.isfinite(slope) and np.isfinite(slope_to)):
         return None
     # A step that ended where they meet has left the names to the next.
-    from_there = abs(square) <= AT_IT * unit * abs(slope) and abs(square) < abs(square_to)
+    from_there = abs(square) <= AT_IT * abs(slope) and abs(square) < abs(square_to)
     if not ((square_to * square.conjugate()).real < 0 or from_there):
         return None
     zeros = _zeros(square, square_to, step * slope, step * slope_to)
     between = zeros[(zeros.real > -0.5) & (zeros.real < 1.5)]
     aside = float(np.abs(between.imag).min(initial=np.inf)) * step
-    sure = step <= SHORT * unit or aside > max(MET * unit, KNOWN * step)
-    if aside <= max(MET * unit, 0.0 if sure else KNOWN * step):
+    sure = step <= SHORT or aside > max(MET, KNOWN * step)
+    if aside <= max(MET, 0.0 if sure else KNOWN * step):
         # √b is the growth of one and the decay of the other where it is more real than not.
         opening = square_to.real > 0
         return Beyond(bool(after.real < 0 if opening else after.imag < 0), sure)

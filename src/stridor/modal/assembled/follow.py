@@ -60,7 +60,7 @@ class Follower:
     """Follows branches, numbered by frequency at μ = 0, towards larger μ in steps up to ``longest``.
 
     watch, where given, is called with each accepted pair of neighbouring states. Only the first ``named`` branches (all
-    by default) must be beyond doubt at every step. unit: what of another parameter compares with one of μ.
+    by default) must be beyond doubt at every step.
     """
 
     def __init__(
@@ -70,9 +70,8 @@ class Follower:
         longest: float = 0.05,
         named: int | None = None,
         watch: Callable[[State, State], None] | None = None,
-        unit: float = 1.0,
     ) -> None:
-        self.reduced, self.unit = reduced, unit
+        self.reduced = reduced
         self.longest, self.watch = longest, watch
         found = reduced.eigenpairs(0.0)
         followed = np.flatnonzero(np.abs(found.values) <= FOLLOWED * reduced.frequency)
@@ -87,7 +86,7 @@ class Follower:
         follower = cls.__new__(cls)
         follower.reduced, follower.state = reduced, state
         follower.named = len(state.place)
-        follower.longest, follower.watch, follower._step, follower.unit = np.inf, None, np.inf, 1.0
+        follower.longest, follower.watch, follower._step = np.inf, None, np.inf
         return follower
 
     def advance(self, mu: float) -> State:
@@ -106,7 +105,7 @@ class Follower:
             if place is None:
                 self._step = step / 4
                 continue
-            new = _named(self.state, State(found, place), self.unit)
+            new = _named(self.state, State(found, place))
             if new is None:
                 self._step = step / 4
                 continue
@@ -153,7 +152,7 @@ def matched(reduced: Reduced, old: State, found: Eigenpairs, named: int, *, sure
     return place if len(np.unique(place)) == len(place) else None
 
 
-def _named(old: State, new: State, unit: float) -> State | None:
+def _named(old: State, new: State) -> State | None:
     """The new state with the names that are a matter of taste given by rule, so that rounding has no say; None where
     the step is too long to tell.
 
@@ -174,12 +173,12 @@ def _named(old: State, new: State, unit: float) -> State | None:
             if new.found.coordinate[free[k]].real > now[i].real:
                 place[i], free[k] = free[k], place[i]
     # Without damping pairs are matched by rule already.
-    if np.all(was == old.values) and not _agreed(old, new, place, unit):
+    if np.all(was == old.values) and not _agreed(old, new, place):
         return None
     return State(new.found, place)
 
 
-def _agreed(old: State, new: State, place: IntArray, unit: float) -> bool:
+def _agreed(old: State, new: State, place: IntArray) -> bool:
     """Exchange, in ``place``, damped modes that have met or passed one another where they bear each other's names;
     False where a shorter step must tell."""
     x, slopes, x_to, slopes_to = old.coordinate, old.tangents, new.coordinate, new.tangents
@@ -192,7 +191,7 @@ def _agreed(old: State, new: State, place: IntArray, unit: float) -> bool:
             continue
         told = beyond(
             (x[i], x[j]), (slopes[i], slopes[j]), (x_to[i], x_to[j]), (slopes_to[i], slopes_to[j]),
-            new.mu - old.mu, unit,
+            new.mu - old.mu,
         )  # fmt: skip
         if told is None:
             continue

@@ -61,7 +61,7 @@ def follower(
             watch(old, new)
 
     longest = (family.high - family.low) / (finer * STEPS[source.whole])
-    return Follower(source, longest=longest, watch=seen, unit=family.high - family.low)
+    return Follower(source, longest=longest, watch=seen)
 
 
 def surely(source: Along) -> Follower:
