@@ -14,10 +14,10 @@ import stridor as st
 from matrix_cases import TURN, matrix_case, rubbing
 from stridor.agreement.assembled import modes_as_in_time, perturb_assembled
 from stridor.system import System
-from stridor.temporal.beta2 import step_limit
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.simulate import Settings, simulate
+from stridor.temporal.steppers.sparse import step_limit_assembled
 from stridor.temporal.trajectory import Trajectory
 from stridor.typing import Array, ComplexArray
 
@@ -137,7 +137,7 @@ def test_the_balance_closes_with_damping_of_the_stiffness_and_between_freedoms(t
 def test_gyroscopic_forces_do_not_let_the_highest_mode_grow(tmp_path: Path):
     """Near the limit of the step, where lagged or extrapolated velocities would blow up."""
     system = imported(tmp_path, np.diag([9.0, 4.0]), 0.2 * TURN)
-    limit = step_limit(system, 0.5)
+    limit = step_limit_assembled(system, 0.5)
     assert limit.step == pytest.approx(2.0 / 3.0, rel=1e-12)
     run, _ = marched(system, 0.95 * limit.step, 2000.0)
     stored = run.kinetic + run.elastic
@@ -146,13 +146,13 @@ def test_gyroscopic_forces_do_not_let_the_highest_mode_grow(tmp_path: Path):
 
 def test_the_step_keeps_the_passes_converging(tmp_path: Path):
     fast = imported(tmp_path, 1e-4 * ONE, 50.0 * TURN)
-    limit = step_limit(fast, 0.5)
+    limit = step_limit_assembled(fast, 0.5)
     assert limit.step == pytest.approx(0.5 / (0.5 * 50.0), rel=1e-12)
     run, _ = marched(fast, limit.step, 4.0)
     assert run.unconverged_steps == 0
     assert energy_balance(run).error < 1e-12
-    still = step_limit(imported(tmp_path, FLUTTER), 0.5)
-    assert still.share < step_limit(imported(tmp_path, np.diag([6.0, 4.0]), TURN), 0.5).share
+    still = step_limit_assembled(imported(tmp_path, FLUTTER), 0.5)
+    assert still.share < step_limit_assembled(imported(tmp_path, np.diag([6.0, 4.0]), TURN), 0.5).share
 
 
 def test_a_restart_goes_on_to_the_last_digit(tmp_path: Path):
@@ -191,7 +191,7 @@ def test_a_block_that_rubs_grows_as_its_modes_do(tmp_path: Path):
     modes = modes_as_in_time(system, mu, 30e3)
     leading = modes.eigenvalues[0][np.argmax(modes.eigenvalues[0].real)]
     assert leading.real > 50.0
-    limit = step_limit(system, 0.5).step
+    limit = step_limit_assembled(system, 0.5).step
     for share in (0.4, 0.2):
         settings = Settings(step=share * limit)
         found = perturb_assembled(system, mu, settings=settings, max_frequency_hz=30e3, modes=modes).eigenvalue
