@@ -42,11 +42,13 @@ if TYPE_CHECKING:
     from .study.pencil import pencil
     from .study.reduced import reduced_model
     from .study.sensitivities import sensitivities
+    from .study.workspace import Workspace
     from .system import System, build_system
 
 _HOMES = {
     "Case": ".case",
     "System": ".system",
+    "Workspace": ".study.workspace",
     "body_modes": ".study.analyses",
     "build_system": ".system",
     "compare": ".study.analyses",
@@ -80,6 +82,7 @@ __all__ = [
     "CaseError",
     "StridorError",
     "System",
+    "Workspace",
     "body_modes",
     "build_system",
     "compare",

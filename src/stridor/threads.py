@@ -37,9 +37,7 @@ def one_thread_if_small(call: Callable[Concatenate[S, P], R]) -> Callable[Concat
     def calm(system: S, /, *args: P.args, **kwargs: P.kwargs) -> R:
         if system.size > SMALL:
             return call(system, *args, **kwargs)
-        from threadpoolctl import threadpool_limits
-
-        with threadpool_limits(limits=1, user_api="blas"):
+        with _libraries().limit(limits=1, user_api="blas"):
             return call(system, *args, **kwargs)
 
     return calm

@@ -24,6 +24,7 @@ from stridor.sliding.resultants import balance, resultants
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip
 from stridor.sliding.stretches import Stretch, _different, _Look, _probes, _Search
 from stridor.sliding.surfaces import SurfaceSliding
+from stridor.system.model import Answers
 
 # What NumPy warns of is a fault here, whatever comes of it.
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
@@ -699,7 +700,8 @@ def model(monkeypatch, forces, *, own: float = 0.1, size: int = 10, none_beyond:
     monkeypatch.setattr(stretches, "steady_sliding_nodes", steady)
     held = np.isin(np.arange(len(forces)), kept)
     nodes = SimpleNamespace(count=len(forces), kept=held)
-    return SimpleNamespace(contact_nodes=lambda: nodes, loads={"P": 1}, load_steps=(), size=size), asked
+    once = Answers().once
+    return SimpleNamespace(contact_nodes=lambda: nodes, loads={"P": 1}, load_steps=(), size=size, once=once), asked
 
 
 LINES = [(1.0, 1.0), (1.0, -1 / 0.31), (-0.1, 1 / 3.3), (1.0, -1 / 0.7001)]  # change at 0.31, 0.33 and 0.7001

@@ -13,7 +13,7 @@ from rubbing_block import rubbing_block
 from solid_cases import BELT
 from stridor.app.reduce import _made
 from stridor.case import template_text
-from stridor.study import without_effect as settings_without_effect
+from stridor.study import workspace
 from stridor.study.without_effect import without_effect
 
 MU = 0.3
@@ -185,7 +185,7 @@ def test_contact_over_a_surface_tells_the_path_without_another_model(monkeypatch
     def refuse(*_: object) -> None:
         raise AssertionError("built once more")
 
-    monkeypatch.setattr(settings_without_effect, "build_system", refuse)
+    monkeypatch.setattr(workspace, "build_system", refuse)
     case = block().with_({"modal.prestress": True, "temporal.path": "nodal"})
     assert [line.split(" ")[0] for line in without_effect(case, "simulate")] == ["modal.prestress", "temporal.path"]
     with pytest.raises(AssertionError, match="built once more"):

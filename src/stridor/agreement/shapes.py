@@ -81,7 +81,7 @@ def component_shape(
     least = 3 * (2 * len(eigenvalues) + SLOW + 1)
     if chosen == 0 or len(time) < least:
         return None
-    values = np.column_stack([low_passed(v, float(time[1] - time[0]), max_frequency_hz) for v in values.T])
+    values = low_passed(values.T, float(time[1] - time[0]), max_frequency_hz).T
     # The filter shifts the motion in time, which changes an exponential by a factor that all nodes share.
     time = time[: len(values)]
     if len(time) < least:

@@ -46,12 +46,12 @@ def new(
 @verb(writes=False)
 def check(call: Call) -> None:
     """Validate a case and print the model in words: bodies, contacts, time step against its limit."""
-    loaded = call.case()
+    work = call.workspace()
 
     from ..study.analyses import describe
     from .output import stdout
 
-    description = describe(loaded)
+    description = describe(work)
     call.warn(description.warnings)
     if call.out is not None:
         from ..io.atomic import write_text

@@ -22,6 +22,7 @@ from ..errors import AnalysisError, CaseError, StridorError
 if TYPE_CHECKING:
     from ..case import Case
     from ..io.datasets import Result
+    from ..study.workspace import Workspace
 P = ParamSpec("P")
 INFINITY = float("inf")
 INCOMPLETE = 3  # exit code: what was checked says that something may be missing from what was printed
@@ -87,6 +88,10 @@ class Call:
             self.stack.enter_context(claimed(self.folder, self.parts))
 
     def case(self, source: str | None = None) -> Case:
+        """The case of `workspace`."""
+        return self.workspace(source).case(self.verb)
+
+    def workspace(self, source: str | None = None) -> Workspace:
         """The case in the file with overrides, its warnings printed and its folder claimed; settings without effect are
         told with the results. source: another modal.source. Raises CaseError.
 
@@ -99,17 +104,20 @@ class Call:
         if self.solver is not None and self.solver != "auto":
             os.environ["STRIDOR_SOLVER"] = self.solver
         self.warn(case.warnings)
-        self.idle[:] = self._without_effect(case)
-        self.claim()
-        return case
+        from ..study.workspace import Workspace
 
-    def _without_effect(self, case: Case) -> list[str]:
+        work = Workspace(case)
+        self.idle[:] = self._without_effect(work)
+        self.claim()
+        return work
+
+    def _without_effect(self, work: Workspace) -> list[str]:
         """Settings that do nothing on the path that the verb takes; none where the model cannot be built, which the
         verb says."""
         from ..study.without_effect import without_effect
 
         try:
-            return without_effect(case, self.verb, solver=self.solver)
+            return without_effect(work, self.verb, solver=self.solver)
         except StridorError:
             return []
 

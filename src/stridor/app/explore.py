@@ -28,14 +28,14 @@ def sensitivities(
     branch: Branch = None,
 ) -> None:
     """What a per cent of any number of the case does to each mode's growth and frequency."""
-    loaded = call.case()
+    work = call.workspace()
 
     from ..study.sensitivities import sensitivities as solve
     from ..view.sensitivity_plots import sensitivity_bars
     from ..view.sensitivity_tables import sensitivity_table
 
     call.check_friction(mu)
-    result = solve(loaded, parameter or ["mu"], mu=mu, modes="unstable" if branch is None else (branch,))
+    result = solve(work, parameter or ["mu"], mu=mu, modes="unstable" if branch is None else (branch,))
     drawn = sensitivity_bars(result) if len(result.branch) else None
     _show(call, result, sensitivity_table(result))
     _draw(call, drawn, "sensitivities.png")
@@ -50,7 +50,7 @@ def countermeasures(
     verify: Annotated[int, typer.Option("--verify", help="How many of the best are solved again.")] = 3,
 ) -> None:
     """Changes ranked by the growth rate they take away per per cent, the best ones solved again."""
-    loaded = call.case()
+    work = call.workspace()
 
     from ..study.countermeasures import rank_countermeasures
     from ..view.sensitivity_plots import countermeasure_bars
@@ -58,7 +58,7 @@ def countermeasures(
 
     call.check_friction(mu)
     target: Any = "sum" if branch is None else branch
-    result = rank_countermeasures(loaded, mu=mu, target=target, percent=percent, verify=verify)
+    result = rank_countermeasures(work, mu=mu, target=target, percent=percent, verify=verify)
     _show(call, result, countermeasure_table(result))
     drawn = countermeasure_bars(result) if result.measures else None
     _draw(call, drawn, "countermeasures.png")

@@ -32,15 +32,15 @@ def steady(
     ] = None,
 ) -> None:
     """Steady sliding: which nodes touch, resultants of each contact, pressure as pictures and ParaView files."""
-    loaded = call.case()
+    work = call.workspace()
 
     from ..study.analyses import steady_sliding
     from .pictures import steady_document, write_steady
 
     call.check_friction(mu)
-    found = steady_sliding(loaded, mu)
+    found = steady_sliding(work, mu)
     call.warn(found.warnings)
-    files = write_steady(loaded, found, call.folder)
+    files = write_steady(work, found, call.folder)
     for path in files:
         call.say(f"written: {path}")
     document = steady_document(found) | {"files": [str(f) for f in files]}
@@ -66,15 +66,15 @@ def shapes(
     gif: Annotated[bool, typer.Option("--gif", help="Also an animated GIF of each.")] = False,
 ) -> None:
     """Shapes of modes: picture, animated page, ParaView file, and where friction feeds them."""
-    loaded = call.case()
+    work = call.workspace()
 
     from ..study.unit_warnings import resolution_warnings
     from .output import table
     from .pictures import write_shapes
 
     call.check_friction(mu)
-    call.warn(resolution_warnings(loaded))
-    documents = write_shapes(loaded, call.folder, mu=mu, branches=branch or None, gif=gif)
+    call.warn(resolution_warnings(work.case(call.verb)))
+    documents = write_shapes(work, call.folder, mu=mu, branches=branch or None, gif=gif)
     for document in documents:
         for path in document["files"]:
             call.say(f"written: {path}")
@@ -105,7 +105,7 @@ def modes(
 ) -> None:
     """Complex modes at one or many friction coefficients, branches followed from μ = 0. Every unstable mode of the band
     up to modal.max_frequency_hz is among them."""
-    loaded = call.case(source=source)
+    work = call.workspace(source)
 
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
@@ -114,12 +114,12 @@ def modes(
 
     values = None if mu is None else numbers(mu, "--mu")
     call.check_friction(values)
-    call.warn(resolution_warnings(loaded))
+    call.warn(resolution_warnings(work.case(call.verb)))
     order: Literal["frequency", "growth"]
     order = "growth" if one_of(sort, "--sort", ("frequency", "growth")) == "growth" else "frequency"
     with counting("modes, friction coefficients", quiet=call.quiet, worth=len(values or ()) > WORTH_A_BAR) as progress:
         result = analyses.modes(
-            loaded, values, count=count, damped=False if undamped else None, progress=progress
+            work, values, count=count, damped=False if undamped else None, progress=progress
         )
     call.keep(result, "modes.nc")
     if result.interrupted:
@@ -164,7 +164,8 @@ def onsets(
     source: Source = None,
 ) -> None:
     """Every critical friction coefficient in range, or critical value of another number: solved, not bracketed."""
-    loaded = call.case(source=source)
+    work = call.workspace(source)
+    loaded = work.case(call.verb)
     if along is not None or between is not None:
         name = MU if along is None else along
         of_friction = name == MU and MU not in loaded.parameters
@@ -190,7 +191,7 @@ def onsets(
     chosen = None if friction_range is None else pair(friction_range, "--range")
     call.check_friction(chosen, "--range")
     call.warn(resolution_warnings(loaded))
-    result = analyses.onsets(loaded, chosen, max_frequency_hz=max_frequency, damped=False if undamped else None)
+    result = analyses.onsets(work, chosen, max_frequency_hz=max_frequency, damped=False if undamped else None)
     call.keep(result, "onsets.nc")
     if call.json:
         call.document(result.to_json())

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..case import Case
 from ..digits import measured
 from ..errors import CaseError
 from ..io.atomic import replacing, write_text
@@ -16,21 +15,23 @@ from ..io.vtk import write_vtk
 from ..modal.complex_modes import ComplexModes
 from ..sliding.surfaces import SurfaceSliding
 from ..study import analyses
-from ..system import System, build_system
+from ..study.workspace import Problem, Workspace
+from ..system import System
 from ..temporal.node_history import NodeHistory
 from ..typing import Array, IntArray
 
 
 def write_shapes(
-    case: Case, folder: Path, *, mu: float | None = None, branches: Sequence[int] | None = None, gif: bool = False
+    problem: Problem, folder: Path, *, mu: float | None = None, branches: Sequence[int] | None = None, gif: bool = False
 ) -> list[dict[str, Any]]:
     """PNG, animated page and VTK file of modes (default: all unstable ones, else the one that decays slowest).
 
     Returns a document for each: branch, frequency, growth and the files. Raises CaseError for branches that are not
     in the list of modes.
     """
-    system = build_system(case, mu)
-    modes = analyses.modes(case, mu, max_frequency_hz=case.modal.max_frequency_hz, vectors="right")
+    work = Workspace.of(problem)
+    system = work.system(mu)
+    modes = analyses.modes(work, mu, max_frequency_hz=work.modal.max_frequency_hz, vectors="right")
     chosen = _chosen(modes, branches)
     documents: list[dict[str, Any]] = []
     for column in chosen:
@@ -109,11 +110,11 @@ def _energy_picture(system: System, energy: Array, path: Path) -> Path:
     return path
 
 
-def write_steady(case: Case, steady: SurfaceSliding, folder: Path) -> list[Path]:
+def write_steady(problem: Problem, steady: SurfaceSliding, folder: Path) -> list[Path]:
     """Pressure of each contact as PNG, and displacement and pressure as VTK files."""
     from ..view.field_plots import contact_snapshot
 
-    system = build_system(case)
+    system = Workspace.of(problem).system()
     nodes = system.contact_nodes()
     history = NodeHistory(
         names=nodes.names,

@@ -16,12 +16,10 @@ from ..digits import measured
 from ..errors import StridorError
 from ..io.atomic import write_text
 from ..io.datasets import load_trajectory, save
-from ..modal.complex_modes import ComplexModes
-from ..sliding import steady_sliding
-from ..study import analyses
-from ..study.case_key import case_key
+from ..sliding import steady_points
 from ..study.everything import Everything, compute_everything
 from ..study.provenance import versions
+from ..study.workspace import Workspace
 from ..temporal.signals import low_passed, spectrogram, spectrum
 from ..temporal.simulate import Progress
 from ..temporal.trajectory import Trajectory
@@ -61,13 +59,13 @@ class Outcome:
     def to_json(self) -> dict[str, Any]:
         """The documents of all verbs under their names, and where the report is."""
         e = self.everything
-        mu = analyses.own_friction(e.case)
+        listed = e.sweep_damped if e.own is None else e.own.lowest(e.case.modal.modes)
         return {
             "verdict": self.verdict,
             "report": str(self.report),
             "files": [str(f) for f in self.files],
             "check": e.description.to_json(),
-            "modes": _listed_modes(e, mu),
+            "modes": listed.to_json(),
             "onsets": e.onsets_damped.to_json(),
             "simulate": e.summary.to_json(),
             "compare": None if e.agreement is None else e.agreement.to_json(),
@@ -77,7 +75,7 @@ class Outcome:
 
 
 def run(
-    case: Case,
+    problem: Case | Workspace,
     folder: str | Path,
     *,
     progress: Progress | None = None,
@@ -90,7 +88,8 @@ def run(
     only and kept are those of `analyses.compare`. A simulate.nc of the same case that is in the folder already is
     taken, and gone on from where Ctrl-C cut it.
     """
-    target = Path(folder)
+    work, target = Workspace.of(problem), Path(folder)
+    case = work.case("run")
     files: list[Path] = []
 
     def keep(name: str, result: Any) -> None:
@@ -100,11 +99,11 @@ def run(
 
     write_text(target / "case.toml", case.text)
     everything = compute_everything(
-        case,
+        work,
         progress=progress,
         log=log,
         keep=keep,
-        before=_before(case, target / "simulate.nc"),
+        before=_before(work, target / "simulate.nc"),
         only=only,
         kept=kept,
     )
@@ -114,7 +113,7 @@ def run(
     return Outcome(report, tuple(files), everything)
 
 
-def _before(case: Case, path: Path) -> Trajectory | None:
+def _before(work: Workspace, path: Path) -> Trajectory | None:
     """The run in a file, if it is one of this very case; None otherwise."""
     if not path.is_file():
         return None
@@ -126,22 +125,21 @@ def _before(case: Case, path: Path) -> Trajectory | None:
     changed = any(restart.get("changed") for restart in told.get("restarts", []))
     own = told.get("settings", {}).get("mu") is None and not changed
     own = own and "fingerprint" in told
-    return run if own and told.get("key") == case_key(case) else None
+    return run if own and told.get("key") == work.key else None
 
 
 def report_inputs(e: Everything) -> ReportInputs:
     """Everything, sorted into what the report takes."""
-    mu = analyses.own_friction(e.case)
     agreement = e.agreement
     on_lines = e.system.contacts and e.system.loads and not e.system.assembled
-    steady = steady_sliding(e.system) if on_lines else None
+    steady = steady_points(e.system) if on_lines else None
     shapes = _shapes(e)
     return ReportInputs(
         case=e.case,
         system=e.system,
-        mu=mu,
+        mu=e.mu,
         steady=steady,
-        modes=_own_modes(e, mu),
+        modes=e.own,
         undamped_sweep=e.sweep_undamped,
         damped_sweep=e.sweep_damped,
         undamped_pair=e.zoom_undamped,
@@ -169,19 +167,6 @@ def report_inputs(e: Everything) -> ReportInputs:
         shape_vector=e.vector,
         friction_energy=e.energy,
     )
-
-
-def _own_modes(e: Everything, mu: float | None) -> ComplexModes | None:
-    """Modes at the friction of the case, computed again only where that costs nothing."""
-    if e.own is not None or mu is None:
-        return e.own
-    return analyses.modes(e.case, mu, max_frequency_hz=e.case.modal.max_frequency_hz)
-
-
-def _listed_modes(e: Everything, mu: float | None) -> dict[str, Any]:
-    if mu is None:
-        return e.sweep_damped.to_json()
-    return (analyses.modes(e.case, mu) if e.own is None else e.own).to_json()
 
 
 def _signals(e: Everything) -> dict[str, Any]:

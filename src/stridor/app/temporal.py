@@ -12,8 +12,8 @@ from ..interrupts import held
 from .arguments import Call, numbers, verb
 
 if TYPE_CHECKING:
-    from ..case import Case
     from ..io.kept_parts import KeptParts
+    from ..study.workspace import Workspace
     from ..temporal.trajectory import Trajectory
 
 Only = Annotated[
@@ -47,11 +47,11 @@ def simulate(
     ] = 0,
 ) -> None:
     """The temporal approach: explicit dynamics with stick, slip and separation. Ctrl-C keeps what was computed."""
-    loaded = call.case()
+    work = call.workspace()
 
     from ..io.datasets import load_trajectory, save
     from ..study import analyses
-    from ..study.touching import case_decided_by_meshes
+    from ..study.touching import decided_by_meshes
     from .output import progress_bar
 
     call.check_friction(mu)
@@ -64,9 +64,9 @@ def simulate(
         raise CaseError("--changed", None, "goes with --restart FILE")
     before = None if restart is None else load_trajectory(restart)
     if restart is not None and before is not None and path.exists() and path.samefile(restart):
-        _check_records(loaded, before, path)
+        _check_records(work, before, path)
 
-    call.warn(case_decided_by_meshes(loaded, mu))
+    call.warn(decided_by_meshes(work.system(mu), mu))
 
     def checkpoint(part: Trajectory) -> None:
         try:
@@ -79,7 +79,7 @@ def simulate(
         try:
             with progress_bar("simulate", quiet=call.quiet) as progress:
                 run = analyses.simulate(
-                    loaded, mu, progress=progress, checkpoint=checkpoint, restart=before, changed=changed
+                    work, mu, progress=progress, checkpoint=checkpoint, restart=before, changed=changed
                 )
         except AnalysisError as error:
             part = getattr(error, "trajectory", None)
@@ -89,7 +89,7 @@ def simulate(
         if run.steps == (0 if before is None else before.steps) and run.interrupted:
             raise KeyboardInterrupt  # nothing that is worth an earlier file
         call.keep(run, "simulate.nc")
-    summary = analyses.summarise(loaded, run)
+    summary = analyses.summarise(work, run)
     if run.interrupted:
         call.say(f"interrupted after {run.steps} of {run.planned_steps} steps; go on with --restart {path}")
     document = summary.to_json()
@@ -97,7 +97,7 @@ def simulate(
         from ..study.copies import perturbed_copies
 
         with progress_bar("copies", quiet=call.quiet) as progress:
-            document["copies"] = perturbed_copies(loaded, run, mu, count=copies, progress=progress).to_json()
+            document["copies"] = perturbed_copies(work, run, mu, count=copies, progress=progress).to_json()
     if call.json:
         call.document(document)
     else:
@@ -108,12 +108,12 @@ def simulate(
         raise typer.Exit(130)
 
 
-def _check_records(case: Case, before: Trajectory, path: Path) -> None:
+def _check_records(work: Workspace, before: Trajectory, path: Path) -> None:
     """Refuse to put a part of a run, which cannot be joined with what was before, over the file of that."""
     from ..study import analyses
     from ..study.settings import settings_of
 
-    if not analyses.same_records(settings_of(case), before):
+    if not analyses.same_records(settings_of(work), before):
         raise CaseError(
             "--restart",
             str(path),
@@ -143,7 +143,7 @@ def compare(
 
     Each part is kept as soon as it is there; a second call on the same case takes what is finished. Ctrl-C prints it.
     """
-    loaded = call.case()
+    work = call.workspace()
 
     from ..study import analyses
 
@@ -153,12 +153,12 @@ def compare(
         word = "--critical" if critical else "--no-critical"
         raise CaseError("--only", ", ".join(only), f"says otherwise than {word}; give one of them")
     result = analyses.compare(
-        loaded,
+        work,
         values,
         critical=critical,
         progress=call.say,
         only=only,
-        kept=_kept(call, loaded),
+        kept=_kept(call, work),
         finished=lambda c: call.say(c.verdict),
     )
     if result.comparisons or result.critical_mu_modal is not None:
@@ -175,12 +175,11 @@ def compare(
         raise typer.Exit(130)
 
 
-def _kept(call: Call, case: Case) -> KeptParts:
+def _kept(call: Call, work: Workspace) -> KeptParts:
     """Parts of the comparison that earlier calls into the same folder have finished."""
     from ..io.kept_parts import NAME, KeptParts
-    from ..study.case_key import case_key
 
-    kept = KeptParts(call.folder / NAME, case_key(case))
+    kept = KeptParts(call.folder / NAME, work.key)
     if kept.others:
         call.say(f"{kept.path} also holds parts of other cases or of another version; they are left alone")
     if kept.damaged:
@@ -191,14 +190,14 @@ def _kept(call: Call, case: Case) -> KeptParts:
 @verb(parts=("figures",))
 def run(call: Call, only: Only = None) -> None:
     """Everything: modes, onsets, simulate, compare, and the report. A second call takes what is finished in time."""
-    loaded = call.case()
+    work = call.workspace()
 
     from .output import progress_bar, stdout
     from .pipeline import run as run_all
 
     with progress_bar("simulate", quiet=call.quiet) as progress:
         outcome = run_all(
-            loaded, call.folder, progress=progress, log=call.say, only=only, kept=_kept(call, loaded)
+            work, call.folder, progress=progress, log=call.say, only=only, kept=_kept(call, work)
         )
     if call.json:
         call.document(outcome.to_json())

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import AnalysisError
-from ..sliding import full_motion, least_force, require_pressed, slip_speeds, steady_sliding
+from ..sliding import full_motion, least_force, require_pressed, slip_speeds, steady_points, steady_sliding
 from ..system import System
 from ..typing import Array, ComplexArray
 
@@ -115,7 +115,7 @@ def couple(system: System, *, mu: float | None = None) -> tuple[Coupling, tuple[
     velocities = full_motion(system)
     system = system.in_place()
     if system.contacts and system.loads:
-        steady = steady_sliding(system, mu=mu if system.touching_at is None else system.touching_at)
+        steady = steady_points(system, mu if system.touching_at is None else system.touching_at)
         require_pressed(system, steady.normal_force)
         # A contact that only rounding presses is not closed, unless it is kept so.
         kept = np.array([c.closed for c in system.contacts], dtype=bool)

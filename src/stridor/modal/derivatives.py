@@ -25,7 +25,7 @@ import scipy.sparse as sp
 
 from ..direct import Factor, SingularMatrix, factorise
 from ..errors import AnalysisError, CaseError
-from ..sliding import steady_sliding_nodes
+from ..sliding import steady_nodes
 from ..system import System
 from ..typing import Array, BoolArray, ComplexArray, IntArray, Sparse
 from .assembled.problem import times, tiny
@@ -126,7 +126,7 @@ def terms_of(system: System, mu: float, held: Held, options: Options) -> Terms:
         raise CaseError("parameter", None, "a number that changes neither the mesh nor who is in contact")
     shown = nodes
     if np.any(nodes.cubic[held.touching] > 0):
-        shown = nodes.at_force(steady_sliding_nodes(system, mu=mu, solver=options.solver).normal_force)
+        shown = nodes.at_force(steady_nodes(system, mu, options.solver).normal_force)
     rows = contact_rows(shown, held.touching, held.sense, held.stuck)
     slide = rows.slide
     state = steadiness(system, nodes, held.touching, options, rows)

@@ -75,10 +75,17 @@ def growing_modes(
 ) -> Growing:
     """Every mode that grows at ``mu`` with a frequency up to max_frequency_hz.
 
-    touching_at: the μ of the steady sliding that says which nodes touch (None: the laws' own). Raises AnalysisError
-    where contacts do not slide or the search does not settle.
+    touching_at: the μ of the steady sliding that says which nodes touch (None: the laws' own). Searched once and kept
+    with the system. Raises AnalysisError where contacts do not slide or the search does not settle.
     """
-    options = options or Options()
+    chosen = options or Options()
+    asked = ("growing modes", mu, max_frequency_hz, touching_at, damped, chosen)
+    return system.once(asked, lambda: _searched_for(system, mu, max_frequency_hz, touching_at, damped, chosen))
+
+
+def _searched_for(
+    system: System, mu: float, max_frequency_hz: float, touching_at: float | None, damped: bool, options: Options
+) -> Growing:
     problem = problem_of(system if damped else system.undamped(), touching_at, options, damped=damped)
     whole = quadratic_of(problem, mu)
     top = searched(whole, 2 * np.pi * max_frequency_hz)

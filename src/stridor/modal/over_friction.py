@@ -160,9 +160,16 @@ def onsets_of_band(
     options: Options | None = None,
 ) -> Onsets:
     """Every onset in a range of μ, as `onsets` solves them and `checked_onsets` completes them, each with the nodes
-    that touch at its μ; where these change, growth may set in or end at once (kind "contact"). Raises as `onsets`."""
-    options = options or Options()
+    that touch at its μ; where these change, growth may set in or end at once (kind "contact"). They are kept
+    with the system. Raises as `onsets`."""
+    chosen, (low, high) = options or Options(), (float(v) for v in friction_range)
+    asked = ("onsets", low, high, max_frequency_hz, damped, chosen)
+    return system.once(asked, lambda: _solved_onsets(system, (low, high), max_frequency_hz, damped, chosen))
 
+
+def _solved_onsets(
+    system: System, friction_range: tuple[float, float], max_frequency_hz: float, damped: bool, options: Options
+) -> Onsets:
     def solved(held: System, between: tuple[float, float]) -> Onsets:
         try:
             found = onsets(
@@ -188,7 +195,7 @@ def onsets_of_band(
         )
         return replace(found, source=SOURCES[-1].name)
 
-    low, high = (float(v) for v in friction_range)
+    low, high = friction_range
     if not (0 <= low < high and np.isfinite(high)):
         return solved(system, friction_range)
     over = stretches(system, low, high, solver=options.solver)

@@ -24,7 +24,11 @@ DOUBTFUL = 1e-11  # backward errors above it are refined on the assembled matric
 
 
 def prepare(system: System, *, mu: float | None = None) -> tuple[Spectrum, Coupling, tuple[str, ...]]:
-    """Spectrum of a system with the contacts that touch in steady sliding at ``mu``."""
+    """Spectrum of a system with the contacts that touch in steady sliding at ``mu``, kept with the system."""
+    return system.once(("receptance", mu), lambda: _prepared(system, mu))
+
+
+def _prepared(system: System, mu: float | None) -> tuple[Spectrum, Coupling, tuple[str, ...]]:
     coupling, open_contacts = couple(system, mu=mu)
     modes = uncoupled_modes(coupling.system)
     return spectrum_of(coupling, modes), coupling, open_contacts

@@ -1,9 +1,9 @@
 """Steady sliding: the equilibrium that both approaches start from, of point contacts and of whole surfaces."""
 
-from .points import SteadySliding, full_motion, slip_speeds, steady_sliding
+from .points import SteadySliding, full_motion, slip_speeds, steady_points, steady_sliding
 from .pressing import least_force, nothing_presses, require_pressed, taken_as_closed
 from .resultants import Balance, Resultant
-from .surfaces import SurfaceSliding, friction_damping_matrix, steady_sliding_nodes, touching
+from .surfaces import SurfaceSliding, friction_damping_matrix, steady_nodes, steady_sliding_nodes, touching
 
 __all__ = [
     "Balance",
@@ -16,6 +16,8 @@ __all__ = [
     "nothing_presses",
     "require_pressed",
     "slip_speeds",
+    "steady_nodes",
+    "steady_points",
     "steady_sliding",
     "steady_sliding_nodes",
     "taken_as_closed",

@@ -90,6 +90,11 @@ def steady_sliding(
     return _active_set(system, force, coefficients, sense, speeds)
 
 
+def steady_points(system: System, mu: float | None = None) -> SteadySliding:
+    """`steady_sliding` under all loads and motions, solved once for each μ and kept with the system."""
+    return system.once(("steady sliding of points", mu), lambda: steady_sliding(system, mu=mu))
+
+
 def _external_force(system: System, load_factors: Mapping[str, float] | None) -> Array:
     force = np.zeros(system.size)
     for name, vector in system.loads.items():

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray
-from .surfaces import SurfaceSliding, steady_sliding_nodes
+from .surfaces import STEADY, SurfaceSliding, steady_sliding_nodes
 
 LOOKS = 9  # equilibria over a range, of small models
 FEWER = 3  # of larger ones
@@ -158,7 +158,7 @@ class _Search:
     def own(self) -> bytes | None:
         """The key of the laws' own coefficients; None where there is no steady sliding."""
         try:
-            found = steady_sliding_nodes(self._system, solver=self._solver)
+            found = self._solved(None)
         except AnalysisError:
             return None
         self._guess = found.active
@@ -168,12 +168,19 @@ class _Search:
         """Steady sliding at ``mu``."""
         if mu not in self._known:
             try:
-                found = steady_sliding_nodes(self._system, mu=mu, guess=self._near(mu), solver=self._solver)
+                found = self._solved(mu)
             except AnalysisError as error:
                 self._known[mu] = _Look(mu, None, None, str(error))
             else:
                 self._known[mu] = _Look(mu, _key(found), found)
         return self._known[mu]
+
+    def _solved(self, mu: float | None) -> SurfaceSliding:
+        def solved() -> SurfaceSliding:
+            guess = None if mu is None else self._near(mu)
+            return steady_sliding_nodes(self._system, mu=mu, guess=guess, solver=self._solver)
+
+        return self._system.once((STEADY, mu, self._solver), solved)
 
     def _near(self, mu: float) -> BoolArray | None:
         solved = [look for look in self._known.values() if look.found is not None]

@@ -28,6 +28,7 @@ from .redundant import closed, redundant
 from .resultants import Balance, Resultant, balance, resultants
 
 SIGN_CHANGES = 30
+STEADY = "steady sliding of nodes"
 
 
 @dataclass(frozen=True)
@@ -172,6 +173,11 @@ def steady_sliding_nodes(
         balance=balance(system, force, push.T @ state.normal_force),
         warnings=tuple(unexplained_patterns(system, normal, state.gap, state.active)),
     )
+
+
+def steady_nodes(system: System, mu: float | None = None, solver: str | None = None) -> SurfaceSliding:
+    """`steady_sliding_nodes` under all loads and motions, solved once for each μ and kept with the system."""
+    return system.once((STEADY, mu, solver), lambda: steady_sliding_nodes(system, mu=mu, solver=solver))
 
 
 def _after_load_steps(system: System, mu: float | None, solver: str | None) -> SurfaceSliding:

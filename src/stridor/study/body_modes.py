@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from ..case import Case
 from ..direct import factorise
-from ..system import System, build_system
+from ..system import System
 from ..system.model import Line, Solid
 from ..system.uncoupled import uncoupled_modes
 from ..typing import Array, Sparse
+from .workspace import Problem, Workspace
 
 DENSE = 1500  # freedoms up to which all modes are computed
 MOST = 40  # modes of a larger body
@@ -30,25 +30,30 @@ class BodyModes:
     labels: tuple[str, ...]
 
 
-def body_modes(case: Case, *, max_frequency_hz: float | None = None) -> Mapping[str, BodyModes]:
+def body_modes(problem: Problem, *, max_frequency_hz: float | None = None) -> Mapping[str, BodyModes]:
     """Modes of every body by itself (the first columns of the paper's Table II).
 
     In large models and those with surfaces a body's modes are those with all other bodies held, up to the 40 lowest
     of a large one; point masses have none.
     """
-    limit = max_frequency_hz or case.modal.max_frequency_hz
-    system = build_system(case)
+    work = Workspace.of(problem)
+    limit = max_frequency_hz or work.modal.max_frequency_hz
+    return work.answers.once(("body modes", limit), lambda: _of_bodies(work.system(), limit))
+
+
+def _of_bodies(system: System, limit: float) -> Mapping[str, BodyModes]:
     result: dict[str, BodyModes] = {}
     if system.assembled or system.solids:
         for body in (*system.lines, *system.solids):
             if len(body.freedoms) > system.dimension:
                 result[body.name] = _of_freedoms(system, body, limit)
         return result
-    modes_ = uncoupled_modes(replace(system, damping=0 * system.damping))
+    modes = uncoupled_modes(system.undamped())
     for line in system.lines:
-        axis = np.array(case.beams[line.name].direction)
+        axis = line.coordinates[-1] - line.coordinates[0]
+        axis = axis / np.linalg.norm(axis)
         entries: list[tuple[float, float]] = []
-        for block in modes_.real:
+        for block in modes.real:
             if not np.isin(block.freedoms[0], line.freedoms):
                 continue
             shapes = np.zeros((system.size, len(block.stiffness)))

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..case import Case
 from ..errors import AnalysisError, CaseError
 from ..temporal.attractor import Spread, spread
 from ..temporal.simulate import Progress
 from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
-from .analyses import initial_state, structured
+from .analyses import initial_state
 from .settings import phases_of, settings_of
+from .workspace import Problem, Workspace
 
 PERTURBATION = 1e-12
 
 
 def perturbed_copies(
-    case: Case,
+    problem: Problem,
     run: Trajectory,
     mu: float | None = None,
     *,
@@ -39,8 +39,9 @@ def perturbed_copies(
     speed = max((s.max_slip_speed for p in run.phases for s in p.contacts.values()), default=0.0)
     if not speed > 0.0:
         raise AnalysisError("copies tell how a run with contacts that slide scatters; in this one nothing slides")
-    system = structured(case, "simulate", mu)
-    own = None if system.assembled else initial_state(case, system)
+    work = Workspace.of(problem)
+    system = work.structured("simulate", mu)
+    own = None if system.assembled else initial_state(work, system)
     zero = np.zeros(system.size)
     u, v, a = (zero, zero, zero) if own is None else own
     draw = np.random.default_rng(seed)
@@ -48,7 +49,7 @@ def perturbed_copies(
     for k in range(count):
         told = None if progress is None else _after(progress, k, count)
         disturbed = v + PERTURBATION * speed * draw.standard_normal(system.size)
-        copy = march(system, phases_of(case), settings_of(case), mu=mu, progress=told, disturbance=(u, disturbed, a))
+        copy = march(system, phases_of(work), settings_of(work), mu=mu, progress=told, disturbance=(u, disturbed, a))
         if copy.interrupted:
             break
         runs.append(copy)

@@ -12,19 +12,19 @@ from ..case import Case
 from ..case.bodies import BeamBody, SolidBody
 from ..errors import CaseError
 from ..modal.assembled.steady import refuse_stick
-from ..system import build_system
 from .asked import require_frequency
 from .measure_ranking import Ranking
 from .measure_verification import verified
 from .measures import Countermeasures, Measure, Target, Verified
 from .provenance import provenance
 from .sensitivities import Linearised
+from .workspace import Workspace
 
 __all__ = ["Countermeasures", "Measure", "Verified", "rank_countermeasures"]
 
 
 def rank_countermeasures(
-    case: Case,
+    problem: Case | Workspace,
     *,
     mu: float | None = None,
     target: Target = "sum",
@@ -56,8 +56,10 @@ def rank_countermeasures(
     if not 0.0 < percent < 100.0:
         raise CaseError("percent", percent, "a size of change between 0 and 100 %")
     require_frequency(max_frequency_hz)
-    refuse_stick(build_system(case), "the ranking of countermeasures")
-    linear = Linearised.of(case, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
+    work = Workspace.of(problem)
+    case = work.case("the ranking of countermeasures")
+    refuse_stick(work.system(), "the ranking of countermeasures")
+    linear = Linearised.of(work, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
     unstable = linear.columns("unstable")
     if not unstable:
         told = (*linear.warnings, f"no mode is unstable at μ = {linear.mu:g}: there is nothing to remove")
@@ -83,7 +85,7 @@ def rank_countermeasures(
         tuple(checked + helping[verify:]),
         margin,
         tuple(linear.warnings),
-        provenance(case, "countermeasures", time.perf_counter() - started, mu=linear.mu),
+        provenance(work, "countermeasures", time.perf_counter() - started, mu=linear.mu),
     )
 
 

@@ -16,16 +16,17 @@ from ..case.usual import USUAL
 from ..errors import AnalysisError
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths, pieces
-from ..sliding import steady_sliding
-from ..sliding.surfaces import SurfaceSliding, steady_sliding_nodes
-from ..system import System, build_system
+from ..sliding import steady_nodes, steady_points
+from ..sliding.surfaces import SurfaceSliding
+from ..system import System
 from ..temporal.inputs import unfit_in_time
 from ..temporal.settings import choose_step
 from ..temporal.simulate import plan
 from .matrix_reports import matrix_reports
-from .pressed import unpressed
+from .pressed import unpressed_in_time
 from .settings import settings_of
 from .unit_warnings import resolution_warnings, unit_warnings
+from .workspace import Workspace
 
 MOST_THROUGH = 0.2  # of a sliding velocity through a surface: facets on a curve make little of it
 
@@ -42,9 +43,10 @@ class Description:
         return {**self.data, "text": list(self.lines), "warnings": list(self.warnings)}
 
 
-def describe(case: Case) -> Description:
+def describe(problem: Case | Workspace) -> Description:
     """Build the model, find its steady sliding and its step limit, and say it in words."""
-    system = build_system(case)
+    work = Workspace.of(problem)
+    case, system = work.case("describe"), work.system()
     settled = system.in_place()
     lines = [f"{case.title or 'case'}: {len(case.bodies)} bodies, {system.size} free degrees of freedom"]
     lines += [_body_words(case, system, name) for name in case.bodies]
@@ -83,7 +85,7 @@ def describe(case: Case) -> Description:
     if system.assembled or system.general:
         lines += _surface_lines(case, system, data)
     elif settled.contacts and settled.loads:
-        steady = steady_sliding(system)
+        steady = steady_points(system)
         for k, contact in enumerate(system.contacts):
             stiffness = "rigid" if np.isinf(contact.stiffness) else f"{contact.stiffness:g} N/m"
             stiffness += ", kept closed" if contact.closed else ""
@@ -119,7 +121,7 @@ def describe(case: Case) -> Description:
         if least > 1e-9 * max(1.0, float(np.ptp(surface.slave_position, axis=0).max())):
             lines.append(f"contact {surface.name} is open by {least:.3g} m or more at the start")
     warnings += _sudden(case)
-    if (why := unpressed(case, system)):
+    if why := unpressed_in_time(work, system):
         warnings.append(
             f"nothing presses the bodies together ({why}): simulate and compare refuse that, modes at most take the "
             "contacts as closed"
@@ -275,7 +277,7 @@ def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str
     if not nodes.count or not system.in_place().loads:
         return []
     try:
-        steady = steady_sliding_nodes(system)
+        steady = steady_nodes(system)
     except AnalysisError as error:
         # Bodies that fly or swing have no steady sliding, and are a case all the same.
         return [f"  no steady sliding: {error}"]

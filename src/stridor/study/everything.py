@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from ..temporal.trajectory import Trajectory
 from ..typing import Array, ComplexArray
 from . import analyses
 from .analyses import BodyModes, Description, RunSummary
+from .workspace import Workspace
 
 T = TypeVar("T")
 Log = Callable[[str], None]
@@ -38,9 +39,9 @@ class Everything:
     sweeps run over the whole friction range, zooms around the first onset. curve: frequency_hz and μ(ω) of the
     undamped receptance. operating: velocity shape of the run at its dominant frequency by body (k, 2);
     shape: that of the mode to compare with, and shape_mode its λ. seconds by analysis. For large models and contact
-    over surfaces there are no undamped sweeps, no curve and no operating shape; steady is their equilibrium, own the
-    modes at the friction of the case, vector
-    (n,) the mode that grows fastest (or decays slowest) and energy (m,) what friction feeds into it at each node.
+    over surfaces there are no undamped sweeps, no curve and no operating shape; steady is their equilibrium, vector
+    (n,) the mode that grows fastest (or decays slowest) and energy (m,) what friction feeds into it at each node. mu is
+    the friction of the case and own the modes there, None where contacts have different coefficients.
     """
 
     case: Case
@@ -63,8 +64,9 @@ class Everything:
     agreement: Agreement | None
     seconds: Mapping[str, float]
     notes: tuple[str, ...] = field(default=())
-    steady: SurfaceSliding | None = None
+    mu: float | None = None
     own: ComplexModes | None = None
+    steady: SurfaceSliding | None = None
     vector: ComplexArray | None = None
     energy: Array | None = None
 
@@ -90,7 +92,7 @@ class _Clock:
 class _Temporal:
     """What the temporal approach does for a report. notes: what was taken from an earlier call."""
 
-    case: Case
+    work: Workspace
     clock: _Clock
     progress: Progress | None
     keep: Callable[[str, object], None]
@@ -111,7 +113,7 @@ class _Temporal:
         run = self.clock(
             "simulate",
             lambda: analyses.simulate(
-                self.case,
+                self.work,
                 progress=self.progress,
                 restart=before,
                 checkpoint=lambda part: self.keep("simulate", part),
@@ -122,11 +124,11 @@ class _Temporal:
 
     def compare(self, run: Trajectory) -> Agreement:
         """The comparison, the run of the case's own friction handed in."""
-        own = analyses.own_friction(self.case)
+        own = self.work.own_friction
         result = self.clock(
             "compare",
             lambda: analyses.compare(
-                self.case,
+                self.work,
                 runs={} if own is None else {own: run},
                 progress=self.clock.log,
                 only=self.only,
@@ -138,7 +140,7 @@ class _Temporal:
 
 
 def compute_everything(
-    case: Case,
+    problem: Case | Workspace,
     *,
     progress: Progress | None = None,
     log: Log | None = None,
@@ -152,32 +154,34 @@ def compute_everything(
     earlier call; only and kept as `analyses.compare` takes them. Raises what the analyses raise."""
     clock = _Clock(log or _silent)
     keep = keep or _keep_nothing
-    temporal = _Temporal(case, clock, progress, keep, before, only, kept)
-    system = analyses.structured(case, "run")
+    work = Workspace.of(problem)
+    temporal = _Temporal(work, clock, progress, keep, before, only, kept)
+    case, system = work.case("run"), work.structured("run")
     if system.assembled:
-        return _large(case, system, clock, temporal, keep)
-    description = analyses.describe(case)
+        return _large(work, case, system, clock, temporal, keep)
+    description = analyses.describe(work)
     limit = case.modal.max_frequency_hz
     mus = np.linspace(*case.modal.friction_range, case.modal.sweep_points)
-    bodies = analyses.body_modes(case)
-    coupled = clock("modes", lambda: analyses.modes(case, 0.0, max_frequency_hz=limit, damped=False), COUPLED)
+    bodies = analyses.body_modes(work)
+    coupled = clock("modes", lambda: _coupled(work), COUPLED)
     sweep = f"{len(mus)} friction coefficients from {mus[0]:g} to {mus[-1]:g}"
-    bare = clock("modes", lambda: analyses.modes(case, mus, max_frequency_hz=limit, damped=False), f"{sweep}, undamped")
-    damped = clock("modes", lambda: analyses.modes(case, mus, max_frequency_hz=limit, damped=True), f"{sweep}, damped")
+    bare = clock("modes", lambda: analyses.modes(work, mus, max_frequency_hz=limit, damped=False), f"{sweep}, undamped")
+    damped = clock("modes", lambda: analyses.modes(work, mus, max_frequency_hz=limit, damped=True), f"{sweep}, damped")
     keep("modes", damped)
-    onsets_bare = clock("onsets", lambda: analyses.onsets(case, damped=False), "undamped")
-    onsets_damped = clock("onsets", lambda: analyses.onsets(case, damped=True), "damped")
+    onsets_bare = clock("onsets", lambda: analyses.onsets(work, damped=False), "undamped")
+    onsets_damped = clock("onsets", lambda: analyses.onsets(work, damped=True), "damped")
     keep("onsets", onsets_damped)
-    zooms = clock("modes", lambda: _zooms(case, onsets_bare), "around the first onset")
-    curve = clock("onsets", lambda: _curve(case), "friction over frequency")
+    zooms = clock("modes", lambda: _zooms(work, onsets_bare), "around the first onset")
+    curve = clock("onsets", lambda: _curve(work), "friction over frequency")
+    own = _own(work, clock, vectors=True)
     run = temporal.run()
-    summary = analyses.summarise(case, run)
+    summary = analyses.summarise(work, run)
     agreement, notes = None, list[str]()
     operating = shape = shape_mode = None
     if not run.interrupted:
         agreement = _or_note(lambda: temporal.compare(run), notes, "no comparison")
         if agreement is None or not agreement.interrupted:
-            operating, shape, shape_mode = clock("compare", lambda: _shapes(case, system, run, summary), "shapes")
+            operating, shape, shape_mode = clock("compare", lambda: _shapes(work, own, run, summary), "shapes")
     return Everything(
         case=case,
         system=system,
@@ -199,10 +203,13 @@ def compute_everything(
         agreement=agreement,
         seconds=clock.seconds,
         notes=(*temporal.notes, *notes),
+        mu=work.own_friction,
+        own=own,
     )
 
 
 def _large(
+    work: Workspace,
     case: Case,
     system: System,
     clock: _Clock,
@@ -212,30 +219,23 @@ def _large(
     """Large models and contact over surfaces: what tells most for its time."""
     notes: list[str] = []
     limit = case.modal.max_frequency_hz
-    description = clock("check", lambda: analyses.describe(case))
-    steady = clock(
-        "check", lambda: _or_note(lambda: analyses.steady_sliding(case), notes, "no steady sliding"), "steady sliding"
-    )
-    bodies = clock("modes", lambda: analyses.body_modes(case), "of the bodies alone")
-    coupled = clock("modes", lambda: analyses.modes(case, 0.0, max_frequency_hz=limit, damped=False), COUPLED)
+    description = clock("check", lambda: analyses.describe(work))
+    steady = clock("check", lambda: _or_note(work.steady, notes, "no steady sliding"), "steady sliding")
+    bodies = clock("modes", lambda: analyses.body_modes(work), "of the bodies alone")
+    coupled = clock("modes", lambda: _coupled(work), COUPLED)
     mus = np.linspace(*case.modal.friction_range, case.modal.sweep_points)
     sweep = clock(
         "modes",
-        lambda: analyses.modes(case, mus, max_frequency_hz=limit),
+        lambda: analyses.modes(work, mus, max_frequency_hz=limit),
         f"{len(mus)} friction coefficients from {mus[0]:g} to {mus[-1]:g}",
     )
     keep("modes", sweep)
-    found = clock("onsets", lambda: analyses.onsets(case))
+    found = clock("onsets", lambda: analyses.onsets(work))
     keep("onsets", found)
-    mu = analyses.own_friction(case)
-    own = (
-        None
-        if mu is None
-        else clock("modes", lambda: analyses.modes(case, mu, max_frequency_hz=limit, vectors="right"), f"at μ = {mu:g}")
-    )
+    own = _own(work, clock, vectors="right")
     vector, mode, energy = (None, None, None) if own is None else _squealing(system, own)
     run = temporal.run()
-    summary = analyses.summarise(case, run)
+    summary = analyses.summarise(work, run)
     agreement = None
     if not run.interrupted:
         agreement = _or_note(lambda: temporal.compare(run), notes, "no comparison")
@@ -260,11 +260,25 @@ def _large(
         agreement=agreement,
         seconds=clock.seconds,
         notes=(*temporal.notes, *notes, *(() if steady is None else steady.warnings)),
-        steady=steady,
+        mu=work.own_friction,
         own=own,
+        steady=steady,
         vector=vector,
         energy=energy,
     )
+
+
+def _coupled(work: Workspace) -> ComplexModes:
+    """In contact without friction, which nothing drives: there is no growth to check."""
+    return analyses.modes(work, 0.0, max_frequency_hz=work.modal.max_frequency_hz, damped=False, check=False)
+
+
+def _own(work: Workspace, clock: _Clock, *, vectors: bool | Literal["right"]) -> ComplexModes | None:
+    """Modes at the friction of the case, None where contacts have different coefficients: no one μ has those modes."""
+    mu, limit = work.own_friction, work.modal.max_frequency_hz
+    if mu is None:
+        return None
+    return clock("modes", lambda: analyses.modes(work, mu, max_frequency_hz=limit, vectors=vectors), f"at μ = {mu:g}")
 
 
 def _or_note(call: Callable[[], T], notes: list[str], what: str) -> T | None:
@@ -298,36 +312,35 @@ def _keep_nothing(name: str, result: object) -> None:
     del name, result
 
 
-def _zooms(case: Case, found: Onsets) -> tuple[ComplexModes | None, ComplexModes | None]:
-    """Fine sweeps from 0 past the first onset, without and with damping."""
+def _zooms(work: Workspace, found: Onsets) -> tuple[ComplexModes | None, ComplexModes | None]:
+    """Fine sweeps from 0 past the first onset, without and with damping: for pictures of branches, as they are."""
     if found.first is None:
         return None, None
     mus = np.linspace(0.0, ZOOM * found.first.mu, 251)
-    limit = case.modal.max_frequency_hz
-    bare, damped = (analyses.modes(case, mus, max_frequency_hz=limit, damped=d) for d in (False, True))
+    limit = work.modal.max_frequency_hz
+    bare, damped = (analyses.modes(work, mus, max_frequency_hz=limit, damped=d, check=False) for d in (False, True))
     return bare, damped
 
 
-def _curve(case: Case) -> tuple[Array, Array] | None:
-    if len(case.contacts) != 1:
+def _curve(work: Workspace) -> tuple[Array, Array] | None:
+    if len(work.system().contacts) != 1:
         return None
-    frequency = np.linspace(0.0, case.modal.max_frequency_hz, CURVE_POINTS)[1:]
-    return frequency, analyses.friction_curve(case, frequency)
+    frequency = np.linspace(0.0, work.modal.max_frequency_hz, CURVE_POINTS)[1:]
+    return frequency, analyses.friction_curve(work, frequency)
 
 
 def _shapes(
-    case: Case, system: System, run: Trajectory, summary: RunSummary
+    work: Workspace, own: ComplexModes | None, run: Trajectory, summary: RunSummary
 ) -> tuple[Mapping[str, ComplexArray] | None, Mapping[str, ComplexArray] | None, complex | None]:
     """Velocity shape of the run at its dominant frequency, and the mode to hold it against."""
     frequency = summary.dominant_frequency_hz
-    if frequency is None or frequency <= 0 or analyses.own_friction(case) is None:
-        # With different coefficients no single μ gives the modes of the run.
+    if frequency is None or frequency <= 0 or own is None:
         return None, None, None
-    operating = operating_shape(system, analyses.phases_of(case), analyses.settings_of(case), run, frequency)
-    modes = analyses.modes(case, max_frequency_hz=case.modal.max_frequency_hz, vectors=True)
-    assert modes.right is not None
-    candidates = np.flatnonzero(modes.unstable[0])
+    assert own.right is not None, "asked for with vectors"
+    system = work.system()
+    operating = operating_shape(system, analyses.phases_of(work), analyses.settings_of(work), run, frequency)
+    candidates = np.flatnonzero(own.unstable[0])
     if not len(candidates):
-        candidates = np.arange(len(modes.branch))
-    nearest = candidates[int(np.argmin(np.abs(modes.frequency_hz[0][candidates] - frequency)))]
-    return operating, mode_shape(system, modes.right[0, nearest]), complex(modes.eigenvalues[0, nearest])
+        candidates = np.arange(len(own.branch))
+    nearest = candidates[int(np.argmin(np.abs(own.frequency_hz[0][candidates] - frequency)))]
+    return operating, mode_shape(system, own.right[0, nearest]), complex(own.eigenvalues[0, nearest])

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from ..case import Case
+from typing import Protocol
+
+from ..case.schema import Modal
 from ..modal.options import Options
 
 
-def options_of(case: Case) -> Options:
-    """The effects of the steady state that the case's [modal] counts."""
+class Asks(Protocol):
+    """A case, or whatever else has a table [modal]."""
+
+    @property
+    def modal(self) -> Modal:
+        """The table."""
+        ...
+
+
+def options_of(case: Asks) -> Options:
+    """The effects of the steady state that [modal] counts."""
     settings = case.modal
     return Options(settings.friction_damping, settings.prestress, _chosen(settings.solver), _chosen(settings.source))
 

@@ -11,6 +11,7 @@ from ..errors import AnalysisError
 from ..sliding import least_force, nothing_presses, steady_sliding_nodes
 from ..system import System
 from ..typing import Array
+from .workspace import Workspace
 
 STILL = 1e-9  # of how contacts move along: a motion towards each other that is rounding
 REMEDY = (
@@ -48,9 +49,15 @@ def unpressed(case: Case, system: System, *, steady: bool = False) -> str:
     return "" if pressed else f"loads that leave every contact at 0 N ({names})"
 
 
-def require_pressed_in_time(case: Case, system: System, what: str, *, steady: bool = False) -> None:
+def unpressed_in_time(work: Workspace, system: System, *, steady: bool = False) -> str:
+    """`unpressed`, looked into once; "" of a system alone, which says nothing of what its loads are to do."""
+    case = work.given
+    return "" if case is None else system.once(("unpressed", steady), lambda: unpressed(case, system, steady=steady))
+
+
+def require_pressed_in_time(work: Workspace, system: System, what: str, *, steady: bool = False) -> None:
     """Raise AnalysisError where nothing presses the bodies together: contacts would carry no force at all."""
-    why = unpressed(case, system, steady=steady)
+    why = unpressed_in_time(work, system, steady=steady)
     if why:
         remedy = STEADY_REMEDY if steady else REMEDY
         raise AnalysisError(f"{what}: nothing presses the bodies together ({why}), so that nothing rubs; {remedy}")

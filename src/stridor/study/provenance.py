@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from ..case import Case
-from .case_key import case_key
+from .workspace import Workspace
 
 LIBRARIES = ("stridor", "numpy", "scipy", "numba", "pydantic")
 
@@ -24,12 +24,13 @@ def versions() -> dict[str, str]:
     return found
 
 
-def provenance(case: Case, analysis: str, seconds: float, **settings: Any) -> dict[str, Any]:
-    """What a result needs to be made again: case, analysis, settings, versions, time."""
+def provenance(problem: Case | Workspace, analysis: str, seconds: float, **settings: Any) -> dict[str, Any]:
+    """What a result needs to be made again: case ("" of a system alone), analysis, settings, versions, time."""
+    work = Workspace.of(problem)
     return {
         "analysis": analysis,
-        "case": case.text,
-        "key": case_key(case),
+        "case": work.text,
+        "key": work.key,
         "settings": settings,
         "versions": versions(),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),

@@ -20,10 +20,9 @@ from ..modal.options import Options
 from ..modal.over_friction import modes_of_band
 from ..system import System, build_system
 from ..typing import Array, ComplexArray, IntArray
-from .analyses import own_friction
 from .asked import require_frequency
-from .options import options_of
 from .provenance import provenance
+from .workspace import Workspace
 
 NEAR = 0.05  # relative change of a number within which an exceptional point is told of
 BENT = 2.0  # condition number from which two close modes are on their way to an exceptional point
@@ -164,7 +163,7 @@ def _complex(value: complex) -> list[float] | None:
 
 
 def sensitivities(
-    case: Case,
+    problem: Case | Workspace,
     parameters: Sequence[str] = ("mu",),
     *,
     mu: float | None = None,
@@ -188,7 +187,8 @@ def sensitivities(
     steady sliding does not exist. A mode without derivatives is left out, and a warning says so.
     """
     started = time.perf_counter()
-    linear = Linearised.of(case, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
+    work = Workspace.of(problem)
+    linear = Linearised.of(work, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
     values = np.array([linear.value(path) for path in parameters])
     changes = [linear.change(path, (steps or {}).get(path)) for path in parameters]
     columns = [b for b in linear.columns(modes) if linear.mode(b) is not None]
@@ -214,7 +214,7 @@ def sensitivities(
         residual=np.array([m.residual for m in found]),
         damped=linear.modes.damped,
         open_contacts=linear.modes.open_contacts,
-        provenance=provenance(case, "sensitivities", time.perf_counter() - started, mu=linear.mu),
+        provenance=provenance(work, "sensitivities", time.perf_counter() - started, mu=linear.mu),
     )
     told = list(linear.warnings)
     if not columns and modes == "unstable" and not linear.columns(modes):
@@ -277,7 +277,7 @@ class Linearised:
 
     @staticmethod
     def of(
-        case: Case,
+        problem: Case | Workspace,
         mu: float | None,
         *,
         count: int | None = None,
@@ -285,13 +285,13 @@ class Linearised:
         damped: bool | None = None,
     ) -> Linearised:
         """At ``mu`` (default: the case's own friction), settings as `sensitivities` takes them."""
-        value = own_friction(case) if mu is None else float(mu)
+        work = Workspace.of(problem)
+        case, value = work.case("a sensitivity"), work.own_friction if mu is None else float(mu)
         if value is None:
             raise CaseError("mu", None, "one friction coefficient for all contacts: the case gives them different ones")
         settings = case.modal
-        options = options_of(case)
+        options, system = work.options, work.system()
         damped = settings.damped if damped is None else damped
-        system = build_system(case)
         require_frequency(max_frequency_hz)
         band = max_frequency_hz or settings.max_frequency_hz
         modes = modes_of_band(system, value, band, damped=damped, options=options)

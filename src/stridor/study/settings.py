@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from ..case import Case
+from typing import Protocol
+
+from ..case.schema import Phase, Temporal
 from ..temporal.schedule import PhaseSpec
 from ..temporal.settings import Settings
 
 
-def phases_of(case: Case) -> list[PhaseSpec]:
-    """The load phases of a case as the temporal approach takes them."""
+class Marches(Protocol):
+    """A case, or whatever else has load phases and a table [temporal]."""
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """The load phases."""
+        ...
+
+    @property
+    def temporal(self) -> Temporal:
+        """The table."""
+        ...
+
+
+def phases_of(case: Marches) -> list[PhaseSpec]:
+    """The load phases as the temporal approach takes them."""
     return [PhaseSpec(p.name, p.duration, p.loads, p.velocities, p.ramp, p.displacements) for p in case.phases]
 
 
-def settings_of(case: Case) -> Settings:
-    """The temporal settings of a case."""
+def settings_of(case: Marches) -> Settings:
+    """The settings of [temporal]."""
     t = case.temporal
     return Settings(t.step, t.beta2, t.record_every, t.path, t.initial, t.perturbation, tuple(t.watch), t.contact)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from ..case import Case
 from ..errors import AnalysisError
 from ..sliding.pattern import BY_MESHES, facet_height
-from ..sliding.surfaces import steady_sliding_nodes
-from ..system import System, build_system
+from ..sliding.surfaces import steady_nodes
+from ..system import System
 
 
 def decided_by_meshes(system: System, mu: float | None = None, solver: str | None = None) -> tuple[str, ...]:
@@ -15,13 +14,7 @@ def decided_by_meshes(system: System, mu: float | None = None, solver: str | Non
     if not any(surface.facets is not None and facet_height(surface) for surface in system.surfaces):
         return ()
     try:
-        return tuple(said for said in steady_sliding_nodes(system, mu=mu, solver=solver).warnings if BY_MESHES in said)
+        return tuple(said for said in steady_nodes(system, mu, solver).warnings if BY_MESHES in said)
     except AnalysisError:
         return ()
 
-
-def case_decided_by_meshes(case: Case, mu: float | None = None) -> tuple[str, ...]:
-    """The same of a case, whose model is built only where boundaries of meshes are in contact."""
-    if not any("." in contact.master for contact in case.contacts.values()):
-        return ()
-    return decided_by_meshes(build_system(case, mu), mu)

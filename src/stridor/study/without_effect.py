@@ -20,14 +20,14 @@ from dataclasses import dataclass
 
 from ..case import Case
 from ..case.bodies import SolidBody
-from ..system import build_system
 from ..system.pairs import is_point_on_line
+from .workspace import Workspace
 
 IN_TIME = ("simulate", "compare", "run")
 MODAL = ("steady", "modes", "shapes", "onsets", "run", "sensitivities", "countermeasures", "damping_map", "reduce")
 
 
-def without_effect(case: Case, verb: str, *, solver: str | None = None) -> list[str]:
+def without_effect(problem: Case | Workspace, verb: str, *, solver: str | None = None) -> list[str]:
     """A line for each setting of the case, or ``--solver``, that changes no number of what a verb computes.
 
     Builds the model only where such a setting is given and the case alone does not tell the path, which is so for small
@@ -35,10 +35,12 @@ def without_effect(case: Case, verb: str, *, solver: str | None = None) -> list[
     """
     if verb not in (*IN_TIME, *MODAL):
         return []
+    work = Workspace.of(problem)
+    case = work.case(verb)
     # By the case alone where that is enough.
     lines = [*_of_materials(case), *_of_comparison(case, verb)]
     if _given(case, solver):
-        path = _path(case)
+        path = _path(work, case)
         lines += [*_of_modes(case, path, verb, solver), *_of_time(case, path, verb)]
     return lines
 
@@ -55,11 +57,11 @@ class _Path:
         return not self.assembled and not self.general
 
 
-def _path(case: Case) -> _Path:
+def _path(work: Workspace, case: Case) -> _Path:
     # Contact over a surface is computed with on assembled matrices; only imported ones may lack structure.
     if not case.imported and any(not is_point_on_line(case, contact) for contact in case.contacts.values()):
         return _Path(assembled=True, general=False)
-    system = build_system(case)
+    system = work.system()
     return _Path(system.assembled, bool(system.general))
 
 

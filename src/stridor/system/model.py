@@ -5,9 +5,10 @@ Nothing after it asks whether the freedoms came from beams, solids or another pr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,6 +24,31 @@ from .load_steps import LoadStep
 from .motion import PrescribedMotion
 
 COMPLETE_BASIS_LIMIT = 2500
+
+T = TypeVar("T")
+
+
+class Answers:
+    """What has been computed of some matrices, or of a whole system, by what was asked."""
+
+    def __init__(self, of: tuple[Sparse, ...] = ()) -> None:
+        self.of = of
+        self._known: dict[Hashable, Any] = {}
+
+    def once(self, asked: Hashable, answer: Callable[[], T]) -> T:
+        """What ``answer`` gives, computed when it is asked for first; what raises is computed again."""
+        if asked not in self._known:
+            self._known[asked] = answer()
+        return self._known[asked]
+
+    def known(self, asked: Hashable) -> Any:
+        """What was computed, None where it was not."""
+        return self._known.get(asked)
+
+    def keep(self, asked: Hashable, answer: Any) -> None:
+        """Know it from now on."""
+        self._known[asked] = answer
+
 
 
 @dataclass(frozen=True)
@@ -78,6 +104,9 @@ class System:
     to the static equilibrium, with stick and partial slip; empty where all contacts slide as the motions have them.
     placed: whether it is what `in_place` has made of another. touching_at: the μ of the steady sliding whose nodes
     touch in its modes, whichever μ these are of; None where whoever asks for modes says.
+
+    Frozen, so that every question has one answer: `once` keeps what is asked for again and again, in ``answers``;
+    ``of_matrices`` has what follows from mass, damping and stiffness alone, which systems with other contacts share.
     """
 
     mass: Sparse
@@ -102,10 +131,16 @@ class System:
     placed: bool = False
     contact_cubic: Mapping[str, float] = field(default_factory=dict)
     touching_at: float | None = None
+    of_matrices: Answers = field(default_factory=Answers, repr=False, compare=False)
+    answers: Answers = field(default_factory=Answers, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness"):
-            object.__setattr__(self, name, sp.csr_array(getattr(self, name)))
+            matrix = getattr(self, name)
+            object.__setattr__(self, name, matrix if isinstance(matrix, sp.csr_array) else sp.csr_array(matrix))
+        own = (self.mass, self.damping, self.stiffness)
+        if [id(matrix) for matrix in self.of_matrices.of] != [id(matrix) for matrix in own]:
+            object.__setattr__(self, "of_matrices", Answers(own))
         if self.motion is None:  # pyright: ignore[reportUnnecessaryComparison]
             object.__setattr__(self, "motion", PrescribedMotion.none(self.size))
 
@@ -165,6 +200,12 @@ class System:
         lines = (f"loads: {', '.join(self.loads)}", f"motions: {', '.join(self.motion.names)}", self.general)
         return html_table(f"System of {self.size} freedoms", ("", "what it is"), rows, lines)
 
+    def once(self, asked: Hashable, answer: Callable[[], T]) -> T:
+        """What ``answer`` gives, computed when it is asked for first and kept with the system.
+
+        asked: the question, with every setting that the answer depends on."""
+        return self.answers.once(asked, answer)
+
     @property
     def size(self) -> int:
         """Number of free freedoms n."""
@@ -197,6 +238,9 @@ class System:
 
     def undamped(self) -> System:
         """The same system without structural damping (paper eq. 5)."""
+        return self.once("undamped", self._undamped)
+
+    def _undamped(self) -> System:
         motion = replace(
             self.motion,
             damping=np.zeros_like(self.motion.damping),
@@ -211,10 +255,15 @@ class System:
         factors (p,): of the motions, those of velocities do not count; None: one. The time loop takes the system as it
         is, where distances are motions that end.
         """
-        motion = self.motion
-        if self.placed or not any(motion.places):
+        if self.placed or not any(self.motion.places):
             return self
-        place = motion.places if factors is None else motion.places * factors
+        if factors is None:
+            return self.once("in place", lambda: self._moved(self.motion.places))
+        return self._moved(self.motion.places * factors)
+
+    def _moved(self, place: Array) -> System:
+        """With distances at ``place`` (p,)."""
+        motion = self.motion
         moved = motion.lift @ place
         loads = dict(self.loads)
         for k in np.flatnonzero(motion.places):
@@ -236,7 +285,7 @@ class System:
 
     def touching(self, mu: float | None) -> System:
         """The system in whose modes those nodes touch that do so in steady sliding at ``mu`` (None: as it is)."""
-        return self if mu is None else replace(self, touching_at=mu)
+        return self if mu is None else self.once(("touching", mu), lambda: replace(self, touching_at=mu))
 
     def with_rigid_contacts(self) -> System:
         """The same system with every contact rigid, points and surfaces."""

@@ -84,7 +84,12 @@ class UncoupledModes:
 
 
 def uncoupled_modes(system: System) -> UncoupledModes:
-    """Solve each uncoupled component densely. Raises AnalysisError where mass is not positive."""
+    """Each uncoupled component solved densely, once for the same matrices. Raises AnalysisError where mass is not
+    positive."""
+    return system.of_matrices.once("uncoupled modes", lambda: _solved(system))
+
+
+def _solved(system: System) -> UncoupledModes:
     mass, damping, stiffness = (m.tocsr() for m in (system.mass, system.damping, system.stiffness))
     real: list[RealBlock] = []
     general: list[ComplexBlock] = []

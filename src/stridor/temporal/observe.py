@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-import scipy  # its module signal takes half a second, and is loaded when it is used
 
 from ..typing import Array, ComplexArray, Sparse
+from .signals import hann
 
 MOST_BYTES = 128e6
 MOST_INSTANTS = 4096
@@ -74,7 +74,7 @@ class LineShape:
     window: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        self.window = scipy.signal.get_window("hann", self.count)
+        self.window = hann(self.count)
 
     def see(self, time: float, velocity: Array) -> None:
         """Add this instant."""

@@ -8,9 +8,11 @@ is a sum of damped exponentials, and the matrix pencil (Hua and Sarkar 1990) tak
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
-import scipy  # its module signal takes half a second, and is loaded when it is used
+import scipy  # its module signal takes half a second, and is loaded where another window than Hann's is asked for
+import scipy.fft as sf
 import scipy.linalg as sl
 
 from ..typing import Array, ComplexArray
@@ -18,8 +20,9 @@ from ..typing import Array, ComplexArray
 PENCIL_TOLERANCE = 1e-9
 # A line outside the band may have grown millions of times larger than what is sought in it; this window
 # keeps 170 dB away.
-STOP_BAND = ("kaiser", 18.0)
+STOP_BAND = 18.0  # β of Kaiser's window
 STOP_DECIBELS = 170.0
+Numbers = TypeVar("Numbers", Array, ComplexArray)
 LONGEST, WIDEST = 3000, 400  # samples and subspace rows of the matrix pencil
 SHARE = 1e-3  # components below this share of the strongest are not trusted
 
@@ -58,10 +61,27 @@ def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:
 _WIDTH = {"hann": 2.0, "boxcar": 1.21, "blackmanharris": 2.67, "flattop": 4.59}  # −6 dB width in bins
 
 
+def hann(count: int) -> Array:
+    """Hann's window (count,), periodic."""
+    return 0.5 - 0.5 * np.cos(2 * np.pi / count * np.arange(count)) if count > 1 else np.ones(count)
+
+
+def _window(name: str, count: int) -> Array:
+    return hann(count) if name == "hann" else np.asarray(scipy.signal.get_window(name, count))
+
+
+def _convolved(signal: Numbers, weights: Array) -> Numbers:
+    """Signals (…, k) with weights (w,) where these overlap in full: (…, k − w + 1)."""
+    count, taps = signal.shape[-1], len(weights)
+    size = sf.next_fast_len(count + taps - 1)
+    there, back = (sf.fft, sf.ifft) if np.iscomplexobj(signal) else (sf.rfft, sf.irfft)
+    return back(there(signal, size) * there(weights, size), size)[..., taps - 1 : count]
+
+
 def spectrum(signal: Array, sampling: float, *, window: str = "hann") -> Spectrum:
     """Amplitude spectrum of a real signal (k,) sampled every ``sampling`` [s], its mean taken off."""
     count = len(signal)
-    weights = scipy.signal.get_window(window, count)
+    weights = _window(window, count)
     values = np.abs(np.fft.rfft((signal - np.mean(signal)) * weights)) * 2 / weights.sum()
     spacing = 1.0 / (count * sampling)
     return Spectrum(np.fft.rfftfreq(count, sampling), values, window, spacing, _WIDTH.get(window, 2.0) * spacing)
@@ -81,7 +101,7 @@ def spectrogram(signal: Array, sampling: float, *, resolution_hz: float, window:
     """Short-time spectra with three quarters of overlap; resolution_hz sets the length of a piece."""
     size = int(min(len(signal), max(16, round(1.0 / (resolution_hz * sampling)))))
     hop = max(1, size // 4)
-    weights = scipy.signal.get_window(window, size)
+    weights = _window(window, size)
     pieces = np.lib.stride_tricks.sliding_window_view(signal, size)[::hop]
     values = np.abs(np.fft.rfft((pieces - pieces.mean(axis=1, keepdims=True)) * weights, axis=1))
     return Spectrogram(
@@ -96,11 +116,11 @@ def envelope(signal: Array, sampling: float, frequency_hz: float, *, periods: fl
     """Time [s] and amplitude of the line at ``frequency_hz``, by demodulation over ``periods`` of it."""
     size = int(max(8, round(periods / (frequency_hz * sampling))))
     size = min(size, max(len(signal) // 3, 8))
-    weights = scipy.signal.get_window("hann", size)
+    weights = hann(size)
     weights = weights / weights.sum() * 2
     time = np.arange(len(signal)) * sampling
     turned = (signal - np.mean(signal)) * np.exp(-2j * np.pi * frequency_hz * time)
-    values = np.abs(scipy.signal.fftconvolve(turned, weights, mode="valid"))
+    values = np.abs(_convolved(turned, weights))
     hop = max(1, size // 10)
     return (np.arange(len(values)) * sampling + size * sampling / 2)[::hop], values[::hop]
 
@@ -166,14 +186,16 @@ class Components:
 
 
 def low_passed(signal: Array, sampling: float, max_frequency_hz: float) -> Array:
-    """Signal without what lies above 1.25 ``max_frequency_hz``; the filter's transients are cut off."""
-    if max_frequency_hz * 1.4 * sampling >= 0.5 or len(signal) < 64:
+    """Signals (…, k) without what lies above 1.25 ``max_frequency_hz``; the filter's transients are cut off."""
+    count = signal.shape[-1]
+    if max_frequency_hz * 1.4 * sampling >= 0.5 or count < 64:
         return signal
     # Kaiser's rule: (A − 8)/(2.285 Δω) taps for A dB over a transition of Δω.
     taps = int((STOP_DECIBELS - 8) / (2.285 * 2 * np.pi * 0.25 * max_frequency_hz * sampling)) | 1
-    taps = min(taps, (len(signal) // 3) | 1)
-    low_pass = scipy.signal.firwin(taps, 1.125 * max_frequency_hz, window=STOP_BAND, fs=1.0 / sampling)
-    return np.asarray(scipy.signal.fftconvolve(signal - np.mean(signal), low_pass, mode="valid"))
+    taps = min(taps, (count // 3) | 1)
+    place = np.arange(taps) - taps // 2
+    low_pass = np.sinc(2 * 1.125 * max_frequency_hz * sampling * place) * np.kaiser(taps, STOP_BAND)
+    return np.ascontiguousarray(_convolved(signal - signal.mean(axis=-1, keepdims=True), low_pass / low_pass.sum()))
 
 
 def components(signal: Array, sampling: float, *, max_frequency_hz: float, order: int = 80) -> Components:
@@ -195,7 +217,8 @@ def components(signal: Array, sampling: float, *, max_frequency_hz: float, order
         return nothing
     rows = min(count // 2, WIDEST)
     hankel = np.lib.stride_tricks.sliding_window_view(reduced, count - rows + 1)
-    left, values, _ = sl.svd(hankel, full_matrices=False)
+    # Its rows are far shorter than its columns are many: the triangle has the same left vectors.
+    left, values, _ = sl.svd(sl.qr(hankel.T, mode="r")[0][:rows].T, check_finite=False)
     rank = int(min(order, rows - 1, max(2, np.sum(values > PENCIL_TOLERANCE * values[0]))))
     space = left[:, :rank]
     poles = sl.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]).astype(complex)

@@ -19,7 +19,7 @@ from .body_words import bodies_table
 from .figures import ReportFigure, agreement_figures, modal_figures, model_figures, temporal_figures
 from .inputs import ReportInputs
 from .modal_tables import frequency_tables, modes_table, onset_tables
-from .style import styled
+from .style import lay_out, styled
 from .surface_figures import contact_figures, shape_figures, surface_table
 from .tables import Row, Table, number
 from .temporal_tables import (
@@ -65,8 +65,8 @@ def write_report(inputs: ReportInputs, folder: Path) -> Path:
     drawings: dict[str, str] = {}
     for part in (p for chapter in chapters for p in chapter.parts):
         if isinstance(part, ReportFigure):
+            lay_out(part.figure)
             vector = _rendered(part.figure, "svg")
-            part.figure.set_layout_engine("none")  # laid out once; the second file takes it as it is
             _write(figures / f"{part.name}.svg", vector)
             _write(figures / f"{part.name}.png", _rendered(part.figure, "png"))
             drawings[part.name] = "data:image/svg+xml;base64," + base64.b64encode(vector).decode("ascii")

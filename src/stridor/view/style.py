@@ -11,8 +11,8 @@ import numpy as np
 from cycler import cycler
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.text import Annotation
 
 from ..typing import Array
 
@@ -28,6 +28,8 @@ DRAWN_POINTS = 20 * DRAWN_COLUMNS  # histories shorter than this are drawn as th
 
 STYLE: dict[str, object] = {
     "figure.dpi": 100,
+    "figure.autolayout": False,
+    "figure.constrained_layout.use": False,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
     "font.family": "sans-serif",
@@ -88,7 +90,7 @@ def _as_written(figure: Figure) -> None:
     """Show titles, labels and legends as they are written: in names of a case $ begins no formula."""
     texts = list(figure.texts)
     for ax in figure.axes:
-        texts += [ax.title, ax.xaxis.label, ax.yaxis.label, *ax.texts, *ax.findobj(Annotation)]
+        texts += [ax.title, ax.xaxis.label, ax.yaxis.label, *ax.texts]
         legend = ax.get_legend()
         texts += [] if legend is None else [*legend.get_texts(), legend.get_title()]
         for side in ("left", "right"):
@@ -97,6 +99,18 @@ def _as_written(figure: Figure) -> None:
         texts += legend.get_texts()
     for text in texts:
         text.set_parse_math(False)
+
+
+@styled
+def lay_out(figure: Figure) -> None:
+    """Place what is in a figure once for all its files: savefig draws it all in vain to do so, for each of them."""
+    engine, canvas, dpi = figure.get_layout_engine(), figure.canvas, figure.dpi
+    if engine is not None:
+        FigureCanvasSVG(figure)  # letters have the widths of their outlines, at every resolution
+        engine.execute(figure)
+        figure.set_canvas(canvas)
+        figure.set_dpi(dpi)
+    figure.set_layout_engine(None)
 
 
 def new_figure(height: float = 3.6, width: float = WIDTH) -> Figure:

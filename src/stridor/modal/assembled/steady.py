@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from ...contact.multipliers import SLIP, STICK
 from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError
-from ...sliding import friction_damping_matrix, full_motion, require_pressed, steady_sliding_nodes
+from ...sliding import friction_damping_matrix, full_motion, require_pressed, steady_nodes, steady_sliding_nodes
 from ...sliding.stick_slip import StickRows
 from ...sliding.surfaces import STILL
 from ...system import System
@@ -79,7 +79,7 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
     system = system.in_place()
     mu = mu if system.touching_at is None else system.touching_at
     if (system.loads or system.load_steps) and nodes.count:
-        steady = steady_sliding_nodes(system, mu=mu, solver=solver)
+        steady = steady_nodes(system, mu, solver)
         require_pressed(system, steady.normal_force)
         if not system.load_steps:
             none = np.zeros(nodes.count, dtype=bool)

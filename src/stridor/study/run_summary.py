@@ -1,0 +1,125 @@
+"""A run in numbers: its last phase, its energies, its cost."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..agreement import dominant_response, linear_part
+from ..sliding import full_motion, slip_speeds
+from ..temporal.attractor import settled
+from ..temporal.energy import EnergyBalance, energy_balance
+from ..temporal.signals import Growth, components
+from ..temporal.trajectory import Trajectory
+from .fingerprint import changes_of
+from .workspace import Problem, Workspace
+
+EXPONENTIAL = 0.5  # rms of ln amplitude about the fitted line, above which nothing is called exponential
+LEAST_RECORDS = 128  # from which on components are sought in a run
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """What `stridor simulate` prints: the last phase in numbers, the energies, the cost."""
+
+    dominant_frequency_hz: float | None
+    growth: Growth | None
+    energy: EnergyBalance
+    trajectory: Trajectory
+    linear: complex | None = None
+
+    @property
+    def growth_rate(self) -> float | None:
+        """Growth [1/s]: of the fastest component of a small perturbation, where the run starts from steady
+        sliding; else of the dominant line where it grows exponentially, None where it does not."""
+        if self.linear is not None:
+            return self.linear.real
+        if self.growth is None or self.growth.spread > EXPONENTIAL:
+            return None
+        return self.growth.rate
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        run = self.trajectory
+        last = run.phases[-1] if run.phases else None
+        return {
+            "dominant_frequency_hz": self.dominant_frequency_hz,
+            "growth_rate": self.growth_rate,
+            "growth_fit": None
+            if self.growth is None
+            else {"start": self.growth.start, "end": self.growth.end, "spread": self.growth.spread},
+            "saturated": None if self.growth is None else self.growth.saturated,
+            "contacts": {} if last is None else {name: vars(c).copy() for name, c in last.contacts.items()},
+            "first_regime": first_regime(run),
+            "settled": {name: asdict(part) for name, part in settled(run).items()},
+            "phases": [
+                {
+                    "name": p.name,
+                    "start": p.start,
+                    "end": p.end,
+                    "contacts": {name: vars(c).copy() for name, c in p.contacts.items()},
+                }
+                for p in run.phases
+            ],
+            "energy": self.energy.to_json() | {"words": self.energy.words(run.beta2)},
+            "steps": run.steps,
+            "planned_steps": run.planned_steps,
+            "interrupted": run.interrupted,
+            "dt": run.step,
+            "step_limit": run.step_limit,
+            "limiting_body": run.limiting_body,
+            "path": run.path,
+            "path_reason": run.path_reason,
+            "most_sweeps": run.most_sweeps,
+            "unconverged_steps": run.unconverged_steps,
+            "wall_seconds": run.wall_seconds,
+            "changed": changes_of(run),
+            "restarts": run.provenance.get("restarts", []),
+        }
+
+
+def first_regime(run: Trajectory) -> dict[str, dict[str, float | None]]:
+    """The stretch of the last phase before a contact first separates, by contact: end [s], largest normal
+    force [N] and slip speed [m/s], share of its last quarter spent in stick (all of the records)."""
+    found: dict[str, dict[str, float | None]] = {}
+    if not run.phases or not len(run.time):
+        return found
+    part = run.phase_slice()
+    phase = run.phases[-1]
+    for k, name in enumerate(run.contact_names):
+        opened = phase.contacts[name].first_separation
+        end = phase.end if opened is None else opened
+        inside = np.flatnonzero(run.time[part] < end)
+        if not len(inside):
+            found[name] = {
+                "end": end,
+                "max_normal_force": None,
+                "max_slip_speed": None,
+                "stick_fraction": None,
+            }
+            continue
+        force = run.normal_force[part][inside, k]
+        status = run.status[part][inside, k]
+        tail = status[-max(1, len(status) // 4) :]
+        found[name] = {
+            "end": float(end),
+            "max_normal_force": float(np.abs(force).max()),
+            "max_slip_speed": float(np.abs(run.slip_speed[part][inside, k]).max()),
+            "stick_fraction": float(np.mean(tail == 1)),
+        }
+    return found
+
+
+def summarise(problem: Problem, run: Trajectory) -> RunSummary:
+    """Dominant frequency, growth, energy balance of a run of a case, a system or a workspace."""
+    work = Workspace.of(problem)
+    limit = work.modal.max_frequency_hz
+    dominant, fitted = dominant_response(run, limit)
+    linear: complex | None = None
+    perturbed = work.temporal.initial == "steady-sliding" and work.temporal.perturbation > 0
+    if perturbed and len(run.time) >= LEAST_RECORDS and run.contact_names and not (system := work.system()).assembled:
+        found = linear_part(run, slip_speeds(system, full_motion(system)), skip=16)
+        linear = components(found, run.sampling, max_frequency_hz=limit).fastest or None
+    return RunSummary(dominant, fitted, energy_balance(run), run, linear)

@@ -1,0 +1,181 @@
+"""A case and what has been computed for it, each thing once.
+
+What follows from a system alone (its steady sliding, its modes without contacts, what grows at a μ, its onsets) is kept
+with the system by whoever computes it (`System.once`); a workspace keeps the systems of its case, and what takes the
+case as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property, lru_cache, partial
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from ..case import Case
+from ..case.fields import Table
+from ..case.matrix_checks import MU
+from ..case.messages import problems_of
+from ..case.schema import DEFAULT_PHASES, Comparison, Modal, Phase, Phases, Temporal
+from ..errors import AnalysisError, CaseError
+from ..modal.options import Options
+from ..sliding import full_motion
+from ..sliding.surfaces import SurfaceSliding, steady_nodes
+from ..system import System, build_system
+from ..system.model import Answers
+from ..temporal.inputs import unfit_in_time
+from .case_key import case_key
+from .options import options_of
+
+SYSTEMS = 16  # kept at the same time, of a case whose matrices depend on μ
+WORKS = "what works for these is `stridor modes`, `stridor onsets` and `stridor steady`"
+
+
+class _Settings(Table):
+    """The tables of a case that say how to compute, not what."""
+
+    phases: Phases = DEFAULT_PHASES
+    modal: Modal = Modal()
+    temporal: Temporal = Temporal()
+    comparison: Comparison = Comparison()
+
+
+class Workspace:
+    """A case, or a system alone, and what has been computed for it.
+
+    Every analysis takes one in place of a case; what it needs and is there already is not computed again. A case is
+    frozen: one that is varied is another workspace. With a system alone the tables [modal], [temporal], [comparison]
+    and [[phases]] of a case may be given by name, as mappings; they have the defaults of a case. answers: what was
+    computed, by what was asked. Raises CaseError for tables that are wrong, or given beside a case.
+    """
+
+    def __init__(self, problem: Case | System, /, **tables: Any) -> None:
+        self._case = problem if isinstance(problem, Case) else None
+        if isinstance(problem, Case):
+            for name in tables:
+                raise CaseError(name, None, "a table of the case; vary that: case.with_({…})")
+            settings: Case | _Settings = problem
+            self._build: Callable[[float | None], System] = lru_cache(SYSTEMS)(partial(build_system, problem))
+        else:
+            try:
+                settings = _Settings(**tables)
+            except ValidationError as error:
+                raise CaseError.many(problems_of(error, tables, _Settings)) from None
+            self._build = lambda mu: problem
+        self.phases: tuple[Phase, ...] = settings.phases
+        self.modal: Modal = settings.modal
+        self.temporal: Temporal = settings.temporal
+        self.comparison: Comparison = settings.comparison
+        self.answers = Answers()
+
+    @staticmethod
+    def of(problem: Problem) -> Workspace:
+        """The workspace itself, or a new one of a case or a system."""
+        return problem if isinstance(problem, Workspace) else Workspace(problem)
+
+    @property
+    def given(self) -> Case | None:
+        """The case, None of a system alone."""
+        return self._case
+
+    def case(self, what: str) -> Case:
+        """The case. Raises CaseError of a system alone, with what it is that cannot do without one."""
+        if self._case is None:
+            raise CaseError("case", None, f"missing – {what} takes a Case, or a Workspace of one, not a System alone")
+        return self._case
+
+    @cached_property
+    def varies(self) -> bool:
+        """Whether factors of imported matrices depend on the friction coefficient."""
+        return self._case is not None and MU in self._case.factor_names
+
+    def system(self, mu: float | None = None) -> System:
+        """The system, built once; where its matrices depend on friction, that at ``mu`` (None: the case's own).
+
+        Raises what `build_system` raises."""
+        return self._build(None if mu is None or not self.varies else float(mu))
+
+    @cached_property
+    def key(self) -> str:
+        """The name of the case by its contents (`case_key`), "" of a system alone."""
+        return "" if self._case is None else case_key(self._case)
+
+    @cached_property
+    def text(self) -> str:
+        """The case as TOML, "" of a system alone."""
+        return "" if self._case is None else self._case.text
+
+    @property
+    def options(self) -> Options:
+        """What [modal] asks of the modal approach."""
+        return options_of(self)
+
+    @property
+    def has_contacts(self) -> bool:
+        """Whether anything is in contact."""
+        return bool(self.system().contact_nodes().count if self._case is None else self._case.contacts)
+
+    @cached_property
+    def own_friction(self) -> float | None:
+        """The coefficient of all contacts at their slip speeds in steady sliding; None where they differ.
+
+        Where the case has a parameter mu, and so no contacts, it is that.
+        """
+        if self._case is not None and MU in self._case.parameters:
+            return self._case.parameters[MU].value
+        if not self.has_contacts:
+            return 0.0
+        nodes = self.system().contact_nodes()
+        speeds = np.linalg.norm(nodes.slip_velocity(full_motion(self.system())), axis=1)
+        # The centre of a turning surface slides at no speed and has no say.
+        moving = speeds > 1e-9 * speeds.max(initial=0.0)
+        found = nodes.friction_coefficients(speeds)[moving] if moving.any() else nodes.friction_coefficients(speeds)
+        if not len(found):
+            return 0.0
+        return float(found[0]) if np.ptp(found) <= 1e-12 * np.max(np.abs(found)) else None
+
+    def one_friction(self) -> float:
+        """The same; raises CaseError where contacts differ."""
+        found = self.own_friction
+        if found is None:
+            raise CaseError(
+                "mu",
+                None,
+                "one friction coefficient for all contacts, since the case gives them different ones: name it "
+                "(--mu 0.3), it scales every contact's law",
+            )
+        return found
+
+    def steady(self, mu: float | None = None) -> SurfaceSliding:
+        """Steady sliding, node by node, at ``mu`` (None: with the laws' own coefficients)."""
+        return steady_nodes(self.system(mu), mu)
+
+    def structured(self, what: str, mu: float | None = None) -> System:
+        """The system, if its matrices are as ``what`` needs them: constant, with a mass that the time loop takes.
+        Raises AnalysisError for others."""
+        case = self._case
+        if case is not None and self.varies:
+            # Nothing gives μ: at 0 the matrices may be symmetric where they are not at any other.
+            unsaid = mu is None and MU not in case.parameters and not case.contacts
+            beyond = self.system(case.modal.friction_range[1]).general if unsaid else ""
+            if what in ("compare", "run") or beyond:
+                why = f", and beyond mu = 0 {beyond}" if beyond else ""
+                raise AnalysisError(
+                    f"{what}: factors of imported matrices depend on mu{why}; the time loop takes constant matrices "
+                    f"only; {WORKS}"
+                )
+        system = self.system(mu)
+        if system.general and (why := unfit_in_time(system)):
+            raise AnalysisError(f"{what}: {why}; {WORKS}")
+        if system.general and what == "run" and not self.has_contacts:
+            raise AnalysisError(
+                "run: there are no contacts and no factor of a matrix has mu in it, so there is no onset to solve for; "
+                "what works here is `stridor modes`, `stridor simulate` and `stridor onsets --along NAME`"
+            )
+        return system
+
+
+Problem = Case | System | Workspace
+"""What every analysis takes."""
