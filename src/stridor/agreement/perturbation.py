@@ -49,7 +49,8 @@ def perturb(
         raise AnalysisError("a perturbation of steady sliding needs contacts that slide")
     speed = float(np.abs(steady).min())
     # The reference configuration, as the modes have it, whatever the full run does (docs/case-file.md).
-    system = replace(system, contacts=tuple(replace(c, sliding="small") for c in system.contacts))
+    if any(c.sliding != "small" for c in system.contacts):
+        system = replace(system, contacts=tuple(replace(c, sliding="small") for c in system.contacts))
     start = replace(
         settings,
         initial="steady-sliding",

@@ -289,6 +289,9 @@ class System:
 
     def with_rigid_contacts(self) -> System:
         """The same system with every contact rigid, points and surfaces."""
+        return self.once("rigid contacts", self._rigid)
+
+    def _rigid(self) -> System:
         contacts = tuple(replace(c, stiffness=np.inf) for c in self.contacts)
         surfaces = tuple(s.rigid() for s in self.surfaces)
         return replace(self, contacts=contacts, surfaces=surfaces, contact_cubic={})
