@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import stridor as st
+from counted import Counts
 from program import stridor
 from rubbing_block import rubbing_block
 
@@ -36,8 +37,10 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_everything_ends_in_a_report(case: Path):
+def test_everything_ends_in_a_report(case: Path, monkeypatch: pytest.MonkeyPatch):
+    counts = Counts(monkeypatch)
     outcome = st.run(st.load(case), case.parent / "out")
+    counts.check()
     page = outcome.report.read_text(encoding="utf-8")
     for name in ("mesh", "mode", "friction-energy", "pressure-face", "status-face"):
         assert f'id="figure-{name}"' in page, name

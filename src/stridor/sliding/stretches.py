@@ -165,15 +165,17 @@ class _Search:
         return _key(found)
 
     def at(self, mu: float) -> _Look:
-        """Steady sliding at ``mu``."""
+        """Steady sliding at ``mu``, kept with the system, also that there is none, which is dear to find out."""
         if mu not in self._known:
-            try:
-                found = self._solved(mu)
-            except AnalysisError as error:
-                self._known[mu] = _Look(mu, None, None, str(error))
-            else:
-                self._known[mu] = _Look(mu, _key(found), found)
+            self._known[mu] = self._system.once(("look", mu, self._solver), lambda: self._look(mu))
         return self._known[mu]
+
+    def _look(self, mu: float) -> _Look:
+        try:
+            found = self._solved(mu)
+        except AnalysisError as error:
+            return _Look(mu, None, None, str(error))
+        return _Look(mu, _key(found), found)
 
     def _solved(self, mu: float | None) -> SurfaceSliding:
         def solved() -> SurfaceSliding:
