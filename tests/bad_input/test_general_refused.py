@@ -11,7 +11,7 @@ import pytest
 import stridor as st
 from matrix_cases import matrix_case
 from program import stridor
-from stridor.study.analyses import structured
+from stridor.study.workspace import Workspace
 
 pytestmark = pytest.mark.bad_input
 
@@ -43,7 +43,8 @@ def test_nothing_depends_on_friction(tmp_path: Path):
 def test_a_run_needs_friction_and_a_comparison_contacts(tmp_path: Path):
     """Circulatory forces alone: modes and time answer, a run has no onset to look for."""
     case = model(tmp_path, factor="0.5", extra="[[phases]]\nname = 'free'\nduration = 1.0\n")
-    assert message(structured, case, "run").startswith("run: there are no contacts and no factor of a matrix")
+    refused = message(Workspace(case).structured, "run")
+    assert refused.startswith("run: there are no contacts and no factor of a matrix")
     assert message(st.compare, case) == "a perturbation of steady sliding needs contacts that slide"
     assert st.simulate(case).steps > 0
 
