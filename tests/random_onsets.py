@@ -194,6 +194,7 @@ def disagreement(problem: Problem, folder: Path) -> tuple[str, str]:
     if not found.complete:
         return "", f"{problem.name}: {found.completeness}"
     base: int | None = None
+    outside: int | None = None
     crossed = False
     inside = [o for o in found.onsets if 2 * np.pi * o.frequency_hz <= problem.top]
     before = 0.0
@@ -208,16 +209,15 @@ def disagreement(problem: Problem, folder: Path) -> tuple[str, str]:
             continue
         if np.any((np.abs(values.real) <= 30 * FAINT * size) & (values.real > 1e-9 * size) & (size <= problem.top)):
             continue
-        count = int(np.sum(grows & (size <= problem.top)))
-        said = sum(_roots(o) for o in inside if o.mu < p)
+        count, beyond = int(np.sum(grows & (size <= problem.top))), int(np.sum(grows & (size > problem.top)))
+        left, outside = beyond - (beyond if outside is None else outside), beyond
+        said = sum(o.roots for o in inside if o.mu < p)
         if base is None or (crossed and not any(before < o.mu < p for o in inside)):
             base = count - said
+        elif count - said == base - left:
+            base -= left  # one has passed it since the last value, whatever else began there
         crossed, before = False, float(p)
         if count - said != base:
             onsets = [(round(o.mu, 6), o.kind, "-" if o.stabilising else "+", round(o.frequency_hz, 4)) for o in found.onsets]
             return f"{problem.name}: {count} roots grow at {p:.6g}, onsets say {said + base}: {onsets} {found.completeness}", ""
     return "", ""
-
-
-def _roots(onset: st.Onset) -> int:
-    return (-1 if onset.stabilising else 1) * (1 if onset.kind == "divergence" else 2)

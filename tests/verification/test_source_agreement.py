@@ -14,6 +14,7 @@ from benches import Slave, bench, paper_case
 from rubbing_block import rubbing_block
 from stridor.case import template_text
 from stridor.modal.complex_modes import complex_modes
+from stridor.modal.general.basis import DECAY
 from stridor.modal.options import Options
 from stridor.modal.over_friction import modes_of_band, onsets_of_band
 from stridor.modal.source import SOURCES, sources_for
@@ -54,8 +55,10 @@ def answers(system: System, names: Sequence[str], band: float, end: float) -> di
 
 def inside(found: st.ComplexModes, row: int, band: float) -> dict[int, complex]:
     """Eigenvalues by the numbers of their branches, |λ| within the band: faster ones, strongly damped or growing out of
-    all bounds, came from above it, where each source follows as far as it likes."""
-    listed = found.in_band[row] & (np.abs(found.eigenvalues[row]) <= 2 * np.pi * band)
+    all bounds, came from above it, where each source follows as far as it likes. The full search leaves out what decays
+    faster than half of the highest angular frequency."""
+    values, top = found.eigenvalues[row], 2 * np.pi * band
+    listed = found.in_band[row] & (np.abs(values) <= top) & (values.real > -DECAY * top)
     return dict(zip(found.branch[listed].tolist(), found.eigenvalues[row, listed].tolist(), strict=True))
 
 

@@ -23,6 +23,7 @@ from .assembled.problem import problem_of
 from .assembled.whole import quadratic_of
 from .complex_modes import complex_modes
 from .general.basis import AT_REST, GROWS, NOTHING
+from .general.growth import growing_roots
 from .onset import refuted
 from .onsets import Onsets, onsets
 from .options import Options
@@ -249,6 +250,7 @@ def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
             wrong.append(f"{extra} of the branches that grow at μ = {mu:g} are not found there")
     if found.unexplained:
         wrong.append(f"{found.unexplained} of those at μ = {high:g} go back to no onset that was solved")
+    wrong += _roots_amiss(found, start, end)
     if wrong:
         return f"NOT COMPLETE: {numbers}, but {'; '.join(wrong)}. Take a smaller range of μ."
     if not (start.complete and end.complete):
@@ -258,6 +260,20 @@ def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
         f"Checked at both ends: {numbers}, and each of them goes back to an onset listed or grew from the start. "
         f"{end.sentence} What grows and ends again between them rests on the branches followed."
     )
+
+
+def _roots_amiss(found: Onsets, start: Growing, end: Growing) -> list[str]:
+    """What onsets and the growing eigenvalues at both ends say otherwise where motions grow without oscillating: a pair
+    that has fallen apart on the real axis is two of them, and one may go through zero unseen by any branch."""
+    if np.all(start.values.imag) and np.all(end.values.imag):
+        return []
+    more, said = growing_roots(end.values) - growing_roots(start.values), sum(o.roots for o in found.onsets)
+    if more == said:
+        return []
+    return [
+        f"{more:+d} eigenvalues grow from one to the other where the onsets say {said:+d}: a motion that does not "
+        "oscillate begins or ceases to grow, or a mode leaves the band"
+    ]
 
 
 def _rows(mu: Array, own: float | None) -> list[int]:

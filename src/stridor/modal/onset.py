@@ -40,6 +40,11 @@ class Onset:
     exceptional_mu: complex | None = None
     enters_at: float | None = None
 
+    @property
+    def roots(self) -> int:
+        """By how many more eigenvalues grow beyond it: a flutter pair is two, a motion that diverges one."""
+        return (-1 if self.stabilising else 1) * (1 if self.kind == "divergence" else 2)
+
     def branch_words(self, between: str) -> str:
         """The modes that meet, or the one that diverges; a dash where branches were not followed."""
         if not any(self.branches):

@@ -103,7 +103,7 @@ def solved(
             found.append(one)
     found = without_crossings(found)
     inside = (f.onset for f in found if between[0] <= f.onset.mu <= between[1])
-    balance += sum((-1 if o.stabilising else 1) * (1 if o.kind == "divergence" else 2) for o in inside)
+    balance += sum(o.roots for o in inside)
     explained = _explained(lost)
     growing = [growing_roots(state.values[unstable(family, state.values, top)]) for state in (way.low, way.high)]
     fast = _throughout(family, (way.low, way.high), ends, top)

@@ -67,7 +67,7 @@ class Counted:
         judged = [(mu, n) for mu, n in self.grid if all(abs(o.mu - mu) > ON_IT * width for o in onsets)]
         lacks: list[Lack] = []
         for (low, before), (high, after) in pairwise(judged):
-            said = sum(roots_of(o) for o in onsets if low < o.mu < high)
+            said = sum(o.roots for o in onsets if low < o.mu < high)
             said += sum(p.roots for p in self.passing if low < p.mu <= high)
             if after - before != said:
                 lacks.append(Lack(low, high, after - before, said))
@@ -86,11 +86,6 @@ class _Count:
     def number(self) -> int:
         """How many roots grow, of which a flutter pair is two."""
         return growing_roots(self.found.values[self.growing])
-
-
-def roots_of(onset: Onset) -> int:
-    """By how many more roots grow beyond an onset."""
-    return (-1 if onset.stabilising else 1) * (1 if onset.kind == "divergence" else 2)
 
 
 def ends(root: Root) -> bool:

@@ -18,7 +18,7 @@ from ..quadratic import Spectrum
 from .axis import walked
 from .basis import DENSE, WHOLE, Along, Whole, along
 from .branches import Found, all_values, solved
-from .counted import ALIKE, ON_IT, Counted, Lack, Passing, as_onset, counted, number_at, roots_of
+from .counted import ALIKE, ON_IT, Counted, Lack, Passing, as_onset, counted, number_at
 from .family import Family
 from .follow import BEYOND, Followed
 from .growth import growing_roots, unstable
@@ -190,7 +190,7 @@ def _counted_answer(
 
 
 def _same(one: Onset, other: Onset, width: float, top: float) -> bool:
-    near = abs(one.mu - other.mu) <= 1e-8 * width and roots_of(one) == roots_of(other)
+    near = abs(one.mu - other.mu) <= 1e-8 * width and one.roots == other.roots
     return near and 2 * np.pi * abs(one.frequency_hz - other.frequency_hz) <= ALIKE * top
 
 
