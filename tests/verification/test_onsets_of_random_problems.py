@@ -42,6 +42,16 @@ def test_some(kind: int, tmp_path: Path) -> None:
     assert not said, "\n".join(said)
 
 
+def test_a_pair_that_falls_apart_and_loses_a_half(tmp_path: Path) -> None:
+    """Two motions diverge where a flutter pair meets the real axis; one goes through zero, the other stays."""
+    problem = random_problem(857, small=True)
+    found = problem.solve(tmp_path)
+    assert [(o.kind, o.roots) for o in found.onsets] == [("flutter", 2), ("divergence", -1)]
+    ends = found.onsets[-1].mu
+    count = [int(np.sum(problem.eigenvalues(mu).real > 1e-9)) for mu in (ends - 1e-6, ends + 1e-6)]
+    assert count == [2, 1]
+
+
 @pytest.mark.slow
 def test_a_heavy_one(tmp_path: Path) -> None:
     assert judged([HEAVY], tmp_path, small=True) == ([], [])

@@ -22,7 +22,6 @@ from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .assembled.problem import problem_of
 from .assembled.whole import quadratic_of
 from .complex_modes import complex_modes
-from .general.basis import AT_REST, GROWS, NOTHING
 from .general.growth import growing_roots
 from .onset import refuted
 from .onsets import Onsets, onsets
@@ -31,6 +30,7 @@ from .quadratic import band_modes
 from .quadratic.polish import pairs
 from .quadratic.reach import searched
 from .results import ComplexModes
+from .tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
 AFFORDABLE = 60_000  # unknowns up to which the full problem is solved unasked
 ROWS = 5  # friction coefficients up to which every one is checked, of more the ends and the case's own
@@ -95,7 +95,7 @@ def _searched_for(
         solver=options.solver,
     )  # fmt: skip
     size = np.abs(found.values)
-    rounding = GROWS if problem.damped else NOTHING
+    rounding = UNSTABLE_RELATIVE if problem.damped else SPLIT_RELATIVE
     grows = (found.values.real > rounding * size) & (size > AT_REST * top)
     right = found.right[: problem.size, grows]
     return Growing(

@@ -21,13 +21,13 @@ from .coupling import Coupling
 from .histories import Change, Entries, reported, unexplained
 from .onset import Branches, Onset, Onsets
 from .receptance_modes import prepare, unfit_words
-from .results import UNSTABLE_RELATIVE, grows
+from .results import grows
 from .roots import Spectrum
+from .tolerances import BELIEVED, UNSTABLE_RELATIVE
 from .tracking import State, Tracker
 from .unfit import Unfit
 
 NARROWINGS = 8
-BELIEVED = 1e-8  # backward error above which a solved onset is no onset
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from ..digits import readable
 from ..errors import CaseError
 from ..notebook import html_table
 from ..typing import Array, BoolArray, ComplexArray, IntArray
+from .tolerances import UNSTABLE_RELATIVE
 
 MOST_BYTES = 4e9  # of eigenvalues and vectors held at one time
-UNSTABLE_RELATIVE = 1e-9  # of |λ|: below it a real part is rounding
 LEAST = 1e-5  # of the band: what |λ| is taken to be at least for that
 BORDER = 1e-12  # of the band: what rounding may put a mode outside by
 

@@ -21,14 +21,15 @@ from ..histories import Change, Entries, reported, unexplained
 from ..onset import Onset, Onsets
 from ..options import Options
 from ..quadratic.reach import searched
-from ..results import UNSTABLE_RELATIVE, grows
+from ..results import grows
+from ..tolerances import BELIEVED, UNSTABLE_RELATIVE
 from .follow import Follower, State, halves
 from .local import Surroundings, axis_crossing, double_eigenvalue
 from .modes import samples
 from .passages import Passage, crossings, meetings
 from .problem import problem_of
 from .reduced import Eigenpairs, Reduced
-from .refine import BELIEVED, Band, projected, settle
+from .refine import Band, projected, settle
 from .shifted import real_columns
 from .whole import quadratic_of
 

@@ -15,10 +15,11 @@ from ...typing import Array, BoolArray
 from ..options import Options
 from ..quadratic.reach import searched
 from ..results import ComplexModes, Progress, require_memory
+from ..tolerances import BELIEVED
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import BELIEVED, MARGIN, Band, left_vectors, projected, settle
+from .refine import MARGIN, Band, left_vectors, projected, settle
 from .whole import quadratic_of
 
 SAMPLES = 7

@@ -12,13 +12,13 @@ import scipy.sparse as sp
 from ...direct import factorise
 from ...errors import AnalysisError, FollowingError
 from ...typing import Array, BoolArray, ComplexArray, IntArray, Sparse
+from ..tolerances import BELIEVED
 from .problem import ContactProblem, times, tiny
 from .reduced import Eigenpairs, Reduced
 from .shifted import Shifted, frictionless_modes, modes_below, real_columns, shift_for
 
 TOLERANCE = 2e-11  # backward error at which an eigenpair counts as found: eigenvalues are right to 1e-9 then
 LARGEST_REST = 1e-4  # and what it may leave of the lumped inertia forces
-BELIEVED = 1e-8  # backward error above which the answer is refused
 SWEEPS = 40
 WIDEST = 64  # right sides of one enrichment
 WEAKEST = 1e-3  # of the strongest direction: residuals below it wait for the next sweep

@@ -23,6 +23,7 @@ from ..parametric import ReducedModel, reduce
 from ..parametric.basis import expanded
 from ..quadratic import Region, find_modes
 from ..quadratic.problem import Quadratic, times
+from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .family import MU, ROLES, Family, Smooth
 
 DENSE = 60  # unknowns up to which the matrices are their own reduced model
@@ -31,9 +32,6 @@ BEYOND = 1.3  # times the band: what full solves look for, since branches are fo
 NEARBY = 1.02  # times the band, where growth in it is all that matters
 BESIDE = 1e-3  # of the highest angular frequency: and how fast what may grow next decays
 DECAY = 0.5  # of the highest angular frequency: modes that decay faster are not looked for
-AT_REST = 1e-5  # of the band: slower than that is a motion as a whole
-NOTHING = 1e-7  # of |λ|: growth of a reversible problem that is rounding; it opens as a square root
-GROWS = 1e-8  # of |λ|: growth of any other that may be rounding of stiff matrices
 
 
 class Along(Reduced):
@@ -79,7 +77,7 @@ class Along(Reduced):
     def steadied(self, found: Eigenpairs) -> Eigenpairs:
         """With growth that may be rounding taken as none: modes that nothing damps would cross the axis everywhere."""
         values = found.values.copy()
-        on_axis = np.abs(values.real) <= GROWS * np.abs(values)
+        on_axis = np.abs(values.real) <= UNSTABLE_RELATIVE * np.abs(values)
         values[on_axis] = 1j * values[on_axis].imag
         return replace(found, coordinate=values, values=values)
 
@@ -87,9 +85,9 @@ class Along(Reduced):
         """λ² as the coordinate where the problem is reversible: it stays smooth where eigenvalues reach zero, and real
         as long as they are on the axis."""
         values = found.values.copy()
-        on_axis = np.abs(values.real) <= NOTHING * np.abs(values)
+        on_axis = np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)
         values[on_axis] = 1j * values[on_axis].imag
-        still = np.abs(values.imag) <= NOTHING * np.abs(values)
+        still = np.abs(values.imag) <= SPLIT_RELATIVE * np.abs(values)
         values[still] = values[still].real
         # Of two real values ±λ one says everything.
         kept = ~(still & (values.real < 0))

@@ -21,7 +21,8 @@ from ..onset import Onset
 from ..quadratic import Region, Spectrum, band_modes
 from ..quadratic.find import Completeness
 from ..quadratic.polish import groups, pairs
-from .basis import AT_REST, DECAY, NOTHING, Along, Held, Projected, by_lambda
+from ..tolerances import AT_REST, SPLIT_RELATIVE
+from .basis import DECAY, Along, Held, Projected, by_lambda
 from .family import Family
 from .follow import Followed, followed
 from .growth import growing_roots, unstable
@@ -126,7 +127,7 @@ def without_crossings(found: list[Found]) -> list[Found]:
             if m in crossings or opens is None or closes is None:
                 continue
             grows = max(opens, closes) * np.sqrt(max(ends.mu - begins.mu, 0.0))
-            if ends.mu >= begins.mu and grows <= NOTHING * 2 * np.pi * begins.frequency_hz:
+            if ends.mu >= begins.mu and grows <= SPLIT_RELATIVE * 2 * np.pi * begins.frequency_hz:
                 crossings |= {k, m}
                 break
     return [one for k, one in enumerate(found) if k not in crossings]
@@ -191,7 +192,7 @@ def _opening(source: Along, end: Spectrum, state: State, top: float) -> list[Fou
     family = source.family
     values, change = end.values, family.slopes(family.low)
     problem = family.built(family.low)
-    on_axis = (np.abs(values.real) <= NOTHING * np.abs(values)) & (np.abs(values) > AT_REST * top)
+    on_axis = (np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)) & (np.abs(values) > AT_REST * top)
     places = np.flatnonzero(on_axis & (values.imag > 0))
     result: list[Found] = []
     for group in groups(values[places], ALIKE * top):

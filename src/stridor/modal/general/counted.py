@@ -18,7 +18,8 @@ from ...typing import BoolArray, ComplexArray
 from ..assembled.reduced import Eigenpairs
 from ..onset import Onset
 from ..quadratic.polish import pairs
-from .basis import AT_REST, GROWS, Along
+from ..tolerances import AT_REST, UNSTABLE_RELATIVE
+from .basis import Along
 from .family import Family
 from .growth import growing_roots, unstable
 from .newton import Root, crossing, meeting, standstill
@@ -161,7 +162,7 @@ class _Search:
         """Whether a mode would cross the axis within a step if it were straight."""
         lam, ahead = at.found.values, at.found.values + step * _rates(at.found)
         inside = (np.abs(lam) <= self.top) & (np.abs(lam) > SLOWEST * self.top) & np.isfinite(ahead)
-        off = np.abs(lam.real) > GROWS * np.abs(lam)
+        off = np.abs(lam.real) > UNSTABLE_RELATIVE * np.abs(lam)
         return bool(np.any(inside & off & ((lam.real > 0) != (ahead.real > 0))))
 
     def _at_edge(self, low: _Count, high: _Count) -> complex | None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ...typing import BoolArray, ComplexArray
-from .basis import AT_REST, GROWS, NOTHING
+from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .family import Family
 
 
 def unstable(family: Family, values: ComplexArray, top: float, still: float = AT_REST) -> BoolArray:
     """Which grow beyond rounding (k,); motions as a whole, up to ``still`` of the highest frequency top [1/s], do not
     count."""
-    rounding = NOTHING if family.reversible else GROWS
+    rounding = SPLIT_RELATIVE if family.reversible else UNSTABLE_RELATIVE
     return (values.real > rounding * np.abs(values)) & (np.abs(values) > still * top)
 
 

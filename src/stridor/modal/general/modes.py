@@ -24,7 +24,8 @@ from ..options import Options
 from ..quadratic import band_modes
 from ..quadratic.reach import searched
 from ..results import ComplexModes, Progress, require_memory
-from .basis import DECAY, NOTHING
+from ..tolerances import SPLIT_RELATIVE
+from .basis import DECAY
 from .family import SystemFamily, family_of
 from .numbers import Numbers, numbered
 
@@ -120,7 +121,7 @@ def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> Found:
     values = spectrum.values.copy()
     if family.reversible:
         # With every λ there is −λ̄: a real part without a partner is rounding.
-        on_axis = np.abs(values.real) <= NOTHING * np.abs(values)
+        on_axis = np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)
         values[on_axis] = 1j * values[on_axis].imag
     return Found(
         values,

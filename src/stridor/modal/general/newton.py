@@ -23,13 +23,13 @@ from ...direct import factorise
 from ...errors import AnalysisError
 from ...typing import ComplexArray, Sparse
 from ..quadratic.problem import Quadratic, times
+from ..tolerances import CONFIRMED
 from .family import Family
 
 STEPS = 14
 SETTLED = 1e-13
 # |Re λ| / |λ| up to which an eigenvalue is on the axis; not all processors know more than double precision.
 ON_AXIS = 1e-12 if np.finfo(np.longdouble).eps < 1e-18 else 1e-9
-BELIEVED = 1e-10  # backward error
 STALLED = 0.5  # of the smallest step so far: a longer one is made of rounding
 IDLE = 3
 ROUNDING = 1e-10  # |Re λ| / |λ| that may be left of slow modes of stiff structures
@@ -243,7 +243,7 @@ def _judged(
 ) -> Root | None:
     """The root with its backward error in the matrices as the system gives them there; None where that is too large."""
     residual = family.backward_error(mu, lam, x)
-    return Root(mu, lam, x, slope, square, residual) if residual <= BELIEVED else None
+    return Root(mu, lam, x, slope, square, residual) if residual <= CONFIRMED else None
 
 
 def _by_lambda(problem: Quadratic, lam: complex, x: ComplexArray) -> ComplexArray:

@@ -15,7 +15,8 @@ from ...threads import one_thread
 from ...typing import Array, ComplexArray, IntArray
 from ..assembled.follow import State
 from ..quadratic.polish import pairs
-from .basis import AT_REST, DECAY, Along, along, double_zeros
+from ..tolerances import AT_REST
+from .basis import DECAY, Along, along, double_zeros
 from .family import SystemFamily
 from .follow import BEYOND, surely
 

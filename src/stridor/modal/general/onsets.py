@@ -14,7 +14,8 @@ from ..onset import Onsets
 from ..options import Options
 from ..quadratic import Spectrum
 from ..quadratic.reach import searched
-from .basis import AT_REST, Along, Projected, along, whole_or_raise
+from ..tolerances import AT_REST
+from .basis import Along, Projected, along, whole_or_raise
 from .branches import ends_of, whole_ends
 from .family import family_of
 from .follow import BEYOND

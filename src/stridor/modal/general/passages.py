@@ -14,7 +14,8 @@ from ..assembled.critical import crossing as reduced_crossing
 from ..assembled.critical import pair_near
 from ..assembled.follow import Follower, State
 from ..assembled.passages import COMPLEX, Passage
-from .basis import AT_REST, GROWS, Along, OnBasis
+from ..tolerances import AT_REST, UNSTABLE_RELATIVE
+from .basis import Along, OnBasis
 from .newton import Root, crossing, meeting, standstill
 
 TRIES = 12
@@ -73,7 +74,7 @@ def _by_rate(source: Along, passage: Passage) -> Iterator[Guess]:
     low, high = passage.low, passage.high
     end = Follower.resumed(source, state).advance(high)
     first, last = (float(s.values[passage.branch].real) for s in (state, end))
-    rounding = GROWS * abs(end.values[passage.branch])
+    rounding = UNSTABLE_RELATIVE * abs(end.values[passage.branch])
     if min(abs(first), abs(last)) <= rounding:
         # On the axis up to rounding, whichever sign that has given it.
         first, last = (-last, last) if abs(first) < abs(last) else (first, -first)

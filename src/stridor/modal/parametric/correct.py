@@ -22,9 +22,10 @@ from ...direct import Factor, factorise
 from ...errors import CaseError
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
+from ..tolerances import UNSTABLE_RELATIVE
 from .basis import expanded, real_and_imaginary, residual
 from .dense import assembled, dense_modes
-from .model import REACH, UNSTABLE, ReducedModel, product_over_slope
+from .model import REACH, ReducedModel, product_over_slope
 from .offline import static_operator, symmetric_parts
 
 STEPS = 10  # at most
@@ -65,7 +66,7 @@ class CorrectedModes:
     @property
     def unstable(self) -> BoolArray:
         """Which grow (k,)."""
-        return self.values.real > UNSTABLE * np.abs(self.values)
+        return self.values.real > UNSTABLE_RELATIVE * np.abs(self.values)
 
 
 class Corrector:

@@ -12,12 +12,12 @@ from ...errors import AnalysisError
 from ...threads import one_thread
 from ...typing import Array, ComplexArray
 from ..quadratic.problem import Quadratic, times
+from ..tolerances import CONFIRMED
 from .model import ReducedModel
 
 STEPS = 20
 SETTLED = 1e-14
 OFF = 1e-6  # of λ: how far beside it is factorised, so that the matrix is not singular
-BELIEVED = 1e-10
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def verified(
     x = np.array([f[1] for f in found], dtype=complex).reshape(len(found), n).T
     y = np.array([f[2] for f in found], dtype=complex).reshape(len(found), n).T
     residual = np.maximum(problem.backward_error(lam, x), problem.transposed.backward_error(lam, y))
-    if np.any(residual > BELIEVED):
+    if np.any(residual > CONFIRMED):
         raise AnalysisError(f"a mode of the full problem does not settle: a backward error of {residual.max():.1e}")
     return FullModes(lam, x, y, residual, np.abs(lam - modes.values[chosen]) / np.abs(lam))
 

@@ -20,12 +20,12 @@ import numpy as np
 
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
+from ..tolerances import UNSTABLE_RELATIVE
 from .basis import expanded
 from .dense import DenseModes, assembled, dense_modes
 from .problem import ParametricProblem
 
 REACH = 1.0 + 1e-9
-UNSTABLE = 1e-9  # growth rate over |λ| above which a mode counts as unstable
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class ReducedModes:
     @property
     def unstable(self) -> BoolArray:
         """Which grow (k,)."""
-        return self.values.real > UNSTABLE * np.abs(self.values)
+        return self.values.real > UNSTABLE_RELATIVE * np.abs(self.values)
 
 
 @dataclass(frozen=True)
