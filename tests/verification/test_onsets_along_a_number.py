@@ -59,6 +59,13 @@ def test_a_parameter_of_imported_matrices(tmp_path: Path) -> None:
     assert onset["value"] == pytest.approx(0.75, rel=1e-12)
     assert onset["growth_slope"] is None
     assert found["completeness"].startswith("Complete as far as both ends tell")
+    called = st.onsets(st.load(tmp_path / "case.toml"), along="p")
+    assert {**called.to_json(), "warnings": []} == found
+    assert (called.parameter, called.between) == ("p", (0.0, 1.5))
+    with pytest.raises(st.CaseError, match=r"friction_range: missing – damping\.q has no range in the case"):
+        st.onsets(paper_case(), along="damping.q")
+    with pytest.raises(st.CaseError, match="along"):
+        st.onsets(st.build_system(paper_case()), along="bodies.beam1.length")
     # A case whose parameter is another one is sent to this call, not to another command.
     done = stridor("onsets", "case.toml", cwd=tmp_path)
     assert done.returncode == 1

@@ -8,7 +8,7 @@ import typer
 
 from ..digits import readable
 from ..errors import CaseError
-from .along import MU, document_along, range_along, show_onsets_along
+from .along import MU, show_onsets_along
 from .arguments import INCOMPLETE, Call, Source, Undamped, numbers, one_of, pair, verb
 
 if TYPE_CHECKING:
@@ -205,22 +205,18 @@ def _onsets_along(
     call: Call, case: Case, name: str, between: tuple[float, float] | None, max_frequency: float | None
 ) -> None:
     """Onsets along a number of the case: sought on a model reduced over its range, each solved in the full problem."""
-    from ..modal.general import onsets_along
-    from ..study.asked import require_frequency
-    from ..study.reduced import reduced_model
+    from ..study.along import onsets_along
     from ..study.unit_warnings import resolution_warnings
 
-    chosen = range_along(case, name, between)
-    require_frequency(max_frequency)
     call.warn(resolution_warnings(case))
-    model = reduced_model(case, {name: chosen}, max_frequency_hz=max_frequency)
-    found = onsets_along(model, name, solver=None if call.solver in (None, "auto") else call.solver)
+    chosen = None if call.solver in (None, "auto") else call.solver
+    found = onsets_along(case, name, between, max_frequency_hz=max_frequency, solver=chosen, said="--between")
     if call.json:
-        call.document(document_along(model, name, found))
+        call.document(found.to_json())
     else:
-        for note in getattr(model.problem, "notes", ()):
+        for note in found.notes:
             call.say(f"note: {note}")
-        show_onsets_along(model, name, found, confirmed=True)
+        show_onsets_along(found, confirmed=True)
     if not found.complete:
         raise typer.Exit(INCOMPLETE)
 

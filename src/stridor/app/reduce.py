@@ -113,7 +113,7 @@ def reduce(
         if points:
             _show_modes(model, points)
         if along is not None and onsets is not None:
-            show_onsets_along(model, along, onsets, confirmed=confirm)
+            show_onsets_along(onsets, confirmed=confirm)
         if not (at or along or save):
             call.say("next: --at mu=0.3 for modes, --onsets mu for onsets, --save model.npz to keep the model")
     if onsets is not None and not onsets.complete:

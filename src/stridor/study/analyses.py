@@ -9,16 +9,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, replace
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
 
 from ..agreement import Agreement, Comparison, Store
 from ..agreement import compare as compare_system
+from ..case.matrix_checks import MU
 from ..errors import AnalysisError, CaseError
 from ..errors import Problem as Wrong
 from ..modal.complex_modes import ComplexModes, complex_modes
-from ..modal.general import general_modes, general_onsets
+from ..modal.general import ParametricOnsets, general_modes, general_onsets
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
 from ..modal.over_friction import modes_of_band, onsets_of_band
@@ -32,6 +33,7 @@ from ..temporal.simulate import Checkpoint, Progress, plan
 from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
+from .along import onsets_along
 from .asked import require_frequency, require_friction
 from .body_modes import BodyModes, body_modes
 from .description import Description, describe
@@ -159,18 +161,43 @@ def steady_sliding(problem: Problem, mu: float | None = None) -> SurfaceSliding:
     return Workspace.of(problem).steady(mu)
 
 
+@overload
 def onsets(
     problem: Problem,
     friction_range: tuple[float, float] | None = None,
     *,
+    along: None = None,
     max_frequency_hz: float | None = None,
     damped: bool | None = None,
     check: bool = True,
-) -> Onsets:
-    """Every critical friction coefficient in range (defaults from [modal]).
+) -> Onsets: ...
+@overload
+def onsets(
+    problem: Problem,
+    friction_range: tuple[float, float] | None = None,
+    *,
+    along: str,
+    max_frequency_hz: float | None = None,
+) -> ParametricOnsets: ...
+def onsets(
+    problem: Problem,
+    friction_range: tuple[float, float] | None = None,
+    *,
+    along: str | None = None,
+    max_frequency_hz: float | None = None,
+    damped: bool | None = None,
+    check: bool = True,
+) -> Onsets | ParametricOnsets:
+    """Every critical friction coefficient in range (defaults from [modal]), or every critical value of another number.
 
-    check: whether what grows at both ends of the range is sought anew in the full problem (`checked_onsets`).
+    along: a number of the case by its path ("bodies.beam1.length") or a parameter of its matrices; the range is then
+    that of this number. check: whether what grows at both ends of the range is sought anew in the full problem
+    (`checked_onsets`). Raises CaseError for a range or a number that is none.
     """
+    if along is not None:
+        case = Workspace.of(problem).case("along")
+        if along != MU or MU in case.parameters:
+            return onsets_along(case, along, friction_range, max_frequency_hz=max_frequency_hz)
     started = time.perf_counter()
     require_frequency(max_frequency_hz)
     work = Workspace.of(problem)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -51,25 +52,59 @@ class ParametricOnset:
     square_root_coefficient: float | None = None
     enters_at: float | None = None
 
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "value": self.value,
+            "frequency_hz": self.frequency_hz,
+            "kind": self.kind,
+            "growth_slope": self.growth_slope,
+            "square_root_coefficient": self.square_root_coefficient,
+            "stabilising": self.stabilising,
+            "residual": self.residual,
+            "enters_band_at": self.enters_at,
+        }
+
 
 class ParametricOnsets(tuple[ParametricOnset, ...]):
-    """Onsets in ascending order. complete: whether as many roots grow, wherever that was looked at, as they say;
-    sentence: that in words."""
+    """Onsets in ascending order, of a parameter over a range up to max_frequency_hz. complete: whether as many roots
+    grow, wherever that was looked at, as they say; sentence: that in words. notes: what else was taken how."""
 
+    parameter: str
+    between: tuple[float, float]
+    max_frequency_hz: float
     complete: bool
     sentence: str
+    notes: tuple[str, ...]
 
     @classmethod
-    def of(cls, onsets: Sequence[ParametricOnset], *, complete: bool, sentence: str) -> ParametricOnsets:
+    def of(
+        cls, onsets: Sequence[ParametricOnset], model: ReducedModel, parameter: str, *, complete: bool, sentence: str
+    ) -> ParametricOnsets:
         """Onsets with what is to be said of them."""
         made = cls(onsets)
-        made.complete, made.sentence = complete, sentence
+        made.parameter, made.complete, made.sentence = parameter, complete, sentence
+        (own,) = (p for p in model.problem.parameters if p.name == parameter)
+        made.between, made.max_frequency_hz = (own.low, own.high), model.frequency / (2 * np.pi)
+        made.notes = tuple(getattr(model.problem, "notes", ()))
         return made
 
-    def from_above_words(self, max_frequency_hz: float) -> list[str]:
+    def to_json(self) -> dict[str, Any]:
+        """Plain values, as `stridor onsets --along NAME --json` prints them."""
+        return {
+            "parameter": self.parameter,
+            "range": list(self.between),
+            "max_frequency_hz": self.max_frequency_hz,
+            "onsets": [onset.to_json() for onset in self],
+            "completeness": self.sentence,
+            "complete": self.complete,
+            "notes": list(self.notes),
+        }
+
+    def from_above_words(self) -> list[str]:
         """Onsets above the band whose mode comes into it, a line each."""
         return [
-            from_above(o.parameter, f"{o.value:.6g}", o.frequency_hz, max_frequency_hz, o.enters_at)
+            from_above(o.parameter, f"{o.value:.6g}", o.frequency_hz, self.max_frequency_hz, o.enters_at)
             for o in self
             if o.enters_at is not None
         ]
@@ -107,7 +142,8 @@ def onsets_along(
     if len(onsets) < len(tried):
         lost = ", ".join(f"{line.value(o.mu):.6g} ({o.frequency_hz:.6g} Hz)" for o, found in tried if found is None)
         complete, said = False, f"Not confirmed in the full problem and left out: {parameter} = {lost}. {said}"
-    return ParametricOnsets.of(sorted(onsets, key=lambda o: o.value), complete=complete, sentence=said)
+    listed = sorted(onsets, key=lambda o: o.value)
+    return ParametricOnsets.of(listed, model, parameter, complete=complete, sentence=said)
 
 
 def _of(line: Line, onset: Onset, root: Root | None) -> ParametricOnset:

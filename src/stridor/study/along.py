@@ -1,0 +1,43 @@
+"""Onsets along any number of a case: sought on a model reduced over its range, each solved in the full problem."""
+
+from __future__ import annotations
+
+import math
+
+from ..case import Case
+from ..errors import CaseError
+from ..modal.general import ParametricOnsets
+from ..modal.general import onsets_along as sought
+from .asked import require_frequency
+from .reduced import reduced_model
+
+
+def onsets_along(
+    case: Case,
+    name: str,
+    between: tuple[float, float] | None = None,
+    *,
+    max_frequency_hz: float | None = None,
+    solver: str | None = None,
+    said: str = "friction_range",
+) -> ParametricOnsets:
+    """Every change of stability along a number of the case, in its range there unless another is given.
+
+    name: its path in the case, or a parameter of its matrices; mu is the friction coefficient. said: what the range is
+    called in messages. Raises CaseError for a number that there is not or that has no range.
+    """
+    chosen = _range(case, name, between, said)
+    require_frequency(max_frequency_hz)
+    model = reduced_model(case, {name: chosen}, max_frequency_hz=max_frequency_hz)
+    return sought(model, name, solver=solver)
+
+
+def _range(case: Case, name: str, between: tuple[float, float] | None, said: str) -> tuple[float, float]:
+    found, form = between, "--between low:high" if said == "--between" else "(low, high)"
+    if found is None and name in case.parameters:
+        found = case.parameters[name].range
+    if found is None:
+        raise CaseError(said, None, f"missing – {name} has no range in the case: give {form}")
+    if not (all(math.isfinite(v) for v in found) and found[0] < found[1]):
+        raise CaseError(said, f"{found[0]:g}:{found[1]:g}", "two finite numbers low < high")
+    return found
