@@ -15,6 +15,7 @@ from stridor.case import template_text
 from stridor.errors import CaseError
 from stridor.modal import complex_modes, over_friction, receptance_modes
 from stridor.system import build
+from stridor.system.model import MOST_ANSWERS, Answers
 from stridor.system.uncoupled import uncoupled_modes
 
 COARSE = {
@@ -187,3 +188,12 @@ def test_settings_of_a_system_are_checked_as_those_of_a_case(case: st.Case) -> N
         st.Workspace(system, modal={"max_frequency": 1.0})
     with pytest.raises(CaseError, match="modal: a table of the case"):
         st.Workspace(case, modal={})
+
+
+def test_the_oldest_of_very_many_answers_is_forgotten() -> None:
+    answers = Answers()
+    for asked in range(MOST_ANSWERS + 1):
+        assert answers.once(asked, lambda asked=asked: -asked) == -asked
+    assert answers.known(0) is None
+    assert answers.known(1) == -1
+    assert answers.once(1, lambda: 7) == -1

@@ -26,6 +26,7 @@ from .motion import PrescribedMotion
 COMPLETE_BASIS_LIMIT = 2500
 
 T = TypeVar("T")
+MOST_ANSWERS = 200  # kept of one system: equilibria of a sweep are vectors of all its freedoms
 
 
 class Answers:
@@ -38,7 +39,7 @@ class Answers:
     def once(self, asked: Hashable, answer: Callable[[], T]) -> T:
         """What ``answer`` gives, computed when it is asked for first; what raises is computed again."""
         if asked not in self._known:
-            self._known[asked] = answer()
+            self.keep(asked, answer())
         return self._known[asked]
 
     def known(self, asked: Hashable) -> Any:
@@ -46,7 +47,9 @@ class Answers:
         return self._known.get(asked)
 
     def keep(self, asked: Hashable, answer: Any) -> None:
-        """Know it from now on."""
+        """Know it from now on; of very many answers the oldest is forgotten."""
+        while len(self._known) >= MOST_ANSWERS:
+            self._known.pop(next(iter(self._known)))
         self._known[asked] = answer
 
 
