@@ -122,7 +122,7 @@ def _of_modes(case: Case, path: _Path, verb: str, solver: str | None) -> Iterato
 def _of_time(case: Case, path: _Path, verb: str) -> Iterator[str]:
     if verb not in IN_TIME:
         return
-    if path.assembled and case.temporal.path != "auto":
+    if path.assembled and case.temporal.path not in ("auto", "assembled"):
         yield f"temporal.path = {case.temporal.path!r} has no effect: assembled matrices have one path"
     if case.temporal.contact == "rigid":
         springs = [name for name, contact in case.contacts.items() if contact.stiffness != "rigid"]
