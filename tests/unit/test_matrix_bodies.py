@@ -19,7 +19,8 @@ from stridor.mesh.model import Mesh
 from stridor.system.bodies import BuiltBody, build_bodies
 
 MODAL = "max_frequency_hz = 40e3\nmodes = 8"
-MESHED = rubbing_block(MODAL)
+COARSE = ("divisions = [10, 2]", "divisions = [10, 1]")
+MESHED = rubbing_block(MODAL).replace(*COARSE)
 IMPORTED = rubbing_block(MODAL, """
 type = "matrices"
 dimension = 2
@@ -31,7 +32,7 @@ terms = [
   { file = "K.mtx", role = "stiffness" },
 MORE]
 points = { crown = CROWN }
-""")
+""").replace(*COARSE)
 
 
 def write_mesh(path: Path, mesh: Mesh, numbers: np.ndarray, order: np.ndarray, scale: float = 1.0) -> None:

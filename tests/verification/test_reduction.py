@@ -97,14 +97,14 @@ def test_every_mode_in_the_band_everywhere_in_the_box(model):
     problem = model.problem
     corners = problem.corners([2, 2])
     for point in [*corners, *random_points(problem, 4, 1)]:
-        exact = eigenvalues(problem, point)
-        exact = exact[np.abs(exact) < 0.999 * model.frequency]
+        whole = eigenvalues(problem, point)
+        exact = whole[np.abs(whole) < 0.999 * model.frequency]
         found = model.modes(point)
         away = np.abs(exact[:, None] - found.values).min(axis=1) / np.abs(exact)
         assert len(found.values) >= len(exact) > 15
         assert away.max() < 1e-8
         # and nothing that is none
-        assert np.abs(found.values[:, None] - eigenvalues(problem, point)).min(axis=1).max() < 1e-7 * model.frequency
+        assert np.abs(found.values[:, None] - whole).min(axis=1).max() < 1e-7 * model.frequency
         assert found.inside
     assert model.size < 100
 

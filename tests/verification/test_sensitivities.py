@@ -69,16 +69,24 @@ def minimal_matrices(mu, kx=60.0, kc=100.0, cx=0.1, cy=0.1):
 
 
 def minimal_growth(mu, **values):
-    damping, stiffness = minimal_matrices(mu, **values)
-    state = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, -damping]])
-    return float(sl.eigvals(state).real.max())
+    """Of one μ or of many (k,)."""
+    states = []
+    for one in np.atleast_1d(mu):
+        damping, stiffness = minimal_matrices(one, **values)
+        states.append(np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, -damping]]))
+    growth = np.linalg.eigvals(np.array(states)).real.max(axis=1)
+    return growth if np.ndim(mu) else float(growth[0])
 
 
 def bisected(cx, cy, kx=60.0, top=2.0):
     """The lowest μ with growth, by dense eigenvalues alone."""
     grid = np.linspace(0.0, top, 4001)
-    first = next((k for k, mu in enumerate(grid) if minimal_growth(mu, cx=cx, cy=cy, kx=kx) > 1e-12), None)
-    if first is None:
+    for part in np.array_split(np.arange(len(grid)), 20):
+        grows = minimal_growth(grid[part], cx=cx, cy=cy, kx=kx) > 1e-12
+        if grows.any():
+            first = int(part[np.argmax(grows)])
+            break
+    else:
         return np.nan
     low, high = grid[first - 1], grid[first]
     for _ in range(60):

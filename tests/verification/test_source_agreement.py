@@ -28,7 +28,7 @@ NAMES = [source.name for source in SOURCES]
 
 
 def two_beams(damped: bool, stiffness: float | str) -> st.Case:
-    case = paper_case(contacts__A__stiffness=stiffness)
+    case = paper_case(contacts__A__stiffness=stiffness, bodies__beam1__elements=10, bodies__beam2__elements=30)
     if damped:
         return case
     return case.with_({f"bodies.{name}.damping": {"mass": 0.0, "stiffness": 0.0} for name in case.bodies})

@@ -229,7 +229,7 @@ def traction(found: SurfaceSliding, system: System) -> np.ndarray:
 PRESS = ({"press": 1.0, "pull": 0.0}, 2)
 
 
-@pytest.mark.parametrize("part", [0.3, 0.7])
+@pytest.mark.parametrize("part", [pytest.param(0.3, marks=pytest.mark.slow), 0.7])
 def test_a_cylinder_pulled_sideways_slips_as_cattaneo_and_mindlin_say(part):
     mu, elements = 0.4, 20
     system, x, force = cylinder_on_a_flat(elements, mu, PRESS, ({"press": 1.0, "pull": part}, 3))
