@@ -10,7 +10,7 @@ import pytest
 import scipy.linalg as sl
 
 import stridor as st
-from benches import by_hand, full_eigenvalues
+from benches import by_hand, full_eigenvalues, paper_case
 from hidden_modes import HZ_OF_POINTS, MU_OF_BLOCK, MU_OF_POINTS, entering_points, hidden_block
 from matrix_cases import matrix_case
 from rubbing_block import rubbing_block
@@ -255,3 +255,15 @@ def test_of_meshed_bodies(seed: int):
     check_rows(st.modes(case, mus), dense[1:], 2 * np.pi * hz, accuracy=1e-5)
     solved = st.onsets(case, (0.0, float(mus[-1])))
     check_onsets(solved, [dense[0], dense[-1]], 2 * np.pi * hz)
+
+
+@pytest.mark.parametrize("source", ["auto", "krylov"])
+def test_the_last_digits_of_a_slow_mode_do_not_grow(source: str) -> None:
+    """Undamped beams whose slowest mode is 644 1/s beside 1e7 1/s of the mesh: its λ has few digits, and is stable."""
+    none = {f"bodies__{name}__damping": {"mass": 0.0, "stiffness": 0.0} for name in ("beam1", "beam2")}
+    case = paper_case(contacts__A__stiffness=1e10, bodies__beam1__elements=10, bodies__beam2__elements=30, **none)
+    found = st.modes(case.with_({"modal.source": source}), 1.0, max_frequency_hz=20e3)
+    truth = st.modes(case.with_({"modal.source": "full"}), 1.0, max_frequency_hz=20e3)
+    grow = [np.sort(m.eigenvalues[m.unstable & m.in_band].imag) for m in (found, truth)]
+    assert grow[0] == pytest.approx(grow[1], rel=1e-9)
+    assert "no branch from" not in found.completeness[0]

@@ -26,8 +26,9 @@ from .general.growth import growing_roots
 from .onset import refuted
 from .onsets import Onsets, onsets
 from .options import Options
-from .quadratic import band_modes
+from .quadratic import Quadratic, band_modes
 from .quadratic.polish import pairs
+from .quadratic.problem import times
 from .quadratic.reach import searched
 from .results import ComplexModes
 from .tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
@@ -38,6 +39,7 @@ BESIDE = 1e-3  # of the band: how much faster than that modes may decay that are
 NEAR = 1e-3  # of the band: eigenvalues further apart are not the same mode
 SAME = 1e-6  # of |λ|: what two ways of solving leave of one eigenvalue
 UNCHECKED = "Not checked"
+SURE = 3.0  # times a correction: growth that is more than what is left to correct
 WIDER = (1.4, 2.0)  # times the band: from where branches are followed that are missing in it
 
 
@@ -97,6 +99,8 @@ def _searched_for(
     size = np.abs(found.values)
     rounding = UNSTABLE_RELATIVE if problem.damped else SPLIT_RELATIVE
     grows = (found.values.real > rounding * size) & (size > AT_REST * top)
+    # Slow modes of stiff meshes are found to fewer digits: what one more correction would change is no growth.
+    grows &= ~(found.values.real <= SURE * _correction(whole, found.values, found.right))
     right = found.right[: problem.size, grows]
     return Growing(
         mu,
@@ -108,6 +112,16 @@ def _searched_for(
         found.completeness.sentence,
         top,
     )
+
+
+def _correction(problem: Quadratic, values: ComplexArray, right: ComplexArray) -> Array:
+    """By how much (k,) [1/s] a step of Newton's method on xᴴ P(λ) x = 0 would still change each λ."""
+    if not len(values):
+        return np.zeros(0)
+    slope = 2 * values * times(problem.mass, right) + times(problem.damping, right)
+    rest = problem.residual(values, right)
+    with np.errstate(all="ignore"):
+        return np.abs(np.sum(right.conj() * rest, axis=0)) / np.abs(np.sum(right.conj() * slope, axis=0))
 
 
 def affordable(system: System) -> bool:
