@@ -253,7 +253,7 @@ def test_unsymmetric_terms_beside_contact_are_found_by_the_general_solver(export
     found = st.modes(general, [0.1, 0.4], vectors=True)
     assert len(found.completeness) == 2
     assert all("Complete" in sentence for sentence in found.completeness)
-    assert found.residual.max() < 1e-10
+    assert np.nanmax(found.residual) < 1e-10  # a mode that is in the band at one μ alone has none at the other
     assert found.right is not None
     assert found.left is not None
     assert all(s.endswith("from where branches were followed.") for s in found.completeness)

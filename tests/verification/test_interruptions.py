@@ -42,7 +42,7 @@ class Arranged:
         lumped = {} if kind in ("modal", "nodal", "finite") else {"mass": "lumped"}
         self.system = bench(*slaves, velocity=2.0, **lumped)
         if kind == "finite":
-            contacts = tuple(replace(c, sliding="finite") for c in self.system.contacts)
+            contacts = tuple(replace(c, sliding="finite", stiffness=np.inf) for c in self.system.contacts)
             self.system = replace(self.system, contacts=contacts)
         path = kind if kind in ("modal", "nodal") else "auto"
         self.settings = Settings(step=STEP, record_every=3, path=path, watch=("base.end",))

@@ -193,5 +193,13 @@ def test_what_is_wrong_is_told(given: dict, told: str):
 def test_freedoms_that_nothing_holds_or_moves():
     with pytest.raises(st.CaseError, match=r"^stiffness: freedoms without an entry in any matrix \(from 0: 1\);"):
         System.from_matrices(np.diag([1.0, 0.0]), None, np.diag([1.0, 0.0]))
+
+
+def test_the_pencil_takes_the_friction_of_the_contacts_where_they_have_one():
+    own, given = (st.pencil(minimal(), *mu).matrices()[2].toarray() for mu in ((), (LAW["coefficient"],)))
+    assert np.array_equal(own, given)
+    contact = {"normal": [0, 1], "tangent": [1, 0], "stiffness": 10.0, "friction": LAW}
+    other = contact | {"friction": {"law": "coulomb", "coefficient": 0.9 * LAW["coefficient"]}}
+    two = System.from_matrices(np.eye(2), None, HOFFMANN, contacts={"A": contact, "B": other | {"normal": [1, 0], "tangent": [0, 1]}})
     with pytest.raises(st.CaseError, match=r"^mu: missing – give the friction coefficient"):
-        st.pencil(minimal())
+        st.pencil(two)

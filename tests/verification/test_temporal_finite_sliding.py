@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from benches import Slave, bench
 from marching import belt_motion, run
 from stridor.contact.interface import Rows, pair
-from stridor.errors import AnalysisError
+from stridor.errors import AnalysisError, CaseError
 from stridor.laws import Coulomb
 from stridor.system import System
 
@@ -138,7 +138,7 @@ def test_slave_on_the_last_node_may_only_go_inwards():
 def test_small_and_finite_sliding_agree_for_small_motion(path):
     """On the bench, whose slip is micrometres in this time: forces agree to the order of slip over element
     length."""
-    small = bench(Slave(place=0.62), velocity=0.02)
+    small = bench(Slave(place=0.62, stiffness=1e8), velocity=0.02)
     finite = replace(small, contacts=tuple(replace(c, sliding="finite") for c in small.contacts))
     runs = [run(system, 3e-4, path=path, record_every=5, ramp=1e-4) for system in (small, finite)]
     forces = [r.normal_force[:, 0] for r in runs]
@@ -146,11 +146,12 @@ def test_small_and_finite_sliding_agree_for_small_motion(path):
     assert np.abs(forces[0] - forces[1]).max() > 0.0
 
 
-@pytest.mark.parametrize("elements", [3, 12])
-def test_beam_slides_over_several_elements(elements):
+@pytest.mark.parametrize(("elements", "stiffness"), [(3, "rigid"), (12, 1e8)])
+def test_beam_slides_over_several_elements(elements, stiffness):
     """The bench with the clamp moving 20 mm, little friction: nodes pass by, the load stays, both paths
     agree."""
-    system = bench(Slave(place=0.5, damping=(3e3, 0.0)), elements=elements, velocity=1.0, damping=(3e3, 0.0))
+    slave = Slave(place=0.5, damping=(3e3, 0.0), stiffness=stiffness)
+    system = bench(slave, elements=elements, velocity=1.0, damping=(3e3, 0.0))
     system = replace(
         system, contacts=tuple(replace(c, sliding="finite", law=Coulomb(0.02)) for c in system.contacts)
     )
@@ -166,3 +167,13 @@ def test_beam_slides_over_several_elements(elements):
     assert np.abs(result.normal_force[late] - 20.0).max() < 2.0
     assert np.abs(both[0].normal_force - both[1].normal_force).max() < 1e-5
     assert np.abs(np.diff(result.normal_force[late, 0])).max() < 0.5  # no blow where a node passes
+
+
+def test_a_spring_that_the_step_cannot_follow_is_refused_where_normals_turn():
+    """A period of 2π √(m/K) below some seven steps: it would ring on, and with any small sliding it does not."""
+    system = bench(Slave(stiffness=1e10), velocity=1.0)
+    finite = replace(system, contacts=tuple(replace(c, sliding="finite") for c in system.contacts))
+    with pytest.raises(CaseError, match=r"contacts.C0.stiffness: 10000000000.0 – with sliding = \"finite\" at most .* N/m"):
+        run(finite, 1e-4)
+    assert run(finite, 1e-4, contact="rigid").steps == run(system, 1e-4).steps
+

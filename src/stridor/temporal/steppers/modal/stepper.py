@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
 
 from ....errors import AnalysisError, CaseError
 from ....sliding import slip_speeds
@@ -32,15 +34,33 @@ PREDICTED = ("predicted", "value", "rate")
 def modal_stepper(system: System, settings: Settings, mu: float | None) -> ModalStepper:
     """A system of point contacts made ready; mu scales every contact's friction law at its slip speed.
 
-    Raises CaseError for a step beyond the limit and for a path that does not take the system.
+    Raises CaseError for a step beyond the limit, a path that does not take the system, and contact springs that the
+    step cannot follow.
     """
     if mu is not None:
         system = system.with_friction(mu, np.abs(slip_speeds(system, system.motion.full)))
     limit = step_limit(system, settings.beta2)
     numbers = scheme(choose_step(limit, settings), settings.beta2)
+    _check_stiffness(system, numbers.step)
     modes, reason = choose_path(system, settings)
     machine = modal_machine(system, numbers, modes) if modes else nodal_machine(system, numbers)
     return ModalStepper(machine, modes, limit, reason)
+
+
+def _check_stiffness(system: System, step: float) -> None:
+    """Refuse springs of contacts that slide finitely and swing faster than the step can follow: what the turning of
+    their normals stirs up would ring on for ever, with forces beyond all measure."""
+    for contact in system.contacts:
+        if contact.sliding == "small" or contact.compliance == 0.0:
+            continue
+        moved = step**2 * float(contact.normal_row @ spl.splu(sp.csc_array(system.mass)).solve(contact.normal_row))
+        if contact.compliance < moved:
+            raise CaseError(
+                f"contacts.{contact.name}.stiffness",
+                contact.stiffness,
+                f'with sliding = "finite" at most {1.0 / moved:.3g} N/m at a step of {step:.3g} s, which a stiffer '
+                'spring outruns; take it as rigid in time ([temporal] contact = "rigid"), or a smaller step',
+            )
 
 
 def choose_path(system: System, settings: Settings) -> tuple[UncoupledModes | None, str]:
