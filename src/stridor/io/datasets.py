@@ -18,7 +18,7 @@ from ..modal.parametric import ReducedModel
 from ..reading import is_reduced_file, starts_with
 from ..study.fingerprint import changes_of
 from ..temporal.node_history import NodeHistory
-from ..temporal.trajectory import STATUS, ContactStatistics, PhaseResult, Trajectory
+from ..temporal.trajectory import HISTORIES, STATUS, ContactStatistics, PhaseResult, Trajectory
 from ..typing import ComplexArray
 from .atomic import replacing
 from .left_out import Keep
@@ -108,24 +108,9 @@ def _run_of(data: Any) -> Trajectory:
         for p in json.loads(data.attrs["phases"])
     )
     return Trajectory(
-        time=data["time"].values,
         contact_names=tuple(names["contacts"]),
         watch_names=tuple(names["watch"]),
-        **{
-            name: data[name].values
-            for name in (
-                "normal_force",
-                "tangential_force",
-                "slip_speed",
-                "gap",
-                "status",
-                "displacement",
-                "velocity",
-                "acceleration",
-                "kinetic",
-                "elastic",
-            )
-        },
+        **{name: data[name].values for name in HISTORIES},
         works={name: data[f"work_{name}"].values for name in names["works"]},
         phases=phases,
         state={name: data[f"restart_{name}"].values for name in names["state"]},

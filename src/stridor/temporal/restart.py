@@ -13,21 +13,8 @@ from .saved import agrees, check_arrays, check_done
 from .settings import Settings
 from .sketch import MOTION, Part, differing, saved_row
 from .stepper import Stepper
-from .trajectory import Trajectory
+from .trajectory import HISTORIES, Trajectory
 
-HISTORIES = (
-    "time",
-    "normal_force",
-    "tangential_force",
-    "slip_speed",
-    "gap",
-    "status",
-    "displacement",
-    "velocity",
-    "acceleration",
-    "kinetic",
-    "elastic",
-)
 NODE_HISTORIES = ("time", "normal_force", "tangential_force", "slip_velocity", "gap", "status")
 
 

@@ -14,6 +14,20 @@ from ..typing import Array, IntArray
 from .node_history import NodeHistory
 
 STATUS = ("separation", "stick", "slip")
+# Fields of a Trajectory with a row for each record, beside its works.
+HISTORIES = (
+    "time",
+    "normal_force",
+    "tangential_force",
+    "slip_speed",
+    "gap",
+    "status",
+    "displacement",
+    "velocity",
+    "acceleration",
+    "kinetic",
+    "elastic",
+)
 
 
 @dataclass(frozen=True)
