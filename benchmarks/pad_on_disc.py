@@ -11,7 +11,7 @@ import numpy as np
 
 import stridor as st
 from _common import COARSE, machine, options
-from stridor.agreement.assembled import modes_as_in_time, perturb_assembled
+from stridor.agreement.perturbation import modes_as_in_time, perturb
 from stridor.case import template_text
 from stridor.study.settings import settings_of
 
@@ -29,7 +29,7 @@ def main() -> None:
     modes = modes_as_in_time(system, MU, limit)
     print(f"modes up to {limit:g} Hz: {time.perf_counter() - started:.1f} s, residual ≤ {modes.residual.max():.1e}")
     started = time.perf_counter()
-    seen = perturb_assembled(system, MU, settings=settings_of(case), max_frequency_hz=limit, modes=modes)
+    seen = perturb(system, MU, settings=settings_of(case), max_frequency_hz=limit, modes=modes)
     print(f"the fastest three in time: {time.perf_counter() - started:.1f} s")
     for found in sorted(seen.components.eigenvalues, key=lambda v: -v.real)[:3]:
         lam = modes.eigenvalues[0][np.argmin(np.abs(modes.eigenvalues[0] - found))]

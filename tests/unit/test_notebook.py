@@ -52,7 +52,7 @@ def agreement() -> Agreement:
 def shown(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
     case = st.loads(template_text("two-beams")).with_({"title": HOSTILE, "phases.0.name": HOSTILE})
     system = st.build_system(case.with_({"bodies.beam1.elements": 3, "bodies.beam2.elements": 6}))
-    system = replace(system, loads={HOSTILE: np.zeros(system.size)}, general=HOSTILE)
+    system = replace(system, loads={HOSTILE: np.zeros(system.size)}, not_symmetric_definite=HOSTILE)
 
     def solved(*_: object, **__: object) -> None:
         raise AssertionError("something was computed")

@@ -19,7 +19,7 @@ STEP, FREQUENCY = 1e-6, 500.0
 def test_a_known_motion_on_assembled_matrices_is_given_back(monkeypatch, interrupted: bool) -> None:
     rows = sp.csr_array(np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 2], [0, 0, 0]]))
     body = SimpleNamespace(name="block", rows=SimpleNamespace(free=rows))
-    system = SimpleNamespace(assembled=True, lines=(body,), solids=(), dimension=2)
+    system = SimpleNamespace(lines=(body,), solids=(), dimension=2)
     amplitude = np.array([1.0, 2j, 0.5 - 0.5j])
     asked = {}
 

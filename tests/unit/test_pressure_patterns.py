@@ -16,9 +16,16 @@ from stridor.contact.obstacles import Cylinder, Flat
 from stridor.mesh.facets import reference_nodes
 from stridor.sliding import pattern
 from stridor.sliding.pattern import OUTLINES, _alternates, _neighbours, _open_amid, left_by_facets, unexplained_patterns
+from stridor.system import System
 
 # What NumPy warns of is a fault here, whatever comes of it.
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
+
+
+def system_of(contacts: tuple[Any, ...], surfaces: tuple[Any, ...], nodes: Any) -> Any:
+    system: Any = SimpleNamespace(contacts=contacts, surfaces=surfaces, contact_nodes=lambda: nodes)
+    system.nodes_of_surfaces = lambda: System.nodes_of_surfaces(system)
+    return system
 
 
 @pytest.mark.parametrize("force", [0.0, 1.0])
@@ -31,7 +38,7 @@ def test_a_contact_that_touches_without_force_has_no_pattern_and_no_warning(forc
         name="rub", nodes=nodes, facets=facets, slave_position=positions, master=Flat(np.zeros(2), np.array([0.0, 1.0])),
         location=SimpleNamespace(normal=np.tile([0.0, 1.0], (4, 1)), gap=np.zeros(4)),
     )  # fmt: skip
-    system: Any = SimpleNamespace(contacts=(), surfaces=(surface,), contact_nodes=lambda: nodes)
+    system: Any = system_of((), (surface,), nodes)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         told = list(unexplained_patterns(system, np.full(4, force), np.zeros(4), np.ones(4, dtype=bool)))
@@ -99,7 +106,7 @@ def words_of(force, gap, *, before=None, area=1.0, others: int = 3, closed=False
     everything: Any = SimpleNamespace(
         gap=np.concatenate([lead, before]), area=np.concatenate([lead, np.full(n * n, area)]), count=count,
     )  # fmt: skip
-    system: Any = SimpleNamespace(contacts=(0, 0), surfaces=(plain, surface), contact_nodes=lambda: everything)
+    system: Any = system_of((0, 0), (plain, surface), everything)
     active = np.asarray(force) > 0 if active is None else active
     return list(
         unexplained_patterns(
@@ -208,7 +215,7 @@ def two_contacts(gap, *, master, normal=None, first: int = 2) -> Any:
     )  # fmt: skip
     gaps = np.concatenate([np.full(1 + first, 9e-6), gap])
     nodes = SimpleNamespace(gap=gaps, area=np.ones(len(gaps)), count=len(gaps))
-    return SimpleNamespace(contacts=(0,), surfaces=(lead, shaft), contact_nodes=lambda: nodes)
+    return system_of((0,), (lead, shaft), nodes)
 
 
 def test_facets_of_a_shaft_are_below_it_by_its_sagitta_and_those_of_a_flat_by_nothing() -> None:

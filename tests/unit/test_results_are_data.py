@@ -12,7 +12,7 @@ import pytest
 # Work in progress: what a run or a look at it counts up.
 CHANGING = {
     "temporal.steppers.modal.machine.Machine", "temporal.steppers.sparse.machine.Machine", "temporal.pace.Pace",
-    "temporal.observe.Snapshots", "temporal.observe.LineShape", "temporal.phase_results.PhaseResults",
+    "temporal.observe.LineShape", "temporal.phase_results.PhaseResults",
 }  # fmt: skip
 
 

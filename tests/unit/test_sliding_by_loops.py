@@ -348,7 +348,7 @@ def test_equilibria_are_those_that_trying_all_sets_finds(stiff: float, size: flo
             continue
         tried += 1
         u, forces, open_by = right[0]
-        system: Any = SimpleNamespace(stiffness=sp.csr_array(stiffness), cubic=None, size=6, general=False)
+        system: Any = SimpleNamespace(stiffness=sp.csr_array(stiffness), cubic=None, size=6, symmetric_definite=True)
         rows = equilibrium.ContactRows(sp.csr_array(normal), gap, compliance, np.zeros(4), np.zeros(4, dtype=bool))
         solver = equilibrium.Equilibrium(system, rows, sp.csr_array(push), force, symmetric=False, solver=None)
         for guess in (None, rng.random(4) < 0.5):

@@ -376,7 +376,7 @@ def test_systems_by_hand_take_the_same_way(tmp_path: Path):
     """`onsets` and `complex_modes` of a system whose matrices are general: contact springs give it its μ."""
     block = case(slider(space=False, stiffness=1e12)).with_({"modal.max_frequency_hz": 12e3})
     system = build_system(block)
-    marked = replace(system, general="taken for general")
+    marked = replace(system, not_symmetric_definite="taken for such")
     expected, found = (onsets(s, (0.0, 1.0), max_frequency_hz=12e3) for s in (system, marked))
     assert_same_onsets(expected, found)
     assert not expected.completeness
@@ -384,7 +384,7 @@ def test_systems_by_hand_take_the_same_way(tmp_path: Path):
     ours = complex_modes(system, mus, max_frequency_hz=12e3)
     theirs = complex_modes(marked, mus, max_frequency_hz=12e3)
     assert theirs.eigenvalues == pytest.approx(ours.eigenvalues, rel=1e-8)
-    with pytest.raises(st.CaseError, match=r"max_frequency_hz: missing – taken for general: modes are sought in a band"):
+    with pytest.raises(st.CaseError, match=r"max_frequency_hz: missing – taken for such: modes are sought in a band"):
         complex_modes(marked, mus)
 
 

@@ -15,7 +15,7 @@ from test_steady_surfaces import moving, on_a_flat
 from typer.testing import CliRunner
 
 import stridor as st
-from stridor.agreement.assembled import modes_as_in_time, perturb_assembled
+from stridor.agreement.perturbation import modes_as_in_time, perturb
 from stridor.app.cli import app
 from stridor.case import loads
 from stridor.contact.multipliers import OPEN, SLIP, STICK
@@ -319,7 +319,7 @@ def test_the_time_loop_rests_on_what_sticks_and_grows_as_the_modes_say():
     errors = []
     for step in (2e-6, 1e-6):
         settings = Settings(step=step)
-        found = perturb_assembled(system, mu, settings=settings, max_frequency_hz=15e3, modes=modes).eigenvalue
+        found = perturb(system, mu, settings=settings, max_frequency_hz=15e3, modes=modes).eigenvalue
         errors.append((abs(found.real / fastest.real - 1), abs(found.imag / fastest.imag - 1)))
     assert errors[1][0] < 5e-3
     assert errors[1][1] < 0.3 * errors[0][1]

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 import stridor as st
 from matrix_cases import TURN, matrix_case, rubbing
-from stridor.agreement.assembled import modes_as_in_time, perturb_assembled
+from stridor.agreement.perturbation import modes_as_in_time, perturb
 from stridor.system import System
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.schedule import PhaseSpec
@@ -187,13 +187,13 @@ def brake(folder: Path, skew: float, turn: float) -> System:
 
 def test_a_block_that_rubs_grows_as_its_modes_do(tmp_path: Path):
     mu, system = 0.2, brake(tmp_path, 0.002, 2000.0)
-    assert system.general
+    assert not system.symmetric_definite
     modes = modes_as_in_time(system, mu, 30e3)
     leading = modes.eigenvalues[0][np.argmax(modes.eigenvalues[0].real)]
     assert leading.real > 50.0
     limit = step_limit_assembled(system, 0.5).step
     for share in (0.4, 0.2):
         settings = Settings(step=share * limit)
-        found = perturb_assembled(system, mu, settings=settings, max_frequency_hz=30e3, modes=modes).eigenvalue
+        found = perturb(system, mu, settings=settings, max_frequency_hz=30e3, modes=modes).eigenvalue
         assert found.real == pytest.approx(leading.real, rel=5e-3)
         assert found.imag == pytest.approx(leading.imag, rel=5e-3)

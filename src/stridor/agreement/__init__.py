@@ -6,7 +6,7 @@ from .kept import Store
 from .perturbation import perturb
 from .result import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, Agreement, Comparison
 from .shapes import modal_assurance, mode_shape
-from .small_motion import LINEAR, PERTURBATION, PERTURBATION_DURATION, Perturbation, linear_part
+from .small_motion import LINEAR, PERTURBATION, Perturbation, linear_part
 
 __all__ = [
     "GOOD_CRITICAL",
@@ -16,7 +16,6 @@ __all__ = [
     "LINEAR",
     "PARTS",
     "PERTURBATION",
-    "PERTURBATION_DURATION",
     "Agreement",
     "Comparison",
     "Perturbation",

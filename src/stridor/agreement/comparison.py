@@ -16,7 +16,6 @@ import numpy as np
 from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.growing import doubt
-from ..modal.over_friction import modes_of_band
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape
@@ -25,10 +24,9 @@ from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..threads import one_thread_if_small
 from ..typing import IntArray
-from .assembled import modes_as_in_time, perturb_assembled
 from .critical import compare_critical
 from .kept import Plain, Store, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
-from .perturbation import perturb
+from .perturbation import modes_as_in_time, perturb
 from .result import Agreement, Comparison, Critical, judge, likeness, overall
 from .shapes import by_body, modal_assurance, mode_shape
 from .small_motion import Perturbation, whole
@@ -123,9 +121,8 @@ def compare(
 
 
 def _notes(system: System, parts: Collection[str], taken: Sequence[str]) -> list[str]:
-    finite = [c.name for c in (*system.contacts, *system.surfaces) if c.sliding == "finite"]
     notes: list[str] = []
-    if finite:
+    if finite := system.finitely_sliding:
         full = "in the full run" if "run" in parts else "in `stridor simulate`"
         notes.append(
             f"contact {', '.join(finite)} slides finitely {full}; modes and perturbations are those of "
@@ -191,10 +188,7 @@ class _At:
         )
 
     def _modes(self, mu: float) -> ComplexModes:
-        highest = 1.02 * self.limit
-        if self.system.assembled:
-            return modes_as_in_time(self.system, mu, highest)
-        return modes_of_band(self.system, mu, highest, vectors=True)
+        return modes_as_in_time(self.system, mu, 1.02 * self.limit)
 
     def _growth(self, mu: float, modes: ComplexModes) -> Comparison:
         unstable = _unstable(modes, self.limit)
@@ -202,13 +196,10 @@ class _At:
         if diverges:
             # Nothing vibrates about what runs away: a march tells no rate to hold against the mode's.
             perturbation = Perturbation(mu, 0j, np.zeros(0), 1.0, Components(np.zeros(0, dtype=complex), np.zeros(0)))
-        elif self.system.assembled:
-            perturbation = perturb_assembled(
-                self.system, mu, settings=self.settings, max_frequency_hz=self.limit, modes=modes, shape=True
-            )
         else:
+            own = modes if self.settings.system(self.system) is self.system else None
             perturbation = perturb(
-                self.system, mu, settings=self.settings, max_frequency_hz=self.limit, shape=True
+                self.system, mu, settings=self.settings, max_frequency_hz=self.limit, modes=own, shape=True
             )
         lam = modes.eigenvalues[0]
         if not len(lam):

@@ -10,13 +10,11 @@ import numpy as np
 from ..digits import measured
 from ..errors import AnalysisError
 from ..modal.onset import refuted
-from ..modal.options import Options
 from ..modal.over_friction import modes_of_band, onsets_of_band
 from ..system import System
 from ..temporal.simulate import Settings
-from .assembled import turns
 from .kept import Store, bool_of, float_of
-from .perturbation import perturb
+from .perturbation import options_in_time, perturb
 from .result import GOOD_CRITICAL, Critical
 
 Say = Callable[[str], None]
@@ -139,7 +137,7 @@ def _modal(
     known = None if kept is None else kept.get("critical modal", None)
     if known is not None and isinstance(known.get("completeness"), str):
         return float_of(known, "mu"), known["completeness"], [str(line) for line in known.get("before", ())]
-    found = onsets_of_band(system, between, limit, options=Options(friction_damping=turns(system)))
+    found = onsets_of_band(system, between, limit, options=options_in_time(system))
     first, grown = None if found.first is None else found.first.mu, found.at_start_words
     if kept is not None:
         kept.put("critical modal", None, {"mu": first, "completeness": found.completeness, "before": grown})
@@ -150,8 +148,7 @@ def _without_change(
     system: System, ends: tuple[float, float], limit: float, modal: float | None, error: NoChangeError
 ) -> Critical:
     """Ends of a bracket at which the motion in time does the same: do the modes say so too?"""
-    options = Options(friction_damping=turns(system))
-    found = modes_of_band(system, list(ends), 1.02 * limit, options=options)
+    found = modes_of_band(system, list(ends), 1.02 * limit, options=options_in_time(system))
     grow = [bool(np.any(row)) for row in found.unstable & (found.frequency_hz <= limit)]
     if modal is not None and not grow[0] and grow[1]:
         begins = f"by the modes growth begins at {measured(modal, 5)} between them"

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..contact.interface import Rows
 from ..system import System
-from ..temporal.observe import Snapshots
 from ..temporal.signals import low_passed
 from ..typing import Array, ComplexArray, Sparse
 
 BEGINNINGS = (1.0, 0.8, 0.6, 0.45, 0.3)
 SLOW = 8  # degree of polynomials for slow parts
-WATCHED = 40  # nodes of a system of point contacts, whose loop records them in every record
 
 
 @dataclass(frozen=True)
@@ -54,17 +51,6 @@ def node_rows(system: System, most: int) -> Sparse:
     rows = sp.csr_array(sp.vstack([sp.csr_array((0, system.size)), *bodies]))
     nodes = np.arange(rows.shape[0] // d)[:: max(1, -(-rows.shape[0] // d // max(most, 1)))]
     return sp.csr_array(rows[(d * nodes[:, None] + np.arange(d)).ravel()])
-
-
-def watching(system: System, rows: Sparse) -> tuple[System, tuple[str, ...]]:
-    """The system with the nodes of the rows as points, and the names of these."""
-    d = system.dimension
-    points = dict(system.points)
-    names = tuple(f"node {k}" for k in range(rows.shape[0] // d))
-    still = np.zeros((d, len(system.motion.names)))
-    for k, name in enumerate(names):
-        points[name] = Rows(sp.csr_array(rows[d * k : d * k + d]), still)
-    return replace(system, points=points), names
 
 
 def component_shape(
@@ -108,11 +94,6 @@ def _split(time: Array, values: Array, eigenvalues: ComplexArray) -> tuple[Array
     parts = np.linalg.lstsq(basis, values, rcond=1e-10)[0]
     size = float(np.linalg.norm(values))
     return parts, float(np.linalg.norm(values - basis @ parts)) / size if size > 0.0 else np.inf
-
-
-def snapshots_of(system: System, steps: int, step: float, fastest_hz: float) -> Snapshots:
-    """Room for the motion of nodes over so many steps Δt [s] with lines up to fastest_hz [Hz]."""
-    return Snapshots.over(steps, step, fastest_hz, lambda most: node_rows(system, most), system.dimension)
 
 
 def by_body(shape: Mapping[str, ComplexArray]) -> ComplexArray:

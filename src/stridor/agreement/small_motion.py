@@ -13,7 +13,6 @@ from .shapes import TimeShape
 
 PERTURBATION = 1e-5  # of the slip speed, at the start
 LINEAR = 0.02  # of the slip speed: beyond it the perturbation is no longer small
-PERTURBATION_DURATION = 0.03  # s, or this many periods of the lowest frequency of interest
 
 
 @dataclass(frozen=True)
@@ -52,10 +51,9 @@ def whole(run: Trajectory) -> Trajectory:
     return run
 
 
-def linear_part(run: Trajectory, steady: Array, *, skip: int = 0) -> Array:
-    """Slip speed minus its steady value (m,) of the contact that moves most, while all of them stay below
-    2 % of it; ``skip`` records at the start, which may hold the spike of a sudden impulse, are left out."""
-    signals = run.slip_speed - steady
+def linear_part(signals: Array, steady: Array, *, skip: int = 0) -> Array:
+    """Of slip speeds less their steady values, (k, m), that which moves most, while all of them stay below 2 % of the
+    steady ones (m,); ``skip`` instants at the start, which may hold the spike of a sudden impulse, are left out."""
     over = np.flatnonzero(np.any(np.abs(signals) > LINEAR * np.abs(steady), axis=1))
     last = int(over[0]) if len(over) else len(signals)
     first = min(last // 8, skip)

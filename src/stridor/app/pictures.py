@@ -86,8 +86,8 @@ def _write_one(system: System, modes: ComplexModes, column: int, folder: Path, *
 
 
 def _energy(system: System, modes: ComplexModes, column: int) -> Array | None:
-    """Friction energy by slave node; only assembled systems know it."""
-    if not system.assembled or not system.contact_nodes().count:
+    """Friction energy by slave node; of what does not vibrate there is none."""
+    if not system.contact_nodes().count or modes.eigenvalues[0, column].imag == 0.0:
         return None
     from ..modal.assembled import friction_energy
 

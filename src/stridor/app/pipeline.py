@@ -16,7 +16,6 @@ from ..digits import measured
 from ..errors import StridorError
 from ..io.atomic import write_text
 from ..io.datasets import load_trajectory, save
-from ..sliding import steady_points
 from ..study.everything import Everything, compute_everything
 from ..study.provenance import versions
 from ..study.workspace import Workspace
@@ -131,14 +130,12 @@ def _before(work: Workspace, path: Path) -> Trajectory | None:
 def report_inputs(e: Everything) -> ReportInputs:
     """Everything, sorted into what the report takes."""
     agreement = e.agreement
-    on_lines = e.system.contacts and e.system.loads and not e.system.assembled
-    steady = steady_points(e.system) if on_lines else None
     shapes = _shapes(e)
     return ReportInputs(
         case=e.case,
         system=e.system,
         mu=e.mu,
-        steady=steady,
+        steady=e.steady,
         modes=e.own,
         undamped_sweep=e.sweep_undamped,
         damped_sweep=e.sweep_damped,
@@ -163,7 +160,6 @@ def report_inputs(e: Everything) -> ReportInputs:
         created=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         warnings=e.description.warnings,
         notes=e.notes,
-        surface_steady=e.steady,
         shape_vector=e.vector,
         friction_energy=e.energy,
     )

@@ -73,7 +73,7 @@ def write_vtk(
         cell_data=_cell_fields(bodies, cell_data),
     )
     _write(path, mesh)
-    if not (system.contacts or system.surfaces):
+    if not system.contact_nodes().count:
         return (path,)
     beside = path.with_name(f"{path.stem}-contact{path.suffix}")
     _write(beside, _contact_mesh(system, contact_data or {}))
@@ -107,8 +107,7 @@ def _problems(
         allowed = sorted({sum(counts[:solids]), sum(counts)} - {0})
         what = where.removesuffix("_data") + "s"
         found += _unfit(where, data, allowed, f"{what} of the solids" if len(allowed) == 1 else f"{what} (with lines)")
-    nodes = len(system.contacts) + sum(s.nodes.count for s in system.surfaces)
-    return found + _unfit("contact_data", contact_data, [nodes], "contact nodes")
+    return found + _unfit("contact_data", contact_data, [system.contact_nodes().count], "contact nodes")
 
 
 def _unfit(where: str, data: Mapping[str, Any], allowed: Sequence[int], what: str) -> list[Problem]:

@@ -16,6 +16,7 @@ from typing import Literal, Protocol, TypeVar
 
 from ..errors import AnalysisError, CaseError, FollowingError
 from ..system import System
+from ..system.uncoupled import no_complete_basis
 from ..typing import Array
 from .assembled import NotPositive, complex_modes_assembled, onsets_assembled
 from .general import general_modes, general_onsets
@@ -83,7 +84,7 @@ class Receptance:
 
     def refuses(self, system: System) -> str:
         """See `EigenSource`."""
-        return system.beyond_points
+        return no_complete_basis(system)
 
     def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
         """See `EigenSource`."""
@@ -106,7 +107,7 @@ class Krylov:
 
     def refuses(self, system: System) -> str:
         """See `EigenSource`."""
-        return system.general
+        return system.not_symmetric_definite
 
     def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
         """See `EigenSource`."""
@@ -140,8 +141,8 @@ class Full:
 
     def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
         """See `EigenSource`."""
-        if asked.max_frequency_hz is None and system.general:
-            raise CaseError("max_frequency_hz", None, f"missing – {system.general}: modes are sought in a band")
+        if asked.max_frequency_hz is None and (why := system.not_symmetric_definite):
+            raise CaseError("max_frequency_hz", None, f"missing – {why}: modes are sought in a band")
         return general_modes(
             lambda _: system, values, count=asked.count, max_frequency_hz=asked.band_hz, damped=asked.damped,
             vectors=asked.vectors, options=asked.options, progress=asked.progress, unfollowed=asked.unfollowed,

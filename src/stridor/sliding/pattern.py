@@ -44,10 +44,7 @@ def unexplained_patterns(system: System, normal_force: Array, gap: Array, active
     normal_force (m,) [N], gap (m,) [m] and active (m,) of all contact nodes in equilibrium.
     """
     nodes = system.contact_nodes()
-    first = len(system.contacts)
-    for surface in system.surfaces:
-        mine = slice(first, first + surface.nodes.count)
-        first += surface.nodes.count
+    for surface, mine in system.nodes_of_surfaces():
         loaded = active[mine] & (normal_force[mine] > 0.0)
         # A contact may touch without any force; one kept closed is open nowhere, and its pressure may change sign.
         if surface.facets is None or any(surface.nodes.closed) or not loaded.any():
@@ -75,11 +72,8 @@ def unexplained_patterns(system: System, normal_force: Array, gap: Array, active
 def left_by_facets(system: System) -> Iterator[str]:
     """A sentence for each surface contact that is open all over by what facets leave of curved surfaces."""
     nodes = system.contact_nodes()
-    first = len(system.contacts)
-    for surface in system.surfaces:
-        gap = nodes.gap[first : first + surface.nodes.count]
-        first += surface.nodes.count
-        height = facet_height(surface)
+    for surface, mine in system.nodes_of_surfaces():
+        gap, height = nodes.gap[mine], facet_height(surface)
         if height and np.all((gap > 0.0) & (gap <= 2 * height)):
             yield (
                 f"the facets of the curved surfaces of contact {surface.name} leave gaps up to {gap.max():.2g} m, so "

@@ -267,7 +267,7 @@ class StickSlip:
             rows,
             whole,
             load.force,
-            symmetric=not np.any(rubbing) and not self.system.general,
+            symmetric=not np.any(rubbing) and self.system.symmetric_definite,
             solver=self.solver,
             travel=load.travel,
         )

@@ -112,7 +112,7 @@ def steady_sliding_nodes(
     sense = np.where(slips[:, None], -slip / np.where(slips, speed, 1.0)[:, None], 0.0)
     force = _external_force(system, load_factors) - system.motion.damping @ factors
     rubs = bool(np.any(coefficient[:, None] * sense))
-    symmetric = not rubs and not system.general
+    symmetric = not rubs and system.symmetric_definite
     sign, iterations = np.ones(nodes.count), 0
     for _ in range(SIGN_CHANGES):
         # Friction is μ|N| against the slip: where a contact kept closed pulls, it goes with −N.

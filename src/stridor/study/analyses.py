@@ -24,7 +24,7 @@ from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
 from ..modal.over_friction import modes_of_band, onsets_of_band
 from ..modal.receptance_modes import prepare
-from ..modal.source import require_full
+from ..modal.source import require_full, sources_for
 from ..sliding import taken_as_closed
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
@@ -54,7 +54,6 @@ __all__ = [
     "describe",
     "first_regime",
     "friction_curve",
-    "initial_state",
     "modes",
     "onsets",
     "phases_of",
@@ -269,7 +268,6 @@ def simulate(
             restart=restart,
             join=restart is None or same_records(settings, restart),
             changed=changed,
-            disturbance=None if system.assembled else initial_state(work, system),
         )
     except AnalysisError as error:
         part = getattr(error, "trajectory", None)
@@ -284,25 +282,6 @@ def same_records(settings: Settings, restart: Trajectory) -> bool:
     return settings.record_every == restart.record_every and settings.watch == restart.watch_names
 
 
-def initial_state(work: Workspace, system: System) -> tuple[Array, Array, Array] | None:
-    """Displacement, velocity and acceleration (n,) that bodies start with, None at rest."""
-    if system.initial_displacement is None and system.initial_velocity is None:
-        return None
-    zero = np.zeros(system.size)
-    displacement = zero if system.initial_displacement is None else system.initial_displacement
-    velocity = zero if system.initial_velocity is None else system.initial_velocity
-    force = -(system.stiffness @ displacement) - system.damping @ velocity
-    factors = {**dict.fromkeys(system.loads, 1.0), **work.phases[0].loads}
-    if work.phases[0].ramp == 0:
-        for name, vector in system.loads.items():
-            force = force + factors[name] * vector
-    mass = system.mass
-    diagonal = mass.diagonal()
-    # The scheme starts from the acceleration that the forces give; a consistent mass only delays it by half a step.
-    acceleration = force / diagonal if mass.nnz == np.count_nonzero(diagonal) else zero
-    return displacement, velocity, acceleration
-
-
 def _check_extent(work: Workspace, system: System) -> None:
     """Refuse runs that start inside one another or that no memory holds."""
     problems = [
@@ -312,7 +291,7 @@ def _check_extent(work: Workspace, system: System) -> None:
             "bodies that touch or are apart at the start; an overlap would be thrown open in one step: move a body",
         )
         for c in system.contacts
-        if c.gap < -1e-9 and work.temporal.initial == "rest" and not system.assembled
+        if c.gap < -1e-9 and work.temporal.initial == "rest"
     ]
     _, _, limit = plan(system, settings_of(work))
     step = work.temporal.step or limit.share * limit.step
@@ -383,7 +362,7 @@ def friction_curve(problem: Problem, frequency_hz: Array) -> Array:
     (docs/theory-modal.md). Raises CaseError for another number of contacts.
     """
     system = Workspace.of(problem).system()
-    if len(system.contacts) != 1 or system.assembled:
+    if len(system.contacts) != 1 or sources_for(system)[0].name != "receptance":
         raise CaseError("contacts", len(system.contacts), "one contact: μ(ω) is a single curve only then")
     spectrum, coupling, _ = prepare(system.undamped())
     h, _ = spectrum.receptance(2j * np.pi * np.asarray(frequency_hz, dtype=float))

@@ -11,9 +11,9 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from ..direct import factorise
+from ..fe.assembly import connected_components
 from ..system import System
 from ..system.model import Line, Solid
-from ..system.uncoupled import uncoupled_modes
 from ..typing import Array, Sparse
 from .workspace import Problem, Workspace
 
@@ -24,7 +24,7 @@ MOST = 40  # modes of a larger body
 @dataclass(frozen=True)
 class BodyModes:
     """Undamped modes of one body alone, supports included: frequency_hz (k,) and what they are
-    ("rigid", "F1" bending, "T1" traction, "FT3" mixed), by frequency."""
+    ("rigid", of beams "F1" bending, "T1" traction, "FT3" mixed, of others "E1"), by frequency."""
 
     frequency_hz: Array
     labels: tuple[str, ...]
@@ -33,8 +33,7 @@ class BodyModes:
 def body_modes(problem: Problem, *, max_frequency_hz: float | None = None) -> Mapping[str, BodyModes]:
     """Modes of every body by itself (the first columns of the paper's Table II).
 
-    In large models and those with surfaces a body's modes are those with all other bodies held, up to the 40 lowest
-    of a large one; point masses have none.
+    All other bodies are held. Of a large body there are up to the 40 lowest; point masses have none.
     """
     work = Workspace.of(problem)
     limit = max_frequency_hz or work.modal.max_frequency_hz
@@ -42,29 +41,32 @@ def body_modes(problem: Problem, *, max_frequency_hz: float | None = None) -> Ma
 
 
 def _of_bodies(system: System, limit: float) -> Mapping[str, BodyModes]:
-    result: dict[str, BodyModes] = {}
-    if system.assembled or system.solids:
-        for body in (*system.lines, *system.solids):
-            if len(body.freedoms) > system.dimension:
-                result[body.name] = _of_freedoms(system, body, limit)
-        return result
-    modes = uncoupled_modes(system.undamped())
-    for line in system.lines:
-        axis = line.coordinates[-1] - line.coordinates[0]
-        axis = axis / np.linalg.norm(axis)
-        entries: list[tuple[float, float]] = []
-        for block in modes.real:
-            if not np.isin(block.freedoms[0], line.freedoms):
-                continue
-            shapes = np.zeros((system.size, len(block.stiffness)))
-            shapes[block.freedoms] = block.vectors
-            motion = (line.rows.free @ shapes).reshape(-1, 2, len(block.stiffness))
-            along = (np.einsum("kdm,d->km", motion, axis) ** 2).sum(axis=0)
-            share = along / np.maximum((motion**2).sum(axis=(0, 1)), 1e-300)
-            frequency = np.sqrt(np.maximum(block.stiffness, 0.0)) / (2 * np.pi)
-            entries += [(float(f), float(a)) for f, a in zip(frequency, share, strict=True) if f <= limit]
-        result[line.name] = _labelled(sorted(entries))
-    return result
+    return {
+        body.name: _of_body(system, body, limit)
+        for body in (*system.lines, *system.solids)
+        if len(body.freedoms) > system.dimension
+    }
+
+
+def _of_body(system: System, body: Line | Solid, limit: float) -> BodyModes:
+    """Modes on the freedoms of one body, all others held."""
+    mass, stiffness = (sp.csr_array(m[body.freedoms][:, body.freedoms]) for m in (system.mass, system.stiffness))
+    rows = sp.csr_array(sp.csc_array(body.rows.free)[:, body.freedoms])
+    entries: list[tuple[float, float]] = []
+    for part in connected_components(mass, stiffness):
+        frequency, vectors = _solved(mass[part][:, part], stiffness[part][:, part], limit)
+        share = _along(body, rows[:, part] @ vectors) if isinstance(body, Line) else np.zeros(len(frequency))
+        entries += [(float(f), float(a)) for f, a in zip(frequency, share, strict=True) if f <= limit]
+    entries.sort()
+    return _labelled(entries) if isinstance(body, Line) else _counted([f for f, _ in entries])
+
+
+def _along(line: Line, motion: Array) -> Array:
+    """Share (m,) of motions (k d, m) of a line's nodes that goes along its axis."""
+    axis = line.coordinates[-1] - line.coordinates[0]
+    motion = motion.reshape(len(line.coordinates), -1, motion.shape[1])
+    along = (np.einsum("kdm,d->km", motion, axis / np.linalg.norm(axis)) ** 2).sum(axis=0)
+    return along / np.maximum((motion**2).sum(axis=(0, 1)), 1e-300)
 
 
 def _labelled(entries: list[tuple[float, float]]) -> BodyModes:
@@ -81,12 +83,16 @@ def _labelled(entries: list[tuple[float, float]]) -> BodyModes:
     return BodyModes(np.array([f for f, _ in entries]), tuple(labels))
 
 
-def _of_freedoms(system: System, body: Line | Solid, limit: float) -> BodyModes:
-    """Modes on the freedoms of one body, all others held."""
-    part = body.freedoms
-    mass = sp.csr_array(system.mass[part][:, part])
-    stiffness = sp.csr_array(system.stiffness[part][:, part])
-    if len(part) <= DENSE:
+def _counted(frequencies: list[float]) -> BodyModes:
+    """Rigid motions and elastic modes in turn."""
+    rigid = frequencies.count(0.0)
+    names = ["rigid"] * rigid + [f"E{k + 1}" for k in range(len(frequencies) - rigid)]
+    return BodyModes(np.array(frequencies), tuple(names))
+
+
+def _solved(mass: Sparse, stiffness: Sparse, limit: float) -> tuple[Array, Array]:
+    """Frequencies (m,) [Hz] and vectors (n, m), all of few freedoms, else the lowest."""
+    if mass.shape[0] <= DENSE:
         _, vectors = sl.eigh(stiffness.toarray(), mass.toarray())
     else:
         # A shift below zero, as a free body has rigid modes at zero.
@@ -94,15 +100,7 @@ def _of_freedoms(system: System, body: Line | Solid, limit: float) -> BodyModes:
         factor = factorise(sp.csr_array(stiffness - shift * mass), symmetric=True)
         inverse = spl.LinearOperator(stiffness.shape, matvec=factor.solve, dtype=float)
         _, vectors = spl.eigsh(stiffness, MOST, mass, sigma=shift, OPinv=inverse, tol=1e-10)
-    frequency = np.sqrt(np.maximum(np.sort(_quotients(stiffness, mass, vectors)), 0.0)) / (2 * np.pi)
-    inside = frequency[frequency <= limit]
-    names = ["rigid" if f == 0.0 else "" for f in inside]
-    elastic = 0
-    for k, name in enumerate(names):
-        if not name:
-            elastic += 1
-            names[k] = f"E{elastic}"
-    return BodyModes(inside, tuple(names))
+    return np.sqrt(np.maximum(_quotients(stiffness, mass, vectors), 0.0)) / (2 * np.pi), vectors
 
 
 def _quotients(stiffness: Sparse, mass: Sparse, vectors: Array) -> Array:

@@ -9,7 +9,6 @@ from ..temporal.attractor import Spread, spread
 from ..temporal.simulate import Progress
 from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
-from .analyses import initial_state
 from .settings import phases_of, settings_of
 from .workspace import Problem, Workspace
 
@@ -41,15 +40,13 @@ def perturbed_copies(
         raise AnalysisError("copies tell how a run with contacts that slide scatters; in this one nothing slides")
     work = Workspace.of(problem)
     system = work.structured("simulate", mu)
-    own = None if system.assembled else initial_state(work, system)
     zero = np.zeros(system.size)
-    u, v, a = (zero, zero, zero) if own is None else own
     draw = np.random.default_rng(seed)
     runs = [run]
     for k in range(count):
         told = None if progress is None else _after(progress, k, count)
-        disturbed = v + PERTURBATION * speed * draw.standard_normal(system.size)
-        copy = march(system, phases_of(work), settings_of(work), mu=mu, progress=told, disturbance=(u, disturbed, a))
+        disturbance = zero, PERTURBATION * speed * draw.standard_normal(system.size), zero
+        copy = march(system, phases_of(work), settings_of(work), mu=mu, progress=told, disturbance=disturbance)
         if copy.interrupted:
             break
         runs.append(copy)

@@ -11,12 +11,12 @@ import numpy as np
 from ..case import Case
 from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBody
 from ..case.matrix_checks import MU
-from ..case.schema import Friction, Load, Spring, TabulatedTable, Tie
+from ..case.schema import Contact, Friction, Load, Spring, TabulatedTable, Tie
 from ..case.usual import USUAL
 from ..errors import AnalysisError
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths, pieces
-from ..sliding import steady_nodes, steady_points
+from ..sliding import steady_nodes
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
 from ..temporal.inputs import unfit_in_time
@@ -47,7 +47,6 @@ def describe(problem: Case | Workspace) -> Description:
     """Build the model, find its steady sliding and its step limit, and say it in words."""
     work = Workspace.of(problem)
     case, system = work.case("describe"), work.system()
-    settled = system.in_place()
     lines = [f"{case.title or 'case'}: {len(case.bodies)} bodies, {system.size} free degrees of freedom"]
     lines += [_body_words(case, system, name) for name in case.bodies]
     for name, support in case.supports.items():
@@ -82,29 +81,10 @@ def describe(problem: Case | Workspace) -> Description:
         for name, contact in case.contacts.items()
         if contact.interference
     ]
-    if system.assembled or system.general:
-        lines += _surface_lines(case, system, data)
-    elif settled.contacts and settled.loads:
-        steady = steady_points(system)
-        for k, contact in enumerate(system.contacts):
-            stiffness = "rigid" if np.isinf(contact.stiffness) else f"{contact.stiffness:g} N/m"
-            stiffness += ", kept closed" if contact.closed else ""
-            state = f"{steady.normal_force[k]:.6g} N" if steady.active[k] else "open"
-            table = case.contacts[contact.name]
-            lines.append(
-                f"  contact {contact.name}: {table.slave} on {table.master}, μ = "
-                f"{steady.friction_coefficient[k]:g}{_law_words(table.friction)}, {stiffness}, "
-                f"{contact.sliding} sliding, normal force {state}, "
-                f"slip speed {abs(steady.slip_speed[k]):g} m/s in steady sliding"
-            )
-            data["contacts"][contact.name] = {
-                "normal_force": float(steady.normal_force[k]),
-                "slip_speed": float(steady.slip_speed[k]),
-                "touches": bool(steady.active[k]),
-                "gap": contact.gap,
-            }
-    if system.general and (why := _untimed(case, system)):
-        lines.append(f"{system.general}: `stridor modes` and `stridor onsets` take that, time loops do not: {why}")
+    lines += _contact_lines(case, system, data)
+    if why := _untimed(case, system):
+        what = system.not_symmetric_definite
+        lines.append(f"{what}: `stridor modes` and `stridor onsets` take that, time loops do not: {why}")
     else:
         lines += _time_lines(case, system, data)
     warnings = [*case.warnings, *unit_warnings(case), *mesh_warnings(case, system), *imported_warnings(case, system)]
@@ -131,6 +111,8 @@ def describe(problem: Case | Workspace) -> Description:
 
 def _untimed(case: Case, system: System) -> str:
     """Why matrices that are not symmetric cannot be marched in time, "" where they can."""
+    if system.symmetric_definite:
+        return ""
     if MU in case.factor_names and MU not in case.parameters and not case.contacts:
         return "factors of imported matrices depend on mu"
     return unfit_in_time(system)
@@ -271,7 +253,7 @@ def _load_words(load: Load) -> str:
     return ", ".join(parts or ["nothing"])
 
 
-def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
+def _contact_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     """Every contact in steady sliding: nodes that touch, forces and moments, pressure, the balance."""
     nodes = system.contact_nodes()
     if not nodes.count or not system.in_place().loads:
@@ -281,35 +263,37 @@ def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str
     except AnalysisError as error:
         # Bodies that fly or swing have no steady sliding, and are a case all the same.
         return [f"  no steady sliding: {error}"]
-    speeds = np.linalg.norm(steady.slip_velocity, axis=1)
     lines: list[str] = []
     for k, name in enumerate(nodes.names):
-        mine = nodes.owner == k
-        touching = mine & steady.active
+        mine = np.flatnonzero(nodes.owner == k)
+        touching = int(steady.active[mine].sum())
         resultant = steady.resultants[name]
+        normal, speed = float(steady.normal_force[mine].sum()), float(steady.slip_speed[mine].max(initial=0.0))
         table = case.contacts[name]
-        normal = float(steady.normal_force[mine].sum())
-        unit = "N/m" if np.isnan(nodes.area[mine]).any() else "N/m³"
-        stiffness = "rigid" if table.stiffness == "rigid" else f"{table.stiffness:g} {unit}"
-        if table.cubic:
-            stiffness += f" and {table.cubic:g} {'N/m³' if unit == 'N/m' else 'N/m⁵'} times the cube of the approach"
-        stiffness += ", kept closed" if table.closed else ""
-        law = _law_words(table.friction)
-        text = (
-            f"  contact {name}: {table.slave} on {table.master}, {int(touching.sum())} of {int(mine.sum())} slave "
-            f"nodes touch, {stiffness}{f', friction{law}' if law else ''}, {table.sliding} sliding, normal force "
-            f"{normal:.6g} N, resultant on the slave {_vector(tuple(float(f) for f in resultant.force))} N, "
-            f"slip speed up to {float(speeds[mine].max(initial=0.0)):g} m/s"
-        )
+        law, point = _law_words(table.friction), bool(np.isnan(nodes.area[mine]).any())
+        stiffness = _stiffness_words(table, point=point)
+        head, ways = f"  contact {name}: {table.slave} on {table.master}", f"{table.sliding} sliding"
+        if point and len(mine) == 1:
+            force = f"{normal:.6g} N" if touching else "open"
+            text = (
+                f"{head}, μ = {steady.friction_coefficient[mine[0]]:g}{law}, {stiffness}, {ways}, "
+                f"normal force {force}, slip speed {speed:g} m/s in steady sliding"
+            )
+        else:
+            text = (
+                f"{head}, {touching} of {len(mine)} slave nodes touch, {stiffness}{f', friction{law}' if law else ''}, "
+                f"{ways}, normal force {normal:.6g} N, resultant on the slave "
+                f"{_vector(tuple(float(f) for f in resultant.force))} N, slip speed up to {speed:g} m/s"
+            )
         if np.isfinite(resultant.largest_pressure):
             text += f", pressure up to {resultant.largest_pressure:.4g} Pa on {resultant.area:.4g} m²"
         lines.append(text)
         data["contacts"][name] = {
             "normal_force": normal,
-            "slip_speed": float(speeds[mine].max(initial=0.0)),
-            "touches": bool(touching.any()),
-            "touching_nodes": int(touching.sum()),
-            "nodes": int(mine.sum()),
+            "slip_speed": speed,
+            "touches": touching > 0,
+            "touching_nodes": touching,
+            "nodes": len(mine),
             "force": [float(f) for f in resultant.force],
             "moment": np.atleast_1d(resultant.moment).astype(float).tolist(),
             "gap": float(nodes.gap[mine].min()),
@@ -317,6 +301,13 @@ def _surface_lines(case: Case, system: System, data: dict[str, Any]) -> list[str
     lines.append(f"  {balance_words(steady)}")
     data["contact_patterns"] = list(steady.warnings)
     return lines
+
+
+def _stiffness_words(contact: Contact, *, point: bool) -> str:
+    text = "rigid" if contact.stiffness == "rigid" else f"{contact.stiffness:g} {'N/m' if point else 'N/m³'}"
+    if contact.cubic:
+        text += f" and {contact.cubic:g} {'N/m³' if point else 'N/m⁵'} times the cube of the approach"
+    return text + (", kept closed" if contact.closed else "")
 
 
 def _interference_words(interference: float) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, TypeVar
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ..errors import AnalysisError
 from ..modal.assembled import friction_energy
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
+from ..modal.source import sources_for
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
 from ..temporal.shapes import operating_shape
@@ -28,7 +30,7 @@ from .workspace import Workspace
 T = TypeVar("T")
 Log = Callable[[str], None]
 CURVE_POINTS = 8001
-COUPLED = "in contact without friction"
+STEADY, COUPLED = "steady sliding", "in contact without friction"
 ZOOM = 2.5  # the sweep around the first onset reaches this many times its μ
 
 
@@ -38,10 +40,10 @@ class Everything:
 
     sweeps run over the whole friction range, zooms around the first onset. curve: frequency_hz and μ(ω) of the
     undamped receptance. operating: velocity shape of the run at its dominant frequency by body (k, 2);
-    shape: that of the mode to compare with, and shape_mode its λ. seconds by analysis. For large models and contact
-    over surfaces there are no undamped sweeps, no curve and no operating shape; steady is their equilibrium, vector
-    (n,) the mode that grows fastest (or decays slowest) and energy (m,) what friction feeds into it at each node. mu is
-    the friction of the case and own the modes there, None where contacts have different coefficients.
+    shape: that of the mode to compare with, and shape_mode its λ. seconds by analysis. Where modes are not cheap (any
+    source but receptance) there are no undamped sweeps, no curve and no operating shape. steady is the equilibrium,
+    vector (n,) the mode that grows fastest (or decays slowest) and energy (m,) what friction feeds into it at each
+    node. mu is the friction of the case and own the modes there, None where contacts have different coefficients.
     """
 
     case: Case
@@ -157,105 +159,40 @@ def compute_everything(
     work = Workspace.of(problem)
     temporal = _Temporal(work, clock, progress, keep, before, only, kept)
     case, system = work.case("run"), work.structured("run")
-    if system.assembled:
-        return _large(work, case, system, clock, temporal, keep)
-    description = analyses.describe(work)
-    limit = case.modal.max_frequency_hz
-    mus = np.linspace(*case.modal.friction_range, case.modal.sweep_points)
-    bodies = analyses.body_modes(work)
+    notes: list[str] = []
+    description = clock("check", lambda: analyses.describe(work))
+    loaded = system.contact_nodes().count and system.in_place().loads
+    steady = clock("check", lambda: _or_note(work.steady, notes, "no steady sliding"), STEADY) if loaded else None
+    bodies = clock("modes", lambda: analyses.body_modes(work), "of the bodies alone")
     coupled = clock("modes", lambda: _coupled(work), COUPLED)
-    sweep = f"{len(mus)} friction coefficients from {mus[0]:g} to {mus[-1]:g}"
-    bare = clock("modes", lambda: analyses.modes(work, mus, max_frequency_hz=limit, damped=False), f"{sweep}, undamped")
-    damped = clock("modes", lambda: analyses.modes(work, mus, max_frequency_hz=limit, damped=True), f"{sweep}, damped")
-    keep("modes", damped)
-    onsets_bare = clock("onsets", lambda: analyses.onsets(work, damped=False), "undamped")
-    onsets_damped = clock("onsets", lambda: analyses.onsets(work, damped=True), "damped")
-    keep("onsets", onsets_damped)
-    zooms = clock("modes", lambda: _zooms(work, onsets_bare), "around the first onset")
-    curve = clock("onsets", lambda: _curve(work), "friction over frequency")
-    own = _own(work, clock, vectors=True)
+    modal = _Modal(work, clock, keep)
+    own = _own(work, clock)
+    vector, mode, energy = (None, None, None) if own is None else _squealing(system, own)
+    shape = None if vector is None else mode_shape(system, vector)
     run = temporal.run()
     summary = analyses.summarise(work, run)
-    agreement, notes = None, list[str]()
-    operating = shape = shape_mode = None
+    agreement = operating = None
     if not run.interrupted:
         agreement = _or_note(lambda: temporal.compare(run), notes, "no comparison")
-        if agreement is None or not agreement.interrupted:
-            operating, shape, shape_mode = clock("compare", lambda: _shapes(work, own, run, summary), "shapes")
+        if modal.cheap and (agreement is None or not agreement.interrupted):
+            operating, shape, mode = clock("compare", lambda: _shapes(work, own, run, summary), "shapes")
     return Everything(
         case=case,
         system=system,
         description=description,
         bodies=bodies,
         coupled=coupled,
-        sweep_undamped=bare,
-        sweep_damped=damped,
-        zoom_undamped=zooms[0],
-        zoom_damped=zooms[1],
-        onsets_undamped=onsets_bare,
-        onsets_damped=onsets_damped,
-        curve=curve,
+        sweep_undamped=modal.bare,
+        sweep_damped=modal.damped,
+        zoom_undamped=modal.zooms[0],
+        zoom_damped=modal.zooms[1],
+        onsets_undamped=modal.onsets_bare,
+        onsets_damped=modal.onsets_damped,
+        curve=modal.curve,
         run=run,
         summary=summary,
         operating=operating,
         shape=shape,
-        shape_mode=shape_mode,
-        agreement=agreement,
-        seconds=clock.seconds,
-        notes=(*temporal.notes, *notes),
-        mu=work.own_friction,
-        own=own,
-    )
-
-
-def _large(
-    work: Workspace,
-    case: Case,
-    system: System,
-    clock: _Clock,
-    temporal: _Temporal,
-    keep: Callable[[str, object], None],
-) -> Everything:
-    """Large models and contact over surfaces: what tells most for its time."""
-    notes: list[str] = []
-    limit = case.modal.max_frequency_hz
-    description = clock("check", lambda: analyses.describe(work))
-    steady = clock("check", lambda: _or_note(work.steady, notes, "no steady sliding"), "steady sliding")
-    bodies = clock("modes", lambda: analyses.body_modes(work), "of the bodies alone")
-    coupled = clock("modes", lambda: _coupled(work), COUPLED)
-    mus = np.linspace(*case.modal.friction_range, case.modal.sweep_points)
-    sweep = clock(
-        "modes",
-        lambda: analyses.modes(work, mus, max_frequency_hz=limit),
-        f"{len(mus)} friction coefficients from {mus[0]:g} to {mus[-1]:g}",
-    )
-    keep("modes", sweep)
-    found = clock("onsets", lambda: analyses.onsets(work))
-    keep("onsets", found)
-    own = _own(work, clock, vectors="right")
-    vector, mode, energy = (None, None, None) if own is None else _squealing(system, own)
-    run = temporal.run()
-    summary = analyses.summarise(work, run)
-    agreement = None
-    if not run.interrupted:
-        agreement = _or_note(lambda: temporal.compare(run), notes, "no comparison")
-    return Everything(
-        case=case,
-        system=system,
-        description=description,
-        bodies=bodies,
-        coupled=coupled,
-        sweep_undamped=None if case.modal.damped else sweep,
-        sweep_damped=sweep,
-        zoom_undamped=None,
-        zoom_damped=None,
-        onsets_undamped=None if case.modal.damped else found,
-        onsets_damped=found,
-        curve=None,
-        run=run,
-        summary=summary,
-        operating=None,
-        shape=None if vector is None else mode_shape(system, vector),
         shape_mode=mode,
         agreement=agreement,
         seconds=clock.seconds,
@@ -268,17 +205,49 @@ def _large(
     )
 
 
+class _Modal:
+    """Sweeps and onsets over friction. cheap: whether the source gives modes at any μ for next to nothing, so that the
+    undamped problem, zooms and μ(ω) are there as well; else what tells most for its time."""
+
+    def __init__(self, work: Workspace, clock: _Clock, keep: Callable[[str, object], None]) -> None:
+        settings = work.modal
+        mus = np.linspace(*settings.friction_range, settings.sweep_points)
+        self.cheap = sources_for(work.system())[0].name == "receptance"
+        ways = (False, True) if self.cheap else (settings.damped,)
+
+        def each(name: str, call: Callable[[bool], T], what: str = "") -> dict[bool, T]:
+            said = {d: what + ("damped" if d else "undamped") for d in ways}
+            return {d: clock(name, partial(call, d), said[d]) for d in ways}
+
+        sweeps = each(
+            "modes",
+            lambda d: analyses.modes(work, mus, max_frequency_hz=settings.max_frequency_hz, damped=d),
+            f"{len(mus)} friction coefficients from {mus[0]:g} to {mus[-1]:g}, ",
+        )
+        # Of an undamped problem the one sweep is both.
+        self.bare, self.damped = sweeps.get(False), sweeps[ways[-1]]
+        keep("modes", self.damped)
+        onsets = each("onsets", lambda d: analyses.onsets(work, damped=d))
+        self.onsets_bare, self.onsets_damped = onsets.get(False), onsets[ways[-1]]
+        keep("onsets", self.onsets_damped)
+        self.zooms: tuple[ComplexModes | None, ComplexModes | None] = (None, None)
+        self.curve: tuple[Array, Array] | None = None
+        if self.cheap:
+            self.zooms = clock("modes", lambda: _zooms(work, onsets[False]), "around the first onset")
+            self.curve = clock("onsets", lambda: _curve(work), "friction over frequency")
+
+
 def _coupled(work: Workspace) -> ComplexModes:
     """In contact without friction, which nothing drives: there is no growth to check."""
     return analyses.modes(work, 0.0, max_frequency_hz=work.modal.max_frequency_hz, damped=False, check=False)
 
 
-def _own(work: Workspace, clock: _Clock, *, vectors: bool | Literal["right"]) -> ComplexModes | None:
+def _own(work: Workspace, clock: _Clock) -> ComplexModes | None:
     """Modes at the friction of the case, None where contacts have different coefficients: no one μ has those modes."""
     mu, limit = work.own_friction, work.modal.max_frequency_hz
     if mu is None:
         return None
-    return clock("modes", lambda: analyses.modes(work, mu, max_frequency_hz=limit, vectors=vectors), f"at μ = {mu:g}")
+    return clock("modes", lambda: analyses.modes(work, mu, max_frequency_hz=limit, vectors="right"), f"at μ = {mu:g}")
 
 
 def _or_note(call: Callable[[], T], notes: list[str], what: str) -> T | None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..contact.surfaces import SurfaceContact
 from ..modal.complex_modes import ComplexModes
 from ..modal.growing import doubt
 from ..modal.over_friction import modes_of_band
@@ -51,7 +50,7 @@ def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequenc
 def _solved(system: System, linear: Linearised, band: float) -> ComplexModes:
     """The modes of the band of a changed system, and what was checked of them."""
     damped, options = linear.modes.damped, linear.options
-    if options.source is None and not system.general:
+    if options.source is None and system.symmetric_definite:
         # Sparse matrices for small systems too: a mass at one node leaves their complete basis no proportional damping.
         with suppress(Unfit):
             return modes_of_band(system, linear.mu, band, damped=damped, options=replace(options, source="krylov"))
@@ -87,12 +86,9 @@ def _chamfered(linear: Linearised, measure: Measure) -> System:
     cuts = edge_rows(nodes, linear.held.touching, linear.held.sense, contact, edge.split()[0], wanted)
     gone = np.zeros(nodes.count, dtype=bool)
     gone[cuts[-1].gone] = True
-    start = len(system.contacts)
-    surfaces: list[SurfaceContact] = []
-    for surface in system.surfaces:
-        stop = start + surface.nodes.count
-        # The modal approach reads nodes alone: what they were paired from stays, and facets number nodes that are gone.
-        kept = surface.nodes.select(~gone[start:stop])
-        surfaces.append(replace(surface, nodes=kept, facets=None))
-        start = stop
+    # The modal approach reads nodes alone: what they were paired from stays, and facets number nodes that are gone.
+    surfaces = [
+        replace(surface, nodes=surface.nodes.select(~gone[mine]), facets=None)
+        for surface, mine in system.nodes_of_surfaces()
+    ]
     return replace(system, surfaces=tuple(surfaces))

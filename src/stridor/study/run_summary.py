@@ -119,7 +119,9 @@ def summarise(problem: Problem, run: Trajectory) -> RunSummary:
     dominant, fitted = dominant_response(run, limit)
     linear: complex | None = None
     perturbed = work.temporal.initial == "steady-sliding" and work.temporal.perturbation > 0
-    if perturbed and len(run.time) >= LEAST_RECORDS and run.contact_names and not (system := work.system()).assembled:
-        found = linear_part(run, slip_speeds(system, full_motion(system)), skip=16)
+    if perturbed and len(run.time) >= LEAST_RECORDS and run.contact_names and run.nodes is None:
+        system = work.system()
+        steady = slip_speeds(system, full_motion(system))
+        found = linear_part(run.slip_speed - steady, steady, skip=16)
         linear = components(found, run.sampling, max_frequency_hz=limit).fastest or None
     return RunSummary(dominant, fitted, energy_balance(run), run, linear)

@@ -7,6 +7,7 @@
 - modal.damped = false: `simulate`, `compare`
 - temporal.path: assembled matrices in time
 - comparison.bracket, comparison.tolerance: without critical friction
+- bodies.NAME.initial_velocity, initial_displacement: from steady sliding
 - temporal.contact = "rigid": where every contact is rigid; where it acts, contacts.NAME.stiffness on `simulate`
 - materials.NAME.poisson_ratio: of beams only
 
@@ -16,10 +17,10 @@ A setting that stays at its default is not told of, nor one of an approach that 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from ..case import Case
 from ..case.bodies import SolidBody
+from ..modal.source import sources_for
 from ..system.pairs import is_point_on_line
 from .workspace import Workspace
 
@@ -40,29 +41,17 @@ def without_effect(problem: Case | Workspace, verb: str, *, solver: str | None =
     # By the case alone where that is enough.
     lines = [*_of_materials(case), *_of_comparison(case, verb)]
     if _given(case, solver):
-        path = _path(work, case)
-        lines += [*_of_modes(case, path, verb, solver), *_of_time(case, path, verb)]
+        few = _of_few_points(work, case)
+        lines += [*_of_modes(case, verb, solver, few=few), *_of_time(case, verb, few=few)]
     return lines
 
 
-@dataclass(frozen=True)
-class _Path:
-    """What decides on the path: whether matrices are assembled, or without structure."""
-
-    assembled: bool
-    general: bool
-
-    @property
-    def points(self) -> bool:
-        return not self.assembled and not self.general
-
-
-def _path(work: Workspace, case: Case) -> _Path:
-    # Contact over a surface is computed with on assembled matrices; only imported ones may lack structure.
+def _of_few_points(work: Workspace, case: Case) -> bool:
+    """Whether it is a structure with a few point contacts on a complete basis, in both approaches."""
+    # Contact over a surface never is, which the case tells without a model.
     if not case.imported and any(not is_point_on_line(case, contact) for contact in case.contacts.values()):
-        return _Path(assembled=True, general=False)
-    system = work.system()
-    return _Path(system.assembled, bool(system.general))
+        return False
+    return sources_for(work.system())[0].name == "receptance"
 
 
 def _given(case: Case, solver: str | None) -> bool:
@@ -75,6 +64,7 @@ def _given(case: Case, solver: str | None) -> bool:
         or modal.prestress
         or not modal.damped
         or case.temporal.path != "auto"
+        or case.temporal.initial != "rest"
         or case.temporal.contact != "as given"
     )
 
@@ -92,8 +82,8 @@ def _of_comparison(case: Case, verb: str) -> Iterator[str]:
             yield f"comparison.{key} has no effect while comparison.critical is false"
 
 
-def _of_modes(case: Case, path: _Path, verb: str, solver: str | None) -> Iterator[str]:
-    dense = path.points and case.modal.source in ("auto", "receptance")
+def _of_modes(case: Case, verb: str, solver: str | None, *, few: bool) -> Iterator[str]:
+    dense = few and case.modal.source in ("auto", "receptance")
     if dense and (solver is not None or case.modal.solver != "auto"):
         what = "modal.solver" if solver is None else "--solver"
         yield f"{what} has no effect: beams in point contacts are solved by dense methods"
@@ -102,14 +92,14 @@ def _of_modes(case: Case, path: _Path, verb: str, solver: str | None) -> Iterato
     elif case.modal.source != "auto" and verb == "run":
         yield "modal.source acts on modes and onsets only: the comparison takes what suits the model"
     if case.modal.friction_damping and verb != "simulate":
-        if path.points or case.dimension < 3:
+        if few or case.dimension < 3:
             yield "modal.friction_damping has no effect: friction turns with the slip in space only, over nodes"
         elif verb == "compare":
             yield "modal.friction_damping has no effect here: compare takes the modes as the time loop is, with it"
     if case.modal.prestress:
         if verb in ("compare", "simulate"):
             yield f"modal.prestress has no effect on {verb}: the time loop has no geometric stiffness"
-        elif path.points or not any(isinstance(body, SolidBody) for body in case.bodies.values()):
+        elif few or not any(isinstance(body, SolidBody) for body in case.bodies.values()):
             yield "modal.prestress has no effect: only meshed solids on assembled matrices have it"
         elif verb == "run":
             yield "modal.prestress acts on modes and onsets only: the time loop and the comparison are without it"
@@ -119,11 +109,16 @@ def _of_modes(case: Case, path: _Path, verb: str, solver: str | None) -> Iterato
         yield "modal.damped = false acts on modes and onsets only: the time loop and the comparison keep the damping"
 
 
-def _of_time(case: Case, path: _Path, verb: str) -> Iterator[str]:
+def _of_time(case: Case, verb: str, *, few: bool) -> Iterator[str]:
     if verb not in IN_TIME:
         return
-    if path.assembled and case.temporal.path not in ("auto", "assembled"):
+    if not few and case.temporal.path not in ("auto", "assembled"):
         yield f"temporal.path = {case.temporal.path!r} has no effect: assembled matrices have one path"
+    if case.temporal.initial == "steady-sliding":
+        for name, body in case.bodies.items():
+            for key in ("initial_velocity", "initial_displacement"):
+                if getattr(body, key, None) is not None:
+                    yield f"bodies.{name}.{key} has no effect: the run starts from steady sliding (temporal.initial)"
     if case.temporal.contact == "rigid":
         springs = [name for name, contact in case.contacts.items() if contact.stiffness != "rigid"]
         if not springs:

@@ -159,7 +159,7 @@ class Workspace:
         if case is not None and self.varies:
             # Nothing gives μ: at 0 the matrices may be symmetric where they are not at any other.
             unsaid = mu is None and MU not in case.parameters and not case.contacts
-            beyond = self.system(case.modal.friction_range[1]).general if unsaid else ""
+            beyond = self.system(case.modal.friction_range[1]).not_symmetric_definite if unsaid else ""
             if what in ("compare", "run") or beyond:
                 why = f", and beyond mu = 0 {beyond}" if beyond else ""
                 raise AnalysisError(
@@ -167,9 +167,9 @@ class Workspace:
                     f"only; {WORKS}"
                 )
         system = self.system(mu)
-        if system.general and (why := unfit_in_time(system)):
+        if why := unfit_in_time(system):
             raise AnalysisError(f"{what}: {why}; {WORKS}")
-        if system.general and what == "run" and not self.has_contacts:
+        if not system.symmetric_definite and what == "run" and not self.has_contacts:
             raise AnalysisError(
                 "run: there are no contacts and no factor of a matrix has mu in it, so there is no onset to solve for; "
                 "what works here is `stridor modes`, `stridor simulate` and `stridor onsets --along NAME`"

@@ -19,7 +19,7 @@ from ..mesh.facets import facet_areas, pressure_load, traction_load
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody, build_bodies
 from .body_loads import body_load
-from .given_matrices import general_reason
+from .given_matrices import not_symmetric_definite
 from .holders import holders_of
 from .links import Links, links_of
 from .load_steps import LoadStep
@@ -85,7 +85,7 @@ def build_system(case: Case, mu: float | None = None) -> System:
         initial_velocity=_initial(case, view, "initial_velocity"),
         initial_displacement=_initial(case, view, "initial_displacement"),
         stress_stiffness=_stress_stiffness(case, view),
-        general=general_reason(mass, damping, stiffness) if case.imported else "",
+        not_symmetric_definite=not_symmetric_definite(mass, damping, stiffness) if case.imported else "",
         holders=holders_of(case, view, contacts, surfaces),
         load_steps=_load_steps(case, motion),
         contact_cubic={name: contact.cubic for name, contact in case.contacts.items() if contact.cubic},

@@ -80,8 +80,8 @@ def square_matrices(mass: object, damping: object, stiffness: object) -> tuple[S
     return found[0], found[1], found[2]
 
 
-def general_reason(mass: Sparse, damping: Sparse, stiffness: Sparse) -> str:
-    """What of imported matrices needs the solver for matrices without structure, "" where nothing does."""
+def not_symmetric_definite(mass: Sparse, damping: Sparse, stiffness: Sparse) -> str:
+    """Why matrices are not all symmetric with a positive definite mass, "" where they are."""
     for matrix, what in zip((mass, damping, stiffness), _ROLES, strict=True):
         if not is_symmetric(matrix):
             return f"the {what} matrix is not symmetric"

@@ -5,7 +5,7 @@ Nothing after it asks whether the freedoms came from beams, solids or another pr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeVar
@@ -19,11 +19,9 @@ from ..contact.surfaces import SurfaceContact
 from ..fe.assembly import connected_components
 from ..notebook import html_table
 from ..typing import Array, IntArray, Sparse
-from .given_matrices import contacts_given, general_reason, points_given, square_matrices, vectors_given
+from .given_matrices import contacts_given, not_symmetric_definite, points_given, square_matrices, vectors_given
 from .load_steps import LoadStep
 from .motion import PrescribedMotion
-
-COMPLETE_BASIS_LIMIT = 2500
 
 T = TypeVar("T")
 MOST_ANSWERS = 200  # kept of one system: equilibria of a sweep are vectors of all its freedoms
@@ -102,11 +100,11 @@ class System:
     the linear; initial_velocity (n,) [m/s] and initial_displacement (n,) [m] of bodies that start so; stress_stiffness
     gives the geometric stiffness (n, n) csr that the stresses of a displacement (n,) [m] make, None where no body
     has any. contact_cubic: contact → factor of the cube of the approach in its normal force, per area [N/m⁵], of a
-    point [N/m³]. general: why its matrices, imported ones, are not all symmetric with a positive definite mass, as all
-    others are; "" where they are. holders: contact → paths of the supports and ties at its nodes. load_steps: the way
-    to the static equilibrium, with stick and partial slip; empty where all contacts slide as the motions have them.
-    placed: whether it is what `in_place` has made of another. touching_at: the μ of the steady sliding whose nodes
-    touch in its modes, whichever μ these are of; None where whoever asks for modes says.
+    point [N/m³]. not_symmetric_definite: why its matrices, imported ones, are not all symmetric with a positive
+    definite mass, as all others are; "" where they are. holders: contact → paths of the supports and ties at its nodes.
+    load_steps: the way to the static equilibrium, with stick and partial slip; empty where all contacts slide as the
+    motions have them. placed: whether it is what `in_place` has made of another. touching_at: the μ of the steady
+    sliding whose nodes touch in its modes, whichever μ these are of; None where whoever asks for modes says.
 
     Frozen, so that every question has one answer: `once` keeps what is asked for again and again, in ``answers``;
     ``of_matrices`` has what follows from mass, damping and stiffness alone, which systems with other contacts share.
@@ -128,7 +126,7 @@ class System:
     initial_velocity: Array | None = None
     initial_displacement: Array | None = None
     stress_stiffness: Callable[..., Sparse] | None = None
-    general: str = ""
+    not_symmetric_definite: str = ""
     holders: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     load_steps: tuple[LoadStep, ...] = ()
     placed: bool = False
@@ -188,7 +186,8 @@ class System:
             motion = PrescribedMotion(("sliding",), column, column, column, own, own, own)
         return cls(
             m, c, k, built, vectors_given("loads", loads, size), motion, points_given(points, size, len(motion.names)),
-            dof_names=tuple(f"freedom {k}" for k in range(size)), general=general_reason(m, c, k), contact_cubic=cubic,
+            dof_names=tuple(f"freedom {k}" for k in range(size)), contact_cubic=cubic,
+            not_symmetric_definite=not_symmetric_definite(m, c, k),
         )  # fmt: skip
 
     def _repr_html_(self) -> str:
@@ -200,7 +199,8 @@ class System:
             for stiffness in (f"stiffness {c.stiffness:g}" if c.compliance else "rigid",)
         ]
         rows += [(f"contact {s.name}", f"{s.nodes.count} nodes") for s in self.surfaces]
-        lines = (f"loads: {', '.join(self.loads)}", f"motions: {', '.join(self.motion.names)}", self.general)
+        named = (f"loads: {', '.join(self.loads)}", f"motions: {', '.join(self.motion.names)}")
+        lines = (*named, self.not_symmetric_definite)
         return html_table(f"System of {self.size} freedoms", ("", "what it is"), rows, lines)
 
     def once(self, asked: Hashable, answer: Callable[[], T]) -> T:
@@ -220,24 +220,9 @@ class System:
         return connected_components(self.mass, self.damping, self.stiffness)
 
     @property
-    def beyond_points(self) -> str:
-        """Why it is no structure with a few point contacts on a complete basis of modes; "" where it is."""
-        if self.general:
-            return self.general
-        if self.surfaces:
-            return "there is contact over surfaces"
-        if self.load_steps:
-            return "contacts may stick"
-        if self.cubic is not None or self.contact_cubic:
-            return "there are cubic springs"
-        if self.size > COMPLETE_BASIS_LIMIT:
-            return f"{self.size} freedoms are too many for a complete basis, which has up to {COMPLETE_BASIS_LIMIT}"
-        return ""
-
-    @property
-    def assembled(self) -> bool:
-        """Whether it is computed with on the assembled sparse matrices."""
-        return bool(self.beyond_points)
+    def symmetric_definite(self) -> bool:
+        """Whether M, C and K are symmetric and M is positive definite."""
+        return not self.not_symmetric_definite
 
     def undamped(self) -> System:
         """The same system without structural damping (paper eq. 5)."""
@@ -299,6 +284,18 @@ class System:
         surfaces = tuple(s.rigid() for s in self.surfaces)
         return replace(self, contacts=contacts, surfaces=surfaces, contact_cubic={})
 
+    @property
+    def finitely_sliding(self) -> tuple[str, ...]:
+        """Contacts whose slave comes to other places of the master in time."""
+        return tuple(c.name for c in (*self.contacts, *self.surfaces) if c.sliding == "finite")
+
+    def in_reference(self) -> System:
+        """The same system with every contact in the reference configuration for ever, as the modes have it."""
+        if not self.finitely_sliding:
+            return self
+        contacts = tuple(replace(c, sliding="small") for c in self.contacts)
+        return replace(self, contacts=contacts, surfaces=tuple(replace(s, sliding="small") for s in self.surfaces))
+
     def contact_nodes(self) -> ContactNodes:
         """Every contact, point or surface, as one list of slave nodes: points first, then surfaces in order."""
         parts = [_point_nodes(c) for c in self.contacts] + [s.nodes for s in self.surfaces]
@@ -307,6 +304,13 @@ class System:
             return nodes
         factor = np.array([self.contact_cubic.get(name, 0.0) for name in nodes.names])[nodes.owner]
         return replace(nodes, cubic=factor * np.where(np.isnan(nodes.area), 1.0, nodes.area))
+
+    def nodes_of_surfaces(self) -> Iterator[tuple[SurfaceContact, slice]]:
+        """Each contact over a surface, and where its nodes are among `contact_nodes`."""
+        first = len(self.contacts)
+        for surface in self.surfaces:
+            yield surface, slice(first, first + surface.nodes.count)
+            first += surface.nodes.count
 
     def contact_rows(self) -> Array:
         """G (2m, n): normal and tangential relative displacement of contact 0, of contact 1, …"""

@@ -18,6 +18,7 @@ from .model import System
 
 PROPORTIONAL_TOLERANCE = 1e-9
 DENSE_LIMIT = 6000
+FEW = 2500  # freedoms for which a complete basis pays
 NEGATIVE = 10.0  # times rounding: a negative stiffness that is meant
 
 
@@ -81,6 +82,21 @@ class UncoupledModes:
     def poles(self) -> ComplexArray:
         """Poles of the general blocks in turn [1/s]."""
         return np.concatenate([b.poles for b in self.general] or [np.zeros(0, dtype=complex)])
+
+
+def no_complete_basis(system: System) -> str:
+    """Why it is no structure with a few point contacts on a complete basis of modes; "" where it is."""
+    if system.not_symmetric_definite:
+        return system.not_symmetric_definite
+    if system.surfaces:
+        return "there is contact over surfaces"
+    if system.load_steps:
+        return "contacts may stick"
+    if system.cubic is not None or system.contact_cubic:
+        return "there are cubic springs"
+    if system.size > FEW:
+        return f"{system.size} freedoms are too many for a complete basis, which has up to {FEW}"
+    return ""
 
 
 def uncoupled_modes(system: System) -> UncoupledModes:

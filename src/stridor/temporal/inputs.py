@@ -17,7 +17,9 @@ DIAGONAL = 1e-14  # of the largest mass: what beside the diagonal is rounding
 
 
 def unfit_in_time(system: System) -> str:
-    """Why the time loop does not take unsymmetric matrices, "" where it does."""
+    """Why the time loop does not take a system for its unsymmetric matrices, "" where it does."""
+    if system.symmetric_definite:
+        return ""
     mass = sp.csr_array(system.mass)
     diagonal = mass.diagonal()
     without = int(np.count_nonzero(diagonal <= 0.0))

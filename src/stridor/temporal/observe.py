@@ -1,19 +1,14 @@
-"""What looks on while a run on assembled matrices marches: motion of many nodes without a record of every instant."""
+"""What looks on while a run marches: the motion of all freedoms without a record of every instant."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
-from ..typing import Array, ComplexArray, Sparse
+from ..typing import Array, ComplexArray
 from .signals import hann
-
-MOST_BYTES = 128e6
-MOST_INSTANTS = 4096
-PER_PERIOD = 12.0  # instants, of the fastest component
 
 
 class Observer(Protocol):
@@ -27,34 +22,6 @@ class Observer(Protocol):
     def see(self, time: float, velocity: Array) -> None:
         """time [s]; velocity (n,) [m/s, rad/s] of the freedoms, β2 of a step before it."""
         ...
-
-
-@dataclass
-class Snapshots:
-    """Velocities of what rows (r, n) csr say at some instants: time (s,) [s], values (s, r) [m/s]."""
-
-    rows: Sparse
-    every: int
-    seen: list[tuple[float, Array]] = field(default_factory=list[tuple[float, Array]])
-
-    @classmethod
-    def over(
-        cls, steps: int, step: float, fastest_hz: float, rows_of: Callable[[int], Sparse], dimension: int
-    ) -> Snapshots:
-        """Room for a run of so many steps Δt [s] with lines up to fastest_hz, of as many nodes as fit into MOST_BYTES;
-        rows_of(most) gives the rows of at most so many."""
-        instants = int(min(MOST_INSTANTS, max(64.0, PER_PERIOD * fastest_hz * steps * step)))
-        return cls(rows_of(max(1, int(MOST_BYTES / (8 * instants * dimension)))), max(1, steps // instants))
-
-    def see(self, time: float, velocity: Array) -> None:
-        """Keep this instant."""
-        self.seen.append((time, self.rows @ velocity))
-
-    def until(self, time: float) -> tuple[Array, Array]:
-        """Times (s,) [s] and values (s, r) [m/s] up to an instant [s]."""
-        kept = [pair for pair in self.seen if pair[0] <= time]
-        values = np.array([v for _, v in kept]).reshape(len(kept), self.rows.shape[0])
-        return np.array([t for t, _ in kept]), values
 
 
 @dataclass

@@ -14,8 +14,8 @@ from .restart import settings_of_restart
 from .schedule import PhaseSpec, lay_out
 from .settings import Settings
 from .stepper import Disturbance, Stepper
-from .steppers.modal import choose_path, modal_stepper
-from .steppers.sparse import reason_for, sparse_stepper, step_limit_assembled
+from .steppers.modal import choose_path, modal_stepper, refuses
+from .steppers.sparse import sparse_stepper, step_limit_assembled
 from .trajectory import Trajectory
 
 __all__ = ["Checkpoint", "Progress", "Settings", "plan", "simulate"]
@@ -74,14 +74,21 @@ def simulate(
 def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
     """How a system would be marched: path, why it is taken, and the limit of the step."""
     system = settings.system(system)
-    if system.assembled or settings.path == "assembled":
-        return "assembled", reason_for(system), step_limit_assembled(system, settings.beta2)
+    if why := _why_sparse(system, settings):
+        return "assembled", why, step_limit_assembled(system, settings.beta2)
     modes, reason = choose_path(system, settings)
     return "modal" if modes else "nodal", reason, step_limit(system, settings.beta2)
 
 
 def stepper_for(system: System, settings: Settings, mu: float | None) -> Stepper:
     """The method of time stepping that suits a system, or the one that the settings ask for."""
-    if system.assembled or settings.path == "assembled":
-        return sparse_stepper(system, settings, mu)
+    if why := _why_sparse(system, settings):
+        return sparse_stepper(system, settings, mu, why)
     return modal_stepper(system, settings, mu)
+
+
+def _why_sparse(system: System, settings: Settings) -> str:
+    """Why a system is marched on assembled matrices, "" where the stepper on few point contacts takes it."""
+    if why := refuses(system):
+        return f"{why}: assembled matrices with lumped mass"
+    return "asked for" if settings.path == "assembled" else ""

@@ -242,7 +242,10 @@ def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigu
     name = run.contact_names[0]
     slave = inputs.case.contacts[name].slave if name in inputs.case.contacts else ""
     contact = next((c for c in system.contacts if c.name == name), None) if system is not None else None
-    steady = float(inputs.steady.normal_force[0]) if inputs.steady is not None else None
+    steady: float | None = None
+    if inputs.steady is not None and system is not None:
+        nodes = system.contact_nodes()
+        steady = float(inputs.steady.normal_force[nodes.owner == nodes.names.index(name)].sum())
     shares = [f"{100 * window.stick_fraction:.0f} % stick"]
     if window.separation_fraction:
         shares.append(f"{100 * window.separation_fraction:.0f} % separation")

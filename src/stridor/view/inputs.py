@@ -9,7 +9,6 @@ from ..agreement import Agreement
 from ..case import Case
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
-from ..sliding import SteadySliding
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
 from ..temporal.energy import EnergyBalance
@@ -56,15 +55,15 @@ class ReportInputs:
     values: computed values by the names used in case.reference.values, in front of those that the results
     give; value_notes: what each of them is. source_places: where in the source of case.reference something is
     found, by the name of the figure or table here ("frequency-pair": "figure 3").
-    surface_steady: equilibrium of contact over surfaces; shape_vector (n,): the mode that grows fastest of a model
-    with solids, friction_energy (m,): what friction feeds into it at each slave node. timings [s] by analysis;
-    versions by program; case_text: the case file as written; created: date and time; warnings and notes in words.
+    steady: equilibrium of every contact node; shape_vector (n,): the mode that grows fastest, friction_energy (m,):
+    what friction feeds into it at each slave node. timings [s] by analysis; versions by program; case_text: the case
+    file as written; created: date and time; warnings and notes in words.
     """
 
     case: Case
     system: System | None = None
     mu: float | None = None
-    steady: SteadySliding | None = None
+    steady: SurfaceSliding | None = None
     modes: ComplexModes | None = None
     undamped_sweep: ComplexModes | None = None
     damped_sweep: ComplexModes | None = None
@@ -97,7 +96,6 @@ class ReportInputs:
     created: str = ""
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    surface_steady: SurfaceSliding | None = None
     shape_vector: ComplexArray | None = None
     friction_energy: Array | None = None
 

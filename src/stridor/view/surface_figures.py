@@ -74,7 +74,7 @@ def contact_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
 
 def surface_table(inputs: ReportInputs) -> Table | None:
     """Resultants of every contact in steady sliding."""
-    steady = inputs.surface_steady
+    steady = inputs.steady
     if steady is None or not steady.resultants:
         return None
     rows = [

@@ -221,11 +221,13 @@ def model_in_words(inputs: ReportInputs) -> list[str]:
     for name, dashpot in case.dashpots.items():
         lines.append(f"{name}: a dashpot of {dashpot.damping:g} N s/m between {_listed(list(dashpot.between))}.")
     if inputs.steady is not None and inputs.system is not None:
-        for contact, force, speed in zip(
-            inputs.system.contacts, inputs.steady.normal_force, inputs.steady.slip_speed, strict=True
-        ):
+        nodes = inputs.system.contact_nodes()
+        for k, name in enumerate(nodes.names):
+            mine = nodes.owner == k
+            force, speeds = inputs.steady.normal_force[mine].sum(), inputs.steady.slip_speed[mine]
+            most = "" if len(speeds) == 1 else "up to "
             lines.append(
-                f"In steady sliding contact {contact.name} carries {force:.4g} N and slips at {abs(speed):.4g} m/s."
+                f"In steady sliding contact {name} carries {force:.4g} N and slips at {most}{speeds.max():.4g} m/s."
             )
     return lines
 

@@ -81,7 +81,7 @@ class Equilibria:
         nodes = replace(self._nodes, compliance=self._nodes.compliance / stiffness)
         rubbing = mu[:, None] * self._sense
         push = sp.csr_array(nodes.normal + nodes.along(rubbing))
-        symmetric = not np.any(rubbing) and not self._system.general
+        symmetric = not np.any(rubbing) and self._system.symmetric_definite
         equilibrium = Equilibrium(self._system, nodes, push, self._force, symmetric=symmetric, solver=self._solver)
         active = np.zeros(nodes.count, dtype=bool)
         active[self._touching] = True
@@ -118,7 +118,7 @@ class _Many:
         springs = 1.0 / np.maximum(chosen.compliance, 1.0 / scale)
         matrix = sp.csr_array(system.stiffness + normal.T @ sp.diags_array(springs) @ normal)
         try:
-            factor = factorise(matrix, symmetric=not system.general, solver=solver)
+            factor = factorise(matrix, symmetric=system.symmetric_definite, solver=solver)
             by_normal, by_slide = (
                 normal @ factor.solve(rows.T.toarray(), refine=False) for rows in (normal, slide)
             )

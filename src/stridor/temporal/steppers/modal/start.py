@@ -24,7 +24,7 @@ def initial_state(
     settings: Settings,
     disturbance: Disturbance | None = None,
 ) -> None:
-    """Put a machine at rest or into steady sliding, disturbed if so asked, and predict its first step."""
+    """Put a machine at rest, in motion or into steady sliding, disturbed if so asked, and predict its first step."""
     system, fields, state = machine.system, machine.fields, machine.state
     if settings.initial == "steady-sliding":
         stretch = schedule.stretches[0]
@@ -43,8 +43,11 @@ def initial_state(
         state.status[:] = np.where(steady.active, 2, 0)
         if stretch.ramp_steps:
             raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
-    if disturbance is not None:
-        displacement, velocity, acceleration = disturbance
+    own = _motion_of_bodies(system, schedule) if settings.initial == "rest" else None
+    for added in (own, disturbance):
+        if added is None:
+            continue
+        displacement, velocity, acceleration = added
         # q_0 = v_0 − β2 Δt a_0 starts the scheme without a jump (docs/theory-temporal.md).
         rate = velocity - machine.scheme.beta2 * machine.scheme.step * acceleration
         fields.u[:] += machine.coordinates(displacement, modes)
@@ -52,6 +55,22 @@ def initial_state(
     machine.repack()
     machine.free_increment(coefficients(machine, schedule))
     machine.predict()
+
+
+def _motion_of_bodies(system: System, schedule: Schedule) -> Disturbance | None:
+    """Displacement, velocity and acceleration (n,) that bodies start with, None where all are at rest."""
+    if system.initial_displacement is None and system.initial_velocity is None:
+        return None
+    zero, stretch = np.zeros(system.size), schedule.stretches[0]
+    displacement = zero if system.initial_displacement is None else system.initial_displacement
+    velocity = zero if system.initial_velocity is None else system.initial_velocity
+    force = -(system.stiffness @ displacement) - system.damping @ velocity
+    if stretch.ramp_steps == 0:
+        for factor, vector in zip(stretch.loads_after, system.loads.values(), strict=True):
+            force = force + factor * vector
+    mass, diagonal = system.mass, system.mass.diagonal()
+    # The scheme starts from the acceleration that the forces give; a consistent mass only delays it by half a step.
+    return displacement, velocity, force / diagonal if mass.nnz == np.count_nonzero(diagonal) else zero
 
 
 def _slip_impulse(system: System, tangent_row: Array) -> Array:

@@ -9,7 +9,7 @@ import scipy.sparse.linalg as spl
 from ....errors import AnalysisError, CaseError
 from ....sliding import slip_speeds
 from ....system import System
-from ....system.uncoupled import UncoupledModes, uncoupled_modes
+from ....system.uncoupled import UncoupledModes, no_complete_basis, uncoupled_modes
 from ....typing import Array
 from ...beta2 import StepLimit, scheme, step_limit
 from ...columns import CONTACT_RECORD, ENERGY_RECORD, WORK_COLUMNS
@@ -61,6 +61,11 @@ def _check_stiffness(system: System, step: float) -> None:
                 f'with sliding = "finite" at most {1.0 / moved:.3g} N/m at a step of {step:.3g} s, which a stiffer '
                 'spring outruns; take it as rigid in time ([temporal] contact = "rigid"), or a smaller step',
             )
+
+
+def refuses(system: System) -> str:
+    """Why it does not take a system; "" if it does."""
+    return no_complete_basis(system)
 
 
 def choose_path(system: System, settings: Settings) -> tuple[UncoupledModes | None, str]:

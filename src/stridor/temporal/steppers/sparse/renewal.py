@@ -23,11 +23,6 @@ SLIDE = 1e-3  # of the distance between nodes
 MOST_STEPS = 200
 
 
-def slides_finitely(system: System) -> bool:
-    """Whether any surface contact is to be paired again as it slides."""
-    return any(s.sliding == "finite" for s in system.surfaces)
-
-
 # Under a name of its own: the one thing here that knows geometry.
 found_again = repair
 

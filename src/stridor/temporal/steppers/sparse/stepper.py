@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ....contact.nodes import ContactNodes
-from ....errors import AnalysisError
+from ....errors import AnalysisError, CaseError
 from ....system import System
 from ....typing import Array
 from ...beta2 import StepLimit, scheme
@@ -26,7 +26,7 @@ from .limit import step_limit_assembled
 from .loop import NOT_FINITE
 from .machine import Machine, assembled_machine, diagonal_mass
 from .records import SKEW_COLUMNS, buffers, node_history
-from .renewal import node_distances, renew, slides_finitely, steps_to_renewal, take_over
+from .renewal import node_distances, renew, steps_to_renewal, take_over
 from .start import begin
 
 # What moves on from step to step, by the part of the machine that holds it.
@@ -37,21 +37,29 @@ SAVED = {
 }
 
 
-def sparse_stepper(system: System, settings: Settings, mu: float | None) -> SparseStepper:
-    """A system of assembled matrices made ready; mu scales every contact's friction law at its slip speed.
+def sparse_stepper(system: System, settings: Settings, mu: float | None, reason: str) -> SparseStepper:
+    """A system of assembled matrices made ready; mu scales every contact's friction law at its slip speed. reason: why
+    it is marched on these.
 
-    Raises CaseError for a mass that is not lumped and a step beyond the limit, AnalysisError for matrices that time
-    does not take.
+    Raises CaseError for a mass that is not lumped, points that slide finitely and a step beyond the limit,
+    AnalysisError for matrices that time does not take.
     """
-    if system.general and (why := unfit_in_time(system)):
+    if why := unfit_in_time(system):
         raise AnalysisError(why)
     diagonal_mass(system)
+    for contact in system.contacts:
+        if contact.sliding == "finite":
+            raise CaseError(
+                f"contacts.{contact.name}.sliding",
+                "finite",
+                f'"small" in a run on assembled matrices ({reason}), in which a point stays where it is on its master',
+            )
     nodes = system.contact_nodes()
     if mu is not None:
         nodes = with_friction(nodes, mu, system.motion.full)
     limit = step_limit_assembled(system, settings.beta2)
     machine = assembled_machine(system, scheme(choose_step(limit, settings), settings.beta2), nodes)
-    return SparseStepper(machine, limit)
+    return SparseStepper(machine, limit, reason)
 
 
 def with_friction(nodes: ContactNodes, mu: float, factors: Array) -> ContactNodes:
@@ -70,13 +78,12 @@ class SparseStepper:
 
     path = "assembled"
 
-    def __init__(self, machine: Machine, limit: StepLimit) -> None:
-        self.machine, self.limit, self.scheme = machine, limit, machine.scheme
-        self.reason = reason_for(machine.system)
+    def __init__(self, machine: Machine, limit: StepLimit, reason: str) -> None:
+        self.machine, self.limit, self.reason, self.scheme = machine, limit, reason, machine.scheme
         self.contact_names, self.closed = machine.nodes.names, machine.nodes.closed
         self.works = WORK_COLUMNS | (SKEW_COLUMNS if len(machine.unsymmetric.force) else {})
         self.parts = sketch(machine.system, machine.nodes)
-        self.finite = slides_finitely(machine.system)
+        self.finite = bool(machine.system.finitely_sliding)
         self.distances = node_distances(machine.system) if self.finite else np.zeros(0)
         # Of the rows: the step of their next renewal, the first for finite sliding, and the steps since the last.
         self.renewal = np.array([0, 1])
@@ -207,16 +214,3 @@ class SparseStepper:
     def node_history(self, start: int) -> NodeHistory | None:
         """Histories of the nodes, where there are any."""
         return node_history(self.machine, self.record, start, self.recorded)
-
-
-def reason_for(system: System) -> str:
-    """Why a system is marched on assembled matrices."""
-    if system.general:
-        return "matrices that are not symmetric: assembled matrices with lumped mass"
-    if system.surfaces:
-        return "contact over surfaces: assembled matrices with lumped mass"
-    if system.cubic is not None:
-        return "cubic springs: assembled matrices with lumped mass"
-    if not system.assembled:
-        return "asked for"
-    return f"{system.size} freedoms are too many for a complete modal basis: assembled matrices with lumped mass"

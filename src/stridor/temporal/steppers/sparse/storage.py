@@ -78,7 +78,7 @@ class Layout:
 def lay_out_freedoms(system: System) -> Layout:
     """Group the freedoms into blocks, the blocks in an order that keeps coupled ones close (reverse Cuthill–McKee)."""
     pattern = sp.csr_array(abs(system.stiffness) + abs(system.damping) + abs(system.mass))
-    if system.general:
+    if not system.symmetric_definite:
         pattern = sp.csr_array(pattern + pattern.T)
     group, inside, width = _groups(system, pattern)
     count = int(group.max()) + 1

@@ -47,7 +47,7 @@ class Halves:
 def halves(system: System) -> Halves:
     """The parts of a system's matrices; of a symmetric one its own matrices and nothing beside them."""
     nothing = sp.csr_array((system.size, system.size))
-    if not system.general:
+    if system.symmetric_definite:
         return Halves(system.stiffness, system.damping, nothing, nothing)
     return Halves(
         _symmetric(system.stiffness), _symmetric(system.damping), _skew(system.stiffness), _skew(system.damping)
