@@ -149,10 +149,10 @@ def test_pencil_of_imported_matrices_with_factors_of_mu(tmp_path: Path):
 
 def test_matrices_of_any_structure():
     system = System.from_matrices(np.eye(2), 0.1 * TURN, sp.coo_array(HOFFMANN + 2 * TURN))
-    assert system.general == "the damping matrix is not symmetric"
+    assert system.not_symmetric_definite == "the damping matrix is not symmetric"
     found = complex_modes(system, 0.0, max_frequency_hz=10.0)
     assert_those_of(st.pencil(system, 0.0), found.eigenvalues[0])
-    assert (found.source, minimal().general) == ("full", "")
+    assert (found.source, minimal().not_symmetric_definite) == ("full", "")
 
 
 MISSING = "missing – give numbers, one for each freedom, or a table of weights by freedom, from 0: the relative displacement "
