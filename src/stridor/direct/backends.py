@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 from ..errors import CaseError
@@ -57,7 +57,12 @@ def available() -> tuple[str, ...]:
 
     "slepc" never is, as it serves only those who ask for it.
     """
-    return tuple(name for name in PACKAGES if name not in ON_REQUEST and installed(name))
+    return tuple(_preferred())
+
+
+def _preferred() -> Iterator[str]:
+    """One after the other: to look for a package that is not there takes long."""
+    return (name for name in PACKAGES if name not in ON_REQUEST and installed(name))
 
 
 def installed(name: str) -> bool:
@@ -73,7 +78,7 @@ def choose(asked: str | None) -> str:
     where = "solver" if asked is not None else f"environment variable {VARIABLE}"
     name = asked if asked is not None else os.environ.get(VARIABLE) or None
     if name is None:
-        return available()[0]
+        return next(_preferred())
     there = tuple(known for known in PACKAGES if installed(known))
     if name not in PACKAGES:
         raise CaseError(where, name, f"no such solver; installed: {', '.join(there)}")

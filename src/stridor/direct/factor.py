@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import AnalysisError
-from ..typing import Array, ComplexArray, IntArray, Sparse
+from ..typing import Array, ComplexArray, Sparse
 from .backends import Backend, Breakdown, choose, start
 
 # Solvers keep a copy of the block they work on; wider blocks win nothing more.
@@ -43,11 +43,12 @@ class Factor:
     memory_bytes: int
     inertia: int | None
 
-    def __init__(self, matrix: Sparse, backend: Backend, solver: str, started: float) -> None:
+    def __init__(
+        self, matrix: Sparse, backend: Backend, solver: str, started: float, largest: tuple[Array, Array]
+    ) -> None:
         self._matrix = matrix
         self._sizes: Sparse = sp.csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
-        self._largest: Array = self._sizes.max(axis=1).toarray().ravel()
-        self._largest_transposed: Array = self._sizes.max(axis=0).toarray().ravel()
+        self._largest, self._largest_transposed = largest
         self._backend: Backend | None = backend
         self.solver = solver
         self.memory_bytes = backend.memory_bytes
@@ -195,7 +196,8 @@ def factorise(matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, 
     if not np.isfinite(held.data).all():
         raise AnalysisError("the matrix has entries that are not finite numbers")
     started = time.perf_counter()
-    empty = _empty_rows(held)
+    largest = _largest(held)
+    empty = np.flatnonzero((largest[0] == 0) | (largest[1] == 0))
     if len(empty):
         motion = np.zeros(held.shape[0])
         motion[empty[0]] = 1.0
@@ -203,13 +205,13 @@ def factorise(matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, 
     if symmetric:
         _require_symmetry(held)
     try:
-        factor = Factor(held, begin(held, symmetric, saddle), name, started)
+        factor = Factor(held, begin(held, symmetric, saddle), name, started, largest)
         ratio, motion = factor.unresisted() if held.shape[0] else (1.0, None)
     except Breakdown:
         # Enough on the diagonal to get through: solved with that, the matrix still shows what it does not resist.
-        stiffened = sp.csr_array(held + sp.diags_array(1e-3 * PERTURBED * abs(held).max(axis=1).toarray().ravel()))
+        stiffened = sp.csr_array(held + sp.diags_array(1e-3 * PERTURBED * largest[0]))
         try:
-            factor = Factor(held, begin(stiffened, symmetric, saddle), name, started)
+            factor = Factor(held, begin(stiffened, symmetric, saddle), name, started, largest)
             ratio, motion = 0.0, factor.unresisted()[1]
         except Breakdown as error:
             raise SingularMatrix("the matrix is singular: elimination meets a pivot of zero") from error
@@ -220,10 +222,14 @@ def factorise(matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, 
     return factor
 
 
-def _empty_rows(matrix: Sparse) -> IntArray:
-    largest = abs(matrix)
-    rows, columns = largest.max(axis=1).toarray().ravel(), largest.max(axis=0).toarray().ravel()
-    return np.flatnonzero((rows == 0) | (columns == 0))
+def _largest(matrix: Sparse) -> tuple[Array, Array]:
+    """The largest entries of the rows and of the columns (n,) of a matrix of rows; SciPy's own take ten times longer."""
+    size = np.abs(matrix.data)
+    rows, columns = np.zeros(matrix.shape[0]), np.zeros(matrix.shape[1])
+    filled = np.flatnonzero(np.diff(matrix.indptr))
+    rows[filled] = np.maximum.reduceat(size, matrix.indptr[filled]) if len(filled) else 0.0
+    np.maximum.at(columns, matrix.indices, size)
+    return rows, columns
 
 
 def _of(count: int) -> str:
