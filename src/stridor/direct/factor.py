@@ -223,7 +223,7 @@ def factorise(matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, 
 
 
 def _largest(matrix: Sparse) -> tuple[Array, Array]:
-    """The largest entries of the rows and of the columns (n,) of a matrix of rows; SciPy's own take ten times longer."""
+    """The largest entries of the rows and of the columns (n,); SciPy's own way takes ten times longer."""
     size = np.abs(matrix.data)
     rows, columns = np.zeros(matrix.shape[0]), np.zeros(matrix.shape[1])
     filled = np.flatnonzero(np.diff(matrix.indptr))
