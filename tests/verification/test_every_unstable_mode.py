@@ -17,7 +17,6 @@ from rubbing_block import rubbing_block
 from stridor.modal.assembled import Options
 from stridor.modal.assembled.problem import problem_of
 from stridor.modal.complex_modes import ComplexModes, complex_modes
-from stridor.modal.general.family import quadratic_of
 from stridor.modal.growing import checked_modes, checked_onsets
 from stridor.modal.onsets import Onsets, onsets
 from stridor.modal.over_friction import modes_of_band
@@ -219,8 +218,8 @@ def test_overdamped_modes_do_not_push_unstable_ones_off_the_list(tmp_path: Path)
 
 def dense_of_meshed(case: st.Case, mu: float, touching_at: float | None = None) -> np.ndarray:
     """All eigenvalues of a small meshed model with compliant contact."""
-    problem = problem_of(st.build_system(case), touching_at, Options(), damped=True)
-    q = quadratic_of(problem, mu)
+    problem = problem_of(st.build_system(case), touching_at, Options())
+    q = problem.pencil(mu).condensed()
     mass, damping, stiffness = (a.toarray() for a in (q.mass, q.damping, q.stiffness))
     inverse, unit = np.linalg.inv(mass), 2 * np.pi * case.modal.max_frequency_hz
     state = np.block(

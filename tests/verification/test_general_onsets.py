@@ -19,8 +19,8 @@ from solid_cases import bench_as_solids, case, slider
 from stridor.modal import general
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.general.family import Smooth
-from stridor.modal.general.newton import Border
 from stridor.modal.growing import checked_onsets
+from stridor.modal.newton import Border
 from stridor.modal.onsets import onsets
 from stridor.modal.quadratic import Quadratic
 from stridor.system import build_system

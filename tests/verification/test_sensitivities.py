@@ -216,7 +216,7 @@ def test_right_vectors_in_place_of_left_ones_give_other_numbers():
     linear = Linearised.of(case(slider(space=False, stiffness=1e13)), 0.6, count=8)
     column = linear.columns("unstable")[0]
     mode, change = linear.known(column), linear.change("bodies.block.thickness")
-    slope = mode.right.motion @ (2 * mode.eigenvalue * (linear.terms.mass @ mode.right.motion))
+    slope = mode.right.motion @ (2 * mode.eigenvalue * (linear.pencil.mass @ mode.right.motion))
     wrong = -change.form(mode.eigenvalue, mode.right, mode.right) / slope
     right = mode.derivative(change)
     assert abs(wrong - right) > 0.05 * abs(right)
@@ -225,7 +225,7 @@ def test_right_vectors_in_place_of_left_ones_give_other_numbers():
 @pytest.mark.parametrize("stiffness", [1e13, "rigid"])
 def test_contact_taken_away_where_it_matters_little(stiffness):
     linear = Linearised.of(case(slider(space=False, stiffness=stiffness)), 0.6, count=8, damped=False)
-    terms, place = linear.terms, len(linear.terms.compliance) - 1
+    terms, place = linear.pencil, len(linear.pencil.compliance) - 1
     kept = np.arange(place)
     mass, stiff = terms.mass.toarray(), terms.stiffness.toarray()
     normal, push = terms.normal.toarray()[kept], terms.push.toarray()[kept]
@@ -315,5 +315,5 @@ def test_solving_for_a_mode_from_a_rough_guess():
     linear = Linearised.of(case(slider(space=False)), 0.6, count=8, damped=False)
     column = linear.columns("unstable")[0]
     lam = complex(linear.eigenvalues[column])
-    again = solve_mode(linear.terms, lam * (1 + 1e-8), linear.gap(column))
+    again = solve_mode(linear.pencil, lam * (1 + 1e-8), linear.gap(column))
     assert abs(again.eigenvalue - lam) < 1e-9 * abs(lam)

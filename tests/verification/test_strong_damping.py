@@ -12,7 +12,6 @@ from benches import paper_case
 from stridor.errors import FollowingError
 from stridor.modal import source as following
 from stridor.modal.assembled.problem import problem_of
-from stridor.modal.assembled.whole import quadratic_of
 from stridor.modal.options import Options
 from stridor.modal.quadratic import find
 from stridor.modal.quadratic.dense import all_modes
@@ -37,8 +36,8 @@ def bench(damping: float, elements: tuple[int, int] = (6, 9)) -> st.Case:
 
 def dense(case: st.Case, mu: float) -> np.ndarray:
     """All eigenvalues (k,) with Im λ ≥ 0 up to the band's end, by QZ."""
-    problem = problem_of(build_system(case), mu, Options(), damped=True)
-    values = all_modes(quadratic_of(problem, mu))[0]
+    problem = problem_of(build_system(case), mu, Options())
+    values = all_modes(problem.pencil(mu).condensed())[0]
     return values[(values.imag >= 0) & (values.imag <= 2 * np.pi * case.modal.max_frequency_hz)]
 
 
@@ -70,7 +69,7 @@ def test_beyond_what_is_affordable_it_is_said(monkeypatch: pytest.MonkeyPatch) -
 
 def test_small_problems_that_discs_do_not_get_through_are_solved_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     case = bench(1e-5, (10, 20))
-    whole = quadratic_of(problem_of(build_system(case), 0.9, Options(), damped=True), 0.9)
+    whole = problem_of(build_system(case), 0.9, Options()).pencil(0.9).condensed()
     region = Region.band(0.0, case.modal.max_frequency_hz, above=-1.2e5)
     discs = monkeypatch.context
     with discs() as alone:

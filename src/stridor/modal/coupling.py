@@ -17,11 +17,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..errors import AnalysisError
 from ..sliding import full_motion, least_force, require_pressed, slip_speeds, steady_points, steady_sliding
 from ..system import System
 from ..typing import Array, ComplexArray
+from .pencil import Pencil
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,16 @@ class Coupling:
             ),
             _blocks(by_mu, -nt * (d_slope * at), -tt * self.sense, tt * (d_slope * at)),
         )
+
+    def pencil(self, mu: float) -> Pencil:
+        """P(λ) of displacements and normal forces at ``mu``."""
+        system, rows = self.system, self.system.contact_rows()
+        normal, tangent = sp.csr_array(rows[0::2]), sp.csr_array(rows[1::2])
+        damping = system.damping
+        if self.sloped and mu:
+            damping = damping + tangent.T @ sp.diags_array(self.friction_damping(mu)) @ tangent
+        push = sp.csr_array(normal + sp.diags_array(mu * self.sense) @ tangent)
+        return Pencil(system.mass, sp.csr_array(damping), system.stiffness, normal, push, self.compliance)
 
     def push(self, mu: float, lam: ComplexArray, null: ComplexArray) -> ComplexArray:
         """Contact forces on [normal, tangential] rows (k, 2m) belonging to null vectors (k, q) of T."""

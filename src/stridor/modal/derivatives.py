@@ -11,8 +11,7 @@ With left vectors yᵀP = 0 a simple eigenvalue moves with any number a that P d
 
 (Lancaster, Numerische Mathematik 6 (1964) 377–387; Seyranian and Mailybaev, Multiparameter Stability Theory with
 Mechanical Applications, World Scientific 2003). Contact forces are unknowns, so rigid contact (c = 0) is no exception.
-Each mode costs one factorisation: residual inverse iteration (Neumaier, SIAM J. Numer. Anal. 22 (1985) 914–923) with it
-for the right vector and with its transpose for the left one, and the two-sided Rayleigh functional for λ.
+Each mode costs one factorisation (`inverse_iteration`).
 """
 
 from __future__ import annotations
@@ -23,17 +22,18 @@ from dataclasses import dataclass, fields
 import numpy as np
 import scipy.sparse as sp
 
-from ..direct import Factor, SingularMatrix, factorise
+from ..direct import SingularMatrix, factorise
 from ..errors import AnalysisError, CaseError
 from ..sliding import steady_nodes
 from ..system import System
 from ..typing import Array, BoolArray, ComplexArray, IntArray, Sparse
-from .assembled.problem import times, tiny
+from .assembled.problem import problem_held
 from .assembled.steady import contact_rows, steadiness, touching_nodes
+from .inverse_iteration import Iterated, two_sided
 from .options import Options
+from .pencil import Pencil
+from .quadratic.problem import times
 
-STEPS = 14
-SETTLED = 1e-14  # relative change of λ at which the iteration ends
 BELIEVED = 1e-7  # relative change of λ, or distance from the guess, above which it has gone elsewhere
 LEAST_SHIFT, MOST_SHIFT = 1e-10, 1e-6  # of |λ|: how far beside an eigenvalue P is factorised
 WIDENED = 30.0
@@ -54,9 +54,9 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Terms:
-    """What P(λ) is made of, or how that changes per unit of a number: mass, damping, stiffness (n, n) csr, normal N and
-    push B (m, n) csr, compliance c (m,). In a change None stands for nothing."""
+class Change:
+    """How a `Pencil` changes per unit of a number, by the same names: mass, damping, stiffness (n, n) csr, normal N and
+    push B (m, n) csr, compliance c (m,); None where it does not."""
 
     mass: Sparse | None = None
     damping: Sparse | None = None
@@ -66,7 +66,7 @@ class Terms:
     compliance: Array | None = None
 
     def form(self, lam: complex, left: Pair, right: Pair) -> complex:
-        """yᵀ P(λ) x, or yᵀ (∂P/∂a) x of a change."""
+        """yᵀ (∂P/∂a) x."""
         total = 0j
         for matrix, factor in ((self.mass, lam**2), (self.damping, lam), (self.stiffness, 1.0)):
             if matrix is not None:
@@ -103,7 +103,7 @@ class Mode:
     condition: float
     residual: float
 
-    def derivative(self, change: Terms) -> complex:
+    def derivative(self, change: Change) -> complex:
         """dλ/da [1/s per unit of a] where P changes so per unit of a."""
         return -change.form(self.eigenvalue, self.left, self.right)
 
@@ -115,37 +115,23 @@ def hold(system: System, mu: float, options: Options) -> Held:
     return Held(np.flatnonzero(steady.active), steady.sense, steady.stuck, system.size, nodes.count)
 
 
-def terms_of(system: System, mu: float, held: Held, options: Options) -> Terms:
+def pencil_of(system: System, mu: float, held: Held, options: Options) -> Pencil:
     """P(λ) of a system at ``mu`` with what is held.
 
     What the law's slope, friction damping and prestress add follows the steady state of this very system. Raises
     CaseError where it has other freedoms or contact nodes than those held.
     """
-    nodes = system.contact_nodes()
-    if (system.size, nodes.count) != (held.size, held.nodes):
+    shown = system.contact_nodes()
+    if (system.size, shown.count) != (held.size, held.nodes):
         raise CaseError("parameter", None, "a number that changes neither the mesh nor who is in contact")
-    shown = nodes
-    if np.any(nodes.cubic[held.touching] > 0):
-        shown = nodes.at_force(steady_nodes(system, mu, options.solver).normal_force)
-    rows = contact_rows(shown, held.touching, held.sense, held.stuck)
-    slide = rows.slide
-    state = steadiness(system, nodes, held.touching, options, rows)
-    damping, stiffness = system.damping, system.stiffness
-    if not state.neutral and (mu or state.prestress):
-        weakening, extra, geometric = state.terms(mu)
-        if weakening is not None:
-            damping = damping + slide.T @ sp.diags_array(weakening) @ slide
-        if extra is not None:
-            damping = damping + extra
-        if geometric is not None:
-            stiffness = stiffness + geometric
-    push = sp.csr_array(rows.normal + mu * slide)
-    return Terms(system.mass, sp.csr_array(damping), sp.csr_array(stiffness), rows.normal, push, rows.compliance)
+    if np.any(shown.cubic[held.touching] > 0):
+        shown = shown.at_force(steady_nodes(system, mu, options.solver).normal_force)
+    return problem_held(system, shown, held.touching, held.sense, held.stuck, options).pencil(mu)
 
 
 def by_friction(
     system: System, mu: float, held: Held, options: Options, *, contact: str | None = None
-) -> Terms:
+) -> Change:
     """Change of P per unit of μ, of every contact or of one by name.
 
     Raises CaseError for one contact where the steady state adds terms of its own: they know a common μ only.
@@ -157,16 +143,16 @@ def by_friction(
         if contact is not None:
             accepted = "mu, of all contacts together, since the law's slope, friction damping or prestress count"
             raise CaseError(f"contacts.{contact}.friction.coefficient", None, accepted)
-        return rate_of(lambda value: terms_of(system, value, held, options), mu)[0]
+        return rate_of(lambda value: pencil_of(system, value, held, options), mu)[0]
     slide = rows.slide
     if contact is not None:
         mine = np.zeros(slide.shape[0])
         mine[: chosen.count] = chosen.owner == nodes.names.index(contact)
         slide = sp.csr_array(sp.diags_array(mine) @ slide)
-    return Terms(push=slide)
+    return Change(push=slide)
 
 
-def by_compliance(system: System, held: Held, contact: str) -> Terms:
+def by_compliance(system: System, held: Held, contact: str) -> Change:
     """Change of P per unit of the compliance 1/K_c of a contact, per area [m³/N] or of a point [m/N], rigid or not."""
     nodes = system.contact_nodes()
     chosen = nodes.select(held.touching)
@@ -177,7 +163,7 @@ def by_compliance(system: System, held: Held, contact: str) -> Terms:
     mine = (chosen.owner == nodes.names.index(contact)).astype(float)
     change = np.divide(mine, area, out=np.zeros_like(area), where=area > 0)
     sticking = contact_rows(nodes, held.touching, held.sense, held.stuck).normal.shape[0] - len(change)
-    return Terms(compliance=np.append(change, np.zeros(sticking)))
+    return Change(compliance=np.append(change, np.zeros(sticking)))
 
 
 def by_mass_at_node(mode: Mode, rows: Sparse, dimension: int) -> ComplexArray:
@@ -187,7 +173,7 @@ def by_mass_at_node(mode: Mode, rows: Sparse, dimension: int) -> ComplexArray:
 
 
 def by_release(
-    terms: Terms, mode: Mode, groups: Sequence[IntArray], gap: float, *, solver: str | None = None
+    pencil: Pencil, mode: Mode, groups: Sequence[IntArray], gap: float, *, solver: str | None = None
 ) -> ComplexArray:
     """δλ (g,) [1/s] as contact is taken away from groups of touching nodes, each (r,) of the m.
 
@@ -201,16 +187,15 @@ def by_release(
     """
     if not groups:
         return np.zeros(0, dtype=complex)
-    problem = _Bordered(terms)
+    problem, n, scale = pencil.whole, pencil.size, pencil.unit
     nodes = np.unique(np.concatenate(groups))
-    n, scale = problem.freedoms, problem.scale
     beside = 0.3j * min(gap, 1e-2 * abs(mode.eigenvalue))
-    unit = np.zeros((problem.stiffness.shape[0], len(nodes)), dtype=complex)
+    unit = np.zeros((problem.size, len(nodes)), dtype=complex)
     unit[n + nodes, np.arange(len(nodes))] = scale
     # On both sides of λ₀, so that what G changes between them cancels.
     regular = np.zeros((len(nodes), len(nodes)), dtype=complex)
     for side in (beside, -beside):
-        with factorise(problem.matrix(mode.eigenvalue + side), saddle=True, solver=solver) as factor:
+        with factorise(problem.at(mode.eigenvalue + side), saddle=True, solver=solver) as factor:
             answer = scale * factor.solve(unit)[n + nodes]
         regular += 0.5 * (answer - np.outer(mode.right.force[nodes], mode.left.force[nodes]) / side)
     found = np.zeros(len(groups), dtype=complex)
@@ -221,7 +206,7 @@ def by_release(
     return found
 
 
-def rate_of(at: Callable[[float], Terms], value: float, step: float | None = None) -> tuple[Terms, bool]:
+def rate_of(at: Callable[[float], Pencil], value: float, step: float | None = None) -> tuple[Change, bool]:
     """Change of P per unit of a number about ``value``, and whether P is affine in it.
 
     Differences over ± step (a thousandth of the value), exact for what is affine; else of fourth order, exact up to
@@ -243,23 +228,22 @@ def rate_of(at: Callable[[float], Terms], value: float, step: float | None = Non
     return _combined(((-2 / 3, low), (2 / 3, high), *farther), h), False
 
 
-def solve_mode(terms: Terms, guess: complex, gap: float, *, solver: str | None = None) -> Mode:
+def solve_mode(pencil: Pencil, guess: complex, gap: float, *, solver: str | None = None) -> Mode:
     """The mode whose eigenvalue is near ``guess``, with both vectors; gap: distance [1/s] to the nearest other one.
 
     Raises AnalysisError where two eigenvalues are one to working precision, or where the iteration goes elsewhere.
     """
-    problem = _Bordered(terms)
     size = max(abs(guess), 1e-300)
     shift = float(np.clip(0.02 * gap, LEAST_SHIFT * size, MOST_SHIFT * size))
     widest = max(min(gap / 3, 1e-2 * size), 1.01 * shift)
     while shift <= widest:
         try:
-            with factorise(problem.matrix(guess + shift), saddle=True, solver=solver) as factor:
-                found = _iterated(problem, factor, guess)
+            found = two_sided(pencil.whole, guess, None, None, beside=shift, solver=solver)
         except SingularMatrix:
             found = None
-        if found is not None and abs(found.eigenvalue - guess) <= max(BELIEVED * size, 0.3 * min(gap, 1e-3 * size)):
-            return found
+        settled = found is not None and found.change <= BELIEVED * abs(found.lam)
+        if found and settled and abs(found.lam - guess) <= max(BELIEVED * size, 0.3 * min(gap, 1e-3 * size)):
+            return _mode(pencil, found)
         shift *= WIDENED
     raise AnalysisError(
         f"the eigenvalue {guess:.6g} 1/s cannot be told from its neighbour: at an exceptional point, or of two equal "
@@ -267,87 +251,20 @@ def solve_mode(terms: Terms, guess: complex, gap: float, *, solver: str | None =
     )
 
 
-class _Bordered:
-    """P(λ) as one sparse matrix, contact forces counted in units of a typical stiffness."""
-
-    def __init__(self, terms: Terms) -> None:
-        stiffness = terms.stiffness
-        assert stiffness is not None, "only changes leave terms out"
-        self.terms = terms
-        self.freedoms = int(stiffness.shape[0])
-        assert terms.normal is not None, "only changes leave terms out"
-        assert terms.push is not None, "only changes leave terms out"
-        assert terms.compliance is not None, "only changes leave terms out"
-        m = len(terms.compliance)
-        self.scale = float(np.abs(stiffness.diagonal()).mean()) or 1.0
-        edge, corner = sp.csr_array((self.freedoms, m)), sp.csr_array((m, m))
-        self.mass, self.damping = (
-            sp.csr_array(sp.block_array([[block, edge], [edge.T, corner]])) for block in (terms.mass, terms.damping)
-        )
-        compliance = sp.diags_array(self.scale**2 * terms.compliance)
-        rows = [[stiffness, -self.scale * terms.push.T], [self.scale * terms.normal, compliance]]
-        self.stiffness = sp.csr_array(sp.block_array(rows))
-        self._sizes = tuple(abs(block) for block in (self.mass, self.damping, self.stiffness))
-
-    def matrix(self, lam: complex) -> Sparse:
-        return sp.csr_array(lam**2 * self.mass + lam * self.damping + self.stiffness)
-
-    def times(self, lam: complex, x: ComplexArray, *, left: bool = False) -> ComplexArray:
-        """P x, or Pᵀ x."""
-        blocks = (self.mass, self.damping, self.stiffness)
-        m, c, k = (_on(block.T if left else block, x) for block in blocks)
-        return lam**2 * m + lam * c + k
-
-    def slope(self, lam: complex, x: ComplexArray) -> ComplexArray:
-        """(∂P/∂λ) x."""
-        return 2 * lam * _on(self.mass, x) + _on(self.damping, x)
-
-    def backward_error(self, lam: complex, x: ComplexArray, *, left: bool) -> float:
-        mass, damping, stiffness = (size.T if left else size for size in self._sizes)
-        size, rate = np.abs(x), abs(lam)
-        terms = rate**2 * (mass @ size) + rate * (damping @ size) + stiffness @ size
-        rest = np.abs(self.times(lam, x, left=left))
-        n = self.freedoms
-        parts = [rest[:n].max() / tiny(terms[:n].max())]
-        if len(x) > n:
-            # As `ContactProblem` judges: a mode that hardly opens gaps leaves nothing but rounding there.
-            reach = max(terms[n:].max(), 1e-4 * self.scale * size[:n].max())
-            parts.append(rest[n:].max() / reach)
-        return float(max(parts))
-
-    def pair(self, x: ComplexArray) -> Pair:
-        return Pair(x[: self.freedoms], self.scale * x[self.freedoms :])
-
-
-def _iterated(problem: _Bordered, factor: Factor, lam: complex) -> Mode | None:
-    """Both vectors by residual inverse iteration from arbitrary ones; None where λ does not settle."""
-    solve = factor.solve
-    rng = np.random.default_rng(0)
-    n = problem.freedoms
-    start = rng.standard_normal((2, problem.stiffness.shape[0])) + 0j
-    start[:, n:] = 0.0
-    x, y = solve(start[0]), solve(start[1], transpose=True)
-    change, best = np.inf, np.inf
-    for step in range(STEPS):
-        x, y = x / np.linalg.norm(x[:n]), y / np.linalg.norm(y[:n])
-        slope = complex(y @ problem.slope(lam, x))
-        if slope == 0 or not (np.all(np.isfinite(x)) and np.all(np.isfinite(y))):
-            return None
-        change = -complex(y @ problem.times(lam, x)) / slope
-        lam = lam + change
-        if step > 2 and (abs(change) <= SETTLED * abs(lam) or (abs(change) < 1e-11 * abs(lam) and abs(change) >= best)):
-            break
-        best = min(best, abs(change))
-        x = x - solve(problem.times(lam, x))
-        y = y - solve(problem.times(lam, y, left=True), transpose=True)
-    if not abs(change) <= BELIEVED * abs(lam):
-        return None
-    x, y = x / np.linalg.norm(x[:n]), y / np.linalg.norm(y[:n])
-    slope = complex(y @ problem.slope(lam, x))
-    weight = problem.mass
-    size = np.sqrt(np.vdot(x, _on(weight, x)).real * np.vdot(y, _on(weight, y)).real)
-    residual = max(problem.backward_error(lam, x, left=False), problem.backward_error(lam, y, left=True))
-    return Mode(lam, problem.pair(x), problem.pair(y / slope), float(2 * abs(lam) * size / abs(slope)), residual)
+def _mode(pencil: Pencil, found: Iterated) -> Mode:
+    """The pair that was found, judged and scaled."""
+    mass, lam = pencil.whole.mass, found.lam
+    right, left, at = pencil.parted(found.right), pencil.parted(found.left), np.array([lam])
+    length = [float(np.linalg.norm(v[0])) for v in (right, left)]
+    right = right[0] / length[0], right[1] / length[0]
+    slope = found.slope / length[0]
+    size = np.sqrt(np.vdot(found.right, _on(mass, found.right)).real * np.vdot(found.left, _on(mass, found.left)).real)
+    residual = max(
+        float(judge.backward_error(at, u[:, None], sign * p[:, None])[0])
+        for judge, (u, p), sign in ((pencil, right, 1.0), (pencil.transposed, left, -1.0))
+    )
+    condition = float(2 * abs(lam) * size / abs(found.slope))
+    return Mode(lam, Pair(*right), Pair(left[0] / slope, left[1] / slope), condition, residual)
 
 
 def _on(matrix: Sparse, vector: ComplexArray) -> ComplexArray:
@@ -355,23 +272,23 @@ def _on(matrix: Sparse, vector: ComplexArray) -> ComplexArray:
     return times(matrix, vector)
 
 
-def _combined(parts: tuple[tuple[float, Terms], ...], step: float) -> Terms:
+def _combined(parts: tuple[tuple[float, Pencil], ...], step: float) -> Change:
     """Σ weight · terms / step."""
     found = {}
-    for field in fields(Terms):
-        values = [weight / step * getattr(terms, field.name) for weight, terms in parts]
+    for field in fields(Change):
+        values = [weight / step * getattr(pencil, field.name) for weight, pencil in parts]
         total = sum(values[1:], start=values[0])
         if sp.issparse(total):
             total = sp.csr_array(total)
             total.eliminate_zeros()
         found[field.name] = total
-    return Terms(**found)
+    return Change(**found)
 
 
-def _is_affine(low: Terms, middle: Terms, high: Terms) -> bool:
-    """Whether equally spaced terms lie on a line, to rounding."""
-    for field in fields(Terms):
-        a, b, c = (getattr(terms, field.name) for terms in (low, middle, high))
+def _is_affine(low: Pencil, middle: Pencil, high: Pencil) -> bool:
+    """Whether equally spaced pencils lie on a line, to rounding."""
+    for field in fields(Change):
+        a, b, c = (getattr(pencil, field.name) for pencil in (low, middle, high))
         size, first, second = (_largest(v) for v in (b, c - a, a - 2 * b + c))
         if second > AFFINE * first + 1e-14 * size:
             return False

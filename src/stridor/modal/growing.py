@@ -20,7 +20,6 @@ from ..system import System
 from ..threads import one_thread_if_small
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .assembled.problem import problem_of
-from .assembled.whole import quadratic_of
 from .complex_modes import complex_modes
 from .general.growth import growing_roots
 from .onset import refuted
@@ -89,11 +88,11 @@ def growing_modes(
 def _searched_for(
     system: System, mu: float, max_frequency_hz: float, touching_at: float | None, damped: bool, options: Options
 ) -> Growing:
-    problem = problem_of(system if damped else system.undamped(), touching_at, options, damped=damped)
-    whole = quadratic_of(problem, mu)
+    problem = problem_of(system if damped else system.undamped(), touching_at, options)
+    whole = problem.pencil(mu).condensed()
     top = searched(whole, 2 * np.pi * max_frequency_hz)
     found = band_modes(
-        whole, top / (2 * np.pi), above=-BESIDE * top, still=quadratic_of(problem, 0.0),
+        whole, top / (2 * np.pi), above=-BESIDE * top, still=problem.pencil(0.0).condensed(),
         solver=options.solver,
     )  # fmt: skip
     size = np.abs(found.values)

@@ -6,13 +6,15 @@ from typing import Literal
 
 import numpy as np
 
+from ..direct import SingularMatrix
 from ..errors import AnalysisError
 from ..system import System
 from ..system.uncoupled import uncoupled_modes
 from ..typing import Array, ComplexArray, IntArray
 from .backward_error import BackwardError
 from .coupling import Coupling, couple
-from .refinement import refine
+from .inverse_iteration import two_sided
+from .pencil import Pencil
 from .results import ComplexModes, Progress, require_memory
 from .roots import Spectrum, spectrum_of
 from .tracking import Tracker
@@ -21,6 +23,8 @@ from .vectors import expand, fixed_vectors, modal_coordinates
 
 CHUNK = 256
 DOUBTFUL = 1e-11  # backward errors above it are refined on the assembled matrices
+BESIDE = 1e-10  # of λ: how far beside it that is, so that an exact eigenvalue can be factorised too
+NEARBY = 1e-6  # of λ: what is found further away is another one
 
 
 def prepare(system: System, *, mu: float | None = None) -> tuple[Spectrum, Coupling, tuple[str, ...]]:
@@ -136,10 +140,34 @@ def _left_of_fixed(coupling: Coupling, lam: ComplexArray, right: ComplexArray, m
 
     Friction works on the modes' tangential motion, so the left vectors do meet the contacts.
     """
-    left = np.array(right)
+    left, pencil = np.array(right), coupling.pencil(mu)
     for k in range(len(lam)):
-        left[:, k] = refine(coupling, complex(lam[k]), right[:, k], right[:, k], mu)[2]
+        left[:, k] = _refined(pencil, complex(lam[k]), right[:, k], right[:, k])[2]
     return left
+
+
+def _refined(
+    pencil: Pencil, lam: complex, right: ComplexArray, left: ComplexArray
+) -> tuple[complex, ComplexArray, ComplexArray]:
+    """λ and unit right and left vectors (n,) sharpened on the matrices, where the modal sum has lost digits.
+
+    A root that almost coincides with a pole of the receptance (a mode that hardly feels its contact) makes T the small
+    difference of large numbers.
+    """
+    n = pencil.size
+    forces = np.zeros(pencil.nodes)
+    # Some of every direction: on a pole the modal sum may lack the very one that is sought.
+    spread = np.random.default_rng(0).standard_normal(n) / np.sqrt(n)
+    given = (np.append(spread if not np.all(np.isfinite(v)) else v + 1e-3 * spread, forces) for v in (right, left))
+    try:
+        found = two_sided(pencil.whole, lam, *given, beside=BESIDE * lam)
+    except SingularMatrix:
+        return lam, right, left
+    if found is None:
+        return lam, right, left
+    x, y = found.right[:n], found.left[:n]
+    better = found.lam if abs(found.lam - lam) <= NEARBY * abs(lam) else lam
+    return better, x / np.linalg.norm(x), y / np.linalg.norm(y)
 
 
 def _pairs(
@@ -172,9 +200,8 @@ def _pairs(
             left[:, chosen] = expand(spectrum, lam[part[chosen]], pull[part[chosen]])
         for k in doubtful:
             at = part[k]
-            value, x, y = refine(
-                spectrum.coupling, complex(lam[at]), right[:, k], left[:, k], float(each[at])
-            )
+            pencil = spectrum.coupling.pencil(float(each[at]))
+            value, x, y = _refined(pencil, complex(lam[at]), right[:, k], left[:, k])
             error = float(judge(np.array([value]), x[:, None], each[at])[0])
             if error < errors[at] or not np.isfinite(errors[at]):
                 errors[at], lam[at], right[:, k], left[:, k] = error, value, x, y

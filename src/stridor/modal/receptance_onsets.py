@@ -8,7 +8,6 @@ the bordered sense; a damped onset is a simple root λ = jω; divergence is λ =
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -16,10 +15,13 @@ from ..errors import AnalysisError
 from ..system import System
 from ..typing import BoolArray, ComplexArray
 from .backward_error import BackwardError
-from .bordered import Bordered
 from .coupling import Coupling
+from .general.family import Family
 from .histories import Change, Entries, reported, unexplained
+from .inverse_iteration import null_vectors
+from .newton import Root, crossing, exceptional, meeting, standstill
 from .onset import Branches, Onset, Onsets
+from .options import Options
 from .receptance_modes import prepare, unfit_words
 from .results import grows
 from .roots import Spectrum
@@ -28,6 +30,7 @@ from .tracking import State, Tracker
 from .unfit import Unfit
 
 NARROWINGS = 8
+STILL = 1e-6  # of |λ|: what swings slower diverges
 
 
 @dataclass(frozen=True)
@@ -80,9 +83,10 @@ def onsets_by_receptance(
     start = tracker.advance(low)
     end = tracker.advance(high)
     order = _numbering(spectrum, tracker.origin)
-    judge = BackwardError(coupling)
+    judge, family = BackwardError(coupling), _PointFamily(coupling, (0.0, high))
     changes = [
-        Change(event.mu, _concerned(event), _located(spectrum, judge, event, order, has_damping)) for event in events
+        Change(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping))
+        for event in events
     ]
     return Onsets(
         tuple(reported(changes, entries, (low, high), max_frequency_hz)),
@@ -99,6 +103,25 @@ def onsets_by_receptance(
         ),
         followed=(_numbered(start, spectrum, order), _numbered(end, spectrum, order)),
     )
+
+
+class _PointFamily(Family):
+    """The problem of point contacts over μ, their normal forces unknowns behind the displacements."""
+
+    def __init__(self, coupling: Coupling, between: tuple[float, float]) -> None:
+        super().__init__(between, lambda mu: coupling.pencil(mu).whole, Options())
+        self._coupling = coupling
+
+    @property
+    def freedoms(self) -> int:
+        """Number of freedoms n."""
+        return self._coupling.system.size
+
+    def backward_error(self, mu: float, lam: complex, x: ComplexArray) -> float:
+        """Backward error of λ, x (n + m,), the contacts' own equations judged by themselves."""
+        pencil = self._coupling.pencil(mu)
+        u, p = pencil.parted(x[:, None])
+        return float(pencil.backward_error(np.array([lam]), u, p)[0])
 
 
 def _numbered(state: State, spectrum: Spectrum, order: dict[int, int]) -> Branches:
@@ -218,11 +241,11 @@ def _axis_crossings(start: float, end: float, slope0: float, slope1: float) -> l
 
 
 def _located(
-    spectrum: Spectrum, judge: BackwardError, event: _Event, order: dict[int, int], has_damping: bool
+    spectrum: Spectrum, family: Family, judge: BackwardError, event: _Event, order: dict[int, int], has_damping: bool
 ) -> Onset | None:
     """The onset inside an enclosed passage; where Newton strays, the passage is enclosed more closely."""
     for _ in range(NARROWINGS):
-        onset = _solve(spectrum.coupling, judge, event, order, has_damping)
+        onset = _solve(family, judge, event, order, has_damping)
         if onset is not None:
             reach = 0.5 * (event.new.mu - event.old.mu) + 1e-9
             near = event.old.mu - reach <= onset.mu <= event.new.mu + reach
@@ -258,51 +281,44 @@ def _narrowed(spectrum: Spectrum, event: _Event, has_damping: bool) -> _Event | 
 
 
 def _solve(
-    coupling: Coupling, judge: BackwardError, event: _Event, order: dict[int, int], has_damping: bool
+    family: Family, judge: BackwardError, event: _Event, order: dict[int, int], has_damping: bool
 ) -> Onset | None:
     """Newton on the assembled matrices from an enclosed passage; None where it was no passage."""
-    bordered = Bordered(coupling, event.root if abs(event.root) > 0 else 0j, event.mu)
     partner = order[event.partner] if event.partner >= 0 else order[event.branch]
     branches = (min(order[event.branch], partner), max(order[event.branch], partner))
-    root: float | None = None
-    slope: float | None = None
-    exceptional: complex | None = None
-    if not event.double:
-        answer = bordered.crossing(event.root, event.mu)
-        if answer is None:
-            return None
-        omega, mu, slope = answer
-        lam = 1j * omega
-        kind: Literal["flutter", "divergence"] = (
-            "divergence" if abs(omega) < 1e-6 * max(abs(event.root), 1.0) else "flutter"
-        )
-        near = None if kind == "divergence" else bordered.double_root(lam, mu, real=False)
-        if near is not None and abs(near[1] - mu) < 0.5 * max(mu, 1e-3):
-            exceptional, root = complex(near[1]), near[2]
-        stabilising = slope < 0
-    elif event.partner < 0:
-        mu = bordered.static(event.mu)
-        if mu is None:
-            return None
-        lam, kind, stabilising = 0j, "divergence", event.stabilising
-        root = bordered.divergence_coefficient(mu)
-    else:
-        double = bordered.double_root(event.root, event.mu, real=True)
-        if double is None:
-            return None
-        lam, mu, root = 1j * double[0].imag, float(np.real(double[1])), double[2]
-        kind, stabilising = "flutter", event.stabilising
-    vector = bordered.vector(lam, mu)
-    residual = float(judge(np.array([lam]), vector[:, None], mu)[0])
+    lam, mu = complex(event.root), min(max(event.mu, family.low), family.high)
+    # What has no partner but its own conjugate may diverge.
+    still = event.partner < 0 or abs(lam.imag) <= STILL * abs(lam)
+    between = (event.old.mu, event.new.mu)
+    root: Root | None = None
+    root_coefficient: float | None = None
+    exceptional_mu: complex | None = None
+    if still and (vectors := null_vectors(family.at(mu), 0j)):
+        root = standstill(family, mu, *vectors, between)
+    if root is None and not (event.double and still) and (vectors := null_vectors(family.at(mu), lam)):
+        if event.double:
+            root = meeting(family, mu, lam, *vectors, between)
+        else:
+            root = crossing(family, mu, lam, *vectors, between)
+            near = None if root is None else exceptional(family, root.mu, root.lam, *vectors, 0.5 * max(root.mu, 0.1))
+            if root is not None and near is not None and abs(near[0] - root.mu) < 0.5 * max(root.mu, 1e-3):
+                kappa = np.sqrt(near[2])
+                exceptional_mu, root_coefficient = near[0], float(max(abs(kappa.real), abs(kappa.imag)))
+    if root is None:
+        return None
+    if root.square is not None:
+        root_coefficient = float(np.sqrt(abs(root.square)))
+    shape = root.vector[: family.freedoms]
+    residual = float(judge(np.array([root.lam]), (shape / np.linalg.norm(shape))[:, None], root.mu)[0])
     return Onset(
-        mu=float(mu),
-        frequency_hz=abs(lam.imag) / (2 * np.pi),
-        kind=kind,
+        mu=root.mu,
+        frequency_hz=abs(root.lam.imag) / (2 * np.pi),
+        kind="flutter" if root.lam else "divergence",
         damped=has_damping,
-        stabilising=bool(stabilising),
+        stabilising=event.stabilising if root.slope is None else root.slope < 0,
         branches=branches,
         residual=residual,
-        square_root_coefficient=root,
-        growth_slope=slope,
-        exceptional_mu=exceptional,
+        square_root_coefficient=root_coefficient,
+        growth_slope=root.slope,
+        exceptional_mu=exceptional_mu,
     )

@@ -10,9 +10,10 @@ import numpy as np
 from ..case import Case
 from ..errors import AnalysisError
 from ..modal.assembled.steady import touching_nodes
-from ..modal.derivatives import Held, Mode, Terms, by_friction, rate_of, solve_mode, terms_of
+from ..modal.derivatives import Held, Mode, by_friction, pencil_of, rate_of, solve_mode
 from ..modal.onsets import Onset, onsets
 from ..modal.options import Options
+from ..modal.pencil import Pencil
 from ..system import System, build_system
 from .options import options_of
 from .sensitivities import number_at
@@ -83,14 +84,14 @@ def onset_slopes(case: Case, system: System, onset: Onset, paths: Sequence[str])
     options = options_of(case)
     mu = onset.mu
     held = _held(system, options)
-    terms = terms_of(system, mu, held, options)
+    pencil = pencil_of(system, mu, held, options)
     lam = 2j * np.pi * onset.frequency_hz
     if not abs(lam):
         raise AnalysisError("divergence at zero frequency; slopes of flutter onsets only")
     # How far the other mode of the meeting is: growth opens as κ √(μ − μ_e).
     point, kappa = onset.exceptional_mu, onset.square_root_coefficient
     gap = 2 * kappa * abs(mu - point) ** 0.5 if point is not None and kappa is not None else 1e-3 * abs(lam)
-    mode = solve_mode(terms, lam, min(gap, abs(lam)), solver=options.solver)
+    mode = solve_mode(pencil, lam, min(gap, abs(lam)), solver=options.solver)
     by_mu = mode.derivative(by_friction(system, mu, held, options)).real
     if by_mu == 0.0:
         raise AnalysisError("growth does not change with friction there")
@@ -106,7 +107,7 @@ def _held(system: System, options: Options) -> Held:
 
 
 def _derivative(case: Case, mode: Mode, path: str, mu: float, held: Held, options: Options) -> complex:
-    def at(value: float) -> Terms:
-        return terms_of(build_system(case.with_({path: value})), mu, held, options)
+    def at(value: float) -> Pencil:
+        return pencil_of(build_system(case.with_({path: value})), mu, held, options)
 
     return mode.derivative(rate_of(at, number_at(case, path))[0])

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..modal.derivatives import Mode, Terms, by_mass_at_node, by_release
+from ..modal.derivatives import Change, Mode, by_mass_at_node, by_release
 from ..system import System
 from ..system.bodies import build_bodies
 from ..system.model import Line, Solid
@@ -78,7 +78,7 @@ class Ranking:
             return []
         moved = np.array(
             [
-                by_release(linear.terms, m, groups, linear.gap(b), solver=linear.options.solver)
+                by_release(linear.pencil, m, groups, linear.gap(b), solver=linear.options.solver)
                 for m, b in zip(self.modes, self.columns, strict=True)
             ]
         )
@@ -132,7 +132,7 @@ def drawn_bodies(system: System) -> list[tuple[Line | Solid, Array, int]]:
     return lines + [(solid, solid.points, solid.points.shape[1]) for solid in system.solids]
 
 
-def _derivatives(modes: Sequence[Mode], change: Terms) -> ComplexArray:
+def _derivatives(modes: Sequence[Mode], change: Change) -> ComplexArray:
     """dλ/dp (b,)."""
     return np.array([m.derivative(change) for m in modes], dtype=complex)
 

@@ -14,10 +14,11 @@ from ..case.overrides import split_path
 from ..digits import measured
 from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
-from ..modal.derivatives import Mode, Terms, by_compliance, by_friction, hold, rate_of, solve_mode, terms_of
+from ..modal.derivatives import Change, Mode, by_compliance, by_friction, hold, pencil_of, rate_of, solve_mode
 from ..modal.growing import doubt
 from ..modal.options import Options
 from ..modal.over_friction import modes_of_band
+from ..modal.pencil import Pencil
 from ..system import System, build_system
 from ..typing import Array, ComplexArray, IntArray
 from .asked import require_frequency
@@ -222,7 +223,7 @@ def sensitivities(
     return replace(result, warnings=(*told, *_divergence(result)))
 
 
-def _derivatives(found: Sequence[Mode], changes: Sequence[Terms]) -> ComplexArray:
+def _derivatives(found: Sequence[Mode], changes: Sequence[Change]) -> ComplexArray:
     """dλ/dp (k, b)."""
     table = [[mode.derivative(change) for mode in found] for change in changes]
     return np.array(table, dtype=complex).reshape(len(changes), len(found))
@@ -270,7 +271,7 @@ class Linearised:
         self.case, self.system, self.mu, self.modes, self.options = case, system, mu, modes, options
         self.eigenvalues: ComplexArray = modes.eigenvalues[0]
         self.held = hold(system, mu, options)
-        self.terms = terms_of(system, mu, self.held, options)
+        self.pencil = pencil_of(system, mu, self.held, options)
         doubtful = doubt(modes.completeness[0]) if modes.completeness else ""
         self.warnings: list[str] = [f"modes at μ = {mu:g}: {doubtful}"] if doubtful else []
         self._solved: dict[int, Mode | None] = {}
@@ -309,7 +310,7 @@ class Linearised:
             return 0.0 if stiffness == "rigid" else 1.0 / stiffness
         return number_at(self.case, path)
 
-    def change(self, path: str, step: float | None = None) -> Terms:
+    def change(self, path: str, step: float | None = None) -> Change:
         """What the number at a path does to the matrices, per unit of it."""
         contact = _contact_of(self.case, path)
         if path == "mu":
@@ -319,8 +320,8 @@ class Linearised:
         if contact and path.endswith(".compliance"):
             return by_compliance(self.system, self.held, contact)
 
-        def at(value: float) -> Terms:
-            return terms_of(self.built(self.case.with_({path: value})), self.mu, self.held, self.options)
+        def at(value: float) -> Pencil:
+            return pencil_of(self.built(self.case.with_({path: value})), self.mu, self.held, self.options)
 
         try:
             return rate_of(at, self.value(path), step)[0]
@@ -368,7 +369,7 @@ class Linearised:
                 if self.gap(column) <= REPEATED * abs(lam):
                     raise AnalysisError("two eigenvalues are equal, and derivatives belong to neither")
                 solver = self.options.solver
-                self._solved[column] = solve_mode(self.terms, lam, self.gap(column), solver=solver)
+                self._solved[column] = solve_mode(self.pencil, lam, self.gap(column), solver=solver)
             except AnalysisError as error:
                 self.warnings.append(f"{name} is left out: {error}")
                 self._solved[column] = None

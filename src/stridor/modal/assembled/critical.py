@@ -12,26 +12,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
+import scipy.linalg as sl
 
 from ...errors import CaseError
 from ...system import System
 from ...threads import one_thread_if_small
 from ...typing import BoolArray, ComplexArray, IntArray
+from ..dense_problem import DenseProblem, Eigenpairs
 from ..histories import Change, Entries, reported, unexplained
+from ..newton import crossing as on_axis
+from ..newton import exceptional
 from ..onset import Onset, Onsets
 from ..options import Options
 from ..quadratic.reach import searched
 from ..results import grows
 from ..tolerances import BELIEVED, UNSTABLE_RELATIVE
 from .follow import Follower, State, halves
-from .local import Surroundings, axis_crossing, double_eigenvalue
 from .modes import samples
 from .passages import Passage, crossings, meetings
 from .problem import problem_of
-from .reduced import Eigenpairs, Reduced
+from .reduced import Reduced
 from .refine import Band, projected, settle
 from .shifted import real_columns
-from .whole import quadratic_of
 
 FOLLOW = 1.1  # times the band: from where branches are followed
 MOST_ABOVE = 1.25  # times that: onsets above the band are solved for up to there
@@ -39,6 +41,7 @@ SAMPLES = 9
 ROUNDS = 6
 ONSET_TOLERANCE = 1e-12  # backward error at which an onset counts as found
 CLEARLY_ABOVE = 1.02
+NEIGHBOURS = 12  # eigenvectors that span the surroundings of an eigenvalue
 NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
 
 
@@ -63,12 +66,12 @@ def onsets_assembled(
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     if not damped:
         system = system.undamped()
-    problem = problem_of(system, None, options or Options(), damped=damped, frictions=np.linspace(0.0, high, 50))
+    problem = problem_of(system, None, options or Options(), frictions=np.linspace(0.0, high, 50))
     if not problem.nodes:
         return Onsets((), (low, high), max_frequency_hz, problem.damped, problem.open_contacts)
-    top = searched(quadratic_of(problem, high), 2 * np.pi * max_frequency_hz)
+    top = searched(problem.pencil(high).condensed(), 2 * np.pi * max_frequency_hz)
     # Modes that start above the band may meet inside it.
-    reduced = projected(problem, Band(1, top * follow))
+    reduced = projected(problem, Band(1, top * follow), high)
     settle(reduced, samples(high, SAMPLES))
     way = _way(reduced, (low, high), top)
     changes: list[Change] = []
@@ -123,7 +126,7 @@ def _way(reduced: Reduced, between: tuple[float, float], top: float) -> _Way:
     entries = Entries(top)
 
     def watch(old: State, new: State) -> None:
-        passages.extend(crossings(old, new) if reduced.problem.damped else meetings(reduced, old, new))
+        passages.extend(crossings(old, new) if reduced.damped else meetings(reduced, old, new))
         entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.place)))
 
     follower = Follower(reduced, longest=max(between[0] / 4, between[1] / 30))
@@ -168,13 +171,13 @@ def _located(
         if solved is None or not _is_wanted(solved, wanted, 1.001 * max_frequency_hz, slack=1e-3):
             break
         lam = np.array([solved.lam])
-        u, p = reduced.expand(reduced.null_vector(solved.lam, solved.mu)[:, None])
-        error = float(problem.backward_error(lam, u, p, solved.mu)[0])
+        u, p = reduced.expand(reduced.null_vectors(solved.lam, solved.mu)[0][:, None])
+        error = float(problem.pencil(solved.mu).backward_error(lam, u, p)[0])
         if best is None or error < best[0]:
             best = error, solved
         if error <= ONSET_TOLERANCE:
             break
-        rest = problem.residual(lam, u, p, solved.mu)
+        rest = problem.pencil(solved.mu).residual(lam, u, p)
         if not reduced.enrich(real_columns(rest)):
             break
     if best is None or best[0] > BELIEVED:
@@ -205,7 +208,7 @@ def _onset(reduced: Reduced, passage: Passage, solved: Solved, error: float) -> 
         mu=solved.mu,
         frequency_hz=abs(solved.lam.imag) / (2 * np.pi),
         kind="divergence" if still else "flutter",
-        damped=reduced.problem.damped,
+        damped=reduced.damped,
         stabilising=stabilising,
         branches=(first, second),
         residual=error,
@@ -234,7 +237,7 @@ def pair_near(coordinate: ComplexArray, place: complex) -> tuple[complex, comple
     return halves(*coordinate[near])
 
 
-def _meeting(reduced: Reduced, passage: Passage) -> Solved | None:
+def _meeting(reduced: DenseProblem, passage: Passage) -> Solved | None:
     """Where two undamped modes meet: their squared half difference passes through zero, with a finite slope."""
     width = passage.high - passage.low
     quick = _quick_meeting(reduced, passage)
@@ -260,12 +263,13 @@ def _meeting(reduced: Reduced, passage: Passage) -> Solved | None:
     return Solved(mu, 1j * omega, float(np.sqrt(abs(slope)) / (2 * omega)))
 
 
-def _quick_meeting(reduced: Reduced, passage: Passage) -> Solved | None:
+def _quick_meeting(reduced: DenseProblem, passage: Passage) -> Solved | None:
     """The same by Newton from the middle of the passage; None where that does not settle inside it."""
     mean = (passage.means[0] + passage.means[1]) / 2
     if not mean.real < 0:
         return None
-    found = double_eigenvalue(reduced, (passage.low + passage.high) / 2, 1j * np.sqrt(-mean.real))
+    lam, mu = 1j * np.sqrt(-mean.real), (passage.low + passage.high) / 2
+    found = exceptional(reduced, mu, lam, *reduced.null_vectors(lam, mu), reach=passage.high - passage.low)
     if found is None:
         return None
     mu, lam, square = found
@@ -282,7 +286,7 @@ def _quick_meeting(reduced: Reduced, passage: Passage) -> Solved | None:
     return Solved(float(mu.real), 1j * abs(lam.imag), float(np.sqrt(opens)))
 
 
-def _divergence(reduced: Reduced, passage: Passage) -> Solved | None:
+def _divergence(reduced: DenseProblem, passage: Passage) -> Solved | None:
     """Where λ² of an undamped mode passes through zero."""
 
     def square(mu: float) -> float:
@@ -298,7 +302,7 @@ def _divergence(reduced: Reduced, passage: Passage) -> Solved | None:
     return Solved(mu, 0j, float(np.sqrt(abs(slope))))
 
 
-def crossing(reduced: Reduced, passage: Passage) -> Solved | None:
+def crossing(reduced: DenseProblem, passage: Passage) -> Solved | None:
     """Where the growth rate of a damped mode passes through zero."""
     found = _quick_crossing(reduced, passage)
     if found is None:
@@ -313,17 +317,16 @@ def crossing(reduced: Reduced, passage: Passage) -> Solved | None:
     return Solved(mu, 0j if still else lam, None, slope)
 
 
-def _crossing_again(reduced: Reduced, passage: Passage, solved: Solved) -> Solved | None:
+def _crossing_again(reduced: DenseProblem, passage: Passage, solved: Solved) -> Solved | None:
     """The same crossing with the basis as it is now, from where it was; None where it has gone."""
     right, left = reduced.null_vectors(solved.lam, solved.mu)
-    found = axis_crossing(reduced, solved.mu, solved.lam, right, left, passage.low, passage.high)
-    if found is None or (found[2] < 0) != passage.stabilising:
+    root = on_axis(reduced, solved.mu, solved.lam, right, left, (passage.low, passage.high))
+    if root is None or root.slope is None or (root.slope < 0) != passage.stabilising:
         return None
-    mu, lam, slope = found
-    return Solved(mu, 0j if abs(lam) <= NEAR_AXIS * reduced.frequency else 1j * lam.imag, None, slope)
+    return Solved(root.mu, 0j if abs(root.lam) <= NEAR_AXIS * reduced.frequency else root.lam, None, root.slope)
 
 
-def _quick_crossing(reduced: Reduced, passage: Passage) -> tuple[float, complex, float] | None:
+def _quick_crossing(reduced: DenseProblem, passage: Passage) -> tuple[float, complex, float] | None:
     """μ, λ on the axis and the growth's slope, following this one mode only; None where that does not settle inside."""
     start = passage.old
     place = int(start.place[passage.branch])
@@ -333,25 +336,18 @@ def _quick_crossing(reduced: Reduced, passage: Passage) -> tuple[float, complex,
         ahead = -lam.real / tangent.real
     width = passage.high - passage.low
     ahead = float(np.clip(ahead, 0.0, width)) if np.isfinite(ahead) else 0.5 * width
-    found = axis_crossing(
-        reduced,
-        start.mu + ahead,
-        lam + tangent * ahead,
-        right,
-        left,
-        passage.low,
-        passage.high,
+    root = on_axis(
+        reduced, start.mu + ahead, lam + tangent * ahead, right, left, (passage.low, passage.high)
     )
-    if found is None:
+    if root is None or root.slope is None:
         return None
-    mu, lam, slope = found
     slack = 0.05 * width
-    if not passage.low - slack <= mu <= passage.high + slack or (slope < 0) != passage.stabilising:
+    if not passage.low - slack <= root.mu <= passage.high + slack or (root.slope < 0) != passage.stabilising:
         return None
-    return mu, 1j * lam.imag, slope
+    return root.mu, root.lam, root.slope
 
 
-def _slow_crossing(reduced: Reduced, passage: Passage, start: State) -> tuple[float, complex, float] | None:
+def _slow_crossing(reduced: DenseProblem, passage: Passage, start: State) -> tuple[float, complex, float] | None:
     """The same by bisection on all branches."""
 
     def at(mu: float) -> State:
@@ -364,7 +360,7 @@ def _slow_crossing(reduced: Reduced, passage: Passage, start: State) -> tuple[fl
     return mu, 1j * float(state.values[passage.branch].imag), float(state.tangents[passage.branch].real)
 
 
-def _by_growth(reduced: Reduced, passage: Passage) -> tuple[float, complex, float] | None:
+def _by_growth(reduced: DenseProblem, passage: Passage) -> tuple[float, complex, float] | None:
     """The same where two modes all but meet and which is which cannot be told: where the fastest of those about them
     begins, or ceases, to grow."""
     begin = complex(passage.old.values[passage.branch])
@@ -394,7 +390,7 @@ def _by_growth(reduced: Reduced, passage: Passage) -> tuple[float, complex, floa
     return mu, 1j * lam.imag, slope
 
 
-def _again(reduced: Reduced, passage: Passage) -> State | None:
+def _again(reduced: DenseProblem, passage: Passage) -> State | None:
     """The state before a passage with the basis as it is now."""
     found = reduced.eigenpairs(passage.low)
     if passage.old.found is found:
@@ -405,22 +401,48 @@ def _again(reduced: Reduced, passage: Passage) -> State | None:
     return State(found, place) if near else None
 
 
-def exceptional_point(reduced: Reduced, state: State, lam: complex, mu: float) -> tuple[complex, float] | None:
+def exceptional_point(reduced: DenseProblem, state: State, lam: complex, mu: float) -> tuple[complex, float] | None:
     """The complex μ beside an onset at which two modes meet, and κ of λ ≈ λ_c ± κ √(μ − μ_c).
 
     Sought with the modes nearby at a state before it, then solved for. None where it is further away than half the
     onset's μ.
     """
     reach = 0.5 * max(mu, 1e-3)
-    near = _Halves(Surroundings(reduced, state.found, lam).values, lam)
+    near = _Halves(_Surroundings(reduced, state.found, lam).values, lam)
     rough = _zero(near.square, mu, complex(mu), reach, 1e-8)
     if rough is None:
         return None
-    found = double_eigenvalue(reduced, rough, near.centre)
+    right, left = reduced.null_vectors(near.centre, rough)
+    found = exceptional(reduced, rough, near.centre, right, left, reach=reach)
     if found is None or abs(found[0] - mu) > reach or abs(found[1] - lam) > 0.5 * abs(lam):
         return None
     root = np.sqrt(found[2])
     return (found[0], float(max(abs(root.real), abs(root.imag)))) if np.isfinite(root) else None
+
+
+class _Surroundings:
+    """The projected problem on the eigenvectors nearest to one λ at one μ, right and left (r, q): exact there, and what
+    these modes do to each other as μ changes is in it."""
+
+    def __init__(self, reduced: DenseProblem, found: Eigenpairs, lam: complex) -> None:
+        near = np.argsort(np.abs(found.values - lam))[:NEIGHBOURS]
+        self.reduced = reduced
+        self.right, self.left = (
+            v / np.linalg.norm(v, axis=0)
+            for v in (reduced.padded(found, found.right[:, near]), reduced.padded(found, found.left[:, near]))
+        )
+
+    def values(self, mu: complex) -> ComplexArray:
+        """Eigenvalues (2q,) [1/s] at a real or complex μ."""
+        mass, damping, stiffness = (self.left.T @ (np.asarray(m) @ self.right) for m in self.reduced.matrices(mu))
+        # Scaled by a typical frequency so that the companion is balanced.
+        unit = self.reduced.frequency
+        size = len(mass)
+        first = np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -unit * damping]])
+        second = sl.block_diag(np.eye(size), unit**2 * mass)
+        with np.errstate(all="ignore"):
+            found: ComplexArray = sl.eigvals(first, second) * unit
+        return found[np.isfinite(found)]
 
 
 class _Halves:

@@ -12,8 +12,9 @@ from ...errors import CaseError
 from ...system import System
 from ...typing import Array, ComplexArray, Sparse
 from ..options import Options
+from ..quadratic.problem import times
 from ..results import ComplexModes
-from .problem import ContactProblem, problem_of, times
+from .problem import ContactProblem, problem_of
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ def friction_energy(
     if lam.imag == 0.0:
         raise CaseError("mode", mode, "this mode does not oscillate; give one with a frequency")
     used = system if modes.damped else system.undamped()
-    problem = problem_of(used, mu if len(modes.mu) == 1 else None, options or Options(), damped=modes.damped)
+    problem = problem_of(used, mu if len(modes.mu) == 1 else None, options or Options())
     p = contact_forces(problem, lam, u, mu)
     extras = problem.at(mu)
     slip = times(problem.slide, u)[:, 0]
@@ -63,8 +64,7 @@ def friction_energy(
         return float(np.vdot(u, times(matrix, u)).real)
 
     compliance = float(np.sum(problem.compliance * np.abs(p[:, 0]) ** 2))
-    stiffness = problem.stiffness if extras.stiffness is None else problem.stiffness + extras.stiffness
-    energy = (size * form(problem.mass) + form(stiffness) + compliance) / 4
+    energy = (size * form(problem.mass) + form(problem.pencil(mu).stiffness) + compliance) / 4
     damping = 0.5 * size * form(problem.damping)
     if extras.damping is not None:
         damping += 0.5 * size * form(extras.damping)
@@ -81,8 +81,8 @@ def contact_forces(problem: ContactProblem, lam: complex, u: ComplexArray, mu: f
     p[soft] = -times(problem.normal, u)[soft] / problem.compliance[soft, None]
     if soft.all():
         return p
-    rest = problem.residual(np.array([lam]), u, p, mu)
-    push = sp.csr_array((problem.normal + mu * problem.slide)[~soft])
+    pencil = problem.pencil(mu)
+    rest, push = pencil.residual(np.array([lam]), u, p), pencil.push[~soft]
     with factorise(sp.csr_array(push @ push.T), symmetric=True) as factor:
         p[~soft] = factor.solve(times(push, rest))
     return p

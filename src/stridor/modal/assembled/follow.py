@@ -14,8 +14,8 @@ import numpy as np
 import scipy
 
 from ...typing import Array, BoolArray, ComplexArray, IntArray
+from ..dense_problem import Eigenpairs, OverNumber
 from ..meeting import beyond
-from .reduced import Eigenpairs, Reduced
 
 CLEAR = 0.3  # an eigenvalue is the predicted one if it is this much nearer than any other
 ALIKE = 0.5  # and its shape has at least this much in common
@@ -65,26 +65,26 @@ class Follower:
 
     def __init__(
         self,
-        reduced: Reduced,
+        source: OverNumber,
         *,
         longest: float = 0.05,
         named: int | None = None,
         watch: Callable[[State, State], None] | None = None,
     ) -> None:
-        self.reduced = reduced
+        self.source = source
         self.longest, self.watch = longest, watch
-        found = reduced.eigenpairs(0.0)
-        followed = np.flatnonzero(np.abs(found.values) <= FOLLOWED * reduced.frequency)
+        found = source.eigenpairs(0.0)
+        followed = np.flatnonzero(np.abs(found.values) <= FOLLOWED * source.frequency)
         order = np.lexsort((np.abs(found.values[followed]), np.abs(found.values[followed].imag)))
         self.state = State(found, followed[order])
         self.named = len(order) if named is None else named
         self._step = longest
 
     @classmethod
-    def resumed(cls, reduced: Reduced, state: State) -> Follower:
+    def resumed(cls, source: OverNumber, state: State) -> Follower:
         """A follower that goes on from a state followed before, and watches nothing."""
         follower = cls.__new__(cls)
-        follower.reduced, follower.state = reduced, state
+        follower.source, follower.state = source, state
         follower.named = len(state.place)
         follower.longest, follower.watch, follower._step = np.inf, None, np.inf
         return follower
@@ -96,12 +96,12 @@ class Follower:
             step = min(self._step, self.longest)
             # No sliver is left over for rounding to make.
             step = left if left <= 1.01 * step else step
-            found = self.reduced.eigenpairs(mu if step == left else self.state.mu + step)
+            found = self.source.eigenpairs(mu if step == left else self.state.mu + step)
             if step < left and _coincide(self.state, found):
                 # Where modes cross or meet they are known least: a little before it they tell which is which.
                 step *= ASIDE
-                found = self.reduced.eigenpairs(self.state.mu + step)
-            place = matched(self.reduced, self.state, found, self.named, surely=step > SMALLEST_STEP)
+                found = self.source.eigenpairs(self.state.mu + step)
+            place = matched(self.state, found, self.named, surely=step > SMALLEST_STEP)
             if place is None:
                 self._step = step / 4
                 continue
@@ -123,7 +123,7 @@ def _coincide(old: State, found: Eigenpairs) -> bool:
     return near[1] > near[0]
 
 
-def matched(reduced: Reduced, old: State, found: Eigenpairs, named: int, *, surely: bool = True) -> IntArray | None:
+def matched(old: State, found: Eigenpairs, named: int, *, surely: bool = True) -> IntArray | None:
     """Places (b,) among ``found`` of the branches of ``old``; None where that is not clear for the first ``named`` of
     them and ``surely`` is asked."""
     step = found.mu - old.mu
@@ -140,7 +140,7 @@ def matched(reduced: Reduced, old: State, found: Eigenpairs, named: int, *, sure
     place[rows] = columns
     if not surely:
         return place
-    clear = _clear(reduced, old, found, place, distance)
+    clear = _clear(old, found, place, distance)
     for i in np.flatnonzero(~clear[:named]):
         if clear[i]:
             continue
@@ -201,12 +201,12 @@ def _agreed(old: State, new: State, place: IntArray) -> bool:
     return sure
 
 
-def _clear(reduced: Reduced, old: State, found: Eigenpairs, place: IntArray, distance: Array) -> BoolArray:
+def _clear(old: State, found: Eigenpairs, place: IntArray, distance: Array) -> BoolArray:
     """Whether each branch's match (b,) is beyond doubt."""
     mine = distance[np.arange(len(place)), place]
     others = distance.copy()
     others[np.arange(len(place)), place] = np.inf
-    own = reduced.pairs.count
+    own = min(old.found.own, found.own)
     before, after = old.found.right[:own, old.place], found.right[:own, place]
     common = np.abs(np.einsum("ij,ij->j", before.conj(), after)) ** 2
     alike = common / np.maximum(np.sum(np.abs(before) ** 2, axis=0) * np.sum(np.abs(after) ** 2, axis=0), 1e-300)

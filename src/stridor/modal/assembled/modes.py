@@ -20,7 +20,6 @@ from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
 from .refine import MARGIN, Band, left_vectors, projected, settle
-from .whole import quadratic_of
 
 SAMPLES = 7
 
@@ -53,11 +52,11 @@ def complex_modes_assembled(
     if not damped:
         system = system.undamped()
     single = float(values.max()) if len(values) == 1 else None
-    problem = problem_of(system, single, options or Options(), damped=damped, frictions=values)
+    problem = problem_of(system, single, options or Options(), frictions=values)
     top = float(values.max())
     asked = None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz
-    band = Band(count, None if asked is None else searched(quadratic_of(problem, top), asked))
-    reduced = projected(problem, band)
+    band = Band(count, None if asked is None else searched(problem.pencil(top).condensed(), asked))
+    reduced = projected(problem, band, top)
     settle(reduced, samples(top), left=vectors is True)
     values, planned = _settled(reduced, values, progress, left=vectors is True)
     found = _followed(reduced, values, band, damped=damped, vectors=vectors)
@@ -108,7 +107,7 @@ def _followed(
             state = follower.advance(mu)
             lam, place = state.values[branches], state.place[branches]
             u, p = reduced.expand(state.found.right[:, place])
-            eigenvalues[k], residual[k] = lam, problem.backward_error(lam, u, p, mu)
+            eigenvalues[k], residual[k] = lam, problem.pencil(mu).backward_error(lam, u, p)
             if vectors:
                 right[k] = u.T
             if vectors is True:

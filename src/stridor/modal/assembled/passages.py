@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from ..dense_problem import OverNumber
 from .follow import State, halves
-from .reduced import Reduced
 
 COMPLEX = 1e-9  # imaginary part of λ² over the band's that is more than rounding
 TOUCHING = 0.05  # squared half differences that come down to this part of their ends are looked at closely
@@ -83,9 +83,9 @@ def _neighbour(state: State, i: int) -> int:
     return int(np.argmin(distance))
 
 
-def meetings(reduced: Reduced, old: State, new: State) -> list[Passage]:
+def meetings(source: OverNumber, old: State, new: State) -> list[Passage]:
     """Undamped modes that meet or part, or diverge, between two states."""
-    floor = COMPLEX * reduced.frequency**2
+    floor = COMPLEX * source.frequency**2
     found: list[Passage] = []
     was, now = np.abs(old.coordinate.imag) > floor, np.abs(new.coordinate.imag) > floor
     for i in np.flatnonzero(was != now):
@@ -100,10 +100,10 @@ def meetings(reduced: Reduced, old: State, new: State) -> list[Passage]:
     beyond_old, beyond_new = old.coordinate.real > floor, new.coordinate.real > floor
     for i in np.flatnonzero(real & (beyond_old != beyond_new)):
         found.append(Passage("divergence", old.mu, new.mu, int(i), int(i), bool(beyond_old[i]), (0j, 0j), old))
-    return found + _bubbles(reduced, old, new, np.flatnonzero(real).tolist())
+    return found + _bubbles(source, old, new, np.flatnonzero(real).tolist())
 
 
-def _bubbles(reduced: Reduced, old: State, new: State, real: list[int]) -> list[Passage]:
+def _bubbles(source: OverNumber, old: State, new: State, real: list[int]) -> list[Passage]:
     """Pairs that meet and part again between two states: where the cubic of their squared half difference comes near
     zero, it is looked at again there."""
     found: list[Passage] = []
@@ -113,7 +113,7 @@ def _bubbles(reduced: Reduced, old: State, new: State, real: list[int]) -> list[
     known = {frozenset(pair) for pair in neighbours}
     neighbours += [pair for pair in pairwise(later) if frozenset(pair) not in known]
     for i, j in neighbours:
-        lowest = _lowest(reduced, old, new, i, j)
+        lowest = _lowest(source, old, new, i, j)
         if lowest is not None:
             mu, mean = lowest
             means = halves(old.coordinate[i], old.coordinate[j])[0], halves(new.coordinate[i], new.coordinate[j])[0]
@@ -122,7 +122,7 @@ def _bubbles(reduced: Reduced, old: State, new: State, real: list[int]) -> list[
     return found
 
 
-def _lowest(reduced: Reduced, old: State, new: State, i: int, j: int) -> tuple[float, complex] | None:
+def _lowest(source: OverNumber, old: State, new: State, i: int, j: int) -> tuple[float, complex] | None:
     """μ and mean at which the real modes i and j are a complex pair; None where none is found."""
     low, high = _ends(old, i, j), _ends(new, i, j)
     mu_low, mu_high = old.mu, new.mu
@@ -135,11 +135,11 @@ def _lowest(reduced: Reduced, old: State, new: State, i: int, j: int) -> tuple[f
         if _cubic(low[1], high[1], step * low[2], step * high[2], at) > TOUCHING * min(low[1], high[1]):
             return None
         mu = mu_low + at * step
-        found = reduced.eigenpairs(mu)
+        found = source.eigenpairs(mu)
         guess = (1 - at) * low[0] + at * high[0]
         near = np.argsort(np.abs(found.coordinate - guess))[:2]
         mean, square = halves(*found.coordinate[near])
-        if square.real < -((COMPLEX * reduced.frequency**2) ** 2):
+        if square.real < -((COMPLEX * source.frequency**2) ** 2):
             return mu, mean
         slopes = found.tangents[near]
         change = float(((found.coordinate[near[0]] - found.coordinate[near[1]]) * (slopes[0] - slopes[1]) / 2).real)

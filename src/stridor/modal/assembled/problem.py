@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
+from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError
 from ...system import System
-from ...typing import Array, ComplexArray, IntArray, Sparse
+from ...typing import Array, BoolArray, IntArray, Sparse
 from ..options import Options
-from ..quadratic.problem import times
+from ..pencil import Pencil
 from .steady import Steadiness, contact_rows, steadiness, touching_nodes
-
-CHUNK = 64  # columns worked on at a time
 
 CHEAP = 600  # freedoms below which an equilibrium costs next to nothing
 MOST_EQUILIBRIA = 6
-NEGLIGIBLE = 1e-4  # of the largest displacement: gaps that open less than this are not judged more closely
+REMEMBERED = 3  # pencils
 
 
 @dataclass(frozen=True)
@@ -80,108 +79,36 @@ class ContactProblem:
         """What steady sliding at ``mu`` adds; nothing at μ = 0, where no friction force is there to vary."""
         return NOTHING if self.extras is None else self.extras(mu)
 
+    def pencil(self, mu: float) -> Pencil:
+        """P(λ) at ``mu``. The last few are remembered."""
+        known = self._pencils
+        if mu not in known:
+            while len(known) >= REMEMBERED:
+                known.pop(next(iter(known)))
+            known[mu] = self._pencil(mu)
+        return known[mu]
+
     @cached_property
-    def _sizes(self) -> tuple[Sparse, Sparse, Sparse, Sparse, Sparse]:
-        """|M|, |C|, |K|, |N|, |S|."""
-        return abs(self.mass), abs(self.damping), abs(self.stiffness), abs(self.normal), abs(self.slide)
+    def _pencils(self) -> dict[float, Pencil]:
+        return {}
 
-    def residual(self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float) -> ComplexArray:
-        """(λ²M + λC + K) u − (N + μS)ᵀ p (n, k) for λ (k,), u (n, k), p (m, k); real where everything is."""
-        return self._terms(lam, u, p, mu)
-
-    def backward_error(
-        self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float, *, rest: ComplexArray | None = None
-    ) -> Array:
-        """Componentwise backward errors (k,), contact forces kept as unknowns and their equations judged alike.
-
-        ‖P(λ)x‖∞ / ‖|P|(|λ|) |x|‖∞ of the equations of motion, and of the contacts' own, whichever is larger. rest
-        (n, k) is what the pairs leave of the equations of motion, where it is known.
-        """
-        result = np.zeros(len(lam))
-        for start in range(0, len(lam), CHUNK):
-            part = slice(start, start + CHUNK)
-            known = None if rest is None else rest[:, part]
-            result[part] = self._judged(lam[part], u[:, part], p[:, part], mu, left=False, rest=known)
-        return result
-
-    def left_backward_error(self, lam: ComplexArray, y: ComplexArray, q: ComplexArray, mu: float) -> Array:
-        """The same of left vectors: (λ²M + λC + K)ᵀ y − Nᵀ q = 0 and (N + μS) y + c q = 0."""
-        result = np.zeros(len(lam))
-        for start in range(0, len(lam), CHUNK):
-            part = slice(start, start + CHUNK)
-            result[part] = self._judged(lam[part], y[:, part], q[:, part], mu, left=True)
-        return result
-
-    def left_residual(self, lam: ComplexArray, y: ComplexArray, q: ComplexArray, mu: float) -> ComplexArray:
-        """(λ²M + λC + K)ᵀ y − Nᵀ q (n, k)."""
-        return self._terms(lam, y, q, mu, left=True)
-
-    def _terms(
-        self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, mu: float, *, left: bool = False
-    ) -> ComplexArray:
-        """The residual of the equations of motion, from the right or from the left."""
+    def _pencil(self, mu: float) -> Pencil:
         extras = self.at(mu)
-
-        def flip(matrix: Sparse) -> Sparse:
-            return matrix.T if left else matrix
-
-        square: Any = lam**2
-        if not np.any(square.imag):
-            square = square.real
-        total = square * times(self.mass, u) + times(self.stiffness, u) - times(self.normal.T, p)
-        if mu and not left:
-            total = total - mu * times(self.slide.T, p)
-        if self.damping.nnz:
-            total = total + lam * times(self.damping, u)
+        damping, stiffness = self.damping, self.stiffness
         if extras.weakening is not None:
-            total = total + lam * times(self.slide.T, extras.weakening[:, None] * times(self.slide, u))
+            damping = damping + self.slide.T @ sp.diags_array(extras.weakening) @ self.slide
         if extras.damping is not None:
-            total = total + lam * times(flip(extras.damping), u)
+            damping = damping + extras.damping
         if extras.stiffness is not None:
-            total = total + times(flip(extras.stiffness), u)
-        return total
-
-    def _judged(
-        self,
-        lam: ComplexArray,
-        u: ComplexArray,
-        p: ComplexArray,
-        mu: float,
-        *,
-        left: bool,
-        rest: ComplexArray | None = None,
-    ) -> Array:
-        extras = self.at(mu)
-        size, force, rate = np.abs(u), np.abs(p), np.abs(lam)
-        mass, damping, stiffness, normal, slide = self._sizes
-        scale = rate**2 * (mass @ size) + stiffness @ size + normal.T @ force
-        if damping.nnz:
-            scale += rate * (damping @ size)
-        if not left:
-            scale += mu * (slide.T @ force)
-        for matrix, factor in ((extras.damping, rate), (extras.stiffness, 1.0)):
-            if matrix is not None:
-                scale += factor * (abs(matrix.T if left else matrix) @ size)
-        if rest is None:
-            rest = self._terms(lam, u, p, mu, left=left)
-        error = np.abs(rest).max(axis=0) / tiny(scale.max(axis=0))
-        if not self.nodes:
-            return error
-        rows = sp.csr_array(self.normal + mu * self.slide) if left else self.normal
-        closure = np.abs(times(rows, u) + self.compliance[:, None] * p).max(axis=0)
-        reach = (abs(rows) @ size + self.compliance[:, None] * force).max(axis=0)
-        # A mode that hardly opens gaps at all (in the plane of the interface) leaves nothing but rounding there.
-        reach = np.maximum(reach, NEGLIGIBLE * size.max(axis=0))
-        return np.maximum(error, closure / tiny(reach))
-
-
-def tiny(values: Array) -> Array:
-    """The values, where they are zero the smallest number to divide by."""
-    return np.maximum(values, 1e-300)
+            stiffness = stiffness + extras.stiffness
+        push = sp.csr_array(self.normal + mu * self.slide) if mu else self.normal
+        return Pencil(
+            self.mass, sp.csr_array(damping), sp.csr_array(stiffness), self.normal, push, self.compliance
+        )
 
 
 def problem_of(
-    system: System, mu: float | None, options: Options, *, damped: bool, frictions: Array | None = None
+    system: System, mu: float | None, options: Options, *, frictions: Array | None = None
 ) -> ContactProblem:
     """The problem of the nodes that touch in steady sliding at ``mu`` (None: at the laws' own coefficients).
 
@@ -199,9 +126,22 @@ def problem_of(
     touching = np.flatnonzero(steady.active)
     # Contact that hardens has the stiffness of small motions about its force.
     shown = nodes if steady.force is None else nodes.at_force(steady.force)
-    rows = contact_rows(shown, touching, steady.sense, steady.stuck)
     closed = {nodes.names[k] for k in nodes.owner[touching]}
-    with_state = steadiness(system, nodes, touching, options, rows)
+    found = problem_held(
+        system, shown, touching, steady.sense, steady.stuck, options, frictions=frictions
+    )
+    open_contacts = tuple(name for name in nodes.names if name not in closed)
+    return replace(found, open_contacts=open_contacts, contact_state=steady.words)
+
+
+def problem_held(
+    system: System, shown: ContactNodes, touching: IntArray, sense: Array, stuck: BoolArray, options: Options,
+    *, frictions: Array | None = None,
+) -> ContactProblem:  # fmt: skip
+    """The problem of nodes ``touching`` (k,) among those of ``shown``, which have the stiffness of small motions; the
+    direction against the slip, sense (m, d−1), and who sticks, stuck (m,), are of all."""
+    rows = contact_rows(shown, touching, sense, stuck)
+    with_state = steadiness(system, system.contact_nodes(), touching, options, rows)
     has_damping = bool(system.damping.nnz and np.abs(system.damping.data).max() > 0)
     return ContactProblem(
         mass=system.mass,
@@ -211,11 +151,10 @@ def problem_of(
         slide=rows.slide,
         compliance=rows.compliance,
         touching=touching,
-        open_contacts=tuple(name for name in nodes.names if name not in closed),
+        open_contacts=(),
         damped=has_damping or with_state.damps,
         extras=None if with_state.neutral else Varying(with_state, _grid(system, frictions)),
         solver=options.solver,
-        contact_state=steady.words,
     )
 
 
@@ -262,11 +201,11 @@ class Varying:
         grid = self.grid
         return np.array([np.prod([(mu - b) / (a - b) for b in grid if b != a]) for a in grid])
 
-    def slopes(self, mu: float) -> Array:
+    def slopes(self, mu: complex) -> Any:
         """Derivatives (k,) of the weights over μ."""
         assert self.grid is not None, "asked for within the grid only"
         grid = self.grid
-        result = np.zeros(len(grid))
+        result = np.zeros(len(grid), dtype=complex if isinstance(mu, complex) else float)
         for i, a in enumerate(grid):
             others = [b for b in grid if b != a]
             parts = [np.prod([mu - b for b in others if b != left]) for left in others]

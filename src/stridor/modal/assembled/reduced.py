@@ -12,55 +12,39 @@ any conforming method: no spurious modes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from ...direct.dense import lu_factors
-from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
+from ..dense_problem import DenseProblem, Eigenpairs, combined
 from .problem import ContactProblem, Extras, Varying
 from .shifted import Pair, Shifted, orthonormal, real_columns
 
-REACH = 1.8  # eigenpairs up to this much above the band are looked at
 FEW = 3  # friction coefficients asked of a basis one by one before all of the grid's terms are projected
-REMEMBERED = 300  # friction coefficients whose eigenpairs are kept, and vectors before they are condensed
+REMEMBERED = 300  # vectors before they are condensed
 KEPT = 1e-10  # of the strongest direction of the vectors kept
 
 
-@dataclass(frozen=True)
-class Eigenpairs:
-    """Eigenpairs of the projected problem at one μ, one of each conjugate pair of λ.
-
-    coordinate x (k,): λ² without damping, else λ. values λ (k,) with Im λ ≥ 0. right (r, k) and left (r, k) vectors,
-    wᵀ P(λ) z = 0, tangents dx/dμ (k,). own: how many of the r belong to pairs, the rest to forces.
-    """
-
-    mu: float
-    coordinate: ComplexArray
-    values: ComplexArray
-    right: ComplexArray
-    left: ComplexArray
-    tangents: ComplexArray
-    own: int
-
-
-class Reduced:
+class Reduced(DenseProblem):
     """A basis and the problem projected on it, both of which grow.
 
     pairs: trial vectors with contact forces; forces P̂ (m, f): forces of rigid contacts of their own; lifts (n, f) their
-    test vectors. solves counts right sides solved for; compressed is the number of unknowns after the last `compress`.
+    test vectors; highest: the largest μ that will be asked for. solves counts right sides solved for; compressed is the
+    number of unknowns after the last `compress`.
     """
 
     compressed: int
 
-    def __init__(self, problem: ContactProblem, shifted: Shifted, modes: Pair, frequency: float) -> None:
+    def __init__(
+        self, problem: ContactProblem, shifted: Shifted, modes: Pair, frequency: float, highest: float
+    ) -> None:
+        super().__init__(frequency, (0.0, highest), damped=problem.damped)
         self.problem = problem
         self.shifted = shifted
-        self.frequency = frequency
         self.pairs = Pair(np.zeros((problem.size, 0)), np.zeros((problem.nodes, 0)))
         self.forces = np.zeros((problem.nodes, 0))
         self.lifts = np.zeros((problem.size, 0))
@@ -71,7 +55,6 @@ class Reduced:
         self._matrices = (empty, empty, empty, empty)
         self._products: list[tuple[Array, Array]] = [(empty, empty)] * 3
         self._slide = np.zeros((problem.nodes, 0))
-        self._known: dict[float, Eigenpairs] = {}
         self._extra: dict[float, tuple[Array, Array]] = {}
         self._grid: list[tuple[Array, Array]] | None = None
         self._lift_scale = 1.0
@@ -215,22 +198,20 @@ class Reduced:
         more_damping, more_stiffness = self._steady(extras, mu)
         return mass, damping + more_damping, stiffness + mu * friction + more_stiffness
 
-    def slopes(self, mu: float) -> tuple[Array, Array]:
-        """dC/dμ and dK/dμ (r, r)."""
-        friction, extras = self._matrices[3], self.problem.extras
+    def changes(self, mu: complex) -> tuple[Array, Array, Array]:
+        """dM, dC and dK (r, r) over μ, the first zero."""
+        mass, _, _, friction = self._matrices
+        nothing, extras = np.zeros_like(mass), self.problem.extras
         if extras is None:
-            return np.zeros_like(friction), friction
+            return nothing, nothing, friction
         if extras.within(mu):
             damping, stiffness = _weighed(self._on_grid(extras), extras.slopes(mu))
         else:
-            low, high = max(mu - 1e-5 * max(mu, 1e-3), 0.0), mu + 1e-5 * max(mu, 1e-3)
+            step = 1e-5 * max(mu.real, 1e-3)
+            low, high = max(mu.real - step, 0.0), mu.real + step
             before, after = self._steady(extras, low), self._steady(extras, high)
             damping, stiffness = ((b - a) / (high - low) for a, b in zip(before, after, strict=True))
-        return damping, friction + stiffness
-
-    def mass_slope(self, mu: float) -> Array | None:
-        """dM/dμ (r, r), None where friction has no part in the mass, as in this problem."""
-        return None
+        return nothing, damping, friction + stiffness
 
     def _steady(self, extras: Varying, mu: complex) -> tuple[Array, Array]:
         """Damping and stiffness (r, r) that steady sliding adds; outside its grid those of the real part of μ."""
@@ -265,15 +246,10 @@ class Reduced:
 
     # -- eigenpairs ---------------------------------------------------------------------------------------------------
     def eigenpairs(self, mu: float) -> Eigenpairs:
-        """All eigenpairs at ``mu`` with |λ| up to REACH times the frequency of interest."""
-        if mu not in self._known:
-            coordinate, right, left = self.solve(mu)
-            values = coordinate if self.problem.damped else upper_root(coordinate)
-            tangents = self.tangents(mu, coordinate, values, right, left)
-            if len(self._known) >= REMEMBERED:
-                self._known.pop(next(iter(self._known)))
-            self._known[mu] = Eigenpairs(mu, coordinate, values, right, left, tangents, self.pairs.count)
-        return self._known[mu]
+        """See `DenseProblem`; own says how many of the unknowns belong to pairs."""
+        if mu in self._known:
+            return self._known[mu]
+        return self.remembered(replace(super().eigenpairs(mu), own=self.pairs.count))
 
     def padded(self, found: Eigenpairs, vectors: ComplexArray) -> ComplexArray:
         """Vectors (r, k) of pairs found before the basis grew, on the basis as it is now."""
@@ -282,43 +258,10 @@ class Reduced:
             [_padded(vectors[:own], self.pairs.count), _padded(vectors[own:], self.forces.shape[1])], dtype=complex
         )
 
-    def solve(self, mu: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Coordinates x (k,), right and left vectors (r, k) at a real or complex μ, |λ| up to REACH times the band."""
-        x, right, left = (_quadratic if self.problem.damped else _linear)(
-            *self.matrices(mu), self.frequency, upper=self.problem.damped and not isinstance(mu, complex)
-        )
-        order = np.lexsort((x.real, np.abs(x)))
-        return x[order], right[:, order], left[:, order]
-
-    def tangents(
-        self, mu: float, coordinate: ComplexArray, values: ComplexArray, right: ComplexArray, left: ComplexArray
-    ) -> ComplexArray:
-        """dx/dμ (k,) = −wᵀ P_μ z / wᵀ P_x z."""
-        mass, damping, _ = self.matrices(mu)
-        by_damping, by_stiffness = self.slopes(mu)
-        change = combined(by_stiffness, right)
-        if self.problem.extras is not None:
-            change = change + values * combined(by_damping, right)
-        by_x = combined(mass, right)
-        if self.problem.damped:
-            by_x = 2 * coordinate * by_x + combined(damping, right)
-        with np.errstate(all="ignore"):
-            return -np.einsum("ij,ij->j", left, change) / np.einsum("ij,ij->j", left, by_x)
-
-    def null_vector(self, lam: complex, mu: float) -> ComplexArray:
-        """The vector (r,) that P(λ, μ) all but takes to zero, for λ that may be double."""
-        return self.null_vectors(lam, mu)[0]
-
-    def null_vectors(self, lam: complex, mu: complex) -> tuple[ComplexArray, ComplexArray]:
-        """The vectors z and y (r,) that make P(λ, μ) z and yᵀP(λ, μ) all but zero."""
-        mass, damping, stiffness = self.matrices(mu)
-        matrix = lam**2 * mass + lam * damping + stiffness
-        # Balanced by what the entries are made of: a row may itself be all but zero here.
-        size = np.abs(self._matrices[2]) + abs(mu) * np.abs(self._matrices[3]) + self.frequency**2 * np.abs(mass)
-        rows = np.maximum(size.max(axis=1), 1e-300)
-        columns = np.maximum((size / rows[:, None]).max(axis=0), 1e-300)
-        u, _, v = sl.svd(matrix / rows[:, None] / columns)
-        return v[-1].conj() / columns, u[:, -1].conj() / rows
+    def _entries(self, lam: complex, mu: complex) -> Array:
+        mass, _, stiffness, friction = self._matrices
+        size: Array = np.abs(stiffness) + abs(mu) * np.abs(friction) + self.frequency**2 * np.abs(mass)
+        return size
 
     def expand(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """u (n, k) of unit norm and p (m, k) of right vectors z (r, k)."""
@@ -381,88 +324,3 @@ def _span(block: Array) -> Array:
         return np.zeros((len(block), 0))
     left, size, _ = sl.svd(block, full_matrices=False)
     return left[:, size > KEPT * max(float(size[0]), 1e-300)]
-
-
-def combined(basis: Array, weights: Any) -> Any:
-    """basis @ weights in real arithmetic; real where the weights are."""
-    if weights.dtype.kind != "c" or not np.any(weights.imag):
-        return basis @ np.ascontiguousarray(weights.real)
-    return basis @ np.ascontiguousarray(weights.real) + 1j * (basis @ np.ascontiguousarray(weights.imag))
-
-
-def upper_root(squares: ComplexArray) -> ComplexArray:
-    """λ (k,) of λ² with Im λ ≥ 0, and Re λ ≥ 0 where it is real."""
-    root: ComplexArray = np.sqrt(squares + 0j)
-    return np.where((root.imag < 0) | ((root.imag == 0) & (root.real < 0)), -root, root)
-
-
-def _linear(
-    mass: Array, damping: Array, stiffness: Array, frequency: float, *, upper: bool
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """x = λ² and right and left vectors of (xM + K) z = 0, shifted and inverted at x = frequency²."""
-    shift = frequency**2
-    factor = _factor(stiffness + shift * mass)
-    theta, left, right = sl.eig(sl.lu_solve(factor, shift * mass), left=True, right=True)
-    with np.errstate(all="ignore"):
-        x = shift - shift / theta
-        chosen = np.flatnonzero(np.isfinite(x) & (np.abs(x) <= (REACH * frequency) ** 2))
-    return x[chosen], right[:, chosen], _transposed_solve(factor, left[:, chosen].conj())
-
-
-def _quadratic(
-    mass: Array, damping: Array, stiffness: Array, frequency: float, *, upper: bool
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """x = λ and right and left vectors of (x²M + xC + K) z = 0, shifted and inverted at x = frequency; ``upper`` leaves
-    out the lower half plane."""
-    companion, factor = _companion(mass, damping, stiffness, frequency)
-    r = len(mass)
-    theta, left, right = sl.eig(companion, left=True, right=True)
-    with np.errstate(all="ignore"):
-        x = frequency * (1 + 1 / theta)
-        chosen = np.isfinite(x) & (np.abs(x) <= REACH * frequency)
-    chosen = np.flatnonzero(chosen & (x.imag >= 0) if upper else chosen)
-    z = np.where(np.abs(theta[chosen]) > 1, right[:r, chosen], right[r:, chosen])
-    return x[chosen], z, _transposed_solve(factor, left[:r, chosen].conj())
-
-
-def eigenvalues(mass: Array, damping: Array, stiffness: Array, frequency: float) -> ComplexArray:
-    """All finite λ (k,) of (λ²M + λC + K) z = 0, without damping one of each ±λ, shifted and inverted at λ = frequency:
-    those of about that size are as good as can be, whatever else there is. The mass need not be regular."""
-    if not np.any(damping):
-        shift = frequency**2
-        theta = sl.eigvals(sl.lu_solve(_factor(stiffness + shift * mass), shift * mass))
-        with np.errstate(all="ignore"):
-            squares: ComplexArray = shift - shift / theta
-        return upper_root(squares[np.isfinite(squares)])
-    theta = sl.eigvals(_companion(mass, damping, stiffness, frequency)[0])
-    with np.errstate(all="ignore"):
-        values: ComplexArray = frequency * (1 + 1 / theta)
-    return values[np.isfinite(values)]
-
-
-def _companion(mass: Array, damping: Array, stiffness: Array, frequency: float) -> tuple[Array, tuple[Array, Array]]:
-    """The matrix (2r, 2r) whose eigenvalues are θ = 1/(λ/frequency − 1), and the factors of P(frequency)."""
-    mass, damping = frequency**2 * mass, frequency * damping
-    r = len(mass)
-    factor = _factor(mass + damping + stiffness)
-    companion = np.zeros((2 * r, 2 * r), dtype=stiffness.dtype)
-    companion[:r, :r] = -sl.lu_solve(factor, damping + 2 * mass)
-    companion[:r, r:] = -sl.lu_solve(factor, mass)
-    companion[r:, :r] = np.eye(r)
-    return companion, factor
-
-
-def _transposed_solve(factor: tuple[Any, Any], right: Any) -> Any:
-    """A⁻ᵀ right; for a real matrix and complex right sides in real arithmetic."""
-    if factor[0].dtype.kind == "c" or right.dtype.kind != "c":
-        return sl.lu_solve(factor, right, trans=1)
-    return sl.lu_solve(factor, right.real, trans=1) + 1j * sl.lu_solve(factor, right.imag, trans=1)
-
-
-def _factor(matrix: Array) -> tuple[Array, Array]:
-    if not np.all(np.isfinite(matrix)):
-        raise AnalysisError("the projected contact problem is not finite; check the model's units and stiffnesses")
-    factor = lu_factors(matrix)
-    if np.abs(np.diag(factor[0])).min(initial=np.inf) == 0.0:
-        raise AnalysisError("the projected contact problem is singular: a contact is given twice, or friction jams")
-    return factor

@@ -12,9 +12,12 @@ import scipy.sparse as sp
 from ...direct import factorise
 from ...errors import AnalysisError, FollowingError
 from ...typing import Array, BoolArray, ComplexArray, IntArray, Sparse
+from ..dense_problem import Eigenpairs
+from ..pencil import tiny
+from ..quadratic.problem import times
 from ..tolerances import BELIEVED
-from .problem import ContactProblem, times, tiny
-from .reduced import Eigenpairs, Reduced
+from .problem import ContactProblem
+from .reduced import Reduced
 from .shifted import Shifted, frictionless_modes, modes_below, real_columns, shift_for
 
 TOLERANCE = 2e-11  # backward error at which an eigenpair counts as found: eigenvalues are right to 1e-9 then
@@ -51,14 +54,15 @@ class Band:
         return float(np.sqrt(max(highest, 1e-12 * float(squares[-1])))) or 1.0
 
 
-def projected(problem: ContactProblem, band: Band) -> Reduced:
-    """The problem on its frictionless modes up to beyond the band, and on what their friction forces do to it."""
+def projected(problem: ContactProblem, band: Band, highest: float) -> Reduced:
+    """The problem on its frictionless modes up to beyond the band, and on what their friction forces do to it, for μ
+    up to ``highest``."""
     shifted = Shifted(problem, shift_for(problem, band.frequency))
     squares, modes = frictionless_modes(shifted, band.enough)
     top = band.top(squares)
     if problem.size <= COUNTED:
         _require_all(problem, squares, top)
-    reduced = Reduced(problem, shifted, modes, top)
+    reduced = Reduced(problem, shifted, modes, top, highest)
     near = squares <= (MARGIN * top) ** 2
     if problem.nodes and near.any():
         forces = problem.slide.T @ modes.p[:, near]
@@ -135,15 +139,17 @@ def unbalanced(reduced: Reduced, mu: float, tolerance: float, *, left: bool = Fa
     chosen = wanted(reduced, found)
     lam = found.values[chosen]
     u, p = reduced.expand(found.right[:, chosen])
-    rest = problem.residual(lam, u, p, mu)
-    error = problem.backward_error(lam, u, p, mu, rest=rest)
+    pencil = problem.pencil(mu)
+    rest = pencil.residual(lam, u, p)
+    error = pencil.backward_error(lam, u, p, rest=rest)
     forces = [_relative(reduced, rest, lam, u, error > tolerance)]
     openings: list[Array] = [np.zeros((problem.nodes, 0))]
     if left:
         y, q = left_vectors(reduced, lam, found.left[:, chosen], mu)
-        left_error = problem.left_backward_error(lam, y, q, mu)
+        left_rest = pencil.transposed.residual(lam, y, q)
+        left_error = pencil.transposed.backward_error(lam, y, q, rest=left_rest)
         wrong = left_error > tolerance
-        forces.append(_relative(reduced, problem.left_residual(lam, y, q, mu), lam, y, wrong))
+        forces.append(_relative(reduced, left_rest, lam, y, wrong))
         openings.append(real_columns(times(problem.slide, y[:, wrong])))
         error = np.maximum(error, left_error)
     return float(error.max(initial=0.0)), np.hstack(forces), np.hstack(openings)
@@ -162,14 +168,12 @@ def left_vectors(reduced: Reduced, lam: ComplexArray, w: ComplexArray, mu: float
     """y (n, k) of unit norm and q (m, k) of left vectors: −(N + μS) y / c, where rigid what fits the equations best."""
     problem = reduced.problem
     y = reduced.expand_left(w)
-    rows = problem.normal + mu * problem.slide
+    pencil = problem.pencil(mu).transposed
     q = np.zeros((problem.nodes, len(lam)), dtype=complex)
     soft = problem.compliance > 0
-    q[soft] = -times(rows, y)[soft] / problem.compliance[soft, None]
+    q[soft] = -times(pencil.normal, y)[soft] / problem.compliance[soft, None]
     if not soft.all() and len(lam):
-        rest = problem.left_residual(lam, y, q, mu)
-        normal = problem.normal[~soft]
-        q[~soft] = fitted(normal, rest)
+        q[~soft] = fitted(pencil.push[~soft], pencil.residual(lam, y, q))
     return y, q
 
 

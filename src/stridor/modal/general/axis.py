@@ -24,9 +24,9 @@ from scipy.optimize import linear_sum_assignment
 from ...direct import SingularMatrix, factorise
 from ...direct.dense import lu_factors
 from ...typing import Array, BoolArray, ComplexArray
+from ..newton import Root, crossing, standstill
 from ..quadratic import Quadratic
 from .family import ROLES, Family
-from .newton import Root, crossing, standstill
 
 LARGEST = 40  # rank of what varies up to which the axis is walked
 DENSE = 150  # unknowns up to which full matrices are solved faster

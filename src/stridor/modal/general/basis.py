@@ -6,23 +6,19 @@ Up to 60 freedoms the basis is the unit matrix, beyond that a reduced model over
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
-from ..assembled.reduced import Eigenpairs, Reduced
-from ..assembled.shifted import Pair
+from ..dense_problem import DenseProblem, Eigenpairs, OverNumber
 from ..parametric import ReducedModel, reduce
 from ..parametric.basis import expanded
 from ..quadratic import Region, find_modes
-from ..quadratic.problem import Quadratic, times
+from ..quadratic.problem import times
 from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .family import MU, ROLES, Family, Smooth
 
@@ -34,19 +30,16 @@ BESIDE = 1e-3  # of the highest angular frequency: and how fast what may grow ne
 DECAY = 0.5  # of the highest angular frequency: modes that decay faster are not looked for
 
 
-class Along(Reduced):
+class Along(OverNumber):
     """Eigenpairs over t = μ − low of a family. whole: whether they are those of the full problem; at_rest: how many
     motions as a whole there are at every μ, which are left out."""
 
     whole: bool
     at_rest: int
 
-    def __init__(self, family: Family, frequency: float, size: int, *, damped: bool) -> None:
-        self.family, self.frequency = family, frequency
-        self.problem = SimpleNamespace(damped=damped, extras=None)  # type: ignore[assignment]
-        self.pairs = Pair(np.zeros((0, size)), np.zeros((0, size)))
-        self.forces = np.zeros((0, 0))
-        self._known: dict[float, Eigenpairs] = {}
+    def __init__(self, family: Family, frequency: float, *, damped: bool) -> None:
+        super().__init__(frequency, (0.0, family.high - family.low), damped=damped)
+        self.family = family
         self.at_rest = 0
 
     def settle(self) -> None:
@@ -98,55 +91,26 @@ class Along(Reduced):
         )  # fmt: skip
 
 
-class OnBasis(Along):
+class OnBasis(Along, DenseProblem):
     """The family on a basis V (n, r), the same on both sides: its matrices and what they change by are small."""
 
     whole = False
 
-    @abstractmethod
-    def _changes(self, mu: float) -> tuple[Array, Any, Any]:
-        """dM, dD and dK over μ (r, r) at μ − low."""
-
-    def slopes(self, mu: float) -> tuple[Array, Array]:
-        """dD/dμ and dK/dμ (r, r); those of a mass that varies are in `tangents` alone."""
-        _, damping, stiffness = self._changes(mu)
-        return damping, stiffness
-
-    def tangents(
-        self, mu: float, coordinate: ComplexArray, values: ComplexArray, right: ComplexArray, left: ComplexArray
-    ) -> ComplexArray:
-        """dx/dμ (k,), x the coordinate."""
-        by_mass, by_damping, by_stiffness = self._changes(mu)
-        change = values**2 * expanded(by_mass, right) + values * expanded(by_damping, right)
-        change = change + expanded(by_stiffness, right)
-        mass, damping, _ = self.matrices(mu)
-        by_x = expanded(mass, right)
-        if self.problem.damped:
-            by_x = 2 * coordinate * by_x + expanded(damping, right)
-        with np.errstate(all="ignore"):
-            return -np.einsum("ij,ij->j", left, change) / np.einsum("ij,ij->j", left, by_x)
-
-    def null_vectors(self, lam: complex, mu: complex) -> tuple[ComplexArray, ComplexArray]:
-        """The vectors z and y (r,) that make P z and yᵀP all but zero."""
-        mass, damping, stiffness = self.matrices(mu)
-        matrix = lam**2 * mass + lam * damping + stiffness
-        size = abs(lam) ** 2 * np.abs(mass) + abs(lam) * np.abs(damping) + np.abs(stiffness)
-        # Rows may be zero altogether, where a load takes a stiffness away.
-        rows = np.maximum(size.max(axis=1), max(1e-16 * float(size.max()), 1e-300))
-        columns = np.maximum((size / rows[:, None]).max(axis=0), 1e-16)
-        u, _, v = sl.svd(matrix / rows[:, None] / columns)
-        return v[-1].conj() / columns, u[:, -1].conj() / rows
+    @property
+    def reversible(self) -> bool:
+        """That of the family."""
+        return self.family.reversible
 
     def eigenpairs(self, mu: float) -> Eigenpairs:
-        """All eigenpairs at ``mu`` with |λ| up to 1.8 times the frequency of interest."""
-        if mu not in self._known:
-            found = super().eigenpairs(mu)
-            if not self.family.reversible:
-                found = self.steadied(found)
-            elif not self.family.still:
-                found = self.turned(found)
-            self._known[mu] = self.moving(found)
-        return self._known[mu]
+        """See `OverNumber`; without motions as a whole, and what is on the axis exactly there."""
+        if mu in self._known:
+            return self._known[mu]
+        found = DenseProblem.eigenpairs(self, mu)
+        if not self.family.reversible:
+            found = self.steadied(found)
+        elif not self.family.still:
+            found = self.turned(found)
+        return self.remembered(self.moving(found))
 
 
 class Projected(OnBasis):
@@ -155,7 +119,8 @@ class Projected(OnBasis):
     def __init__(self, family: Family, frequency: float, model: ReducedModel | None) -> None:
         problem = _on_basis(family)
         assert problem.form is not None, "asked for families that have one"
-        super().__init__(family, frequency, problem.size if model is None else model.size, damped=not family.still)
+        super().__init__(family, frequency, damped=not family.still)
+        self._size = problem.size if model is None else model.size
         self.model = model
         self._form = problem.form
         self._parts: list[tuple[int, int, Array]] = []
@@ -190,31 +155,17 @@ class Projected(OnBasis):
         factors = [self._form[role].factors(there) for role in ROLES]
         return self._summed([f.real if real else f for f in factors])
 
-    def _changes(self, mu: float) -> tuple[Array, Any, Any]:
-        return self._summed([self._form[role].slopes(self.family.low + float(np.real(mu))) for role in ROLES])
+    def changes(self, mu: complex) -> tuple[Array, Any, Any]:
+        """dM, dD and dK over μ (r, r) at μ − low, which may be complex."""
+        return self._summed([self._form[role].slopes(self.family.low + mu) for role in ROLES])
 
     def _summed(self, factors: list[Any]) -> tuple[Array, Any, Any]:
-        size = self.pairs.count
+        size = self._size
         totals = [np.zeros((size, size), dtype=f.dtype) for f in factors]
         for row, k, part in self._parts:
             if factors[row][k]:
                 totals[row] += factors[row][k] * part
         return totals[0], totals[1], totals[2]
-
-
-class Held(Projected):
-    """The same with the mass as it is at one μ, and what it changes by counted as stiffness at one λ: a problem whose
-    mass does not vary and that is the same there."""
-
-    def __init__(self, source: Projected, lam: complex, mu: complex) -> None:
-        self.__dict__.update(source.__dict__)
-        self._known = {}
-        self._mass, self._square = source.matrices(mu)[0], lam**2
-
-    def matrices(self, mu: complex) -> tuple[Array, Any, Any]:
-        """M, D and K (r, r) at μ − low, which may be complex."""
-        mass, damping, stiffness = super().matrices(mu)
-        return self._mass, damping, stiffness + self._square * (mass - self._mass)
 
 
 class Whole(Along):
@@ -223,7 +174,7 @@ class Whole(Along):
     whole = True
 
     def __init__(self, family: Family, frequency: float, *, beside: bool = False) -> None:
-        super().__init__(family, frequency, family.freedoms, damped=not family.still)
+        super().__init__(family, frequency, damped=not family.still)
         self._reach, self._decay = (NEARBY, BESIDE) if beside else (BEYOND, DECAY)
 
     def vectors(self, z: ComplexArray, mu: float, *, left: bool = False) -> ComplexArray:
@@ -241,12 +192,12 @@ class Whole(Along):
             change = self.family.slopes(there)
             with np.errstate(all="ignore"):
                 by_mu = change.residual(found.values, found.right)
-                slope = by_lambda(problem, found.values, found.right)
+                slope = problem.slope(found.values, found.right)
                 tangents = -np.einsum("ij,ij->j", found.left, by_mu) / np.einsum("ij,ij->j", found.left, slope)
             pairs = Eigenpairs(
                 mu, found.values, found.values, found.right, found.left, tangents, self.family.freedoms
             )
-            self._known[mu] = self.moving(self.turned(pairs) if self.family.reversible else self.steadied(pairs))
+            self.remembered(self.moving(self.turned(pairs) if self.family.reversible else self.steadied(pairs)))
         return self._known[mu]
 
 
@@ -255,12 +206,6 @@ def double_zeros(values: ComplexArray) -> int:
     latter one is left unsaid."""
     real = int(np.count_nonzero(values.imag == 0))
     return len(values) - real + (real + 1) // 2
-
-
-def by_lambda(problem: Quadratic, lam: ComplexArray, x: ComplexArray) -> ComplexArray:
-    """P'(λ)x (n, k) for λ (k,) and x (n, k)."""
-    result: ComplexArray = 2 * lam * times(problem.mass, x) + times(problem.damping, x)
-    return result
 
 
 def along(family: Family, frequency: float) -> Along:

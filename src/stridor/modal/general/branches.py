@@ -13,25 +13,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...typing import ComplexArray
-from ..assembled.critical import exceptional_point, pair_near
+from ..assembled.critical import exceptional_point
 from ..assembled.follow import State
 from ..assembled.passages import Passage
-from ..assembled.reduced import eigenvalues
+from ..dense_problem import eigenvalues
+from ..newton import FLAT, Root
 from ..onset import Onset
 from ..quadratic import Region, Spectrum, band_modes
 from ..quadratic.find import Completeness
 from ..quadratic.polish import groups, pairs
 from ..tolerances import AT_REST, SPLIT_RELATIVE
-from .basis import DECAY, Along, Held, Projected, by_lambda
+from .basis import DECAY, Along, Projected
 from .family import Family
 from .follow import Followed, followed
 from .growth import growing_roots, unstable
-from .newton import FLAT, Root
 from .passages import located, quiet
 
 ALIKE = 1e-8  # of |λ|: eigenvalues that are one
 OPENING = 1e-6  # of the range: passages that close to where growth opens are that
-HOLDS = 8
 CLEARLY = 1.02  # times the band: passages beyond it are counted and not solved
 
 
@@ -200,7 +199,7 @@ def _opening(source: Along, end: Spectrum, state: State, top: float) -> list[Fou
         if family.reversible and len(mine) < 2:
             continue
         x, y, lam = end.right[:, mine], end.left[:, mine], values[mine]
-        gram = y.T @ by_lambda(problem, lam, x)
+        gram = y.T @ problem.slope(lam, x)
         if np.linalg.cond(gram) > 1e8:
             continue
         slopes = np.linalg.eigvals(-np.linalg.solve(gram, y.T @ change.residual(lam, x)))
@@ -228,7 +227,8 @@ def _onset(source: Along, passage: Passage, root: Root, t: float) -> Onset:
     square_root = None if root.square is None else float(np.sqrt(abs(root.square)))
     exceptional: complex | None = None
     if root.slope is not None and not still and isinstance(source, Projected):
-        near = _exceptional(source, passage.old, root.lam, t)
+        with quiet():
+            near = exceptional_point(source, passage.old, root.lam, t)
         if near is not None:
             exceptional, square_root = complex(family.low + near[0]), near[1]
     return Onset(
@@ -237,23 +237,6 @@ def _onset(source: Along, passage: Passage, root: Root, t: float) -> Onset:
         residual=root.residual, square_root_coefficient=square_root, growth_slope=root.slope,
         exceptional_mu=exceptional,
     )  # fmt: skip
-
-
-def _exceptional(source: Projected, state: State, lam: complex, t: float) -> tuple[complex, float] | None:
-    """The complex μ − low beside an onset at which two modes meet, and κ, as `exceptional_point` finds them."""
-    if source.constant_mass:
-        with quiet():
-            return exceptional_point(source, state, lam, t)
-    # What is sought is where the mass is held, which is known better each time.
-    mean, place = lam, complex(t)
-    for _ in range(HOLDS):
-        with quiet():
-            near = exceptional_point(Held(source, mean, place), state, lam, t)
-        if near is None or abs(near[0] - place) <= 1e-12 * abs(near[0]):
-            return near
-        place = near[0]
-        mean = pair_near(source.solve(place)[0], mean)[0]
-    return None
 
 
 def _numbers(source: Along, branch: int, partner: int) -> tuple[int, int]:

@@ -15,14 +15,14 @@ from itertools import pairwise
 import numpy as np
 
 from ...typing import BoolArray, ComplexArray
-from ..assembled.reduced import Eigenpairs
+from ..dense_problem import Eigenpairs
+from ..newton import Root, crossing, meeting, standstill
 from ..onset import Onset
 from ..quadratic.polish import pairs
 from ..tolerances import AT_REST, UNSTABLE_RELATIVE
 from .basis import Along
 from .family import Family
 from .growth import growing_roots, unstable
-from .newton import Root, crossing, meeting, standstill
 
 GRID = {False: 96, True: 24}  # intervals to begin with, on a basis and by full solves
 ON_IT = 1e-6  # of the range: so near an onset growth may be rounding

@@ -19,11 +19,12 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ...direct import Factor, factorise
 from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...typing import Array, ComplexArray, Sparse
 from ..assembled.problem import ContactProblem, problem_of
-from ..assembled.whole import quadratic_of
+from ..newton import Border
 from ..options import Options
 from ..parametric import Parameter, ParametricProblem, Term
 from ..parametric.contacts_rigid import Elimination, eliminate
@@ -51,20 +52,21 @@ class Form:
         steps = [1.0, *(mu - node for node in self.nodes[: len(self.matrices) - 1])]
         return np.array(steps, dtype=complex).cumprod()
 
-    def wide_factors(self, mu: float) -> Array:
+    def wide_factors(self, mu: complex) -> ComplexArray:
         """The same in extended precision."""
-        steps = [1.0, *(np.longdouble(mu) - node for node in self.nodes[: len(self.matrices) - 1])]
-        result: Array = np.cumprod(np.array(steps, dtype=np.longdouble))
-        return result
+        wide = np.clongdouble(mu)
+        steps = [np.clongdouble(1.0), *(wide - node for node in self.nodes[: len(self.matrices) - 1])]
+        result: ComplexArray = np.cumprod(np.array(steps, dtype=np.clongdouble))
+        return result if mu.imag else result.real
 
-    def slopes(self, mu: float) -> Array:
+    def slopes(self, mu: complex) -> ComplexArray:
         """Their derivatives (k,) over μ."""
-        result = np.zeros(len(self.matrices))
-        value, slope = 1.0, 0.0
+        result = np.zeros(len(self.matrices), dtype=complex)
+        value, slope = complex(1.0), complex(0.0)
         for k, node in enumerate(self.nodes[: len(self.matrices) - 1]):
             value, slope = value * (mu - node), slope * (mu - node) + value
             result[k + 1] = slope
-        return result
+        return result if mu.imag else result.real
 
 
 @dataclass(frozen=True)
@@ -91,12 +93,14 @@ class Smooth:
         """Number of unknowns."""
         return self.built(self.low).size
 
-    def at(self, mu: float) -> Quadratic:
-        """The problem at μ, from the form where that is exact."""
-        if self.form is None or not self.exact:
-            return self.built(mu)
-        sums = (_sum(self.form[role].matrices, self.form[role].factors(mu).real) for role in ROLES)
-        return Quadratic(*sums)
+    def at(self, mu: complex) -> Quadratic:
+        """The problem at μ, from the form where that is exact or where μ is complex. Raises AnalysisError for a complex
+        one where there is no form."""
+        if mu.imag and self.form is None:
+            raise AnalysisError("the matrices are no smooth functions of mu")
+        if self.form is None or not (self.exact or mu.imag):
+            return self.built(mu.real)
+        return Quadratic(*(_sum(self.form[role].matrices, self.form[role].factors(mu)) for role in ROLES))
 
     def built(self, mu: float) -> Quadratic:
         """The problem at μ as the system gives it there."""
@@ -106,18 +110,18 @@ class Smooth:
             self._known[mu] = self._make(mu)
         return self._known[mu]
 
-    def slopes(self, mu: float) -> Quadratic:
-        """dM/dμ, dD/dμ and dK/dμ."""
+    def slopes(self, mu: complex) -> Quadratic:
+        """dM/dμ, dD/dμ and dK/dμ; where there is no form, by differences about the real part of μ."""
         if self.form is not None:
             return Quadratic(*(_sum(self.form[role].matrices, self.form[role].slopes(mu)) for role in ROLES))
         step = 1e-5 * (self.high - self.low)
-        low, high = max(mu - step, self.low), min(mu + step, self.high)
+        low, high = max(mu.real - step, self.low), min(mu.real + step, self.high)
         before, after = self.built(low), self.built(high)
         return Quadratic(
             *(sp.csr_array((getattr(after, role) - getattr(before, role)) / (high - low)) for role in ROLES)
         )
 
-    def functional(self, lam: complex, mu: float, y: ComplexArray, x: ComplexArray) -> complex:
+    def functional(self, lam: complex, mu: complex, y: ComplexArray, x: ComplexArray) -> complex:
         """yᵀP(λ, μ)x in extended precision, term by term.
 
         Stiff springs and fine meshes make terms that cancel to a millionth of a millionth of their size; how near an
@@ -133,10 +137,10 @@ class Smooth:
                 total = total + extended**power * factor * (real + np.clongdouble(1j) * imaginary)
         return complex(total)
 
-    def _wide_terms(self, mu: float) -> list[list[tuple[Sparse, Any]]]:
+    def _wide_terms(self, mu: complex) -> list[list[tuple[Sparse, Any]]]:
         """Matrices and factors of M, D and K at μ in extended precision."""
-        if self.form is None or not self.exact:
-            problem = self.built(mu)
+        if self.form is None or not (self.exact or mu.imag):
+            problem = self.built(mu.real)
             return [[(wide(getattr(problem, role)), np.longdouble(1.0))] for role in ROLES]
         result: list[list[tuple[Sparse, Any]]] = []
         for role, matrices in zip(ROLES, self._wide_form, strict=True):
@@ -182,7 +186,7 @@ class Smooth:
                 columns[role].append(new)
                 form = Form(tuple(columns[role]), tuple(nodes[: k + 1]))
                 left = max(
-                    away(_sum(form.matrices, form.factors(mu).real), true)
+                    away(_sum(form.matrices, form.factors(mu)), true)
                     for mu, true in zip(tried, truth[role], strict=True)
                 )
                 if left < best[role][1]:
@@ -256,6 +260,15 @@ class Family(Smooth):
         """Number of freedoms n; the forces of rigid contacts are unknowns beyond them."""
         return self.size
 
+    def bordered(self, lam: complex, mu: complex, border: Border) -> Factor:
+        """Factors of P(λ, μ) with a border. Raises AnalysisError where it is singular."""
+        coo = sp.coo_array(self.at(mu).at(lam))
+        n, scale = coo.shape[0], border.scale
+        data = np.concatenate([coo.data.astype(complex), [scale, scale]])
+        rows, columns = np.concatenate([coo.row, [border.row, n]]), np.concatenate([coo.col, [n, border.column]])
+        matrix = sp.csr_array(sp.coo_array((data, (rows, columns)), shape=(n + 1, n + 1)))
+        return factorise(matrix, solver=self.options.solver)
+
     def backward_error(self, mu: float, lam: complex, x: ComplexArray) -> float:
         """Backward error of an eigenpair λ, x (n,) in the matrices as they are given at μ."""
         return float(self.built(mu).backward_error(np.array([lam]), x[:, None])[0])
@@ -284,14 +297,14 @@ class SystemFamily(Family):
         own: float,
         touching_at: float | None = None,
     ) -> None:
-        super().__init__(between, lambda mu: self._damped(quadratic_of(self._problem(mu), mu)), options)
+        super().__init__(between, lambda mu: self._damped(self._problem(mu).pencil(mu).condensed()), options)
         self._whole_damping = damped
         self._system_at = system_at
         first = system_at(own)
         # Contacts alone depend on μ by themselves; nothing needs to be built again.
         self.varies = system_at(self.high if own != self.high else self.low) is not first
         grid = np.linspace(0.0, self.high, 50) if self.high > 0 else None
-        self.contacts = problem_of(first, touching_at, options, damped=True, frictions=grid)
+        self.contacts = problem_of(first, touching_at, options, frictions=grid)
 
     @property
     def freedoms(self) -> int:
@@ -323,7 +336,7 @@ class SystemFamily(Family):
         found = eliminate(self.contacts.normal[rigid], self.contacts.slide[rigid], friction)
 
         def make(mu: float) -> Quadratic:
-            whole = self._damped(quadratic_of(self._problem(mu), mu, rigid=False))
+            whole = self._damped(self._problem(mu).pencil(mu).condensed(rigid=False))
             tests = found.tests({MU: mu}).T
             return Quadratic(*(sp.csr_array(tests @ getattr(whole, role) @ found.motion) for role in ROLES))
 
@@ -341,7 +354,7 @@ class SystemFamily(Family):
         system = self._system_at(mu)
         if self.contacts.extras is None:
             return replace(self.contacts, mass=system.mass, damping=system.damping, stiffness=system.stiffness)
-        found = problem_of(system, None, self.options, damped=True)
+        found = problem_of(system, None, self.options)
         if not np.array_equal(found.touching, self.contacts.touching):
             raise AnalysisError("the nodes in contact change with mu, since matrices do; take a smaller range of mu")
         return found
@@ -373,10 +386,11 @@ def wide(matrix: Sparse) -> Sparse:
 
 
 def _sum(matrices: tuple[Sparse, ...], factors: Any) -> Sparse:
-    total = matrices[0] if factors[0] == 1.0 else float(factors[0]) * matrices[0]
+    factors = factors if np.any(np.imag(factors)) else np.real(factors)
+    total = matrices[0] if factors[0] == 1.0 else factors[0] * matrices[0]
     for matrix, factor in zip(matrices[1:], factors[1:], strict=True):
         if factor and matrix.nnz:
-            total = total + float(factor) * matrix
+            total = total + factor * matrix
     total = sp.csr_array(total)
     total.eliminate_zeros()
     return total

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
 from ..options import Options
 from ..parametric import Parameter, ParametricProblem, ReducedModel, Term
@@ -44,14 +45,16 @@ class Line(Family):
         length = self.parameter.high - self.parameter.low
         return length * self.problem.factor_slopes(self.point(s), self.parameter.name)
 
-    def at(self, mu: float) -> Quadratic:
-        """The problem at s, the sum of its terms."""
-        return self.built(mu)
+    def at(self, mu: complex) -> Quadratic:
+        """The problem at s, the sum of its terms. Raises AnalysisError for a complex one."""
+        if mu.imag:
+            raise AnalysisError("factors of terms are known for real parameters alone")
+        return self.built(mu.real)
 
-    def slopes(self, mu: float) -> Quadratic:
+    def slopes(self, mu: complex) -> Quadratic:
         """dM/ds, dD/ds and dK/ds."""
         total = {role: sp.csr_array((self.size, self.size)) for role in ROLES}
-        for term, slope in zip(self.problem.terms, self.factor_slopes(mu), strict=True):
+        for term, slope in zip(self.problem.terms, self.factor_slopes(mu.real), strict=True):
             if slope:
                 total[term.role] = total[term.role] + slope * term.matrix
         return Quadratic(*(sp.csr_array(total[role]) for role in ROLES))
@@ -66,10 +69,10 @@ class Line(Family):
             scale += abs(factor) * abs(lam) ** power * (abs(term.matrix) @ np.abs(x))
         return float(np.abs(rest).max() / max(float(scale.max()), 1e-300))
 
-    def _wide_terms(self, mu: float) -> list[list[tuple[Sparse, Any]]]:
+    def _wide_terms(self, mu: complex) -> list[list[tuple[Sparse, Any]]]:
         result: list[list[tuple[Sparse, Any]]] = [[], [], []]
         for term, matrix, factor in zip(
-            self.problem.terms, self._wide_matrices, self.problem.factors(self.point(mu)), strict=True
+            self.problem.terms, self._wide_matrices, self.problem.factors(self.point(mu.real)), strict=True
         ):
             if factor:
                 result[ROLES.index(term.role)].append((matrix, np.longdouble(factor)))
@@ -113,7 +116,7 @@ class OnTerms(OnBasis):
     """A line whose matrices are small: the terms themselves (t, r, r), on all freedoms."""
 
     def __init__(self, line: Line, frequency: float, terms: Array) -> None:
-        super().__init__(line, frequency, line.size, damped=not line.still)
+        super().__init__(line, frequency, damped=not line.still)
         self._line, self._terms = line, terms
 
     def vectors(self, z: ComplexArray, mu: float, *, left: bool = False) -> ComplexArray:
@@ -125,5 +128,6 @@ class OnTerms(OnBasis):
         problem = self._line.problem
         return assembled(self._terms, problem.factors(self._line.point(float(mu.real))), problem.powers)
 
-    def _changes(self, mu: float) -> tuple[Array, Any, Any]:
-        return assembled(self._terms, self._line.factor_slopes(float(np.real(mu))), self._line.problem.powers)
+    def changes(self, mu: complex) -> tuple[Array, Any, Any]:
+        """dM, dD and dK over s (r, r), of the real part of it."""
+        return assembled(self._terms, self._line.factor_slopes(float(mu.real)), self._line.problem.powers)

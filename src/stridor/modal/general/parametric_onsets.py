@@ -14,6 +14,7 @@ import numpy as np
 from ...errors import CaseError
 from ...threads import one_thread
 from ...typing import ComplexArray
+from ..newton import Root, crossing, meeting, standstill
 from ..onset import Onset, from_above
 from ..options import Options
 from ..parametric import ReducedModel
@@ -21,7 +22,6 @@ from ..parametric.basis import expanded
 from .branches import ends_of
 from .counted import ends as turns
 from .line import Line, OnTerms, of_model
-from .newton import Root, crossing, meeting, standstill
 from .passages import quiet
 from .search import search
 from .words import sentence

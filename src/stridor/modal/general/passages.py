@@ -14,9 +14,9 @@ from ..assembled.critical import crossing as reduced_crossing
 from ..assembled.critical import pair_near
 from ..assembled.follow import Follower, State
 from ..assembled.passages import COMPLEX, Passage
+from ..newton import Root, crossing, meeting, standstill
 from ..tolerances import AT_REST, UNSTABLE_RELATIVE
 from .basis import Along, OnBasis
-from .newton import Root, crossing, meeting, standstill
 
 TRIES = 12
 Guess = tuple[float, complex, ComplexArray, ComplexArray]

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...direct import factorise
 from ...errors import AnalysisError
 from ...threads import one_thread
 from ...typing import Array, ComplexArray
-from ..quadratic.problem import Quadratic, times
+from ..inverse_iteration import two_sided
+from ..quadratic.problem import Quadratic
 from ..tolerances import CONFIRMED
 from .model import ReducedModel
 
-STEPS = 20
-SETTLED = 1e-14
 OFF = 1e-6  # of λ: how far beside it is factorised, so that the matrix is not singular
 
 
@@ -63,22 +61,11 @@ def refined(
 
     Raises AnalysisError where it does not settle.
     """
-    x, y = right / np.linalg.norm(right), left / np.linalg.norm(left)
-    change = complex("inf")
-    with factorise(problem.at(lam * (1 + OFF)), solver=solver) as factor:
-        for _ in range(STEPS):
-            x = factor.solve(_slope(problem, lam, x), refine=False)
-            y = factor.solve(_slope(problem.transposed, lam, y), transpose=True, refine=False)
-            x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
-            rest = problem.residual(np.array([lam]), x[:, None])[:, 0]
-            change = complex((y @ rest) / (y @ _slope(problem, lam, x)))
-            if not np.isfinite(change):
-                break
-            lam -= change
-            if abs(change) <= SETTLED * abs(lam):
-                return lam, x, y
-    if np.isfinite(change) and abs(change) <= max(1e-12 * abs(lam), rounding(problem, lam, x, y)):
-        return lam, x, y
+    found = two_sided(problem, lam, right, left, beside=OFF * lam, solver=solver)
+    if found is not None:
+        enough = max(1e-12 * abs(found.lam), rounding(problem, found.lam, found.right, found.left))
+        if found.change <= enough:
+            return found.lam, found.right, found.left
     raise AnalysisError(f"the mode near λ = {lam:.6g} 1/s does not settle in the full problem")
 
 
@@ -86,10 +73,4 @@ def rounding(problem: Quadratic, lam: complex, x: ComplexArray, y: ComplexArray)
     """What rounding of the matrices' entries and products may make of λ: of stiff ones far more than of λ itself."""
     rate, size = abs(lam), np.abs(x)
     scale = rate**2 * (abs(problem.mass) @ size) + rate * (abs(problem.damping) @ size) + abs(problem.stiffness) @ size
-    return float(4 * np.finfo(float).eps * (np.abs(y) @ scale) / abs(y @ _slope(problem, lam, x)))
-
-
-def _slope(problem: Quadratic, lam: complex, x: ComplexArray) -> ComplexArray:
-    """P'(λ)x (n,)."""
-    result: ComplexArray = 2 * lam * times(problem.mass, x) + times(problem.damping, x)
-    return result
+    return float(4 * np.finfo(float).eps * (np.abs(y) @ scale) / abs(y @ problem.slope(lam, x)))

@@ -48,6 +48,16 @@ class Quadratic:
         """P(λ)x (n, k) of λ (k,) and x (n, k)."""
         return lam**2 * times(self.mass, x) + lam * times(self.damping, x) + times(self.stiffness, x)
 
+    def applied(self, lam: complex, x: ComplexArray) -> ComplexArray:
+        """P(λ)x (n,) of one vector (n,)."""
+        found: ComplexArray = self.residual(np.array([lam]), x[:, None])[:, 0]
+        return found
+
+    def slope(self, lam: complex, x: ComplexArray) -> ComplexArray:
+        """P'(λ)x (n,) or (n, k)."""
+        found: ComplexArray = 2 * lam * times(self.mass, x) + times(self.damping, x)
+        return found
+
     def backward_error(self, lam: ComplexArray, x: ComplexArray) -> Array:
         """‖P(λ)x‖∞ / ‖(|λ|²|M| + |λ||D| + |K|)|x|‖∞ (k,)."""
         result = np.zeros(len(lam))

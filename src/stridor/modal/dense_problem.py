@@ -1,0 +1,279 @@
+"""Small dense problems over a number μ: all eigenpairs at any μ with their tangents, as followers of branches and
+Newton's method need them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sl
+
+from ..direct.dense import lu_factors
+from ..errors import AnalysisError
+from ..typing import Array, ComplexArray
+from .newton import Border
+from .quadratic.problem import Quadratic
+
+REACH = 1.8  # eigenpairs up to this much above the band are looked at
+REMEMBERED = 300  # values of μ whose eigenpairs are kept
+
+
+@dataclass(frozen=True)
+class Eigenpairs:
+    """Eigenpairs of the projected problem at one μ, one of each conjugate pair of λ.
+
+    coordinate x (k,): λ² without damping, else λ. values λ (k,) with Im λ ≥ 0. right (r, k) and left (r, k) vectors,
+    wᵀ P(λ) z = 0, tangents dx/dμ (k,). own: how many of the r belong to pairs, the rest to forces.
+    """
+
+    mu: float
+    coordinate: ComplexArray
+    values: ComplexArray
+    right: ComplexArray
+    left: ComplexArray
+    tangents: ComplexArray
+    own: int
+
+
+class OverNumber(ABC):
+    """Eigenpairs over a number μ in [low, high], up to beyond a frequency [1/s]. damped: whether anything works on
+    velocities; the coordinate is λ² where nothing does."""
+
+    def __init__(self, frequency: float, between: tuple[float, float], *, damped: bool) -> None:
+        self.frequency, self.damped = frequency, damped
+        self.low, self.high = between
+        self._known: dict[float, Eigenpairs] = {}
+
+    @abstractmethod
+    def eigenpairs(self, mu: float) -> Eigenpairs:
+        """All eigenpairs at ``mu`` with |λ| up to REACH times the frequency of interest."""
+
+    def padded(self, found: Eigenpairs, vectors: ComplexArray) -> ComplexArray:
+        """Vectors (r, k) of pairs found before a basis grew, on the basis as it is now."""
+        return vectors
+
+    def remembered(self, found: Eigenpairs) -> Eigenpairs:
+        """The same, known from now on."""
+        if len(self._known) >= REMEMBERED:
+            self._known.pop(next(iter(self._known)))
+        self._known[found.mu] = found
+        return found
+
+
+class DenseProblem(OverNumber):
+    """The same of matrices (r, r), which may be complex where μ is: also a problem for Newton's method."""
+
+    @abstractmethod
+    def matrices(self, mu: complex) -> tuple[Any, Any, Any]:
+        """M, C and K (r, r) at μ."""
+
+    @abstractmethod
+    def changes(self, mu: complex) -> tuple[Any, Any, Any]:
+        """dM, dC and dK (r, r) over μ."""
+
+    def eigenpairs(self, mu: float) -> Eigenpairs:
+        """All eigenpairs at ``mu`` with |λ| up to REACH times the frequency of interest."""
+        if mu not in self._known:
+            coordinate, right, left = self.solve(mu)
+            values = coordinate if self.damped else upper_root(coordinate)
+            tangents = self.tangents(mu, coordinate, values, right, left)
+            self.remembered(Eigenpairs(mu, coordinate, values, right, left, tangents, len(right)))
+        return self._known[mu]
+
+    def solve(self, mu: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Coordinates x (k,), right and left vectors (r, k) at a real or complex μ, |λ| up to REACH times the band."""
+        x, right, left = (_quadratic if self.damped else _linear)(
+            *self.matrices(mu), self.frequency, upper=self.damped and not isinstance(mu, complex)
+        )
+        order = np.lexsort((x.real, np.abs(x)))
+        return x[order], right[:, order], left[:, order]
+
+    def tangents(
+        self, mu: float, coordinate: ComplexArray, values: ComplexArray, right: ComplexArray, left: ComplexArray
+    ) -> ComplexArray:
+        """dx/dμ (k,) = −wᵀ P_μ z / wᵀ P_x z."""
+        by_mass, by_damping, by_stiffness = self.changes(mu)
+        change = combined(by_stiffness, right)
+        if np.any(by_damping):
+            change = change + values * combined(by_damping, right)
+        if np.any(by_mass):
+            change = change + values**2 * combined(by_mass, right)
+        mass, damping, _ = self.matrices(mu)
+        by_x = combined(mass, right)
+        if self.damped:
+            by_x = 2 * coordinate * by_x + combined(damping, right)
+        with np.errstate(all="ignore"):
+            return -np.einsum("ij,ij->j", left, change) / np.einsum("ij,ij->j", left, by_x)
+
+    def null_vectors(self, lam: complex, mu: complex) -> tuple[ComplexArray, ComplexArray]:
+        """The vectors z and y (r,) that make P(λ, μ) z and yᵀP(λ, μ) all but zero, for λ that may be double."""
+        mass, damping, stiffness = self.matrices(mu)
+        matrix = lam**2 * mass + lam * damping + stiffness
+        # Balanced by what the entries are made of: a row may itself be all but zero here, or have nothing in it at all
+        # where a load takes a stiffness away.
+        size = self._entries(lam, mu)
+        rows = np.maximum(size.max(axis=1), max(1e-16 * float(size.max()), 1e-300))
+        columns = np.maximum((size / rows[:, None]).max(axis=0), 1e-16)
+        u, _, v = sl.svd(matrix / rows[:, None] / columns)
+        return v[-1].conj() / columns, u[:, -1].conj() / rows
+
+    def _entries(self, lam: complex, mu: complex) -> Array:
+        """What the entries (r, r) of P(λ, μ) are made of."""
+        mass, damping, stiffness = self.matrices(mu)
+        size: Array = abs(lam) ** 2 * np.abs(mass) + abs(lam) * np.abs(damping) + np.abs(stiffness)
+        return size
+
+    # -- as Newton's method has it ------------------------------------------------------------------------------------
+    @property
+    def reversible(self) -> bool:
+        """Whether λ comes with −λ̄."""
+        return not self.damped
+
+    @property
+    def sizes(self) -> Array:
+        """What a unit of each unknown (r,) is worth: the square root of its largest stiffness."""
+        largest = np.abs(self.matrices(self.low)[2]).max(axis=1)
+        return np.sqrt(np.maximum(largest, 1e-24 * float(largest.max(initial=0.0))))
+
+    def at(self, mu: complex) -> Quadratic:
+        """The matrices at μ."""
+        return Quadratic(*self.matrices(mu))
+
+    def slopes(self, mu: complex) -> Quadratic:
+        """Their derivatives over μ."""
+        return Quadratic(*self.changes(mu))
+
+    def bordered(self, lam: complex, mu: complex, border: Border) -> DenseFactor:
+        """Factors of P(λ, μ), its rows of the size of one, with a border."""
+        mass, damping, stiffness = self.matrices(mu)
+        r = len(mass)
+        whole = np.zeros((r + 1, r + 1), dtype=complex)
+        whole[:r, :r] = lam**2 * mass + lam * damping + stiffness
+        whole[border.row, r] = whole[r, border.column] = border.scale
+        return DenseFactor.of(whole)
+
+    def functional(self, lam: complex, mu: complex, y: ComplexArray, x: ComplexArray) -> complex:
+        """yᵀP(λ, μ)x."""
+        return complex(y @ self.at(mu).applied(lam, x))
+
+    def backward_error(self, mu: float, lam: complex, x: ComplexArray) -> float:
+        """‖P(λ)x‖∞ over what it is made of."""
+        rest = np.abs(self.at(mu).applied(lam, x))
+        return float(rest.max() / max(float((self._entries(lam, mu) @ np.abs(x)).max()), 1e-300))
+
+
+@dataclass(frozen=True)
+class DenseFactor:
+    """LU factors of a matrix whose rows were divided by ``rows`` (n,)."""
+
+    factors: tuple[Any, Any]
+    rows: Array
+
+    @staticmethod
+    def of(matrix: ComplexArray) -> DenseFactor:
+        """Raises AnalysisError where it is singular."""
+        rows = np.maximum(np.abs(matrix).max(axis=1), 1e-300)
+        try:
+            factors = lu_factors(matrix / rows[:, None], check_finite=False)
+        except (sl.LinAlgError, ValueError) as error:
+            raise AnalysisError("the bordered matrix is singular") from error
+        return DenseFactor(factors, rows)
+
+    def solve(self, right: ComplexArray, *, transpose: bool = False) -> ComplexArray:
+        """A⁻¹ right, or A⁻ᵀ right (never conjugated), of right (n,) or (n, k)."""
+        scale = self.rows if right.ndim == 1 else self.rows[:, None]
+        if transpose:
+            found: ComplexArray = sl.lu_solve(self.factors, right, trans=1, check_finite=False) / scale
+        else:
+            found = sl.lu_solve(self.factors, right / scale, check_finite=False)
+        return found
+
+    def free(self) -> None:
+        """Nothing to give back."""
+
+
+def combined(basis: Array, weights: Any) -> Any:
+    """basis @ weights in real arithmetic; real where the weights are."""
+    if weights.dtype.kind != "c" or not np.any(weights.imag):
+        return basis @ np.ascontiguousarray(weights.real)
+    return basis @ np.ascontiguousarray(weights.real) + 1j * (basis @ np.ascontiguousarray(weights.imag))
+
+
+def upper_root(squares: ComplexArray) -> ComplexArray:
+    """λ (k,) of λ² with Im λ ≥ 0, and Re λ ≥ 0 where it is real."""
+    root: ComplexArray = np.sqrt(squares + 0j)
+    return np.where((root.imag < 0) | ((root.imag == 0) & (root.real < 0)), -root, root)
+
+
+def _linear(
+    mass: Array, damping: Array, stiffness: Array, frequency: float, *, upper: bool
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """x = λ² and right and left vectors of (xM + K) z = 0, shifted and inverted at x = frequency²."""
+    shift = frequency**2
+    factor = _factor(stiffness + shift * mass)
+    theta, left, right = sl.eig(sl.lu_solve(factor, shift * mass), left=True, right=True)
+    with np.errstate(all="ignore"):
+        x = shift - shift / theta
+        chosen = np.flatnonzero(np.isfinite(x) & (np.abs(x) <= (REACH * frequency) ** 2))
+    return x[chosen], right[:, chosen], _transposed_solve(factor, left[:, chosen].conj())
+
+
+def _quadratic(
+    mass: Array, damping: Array, stiffness: Array, frequency: float, *, upper: bool
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """x = λ and right and left vectors of (x²M + xC + K) z = 0, shifted and inverted at x = frequency; ``upper`` leaves
+    out the lower half plane."""
+    companion, factor = _companion(mass, damping, stiffness, frequency)
+    r = len(mass)
+    theta, left, right = sl.eig(companion, left=True, right=True)
+    with np.errstate(all="ignore"):
+        x = frequency * (1 + 1 / theta)
+        chosen = np.isfinite(x) & (np.abs(x) <= REACH * frequency)
+    chosen = np.flatnonzero(chosen & (x.imag >= 0) if upper else chosen)
+    z = np.where(np.abs(theta[chosen]) > 1, right[:r, chosen], right[r:, chosen])
+    return x[chosen], z, _transposed_solve(factor, left[:r, chosen].conj())
+
+
+def eigenvalues(mass: Array, damping: Array, stiffness: Array, frequency: float) -> ComplexArray:
+    """All finite λ (k,) of (λ²M + λC + K) z = 0, without damping one of each ±λ, shifted and inverted at λ = frequency:
+    those of about that size are as good as can be, whatever else there is. The mass need not be regular."""
+    if not np.any(damping):
+        shift = frequency**2
+        theta = sl.eigvals(sl.lu_solve(_factor(stiffness + shift * mass), shift * mass))
+        with np.errstate(all="ignore"):
+            squares: ComplexArray = shift - shift / theta
+        return upper_root(squares[np.isfinite(squares)])
+    theta = sl.eigvals(_companion(mass, damping, stiffness, frequency)[0])
+    with np.errstate(all="ignore"):
+        values: ComplexArray = frequency * (1 + 1 / theta)
+    return values[np.isfinite(values)]
+
+
+def _companion(mass: Array, damping: Array, stiffness: Array, frequency: float) -> tuple[Array, tuple[Array, Array]]:
+    """The matrix (2r, 2r) whose eigenvalues are θ = 1/(λ/frequency − 1), and the factors of P(frequency)."""
+    mass, damping = frequency**2 * mass, frequency * damping
+    r = len(mass)
+    factor = _factor(mass + damping + stiffness)
+    companion = np.zeros((2 * r, 2 * r), dtype=stiffness.dtype)
+    companion[:r, :r] = -sl.lu_solve(factor, damping + 2 * mass)
+    companion[:r, r:] = -sl.lu_solve(factor, mass)
+    companion[r:, :r] = np.eye(r)
+    return companion, factor
+
+
+def _transposed_solve(factor: tuple[Any, Any], right: Any) -> Any:
+    """A⁻ᵀ right; for a real matrix and complex right sides in real arithmetic."""
+    if factor[0].dtype.kind == "c" or right.dtype.kind != "c":
+        return sl.lu_solve(factor, right, trans=1)
+    return sl.lu_solve(factor, right.real, trans=1) + 1j * sl.lu_solve(factor, right.imag, trans=1)
+
+
+def _factor(matrix: Array) -> tuple[Array, Array]:
+    if not np.all(np.isfinite(matrix)):
+        raise AnalysisError("the projected contact problem is not finite; check the model's units and stiffnesses")
+    factor = lu_factors(matrix)
+    if np.abs(np.diag(factor[0])).min(initial=np.inf) == 0.0:
+        raise AnalysisError("the projected contact problem is singular: a contact is given twice, or friction jams")
+    return factor
