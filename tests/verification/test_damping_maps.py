@@ -17,7 +17,6 @@ from stridor.study import damping_full, damping_map, damping_reduced
 from stridor.study.damping_full import FullSearch
 from stridor.study.damping_map import damping_map as solve
 from stridor.study.damping_reduced import ReducedSearch
-from stridor.study.undamped_onset import undamped_onset
 from stridor.view import sensitivity_plots
 
 X, Y = "bodies.block.damping.stiffness", "bodies.slider.damping.stiffness"
@@ -124,8 +123,8 @@ def test_rigid_contact_too(block):
     assert one.slopes == pytest.approx(other.slopes, rel=1e-4)
     assert search.confirmed(5e-8, 1e-9, one).mu == pytest.approx(other.mu, abs=1e-12)
     # Friction is in the mass, too: the undamped onset follows that.
-    bare = undamped_onset(search.model, "mu")
-    assert bare.value == pytest.approx(full.undamped().mu, abs=1e-12)
+    bare = search.undamped()
+    assert bare.mu == pytest.approx(full.undamped().mu, abs=1e-12)
     assert bare.residual < 1e-12
 
 

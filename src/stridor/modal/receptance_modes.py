@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..system.uncoupled import uncoupled_modes
 from ..typing import Array, ComplexArray, IntArray
 from .backward_error import BackwardError
 from .coupling import Coupling, couple
-from .inverse_iteration import two_sided
+from .inverse_iteration import Iterated, two_sided
 from .pencil import Pencil
 from .results import ComplexModes, Progress, require_memory
 from .roots import Spectrum, spectrum_of
@@ -23,7 +24,7 @@ from .vectors import expand, fixed_vectors, modal_coordinates
 
 CHUNK = 256
 DOUBTFUL = 1e-11  # backward errors above it are refined on the assembled matrices
-BESIDE = 1e-10  # of λ: how far beside it that is, so that an exact eigenvalue can be factorised too
+BESIDE = (1e-10, 1e-9, 1e-8, 1e-7)  # of λ: how far beside it that is, where stiff contacts make P singular nearer to it
 NEARBY = 1e-6  # of λ: what is found further away is another one
 
 
@@ -158,11 +159,12 @@ def _refined(
     forces = np.zeros(pencil.nodes)
     # Some of every direction: on a pole the modal sum may lack the very one that is sought.
     spread = np.random.default_rng(0).standard_normal(n) / np.sqrt(n)
-    given = (np.append(spread if not np.all(np.isfinite(v)) else v + 1e-3 * spread, forces) for v in (right, left))
-    try:
-        found = two_sided(pencil.whole, lam, *given, beside=BESIDE * lam)
-    except SingularMatrix:
-        return lam, right, left
+    given = [np.append(spread if not np.all(np.isfinite(v)) else v + 1e-3 * spread, forces) for v in (right, left)]
+    found: Iterated | None = None
+    for part in BESIDE:
+        with contextlib.suppress(SingularMatrix):
+            found = two_sided(pencil.whole, lam, *given, beside=part * lam)
+            break
     if found is None:
         return lam, right, left
     x, y = found.right[:n], found.left[:n]

@@ -26,7 +26,6 @@ from ..typing import Array, Sparse
 from .damping_full import FullSearch, LowestOnset
 from .options import options_of
 from .reduced import reduced_model
-from .undamped_onset import undamped_onset
 
 FRICTION = "mu"
 BEYOND = 1.25  # how much further than a neighbour's onset is looked first
@@ -166,10 +165,14 @@ class ReducedSearch:
             if np.any(problem.factor_slopes({**fixed, FRICTION: float(mu)}, FRICTION)[damping]):
                 # Friction has a part in damping, which stays: that is no undamped problem.
                 return self.full.undamped()
-        found = undamped_onset(self.model, FRICTION, solver=options_of(self.case).solver)
-        if found is None:
+        found = onsets_along(without_damping(self.model), FRICTION, solver=options_of(self.case).solver)
+        if not found.complete:
+            return self.full.undamped()
+        first = next((onset for onset in found if not onset.stabilising), None)
+        if first is None:
             return None
-        return LowestOnset(found.value, found.frequency_hz, residual=found.residual)
+        residual = float("nan") if first.residual is None else first.residual
+        return LowestOnset(first.value, first.frequency_hz, residual=residual)
 
     def _matrices(self, point: Mapping[str, float]) -> tuple[Array, Array, Array]:
         problem = self.model.problem
@@ -187,6 +190,16 @@ class ReducedSearch:
         change = assembled(self.model.projected, problem.factor_slopes(modes.point, name), problem.powers)
         moved = lam**2 * (change[0] @ z) + lam * (change[1] @ z) + change[2] @ z
         return float((-(w @ moved) / (w @ (2 * lam * (mass @ z) + damping @ z))).real)
+
+
+def without_damping(model: ReducedModel) -> ReducedModel:
+    """The model of the problem that is left without terms that work on velocities."""
+    kept = np.flatnonzero(model.problem.powers != 1)
+    terms = tuple(model.problem.terms[k] for k in kept)
+    return replace(
+        model, problem=replace(model.problem, terms=terms), projected=model.projected[kept],
+        right_sketch=model.right_sketch[kept], left_sketch=model.left_sketch[kept],
+    )  # fmt: skip
 
 
 def _between(model: ReducedModel, low: float, high: float) -> ReducedModel:
