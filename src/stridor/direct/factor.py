@@ -175,13 +175,16 @@ class Factor:
         return float(left.max() / ((self._sizes @ np.abs(motion)) / self._largest).max())
 
 
-def factorise(matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, solver: str | None = None) -> Factor:
+def factorise(
+    matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, solver: str | None = None, tried: bool = True
+) -> Factor:
     """Factorise a sparse matrix (n, n), real or complex.
 
     symmetric: A = Aᵀ (not conjugated), which halves the work. saddle: [[K, Bᵀ], [B, −C]] with K positive
     (semi)definite and rows of zeros allowed on the diagonal of C, as multipliers make them; with friction Bᵀ may be
     another matrix. solver: "mumps", "pardiso", "superlu" or, over all processes of an MPI run, "slepc"; by default the
-    environment variable STRIDOR_SOLVER, else the first of the others that is installed.
+    environment variable STRIDOR_SOLVER, else the first of the others that is installed. tried: whether the factors are
+    tried for a singular matrix at once, which costs two solutions; without it solving alone tells, by its error.
 
     Raises SingularMatrix (an AnalysisError) for a matrix without inverse to working precision, CaseError for an
     unknown or missing solver.
@@ -206,7 +209,7 @@ def factorise(matrix: Sparse, *, symmetric: bool = False, saddle: bool = False, 
         _require_symmetry(held)
     try:
         factor = Factor(held, begin(held, symmetric, saddle), name, started, largest)
-        ratio, motion = factor.unresisted() if held.shape[0] else (1.0, None)
+        ratio, motion = factor.unresisted() if held.shape[0] and tried else (1.0, None)
     except Breakdown:
         # Enough on the diagonal to get through: solved with that, the matrix still shows what it does not resist.
         stiffened = sp.csr_array(held + sp.diags_array(1e-3 * PERTURBED * largest[0]))

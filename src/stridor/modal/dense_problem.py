@@ -145,12 +145,11 @@ class DenseProblem(OverNumber):
         """Their derivatives over μ."""
         return Quadratic(*self.changes(mu))
 
-    def bordered(self, lam: complex, mu: complex, border: Border) -> DenseFactor:
-        """Factors of P(λ, μ), its rows of the size of one, with a border."""
-        mass, damping, stiffness = self.matrices(mu)
-        r = len(mass)
+    def bordered(self, here: Quadratic, lam: complex, border: Border) -> DenseFactor:
+        """Factors of P(λ), its rows of the size of one, with a border."""
+        r = here.size
         whole = np.zeros((r + 1, r + 1), dtype=complex)
-        whole[:r, :r] = lam**2 * mass + lam * damping + stiffness
+        whole[:r, :r] = lam**2 * here.mass + lam * here.damping + here.stiffness
         whole[border.row, r] = whole[r, border.column] = border.scale
         return DenseFactor.of(whole)
 

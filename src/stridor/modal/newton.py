@@ -108,8 +108,8 @@ class Problem(Protocol):
         """Their derivatives over μ."""
         ...
 
-    def bordered(self, lam: complex, mu: complex, border: Border) -> Factor:
-        """Factors of the bordered matrix (n + 1, n + 1). Raises AnalysisError where it is singular."""
+    def bordered(self, here: Any, lam: complex, border: Border) -> Factor:
+        """Factors of P(λ) (n, n) of the matrices ``here`` with a border. Raises AnalysisError where it is singular."""
         ...
 
     def functional(self, lam: complex, mu: complex, y: ComplexArray, x: ComplexArray) -> complex:
@@ -170,7 +170,7 @@ class Border:
     def at(self, lam: complex, mu: complex) -> Point:
         """g and its derivatives. Raises AnalysisError where even the bordered matrix is singular."""
         here, change = self.problem.at(mu), self.problem.slopes(mu)
-        factor, scale, n = self.problem.bordered(lam, mu, self), self.scale, here.mass.shape[0]
+        factor, scale, n = self.problem.bordered(here, lam, self), self.scale, here.mass.shape[0]
         try:
             unit = np.zeros(n + 1, dtype=complex)
             unit[n] = scale

@@ -30,6 +30,7 @@ from .tracking import State, Tracker
 from .unfit import Unfit
 
 NARROWINGS = 8
+ASTRAY = 0.1  # of μ
 STILL = 1e-6  # of |λ|: what swings slower diverges
 
 
@@ -188,6 +189,9 @@ def _passages(spectrum: Spectrum, old: State, new: State, has_damping: bool) -> 
         fraction = float(np.clip((first / (first - second)).real, 0.0, 1.0)) if first != second else 0.5
         means = ((a + old.roots[j]) / 2, (b + new.roots[j]) / 2) if j >= 0 else (0.0, 0.0)
         middle = (1 - fraction) * means[0] + fraction * means[1]
+        if j >= 0 and first.real * second.real > 0:
+            # These two do not meet: the other half is beyond what is followed. At a meeting both are where one is.
+            middle = 1j * (a.imag + b.imag) / 2
         at = old.mu + fraction * step
         events.append(_Event(at, complex(middle), int(new.branch[i]), _named(new, j), was, True, i, old, new))
     return events
@@ -289,7 +293,9 @@ def _solve(
     lam, mu = complex(event.root), min(max(event.mu, family.low), family.high)
     # What has no partner but its own conjugate may diverge.
     still = event.partner < 0 or abs(lam.imag) <= STILL * abs(lam)
-    between = (event.old.mu, event.new.mu)
+    # Newton may go astray on its way; whether what it finds is the one enclosed is asked after it.
+    astray = max(event.new.mu - event.old.mu, ASTRAY * max(mu, ASTRAY))
+    between = (mu - astray, mu + astray)
     root: Root | None = None
     root_coefficient: float | None = None
     exceptional_mu: complex | None = None

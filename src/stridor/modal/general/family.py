@@ -22,8 +22,9 @@ import scipy.sparse as sp
 from ...direct import Factor, factorise
 from ...errors import AnalysisError, CaseError
 from ...system import System
-from ...typing import Array, ComplexArray, Sparse
+from ...typing import Array, ComplexArray, IntArray, Sparse
 from ..assembled.problem import ContactProblem, problem_of
+from ..backward_error import common_pattern
 from ..newton import Border
 from ..options import Options
 from ..parametric import Parameter, ParametricProblem, Term
@@ -51,6 +52,16 @@ class Form:
         """(k,) products of μ − μ_j over the nodes before each; μ may be complex."""
         steps = [1.0, *(mu - node for node in self.nodes[: len(self.matrices) - 1])]
         return np.array(steps, dtype=complex).cumprod()
+
+    def sum(self, factors: ComplexArray) -> Sparse:
+        """Σ factor · matrix (n, n) csr, real where the factors are."""
+        indptr, indices, data = self._stacked
+        factors = factors if np.any(np.imag(factors)) else np.real(factors)
+        return sp.csr_array((factors @ data, indices, indptr), shape=self.matrices[0].shape)
+
+    @cached_property
+    def _stacked(self) -> tuple[IntArray, IntArray, Array]:
+        return common_pattern(*self.matrices)
 
     def wide_factors(self, mu: complex) -> ComplexArray:
         """The same in extended precision."""
@@ -100,7 +111,7 @@ class Smooth:
             raise AnalysisError("the matrices are no smooth functions of mu")
         if self.form is None or not (self.exact or mu.imag):
             return self.built(mu.real)
-        return Quadratic(*(_sum(self.form[role].matrices, self.form[role].factors(mu)) for role in ROLES))
+        return Quadratic(*(self.form[role].sum(self.form[role].factors(mu)) for role in ROLES))
 
     def built(self, mu: float) -> Quadratic:
         """The problem at μ as the system gives it there."""
@@ -113,7 +124,7 @@ class Smooth:
     def slopes(self, mu: complex) -> Quadratic:
         """dM/dμ, dD/dμ and dK/dμ; where there is no form, by differences about the real part of μ."""
         if self.form is not None:
-            return Quadratic(*(_sum(self.form[role].matrices, self.form[role].slopes(mu)) for role in ROLES))
+            return Quadratic(*(self.form[role].sum(self.form[role].slopes(mu)) for role in ROLES))
         step = 1e-5 * (self.high - self.low)
         low, high = max(mu.real - step, self.low), min(mu.real + step, self.high)
         before, after = self.built(low), self.built(high)
@@ -186,7 +197,7 @@ class Smooth:
                 columns[role].append(new)
                 form = Form(tuple(columns[role]), tuple(nodes[: k + 1]))
                 left = max(
-                    away(_sum(form.matrices, form.factors(mu)), true)
+                    away(form.sum(form.factors(mu)), true)
                     for mu, true in zip(tried, truth[role], strict=True)
                 )
                 if left < best[role][1]:
@@ -260,14 +271,14 @@ class Family(Smooth):
         """Number of freedoms n; the forces of rigid contacts are unknowns beyond them."""
         return self.size
 
-    def bordered(self, lam: complex, mu: complex, border: Border) -> Factor:
-        """Factors of P(λ, μ) with a border. Raises AnalysisError where it is singular."""
-        coo = sp.coo_array(self.at(mu).at(lam))
+    def bordered(self, here: Quadratic, lam: complex, border: Border) -> Factor:
+        """Factors of P(λ) with a border. Raises AnalysisError where it is singular."""
+        coo = sp.coo_array(here.at(lam))
         n, scale = coo.shape[0], border.scale
         data = np.concatenate([coo.data.astype(complex), [scale, scale]])
         rows, columns = np.concatenate([coo.row, [border.row, n]]), np.concatenate([coo.col, [n, border.column]])
         matrix = sp.csr_array(sp.coo_array((data, (rows, columns)), shape=(n + 1, n + 1)))
-        return factorise(matrix, solver=self.options.solver)
+        return factorise(matrix, solver=self.options.solver, tried=False)
 
     def backward_error(self, mu: float, lam: complex, x: ComplexArray) -> float:
         """Backward error of an eigenpair λ, x (n,) in the matrices as they are given at μ."""
@@ -383,17 +394,6 @@ def family_of(
 def wide(matrix: Sparse) -> Sparse:
     """A matrix whose products are taken in extended precision."""
     return sp.csr_array(matrix, dtype=np.longdouble)
-
-
-def _sum(matrices: tuple[Sparse, ...], factors: Any) -> Sparse:
-    factors = factors if np.any(np.imag(factors)) else np.real(factors)
-    total = matrices[0] if factors[0] == 1.0 else factors[0] * matrices[0]
-    for matrix, factor in zip(matrices[1:], factors[1:], strict=True):
-        if factor and matrix.nnz:
-            total = total + factor * matrix
-    total = sp.csr_array(total)
-    total.eliminate_zeros()
-    return total
 
 
 def away(one: Sparse, other: Sparse) -> float:
