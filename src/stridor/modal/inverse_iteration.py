@@ -43,7 +43,7 @@ def two_sided(
     """
     random = np.random.default_rng(0)
     x, y = (random.standard_normal(problem.size) + 0j if v is None else v for v in (right, left))
-    last = np.inf
+    last, size, slope = np.inf, np.inf, 0j
     with factorise(problem.at(lam + beside), saddle=True, solver=solver) as factor, np.errstate(all="ignore"):
         x = factor.solve(problem.slope(lam, x))
         y = factor.solve(problem.transposed.slope(lam, y), transpose=True)

@@ -16,13 +16,13 @@ that are needed (Govaerts, Numerical Methods for Bifurcations of Dynamical Equil
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from ..errors import AnalysisError
 from ..typing import Array, ComplexArray
-from .quadratic.problem import times
+from .quadratic.problem import Quadratic, times
 from .tolerances import CONFIRMED
 
 STEPS = 14
@@ -64,22 +64,6 @@ class Factor(Protocol):
         ...
 
 
-class Matrices(Protocol):
-    """M, D and K (n, n), sparse or dense, of P(λ) = λ²M + λD + K, or of how it changes with μ."""
-
-    mass: Any
-    damping: Any
-    stiffness: Any
-
-    def slope(self, lam: complex, x: ComplexArray) -> ComplexArray:
-        """P'(λ)x (n,)."""
-        ...
-
-    def applied(self, lam: complex, x: ComplexArray) -> ComplexArray:
-        """P(λ)x (n,)."""
-        ...
-
-
 class Problem(Protocol):
     """A problem over μ in [low, high], as Newton's method needs it; μ may be complex where its matrices are known so.
 
@@ -100,15 +84,15 @@ class Problem(Protocol):
         """Whether −λ̄ is an eigenvalue with every λ."""
         ...
 
-    def at(self, mu: complex) -> Matrices:
+    def at(self, mu: complex) -> Quadratic:
         """The matrices at μ."""
         ...
 
-    def slopes(self, mu: complex) -> Matrices:
+    def slopes(self, mu: complex) -> Quadratic:
         """Their derivatives over μ."""
         ...
 
-    def bordered(self, here: Any, lam: complex, border: Border) -> Factor:
+    def bordered(self, here: Quadratic, lam: complex, border: Border) -> Factor:
         """Factors of P(λ) (n, n) of the matrices ``here`` with a border. Raises AnalysisError where it is singular."""
         ...
 

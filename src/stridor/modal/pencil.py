@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from ..typing import Array, ComplexArray, Sparse
+from ..typing import Array, ComplexArray, IntArray, Sparse
 from .quadratic.problem import CHUNK, Quadratic, times
 
 NEGLIGIBLE = 1e-4  # of the largest displacement: gaps that open less than this are not judged more closely
@@ -113,7 +113,7 @@ class Pencil:
             stiffness = stiffness + self.push[soft].T @ springs @ self.normal[soft]
         return self._bordered(stiffness, np.flatnonzero(~soft) if rigid else np.zeros(0, dtype=np.int64))
 
-    def _bordered(self, stiffness: Sparse, nodes: Array) -> Quadratic:
+    def _bordered(self, stiffness: Sparse, nodes: IntArray) -> Quadratic:
         """With the forces of some nodes as unknowns."""
         if not len(nodes):
             return Quadratic(self.mass, sp.csr_array(self.damping), sp.csr_array(stiffness))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg as spl
@@ -79,7 +80,7 @@ def _damped(
     return 1j * omega + 1 / theta, whole(vectors[:n], vectors[n:])
 
 
-def _padded(u: ComplexArray, size: int) -> ComplexArray:
+def _padded(u: Any, size: int) -> Any:
     """With rows of zeros for the contact forces."""
     return np.concatenate([u, np.zeros((size - len(u), u.shape[1]))])
 

@@ -53,7 +53,7 @@ class Form:
         steps = [1.0, *(mu - node for node in self.nodes[: len(self.matrices) - 1])]
         return np.array(steps, dtype=complex).cumprod()
 
-    def sum(self, factors: ComplexArray) -> Sparse:
+    def sum(self, factors: Any) -> Sparse:
         """Σ factor · matrix (n, n) csr, real where the factors are."""
         indptr, indices, data = self._stacked
         factors = factors if np.any(np.imag(factors)) else np.real(factors)
@@ -63,15 +63,15 @@ class Form:
     def _stacked(self) -> tuple[IntArray, IntArray, Array]:
         return common_pattern(*self.matrices)
 
-    def wide_factors(self, mu: complex) -> ComplexArray:
+    def wide_factors(self, mu: complex) -> Any:
         """The same in extended precision."""
         wide = np.clongdouble(mu)
         steps = [np.clongdouble(1.0), *(wide - node for node in self.nodes[: len(self.matrices) - 1])]
-        result: ComplexArray = np.cumprod(np.array(steps, dtype=np.clongdouble))
+        result: Any = np.cumprod(np.array(steps, dtype=np.clongdouble))
         return result if mu.imag else result.real
 
-    def slopes(self, mu: complex) -> ComplexArray:
-        """Their derivatives (k,) over μ."""
+    def slopes(self, mu: complex) -> Any:
+        """Their derivatives (k,) over μ, real where that is."""
         result = np.zeros(len(self.matrices), dtype=complex)
         value, slope = complex(1.0), complex(0.0)
         for k, node in enumerate(self.nodes[: len(self.matrices) - 1]):
@@ -210,10 +210,14 @@ class Smooth:
             return None, False
         return forms, max(left for _, left in best.values()) <= EXACT
 
-    @cached_property
+    @property
     def reversible(self) -> bool:
         """Whether −λ̄ is an eigenvalue with every λ: nothing works on velocities, or gyroscopic forces alone do and all
         others have a potential. Stability ends there only where eigenvalues meet."""
+        return self._reversible
+
+    @cached_property
+    def _reversible(self) -> bool:
         if self.form is not None:
             mass, damping, stiffness = (self.form[role].matrices for role in ROLES)
         else:
@@ -224,9 +228,13 @@ class Smooth:
         potential = all(away(m, sp.csr_array(m.T)) <= EXACT for m in (*mass, *stiffness))
         return potential and all(away(d, sp.csr_array(-d.T)) <= EXACT for d in damping)
 
-    @cached_property
+    @property
     def sizes(self) -> Array:
         """What a unit of each unknown (n,) is worth: the square root of its largest stiffness, at some μ."""
+        return self._sizes
+
+    @cached_property
+    def _sizes(self) -> Array:
         largest = np.zeros(self.built(self.low).size)
         for part in (0.0, *PROBES, 1.0):
             matrix = abs(self.built(self.low + part * (self.high - self.low)).stiffness)

@@ -83,7 +83,7 @@ class Line(Family):
         return [wide(t.matrix) for t in self.problem.terms]
 
     @cached_property
-    def reversible(self) -> bool:
+    def _reversible(self) -> bool:
         """Whether −λ̄ is an eigenvalue with every λ, as `Smooth.reversible` has it, for every value of the parameter."""
         damping = [t.matrix for t in self._acting if t.role == "damping"]
         if not damping:

@@ -53,8 +53,8 @@ class Quadratic:
         found: ComplexArray = self.residual(np.array([lam]), x[:, None])[:, 0]
         return found
 
-    def slope(self, lam: complex, x: ComplexArray) -> ComplexArray:
-        """P'(λ)x (n,) or (n, k)."""
+    def slope(self, lam: complex | ComplexArray, x: ComplexArray) -> ComplexArray:
+        """P'(λ)x (n,), or (n, k) of λ (k,)."""
         found: ComplexArray = 2 * lam * times(self.mass, x) + times(self.damping, x)
         return found
 
