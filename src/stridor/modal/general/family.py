@@ -72,7 +72,7 @@ class Form:
 
     def slopes(self, mu: complex) -> Any:
         """Their derivatives (k,) over μ, real where that is."""
-        result = np.zeros(len(self.matrices), dtype=complex)
+        result: Any = np.zeros(len(self.matrices), dtype=complex)
         value, slope = complex(1.0), complex(0.0)
         for k, node in enumerate(self.nodes[: len(self.matrices) - 1]):
             value, slope = value * (mu - node), slope * (mu - node) + value
