@@ -20,7 +20,7 @@ from assembled_modes import grid
 from stridor.case import template_text
 from stridor.direct import factorise
 from stridor.modal.parametric import contact_parameters
-from stridor.modal.quadratic import Quadratic, Region, Spectrum, find_modes
+from stridor.modal.quadratic import Quadratic, Region, RegionModes, find_modes
 from stridor.modal.quadratic.krylov import times
 
 
@@ -71,7 +71,7 @@ def by_hand(problem: Quadratic, shift: complex, radius: float, count: int) -> di
 
 
 def compare(name: str, problem: Quadratic, region: Region, neighbour: Quadratic) -> None:
-    found: Spectrum = find_modes(problem, region)
+    found: RegionModes = find_modes(problem, region)
     disc = found.completeness.discs[0]
     print(
         f"{name}, {problem.size} freedoms, {len(found.values)} modes up to {region.im_max / 2 / np.pi:g} Hz: "

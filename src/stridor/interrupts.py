@@ -23,7 +23,7 @@ STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP
 
 
 @dataclass(eq=False)
-class Held:
+class HeldSignals:
     """A block that is not to be interrupted in its middle: whether an end was asked for, whether that was met.
 
     ending: what it has is on its way out and is not to be lost; late: an end was asked for after that.
@@ -39,7 +39,7 @@ class Held:
 class _Program:
     """What this process knows: the blocks it is in, and whether an interrupt is still to be caught by the program."""
 
-    blocks: list[Held]
+    blocks: list[HeldSignals]
     installed: bool = False
     pending: bool = False
     leaving: bool = False
@@ -90,12 +90,12 @@ def gone() -> None:
 
 
 @contextlib.contextmanager
-def held() -> Generator[Held]:
+def held() -> Generator[HeldSignals]:
     """A block that a first Ctrl-C does not interrupt: it looks at ``asked`` itself and says ``met`` when it ends early.
 
     What was asked for and not met reaches the block around this one, or is raised as KeyboardInterrupt at its end.
     """
-    block = Held()
+    block = HeldSignals()
     before = _take_over()
     _program.blocks.append(block)
     try:
@@ -116,7 +116,7 @@ def held() -> Generator[Held]:
 @contextlib.contextmanager
 def at_once() -> Generator[None]:
     """A part of a `held` block that may be interrupted at any place: nothing is lost by it, and it takes long."""
-    block = Held(met=True)
+    block = HeldSignals(met=True)
     _program.blocks.append(block)
     try:
         yield

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from stridor.modal.parametric.factors import CONSTANT, Factor, Formula, Lagrange, Product, factor_from_json
+from stridor.modal.parametric.factors import CONSTANT, Formula, Lagrange, ParameterFactor, Product, factor_from_json
 
 POINT = {"mu": 0.4, "k": 1.7, "Omega": 12.0}
 GRID = (0.0, 0.3, 0.8)
-CASES: list[tuple[Factor, float]] = [
+CASES: list[tuple[ParameterFactor, float]] = [
     (CONSTANT, 1.0),
     (Product((("mu", 0.9), ("k", 1.0))), 0.4 * 1.7),
     (Product((("mu", 0.9), ("mu", 0.9))), 0.16),
@@ -21,7 +21,7 @@ CASES: list[tuple[Factor, float]] = [
 
 
 @pytest.mark.parametrize(("factor", "value"), CASES)
-def test_value_slope_and_the_way_through_json(factor: Factor, value: float) -> None:
+def test_value_slope_and_the_way_through_json(factor: ParameterFactor, value: float) -> None:
     assert factor(POINT) == pytest.approx(value, rel=1e-14)
     again = factor_from_json(json.loads(json.dumps(factor.to_json())))
     assert again == factor

@@ -15,8 +15,8 @@ from stridor.modal.parametric.contacts_sampling import combined_matrices, sample
 from stridor.modal.parametric.factors import (
     CONSTANT,
     Axis,
-    Factor,
     Formula,
+    ParameterFactor,
     Product,
     Tabulated,
     Times,
@@ -28,7 +28,7 @@ from stridor.modal.parametric.family import merged, term_of
 POINT = {"mu": 0.4, "k": 1.7, "Omega": 12.0}
 MU, K = Axis("mu", (0.0, 0.2, 0.7, 0.9)), Axis("k", (0.5, 1.0, 3.0), logarithmic=True)
 TABLE = Tabulated((MU, K), tuple((m**3 - 2 * m) * (1 + np.log(k) ** 2) for m in MU.points for k in K.points))
-CASES: list[tuple[Factor, float]] = [
+CASES: list[tuple[ParameterFactor, float]] = [
     (Tabulated((MU,), tuple(m**3 for m in MU.points)), 0.064),
     (TABLE, (0.064 - 0.8) * (1 + np.log(1.7) ** 2)),
     (Times((Product((("mu", 1.0),)), TABLE)), 0.4 * (0.064 - 0.8) * (1 + np.log(1.7) ** 2)),
@@ -37,7 +37,7 @@ CASES: list[tuple[Factor, float]] = [
 
 
 @pytest.mark.parametrize(("factor", "value"), CASES)
-def test_value_slope_and_the_way_through_json_of_tables(factor: Factor, value: float) -> None:
+def test_value_slope_and_the_way_through_json_of_tables(factor: ParameterFactor, value: float) -> None:
     assert factor(POINT) == pytest.approx(value, rel=1e-13)
     again = factor_from_json(json.loads(json.dumps(factor.to_json())))
     assert again == factor

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from stridor.contact.multipliers import OPEN, SLIP, STICK
 from stridor.errors import AnalysisError
 from stridor.sliding import history, points, surfaces
-from stridor.sliding.equilibrium import NEWTON_STEPS, ContactRows, Equilibrium, State, changed, settle
+from stridor.sliding.equilibrium import NEWTON_STEPS, ContactRows, Equilibrium, NodeState, changed, settle
 from stridor.sliding.redundant import closed, redundant
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip, _Change, increments_of
 from stridor.system.load_steps import LoadStep
@@ -205,7 +205,7 @@ def test_a_body_that_moves_a_million_times_its_size_is_loose(monkeypatch, size: 
     bar = SimpleNamespace(points=np.array([[50.0, 10.0], [53.0, 10.5]]))
     system = SimpleNamespace(lines=(), solids=(bar,))
     monkeypatch.setattr(surfaces, "_loose", lambda *given: "it is loose")
-    state = State(np.zeros(0, dtype=bool), np.array([0.0, -size]), np.zeros(0), np.zeros(0))
+    state = NodeState(np.zeros(0, dtype=bool), np.array([0.0, -size]), np.zeros(0), np.zeros(0))
     if held:
         surfaces._require_held(system, None, state, 1e-9)
         with pytest.raises(AnalysisError, match="it is loose"):

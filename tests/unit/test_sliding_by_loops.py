@@ -18,7 +18,7 @@ from stridor.direct import SingularMatrix
 from stridor.errors import AnalysisError
 from stridor.laws import Coulomb, Weakening
 from stridor.sliding import equilibrium, points, pressing, stretches, surfaces
-from stridor.sliding.equilibrium import State, offenders, settle
+from stridor.sliding.equilibrium import NodeState, offenders, settle
 from stridor.sliding.redundant import redundant
 from stridor.sliding.resultants import balance, resultants
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip
@@ -166,13 +166,13 @@ def test_offenders_are_those_beyond_rounding_and_the_worst_come_first() -> None:
             force = size * rng.normal(size=m) * 10.0 ** rng.integers(-14, 1, size=m)
             gap = size * rng.normal(size=m) * 10.0 ** rng.integers(-14, 1, size=m)
             load = size * rng.choice([0.1, 10.0])
-            pulled, closing = offenders(State(active, np.zeros(0), force, gap), movable, load)
+            pulled, closing = offenders(NodeState(active, np.zeros(0), force, gap), movable, load)
             rounding, width = 1e-12 * max(*np.abs(force), load), 1e-12 * max(np.abs(gap))
             assert list(pulled) == sorted((i for i in range(m) if active[i] and force[i] < -rounding), key=lambda i: force[i])
             assert list(closing) == sorted(
                 (i for i in range(m) if not active[i] and movable[i] and gap[i] < -width), key=lambda i: gap[i]
             )
-    empty = State(np.zeros(0, dtype=bool), np.zeros(0), np.zeros(0), np.zeros(0))
+    empty = NodeState(np.zeros(0, dtype=bool), np.zeros(0), np.zeros(0), np.zeros(0))
     assert [len(x) for x in offenders(empty, np.zeros(0, dtype=bool), 0.0)] == [0, 0]
 
 
@@ -193,7 +193,7 @@ class Tried:
         if forces is None:
             raise SingularMatrix("", None)
         forces = np.asarray(forces, dtype=float)
-        return State(active.copy(), np.array([float(len(self.asked))]), np.where(active, forces, 0.0), np.where(active, 0.0, forces))  # fmt: skip
+        return NodeState(active.copy(), np.array([float(len(self.asked))]), np.where(active, forces, 0.0), np.where(active, 0.0, forces))  # fmt: skip
 
 
 def test_settling_begins_with_the_guess_and_what_is_kept() -> None:
@@ -285,7 +285,7 @@ def test_residual_is_the_largest_imbalance_over_the_largest_force() -> None:
         found = equilibrium.Equilibrium(
             system, nodes, sp.csr_array(push), force, symmetric=False, solver=None, travel=np.array([0.4])
         )
-        given = State(np.ones(m, dtype=bool), u, normal, np.zeros(m))
+        given = NodeState(np.ones(m, dtype=bool), u, normal, np.zeros(m))
         imbalance, terms = [], []
         for i in range(n):
             left = sum(stiffness[i, j] * u[j] for j in range(n))
@@ -302,7 +302,7 @@ def test_residual_is_the_largest_imbalance_over_the_largest_force() -> None:
         SimpleNamespace(stiffness=sp.csr_array(stiffness), cubic=None, size=n), nodes, sp.csr_array(push), np.zeros(n),
         symmetric=False, solver=None,
     )  # fmt: skip
-    assert still.residual(State(np.ones(m, dtype=bool), np.zeros(n), np.zeros(m), np.zeros(m))) == 0.0
+    assert still.residual(NodeState(np.ones(m, dtype=bool), np.zeros(n), np.zeros(m), np.zeros(m))) == 0.0
 
 
 def pressed(rng, *, stiff: float, size: float, mu: float = 0.2) -> Any:

@@ -38,7 +38,7 @@ class Points:
 
 
 @dataclass(frozen=True)
-class Line:
+class NodeLine:
     """Nodes (k, 2) [m] of a master in the plane, and the tree of them."""
 
     nodes: Array
@@ -63,10 +63,10 @@ class Outlines:
     lots: tuple[tuple[IntArray, Any, float], ...]
 
 
-def outlines(master: Curve | FacetSurface, current: Array) -> Line | Outlines:
+def outlines(master: Curve | FacetSurface, current: Array) -> NodeLine | Outlines:
     """What slave facets are cut by on a master whose nodes are at current (k, d) [m]."""
     if isinstance(master, Curve):
-        return Line(current, cKDTree(current))
+        return NodeLine(current, cKDTree(current))
     corners, sides, even = _corners(master, current)
     a, b, c, d = (corners[:, i] for i in range(4))
     normal = np.where((sides == 4)[:, None], np.cross(c - a, d - b), np.cross(b - a, c - a))
@@ -79,13 +79,13 @@ def outlines(master: Curve | FacetSurface, current: Array) -> Line | Outlines:
     return Outlines(corners, sides, even, normal, centre, radius, by_size)
 
 
-def pieces(kind: str, facets: Array, under: Array, below: Line | Outlines) -> Points:
+def pieces(kind: str, facets: Array, under: Array, below: NodeLine | Outlines) -> Points:
     """Points on slave facets (f, r, d) [m] of a kind over a master of these outlines.
 
     under (f, d) [m]: the point of the master below the middle of each facet. Facets that the master does not cover
     get points that know nothing of it.
     """
-    cut = _on_line(kind, facets, under, below) if isinstance(below, Line) else _in_space(kind, facets, under, below)
+    cut = _on_line(kind, facets, under, below) if isinstance(below, NodeLine) else _in_space(kind, facets, under, below)
     owner, place, weight, good = cut
     keep = good[owner]
     rest = np.flatnonzero(~good)
@@ -98,7 +98,7 @@ def pieces(kind: str, facets: Array, under: Array, below: Line | Outlines) -> Po
 
 
 def _on_line(
-    kind: str, facets: Array, under: Array, line: Line
+    kind: str, facets: Array, under: Array, line: NodeLine
 ) -> tuple[IntArray, Array, Array, BoolArray]:
     """Between the feet of the master's nodes on the chord of each facet, four Gauss points each."""
     begin, chord = facets[:, 0], facets[:, 1] - facets[:, 0]

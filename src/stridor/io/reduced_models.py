@@ -27,7 +27,7 @@ from ..errors import CaseError
 from ..modal.parametric import Parameter, ParametricProblem, ReducedModel, Term
 from ..modal.parametric.contacts import ContactsProblem
 from ..modal.parametric.contacts_rigid import Elimination
-from ..modal.parametric.factors import Factor, factor_from_json
+from ..modal.parametric.factors import ParameterFactor, factor_from_json
 from ..modal.parametric.problem import POWERS
 from ..reading import ZIP, bounded, irregular, size_words
 from ..study.provenance import versions
@@ -198,7 +198,7 @@ def _csr(name: str, matrix: Any, written: _Arrays) -> dict[str, Any]:
 
 def _factor(where: str, factor: object, of: str) -> dict[str, Any]:
     """A factor as data. Raises CaseError where it is none."""
-    if isinstance(factor, Factor):
+    if isinstance(factor, ParameterFactor):
         document = factor.to_json()
         with contextlib.suppress(ValueError):
             if factor_from_json(json.loads(json.dumps(document))) == factor:

@@ -23,7 +23,7 @@ _DATA_FROM_FILES = ("NODE", "ELEMENT", "NSET", "ELSET")
 
 
 @dataclass(frozen=True)
-class Line:
+class DeckLine:
     """A line of a file: the file's name, the line's number from 1, its text."""
 
     file: str
@@ -72,8 +72,8 @@ class Card:
 
     keyword: str
     options: Mapping[str, str]
-    line: Line
-    data: list[Line] = field(default_factory=list)
+    line: DeckLine
+    data: list[DeckLine] = field(default_factory=list)
 
     def need(self, option: str) -> str:
         """The value of a parameter. Raises CaseError where it is missing or empty."""
@@ -91,7 +91,7 @@ def read_deck(file: Path) -> list[Card]:
     return cards
 
 
-def _cards(lines: list[Line], file: Path, above: tuple[Path, ...]) -> Iterator[Card]:
+def _cards(lines: list[DeckLine], file: Path, above: tuple[Path, ...]) -> Iterator[Card]:
     """Cards of lines; above: the files that include this one."""
     card: Card | None = None
     at = 0
@@ -128,7 +128,7 @@ def _continues(text: str) -> bool:
     return not text.startswith("*") and ("=" in text or text.split(",")[0].strip().upper() in _WITHOUT_VALUE)
 
 
-def _card(text: str, line: Line) -> Card:
+def _card(text: str, line: DeckLine) -> Card:
     """A card without data from a keyword line."""
     keyword, *parameters = text[1:].split(",")
     options: dict[str, str] = {}
@@ -139,7 +139,7 @@ def _card(text: str, line: Line) -> Card:
     return Card(" ".join(keyword.upper().split()), options, line)
 
 
-def _lines(file: Path, asked: Line | None) -> list[Line]:
+def _lines(file: Path, asked: DeckLine | None) -> list[DeckLine]:
     """Lines of a file that are neither empty nor comments. asked: the line that includes it, for the message."""
     content = b""
     try:
@@ -160,9 +160,9 @@ def _lines(file: Path, asked: Line | None) -> list[Line]:
     except UnicodeDecodeError:
         text = content.decode("latin-1")
     # Not splitlines(): form feeds and the like are no ends of lines to an editor that shows their numbers.
-    found: list[Line] = []
+    found: list[DeckLine] = []
     for number, entry in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
         stripped = entry.strip()
         if stripped and not stripped.startswith("**"):
-            found.append(Line(file.name, number, stripped))
+            found.append(DeckLine(file.name, number, stripped))
     return found

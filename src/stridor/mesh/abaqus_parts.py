@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..typing import Array
-from .abaqus_deck import Card, Line
+from .abaqus_deck import Card, DeckLine
 
 Place = tuple[float, float, float]
 
@@ -31,7 +31,7 @@ class Element:
 
     kind: str
     nodes: tuple[int, ...]
-    line: Line
+    line: DeckLine
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class NamedSet:
 
     name: str
     internal: bool
-    line: Line
+    line: DeckLine
     numbers: list[int] = field(default_factory=list)
     members: list[Members] = field(default_factory=list)
 
@@ -71,7 +71,7 @@ class SectionCard:
     elset: str
     material: str
     thickness: float | None
-    line: Line
+    line: DeckLine
 
 
 @dataclass
@@ -238,7 +238,7 @@ class PartsReader:
         return sets.setdefault(name.upper(), NamedSet(name, "INTERNAL" in card.options, card.line))
 
 
-def _element_rows(data: list[Line], needed: int) -> Iterable[tuple[Line, list[str]]]:
+def _element_rows(data: list[DeckLine], needed: int) -> Iterable[tuple[DeckLine, list[str]]]:
     """First line and fields of each element, which may go over several lines: until it has as many as it needs, or,
     where that is not known (0), while lines end in a comma."""
     at = 0

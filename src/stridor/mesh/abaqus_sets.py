@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from ..typing import Array, IntArray
-from .abaqus_deck import Line
+from .abaqus_deck import DeckLine
 from .abaqus_parts import ACCEPTED_TYPES, NamedSet, Scope, SurfaceCard
 from .boundary import cell_facets, facets_of_faces, match_facets
 from .gather import Contents
@@ -100,7 +100,7 @@ class Collector:
         kinds, rows = self._kind_of[elements], self._row_of[elements]
         return {self._kinds[k]: np.sort(rows[kinds == k]) for k in np.unique(kinds)}
 
-    def _members(self, table: str, body: int, key: str, line: Line, depth: int = 0) -> IntArray:
+    def _members(self, table: str, body: int, key: str, line: DeckLine, depth: int = 0) -> IntArray:
         """Members of a set, numbered through, sorted. Raises CaseError at ``line`` where there is none of the name."""
         if (table, body, key) in self._known:
             return self._known[table, body, key]
@@ -134,14 +134,14 @@ class Collector:
                     parts.append(self._listed(table, where, line, line.fields, depth))
         return np.unique(np.concatenate(parts))
 
-    def _instance(self, name: str, line: Line) -> int:
+    def _instance(self, name: str, line: DeckLine) -> int:
         """The body of an instance's name."""
         if name.upper() not in self._instances:
             names = ", ".join(s.name for s in self._bodies[1:]) or "none"
             line.refuse(f"there is no instance {name}; there are: {names}")
         return self._instances[name.upper()]
 
-    def _generated(self, table: str, body: int, line: Line) -> IntArray:
+    def _generated(self, table: str, body: int, line: DeckLine) -> IntArray:
         """Those that exist of first, last, step."""
         what = "the number of a node" if table == "NSET" else "the number of an element"
         numbers = [line.whole(f, what, largest=10**30) for f in line.fields]  # ranges may go on for ever
@@ -152,7 +152,7 @@ class Collector:
         # A range may be far longer than the mesh, and holds more numbers than exist.
         return np.array([index for number, index in own.items() if number in chosen], dtype=np.int64)
 
-    def _listed(self, table: str, body: int, line: Line, fields: Iterable[str], depth: int) -> IntArray:
+    def _listed(self, table: str, body: int, line: DeckLine, fields: Iterable[str], depth: int) -> IntArray:
         """Members listed by number, by the name of another set, or as instance.number or instance.name."""
         own = self._node_index[body] if table == "NSET" else self._element_index[body]
         numbers: list[int] = []

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from ..kernels import njit
 from ..typing import Array, ComplexArray, IntArray, Sparse
-from .coupling import Coupling
+from .coupling import PointCoupling
 
 _CHUNK = 256
 
@@ -68,7 +68,7 @@ class BackwardError:
     as unknowns, so that rigid contact is judged like any other; the contacts' own equations count too.
     """
 
-    def __init__(self, coupling: Coupling) -> None:
+    def __init__(self, coupling: PointCoupling) -> None:
         system = coupling.system
         self.coupling = coupling
         self._pattern = common_pattern(system.stiffness, system.damping, system.mass)

@@ -27,7 +27,7 @@ from .pencil import Pencil
 
 
 @dataclass(frozen=True)
-class Coupling:
+class PointCoupling:
     """What friction adds to a system whose contacts all touch. m contacts.
 
     compliance (m,) 1/K_c [m/N]; sense (m,) ±1; slip_speed (m,) [m/s], signed. Whether the laws have
@@ -120,7 +120,7 @@ def _blocks(a: ComplexArray, b: ComplexArray, c: ComplexArray, d: ComplexArray) 
     return np.concatenate([np.concatenate([a, b], axis=2), np.concatenate([c, d], axis=2)], axis=1)
 
 
-def couple(system: System, *, mu: float | None = None) -> tuple[Coupling, tuple[str, ...]]:
+def couple(system: System, *, mu: float | None = None) -> tuple[PointCoupling, tuple[str, ...]]:
     """Coupling of the contacts that touch in steady sliding at `System.touching_at`, else at ``mu``, else at the
     laws' own coefficients, and the names of those that do not. Without loads every contact counts as touching."""
     open_names: tuple[str, ...] = ()
@@ -152,4 +152,4 @@ def couple(system: System, *, mu: float | None = None) -> tuple[Coupling, tuple[
         )
     compliance = np.array([c.compliance for c in system.contacts])
     # Friction is μ|N|: where a contact kept closed pulls, it goes with −N.
-    return Coupling(system, compliance, np.where(pulls, 1.0, -1.0) * np.sign(speeds), speeds, sloped), open_names
+    return PointCoupling(system, compliance, np.where(pulls, 1.0, -1.0) * np.sign(speeds), speeds, sloped), open_names

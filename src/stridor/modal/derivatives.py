@@ -42,7 +42,7 @@ AFFINE = 1e-8  # second over first differences below which a matrix is affine in
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldContacts:
     """What stays as it is while a number changes: the touching nodes (m,) among all contact nodes, the direction
     against the slip (all, d−1) of every node, which stick (all,), and how many freedoms and contact nodes there are."""
 
@@ -54,7 +54,7 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Change:
+class PencilChange:
     """How a `Pencil` changes per unit of a number, by the same names: mass, damping, stiffness (n, n) csr, normal N and
     push B (m, n) csr, compliance c (m,); None where it does not."""
 
@@ -65,7 +65,7 @@ class Change:
     push: Sparse | None = None
     compliance: Array | None = None
 
-    def form(self, lam: complex, left: Pair, right: Pair) -> complex:
+    def form(self, lam: complex, left: ModeVector, right: ModeVector) -> complex:
         """yᵀ (∂P/∂a) x."""
         total = 0j
         for matrix, factor in ((self.mass, lam**2), (self.damping, lam), (self.stiffness, 1.0)):
@@ -81,7 +81,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Pair:
+class ModeVector:
     """Displacements (n,) and contact forces (m,) of a right or a left vector."""
 
     motion: ComplexArray
@@ -98,24 +98,24 @@ class Mode:
     """
 
     eigenvalue: complex
-    right: Pair
-    left: Pair
+    right: ModeVector
+    left: ModeVector
     condition: float
     residual: float
 
-    def derivative(self, change: Change) -> complex:
+    def derivative(self, change: PencilChange) -> complex:
         """dλ/da [1/s per unit of a] where P changes so per unit of a."""
         return -change.form(self.eigenvalue, self.left, self.right)
 
 
-def hold(system: System, mu: float, options: Options) -> Held:
+def hold(system: System, mu: float, options: Options) -> HeldContacts:
     """The touching nodes and the directions of sliding at ``mu``. Raises AnalysisError without steady sliding."""
     nodes = system.contact_nodes()
     steady = touching_nodes(system, nodes, mu, options.solver)
-    return Held(np.flatnonzero(steady.active), steady.sense, steady.stuck, system.size, nodes.count)
+    return HeldContacts(np.flatnonzero(steady.active), steady.sense, steady.stuck, system.size, nodes.count)
 
 
-def pencil_of(system: System, mu: float, held: Held, options: Options) -> Pencil:
+def pencil_of(system: System, mu: float, held: HeldContacts, options: Options) -> Pencil:
     """P(λ) of a system at ``mu`` with what is held.
 
     What the law's slope, friction damping and prestress add follows the steady state of this very system. Raises
@@ -130,8 +130,8 @@ def pencil_of(system: System, mu: float, held: Held, options: Options) -> Pencil
 
 
 def by_friction(
-    system: System, mu: float, held: Held, options: Options, *, contact: str | None = None
-) -> Change:
+    system: System, mu: float, held: HeldContacts, options: Options, *, contact: str | None = None
+) -> PencilChange:
     """Change of P per unit of μ, of every contact or of one by name.
 
     Raises CaseError for one contact where the steady state adds terms of its own: they know a common μ only.
@@ -149,10 +149,10 @@ def by_friction(
         mine = np.zeros(slide.shape[0])
         mine[: chosen.count] = chosen.owner == nodes.names.index(contact)
         slide = sp.csr_array(sp.diags_array(mine) @ slide)
-    return Change(push=slide)
+    return PencilChange(push=slide)
 
 
-def by_compliance(system: System, held: Held, contact: str) -> Change:
+def by_compliance(system: System, held: HeldContacts, contact: str) -> PencilChange:
     """Change of P per unit of the compliance 1/K_c of a contact, per area [m³/N] or of a point [m/N], rigid or not."""
     nodes = system.contact_nodes()
     chosen = nodes.select(held.touching)
@@ -163,7 +163,7 @@ def by_compliance(system: System, held: Held, contact: str) -> Change:
     mine = (chosen.owner == nodes.names.index(contact)).astype(float)
     change = np.divide(mine, area, out=np.zeros_like(area), where=area > 0)
     sticking = contact_rows(nodes, held.touching, held.sense, held.stuck).normal.shape[0] - len(change)
-    return Change(compliance=np.append(change, np.zeros(sticking)))
+    return PencilChange(compliance=np.append(change, np.zeros(sticking)))
 
 
 def by_mass_at_node(mode: Mode, rows: Sparse, dimension: int) -> ComplexArray:
@@ -206,7 +206,7 @@ def by_release(
     return found
 
 
-def rate_of(at: Callable[[float], Pencil], value: float, step: float | None = None) -> tuple[Change, bool]:
+def rate_of(at: Callable[[float], Pencil], value: float, step: float | None = None) -> tuple[PencilChange, bool]:
     """Change of P per unit of a number about ``value``, and whether P is affine in it.
 
     Differences over ± step (a thousandth of the value), exact for what is affine; else of fourth order, exact up to
@@ -264,7 +264,7 @@ def _mode(pencil: Pencil, found: Iterated) -> Mode:
         for judge, (u, p), sign in ((pencil, right, 1.0), (pencil.transposed, left, -1.0))
     )
     condition = float(2 * abs(lam) * size / abs(found.slope))
-    return Mode(lam, Pair(*right), Pair(left[0] / slope, left[1] / slope), condition, residual)
+    return Mode(lam, ModeVector(*right), ModeVector(left[0] / slope, left[1] / slope), condition, residual)
 
 
 def _on(matrix: Sparse, vector: ComplexArray) -> ComplexArray:
@@ -272,22 +272,22 @@ def _on(matrix: Sparse, vector: ComplexArray) -> ComplexArray:
     return times(matrix, vector)
 
 
-def _combined(parts: tuple[tuple[float, Pencil], ...], step: float) -> Change:
+def _combined(parts: tuple[tuple[float, Pencil], ...], step: float) -> PencilChange:
     """Σ weight · terms / step."""
     found = {}
-    for field in fields(Change):
+    for field in fields(PencilChange):
         values = [weight / step * getattr(pencil, field.name) for weight, pencil in parts]
         total = sum(values[1:], start=values[0])
         if sp.issparse(total):
             total = sp.csr_array(total)
             total.eliminate_zeros()
         found[field.name] = total
-    return Change(**found)
+    return PencilChange(**found)
 
 
 def _is_affine(low: Pencil, middle: Pencil, high: Pencil) -> bool:
     """Whether equally spaced pencils lie on a line, to rounding."""
-    for field in fields(Change):
+    for field in fields(PencilChange):
         a, b, c = (getattr(pencil, field.name) for pencil in (low, middle, high))
         size, first, second = (_largest(v) for v in (b, c - a, a - 2 * b + c))
         if second > AFFINE * first + 1e-14 * size:

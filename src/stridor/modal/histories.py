@@ -12,7 +12,7 @@ from .onset import Onset
 
 
 @dataclass(frozen=True)
-class Change:
+class StabilityChange:
     """A passage into or out of growth, the branches that it concerns, and the onset it was solved to be, if any."""
 
     mu: float
@@ -46,7 +46,7 @@ class Entries:
 
 
 def reported(
-    changes: Iterable[Change], entries: Entries, between: tuple[float, float], max_frequency_hz: float
+    changes: Iterable[StabilityChange], entries: Entries, between: tuple[float, float], max_frequency_hz: float
 ) -> list[Onset]:
     """Onsets of the range in the band, and those above it that begin growth which comes into it; each once."""
     low, high = between
@@ -73,7 +73,7 @@ def _place(onset: Onset) -> tuple[float, float]:
     return onset.mu, onset.frequency_hz
 
 
-def _next_end(every: list[Change], change: Change, mu: float) -> float:
+def _next_end(every: list[StabilityChange], change: StabilityChange, mu: float) -> float:
     """The next μ at which growth of all of these branches ends."""
     ends = [
         other.onset.mu
@@ -94,7 +94,7 @@ def _same(one: Onset, other: Onset) -> bool:
     )
 
 
-def unexplained(growing: Iterable[int], from_start: Iterable[int], changes: Iterable[Change]) -> int:
+def unexplained(growing: Iterable[int], from_start: Iterable[int], changes: Iterable[StabilityChange]) -> int:
     """How many of the branches that grow at the end neither grew from the start nor have begun at a solved onset."""
     began = set(from_start)
     last: dict[int, tuple[float, bool]] = {}

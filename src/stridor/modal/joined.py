@@ -21,7 +21,7 @@ ALIKE = 0.1  # of |λ|: how far a mode may jump where a node opens or closes
 
 
 @dataclass(frozen=True)
-class Border:
+class TouchingChange:
     """Branch numbers and eigenvalues (b,) of the modes on both sides of a μ at which other nodes touch."""
 
     mu: float
@@ -57,7 +57,7 @@ class Names:
         self._highest = 0
         self._first = True
 
-    def cross(self, border: Border) -> None:
+    def cross(self, border: TouchingChange) -> None:
         """Go on to the stretch behind a border."""
         same = border.same()
         self._known = {own: self.of(before) for own, before in same.items()}
@@ -86,7 +86,7 @@ def rows_of(modes: ComplexModes, rows: Sequence[int]) -> ComplexModes:
     )  # fmt: skip
 
 
-def joined_modes(parts: Sequence[ComplexModes], borders: Sequence[Border], order: IntArray) -> ComplexModes:
+def joined_modes(parts: Sequence[ComplexModes], borders: Sequence[TouchingChange], order: IntArray) -> ComplexModes:
     """One list of modes from those of stretches, parts[k] and parts[k + 1] at both sides of borders[k]; order (k,):
     the place of each of their μ, one part after the other, in the list."""
     names = Names()
@@ -134,7 +134,7 @@ def joined_modes(parts: Sequence[ComplexModes], borders: Sequence[Border], order
 def joined_onsets(
     parts: Sequence[tuple[Stretch, Onsets]],
     between: tuple[float, float],
-    border: Callable[[int], Border],
+    border: Callable[[int], TouchingChange],
     residual: Callable[[Stretch, float, complex], float],
 ) -> Onsets:
     """One list of onsets from those of neighbouring stretches.

@@ -52,7 +52,7 @@ class Root:
     residual: float
 
 
-class Factor(Protocol):
+class BorderedFactor(Protocol):
     """A factorised matrix."""
 
     def solve(self, right: ComplexArray, *, transpose: bool = False) -> ComplexArray:
@@ -64,7 +64,7 @@ class Factor(Protocol):
         ...
 
 
-class Problem(Protocol):
+class NewtonProblem(Protocol):
     """A problem over μ in [low, high], as Newton's method needs it; μ may be complex where its matrices are known so.
 
     sizes (n,): what a unit of each unknown is worth, for choosing large entries of vectors.
@@ -92,7 +92,7 @@ class Problem(Protocol):
         """Their derivatives over μ."""
         ...
 
-    def bordered(self, here: Quadratic, lam: complex, border: Border) -> Factor:
+    def bordered(self, here: Quadratic, lam: complex, border: Border) -> BorderedFactor:
         """Factors of P(λ) (n, n) of the matrices ``here`` with a border. Raises AnalysisError where it is singular."""
         ...
 
@@ -143,7 +143,7 @@ class _Steps:
 class Border:
     """g(λ, μ) of a problem, bordered for eigenvectors near x and y (n,): by ``scale`` in ``row`` and ``column``."""
 
-    def __init__(self, problem: Problem, x: ComplexArray, y: ComplexArray) -> None:
+    def __init__(self, problem: NewtonProblem, x: ComplexArray, y: ComplexArray) -> None:
         self.problem = problem
         # Rotations and multipliers have units of their own: sizes are judged by what the stiffness makes of them.
         weight = problem.sizes
@@ -175,7 +175,7 @@ class Border:
 
 
 def crossing(
-    problem: Problem, mu: float, lam: complex, x: ComplexArray, y: ComplexArray, between: tuple[float, float]
+    problem: NewtonProblem, mu: float, lam: complex, x: ComplexArray, y: ComplexArray, between: tuple[float, float]
 ) -> Root | None:
     """Where a simple eigenvalue is on the axis, from a guess; None where that does not settle between two μ."""
     width = between[1] - between[0]
@@ -211,7 +211,7 @@ def crossing(
 
 
 def meeting(
-    problem: Problem, mu: float, lam: complex, x: ComplexArray, y: ComplexArray, between: tuple[float, float]
+    problem: NewtonProblem, mu: float, lam: complex, x: ComplexArray, y: ComplexArray, between: tuple[float, float]
 ) -> Root | None:
     """Where two eigenvalues of a reversible problem meet on the axis; None where that does not settle."""
     width = between[1] - between[0]
@@ -243,7 +243,7 @@ def meeting(
 
 
 def exceptional(
-    problem: Problem, mu: complex, lam: complex, x: ComplexArray, y: ComplexArray, reach: float
+    problem: NewtonProblem, mu: complex, lam: complex, x: ComplexArray, y: ComplexArray, reach: float
 ) -> tuple[complex, complex, complex] | None:
     """Complex μ at which two eigenvalues meet, λ there and κ² of λ ≈ λ_e ± κ √(μ − μ_e), from a guess.
 
@@ -278,7 +278,7 @@ def _to_double(here: Point) -> tuple[complex, complex]:
 
 
 def standstill(
-    problem: Problem, mu: float, x: ComplexArray, y: ComplexArray, between: tuple[float, float]
+    problem: NewtonProblem, mu: float, x: ComplexArray, y: ComplexArray, between: tuple[float, float]
 ) -> Root | None:
     """Where the stiffness becomes singular, λ = 0; None where that does not settle."""
     width = between[1] - between[0]
@@ -310,7 +310,7 @@ def standstill(
 
 
 def _judged(
-    problem: Problem, mu: float, lam: complex, x: ComplexArray, slope: float | None, square: float | None
+    problem: NewtonProblem, mu: float, lam: complex, x: ComplexArray, slope: float | None, square: float | None
 ) -> Root | None:
     """The root with its backward error in the matrices as the system gives them there; None where that is too large."""
     residual = problem.backward_error(mu, lam, x)

@@ -20,7 +20,7 @@ from .complex_modes import complex_modes
 from .general import general_onsets
 from .general.basis import WHOLE
 from .growing import UNCHECKED, checked_modes, checked_onsets, growing_modes
-from .joined import Border, joined_modes, joined_onsets, rows_of
+from .joined import TouchingChange, joined_modes, joined_onsets, rows_of
 from .onsets import Onsets, onsets
 from .options import Options
 from .results import ComplexModes, Progress
@@ -85,7 +85,7 @@ def _modes_of_parts(
     if not solid:
         raise AnalysisError(parts[0][0].reason)
     found: list[ComplexModes] = []
-    borders: list[Border] = []
+    borders: list[TouchingChange] = []
     order: list[int] = []
     left: tuple[IntArray, ComplexArray] | None = None
     stopped = False
@@ -115,7 +115,7 @@ def _modes_of_parts(
         if k and left is not None:
             if not sides:
                 break
-            borders.append(Border(stretch.low, left, sides[0]))
+            borders.append(TouchingChange(stretch.low, left, sides[0]))
         left = sides[-1] if sides else None
         found.append(checked(held, replace(own, planned=None)))
         order += keep
@@ -206,18 +206,18 @@ def _solved_onsets(
         raise AnalysisError(over[0].reason)
     parts = [(s, solved(s.of(system), (s.low, s.high))) for s in solid]
 
-    def border(k: int) -> Border:
+    def border(k: int) -> TouchingChange:
         mu = parts[k + 1][0].low
         sides = parts[k][1].followed, parts[k + 1][1].followed
         if sides[0] is not None and sides[1] is not None:
-            return Border(mu, sides[0][1], sides[1][0])
+            return TouchingChange(mu, sides[0][1], sides[1][0])
         before, after = (
             complex_modes(
                 s.of(system), [mu], max_frequency_hz=max_frequency_hz, damped=damped, **asdict(options)
             )
             for s in (parts[k][0], parts[k + 1][0])
         )
-        return Border(mu, (before.branch, before.eigenvalues[0]), (after.branch, after.eigenvalues[0]))
+        return TouchingChange(mu, (before.branch, before.eigenvalues[0]), (after.branch, after.eigenvalues[0]))
 
     def residual(stretch: Stretch, mu: float, lam: complex) -> float:
         try:

@@ -13,11 +13,11 @@ from ..system import System
 from ..system.uncoupled import uncoupled_modes
 from ..typing import Array, ComplexArray, IntArray
 from .backward_error import BackwardError
-from .coupling import Coupling, couple
+from .coupling import PointCoupling, couple
 from .inverse_iteration import Iterated, two_sided
 from .pencil import Pencil
 from .results import ComplexModes, Progress, require_memory
-from .roots import Spectrum, spectrum_of
+from .roots import ReceptanceProblem, spectrum_of
 from .tracking import Tracker
 from .unfit import Unfit
 from .vectors import expand, fixed_vectors, modal_coordinates
@@ -28,12 +28,12 @@ BESIDE = (1e-10, 1e-9, 1e-8, 1e-7)  # of λ: how far beside it that is, where st
 NEARBY = 1e-6  # of λ: what is found further away is another one
 
 
-def prepare(system: System, *, mu: float | None = None) -> tuple[Spectrum, Coupling, tuple[str, ...]]:
+def prepare(system: System, *, mu: float | None = None) -> tuple[ReceptanceProblem, PointCoupling, tuple[str, ...]]:
     """Spectrum of a system with the contacts that touch in steady sliding at ``mu``, kept with the system."""
     return system.once(("receptance", mu), lambda: _prepared(system, mu))
 
 
-def _prepared(system: System, mu: float | None) -> tuple[Spectrum, Coupling, tuple[str, ...]]:
+def _prepared(system: System, mu: float | None) -> tuple[ReceptanceProblem, PointCoupling, tuple[str, ...]]:
     coupling, open_contacts = couple(system, mu=mu)
     modes = uncoupled_modes(coupling.system)
     return spectrum_of(coupling, modes), coupling, open_contacts
@@ -128,7 +128,7 @@ def _followed(
 
 
 def _judge_fixed(
-    judge: BackwardError, spectrum: Spectrum, lam: ComplexArray, vectors: ComplexArray, mu: Array
+    judge: BackwardError, spectrum: ReceptanceProblem, lam: ComplexArray, vectors: ComplexArray, mu: Array
 ) -> Array:
     """Backward errors (k, b) of the modes that no contact sees: the same at every μ."""
     if not len(lam):
@@ -136,7 +136,7 @@ def _judge_fixed(
     return np.broadcast_to(judge(lam, vectors, 0.0), (len(mu), len(lam)))
 
 
-def _left_of_fixed(coupling: Coupling, lam: ComplexArray, right: ComplexArray, mu: float) -> ComplexArray:
+def _left_of_fixed(coupling: PointCoupling, lam: ComplexArray, right: ComplexArray, mu: float) -> ComplexArray:
     """Left vectors (n, b) of modes that no contact sees.
 
     Friction works on the modes' tangential motion, so the left vectors do meet the contacts.
@@ -173,7 +173,7 @@ def _refined(
 
 
 def _pairs(
-    spectrum: Spectrum,
+    spectrum: ReceptanceProblem,
     judge: BackwardError,
     eigenvalues: ComplexArray,
     mu: Array,
@@ -213,7 +213,7 @@ def _pairs(
     return lam.reshape(eigenvalues.shape), errors.reshape(eigenvalues.shape)
 
 
-def _limit(spectrum: Spectrum, count: int, max_frequency_hz: float | None) -> float:
+def _limit(spectrum: ReceptanceProblem, count: int, max_frequency_hz: float | None) -> float:
     """|λ| [1/s] up to which roots must be followed."""
     if max_frequency_hz is not None:
         return 2 * np.pi * max_frequency_hz
@@ -231,7 +231,7 @@ def _limit(spectrum: Spectrum, count: int, max_frequency_hz: float | None) -> fl
     return float(np.sqrt(poles[-1] ** 2 + added)) * (1 + 1e-9)
 
 
-def unfit_words(spectrum: Spectrum) -> str:
+def unfit_words(spectrum: ReceptanceProblem) -> str:
     """Why roots of the receptance are not sought."""
     if spectrum.modes.indefinite:
         return "a motion of the structure has a stiffness that is not positive"

@@ -15,18 +15,18 @@ from ..errors import AnalysisError
 from ..system import System
 from ..typing import BoolArray, ComplexArray
 from .backward_error import BackwardError
-from .coupling import Coupling
+from .coupling import PointCoupling
 from .general.family import Family
-from .histories import Change, Entries, reported, unexplained
+from .histories import Entries, StabilityChange, reported, unexplained
 from .inverse_iteration import null_vectors
 from .newton import Root, crossing, exceptional, meeting, standstill
 from .onset import Branches, Onset, Onsets
 from .options import Options
 from .receptance_modes import prepare, unfit_words
 from .results import grows
-from .roots import Spectrum
+from .roots import ReceptanceProblem
 from .tolerances import BELIEVED, UNSTABLE_RELATIVE
-from .tracking import State, Tracker
+from .tracking import RootState, Tracker
 from .unfit import Unfit
 
 NARROWINGS = 8
@@ -45,8 +45,8 @@ class _Event:
     stabilising: bool
     double: bool
     index: int
-    old: State
-    new: State
+    old: RootState
+    new: RootState
 
 
 def onsets_by_receptance(
@@ -75,7 +75,7 @@ def onsets_by_receptance(
     # Roots that start above the band may meet inside it; follow some beyond.
     tracker = Tracker(spectrum, top * follow)
 
-    def watch(old: State, new: State) -> None:
+    def watch(old: RootState, new: RootState) -> None:
         count = len(old.roots)
         events.extend(_passages(spectrum, old, new, has_damping))
         entries.watch((old.mu, new.mu), old.roots, new.roots[:count], new.branch[:count])
@@ -86,7 +86,7 @@ def onsets_by_receptance(
     order = _numbering(spectrum, tracker.origin)
     judge, family = BackwardError(coupling), _PointFamily(coupling, (0.0, high))
     changes = [
-        Change(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping))
+        StabilityChange(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping))
         for event in events
     ]
     return Onsets(
@@ -109,7 +109,7 @@ def onsets_by_receptance(
 class _PointFamily(Family):
     """The problem of point contacts over μ, their normal forces unknowns behind the displacements."""
 
-    def __init__(self, coupling: Coupling, between: tuple[float, float]) -> None:
+    def __init__(self, coupling: PointCoupling, between: tuple[float, float]) -> None:
         super().__init__(between, lambda mu: coupling.pencil(mu).whole, Options())
         self._coupling = coupling
 
@@ -125,7 +125,7 @@ class _PointFamily(Family):
         return float(pencil.backward_error(np.array([lam]), u, p)[0])
 
 
-def _numbered(state: State, spectrum: Spectrum, order: dict[int, int]) -> Branches:
+def _numbered(state: RootState, spectrum: ReceptanceProblem, order: dict[int, int]) -> Branches:
     """Numbers and eigenvalues (b,) of the branches at one μ, twins in the lower half plane left out."""
     known = [k for k in range(len(state.roots)) if int(state.branch[k]) in order and state.roots[k].imag >= 0]
     numbers = [order[int(state.branch[k])] for k in known]
@@ -148,14 +148,14 @@ def _concerned(event: _Event) -> tuple[int, ...]:
     return (event.branch, event.partner) if event.double and event.partner >= 0 else (event.branch,)
 
 
-def _numbering(spectrum: Spectrum, roots: ComplexArray) -> dict[int, int]:
+def _numbering(spectrum: ReceptanceProblem, roots: ComplexArray) -> dict[int, int]:
     """Tracked root → mode number from 1 by frequency at μ = 0, modes that no contact sees included."""
     everything = np.concatenate([roots, spectrum.fixed])
     rank = np.argsort(np.argsort(np.abs(everything.imag), kind="stable"), kind="stable")
     return {k: int(rank[k]) + 1 for k in range(len(roots))}
 
 
-def _passages(spectrum: Spectrum, old: State, new: State, has_damping: bool) -> list[_Event]:
+def _passages(spectrum: ReceptanceProblem, old: RootState, new: RootState, has_damping: bool) -> list[_Event]:
     """Enclosed changes of stability between two neighbouring states."""
     step = new.mu - old.mu
     events: list[_Event] = []
@@ -201,7 +201,7 @@ def _grows(root: complex) -> bool:
     return bool(abs(root.real) > UNSTABLE_RELATIVE * abs(root))
 
 
-def _named(state: State, i: int) -> int:
+def _named(state: RootState, i: int) -> int:
     return int(state.branch[i]) if i >= 0 else -1
 
 
@@ -213,7 +213,7 @@ def _nearest(roots: ComplexArray, i: int, root: complex) -> int:
     return -1 if 2 * abs(root.imag) < distance[j] else j
 
 
-def _partner(old: State, new: State, i: int) -> int:
+def _partner(old: RootState, new: RootState, i: int) -> int:
     """The root that shares the coalescence: i's conjugate twin mirrored, i.e. equal frequency after it."""
     split = new if _grows(new.roots[i]) else old
     if abs(split.roots[i].imag) < 1e-9 * abs(split.roots[i]):
@@ -245,7 +245,8 @@ def _axis_crossings(start: float, end: float, slope0: float, slope1: float) -> l
 
 
 def _located(
-    spectrum: Spectrum, family: Family, judge: BackwardError, event: _Event, order: dict[int, int], has_damping: bool
+    spectrum: ReceptanceProblem, family: Family, judge: BackwardError, event: _Event, order: dict[int, int],
+    has_damping: bool,
 ) -> Onset | None:
     """The onset inside an enclosed passage; where Newton strays, the passage is enclosed more closely."""
     for _ in range(NARROWINGS):
@@ -269,7 +270,7 @@ def _distance(event: _Event) -> float:
     return 2.0 * moved + 1e-6 * abs(event.root) + 1e-3
 
 
-def _narrowed(spectrum: Spectrum, event: _Event, has_damping: bool) -> _Event | None:
+def _narrowed(spectrum: ReceptanceProblem, event: _Event, has_damping: bool) -> _Event | None:
     """The same passage between states a quarter as far apart or closer, None where it is gone."""
     inner: list[_Event] = []
     tracker = Tracker.resumed(spectrum, event.old)

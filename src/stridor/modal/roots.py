@@ -16,7 +16,7 @@ from ..direct.dense import lu_factors
 from ..errors import AnalysisError
 from ..system.uncoupled import UncoupledModes
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .coupling import Coupling
+from .coupling import PointCoupling
 from .receptance import Receptance, wanted_pairs
 
 CONVERGED = 1e-9  # of the step before last: convergence is at least quadratic
@@ -25,7 +25,7 @@ UNCOUPLED_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class ReceptanceProblem:
     """Contact problem on a complete modal basis, ready for root finding.
 
     coupled (n_real,) tells which real modes feel the contacts; fixed_modes (k, n_real) are the
@@ -33,7 +33,7 @@ class Spectrum:
     (2m, n_real): the contact rows on the modes as they are; the receptance has those of equal poles turned.
     """
 
-    coupling: Coupling
+    coupling: PointCoupling
     receptance: Receptance
     fixed: ComplexArray
     fixed_modes: Array
@@ -85,14 +85,14 @@ def _null_vectors(value: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     return u[:, :, -1].conj(), vh[:, -1, :].conj()
 
 
-def spectrum_of(coupling: Coupling, modes: UncoupledModes) -> Spectrum:
+def spectrum_of(coupling: PointCoupling, modes: UncoupledModes) -> ReceptanceProblem:
     """Prepare root finding: separate what the contacts do not see from what they do."""
     rows = coupling.system.contact_rows()
     projections, general = modes.project(rows)
     fixed, combinations, real, coupled = _split_unseen(modes, projections, sloped=coupling.sloped)
     pairs = wanted_pairs(coupling.contacts, slip=coupling.sloped)
     receptance = Receptance(modes, real, general, pairs)
-    return Spectrum(
+    return ReceptanceProblem(
         coupling=coupling,
         receptance=receptance,
         fixed=fixed,
@@ -169,7 +169,7 @@ def _poles(stiffness: float, damping: float) -> list[complex]:
     return [complex(stiffness / fast), complex(fast)]
 
 
-def frictionless_roots(spectrum: Spectrum, limit: float) -> ComplexArray:
+def frictionless_roots(spectrum: ReceptanceProblem, limit: float) -> ComplexArray:
     """Coupled eigenvalues at μ = 0 with |λ| ≤ about 1.3 ``limit`` [1/s] (k,), sorted by |λ|.
 
     At μ = 0 the coupled stiffness is symmetric and the dense solver finds every root, so the count
@@ -198,7 +198,7 @@ def frictionless_roots(spectrum: Spectrum, limit: float) -> ComplexArray:
     return roots[np.argsort(np.abs(roots), kind="stable")]
 
 
-def _without_tangential(spectrum: Spectrum) -> tuple[Spectrum, ComplexArray]:
+def _without_tangential(spectrum: ReceptanceProblem) -> tuple[ReceptanceProblem, ComplexArray]:
     """The problem at μ = 0, where modes with tangential motion alone keep their poles, and those poles.
 
     They come into it where friction has a slope, and then only with μ.
@@ -223,7 +223,7 @@ def _without_tangential(spectrum: Spectrum) -> tuple[Spectrum, ComplexArray]:
     return still, np.array(own, dtype=complex)
 
 
-def _dense_undamped(spectrum: Spectrum, limit: float) -> ComplexArray | None:
+def _dense_undamped(spectrum: ReceptanceProblem, limit: float) -> ComplexArray | None:
     """Undamped coupled roots with damping to first order; None where that is too strong for a start."""
     keep = _coupled_columns(spectrum)
     normal = spectrum.receptance.real[0::2][:, keep]
@@ -255,7 +255,7 @@ def _elastic(normal: Array, compliance: Array, stiffness: Array) -> tuple[Array,
     return basis, basis.T @ stiffness @ basis
 
 
-def dense_roots(spectrum: Spectrum, mu: float, limit: float) -> ComplexArray:
+def dense_roots(spectrum: ReceptanceProblem, mu: float, limit: float) -> ComplexArray:
     """Every eigenvalue with |λ| ≤ ``limit`` [1/s] but the fixed ones, densely in physical freedoms."""
     coupling, system = spectrum.coupling, spectrum.coupling.system
     rows = system.contact_rows()
@@ -298,7 +298,7 @@ def _without(values: ComplexArray, fixed: ComplexArray) -> ComplexArray:
     return np.array(left, dtype=complex)
 
 
-def _coupled_columns(spectrum: Spectrum) -> IntArray:
+def _coupled_columns(spectrum: ReceptanceProblem) -> IntArray:
     seen = spectrum.receptance.real[0::2]
     scale = max(float(np.abs(spectrum.receptance.real).max(initial=0.0)), 1e-300)
     return np.flatnonzero(np.abs(seen).max(axis=0, initial=0.0) > UNCOUPLED_TOLERANCE * scale)
@@ -310,7 +310,7 @@ def mirrored(roots: ComplexArray, implied: BoolArray) -> ComplexArray:
 
 
 def polish(
-    spectrum: Spectrum, starts: ComplexArray, implied: BoolArray, mu: float, *, steps: int = MAX_STEPS
+    spectrum: ReceptanceProblem, starts: ComplexArray, implied: BoolArray, mu: float, *, steps: int = MAX_STEPS
 ) -> tuple[ComplexArray, bool]:
     """Simultaneous iteration from ``starts`` (k,), the ``implied`` conjugate roots (k,) held apart too.
 
@@ -334,7 +334,7 @@ def polish(
     return roots, bool(not active.any() and np.all(np.isfinite(roots)))
 
 
-def _poles_near(spectrum: Spectrum, roots: ComplexArray) -> tuple[Array, Array]:
+def _poles_near(spectrum: ReceptanceProblem, roots: ComplexArray) -> tuple[Array, Array]:
     # An overdamped pole pair has its slow one far below its ω.
     half = spectrum.pole_damping / 2
     slow = half - np.sqrt(np.maximum(half**2 - spectrum.pole_stiffness, 0.0))
@@ -344,7 +344,7 @@ def _poles_near(spectrum: Spectrum, roots: ComplexArray) -> tuple[Array, Array]:
 
 
 def _step(
-    spectrum: Spectrum,
+    spectrum: ReceptanceProblem,
     roots: ComplexArray,
     mirror: ComplexArray,
     index: IntArray,

@@ -18,7 +18,7 @@ import scipy
 from ..errors import AnalysisError, FollowingError
 from ..typing import BoolArray, ComplexArray, IntArray
 from .meeting import beyond
-from .roots import Spectrum, dense_roots, frictionless_roots, polish
+from .roots import ReceptanceProblem, dense_roots, frictionless_roots, polish
 
 CLOSE = 0.25  # a correction may be this fraction of the distance to the next root
 CONTINUATION_STEPS = 12
@@ -27,7 +27,7 @@ START_OF_SLOPES = 1e-6  # μ at which tracking starts where friction has a slope
 
 
 @dataclass
-class State:
+class RootState:
     """Roots at one μ: roots (k,) of the branches, tangents dλ/dμ (k,), and implied (k,): whether the
     conjugate root is left unsaid. Real roots stand for themselves, and so does each of a pair that was
     on the real axis once; a root that reaches the axis gets its twin appended. branch (k,): the
@@ -47,10 +47,10 @@ class Tracker:
     watch, where given, is called with each accepted pair of states (onset detection).
     """
 
-    spectrum: Spectrum
+    spectrum: ReceptanceProblem
     limit: float
-    watch: Callable[[State, State], None] | None = None
-    state: State = field(init=False)
+    watch: Callable[[RootState, RootState], None] | None = None
+    state: RootState = field(init=False)
     origin: ComplexArray = field(init=False)
     smallest_step: float = 1e-9
 
@@ -64,12 +64,12 @@ class Tracker:
             roots, converged = polish(self.spectrum, roots * (1 + mu * 1e-3), implied, mu)
             if not converged:
                 raise AnalysisError("the eigenvalues at vanishing friction do not settle")
-        self.state = State(mu, roots, implied, self._tangents(roots, mu), np.arange(len(roots)))
+        self.state = RootState(mu, roots, implied, self._tangents(roots, mu), np.arange(len(roots)))
         self._step, self._leaps = 0.01, 0
-        self._before: State | None = None
+        self._before: RootState | None = None
 
     @classmethod
-    def resumed(cls, spectrum: Spectrum, state: State) -> Tracker:
+    def resumed(cls, spectrum: ReceptanceProblem, state: RootState) -> Tracker:
         """A tracker that goes on from a state followed before."""
         tracker = cls.__new__(cls)
         tracker.spectrum, tracker.limit, tracker.watch = spectrum, float(np.abs(state.roots).max()), None
@@ -82,7 +82,7 @@ class Tracker:
             return roots.copy()
         return self.spectrum.tangents(roots, mu)
 
-    def advance(self, mu: float) -> State:
+    def advance(self, mu: float) -> RootState:
         """Follow the branches to ``mu`` ≥ the present one; raises AnalysisError where they are lost."""
         if mu == 0.0:
             return replace(self.state, mu=0.0, roots=self.origin)
@@ -108,7 +108,7 @@ class Tracker:
                 self._step = min(self._step * 2, 0.02)
         return self.state
 
-    def _leap(self, end: float) -> State:
+    def _leap(self, end: float) -> RootState:
         """Over a place where three or more roots merge: every root anew, each branch to the nearest.
 
         Which of the merging branches is which beyond that place is a convention; that none is lost is not.
@@ -142,7 +142,7 @@ class Tracker:
                 continue
             roots, converged = polish(self.spectrum, roots, implied, mu)
             if converged:
-                return State(mu, roots, implied, self._tangents(roots, mu), old.branch)
+                return RootState(mu, roots, implied, self._tangents(roots, mu), old.branch)
         if reach > 1e3 * self.limit and np.any(self.spectrum.coupling.compliance == 0.0):
             raise AnalysisError(
                 f"an eigenvalue grows beyond all bounds at μ = {old.mu:.9g}: from there on rigid contact "
@@ -155,7 +155,7 @@ class Tracker:
             "friction coefficient on its own"
         )
 
-    def _try(self, mu: float) -> State | None:
+    def _try(self, mu: float) -> RootState | None:
         old = self.state
         step = mu - old.mu
         predicted = old.roots + step * old.tangents
@@ -203,9 +203,9 @@ class Tracker:
                 return None
             if told is not None and told.exchanged:
                 roots[[i, j]], tangents[[i, j]] = roots[[j, i]], tangents[[j, i]]
-        return State(mu, roots, implied, tangents, branch)
+        return RootState(mu, roots, implied, tangents, branch)
 
-    def _extrapolated(self, old: State, step: float, predicted: ComplexArray) -> ComplexArray:
+    def _extrapolated(self, old: RootState, step: float, predicted: ComplexArray) -> ComplexArray:
         """The cubic through the last two states and their tangents, where it does not reach too far."""
         before = self._before
         if before is None or len(before.roots) != len(old.roots):
@@ -222,7 +222,7 @@ class Tracker:
         near = np.abs(further - predicted) <= np.abs(step * old.tangents)
         return np.where(near & np.isfinite(further), further, predicted)
 
-    def _pairs(self, old: State, predicted: ComplexArray) -> list[tuple[int, int]]:
+    def _pairs(self, old: RootState, predicted: ComplexArray) -> list[tuple[int, int]]:
         """Pairs (i, j) whose distance is not large against the step; j = −1 is i's own conjugate."""
         moved = np.abs(predicted - old.roots)
         found: list[tuple[int, int]] = []
@@ -251,7 +251,7 @@ class Tracker:
 
     def _accept(
         self,
-        old: State,
+        old: RootState,
         roots: ComplexArray,
         implied: BoolArray,
         predicted: ComplexArray,
@@ -299,11 +299,11 @@ def _pair(first: complex, second: complex) -> tuple[complex, complex]:
     return (first + second) / 2, ((first - second) / 2) ** 2
 
 
-def _half(old: State, i: int, j: int) -> complex:
+def _half(old: RootState, i: int, j: int) -> complex:
     return complex(old.roots[i] - (old.roots[j] if j >= 0 else np.conj(old.roots[i]))) / 2
 
 
-def _pair_slope(old: State, i: int, j: int) -> tuple[complex, complex]:
+def _pair_slope(old: RootState, i: int, j: int) -> tuple[complex, complex]:
     first, second = old.roots[i], old.roots[j] if j >= 0 else np.conj(old.roots[i])
     slope = old.tangents[i]
     other = old.tangents[j] if j >= 0 else np.conj(slope)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..typing import Array, ComplexArray
-from .roots import Spectrum
+from .roots import ReceptanceProblem
 
 
-def modal_coordinates(spectrum: Spectrum, lam: ComplexArray, mu: float) -> tuple[ComplexArray, ComplexArray]:
+def modal_coordinates(spectrum: ReceptanceProblem, lam: ComplexArray, mu: float) -> tuple[ComplexArray, ComplexArray]:
     """Contact forces (k, 2m) on the right vectors u = D⁻¹ Gᵀ p and on the left ones, at the roots λ (k,)."""
     left, right = spectrum.null_vectors(lam, mu)
     coupling = spectrum.coupling
@@ -22,7 +22,7 @@ def modal_coordinates(spectrum: Spectrum, lam: ComplexArray, mu: float) -> tuple
     return push, pull
 
 
-def expand(spectrum: Spectrum, lam: ComplexArray, forces: ComplexArray) -> ComplexArray:
+def expand(spectrum: ReceptanceProblem, lam: ComplexArray, forces: ComplexArray) -> ComplexArray:
     """u (n, k) = D(λ)⁻¹ Gᵀ p for each λ (k,) and contact forces p (k, 2m), scaled to unit norm."""
     modes = spectrum.modes
     projections, general_rows = spectrum.projections, spectrum.receptance.general
@@ -56,7 +56,7 @@ def _real_times_complex(real: Array, values: ComplexArray) -> ComplexArray:
     return (real @ values.view(float)).view(complex)
 
 
-def fixed_vectors(spectrum: Spectrum) -> Array:
+def fixed_vectors(spectrum: ReceptanceProblem) -> Array:
     """Vectors (n, k) of the modes that no contact sees."""
     modes = spectrum.modes
     u = np.zeros((modes.size, len(spectrum.fixed)))

@@ -37,7 +37,7 @@ class ContactRows:
 
 
 @dataclass(frozen=True)
-class State:
+class NodeState:
     """Displacement (n,) [m], normal force (m,) [N] and gap (m,) [m] for one set of touching nodes."""
 
     active: BoolArray
@@ -76,7 +76,7 @@ class Equilibrium:
         if cubic is not None and travel is not None:
             self.stretched = self.stretched + cubic.rows.lift @ travel
 
-    def solve(self, active: BoolArray, start: Array | None = None) -> State:
+    def solve(self, active: BoolArray, start: Array | None = None) -> NodeState:
         """The equilibrium with exactly these nodes touching, whichever the signs of gap and force.
 
         start (n,): where Newton's method begins for springs beyond the linear. Raises direct.SingularMatrix where the
@@ -87,14 +87,14 @@ class Equilibrium:
         springs = cubic is not None and bool(cubic.coefficient.size)
         if not springs and not np.any(nodes.cubic):
             u, normal = self._linear(active, None, None)
-            return State(active, u, normal, nodes.gap + nodes.normal @ u)
+            return NodeState(active, u, normal, nodes.gap + nodes.normal @ u)
         for _ in range(NEWTON_STEPS):
             before = u
             tangent, extra = self._springs(before)
             self._contacts(before)
             u, normal = self._linear(active, tangent, extra)
             if self._settled(before, u, active):
-                return State(active, u, normal, nodes.gap + nodes.normal @ u)
+                return NodeState(active, u, normal, nodes.gap + nodes.normal @ u)
         raise AnalysisError(
             "steady sliding: the springs beyond the linear find no equilibrium in "
             f"{NEWTON_STEPS} steps; check their coefficients (softening springs may have none)"
@@ -139,7 +139,7 @@ class Equilibrium:
         moved, size = float(np.abs(rows @ (u - before)).max(initial=0.0)), float(np.abs(rows @ u).max(initial=0.0))
         return moved <= 1e-12 * size
 
-    def residual(self, state: State) -> float:
+    def residual(self, state: NodeState) -> float:
         """Largest imbalance of a freedom over the largest force that takes part."""
         u, normal = state.displacement, state.normal_force
         internal = self.system.stiffness @ u
@@ -181,7 +181,7 @@ class Equilibrium:
         return answer[:n], normal
 
 
-def settle(equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: int = 60) -> tuple[State, int]:
+def settle(equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: int = 60) -> tuple[NodeState, int]:
     """Find the touching nodes: N ≥ 0 where they touch, gap ≥ 0 where they do not. Also returns the steps taken. Nodes
     of contacts kept closed touch, whichever the sign of N.
 
@@ -198,7 +198,7 @@ def settle(equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: i
     load = float(np.abs(equilibrium.force).max(initial=0.0))
     kept: BoolArray = movable & nodes.kept
     active: BoolArray = movable if guess is None else movable & (guess | kept)
-    last: State | None = None
+    last: NodeState | None = None
     seen: set[bytes] = set()
     care = 0
     for step in range(1, limit + 1):
@@ -233,7 +233,7 @@ def settle(equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: i
     )
 
 
-def offenders(state: State, movable: BoolArray, load: float) -> tuple[IntArray, IntArray]:
+def offenders(state: NodeState, movable: BoolArray, load: float) -> tuple[IntArray, IntArray]:
     """Touching nodes that pull and open nodes that penetrate, beyond rounding of forces as large as load [N]; the
     worst come first."""
     force, gap = state.normal_force, state.gap

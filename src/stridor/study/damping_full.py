@@ -10,7 +10,7 @@ import numpy as np
 from ..case import Case
 from ..errors import AnalysisError
 from ..modal.assembled.steady import touching_nodes
-from ..modal.derivatives import Held, Mode, by_friction, pencil_of, rate_of, solve_mode
+from ..modal.derivatives import HeldContacts, Mode, by_friction, pencil_of, rate_of, solve_mode
 from ..modal.onsets import Onset, onsets
 from ..modal.options import Options
 from ..modal.pencil import Pencil
@@ -98,15 +98,15 @@ def onset_slopes(case: Case, system: System, onset: Onset, paths: Sequence[str])
     return [-_derivative(case, mode, path, mu, held, options).real / by_mu for path in paths]
 
 
-def _held(system: System, options: Options) -> Held:
+def _held(system: System, options: Options) -> HeldContacts:
     """The nodes that touch where the search for onsets has them touch: in steady sliding with the laws' own friction,
     not with that of the onset, which other nodes may do."""
     nodes = system.contact_nodes()
     steady = touching_nodes(system, nodes, None, options.solver)
-    return Held(np.flatnonzero(steady.active), steady.sense, steady.stuck, system.size, nodes.count)
+    return HeldContacts(np.flatnonzero(steady.active), steady.sense, steady.stuck, system.size, nodes.count)
 
 
-def _derivative(case: Case, mode: Mode, path: str, mu: float, held: Held, options: Options) -> complex:
+def _derivative(case: Case, mode: Mode, path: str, mu: float, held: HeldContacts, options: Options) -> complex:
     def at(value: float) -> Pencil:
         return pencil_of(build_system(case.with_({path: value})), mu, held, options)
 

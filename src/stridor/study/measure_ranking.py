@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..modal.derivatives import Change, Mode, by_mass_at_node, by_release
+from ..modal.derivatives import Mode, PencilChange, by_mass_at_node, by_release
 from ..system import System
 from ..system.bodies import build_bodies
 from ..system.model import Line, Solid
@@ -132,7 +132,7 @@ def drawn_bodies(system: System) -> list[tuple[Line | Solid, Array, int]]:
     return lines + [(solid, solid.points, solid.points.shape[1]) for solid in system.solids]
 
 
-def _derivatives(modes: Sequence[Mode], change: Change) -> ComplexArray:
+def _derivatives(modes: Sequence[Mode], change: PencilChange) -> ComplexArray:
     """dλ/dp (b,)."""
     return np.array([m.derivative(change) for m in modes], dtype=complex)
 

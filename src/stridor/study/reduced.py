@@ -58,7 +58,7 @@ def reduced_model(
 def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> ContactsProblem:
     """The matrices of a case as sums of terms in the numbers of a box, as `reduced_model` takes it."""
     from ..modal.options import Options
-    from ..modal.parametric.contacts import FRICTION, STIFFNESS, Family, contacts_problem
+    from ..modal.parametric.contacts import FRICTION, STIFFNESS, ParametricSystems, contacts_problem
 
     parameters = _parameters(case, box)
     numbers = _Numbers(case, box)
@@ -69,7 +69,7 @@ def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> Co
                 raise CaseError(f"box.{name}", None, "the case has no contacts; give a range of another number")
     exact = {FRICTION, STIFFNESS, *case.parameters}
     settings = case.modal
-    family = Family(
+    family = ParametricSystems(
         numbers.own,
         numbers.system,
         numbers.structure,

@@ -14,7 +14,7 @@ from ..case.overrides import split_path
 from ..digits import measured
 from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
-from ..modal.derivatives import Change, Mode, by_compliance, by_friction, hold, pencil_of, rate_of, solve_mode
+from ..modal.derivatives import Mode, PencilChange, by_compliance, by_friction, hold, pencil_of, rate_of, solve_mode
 from ..modal.growing import doubt
 from ..modal.options import Options
 from ..modal.over_friction import modes_of_band
@@ -223,7 +223,7 @@ def sensitivities(
     return replace(result, warnings=(*told, *_divergence(result)))
 
 
-def _derivatives(found: Sequence[Mode], changes: Sequence[Change]) -> ComplexArray:
+def _derivatives(found: Sequence[Mode], changes: Sequence[PencilChange]) -> ComplexArray:
     """dλ/dp (k, b)."""
     table = [[mode.derivative(change) for mode in found] for change in changes]
     return np.array(table, dtype=complex).reshape(len(changes), len(found))
@@ -310,7 +310,7 @@ class Linearised:
             return 0.0 if stiffness == "rigid" else 1.0 / stiffness
         return number_at(self.case, path)
 
-    def change(self, path: str, step: float | None = None) -> Change:
+    def change(self, path: str, step: float | None = None) -> PencilChange:
         """What the number at a path does to the matrices, per unit of it."""
         contact = _contact_of(self.case, path)
         if path == "mu":

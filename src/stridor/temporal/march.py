@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import AnalysisError
-from ..interrupts import Held, at_once, held
+from ..interrupts import HeldSignals, at_once, held
 from .observe import Observer
 from .pace import Pace
 from .phase_results import PhaseResults
@@ -62,7 +62,7 @@ class March:
             return stopped if block.asked else result
 
     def _loop(
-        self, block: Held, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float
+        self, block: HeldSignals, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float
     ) -> bool:
         """The chunks; whether they were interrupted."""
         stepper, steps = self.stepper, self.schedule.steps

@@ -19,7 +19,7 @@ from ...system import System
 from ...threads import one_thread_if_small
 from ...typing import BoolArray, ComplexArray, IntArray
 from ..dense_problem import DenseProblem, Eigenpairs
-from ..histories import Change, Entries, reported, unexplained
+from ..histories import Entries, StabilityChange, reported, unexplained
 from ..newton import crossing as on_axis
 from ..newton import exceptional
 from ..onset import Onset, Onsets
@@ -74,7 +74,7 @@ def onsets_assembled(
     reduced = projected(problem, Band(1, top * follow), high)
     settle(reduced, samples(high, SAMPLES))
     way = _way(reduced, (low, high), top)
-    changes: list[Change] = []
+    changes: list[StabilityChange] = []
     for passage in way.passages:
         concerned = (passage.branch, passage.partner) if passage.kind == "meeting" else (passage.branch,)
         # What begins beyond the band counts where it comes into it.
@@ -83,7 +83,7 @@ def onsets_assembled(
             continue
         limit = max_frequency_hz * (follow * MOST_ABOVE if matters else 1.0)
         onset = _located(reduced, passage, (0.0, high), limit)
-        changes.append(Change(passage.low, concerned, onset))
+        changes.append(StabilityChange(passage.low, concerned, onset))
     return Onsets(
         tuple(reported(changes, way.entries, (low, high), max_frequency_hz)),
         (low, high),

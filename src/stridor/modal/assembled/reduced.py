@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from ...typing import Array, ComplexArray, Sparse
 from ..dense_problem import DenseProblem, Eigenpairs, combined
 from .problem import ContactProblem, Extras, Varying
-from .shifted import Pair, Shifted, orthonormal, real_columns
+from .shifted import ForcedShapes, Shifted, orthonormal, real_columns
 
 FEW = 3  # friction coefficients asked of a basis one by one before all of the grid's terms are projected
 REMEMBERED = 300  # vectors before they are condensed
@@ -40,12 +40,12 @@ class Reduced(DenseProblem):
     compressed: int
 
     def __init__(
-        self, problem: ContactProblem, shifted: Shifted, modes: Pair, frequency: float, highest: float
+        self, problem: ContactProblem, shifted: Shifted, modes: ForcedShapes, frequency: float, highest: float
     ) -> None:
         super().__init__(frequency, (0.0, highest), damped=problem.damped)
         self.problem = problem
         self.shifted = shifted
-        self.pairs = Pair(np.zeros((problem.size, 0)), np.zeros((problem.nodes, 0)))
+        self.pairs = ForcedShapes(np.zeros((problem.size, 0)), np.zeros((problem.nodes, 0)))
         self.forces = np.zeros((problem.nodes, 0))
         self.lifts = np.zeros((problem.size, 0))
         self.solves = 0
@@ -67,7 +67,7 @@ class Reduced(DenseProblem):
         """Number of unknowns r."""
         return self.pairs.count + self.forces.shape[1]
 
-    def add(self, candidates: Pair) -> int:
+    def add(self, candidates: ForcedShapes) -> int:
         """Take pairs in as far as they are new; returns how many unknowns that made."""
         before = self.count
         new, _ = orthonormal(self.problem, self.pairs, candidates)
@@ -75,7 +75,7 @@ class Reduced(DenseProblem):
             self._add_forces(candidates.p)
             free = new.p.copy()
             free[self._rigid] = 0.0
-            new = Pair(new.u, free)
+            new = ForcedShapes(new.u, free)
         self.pairs = self.pairs.with_(new)
         if self.count > before:
             self._project()
@@ -84,7 +84,7 @@ class Reduced(DenseProblem):
     def enrich(self, force: Array) -> int:
         """Take in what forces (n, k) do to the frictionless problem; returns how many unknowns that made."""
         self.solves += force.shape[1]
-        return self.add(Pair(*self.shifted.solve(force)))
+        return self.add(ForcedShapes(*self.shifted.solve(force)))
 
     def enrich_left(self, force: Array, opening: Array) -> int:
         """Take in what left vectors need: answers to forces (n, k), and lifts of gap openings (m, l)."""
@@ -102,7 +102,7 @@ class Reduced(DenseProblem):
             p = np.zeros_like(soft)
             given = compliance > 0
             p[given] = -(self.problem.normal @ u)[given] / compliance[given, None]
-            new, _ = orthonormal(self.problem, self.pairs, Pair(u, p))
+            new, _ = orthonormal(self.problem, self.pairs, ForcedShapes(u, p))
             self.pairs = self.pairs.with_(new)
         if self.count > before:
             self._project()

@@ -38,7 +38,7 @@ class NotPositive(AnalysisError):
 
 
 @dataclass(frozen=True)
-class Pair:
+class ForcedShapes:
     """Shapes u (n, k) with the contact forces p (m, k) that go with them: N u + c p = 0 for every column."""
 
     u: Array
@@ -49,17 +49,17 @@ class Pair:
         """Number of columns k."""
         return int(self.u.shape[1])
 
-    def turned(self, by: Array) -> Pair:
+    def turned(self, by: Array) -> ForcedShapes:
         """Linear combinations, by (k, l)."""
-        return Pair(self.u @ by, self.p @ by)
+        return ForcedShapes(self.u @ by, self.p @ by)
 
-    def less(self, other: Pair, weights: Array) -> Pair:
+    def less(self, other: ForcedShapes, weights: Array) -> ForcedShapes:
         """Minus the combinations of ``other`` with weights (l, k)."""
-        return Pair(self.u - other.u @ weights, self.p - other.p @ weights)
+        return ForcedShapes(self.u - other.u @ weights, self.p - other.p @ weights)
 
-    def with_(self, other: Pair) -> Pair:
+    def with_(self, other: ForcedShapes) -> ForcedShapes:
         """Both side by side."""
-        return Pair(np.hstack([self.u, other.u]), np.hstack([self.p, other.p]))
+        return ForcedShapes(np.hstack([self.u, other.u]), np.hstack([self.p, other.p]))
 
 
 class Shifted:
@@ -120,18 +120,18 @@ def shift_for(problem: ContactProblem, frequency: float | None) -> float:
     return 1e-6 * largest
 
 
-def frictionless_modes(shifted: Shifted, enough: Callable[[Array, int], bool]) -> tuple[Array, Pair]:
+def frictionless_modes(shifted: Shifted, enough: Callable[[Array, int], bool]) -> tuple[Array, ForcedShapes]:
     """ω² (k,) [1/s²] ascending, and the modes as pairs of unit modal mass.
 
     Block Lanczos with every vector kept: one block solve brings BLOCK vectors, and multiple frequencies come as they
     are. ``enough`` is asked with all converged ω² below the first that is not, and the number of vectors so far.
     """
     mass = shifted.problem.mass
-    empty = Pair(np.zeros((shifted.problem.size, 0)), np.zeros((0, 0)))
+    empty = ForcedShapes(np.zeros((shifted.problem.size, 0)), np.zeros((0, 0)))
     block, _ = orthonormal(shifted.problem, empty, _start(shifted))
     basis, image = block, np.zeros((0, 0))
     for _ in range(MOST_BLOCKS):
-        answer = Pair(shifted.solve(mass @ block.u)[0], np.zeros((0, block.count)))
+        answer = ForcedShapes(shifted.solve(mass @ block.u)[0], np.zeros((0, block.count)))
         new, rest = orthonormal(shifted.problem, basis, answer)
         column = basis.u.T @ (mass @ answer.u)
         # The inverse is symmetric in the mass: what the earlier vectors give of the last is known.
@@ -149,21 +149,21 @@ def frictionless_modes(shifted: Shifted, enough: Callable[[Array, int], bool]) -
     raise AnalysisError("the frictionless modes do not converge; ask for fewer modes or a lower max_frequency_hz")
 
 
-def _start(shifted: Shifted) -> Pair:
+def _start(shifted: Shifted) -> ForcedShapes:
     """A first block that respects the contacts."""
     problem = shifted.problem
     width = max(1, min(BLOCK, problem.size))
     random = np.random.default_rng(SEED).standard_normal((problem.size, width))
-    return Pair(shifted.solve(problem.mass @ random)[0], np.zeros((0, width)))
+    return ForcedShapes(shifted.solve(problem.mass @ random)[0], np.zeros((0, width)))
 
 
-def _polished(shifted: Shifted, shapes: Array) -> tuple[Array, Pair]:
+def _polished(shifted: Shifted, shapes: Array) -> tuple[Array, ForcedShapes]:
     """One more inverse iteration of all together, which also gives the contact forces, and Rayleigh–Ritz."""
     problem = shifted.problem
     if not shapes.shape[1]:
-        return np.zeros(0), Pair(shapes, np.zeros((problem.nodes, 0)))
+        return np.zeros(0), ForcedShapes(shapes, np.zeros((problem.nodes, 0)))
     u, p = shifted.solve(problem.mass @ shapes)
-    found = Pair(u, p)
+    found = ForcedShapes(u, p)
     # The iteration shortens each shape by its ω²: of one length again, and without what only rounding tells apart
     # where all modes of a small problem are found.
     found = found.turned(np.diag(1.0 / np.sqrt(np.einsum("ij,ij->j", u, problem.mass @ u))))
@@ -181,7 +181,9 @@ def _symmetric(matrix: Array) -> Array:
     return (matrix + matrix.T) / 2
 
 
-def orthonormal(problem: ContactProblem, basis: Pair, block: Pair, *, smallest: float = 1e-8) -> tuple[Pair, Array]:
+def orthonormal(
+    problem: ContactProblem, basis: ForcedShapes, block: ForcedShapes, *, smallest: float = 1e-8
+) -> tuple[ForcedShapes, Array]:
     """What pairs ``block`` (k) add to the M-orthonormal pairs ``basis``, and the weights (a, k) of it in them.
 
     Contact forces are transformed as their shapes are. Directions that leave less than ``smallest`` of their column's

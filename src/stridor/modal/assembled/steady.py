@@ -34,7 +34,7 @@ class Touching:
 
 
 @dataclass(frozen=True)
-class Rows:
+class ContactRows:
     """Rows of the touching nodes (m, n) csr, then those that hold stuck ones along their tangents: normal N, slide S
     (zero where a node sticks), compliance c (m,) [m/N]."""
 
@@ -43,7 +43,7 @@ class Rows:
     compliance: Array
 
 
-def contact_rows(nodes: ContactNodes, touching: IntArray, sense: Array, stuck: BoolArray) -> Rows:
+def contact_rows(nodes: ContactNodes, touching: IntArray, sense: Array, stuck: BoolArray) -> ContactRows:
     """What the nodes ``touching`` (k,) of all add to small motions: sense (m, d−1) and stuck (m,) are of all nodes.
 
     A node that sticks is held along its tangents as a rigid contact is along its normal: rows with forces of their own.
@@ -51,10 +51,10 @@ def contact_rows(nodes: ContactNodes, touching: IntArray, sense: Array, stuck: B
     chosen = nodes.select(touching)
     slide = chosen.along(sense[touching])
     if not np.any(stuck[touching]):
-        return Rows(chosen.normal, slide, chosen.compliance)
+        return ContactRows(chosen.normal, slide, chosen.compliance)
     sticks = StickRows(chosen)
     held = sticks.rows[sticks.held(np.ones(chosen.count, dtype=bool), stuck[touching])]
-    return Rows(
+    return ContactRows(
         sp.csr_array(sp.vstack([chosen.normal, held])),
         sp.csr_array(sp.vstack([slide, sp.csr_array(held.shape)])),
         np.concatenate([chosen.compliance, np.zeros(held.shape[0])]),
@@ -121,7 +121,7 @@ class Steadiness:
     prestress: bool
     solver: str | None
     hardens: bool
-    layer: Rows
+    layer: ContactRows
 
     @property
     def neutral(self) -> bool:
@@ -181,7 +181,9 @@ class Steadiness:
         return sp.csr_array((normal + mu * self.layer.slide[soft]).T @ change @ normal)
 
 
-def steadiness(system: System, nodes: ContactNodes, touching: IntArray, options: Options, layer: Rows) -> Steadiness:
+def steadiness(
+    system: System, nodes: ContactNodes, touching: IntArray, options: Options, layer: ContactRows
+) -> Steadiness:
     """What of the steady state matters here, beside the contact rows of the problem.
 
     Raises AnalysisError where something does but no load presses the bodies.

@@ -19,7 +19,7 @@ from ..assembled.passages import Passage
 from ..dense_problem import eigenvalues
 from ..newton import FLAT, Root
 from ..onset import Onset
-from ..quadratic import Region, Spectrum, band_modes
+from ..quadratic import Region, RegionModes, band_modes
 from ..quadratic.find import Completeness
 from ..quadratic.polish import groups, pairs
 from ..tolerances import AT_REST, SPLIT_RELATIVE
@@ -35,14 +35,14 @@ CLEARLY = 1.02  # times the band: passages beyond it are counted and not solved
 
 
 @dataclass(frozen=True)
-class Found:
+class BranchOnset:
     """An onset with the branch it is on, counted from 0."""
 
     onset: Onset
     branch: int
 
 
-def ends_of(family: Family, low: float, high: float, top: float) -> tuple[Spectrum, Spectrum]:
+def ends_of(family: Family, low: float, high: float, top: float) -> tuple[RegionModes, RegionModes]:
     """All modes of the band at both ends, in the full problem."""
     band, least, solver, still = top / (2 * np.pi), -DECAY * top, family.options.solver, family.built(low)
     return (
@@ -51,16 +51,16 @@ def ends_of(family: Family, low: float, high: float, top: float) -> tuple[Spectr
     )
 
 
-def whole_ends(family: Family, low: float, high: float, top: float) -> tuple[Spectrum, Spectrum]:
+def whole_ends(family: Family, low: float, high: float, top: float) -> tuple[RegionModes, RegionModes]:
     """The same of small problems, by QR and without vectors: whatever else there may be, overdamped modes above all."""
-    started, found = time.perf_counter(), list[Spectrum]()
+    started, found = time.perf_counter(), list[RegionModes]()
     region = Region.band(0.0, top / (2 * np.pi), above=-DECAY * top).bounded()
     said = f"Complete: QR computes all eigenvalues of {family.size} freedoms at once."
     for mu in (low, high):
         values = all_values(family, mu, top)
         values = values[(values.imag >= 0) & (values.imag <= top) & (values.real >= -DECAY * top)]
         nothing, zero = np.zeros((0, len(values)), dtype=complex), np.zeros(len(values))
-        found.append(Spectrum(
+        found.append(RegionModes(
             values, nothing, None, zero, None, Completeness(True, said, region), 0, 0,
             time.perf_counter() - started, 0,
         ))  # fmt: skip
@@ -74,8 +74,8 @@ def all_values(family: Family, mu: float, top: float) -> ComplexArray:
 
 
 def solved(
-    source: Along, between: tuple[float, float], ends: tuple[Spectrum, Spectrum], top: float, finer: int
-) -> tuple[list[Found], Followed, bool]:
+    source: Along, between: tuple[float, float], ends: tuple[RegionModes, RegionModes], top: float, finer: int
+) -> tuple[list[BranchOnset], Followed, bool]:
     """Onsets, and whether what grows at the ends is what they say."""
     family = source.family
     way = followed(source, *between, top, finer)
@@ -95,7 +95,7 @@ def solved(
         if root is None:
             lost.append(passage)
             continue
-        one = Found(_onset(source, passage, *root), passage.branch)
+        one = BranchOnset(_onset(source, passage, *root), passage.branch)
         if enters is not None and abs(root[0].lam.imag) > top:
             place = min(max(family.low + enters, one.onset.mu), between[1])
             one = replace(one, onset=replace(one.onset, enters_at=place))
@@ -113,7 +113,7 @@ def solved(
     return found, way, agree and explained and growing[1] - growing[0] == balance
 
 
-def without_crossings(found: list[Found]) -> list[Found]:
+def without_crossings(found: list[BranchOnset]) -> list[BranchOnset]:
     """Without undamped modes that cross: rounding makes them meet and part again at one place, and grow in between by
     no more than rounding, κ√Δμ at most."""
     crossings: set[int] = set()
@@ -158,7 +158,7 @@ def _is_above(passage: Passage, frequency: float) -> bool:
     return bool(lam.imag > frequency and not ahead.imag < frequency)
 
 
-def _throughout(family: Family, states: tuple[State, State], ends: tuple[Spectrum, Spectrum], top: float) -> int:
+def _throughout(family: Family, states: tuple[State, State], ends: tuple[RegionModes, RegionModes], top: float) -> int:
     """How many modes diverge faster than the band at both ends, and were not followed: branches start in the band."""
     alone: list[int] = []
     for state, end in zip(states, ends, strict=True):
@@ -168,7 +168,7 @@ def _throughout(family: Family, states: tuple[State, State], ends: tuple[Spectru
     return alone[0] if alone[0] == alone[1] else 0
 
 
-def _agree(family: Family, state: State, end: Spectrum, top: float, fast: int) -> bool:
+def _agree(family: Family, state: State, end: RegionModes, top: float, fast: int) -> bool:
     """Whether the followed modes that grow in the band are those found in full, but for ``fast`` that diverge at every
     μ beyond what is followed."""
     mine = state.values[unstable(family, state.values, top) & (state.values.imag <= top)]
@@ -184,7 +184,7 @@ def _same(one: Onset, other: Onset, family: Family) -> bool:
     return near and abs(one.frequency_hz - other.frequency_hz) <= 1e-7 * max(one.frequency_hz, 1e-300)
 
 
-def _opening(source: Along, end: Spectrum, state: State, top: float) -> list[Found]:
+def _opening(source: Along, end: RegionModes, state: State, top: float) -> list[BranchOnset]:
     """Growth that begins at the very start, where nothing damps: of an eigenvalue that friction drives off the axis at
     once, or of equal ones that it splits (modes of bodies that turn into themselves)."""
     assert end.left is not None, "asked for at the low end"
@@ -193,7 +193,7 @@ def _opening(source: Along, end: Spectrum, state: State, top: float) -> list[Fou
     problem = family.built(family.low)
     on_axis = (np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)) & (np.abs(values) > AT_REST * top)
     places = np.flatnonzero(on_axis & (values.imag > 0))
-    result: list[Found] = []
+    result: list[BranchOnset] = []
     for group in groups(values[places], ALIKE * top):
         mine = places[group]
         if family.reversible and len(mine) < 2:
@@ -216,7 +216,7 @@ def _opening(source: Along, end: Spectrum, state: State, top: float) -> list[Fou
                 residual=float(end.residual[mine].max()), square_root_coefficient=None,
                 growth_slope=float(slope.real),
             )  # fmt: skip
-            result.append(Found(onset, branch))
+            result.append(BranchOnset(onset, branch))
     return result
 
 

@@ -23,7 +23,7 @@ from .basis import OnBasis
 from .family import EXACT, ROLES, Family, away, wide
 
 
-class Line(Family):
+class ParameterLine(Family):
     """A parametric problem from the low to the high end of one of its parameters, the others at ``point``."""
 
     def __init__(self, problem: ParametricProblem, name: str, point: Mapping[str, float], options: Options) -> None:
@@ -103,19 +103,19 @@ def _is(one: Sparse, other: Any) -> bool:
     return away(one, sp.csr_array(other)) <= EXACT
 
 
-def of_model(model: ReducedModel, name: str, point: Mapping[str, float]) -> Line:
+def of_model(model: ReducedModel, name: str, point: Mapping[str, float]) -> ParameterLine:
     """The reduced model's own problem along a parameter: as small as its basis, of the full problem's kind."""
     terms = tuple(
         Term(sp.csr_array(matrix), t.role, t.factor, symmetric=t.symmetric)
         for t, matrix in zip(model.problem.terms, model.projected, strict=True)
     )
-    return Line(ParametricProblem(terms, model.problem.parameters), name, point, Options())
+    return ParameterLine(ParametricProblem(terms, model.problem.parameters), name, point, Options())
 
 
 class OnTerms(OnBasis):
     """A line whose matrices are small: the terms themselves (t, r, r), on all freedoms."""
 
-    def __init__(self, line: Line, frequency: float, terms: Array) -> None:
+    def __init__(self, line: ParameterLine, frequency: float, terms: Array) -> None:
         super().__init__(line, frequency, damped=not line.still)
         self._line, self._terms = line, terms
 

@@ -31,7 +31,7 @@ from .numbers import Numbers, numbered
 
 
 @dataclass(frozen=True)
-class Found:
+class ModesAtFriction:
     """Eigenvalues (k,) at one μ by frequency, right and left vectors (n, k), backward errors (k,)."""
 
     values: ComplexArray
@@ -79,9 +79,9 @@ def general_modes(
 
 def _each(
     family: SystemFamily, values: Array, top: float, progress: Progress | None, *, vectors: bool | Literal["right"]
-) -> tuple[Array, list[Found], int | None]:
+) -> tuple[Array, list[ModesAtFriction], int | None]:
     """The μ (k,), what is found at each, and how many there were to be where it was interrupted."""
-    found: dict[int, Found] = {}
+    found: dict[int, ModesAtFriction] = {}
     try:
         for at, k in enumerate(np.argsort(values, kind="stable").tolist(), start=1):
             found[k] = _modes(family, float(values[k]), top, left=vectors is True)
@@ -111,7 +111,7 @@ def _family(
     return family_of(system_at, (low, high), options, damped=damped, own=low if own is None else own)
 
 
-def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> Found:
+def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> ModesAtFriction:
     spectrum = band_modes(
         family.built(mu), top / (2 * np.pi), above=-DECAY * top, still=family.built(family.low), left=left,
         solver=family.options.solver,
@@ -123,7 +123,7 @@ def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> Found:
         # With every λ there is −λ̄: a real part without a partner is rounding.
         on_axis = np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)
         values[on_axis] = 1j * values[on_axis].imag
-    return Found(
+    return ModesAtFriction(
         values,
         _normed(spectrum.right[:n]),
         None if spectrum.left is None else _normed(spectrum.left[:n]),
@@ -135,7 +135,7 @@ def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> Found:
 def _table(
     family: SystemFamily,
     mu: Array,
-    found: list[Found],
+    found: list[ModesAtFriction],
     numbers: Numbers,
     *,
     damped: bool,

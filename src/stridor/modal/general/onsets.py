@@ -12,7 +12,7 @@ from ...system import System
 from ...threads import one_thread
 from ..onset import Onsets
 from ..options import Options
-from ..quadratic import Spectrum
+from ..quadratic import RegionModes
 from ..quadratic.reach import searched
 from ..tolerances import AT_REST
 from .basis import Along, Projected, along, whole_or_raise
@@ -77,7 +77,7 @@ def general_onsets(
     return replace(result, onsets=answer.onsets, completeness=said)
 
 
-def _checked(source: Along, ends: tuple[Spectrum, Spectrum], top: float) -> Along:
+def _checked(source: Along, ends: tuple[RegionModes, RegionModes], top: float) -> Along:
     """The source if it has all the modes found at both ends, else full solves."""
     family = source.family
     if source.whole or (isinstance(source, Projected) and source.model is None):

@@ -21,7 +21,7 @@ from ..parametric import ReducedModel
 from ..parametric.basis import expanded
 from .branches import ends_of
 from .counted import ends as turns
-from .line import Line, OnTerms, of_model
+from .line import OnTerms, ParameterLine, of_model
 from .passages import quiet
 from .search import search
 from .words import sentence
@@ -135,7 +135,7 @@ def onsets_along(
     source.settle()
     ends = ends_of(line, 0.0, 1.0, top)
     answer = search(line, [lambda: source], (0.0, 1.0), ends, top)
-    full = Line(model.problem, parameter, point, Options(solver=solver)) if confirm else None
+    full = ParameterLine(model.problem, parameter, point, Options(solver=solver)) if confirm else None
     tried = [(o, _confirmed(model, source, full, o) if full else _of(line, o, None)) for o in answer.onsets]
     onsets = [found for _, found in tried if found is not None]
     said, complete = sentence(line, answer, ends, top, parameter, line.value, "in the reduced model"), answer.complete
@@ -146,7 +146,7 @@ def onsets_along(
     return ParametricOnsets.of(listed, model, parameter, complete=complete, sentence=said)
 
 
-def _of(line: Line, onset: Onset, root: Root | None) -> ParametricOnset:
+def _of(line: ParameterLine, onset: Onset, root: Root | None) -> ParametricOnset:
     """The onset in terms of the parameter, as the full problem has it where that was asked."""
     length = line.parameter.high - line.parameter.low
     s = onset.mu if root is None else root.mu
@@ -165,7 +165,7 @@ def _of(line: Line, onset: Onset, root: Root | None) -> ParametricOnset:
     )  # fmt: skip
 
 
-def _confirmed(model: ReducedModel, source: OnTerms, full: Line, onset: Onset) -> ParametricOnset | None:
+def _confirmed(model: ReducedModel, source: OnTerms, full: ParameterLine, onset: Onset) -> ParametricOnset | None:
     """The same in the full problem, by Newton from there; None where that does not lead to it."""
     lam, s = 2j * np.pi * onset.frequency_hz, onset.mu
     with quiet():
@@ -180,7 +180,8 @@ def _confirmed(model: ReducedModel, source: OnTerms, full: Line, onset: Onset) -
 
 
 def _roots(
-    full: Line, s: float, lam: complex, x: ComplexArray, y: ComplexArray, between: tuple[float, float], onset: Onset
+    full: ParameterLine, s: float, lam: complex, x: ComplexArray, y: ComplexArray, between: tuple[float, float],
+    onset: Onset,
 ) -> Iterator[Root | None]:
     if onset.kind == "divergence":
         yield standstill(full, s, x, y, between)

@@ -14,10 +14,10 @@ import numpy as np
 
 from ...errors import AnalysisError
 from ..onset import Onset
-from ..quadratic import Spectrum
+from ..quadratic import RegionModes
 from .axis import walked
 from .basis import DENSE, WHOLE, Along, Whole, along
-from .branches import Found, all_values, solved
+from .branches import BranchOnset, all_values, solved
 from .counted import ALIKE, ON_IT, Counted, Lack, Passing, as_onset, counted, number_at
 from .family import Family
 from .follow import BEYOND, Followed
@@ -54,7 +54,7 @@ class Answer:
 
 def search(
     family: Family, make: Sequence[Callable[[], Along]], between: tuple[float, float],
-    ends: tuple[Spectrum, Spectrum], top: float, why: str = "",
+    ends: tuple[RegionModes, RegionModes], top: float, why: str = "",
 ) -> Answer:  # fmt: skip
     """Every onset of a family in a range up to the angular frequency top [1/s].
 
@@ -87,7 +87,7 @@ def search(
     return _counted_answer(family, best, seen, ends, top, why)
 
 
-def _wanted(found: Sequence[Found], between: tuple[float, float], top: float) -> tuple[Onset, ...]:
+def _wanted(found: Sequence[BranchOnset], between: tuple[float, float], top: float) -> tuple[Onset, ...]:
     """Those of the range in the band, or above it and leading into it."""
     low, high = between
     inside = [
@@ -124,7 +124,7 @@ def _places(onsets: Sequence[Onset], between: tuple[float, float]) -> list[float
 
 
 def _walked(
-    family: Family, between: tuple[float, float], ends: tuple[Spectrum, Spectrum], top: float, why: str
+    family: Family, between: tuple[float, float], ends: tuple[RegionModes, RegionModes], top: float, why: str
 ) -> Answer | None:
     """Onsets found along the imaginary axis, where as many roots grow between every two of them as they say; None where
     that does not apply or they are not all."""
@@ -170,7 +170,7 @@ def _beside(family: Family, source: Along | None, top: float, why: str) -> Along
 
 
 def _counted_answer(
-    family: Family, best: Answer | None, seen: Counted, ends: tuple[Spectrum, Spectrum], top: float, why: str
+    family: Family, best: Answer | None, seen: Counted, ends: tuple[RegionModes, RegionModes], top: float, why: str
 ) -> Answer:
     """The list of onsets that what was counted bears out: of branches, of the count, or of both."""
     followed = () if best is None else best.onsets
@@ -194,7 +194,7 @@ def _same(one: Onset, other: Onset, width: float, top: float) -> bool:
     return near and 2 * np.pi * abs(one.frequency_hz - other.frequency_hz) <= ALIKE * top
 
 
-def _ends_agree(family: Family, seen: Counted, ends: tuple[Spectrum, Spectrum], top: float) -> bool:
+def _ends_agree(family: Family, seen: Counted, ends: tuple[RegionModes, RegionModes], top: float) -> bool:
     """Whether as many roots were counted at both ends as the full problem has there."""
     for (mu, number), end in zip((seen.grid[0], seen.grid[-1]), ends, strict=True):
         if any(abs(o.mu - mu) <= ON_IT for o in seen.onsets):

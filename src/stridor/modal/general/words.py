@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..quadratic import Spectrum
+from ..quadratic import RegionModes
 from .basis import Projected
 from .counted import Passing
 from .family import Family
@@ -17,7 +17,7 @@ MOST = 4  # places that are named one by one
 
 
 def sentence(
-    family: Family, answer: Answer, ends: tuple[Spectrum, Spectrum], top: float, name: str,
+    family: Family, answer: Answer, ends: tuple[RegionModes, RegionModes], top: float, name: str,
     value: Callable[[float], float], where: str = "",
 ) -> str:  # fmt: skip
     """What speaks for these onsets being all, or where they are not. name: of the parameter, value(μ) what it is there;

@@ -26,7 +26,7 @@ from ..options import Options
 from .contacts_rigid import Elimination, eliminate
 from .contacts_sampling import Values
 from .contacts_steady import FRICTION, STIFFNESS, Contacts, contacts_of, steady_terms
-from .factors import Factor, Product
+from .factors import ParameterFactor, Product
 from .family import Piece, away, interpolated_terms
 from .problem import Parameter, ParametricProblem
 
@@ -54,7 +54,7 @@ class ContactsProblem(ParametricProblem):
 
 
 @dataclass(frozen=True)
-class Family:
+class ParametricSystems:
     """Systems that depend on parameters.
 
     own: the one whose steady sliding says which nodes touch. system_at: the system at values of the parameters.
@@ -70,7 +70,7 @@ class Family:
 
 
 def contacts_problem(
-    family: Family, *, touching_at: float | None = None, options: Options | None = None
+    family: ParametricSystems, *, touching_at: float | None = None, options: Options | None = None
 ) -> ContactsProblem:
     """The problem over all parameters of a family, in its contacts too.
 
@@ -132,8 +132,8 @@ def _springs(contacts: Contacts, *, varied: bool) -> dict[str, Piece]:
         return {}
     rows = sp.csr_array(sp.diags_array(1.0 / contacts.compliance[soft]) @ contacts.normal[soft])
     friction = sp.csr_array(contacts.slide[soft].T @ rows)
-    stiffness: Factor = Product(((STIFFNESS, 1.0),))
-    by_friction: Factor = Product(((STIFFNESS, 1.0), (FRICTION, 1.0)))
+    stiffness: ParameterFactor = Product(((STIFFNESS, 1.0),))
+    by_friction: ParameterFactor = Product(((STIFFNESS, 1.0), (FRICTION, 1.0)))
     if not varied:
         friction, by_friction = sp.csr_array(_friction_of(contacts) * friction), stiffness
     return {
@@ -150,7 +150,7 @@ def _friction_of(contacts: Contacts) -> float:
     return found
 
 
-def _elimination(family: Family, contacts_at: Callable[[Values], Contacts], rigid: BoolArray) -> Elimination:
+def _elimination(family: ParametricSystems, contacts_at: Callable[[Values], Contacts], rigid: BoolArray) -> Elimination:
     """Rigid contact taken out, the same for all values of the parameters. Raises CaseError where it is not the same."""
     reference = {p.name: p.value for p in family.interpolated}
     own = contacts_at(reference)
@@ -193,7 +193,7 @@ def contact_parameters(
         "damping": Piece(system.damping, "damping"),
         "stiffness": Piece(system.stiffness, "stiffness"),
     }
-    family = Family(system, lambda _: system, lambda _: pieces, tuple(parameters))
+    family = ParametricSystems(system, lambda _: system, lambda _: pieces, tuple(parameters))
     return contacts_problem(family, touching_at=touching_at, options=options)
 
 

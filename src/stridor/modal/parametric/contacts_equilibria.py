@@ -36,7 +36,7 @@ CORRECTIONS = 4
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldEquilibria:
     """Displacement (n,) [m], forces (m,) [N] of the touching nodes and gaps (k,) [m] of all of them."""
 
     displacement: Array
@@ -57,7 +57,7 @@ class Equilibria:
         self._count = 0
         self._many: _Many | None = None
 
-    def at(self, mu: Array, stiffness: float) -> Held:
+    def at(self, mu: Array, stiffness: float) -> HeldEquilibria:
         """The equilibrium at friction coefficients (k,) of all nodes and a factor of all contact stiffnesses.
 
         Raises AnalysisError where there is none.
@@ -77,7 +77,7 @@ class Equilibria:
             self._many.factor.free()
             self._many = None
 
-    def _alone(self, mu: Array, stiffness: float) -> Held:
+    def _alone(self, mu: Array, stiffness: float) -> HeldEquilibria:
         nodes = replace(self._nodes, compliance=self._nodes.compliance / stiffness)
         rubbing = mu[:, None] * self._sense
         push = sp.csr_array(nodes.normal + nodes.along(rubbing))
@@ -88,7 +88,7 @@ class Equilibria:
         state = equilibrium.solve(active)
         if not equilibrium.residual(state) <= BALANCED:
             raise SingularMatrix("the equilibrium is not balanced")
-        return Held(state.displacement, state.normal_force[self._touching], state.gap)
+        return HeldEquilibria(state.displacement, state.normal_force[self._touching], state.gap)
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class _Many:
         right = force - normal.T @ (springs * gap)
         return cls(nodes, normal, slide, chosen.compliance, gap, springs, right, factor, by_normal, by_slide)
 
-    def at(self, mu: Array, stiffness: float) -> Held:
+    def at(self, mu: Array, stiffness: float) -> HeldEquilibria:
         """The equilibrium at friction coefficients (m,) of the touching nodes."""
         compliance = self.compliance / stiffness
         share = 1.0 - self.springs * compliance
@@ -147,7 +147,7 @@ class _Many:
             displacement = self._moved(forces, share, mu)
         if not np.all(np.isfinite(displacement)):
             raise SingularMatrix("the contacts' equations have no solution")
-        return Held(displacement, forces, self.nodes.gap + self.nodes.normal @ displacement)
+        return HeldEquilibria(displacement, forces, self.nodes.gap + self.nodes.normal @ displacement)
 
     def _moved(self, forces: Array, share: Array, mu: Array) -> Array:
         found: Array = self.factor.solve(self.right + self.normal.T @ (share * forces) + self.slide.T @ (mu * forces))

@@ -33,7 +33,7 @@ from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 from ...errors import AnalysisError
 from ...typing import Array, IntArray, Sparse
 from .contacts_sampling import sampled
-from .factors import CONSTANT, Factor, Product, product_of
+from .factors import CONSTANT, ParameterFactor, Product, product_of
 from .family import merged, term_of
 from .problem import Parameter, Term
 
@@ -54,7 +54,7 @@ class Elimination:
     V_k (n, r)."""
 
     motion: Sparse
-    changes: tuple[tuple[Factor, Sparse], ...]
+    changes: tuple[tuple[ParameterFactor, Sparse], ...]
 
     def applied(self, terms: Iterable[Term]) -> tuple[Term, ...]:
         """The terms WᵀAZ (r, r) of terms A (n, n)."""
@@ -73,8 +73,8 @@ class Elimination:
         return sp.csr_array(sum((f(values) * v for f, v in self.changes), start=self.motion))
 
 
-def _times(one: Factor, other: Any) -> Factor:
-    assert isinstance(other, Factor), "terms of cases have factors that are data"
+def _times(one: ParameterFactor, other: Any) -> ParameterFactor:
+    assert isinstance(other, ParameterFactor), "terms of cases have factors that are data"
     return product_of(one, other)
 
 
@@ -105,7 +105,7 @@ def eliminate(normal: Sparse, slide: Sparse, friction: Parameter | float) -> Eli
 
 def _wedged(
     lift: Sparse, slip: Sparse, turned: Sparse, friction: Parameter | float
-) -> tuple[tuple[Factor, Sparse], ...]:
+) -> tuple[tuple[ParameterFactor, Sparse], ...]:
     """The changes −μ R (1 + μΦ)⁻¹ S Z where Φ is not zero, on the few nodes that it has entries of."""
     coo = sp.coo_array(turned)
     rows = np.unique(np.concatenate([coo.row, coo.col]))
@@ -132,7 +132,7 @@ def _wedged(
 
     grid = sampled((friction,), at, "friction of nodes held along their normal")
     own = Product(((friction.name, 1.0),))
-    pieces: list[tuple[Factor, Sparse]] = []
+    pieces: list[tuple[ParameterFactor, Sparse]] = []
     for factor, entries in grid.compressed():
         whole = sp.lil_array(turned.shape)
         whole[np.ix_(rows, rows)] = entries.reshape(block.shape)

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from ...errors import AnalysisError
 from ...typing import Array, Sparse
-from .factors import CONSTANT, Axis, Factor, Tabulated
+from .factors import CONSTANT, Axis, ParameterFactor, Tabulated
 from .problem import Parameter
 
 COUNTS = (4, 7, 13, 25)  # of points along a parameter, each among the next
@@ -45,7 +45,7 @@ class Sampled:
         """The vector (l,) that polynomials through the samples give."""
         return _interpolated(self.axes, self.vectors, values)
 
-    def compressed(self) -> list[tuple[Factor, Array]]:
+    def compressed(self) -> list[tuple[ParameterFactor, Array]]:
         """As few vectors (l,) as there are independent ones among the samples, each with its factor."""
         return [(factor, weights @ self.vectors) for factor, weights in directions(self.axes, self.vectors)]
 
@@ -85,7 +85,7 @@ def sampled(parameters: tuple[Parameter, ...], at: Callable[[Values], Array], wh
     raise AnalysisError(f"{what} changes too sharply with {names} together ({left:.0e} is left); take smaller ranges")
 
 
-def directions(axes: tuple[Axis, ...], vectors: Array) -> list[tuple[Factor, Array]]:
+def directions(axes: tuple[Axis, ...], vectors: Array) -> list[tuple[ParameterFactor, Array]]:
     """Factors and weights (s,) of the samples (s, l) that span them; factor times weighted samples, summed, is what
     polynomials through the samples give."""
     if not len(axes):
@@ -97,7 +97,7 @@ def directions(axes: tuple[Axis, ...], vectors: Array) -> list[tuple[Factor, Arr
 
 def combined_matrices(
     axes: tuple[Axis, ...], matrices: list[Sparse], tables: list[Array]
-) -> list[tuple[Factor, Sparse]]:
+) -> list[tuple[ParameterFactor, Sparse]]:
     """Σ f_k A_k of symmetric A_k and factors tabulated on the axes (s,), by as few matrices as span them."""
     for matrix in matrices:
         matrix.sum_duplicates()
@@ -106,7 +106,7 @@ def combined_matrices(
     pattern.sort_indices()
     entries = np.array([_on_pattern(m, pattern) for m in matrices])
     left, size, right = np.linalg.svd(entries, full_matrices=False)
-    result: list[tuple[Factor, Sparse]] = []
+    result: list[tuple[ParameterFactor, Sparse]] = []
     for k in np.flatnonzero(size > KEPT * max(float(size[0]), 1e-300)):
         whole = sp.csr_array((size[k] * right[k], pattern.indices, pattern.indptr), shape=pattern.shape)
         table = left[:, k] @ np.array(tables)

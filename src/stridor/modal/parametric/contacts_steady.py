@@ -21,7 +21,7 @@ from ...sliding.surfaces import STILL
 from ...system import System
 from ...typing import Array, IntArray, Sparse
 from ..assembled.steady import Steadiness
-from .contacts_equilibria import Equilibria, Held
+from .contacts_equilibria import Equilibria, HeldEquilibria
 from .contacts_sampling import Sampled, Values, combined_matrices, directions, sampled
 from .family import term_of
 from .problem import Parameter, Role, Term
@@ -204,7 +204,7 @@ class _States:
             rates = np.concatenate([rates, np.where(slips, across, 0.0)])
         return rates, held.displacement if effects.prestress else np.zeros(0)
 
-    def _noted(self, contacts: Contacts, held: Held, values: Values) -> None:
+    def _noted(self, contacts: Contacts, held: HeldEquilibria, values: Values) -> None:
         """Remember where most nodes are held that would not touch, or would."""
         others = np.ones(contacts.nodes.count, dtype=bool)
         others[self._touching] = False

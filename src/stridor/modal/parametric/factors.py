@@ -14,7 +14,7 @@ from ...typing import Array
 
 
 @runtime_checkable
-class Factor(Protocol):
+class ParameterFactor(Protocol):
     """A number that depends on parameters given by name."""
 
     def __call__(self, values: Mapping[str, float], /) -> float:
@@ -128,7 +128,7 @@ class Formula:
 class Times:
     """A product of factors of any kind."""
 
-    parts: tuple[Factor, ...]
+    parts: tuple[ParameterFactor, ...]
 
     def __call__(self, values: Mapping[str, float], /) -> float:
         result = 1.0
@@ -150,7 +150,7 @@ class Times:
         return {"kind": "times", "parts": [part.to_json() for part in self.parts]}
 
 
-def product_of(one: Factor, other: Factor) -> Factor:
+def product_of(one: ParameterFactor, other: ParameterFactor) -> ParameterFactor:
     """The product of two factors, as simple as it can be."""
     if isinstance(one, Product) and isinstance(other, Product):
         return Product(tuple(sorted(one.names + other.names)))
@@ -239,7 +239,7 @@ class Tabulated:
         return {"kind": "tabulated", "axes": axes, "values": list(self.values)}
 
 
-def factor_from_json(document: Mapping[str, Any]) -> Factor:
+def factor_from_json(document: Mapping[str, Any]) -> ParameterFactor:
     """The factor that `to_json` was asked of. Raises ValueError for what is none."""
     try:
         if document["kind"] == "product":

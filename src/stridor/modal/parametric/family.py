@@ -18,7 +18,7 @@ import scipy.sparse as sp
 
 from ...errors import AnalysisError
 from ...typing import Array, Sparse
-from .factors import CONSTANT, Factor, Lagrange, product_of
+from .factors import CONSTANT, Lagrange, ParameterFactor, product_of
 from .problem import Parameter, Role, Term
 
 MOST_POINTS = 6  # of one parameter
@@ -32,7 +32,7 @@ class Piece:
 
     matrix: Sparse
     role: Role
-    factor: Factor = CONSTANT
+    factor: ParameterFactor = CONSTANT
 
 
 # Values of the parameters that are to be interpolated over → pieces by name, the same names everywhere.
@@ -76,7 +76,7 @@ def _interpolated(
     return [t for matrix, weight in parts for t in term_of(matrix, piece.role, product_of(piece.factor, weight))]
 
 
-def term_of(matrix: Sparse, role: Role, factor: Factor) -> list[Term]:
+def term_of(matrix: Sparse, role: Role, factor: ParameterFactor) -> list[Term]:
     """A matrix as a term, none where it is zero."""
     csr = sp.csr_array(matrix)
     if not csr.nnz or not np.any(csr.data):

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from ...errors import CaseError
 from ...typing import Array, Sparse
 from ..quadratic.problem import Quadratic
-from .factors import Factor
+from .factors import ParameterFactor
 
 Role = Literal["mass", "damping", "stiffness"]
 POWERS: Mapping[Role, int] = {"mass": 2, "damping": 1, "stiffness": 0}
@@ -98,7 +98,7 @@ class ParametricProblem:
         low, high = max(values[name] - step, own.low), min(values[name] + step, own.high)
 
         def slope(factor: Callable[[Mapping[str, float]], float]) -> float:
-            if isinstance(factor, Factor):
+            if isinstance(factor, ParameterFactor):
                 return factor.slope(values, name)
             return (factor({**values, name: high}) - factor({**values, name: low})) / (high - low)
 

@@ -2,8 +2,8 @@
 
 from .band import band_modes
 from .count import undamped_count
-from .find import Completeness, Spectrum, find_modes
+from .find import Completeness, RegionModes, find_modes
 from .problem import Quadratic
 from .region import Disc, Region
 
-__all__ = ["Completeness", "Disc", "Quadratic", "Region", "Spectrum", "band_modes", "find_modes", "undamped_count"]
+__all__ = ["Completeness", "Disc", "Quadratic", "Region", "RegionModes", "band_modes", "find_modes", "undamped_count"]

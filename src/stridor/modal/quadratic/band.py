@@ -10,7 +10,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sl
 
 from ...typing import Array
-from .find import DENSE, Spectrum, find_modes
+from .find import DENSE, RegionModes, find_modes
 from .polish import pairs
 from .problem import Quadratic
 from .region import Region
@@ -22,7 +22,7 @@ SAME = 1e-8  # of the band: one eigenvalue, found from both sides of a border
 
 def band_modes(
     problem: Quadratic, max_hz: float, *, above: float, still: Quadratic, left: bool = False, solver: str | None = None
-) -> Spectrum:
+) -> RegionModes:
     """All eigenvalues with frequencies up to ``max_hz`` [Hz] and growth rates over ``above`` [1/s].
 
     `find_modes` cuts an endless region off at the size of its frequencies, which holds all where stiffness is positive.
@@ -61,7 +61,7 @@ def is_stiff(problem: Quadratic, rate: float) -> bool:
     return straight and bool(np.all(factors.U.diagonal() > 0.0))
 
 
-def _joined(slow: Spectrum, fast: Spectrum, near: float) -> Spectrum:
+def _joined(slow: RegionModes, fast: RegionModes, near: float) -> RegionModes:
     """Both, what is in both once; by imaginary, then real part."""
     _, known = pairs(slow.values, fast.values, near)
     fresh = np.setdiff1d(np.arange(len(fast.values)), known)
@@ -79,7 +79,7 @@ def _joined(slow: Spectrum, fast: Spectrum, near: float) -> Spectrum:
     told = slow.completeness
     if not fast.completeness.complete:
         told = replace(told, complete=False, sentence=f"{fast.completeness.sentence} {told.sentence}")
-    return Spectrum(
+    return RegionModes(
         values[order], np.concatenate([slow.right, fast.right[:, fresh]], axis=1)[:, order], left,
         rates(slow.residual, fast.residual), left_residual, told, slow.factorisations + fast.factorisations,
         slow.solves + fast.solves, slow.seconds + fast.seconds, max(slow.memory_bytes, fast.memory_bytes),

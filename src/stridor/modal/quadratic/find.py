@@ -20,7 +20,7 @@ from .krylov import Krylov
 from .polish import ALIKE, SPREAD, biorthogonal, inverse_iteration, merged, pairs, snapped, tuned
 from .problem import Quadratic
 from .region import BORDER, MARGIN, PAD, Disc, Region, cells, remaining, uncovered
-from .search import BLOCK, Found, Search, TooClose
+from .search import BLOCK, DiscModes, Search, TooClose
 
 WHOLE = 600  # freedoms up to which all eigenvalues are found at once where a few discs do not do
 CROWDED = 1e-8  # backward error that does for what lies as dense as overdamped modes do about −1/α₂
@@ -59,7 +59,7 @@ class Completeness:
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class RegionModes:
     """Eigenvalues (k,) [1/s] sorted by imaginary, then real part; of conjugate pairs the one with Im λ ≥ 0.
 
     right (n, k): P(λ)x = 0; left (n, k): yᵀP(λ) = 0, transposed and not conjugated; both of unit norm. residual and
@@ -83,7 +83,7 @@ class Spectrum:
 def find_modes(
     problem: Quadratic, region: Region, *, left: bool = False, tolerance: float = 1e-10, solver: str | None = None,
     guess: Any = None, count: bool | None = None, hint: bool = False,
-) -> Spectrum:  # fmt: skip
+) -> RegionModes:  # fmt: skip
     """All eigenvalues of λ²M + λD + K in ``region``, with right and, if asked for, left vectors.
 
     tolerance: backward error of every pair. guess (n, k): shapes of a neighbouring problem to start from; they decide
@@ -111,7 +111,7 @@ def find_modes(
     values, right, y = values[order], right[:, order], None if y is None else y[:, order]
     undamped = undamped_count(problem, region, solver=solver) if hint else None
     run.factorisations += 2 * hint
-    return Spectrum(
+    return RegionModes(
         values, right, y, problem.backward_error(values, right),
         None if y is None else problem.transposed.backward_error(values, y), evidence(undamped),
         run.factorisations, run.solves, time.perf_counter() - started, run.memory,
@@ -165,7 +165,7 @@ class _Run:
         """Eigenvalues whose vectors are wanted."""
         return self.padded.contains(values)
 
-    def dense(self, *, endless: bool) -> tuple[list[Found], Callable[[int | None], Completeness]]:
+    def dense(self, *, endless: bool) -> tuple[list[DiscModes], Callable[[int | None], Completeness]]:
         """Everything, by QZ; endless: however fast it grows."""
         lam, x, y = all_modes(self.problem)
         strip = lam[(lam.imag >= 0) & (lam.imag <= self.region.im_max)]
@@ -173,9 +173,9 @@ class _Run:
             self.region = replace(self.region, re_max=max(self.region.re_max, 1.1 * float(strip.real.max())))
         inside = self.keep(lam)
         lam, x, y = lam[inside], x[:, inside], y[:, inside]
-        sides = [Found(lam, x, self.problem.backward_error(lam, x))]
+        sides = [DiscModes(lam, x, self.problem.backward_error(lam, x))]
         if self.left:
-            sides.append(Found(lam, y, self.problem.transposed.backward_error(lam, y)))
+            sides.append(DiscModes(lam, y, self.problem.transposed.backward_error(lam, y)))
 
         def evidence(undamped: int | None) -> Completeness:
             text = f"Complete: QZ computes all eigenvalues of {self.problem.size} freedoms at once."
@@ -183,7 +183,7 @@ class _Run:
 
         return sides, evidence
 
-    def sparse(self) -> tuple[list[Found], Callable[[int | None], Completeness]]:
+    def sparse(self) -> tuple[list[DiscModes], Callable[[int | None], Completeness]]:
         """Disc by disc, and the check that none is missing."""
         self._cover()
         sides = self._sides()
@@ -220,7 +220,7 @@ class _Run:
             site.factor.free()
         return sides, evidence
 
-    def chosen(self, sides: list[Found]) -> tuple[ComplexArray, ComplexArray, ComplexArray | None]:
+    def chosen(self, sides: list[DiscModes]) -> tuple[ComplexArray, ComplexArray, ComplexArray | None]:
         """What is reported: inside the region, each with its left vector, all to the tolerance."""
         scale = self.padded.scale
         found = self._selected(sides[0], scale)
@@ -236,7 +236,7 @@ class _Run:
             near = max(float(np.abs(sides[1].values - lam).min(initial=np.inf)), SPREAD * scale)
             other[:, place] = tuned(transposed, lam, sides[1], near)
         error = transposed.backward_error(found.values, other)
-        y = self._settled(Found(found.values, other, error), transposed, "left").shapes
+        y = self._settled(DiscModes(found.values, other, error), transposed, "left").shapes
         turned = biorthogonal(self.problem, found.values, found.shapes, y, scale)
         worse = self.problem.transposed.backward_error(found.values, turned) > self.tolerance
         return found.values, found.shapes, np.where(worse, y, turned)
@@ -321,14 +321,14 @@ class _Run:
                 search.look()
         return _Site(factor, searches)
 
-    def _sides(self) -> list[Found]:
+    def _sides(self) -> list[DiscModes]:
         """Right and left pairs of all discs together."""
         scale = self.padded.scale
         return [
             merged([_collected(site.searches[side]) for site in self.sites], scale) for side in range(1 + self.left)
         ]
 
-    def _missing(self, found: Found) -> int | None:
+    def _missing(self, found: DiscModes) -> int | None:
         if not self.counting:
             return None
         guards = [s.guards for site in self.sites for s in site.searches[:1]]
@@ -339,20 +339,20 @@ class _Run:
         inner = self.region.grown(BORDER * self.region.scale)
         return unknown(self.problem, inner, self.padded, np.concatenate([found.values, others]))
 
-    def _enclosed(self, found: Found) -> int:
+    def _enclosed(self, found: DiscModes) -> int:
         return int(self.padded.contains(found.values).sum())
 
     def _count_solves(self) -> None:
         if self.counting:
             self.solves += sum(s.krylov.solves for site in self.sites for s in site.searches)
 
-    def _selected(self, found: Found, scale: float) -> Found:
+    def _selected(self, found: DiscModes, scale: float) -> DiscModes:
         values = snapped(found.values, scale)
         inside = np.flatnonzero(self.region.contains(values) & (values.imag >= 0))
         x = found.shapes[:, inside]
-        return Found(values[inside], x, self.problem.backward_error(values[inside], x))
+        return DiscModes(values[inside], x, self.problem.backward_error(values[inside], x))
 
-    def _settled(self, found: Found, problem: Quadratic, which: str) -> Found:
+    def _settled(self, found: DiscModes, problem: Quadratic, which: str) -> DiscModes:
         """With those that miss the tolerance improved one by one."""
         bad = np.flatnonzero(~(found.error <= self.tolerance))
         values, shapes, error = found.values.copy(), found.shapes.copy(), found.error.copy()
@@ -370,9 +370,9 @@ class _Run:
                 f"{len(bad)} {which} eigenvectors do not reach a backward error of {self.tolerance:g}: "
                 f"λ = {shown} 1/s, the worst leaves {error[bad].max():.1e}"
             )
-        return Found(values, shapes, error)
+        return DiscModes(values, shapes, error)
 
-    def _with_partners(self, found: Found, left: Found) -> ComplexArray:
+    def _with_partners(self, found: DiscModes, left: DiscModes) -> ComplexArray:
         """Left vectors (n, k) of the right pairs; one that the left search lacks by inverse iteration."""
         y = np.zeros_like(found.shapes)
         ours, theirs = pairs(found.values, left.values, 1e-4 * self.padded.scale)
@@ -414,7 +414,7 @@ class _Run:
         return f" Growth rates above {self.region.re_max:.6g} 1/s were not searched."
 
 
-def _collected(search: Search) -> Found:
+def _collected(search: Search) -> DiscModes:
     """What a search contributes: only what is in its disc."""
     return search.found
 

@@ -10,7 +10,7 @@ from ...direct import SingularMatrix, factorise
 from ...typing import Array, ComplexArray, IntArray
 from .dense import unit
 from .problem import Quadratic
-from .search import Found, start
+from .search import DiscModes, start
 
 ALIKE = 1e-9  # of the scale: eigenvalues closer than this are one, or copies of one
 SPREAD = 1e-5  # how far rounding spreads copies of a defective one
@@ -50,7 +50,7 @@ def inverse_iteration(
     return best
 
 
-def merged(parts: list[Found], scale: float) -> Found:
+def merged(parts: list[DiscModes], scale: float) -> DiscModes:
     """Sets of several discs as one: what two of them hold is kept once, from where its backward error is smaller."""
     result = parts[0]
     for part in parts[1:]:
@@ -65,7 +65,7 @@ def merged(parts: list[Found], scale: float) -> Found:
         shapes[:, ours[better]] = part.shapes[:, theirs[better]]
         error[ours[better]] = part.error[theirs[better]]
         new = np.setdiff1d(np.arange(len(part.values)), theirs)
-        result = Found(
+        result = DiscModes(
             np.concatenate([values, part.values[new]]), np.hstack([shapes, part.shapes[:, new]]),
             np.concatenate([error, part.error[new]]),
         )  # fmt: skip
@@ -104,7 +104,7 @@ def biorthogonal(problem: Quadratic, lam: ComplexArray, x: ComplexArray, y: Comp
     return result
 
 
-def tuned(problem: Quadratic, lam: complex, found: Found, near: float) -> ComplexArray:
+def tuned(problem: Quadratic, lam: complex, found: DiscModes, near: float) -> ComplexArray:
     """x (n,) that comes nearest to P(λ)x = 0 among combinations of found vectors with eigenvalues ``near`` λ.
 
     Copies of a defective eigenvalue spread, and differently in two searches; their vectors span the same.

@@ -31,7 +31,7 @@ class TooClose(Exception):
 
 
 @dataclass(frozen=True)
-class Found:
+class DiscModes:
     """Eigenvalues (k,) [1/s] inside a disc, shapes (n, k) of unit norm and backward errors (k,)."""
 
     values: ComplexArray
@@ -54,7 +54,7 @@ class Search:
     looks: int = 0
     later: int = 0  # eigenvalues that only a second look brought
     seed: int = SEED
-    found: Found = field(init=False)
+    found: DiscModes = field(init=False)
     disc: Disc = field(init=False)
     guards: ComplexArray = field(init=False)  # Ritz values outside the disc that have nearly converged
     _values: ComplexArray = field(init=False)
@@ -148,7 +148,7 @@ class Search:
         guard = float(np.abs(values[~inside] - krylov.shift).min(initial=np.inf))
         self.disc = Disc(krylov.shift, reach * krylov.radius, int(inside.sum()), guard)
         self._values = values[inside]
-        self.found = Found(values[kept], shapes, error)
+        self.found = DiscModes(values[kept], shapes, error)
         self.guards = values[nearly & ~kept]
         return True, 0
 

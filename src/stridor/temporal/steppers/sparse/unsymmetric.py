@@ -64,7 +64,7 @@ def _skew(matrix: Sparse) -> Sparse:
     return skew
 
 
-class Rows(NamedTuple):
+class SparseRows(NamedTuple):
     """Full csr rows on places."""
 
     ptr: IntArray
@@ -76,8 +76,8 @@ class Unsymmetric(NamedTuple):
     """N and G as rows, and vectors on places, all empty where nothing is unsymmetric: force h and the part of it that
     N makes; q_n; u and q at t_{n+1} without h and without contact forces."""
 
-    circulatory: Rows
-    gyroscopic: Rows
+    circulatory: SparseRows
+    gyroscopic: SparseRows
     force: Array
     of_place: Array
     q_before: Array
@@ -91,22 +91,22 @@ def unsymmetric(parts: Halves, layout: Layout) -> Unsymmetric:
     size = layout.size if some else 0
     force, of_place, q_before, u_free, q_free = (aligned_zeros((size,)) for _ in range(5))
     circulatory, gyroscopic = (
-        _rows(m, layout) if some else Rows(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
+        _rows(m, layout) if some else SparseRows(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
         for m in (parts.circulatory, parts.gyroscopic)
     )
     return Unsymmetric(circulatory, gyroscopic, force, of_place, q_before, u_free, q_free)
 
 
-def _rows(matrix: Sparse, layout: Layout) -> Rows:
+def _rows(matrix: Sparse, layout: Layout) -> SparseRows:
     coo = sp.coo_array(matrix)
     shape = (layout.size, layout.size)
     rows = sp.csr_array((coo.data, (layout.place[coo.row], layout.place[coo.col])), shape=shape)
     rows.sort_indices()
-    return Rows(rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data.astype(float))
+    return SparseRows(rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data.astype(float))
 
 
 @njit(cache=True)
-def _add(m: Rows, x: Array, y: Array) -> None:  # pragma: no cover - compiled
+def _add(m: SparseRows, x: Array, y: Array) -> None:  # pragma: no cover - compiled
     for i in range(y.shape[0]):
         total = 0.0
         for p in range(m.ptr[i], m.ptr[i + 1]):
