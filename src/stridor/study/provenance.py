@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -15,6 +16,12 @@ LIBRARIES = ("stridor", "numpy", "scipy", "numba", "pydantic")
 
 def versions() -> dict[str, str]:
     """Versions of stridor, of what it computes with, and of Python."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Read from the disk once."""
     found = {"python": platform.python_version()}
     for name in LIBRARIES:
         try:
