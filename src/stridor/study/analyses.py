@@ -296,7 +296,7 @@ def _check_extent(work: Workspace, system: System) -> None:
     _, _, limit = plan(system, settings_of(work))
     step = work.temporal.step or limit.share * limit.step
     steps = sum(p.duration for p in work.phases) / step
-    size = 8.0 * (6 * len(system.contacts) + 6 * len(system.surfaces) + 6 * len(work.temporal.watch) + 8)
+    size = 8.0 * (6 * len(system.contact_nodes().names) + 6 * len(work.temporal.watch) + 8)
     needed = steps / work.temporal.record_every * size
     if steps > 1e12 or needed > MOST_BYTES:
         problems.append(

@@ -39,7 +39,7 @@ def without_effect(problem: Case | Workspace, verb: str, *, solver: str | None =
     work = Workspace.of(problem)
     case = work.case(verb)
     # By the case alone where that is enough.
-    lines = [*_of_materials(case), *_of_comparison(case, verb)]
+    lines = [*_of_materials(case), *_of_comparison(case, verb), *_of_start(case, verb)]
     if _given(case, solver):
         few = _of_few_points(work, case)
         lines += [*_of_modes(case, verb, solver, few=few), *_of_time(case, verb, few=few)]
@@ -64,7 +64,6 @@ def _given(case: Case, solver: str | None) -> bool:
         or modal.prestress
         or not modal.damped
         or case.temporal.path != "auto"
-        or case.temporal.initial != "rest"
         or case.temporal.contact != "as given"
     )
 
@@ -80,6 +79,14 @@ def _of_comparison(case: Case, verb: str) -> Iterator[str]:
     if verb in ("compare", "run") and not case.comparison.critical:
         for key in sorted({"bracket", "tolerance"} & case.comparison.model_fields_set):
             yield f"comparison.{key} has no effect while comparison.critical is false"
+
+
+def _of_start(case: Case, verb: str) -> Iterator[str]:
+    if verb in ("simulate", "run") and case.temporal.initial == "steady-sliding":
+        for name, body in case.bodies.items():
+            for key in ("initial_velocity", "initial_displacement"):
+                if getattr(body, key, None) is not None:
+                    yield f"bodies.{name}.{key} has no effect: the run starts from steady sliding (temporal.initial)"
 
 
 def _of_modes(case: Case, verb: str, solver: str | None, *, few: bool) -> Iterator[str]:
@@ -114,11 +121,6 @@ def _of_time(case: Case, verb: str, *, few: bool) -> Iterator[str]:
         return
     if not few and case.temporal.path not in ("auto", "assembled"):
         yield f"temporal.path = {case.temporal.path!r} has no effect: assembled matrices have one path"
-    if case.temporal.initial == "steady-sliding":
-        for name, body in case.bodies.items():
-            for key in ("initial_velocity", "initial_displacement"):
-                if getattr(body, key, None) is not None:
-                    yield f"bodies.{name}.{key} has no effect: the run starts from steady sliding (temporal.initial)"
     if case.temporal.contact == "rigid":
         springs = [name for name, contact in case.contacts.items() if contact.stiffness != "rigid"]
         if not springs:
