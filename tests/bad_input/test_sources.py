@@ -20,17 +20,17 @@ BLOCK = "max_frequency_hz = 10e3\nfriction_range = [0.0, 0.5]"
 
 
 def test_a_name_that_none_has():
-    told = 'modal.source: \'arnoldi\' – must be "auto", "receptance", "krylov" or "full", where eigenpairs come from'
+    told = 'modal.source: \'arnoldi\' – must be "auto", "receptance", "krylov", "reduced" or "full", where eigenpairs come from'
     with pytest.raises(st.CaseError, match=re.escape(told)):
         paper_case(modal__source="arnoldi")
-    told = "source: 'arnoldi' – one of receptance, krylov, full, or none for what suits"
+    told = "source: 'arnoldi' – one of receptance, krylov, reduced, full, or none for what suits"
     with pytest.raises(st.CaseError, match=re.escape(told)):
         complex_modes(st.build_system(paper_case()), 0.1, source="arnoldi")
 
 
 def test_one_that_does_not_take_the_model():
     case = st.loads(rubbing_block(BLOCK)).with_({"modal.source": "receptance"})
-    told = "source receptance: there is contact over surfaces; leave it out for what suits, or take krylov or full"
+    told = "source receptance: there is contact over surfaces; leave it out for what suits, or take krylov or reduced or full"
     with pytest.raises(st.AnalysisError, match=re.escape(told)):
         st.modes(case, 0.1)
     with pytest.raises(st.AnalysisError, match=re.escape(told)):
@@ -46,6 +46,14 @@ def test_one_that_turns_out_not_to():
             onsets(system, (0.0, 0.5), max_frequency_hz=1.0, source=source)
 
 
+def test_a_reduced_model_of_what_moves_as_a_whole():
+    system = by_hand(np.eye(2), np.zeros((2, 2)), [[1.0, -1.0], [-1.0, 1.0]], [[1.0, -1.0]], [[1.0, -1.0]], 0.5)
+    for analysis in (lambda: onsets(system, (0.0, 0.5), max_frequency_hz=1.0, source="reduced"),
+                     lambda: complex_modes(system, [0.1, 0.3], max_frequency_hz=1.0, source="reduced")):  # fmt: skip
+        with pytest.raises(st.AnalysisError, match=r"^source reduced: the structure moves as a whole"):
+            analysis()
+
+
 def test_where_it_has_no_effect():
     case = paper_case(modal__source="krylov")
     assert "modal.source has no effect on simulate: it acts on modes and onsets" in without_effect(case, "simulate")
@@ -58,7 +66,7 @@ def test_where_it_has_no_effect():
 
 def test_results_say_which_it_was(tmp_path):
     case = paper_case()
-    for name in ("receptance", "krylov", "full"):
+    for name in ("receptance", "krylov", "reduced", "full"):
         found = st.modes(case.with_({"modal.source": name}), 0.1, max_frequency_hz=5e3)
         assert found.source == found.to_json()["source"] == name
     assert st.modes(case, 0.1, max_frequency_hz=5e3).source == "receptance"

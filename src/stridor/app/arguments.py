@@ -52,7 +52,7 @@ Source = Annotated[
     typer.Option(
         "--source",
         metavar="NAME",
-        help="Where eigenpairs come from: receptance, krylov, full [default: modal.source, what suits the model].",
+        help="Where eigenpairs come from: receptance, krylov, reduced, full [default: modal.source, what suits].",
     ),
 ]
 Undamped = Annotated[bool, typer.Option("--undamped", help="Leave structural damping out.")]

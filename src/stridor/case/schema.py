@@ -359,8 +359,8 @@ class Modal(Table):
     prestress: Truth = Field(
         default=False, description="true or false, geometric stiffness by the stresses of steady sliding (solids)"
     )
-    source: Literal["auto", "receptance", "krylov", "full"] = Field(
-        default="auto", description='"auto", "receptance", "krylov" or "full", where eigenpairs come from'
+    source: Literal["auto", "receptance", "krylov", "reduced", "full"] = Field(
+        default="auto", description='"auto", "receptance", "krylov", "reduced" or "full", where eigenpairs come from'
     )
     solver: Literal["auto", "mumps", "pardiso", "superlu", "slepc"] = Field(
         default="auto", description='"auto", "mumps", "pardiso", "superlu" or "slepc", the sparse direct solver'

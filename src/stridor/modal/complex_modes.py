@@ -38,9 +38,10 @@ def complex_modes(
     count: how many branches, lowest frequencies at μ = 0 first; max_frequency_hz instead takes all that start below it,
     and those that start a little above and come below it at one of these μ. vectors keeps left and right ones, "right"
     those alone where that saves time. source: where eigenpairs come from, "receptance" (point contacts on a complete
-    basis), "krylov" (sparse matrices that stand without friction) or "full" (any matrices); None takes what suits the
-    system, and the next where that turns out not to. friction_damping (across the direction of sliding), prestress and
-    the direct solver matter on sparse matrices only. progress is called with the number of μ done and of all; on
+    basis), "krylov" (sparse matrices that stand without friction), "reduced" (a model over μ, its modes solved in full)
+    or "full" (any matrices); None takes what suits the system, and the next where that turns out not to.
+    friction_damping (across the direction of sliding), prestress and the direct solver matter on sparse matrices only.
+    progress is called with the number of μ done and of all; on
     KeyboardInterrupt what is done is returned, ``planned`` tells of how many. Raises AnalysisError where contacts do
     not slide, have no equilibrium, branches cannot be told apart, or the source named does not take the system;
     CaseError for a source that there is none of and for more numbers than memory holds.

@@ -2,6 +2,7 @@
 
 - receptance: few point contacts on a complete basis of the structure without them. The fastest.
 - krylov: sparse symmetric matrices that stand without friction, on a basis enriched until it is right.
+- reduced: a reduced model over μ, made once, whose modes are solved in the full problem. Asked for by name alone.
 - full: any matrices, searched region by region. The slowest, and the one that takes everything.
 
 `sources_for` names those that take a system, the fastest first; where one turns out not to serve, the next is asked. A
@@ -20,6 +21,7 @@ from ..system.uncoupled import no_complete_basis
 from ..typing import Array
 from .assembled import NotPositive, complex_modes_assembled, onsets_assembled
 from .general import general_modes, general_onsets
+from .general.reduced_source import reduced_modes, reduced_onsets
 from .onset import Onsets
 from .options import Options
 from .quadratic.find import WHOLE
@@ -130,6 +132,30 @@ class Krylov:
             raise Unfit(str(error), asked.max_frequency_hz) from error
 
 
+class Reduced:
+    """A reduced model over μ, its modes solved in the full problem. Asked for by name."""
+
+    name = "reduced"
+
+    def refuses(self, system: System) -> str:
+        """See `EigenSource`."""
+        return ""
+
+    def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
+        """See `EigenSource`."""
+        return reduced_modes(
+            system, values, max_frequency_hz=asked.band_hz, damped=asked.damped, vectors=asked.vectors,
+            options=asked.options, progress=asked.progress,
+        )  # fmt: skip
+
+    def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
+        """See `EigenSource`."""
+        return reduced_onsets(
+            system, friction_range, max_frequency_hz=asked.band_hz, damped=asked.damped, options=asked.options,
+            beyond=asked.follow,
+        )  # fmt: skip
+
+
 class Full:
     """The region search, matrices of any structure."""
 
@@ -156,7 +182,8 @@ class Full:
         )  # fmt: skip
 
 
-SOURCES: tuple[EigenSource, ...] = (Receptance(), Krylov(), Full())
+SOURCES: tuple[EigenSource, ...] = (Receptance(), Krylov(), Reduced(), Full())
+UNASKED = tuple(source for source in SOURCES if source.name != Reduced.name)
 
 
 def sources_for(system: System, name: str | None = None) -> tuple[EigenSource, ...]:
@@ -166,7 +193,7 @@ def sources_for(system: System, name: str | None = None) -> tuple[EigenSource, .
     """
     if name is None:
         # What turned out not to suit receptances is known to suit any matrices alone.
-        first = next(source for source in SOURCES if not source.refuses(system))
+        first = next(source for source in UNASKED if not source.refuses(system))
         return (first,) if first is SOURCES[-1] else (first, SOURCES[-1])
     chosen = next((source for source in SOURCES if source.name == name), None)
     if chosen is None:

@@ -17,7 +17,7 @@ from ...typing import Array, ComplexArray, Sparse
 from ..dense_problem import DenseProblem, Eigenpairs, OverNumber
 from ..parametric import ReducedModel, reduce
 from ..parametric.basis import expanded
-from ..quadratic import Region, find_modes
+from ..quadratic import Quadratic, Region, find_modes
 from ..quadratic.problem import times
 from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .family import MU, ROLES, Family, Smooth
@@ -147,6 +147,10 @@ class Projected(OnBasis):
         result: ComplexArray = np.zeros((self.family.size, moved.shape[1]), dtype=complex)
         result[: len(moved)] = moved
         return result
+
+    def sparse(self, mu: float) -> Quadratic:
+        """The problem (r, r) at μ − low as any other has it."""
+        return Quadratic(*(sp.csr_array(matrix) for matrix in self.matrices(mu)))
 
     def matrices(self, mu: complex) -> tuple[Array, Any, Any]:
         """M, D and K (r, r) at μ − low, which may be complex."""

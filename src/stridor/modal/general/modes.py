@@ -68,27 +68,32 @@ def general_modes(
         raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
     if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
-    family = _family(system_at, values, options or Options(), damped=damped, own=own)
+    family = family_over(system_at, values, options or Options(), damped=damped, own=own)
     top = searched(family.built(float(values.max())), 2 * np.pi * max_frequency_hz)
-    values, found, planned = _each(family, values, top, progress, vectors=vectors)
+    values, found, planned = modes_at_each(
+        values, lambda at: _modes(family, at, top, left=vectors is True), family.freedoms, progress, vectors
+    )
     numbers = numbered(family, values, [f.values for f in found], top, unfollowed)
-    table = _table(family, values, found, numbers, damped=damped, vectors=vectors)
+    table = table_of(family, values, found, numbers, damped=damped, vectors=vectors)
     table = replace(table, max_frequency_hz=max_frequency_hz, planned=planned)
     return table if count is None else table.lowest(count)
 
 
-def _each(
-    family: SystemFamily, values: Array, top: float, progress: Progress | None, *, vectors: bool | Literal["right"]
-) -> tuple[Array, list[ModesAtFriction], int | None]:
-    """The μ (k,), what is found at each, and how many there were to be where it was interrupted."""
+def modes_at_each(
+    values: Array, modes: Callable[[float], ModesAtFriction], freedoms: int, progress: Progress | None,
+    vectors: bool | Literal["right"],
+) -> tuple[Array, list[ModesAtFriction], int | None]:  # fmt: skip
+    """The μ (k,), what ``modes`` finds at each, and how many there were to be where it was interrupted."""
     found: dict[int, ModesAtFriction] = {}
     try:
         for at, k in enumerate(np.argsort(values, kind="stable").tolist(), start=1):
-            found[k] = _modes(family, float(values[k]), top, left=vectors is True)
+            found[k] = modes(float(values[k]))
+            if vectors is not True:
+                found[k] = replace(found[k], left=None)
             if not vectors:
                 found[k] = replace(found[k], right=found[k].right[:0])
             if at == 1:
-                require_memory(len(values), len(found[k].values), family.freedoms if vectors else 0)
+                require_memory(len(values), len(found[k].values), freedoms if vectors else 0)
             if progress is not None:
                 progress(at, len(values))
     except KeyboardInterrupt:
@@ -98,7 +103,7 @@ def _each(
     return values[done], [found[k] for k in done.tolist()], None if len(done) == len(values) else len(values)
 
 
-def _family(
+def family_over(
     system_at: Callable[[float], System], values: Array, options: Options, *, damped: bool, own: float | None
 ) -> SystemFamily:
     """The family up to the largest μ; one alone is also where the touching nodes are found."""
@@ -132,7 +137,7 @@ def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> ModesA
     )
 
 
-def _table(
+def table_of(
     family: SystemFamily,
     mu: Array,
     found: list[ModesAtFriction],

@@ -32,10 +32,12 @@ class Numbers:
 
 
 def numbered(
-    family: SystemFamily, mu: Array, values: list[ComplexArray], top: float, unfollowed: str = ""
-) -> Numbers:
+    family: SystemFamily, mu: Array, values: list[ComplexArray], top: float, unfollowed: str = "",
+    source: Along | None = None,
+) -> Numbers:  # fmt: skip
     """Numbers of eigenvalues (k,) sorted by frequency at each of the friction coefficients ``mu``; 0 for those that say
-    nothing new, of ±ε that rounding makes of a motion as a whole. unfollowed: why nothing is to be followed."""
+    nothing new, of ±ε that rounding makes of a motion as a whole. unfollowed: why nothing is to be followed. source: of
+    the eigenpairs that are followed, where there is one."""
     plain = [_by_frequency(v, top) for v in values]
     if not float(mu.max()) > 0:
         return Numbers(plain, "")
@@ -45,7 +47,7 @@ def numbered(
         return Numbers(plain, "")
     try:
         if not unfollowed:
-            return _followed(family, mu, values, top)
+            return _followed(family, mu, values, top, source)
     except AnalysisError as error:
         unfollowed = str(error)
     return Numbers(plain, f" Numbers count by frequency at each μ, since branches were not followed: {unfollowed}.")
@@ -65,8 +67,10 @@ def at_rest(values: ComplexArray, top: float) -> IntArray:
 
 
 @one_thread
-def _followed(family: SystemFamily, mu: Array, values: list[ComplexArray], top: float) -> Numbers:
-    source = along(family, BEYOND * top)
+def _followed(
+    family: SystemFamily, mu: Array, values: list[ComplexArray], top: float, source: Along | None
+) -> Numbers:
+    source = source or along(family, BEYOND * top)
     if source.whole and len(mu) == 1:
         raise AnalysisError("that takes full solves on the way from μ = 0, worth while for several μ only")
     way = surely(source)
