@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -66,8 +67,21 @@ def _turns(start: float, end: float, first: float, second: float) -> list[float]
         return []
     c3 = 2 * start - 2 * end + first + second
     c2 = -3 * start + 3 * end - 2 * first - second
-    roots = np.roots([3 * c3, 2 * c2, first]) if np.all(np.isfinite([c3, c2])) else np.zeros(0)
-    return sorted(float(r.real) for r in roots if abs(r.imag) < 1e-12 and 0 < r.real < 1)
+    return sorted(r for r in _roots(3 * float(c3), float(c2), float(first)) if 0 < r < 1)
+
+
+def _roots(a: float, b: float, c: float) -> tuple[float, ...]:
+    """The real roots of a x² + 2b x + c, an all but double one counted twice."""
+    square = b * b - a * c
+    if not math.isfinite(square) or (a == 0.0 and b == 0.0):
+        return ()
+    if a == 0.0:
+        return (-c / (2 * b),)
+    if square < 0.0:
+        return (-b / a, -b / a) if square > -((1e-12 * a) ** 2) else ()
+    # Of the two that which loses no digits; the other by the product of both.
+    larger = -(b + math.copysign(math.sqrt(square), b))
+    return (larger / a, c / larger) if larger != 0.0 else (0.0, 0.0)
 
 
 def _cubic(start: float, end: float, first: float, second: float, at: float) -> float:

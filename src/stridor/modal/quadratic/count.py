@@ -77,13 +77,14 @@ def between(inner: Region, outer: Region, known: ComplexArray) -> Region:
 
 def log_det(problem: Quadratic, z: complex) -> complex:
     """Logarithm of det P(z), its imaginary part up to multiples of 2π."""
-    matrix = sp.csc_array(problem.at(complex(z)), dtype=complex)
+    matrix = problem.at(complex(z))
     if matrix.shape[0] <= DENSE:
         factors, pivots = lu_factors(matrix.toarray(), check_finite=False)
         diagonal, odd = np.diag(factors), int((pivots != np.arange(len(pivots))).sum()) % 2
     else:
+        given = sp.csc_array(matrix)
         try:
-            held = spl.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True})
+            held = spl.splu(given, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True})
         except RuntimeError as error:
             raise _Unsettled from error
         diagonal, odd = held.U.diagonal(), (_odd(held.perm_r) + _odd(held.perm_c)) % 2

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...typing import Array, ComplexArray, Sparse
+from ...typing import Array, ComplexArray, IntArray, Sparse
 
 CHUNK = 64  # columns worked on at a time
 
@@ -37,12 +37,28 @@ class Quadratic:
         return Quadratic(*(sp.csr_array(m.T) for m in (self.mass, self.damping, self.stiffness)))
 
     @cached_property
+    def _aligned(self) -> tuple[list[Array], IntArray, IntArray]:
+        """Entries of M, D and K on the places of all three, and these places as a csr matrix has them: sums of sparse
+        matrices look for them each time."""
+        n, parts = self.size, [sp.coo_array(m) for m in self.matrices()]
+        keys = [part.row.astype(np.int64) * n + part.col for part in parts]
+        places = np.unique(np.concatenate(keys))
+        index = np.int32 if len(places) < np.iinfo(np.int32).max else np.int64
+        entries: list[Array] = [
+            np.bincount(np.searchsorted(places, key), weights=part.data, minlength=len(places)).astype(float)
+            for key, part in zip(keys, parts, strict=True)
+        ]
+        rows = np.searchsorted(places, n * np.arange(n + 1, dtype=np.int64))
+        return entries, (places % max(n, 1)).astype(index), rows.astype(index)
+
+    @cached_property
     def _sizes(self) -> tuple[Sparse, Sparse, Sparse]:
         return abs(self.mass), abs(self.damping), abs(self.stiffness)
 
     def at(self, lam: complex) -> Sparse:
         """P(λ), complex unless λ is real."""
-        return sp.csr_array(lam**2 * self.mass + lam * self.damping + self.stiffness)
+        (mass, damping, stiffness), where, rows = self._aligned
+        return sp.csr_array((lam**2 * mass + lam * damping + stiffness, where, rows), shape=self.mass.shape)
 
     def residual(self, lam: ComplexArray, x: ComplexArray) -> ComplexArray:
         """P(λ)x (n, k) of λ (k,) and x (n, k)."""
