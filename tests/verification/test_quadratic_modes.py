@@ -295,7 +295,7 @@ def test_a_mode_dropped_again_and_again_is_reported_missing(monkeypatch, left):
     def dropping(search):
         found = whole(search)
         keep = np.arange(len(found.values)) != np.argmin(np.abs(found.values - 30j))
-        return searching.Found(found.values[keep], found.shapes[:, keep], found.error[keep])
+        return searching.DiscModes(found.values[keep], found.shapes[:, keep], found.error[keep])
 
     monkeypatch.setattr(finding, "_collected", dropping)
     monkeypatch.setattr(finding, "WHOLE", 0)  # else QZ would find it
@@ -313,7 +313,7 @@ def test_a_mode_dropped_once_is_found_again(monkeypatch):
         calls.append(search)
         if len(calls) > 1:
             return found
-        return searching.Found(found.values[1:], found.shapes[:, 1:], found.error[1:])
+        return searching.DiscModes(found.values[1:], found.shapes[:, 1:], found.error[1:])
 
     monkeypatch.setattr(finding, "_collected", dropping)
     problem, region = scattered(160, 3), Region.box(-3.0, 3.0, 20.0, 40.0)

@@ -37,17 +37,17 @@ class Quadratic:
         return Quadratic(*(sp.csr_array(m.T) for m in (self.mass, self.damping, self.stiffness)))
 
     @cached_property
-    def _aligned(self) -> tuple[list[Array], IntArray, IntArray]:
+    def _aligned(self) -> tuple[list[Any], IntArray, IntArray]:
         """Entries of M, D and K on the places of all three, and these places as a csr matrix has them: sums of sparse
         matrices look for them each time."""
         n, parts = self.size, [sp.coo_array(m) for m in self.matrices()]
         keys = [part.row.astype(np.int64) * n + part.col for part in parts]
         places = np.unique(np.concatenate(keys))
         index = np.int32 if len(places) < np.iinfo(np.int32).max else np.int64
-        entries: list[Array] = [
-            np.bincount(np.searchsorted(places, key), weights=part.data, minlength=len(places)).astype(float)
-            for key, part in zip(keys, parts, strict=True)
-        ]
+        entries: list[Any] = []
+        for key, part in zip(keys, parts, strict=True):
+            entries.append(np.zeros(len(places), dtype=np.result_type(part.data, float)))
+            np.add.at(entries[-1], np.searchsorted(places, key), part.data)
         rows = np.searchsorted(places, n * np.arange(n + 1, dtype=np.int64))
         return entries, (places % max(n, 1)).astype(index), rows.astype(index)
 
