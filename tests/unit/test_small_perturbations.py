@@ -16,6 +16,7 @@ from rubbing_block import rubbing_block
 from solid_cases import BELT
 from stridor.agreement import perturbation
 from stridor.agreement.perturbation import perturb
+from stridor.modal.options import Options
 from stridor.study.settings import settings_of
 from stridor.study.without_effect import without_effect
 from stridor.temporal.schedule import PhaseSpec
@@ -112,3 +113,19 @@ def test_check_tells_steady_sliding_of_points_with_the_residual_of_its_equilibri
     assert abs(told["force"][1]) == pytest.approx(told["normal_force"])
     still = st.describe(case.with_({"supports.clamp.velocity.x": 0.0}))
     assert any(x.startswith("  no steady sliding: ") for x in still.lines)
+
+
+def test_the_modes_compared_come_from_the_source_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Solver and source of the case act on a comparison's modes; what only modes know (prestress) does not."""
+    asked: list[Options] = []
+
+    def recorded(*_: Any, options: Options, **__: Any) -> None:
+        asked.append(options)
+        raise st.AnalysisError("seen")
+
+    monkeypatch.setattr(perturbation, "modes_of_band", recorded)
+    case = paper_case(modal__source="krylov", modal__solver="superlu", modal__prestress=True)
+    for critical in (False, None):
+        with pytest.raises(st.AnalysisError, match="seen"):
+            st.compare(case, [0.2], only=["growth"], critical=critical)
+    assert asked == [Options(solver="superlu", source="krylov")] * 2

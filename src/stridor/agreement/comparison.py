@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.growing import doubt
+from ..modal.options import Options
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape
@@ -70,17 +71,19 @@ def compare(
     only: Collection[str] | None = None,
     kept: Store | None = None,
     finished: Callable[[Comparison], None] | None = None,
+    options: Options | None = None,
 ) -> Agreement:
     """Compare both approaches at each μ and, if asked, by their critical friction coefficients.
 
     runs may hand in full trajectories already computed at some of the μ. only: parts of PARTS instead of all (critical
     False leaves out that one, and with it the solution of the onsets). kept: where finished parts are put, and sought
     before they are computed. finished is called with each μ when it is done. Ctrl-C ends it early, and what is finished
-    is returned (``interrupted``). Raises what the analyses raise.
+    is returned (``interrupted``). options: of the modes, whose solver and source count here. Raises what the analyses
+    raise.
     """
     say = progress or _silent
     parts = chosen_parts(only, critical=critical)
-    at = _At(system, phases, settings, max_frequency_hz, runs or {}, kept, say)
+    at = _At(system, phases, settings, max_frequency_hz, runs or {}, kept, say, options)
     comparisons: list[Comparison] = []
     of_critical = Critical()
     interrupted = False
@@ -99,6 +102,7 @@ def compare(
                 tolerance=tolerance,
                 progress=say,
                 kept=kept,
+                options=options,
             )
     except KeyboardInterrupt:
         interrupted = True
@@ -149,6 +153,7 @@ class _At:
     runs: dict[float, Trajectory]
     kept: Store | None
     say: Callable[[str], None]
+    options: Options | None = None
 
     def __post_init__(self) -> None:
         self.taken: list[str] = []
@@ -188,7 +193,7 @@ class _At:
         )
 
     def _modes(self, mu: float) -> ComplexModes:
-        return modes_as_in_time(self.system, mu, 1.02 * self.limit)
+        return modes_as_in_time(self.system, mu, 1.02 * self.limit, self.options)
 
     def _growth(self, mu: float, modes: ComplexModes) -> Comparison:
         unstable = _unstable(modes, self.limit)

@@ -10,6 +10,7 @@ import numpy as np
 from ..digits import measured
 from ..errors import AnalysisError
 from ..modal.onset import refuted
+from ..modal.options import Options
 from ..modal.over_friction import modes_of_band, onsets_of_band
 from ..system import System
 from ..temporal.simulate import Settings
@@ -81,11 +82,15 @@ def compare_critical(
     tolerance: float,
     progress: Say,
     kept: Store | None,
+    options: Options | None = None,
 ) -> Critical:
     """Both critical friction coefficients, and whether they are one. Raises what the analyses raise."""
     progress("critical friction, modal")
-    modal, told, grown = _modal(system, friction_range, max_frequency_hz, kept)
-    found = _in_time(system, modal, friction_range, max_frequency_hz, settings, bracket, tolerance, progress, kept)
+    chosen = options_in_time(system, options)
+    modal, told, grown = _modal(system, friction_range, max_frequency_hz, kept, chosen)
+    found = _in_time(
+        system, modal, friction_range, max_frequency_hz, settings, bracket, tolerance, progress, kept, chosen
+    )
     # A first onset that may not be the first agrees with nothing.
     agrees = None if found.agrees and refuted(told) else found.agrees
     why = "; ".join(part for part in (*grown, found.why) if part) if found.why else ""
@@ -102,6 +107,7 @@ def _in_time(
     tolerance: float,
     progress: Say,
     kept: Store | None,
+    options: Options,
 ) -> Critical:
     """The critical friction by bisection in time, held against the modal one."""
     ends = bracket or (None if modal is None else (0.6 * modal, 1.5 * modal))
@@ -119,7 +125,7 @@ def _in_time(
             kept=kept,
         )
     except NoChangeError as error:
-        return _without_change(system, ends, max_frequency_hz, modal, error)
+        return _without_change(system, ends, max_frequency_hz, modal, error, options)
     except AnalysisError as error:
         return Critical(modal, why=str(error))
     if modal is None:
@@ -130,14 +136,14 @@ def _in_time(
 
 
 def _modal(
-    system: System, between: tuple[float, float], limit: float, kept: Store | None
+    system: System, between: tuple[float, float], limit: float, kept: Store | None, options: Options
 ) -> tuple[float | None, str, list[str]]:
     """The first onset, None where there is none, what speaks for that, and what grows before any; taken from what is
     kept if it is there."""
     known = None if kept is None else kept.get("critical modal", None)
     if known is not None and isinstance(known.get("completeness"), str):
         return float_of(known, "mu"), known["completeness"], [str(line) for line in known.get("before", ())]
-    found = onsets_of_band(system, between, limit, options=options_in_time(system))
+    found = onsets_of_band(system, between, limit, options=options)
     first, grown = None if found.first is None else found.first.mu, found.at_start_words
     if kept is not None:
         kept.put("critical modal", None, {"mu": first, "completeness": found.completeness, "before": grown})
@@ -145,10 +151,11 @@ def _modal(
 
 
 def _without_change(
-    system: System, ends: tuple[float, float], limit: float, modal: float | None, error: NoChangeError
+    system: System, ends: tuple[float, float], limit: float, modal: float | None, error: NoChangeError,
+    options: Options,
 ) -> Critical:
     """Ends of a bracket at which the motion in time does the same: do the modes say so too?"""
-    found = modes_of_band(system, list(ends), 1.02 * limit, options=options_in_time(system))
+    found = modes_of_band(system, list(ends), 1.02 * limit, options=options)
     grow = [bool(np.any(row)) for row in found.unstable & (found.frequency_hz <= limit)]
     if modal is not None and not grow[0] and grow[1]:
         begins = f"by the modes growth begins at {measured(modal, 5)} between them"

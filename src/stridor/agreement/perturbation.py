@@ -41,15 +41,19 @@ MOST_BYTES = 128e6  # of their motion
 MOST_INSTANTS = 4096  # of it in a shape
 
 
-def options_in_time(system: System) -> Options:
+def options_in_time(system: System, asked: Options | None = None) -> Options:
     """What makes modes those of the model that the time loop marches: in space Coulomb friction turns with the slip
-    velocity, which damps motion across the direction of sliding."""
-    return Options(friction_damping=system.dimension == 3)
+    velocity, which damps motion across the direction of sliding. Of what is asked for, solver and source count."""
+    asked = asked or Options()
+    return Options(friction_damping=system.dimension == 3, solver=asked.solver, source=asked.source)
 
 
-def modes_as_in_time(system: System, mu: float, max_frequency_hz: float) -> ComplexModes:
+def modes_as_in_time(
+    system: System, mu: float, max_frequency_hz: float, options: Options | None = None
+) -> ComplexModes:
     """Modes with right vectors, of the very model that the time loop marches."""
-    return modes_of_band(system, mu, max_frequency_hz, vectors="right", options=options_in_time(system))
+    chosen = options_in_time(system, options)
+    return modes_of_band(system, mu, max_frequency_hz, vectors="right", options=chosen)
 
 
 @one_thread_if_small

@@ -9,7 +9,7 @@ import typer
 
 from ..errors import AnalysisError, CaseError
 from ..interrupts import held
-from .arguments import Call, numbers, verb
+from .arguments import Call, Source, numbers, verb
 
 if TYPE_CHECKING:
     from ..io.kept_parts import KeptParts
@@ -138,12 +138,13 @@ def compare(
         ),
     ] = None,
     only: Only = None,
+    source: Source = None,
 ) -> None:
     """Agreement of both approaches, as a table and a verdict.
 
     Each part is kept as soon as it is there; a second call on the same case takes what is finished. Ctrl-C prints it.
     """
-    work = call.workspace()
+    work = call.workspace(source)
 
     from ..study import analyses
 

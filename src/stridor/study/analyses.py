@@ -349,6 +349,7 @@ def compare(
         only=only,
         kept=kept,
         finished=finished,
+        options=work.options,
     )
     notes = dict.fromkeys((*result.notes, *(said for mu in chosen for said in decided_by_meshes(system, mu))))
     seconds = time.perf_counter() - started

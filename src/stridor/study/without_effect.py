@@ -1,7 +1,7 @@
 """Settings that a case gives and that change nothing on the path its analyses take: told, one line each.
 
 - modal.solver, --solver: beams in point contacts, whose modes are dense unless modal.source says otherwise
-- modal.source: `steady`, `reduce`, `simulate`, `compare`
+- modal.source: `steady`, `reduce`, `simulate`
 - modal.friction_damping: but for contact over nodes in space; `compare`, which has it as the time loop has
 - modal.prestress: but for assembled matrices with meshed solids; `compare`, `simulate`
 - modal.damped = false: `simulate`, `compare`
@@ -94,10 +94,8 @@ def _of_modes(case: Case, verb: str, solver: str | None, *, few: bool) -> Iterat
     if dense and (solver is not None or case.modal.solver != "auto"):
         what = "modal.solver" if solver is None else "--solver"
         yield f"{what} has no effect: beams in point contacts are solved by dense methods"
-    if case.modal.source != "auto" and verb in ("steady", "reduce", "simulate", "compare"):
+    if case.modal.source != "auto" and verb in ("steady", "reduce", "simulate"):
         yield f"modal.source has no effect on {verb}: it acts on modes and onsets"
-    elif case.modal.source != "auto" and verb == "run":
-        yield "modal.source acts on modes and onsets only: the comparison takes what suits the model"
     if case.modal.friction_damping and verb != "simulate":
         if few or case.dimension < 3:
             yield "modal.friction_damping has no effect: friction turns with the slip in space only, over nodes"
