@@ -203,3 +203,14 @@ def test_the_pencil_takes_the_friction_of_the_contacts_where_they_have_one():
     two = System.from_matrices(np.eye(2), None, HOFFMANN, contacts={"A": contact, "B": other | {"normal": [1, 0], "tangent": [0, 1]}})
     with pytest.raises(st.CaseError, match=r"^mu: missing – give the friction coefficient"):
         st.pencil(two)
+
+
+def test_a_band_holds_all_its_modes_whatever_the_matrices():
+    """Forty of them, and as many as are asked for, where the stiffness is not symmetric as where it is."""
+    stiffness = np.diag((2 * np.pi * np.linspace(10.0, 400.0, 40)) ** 2)
+    for skew in (0.0, 500.0):
+        stiffness[0, 1] = skew
+        system = st.System.from_matrices(np.eye(40), None, stiffness)
+        found = st.modes(system, 0.1, max_frequency_hz=500.0)
+        np.testing.assert_allclose(found.frequency_hz[0], np.linspace(10.0, 400.0, 40), rtol=1e-9)
+        assert st.modes(system, 0.1, count=30).eigenvalues.shape == (1, 30)

@@ -170,7 +170,7 @@ class Full:
         if asked.max_frequency_hz is None and (why := system.not_symmetric_definite):
             raise CaseError("max_frequency_hz", None, f"missing – {why}: modes are sought in a band")
         return general_modes(
-            lambda _: system, values, count=asked.count, max_frequency_hz=asked.band_hz, damped=asked.damped,
+            lambda _: system, values, count=None, max_frequency_hz=asked.band_hz, damped=asked.damped,
             vectors=asked.vectors, options=asked.options, progress=asked.progress, unfollowed=asked.unfollowed,
         )  # fmt: skip
 
