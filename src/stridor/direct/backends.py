@@ -5,38 +5,13 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
 
 from ..errors import CaseError
 from ..typing import Sparse
+from .interface import SLEPC_BUILD, Backend
 
 VARIABLE = "STRIDOR_SOLVER"
 
-
-class Backend(Protocol):
-    """A factorised matrix of n rows as one of the programs keeps it."""
-
-    memory_bytes: int
-    inertia: int | None
-
-    def solve(self, right: Any, transpose: bool) -> Any:
-        """One unrefined solve of right (n, r), of the matrix's own type; may overwrite it."""
-        ...
-
-    def free(self) -> None:
-        """Give the memory of the factors back."""
-        ...
-
-
-class Breakdown(Exception):
-    """A program found a pivot of zero."""
-
-
-SLEPC_BUILD = (
-    "PETSc must be built with complex numbers, double precision and MUMPS (on Debian: apt install "
-    "libpetsc-complex-dev libslepc-complex-dev; then set PETSC_DIR and SLEPC_DIR to theirs and install petsc4py and "
-    "slepc4py of the same version)"
-)
 
 # In the order they are tried: modules that have to be importable, and how to install them.
 PACKAGES = {

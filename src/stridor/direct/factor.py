@@ -11,7 +11,8 @@ import scipy.sparse as sp
 
 from ..errors import AnalysisError
 from ..typing import Array, ComplexArray, Sparse
-from .backends import Backend, Breakdown, choose, start
+from .backends import choose, start
+from .interface import Backend, Breakdown
 
 # Solvers keep a copy of the block they work on; wider blocks win nothing more.
 BLOCK = 64

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from ..errors import AnalysisError
 from ..typing import Sparse
-from .backends import Breakdown
+from .interface import Breakdown
 
 SINGULAR = (-6, -10)
 OUT_OF_MEMORY = (-5, -7, -13)

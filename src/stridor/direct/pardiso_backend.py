@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from ..errors import AnalysisError
 from ..typing import Sparse
-from .backends import Breakdown
+from .interface import Breakdown
 
 REAL_SYMMETRIC, COMPLEX_SYMMETRIC, REAL, COMPLEX = -2, 6, 11, 13
 ANALYSE_AND_FACTOR, SOLVE, RELEASE = 12, 33, -1

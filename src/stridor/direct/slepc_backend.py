@@ -21,7 +21,7 @@ import scipy.sparse as sp
 
 from ..errors import AnalysisError, CaseError
 from ..typing import Sparse
-from .backends import SLEPC_BUILD, Breakdown
+from .interface import SLEPC_BUILD, Breakdown
 from .ranks import Ranks, all_processes, deaf_to_interrupts, only_this, undisturbed
 
 STOP, FACTORISE, SOLVE, FREE = range(4)

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from ..typing import Array, Sparse
-from .backends import Breakdown
+from .interface import Breakdown
 
 
 class SuperluFactor:
