@@ -501,7 +501,7 @@ def test_pieces_of_a_line_integrate_what_has_kinks_at_the_masters_nodes(kind: st
     master = np.sort(rng.random(9))
     master[0], master[-1] = -0.1, 1.1
     nodes = np.column_stack([master, np.full(9, -0.01)])
-    below = pieces.Line(nodes, cKDTree(nodes))
+    below = pieces.NodeLine(nodes, cKDTree(nodes))
     under = np.column_stack([facets[:, :2, 0].mean(axis=1), np.full(4, -0.01)])
     found = pieces.pieces(kind, facets, under, below)
     values, slopes = shape_functions(kind, found.place)
