@@ -52,6 +52,17 @@ def test_a_pair_that_falls_apart_and_loses_a_half(tmp_path: Path) -> None:
     assert count == [2, 1]
 
 
+def test_one_that_begins_where_another_ends(tmp_path: Path) -> None:
+    """Between two values that are looked at a mode begins to grow at 1070 Hz and another ceases to at 2040 Hz: as many
+    grow at both, and they are not the same."""
+    problem = random_problem(1664, small=True)
+    found = problem.solve(tmp_path)
+    close = [o for o in found.onsets if 0.32 < o.mu < 0.33]
+    assert [(round(o.frequency_hz, -1), o.roots) for o in close] == [(1070.0, 2), (2040.0, -2)]
+    count = [int(np.sum(problem.eigenvalues(mu).real > 1e-9)) for o in close for mu in (o.mu - 1e-6, o.mu + 1e-6)]
+    assert [count[1] - count[0], count[3] - count[2]] == [2, -2]
+
+
 @pytest.mark.slow
 def test_a_heavy_one(tmp_path: Path) -> None:
     assert judged([HEAVY], tmp_path, small=True) == ([], [])

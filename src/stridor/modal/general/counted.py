@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from ...typing import BoolArray, ComplexArray
 from ..dense_problem import Eigenpairs
@@ -30,6 +31,7 @@ SMALLEST = 1e-9  # of the range: no interval is halved further
 ALONE = 1e-4  # of the range: an interval in which one mode changes is short enough for Newton from here on
 SLOWEST = 1e-8  # of the highest frequency: growth slower than that is rounding
 STILL = 1e-3  # of the highest frequency: slower than that may be divergence
+NEARBY = 0.05  # of |λ|: how far from where slopes lead it to a growing mode may be in the next interval's end
 EDGE = 1e-3  # of the highest frequency: modes that come in or leave there are no onsets
 ALIKE = 1e-7  # of the highest frequency: onsets at one value whose frequencies are no further apart are one
 
@@ -146,7 +148,8 @@ class _Search:
     def _changes(self, low: _Count, high: _Count) -> Iterator[tuple[_Count, _Count]]:
         """Intervals in which the growing modes change by one, those that slopes foretell included."""
         differs, width = low.number != high.number, high.t - low.t
-        if not differs and not self._foretold(low, width) and not self._foretold(high, -width):
+        foretold = self._foretold(low, width) or self._foretold(high, -width)
+        if not differs and not foretold and self._are_those(low, high):
             return
         if width <= SMALLEST * self.width or (width <= ALONE * self.width and _one(low, high)):
             if differs:
@@ -164,6 +167,23 @@ class _Search:
         inside = (np.abs(lam) <= self.top) & (np.abs(lam) > SLOWEST * self.top) & np.isfinite(ahead)
         off = np.abs(lam.real) > UNSTABLE_RELATIVE * np.abs(lam)
         return bool(np.any(inside & off & ((lam.real > 0) != (ahead.real > 0))))
+
+    def _are_those(self, low: _Count, high: _Count) -> bool:
+        """Whether as many growing modes are the same ones: where one begins and another ends their number says nothing.
+        Each is where the slopes at both ends lead to."""
+        ends = [(count.found.values[count.growing], _rates(count.found)[count.growing]) for count in (low, high)]
+        half = 0.5 * (high.t - low.t)
+        (first, rates), (last, rates_to) = ends
+        if len(first) != len(last):
+            return False
+        ahead, back = (
+            np.where(np.isfinite(slope), values + way * slope, values)
+            for values, slope, way in ((first, rates, half), (last, rates_to, -half))
+        )
+        away = np.abs(ahead[:, None] - back)
+        rows, columns = linear_sum_assignment(away)
+        near = NEARBY * np.maximum(np.abs(first[rows]), np.abs(last[columns])) + 0.1 * NEARBY * self.top
+        return bool(np.all(away[rows, columns] <= near))
 
     def _at_edge(self, low: _Count, high: _Count) -> complex | None:
         """The growing mode that passes the highest frequency between two values, if that is what changes."""
