@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..direct.light import LightFactor
 from ..errors import AnalysisError
 from ..system import System
-from ..typing import BoolArray, ComplexArray
+from ..typing import BoolArray, ComplexArray, Sparse
 from .backward_error import BackwardError
 from .coupling import PointCoupling
 from .general.family import Family
@@ -117,6 +118,9 @@ class _PointFamily(Family):
     def freedoms(self) -> int:
         """Number of freedoms n."""
         return self._coupling.system.size
+
+    def _factorised(self, matrix: Sparse) -> LightFactor:
+        return LightFactor(matrix)
 
     def backward_error(self, mu: float, lam: complex, x: ComplexArray) -> float:
         """Backward error of λ, x (n + m,), the contacts' own equations judged by themselves."""

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...direct import Factor, factorise
+from ...direct import factorise
 from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...typing import Array, ComplexArray, IntArray, Sparse
 from ..assembled.problem import ContactProblem, problem_of
 from ..backward_error import common_pattern
-from ..newton import Border
+from ..newton import Border, BorderedFactor
 from ..options import Options
 from ..parametric import Parameter, ParametricProblem, Term
 from ..parametric.contacts_rigid import Elimination, eliminate
@@ -279,14 +279,16 @@ class Family(Smooth):
         """Number of freedoms n; the forces of rigid contacts are unknowns beyond them."""
         return self.size
 
-    def bordered(self, here: Quadratic, lam: complex, border: Border) -> Factor:
+    def bordered(self, here: Quadratic, lam: complex, border: Border) -> BorderedFactor:
         """Factors of P(λ) with a border. Raises AnalysisError where it is singular."""
         coo = sp.coo_array(here.at(lam))
         n, scale = coo.shape[0], border.scale
         data = np.concatenate([coo.data.astype(complex), [scale, scale]])
         rows, columns = np.concatenate([coo.row, [border.row, n]]), np.concatenate([coo.col, [n, border.column]])
-        matrix = sp.csr_array(sp.coo_array((data, (rows, columns)), shape=(n + 1, n + 1)))
-        return factorise(matrix, solver=self.options.solver, tried=False)
+        return self._factorised(sp.coo_array((data, (rows, columns)), shape=(n + 1, n + 1)))
+
+    def _factorised(self, matrix: Sparse) -> BorderedFactor:
+        return factorise(sp.csr_array(matrix), solver=self.options.solver, tried=False)
 
     def backward_error(self, mu: float, lam: complex, x: ComplexArray) -> float:
         """Backward error of an eigenpair λ, x (n,) in the matrices as they are given at μ."""
