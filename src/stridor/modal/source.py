@@ -204,6 +204,11 @@ def sources_for(system: System, name: str | None = None) -> tuple[EigenSource, .
     return (chosen,)
 
 
+def by_receptance(system: System) -> bool:
+    """Whether modes at any μ are roots of receptances unless something else is asked for: they cost next to nothing."""
+    return sources_for(system)[0].name == Receptance.name
+
+
 def require_full(name: str | None) -> None:
     """Raise AnalysisError for a source by name that takes no matrices which depend on μ."""
     if name not in (None, SOURCES[-1].name):

@@ -24,7 +24,7 @@ from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
 from ..modal.over_friction import modes_of_band, onsets_of_band
 from ..modal.receptance_modes import prepare
-from ..modal.source import require_full, sources_for
+from ..modal.source import by_receptance, require_full
 from ..sliding import taken_as_closed
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
@@ -363,7 +363,7 @@ def friction_curve(problem: Problem, frequency_hz: Array) -> Array:
     (docs/theory-modal.md). Raises CaseError for another number of contacts.
     """
     system = Workspace.of(problem).system()
-    if len(system.contacts) != 1 or sources_for(system)[0].name != "receptance":
+    if len(system.contacts) != 1 or not by_receptance(system):
         raise CaseError("contacts", len(system.contacts), "one contact: μ(ω) is a single curve only then")
     spectrum, coupling, _ = prepare(system.undamped())
     h, _ = spectrum.receptance(2j * np.pi * np.asarray(frequency_hz, dtype=float))

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..case import Case
 from ..errors import AnalysisError, CaseError
-from ..modal.source import sources_for
+from ..modal.source import by_receptance
 from ..system import build_system
 from ..typing import Array, BoolArray
 from .damping_full import FullSearch, LowestOnset
@@ -218,7 +218,7 @@ def _search(
     """How onsets are searched for, and what is to be said about it."""
     if method == "auto":
         system = build_system(full.case)
-        if system.size < LARGE or len(xs) * len(ys) < MANY or sources_for(system)[0].name == "receptance":
+        if system.size < LARGE or len(xs) * len(ys) < MANY or by_receptance(system):
             method = "full"
     if method == "full":
         return full, (FOLLOWED,)

@@ -16,7 +16,7 @@ from ..errors import AnalysisError
 from ..modal.assembled import friction_energy
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
-from ..modal.source import sources_for
+from ..modal.source import by_receptance
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
 from ..temporal.shapes import operating_shape
@@ -212,7 +212,7 @@ class _Modal:
     def __init__(self, work: Workspace, clock: _Clock, keep: Callable[[str, object], None]) -> None:
         settings = work.modal
         mus = np.linspace(*settings.friction_range, settings.sweep_points)
-        self.cheap = sources_for(work.system())[0].name == "receptance"
+        self.cheap = by_receptance(work.system())
         ways = (False, True) if self.cheap else (settings.damped,)
 
         def each(name: str, call: Callable[[bool], T], what: str = "") -> dict[bool, T]:

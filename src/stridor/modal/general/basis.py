@@ -21,6 +21,7 @@ from ..quadratic import Quadratic, Region, find_modes
 from ..quadratic.problem import times
 from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .family import MU, ROLES, Family, Smooth
+from .growth import off_rounding
 
 DENSE = 60  # unknowns up to which the matrices are their own reduced model
 WHOLE = 6000  # and up to which branches are followed by full solves where there is none
@@ -69,17 +70,13 @@ class Along(OverNumber):
 
     def steadied(self, found: Eigenpairs) -> Eigenpairs:
         """With growth that may be rounding taken as none: modes that nothing damps would cross the axis everywhere."""
-        values = found.values.copy()
-        on_axis = np.abs(values.real) <= UNSTABLE_RELATIVE * np.abs(values)
-        values[on_axis] = 1j * values[on_axis].imag
+        values = off_rounding(found.values, UNSTABLE_RELATIVE)
         return replace(found, coordinate=values, values=values)
 
     def turned(self, found: Eigenpairs) -> Eigenpairs:
         """λ² as the coordinate where the problem is reversible: it stays smooth where eigenvalues reach zero, and real
         as long as they are on the axis."""
-        values = found.values.copy()
-        on_axis = np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)
-        values[on_axis] = 1j * values[on_axis].imag
+        values = off_rounding(found.values, SPLIT_RELATIVE)
         still = np.abs(values.imag) <= SPLIT_RELATIVE * np.abs(values)
         values[still] = values[still].real
         # Of two real values ±λ one says everything.

@@ -16,6 +16,17 @@ def unstable(family: Family, values: ComplexArray, top: float, still: float = AT
     return (values.real > rounding * np.abs(values)) & (np.abs(values) > still * top)
 
 
+def off_rounding(values: ComplexArray, rounding: float) -> ComplexArray:
+    """Eigenvalues (k,) whose real part may be rounding, a share of |λ|, put on the imaginary axis."""
+    return np.where(np.abs(values.real) <= rounding * np.abs(values), 1j * values.imag, values)
+
+
+def steadied(family: Family, values: ComplexArray) -> ComplexArray:
+    """Eigenvalues (k,) as they are told: of a reversible problem, with every λ there is −λ̄, so that a real part without
+    a partner is rounding."""
+    return off_rounding(values, SPLIT_RELATIVE) if family.reversible else values
+
+
 def growing_roots(values: ComplexArray) -> int:
     """How many roots grow, of which a flutter pair is two and a motion that diverges one: a pair that meets on the real
     axis and parts there is no onset."""

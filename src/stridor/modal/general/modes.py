@@ -22,11 +22,12 @@ from ...system import System
 from ...typing import Array, ComplexArray
 from ..options import Options
 from ..quadratic import band_modes
+from ..quadratic.dense import unit
 from ..quadratic.reach import searched
 from ..results import ComplexModes, Progress, require_memory
-from ..tolerances import SPLIT_RELATIVE
 from .basis import DECAY
 from .family import SystemFamily, family_of
+from .growth import steadied
 from .numbers import Numbers, numbered
 
 
@@ -123,15 +124,10 @@ def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> ModesA
     )  # fmt: skip
     n = family.freedoms
     told = spectrum.completeness.sentence
-    values = spectrum.values.copy()
-    if family.reversible:
-        # With every λ there is −λ̄: a real part without a partner is rounding.
-        on_axis = np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)
-        values[on_axis] = 1j * values[on_axis].imag
     return ModesAtFriction(
-        values,
-        _normed(spectrum.right[:n]),
-        None if spectrum.left is None else _normed(spectrum.left[:n]),
+        steadied(family, spectrum.values),
+        unit(spectrum.right[:n]),
+        None if spectrum.left is None else unit(spectrum.left[:n]),
         spectrum.residual,
         f"Modes up to {top / (2 * np.pi):g} Hz that decay at less than {DECAY * top:.4g} 1/s. {told}",
     )
@@ -175,8 +171,3 @@ def table_of(
         contact_state=family.contacts.contact_state,
         completeness=tuple(f"{f.sentence}{numbers.sentence}" for f in found),
     )
-
-
-def _normed(shapes: ComplexArray) -> ComplexArray:
-    """Vectors of unit norm, the normal forces left out."""
-    return shapes / np.maximum(np.linalg.norm(shapes, axis=0), 1e-300)

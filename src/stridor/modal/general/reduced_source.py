@@ -21,6 +21,7 @@ from ...typing import Array, ComplexArray
 from ..inverse_iteration import Iterated, two_sided
 from ..onset import Onsets
 from ..options import Options
+from ..quadratic.dense import unit
 from ..quadratic.problem import Quadratic
 from ..quadratic.reach import searched
 from ..results import ComplexModes, Progress
@@ -29,7 +30,7 @@ from .basis import DECAY, Along, Projected, along
 from .branches import ends_of
 from .family import Family, SystemFamily, family_of
 from .follow import BEYOND
-from .growth import unstable
+from .growth import steadied, unstable
 from .modes import ModesAtFriction, family_over, modes_at_each, table_of
 from .numbers import numbered
 from .search import search
@@ -74,7 +75,7 @@ def reduced_onsets(
     family = family_of(lambda _: system, (low, high), options, damped=damped, own=low)
     top = searched(family.built(high), 2 * np.pi * max_frequency_hz)
     source = _model(family, beyond * top / BEYOND, max_frequency_hz)
-    small = Family((family.low, family.high), lambda mu: _dense(source, mu), options)
+    small = Family((family.low, family.high), lambda mu: source.sparse(mu - family.low), options)
     ends = ends_of(small, low, high, top)
     answer = search(family, [lambda: source], (low, high), ends, top)
     at_start, at_end = (tuple(end.values[unstable(family, end.values, top)].tolist()) for end in ends)
@@ -98,11 +99,6 @@ def _model(family: SystemFamily, top: float, band_hz: float) -> Projected:
     return source
 
 
-def _dense(source: Projected, mu: float) -> Quadratic:
-    """The model's own problem at μ."""
-    return source.sparse(mu - source.family.low)
-
-
 def _confirmed(
     family: SystemFamily, source: Projected, mu: float, top: float, band_hz: float
 ) -> ModesAtFriction:
@@ -112,8 +108,8 @@ def _confirmed(
     inside = (found.values.imag <= top * (1 + 1e-12)) & (found.values.real >= -DECAY * top)
     chosen = np.flatnonzero(inside & (found.values.imag >= 0))
     lam = found.values[chosen].copy()
-    right = _unit(source.vectors(found.right[:, chosen], t))
-    left = _unit(source.vectors(found.left[:, chosen], t, left=True))
+    right = unit(source.vectors(found.right[:, chosen], t))
+    left = unit(source.vectors(found.left[:, chosen], t, left=True))
     with np.errstate(all="ignore"):
         slope = np.sum(left * problem.slope(lam, right), axis=0)
         better = lam - np.sum(left * problem.residual(lam, right), axis=0) / slope
@@ -132,11 +128,8 @@ def _confirmed(
             float(problem.transposed.backward_error(pair, left[:, [k]])[0]),
         )
     order, n = np.lexsort((lam.real, lam.imag)), family.freedoms
-    lam, right, left = lam[order], _unit(right[:n, order]), _unit(left[:n, order])
-    if family.reversible:
-        on_axis = np.abs(lam.real) <= 1e-9 * np.abs(lam)
-        lam[on_axis] = 1j * lam[on_axis].imag
-    return ModesAtFriction(lam, right, left, residual[order], "")
+    lam, right, left = lam[order], unit(right[:n, order]), unit(left[:n, order])
+    return ModesAtFriction(steadied(family, lam), right, left, residual[order], "")
 
 
 def _solved(
@@ -148,7 +141,3 @@ def _solved(
         except SingularMatrix:
             continue
     return None
-
-
-def _unit(vectors: ComplexArray) -> ComplexArray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=0), 1e-300)
