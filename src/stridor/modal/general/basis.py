@@ -129,11 +129,6 @@ class Projected(OnBasis):
                     self._parts.append((row, k, dense))
                     place += 1
 
-    @property
-    def constant_mass(self) -> bool:
-        """Whether μ leaves the mass alone."""
-        return all(not m.nnz for m in self._form["mass"].matrices[1:])
-
     def vectors(self, z: ComplexArray, mu: float, *, left: bool = False) -> ComplexArray:
         """V z, or z where V is the unit matrix; without the forces of rigid contact."""
         x = z if self.model is None else expanded(self.model.vectors, z)
