@@ -125,8 +125,9 @@ def test_the_same_seed_gives_the_same_copies():
     run = st.simulate(case)
     first, again, other = (st.perturbed_copies(case, run, count=1, seed=seed) for seed in (1, 1, 2))
     assert first == again
-    assert first.deviation["A"]["quantile_95_normal_force"] != other.deviation["A"]["quantile_95_normal_force"]
-    assert 0.0 < first.deviation["A"]["quantile_95_normal_force"] < 1e-6  # of some 40 N
+    # Of peaks: the first separation may fall into another record on another processor, and quantiles begin with it.
+    assert first.deviation["A"]["mean_peak_normal_force"] != other.deviation["A"]["mean_peak_normal_force"]
+    assert 0.0 < first.deviation["A"]["mean_peak_normal_force"] < 1e-6  # of some 40 N
 
 
 def test_copies_on_the_command_line(tmp_path):
