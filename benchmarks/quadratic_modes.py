@@ -16,7 +16,7 @@ import scipy.sparse.linalg as spl
 
 import stridor as st
 from _common import machine, options
-from assembled_modes import grid
+from krylov_modes import grid
 from stridor.case import template_text
 from stridor.direct import factorise
 from stridor.modal.parametric import contact_parameters

@@ -11,8 +11,8 @@ import scipy.sparse as sp
 import stridor as st
 from rubbing_block import rubbing_block
 from stridor.mesh.model import Mesh
-from stridor.modal.assembled import Options
-from stridor.modal.assembled.problem import problem_of
+from stridor.modal.krylov import Options
+from stridor.modal.krylov.problem import problem_of
 from stridor.system.bodies import build_bodies
 
 Term = tuple[object, str, str]

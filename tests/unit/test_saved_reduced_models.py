@@ -26,7 +26,7 @@ from stridor.io import reduced_models
 from stridor.io.left_out import kept_in
 from stridor.io.reduced_models import provenance_of
 from stridor.io.seals import digest, text_digest
-from stridor.modal.general import onsets_along
+from stridor.modal.full import onsets_along
 from stridor.modal.parametric import Parameter, ParametricProblem, Term, reduce, verified
 from stridor.modal.parametric.factors import CONSTANT, Formula, Product
 

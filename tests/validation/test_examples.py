@@ -52,7 +52,7 @@ def test_example_reads_like_a_page(example: Path):
     # The number that is known is asserted, and nothing inside the package is used but what the documentation names.
     assert any(isinstance(node, ast.Assert) for node in ast.walk(tree))
     inner = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and "stridor" in (node.module or "")}
-    assert inner <= {"stridor.case", "stridor.modal.general"}
+    assert inner <= {"stridor.case", "stridor.modal.full"}
 
 
 def test_gallery_shows_each_example_once_with_its_picture():

@@ -8,7 +8,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 import stridor as st
-from stridor.modal.assembled import refine
+from stridor.modal.krylov import refine
 from stridor.modal.quadratic import Quadratic
 from stridor.modal.quadratic.reach import fastest, searched
 
@@ -105,7 +105,7 @@ def test_a_heavy_mass_on_a_rigid_floor(band: float) -> None:
 
 
 def test_what_does_not_settle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stridor.modal.assembled.modes.searched", lambda _, top: top)
+    monkeypatch.setattr("stridor.modal.krylov.modes.searched", lambda _, top: top)
     monkeypatch.setattr("stridor.modal.source.WHOLE", 0)  # too large for the answer in full
     with pytest.raises(st.AnalysisError, match=r"do not settle: a backward error of .* lower modal.max_frequency_hz"):
         st.modes(floor("max_frequency_hz = 1e6"), 0.1)

@@ -11,7 +11,7 @@ import stridor as st
 from matrix_cases import matrix_case
 from program import stridor
 from random_onsets import column
-from stridor.modal.general import branches, counted
+from stridor.modal.full import branches, counted
 
 pytestmark = pytest.mark.verification
 

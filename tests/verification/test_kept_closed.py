@@ -15,7 +15,7 @@ import stridor as st
 from stridor.case import loads
 from stridor.contact.multipliers import SLIP, STICK, solve_kept
 from stridor.laws import Coulomb
-from stridor.modal.assembled.refine import TOLERANCE  # to which modes are found
+from stridor.modal.krylov.refine import TOLERANCE  # to which modes are found
 from stridor.sliding import surfaces
 from stridor.temporal.energy import energy_balance
 from stridor.view.temporal_tables import contact_table

@@ -10,8 +10,8 @@ import pytest
 
 import random_onsets
 from random_onsets import KINDS, disagreement, random_problem
-from stridor.modal.general import branches, counted, general_onsets, search
-from stridor.modal.general.axis import _Walk
+from stridor.modal.full import branches, counted, full_onsets, search
+from stridor.modal.full.axis import _Walk
 from stridor.modal.onset import Onsets
 from stridor.modal.options import Options
 from stridor.system import System
@@ -78,7 +78,7 @@ def test_many(first: int, tmp_path: Path) -> None:
 
 
 def along_the_axis(system: System, between: tuple[float, float], hz: float, *, damped: bool = True) -> Onsets:
-    return general_onsets(
+    return full_onsets(
         lambda _: system, between, max_frequency_hz=hz, damped=damped, options=Options(), unfollowed="not asked for"
     )
 

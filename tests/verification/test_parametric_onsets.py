@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 
 from stridor.errors import AnalysisError
-from stridor.modal.general import counted, onsets_along, search
+from stridor.modal.full import counted, onsets_along, search
 from stridor.modal.parametric import Parameter, ParametricProblem, Term, reduce
 from stridor.modal.parametric.factors import CONSTANT, Product
 from stridor.typing import Array, ComplexArray

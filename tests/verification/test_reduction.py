@@ -15,7 +15,7 @@ from solid_cases import bench_as_solids, case
 from stridor.case import load
 from stridor.errors import AnalysisError, CaseError
 from stridor.modal.complex_modes import complex_modes
-from stridor.modal.general import onsets_along
+from stridor.modal.full import onsets_along
 from stridor.modal.onsets import onsets
 from stridor.modal.parametric import Parameter, ParametricProblem, Term, contact_parameters, craig_bampton, reduce
 from stridor.modal.parametric.basis import residual

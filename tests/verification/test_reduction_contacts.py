@@ -12,9 +12,9 @@ import stridor as st
 from benches import Slave, bench_case, paper_case
 from solid_cases import slider
 from stridor.case import Case, loads
-from stridor.modal.assembled import Options
-from stridor.modal.assembled.problem import problem_of
-from stridor.modal.general import onsets_along
+from stridor.modal.full import onsets_along
+from stridor.modal.krylov import Options
+from stridor.modal.krylov.problem import problem_of
 from stridor.modal.parametric.contacts_equilibria import FEW, Equilibria
 from stridor.modal.parametric.contacts_steady import contacts_of
 from stridor.modal.parametric.full import verified

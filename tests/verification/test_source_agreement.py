@@ -14,7 +14,7 @@ from benches import Slave, bench, paper_case
 from rubbing_block import rubbing_block
 from stridor.case import template_text
 from stridor.modal.complex_modes import complex_modes
-from stridor.modal.general.basis import DECAY
+from stridor.modal.full.basis import DECAY
 from stridor.modal.options import Options
 from stridor.modal.over_friction import modes_of_band, onsets_of_band
 from stridor.modal.source import SOURCES, sources_for

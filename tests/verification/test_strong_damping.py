@@ -11,7 +11,7 @@ import stridor as st
 from benches import paper_case
 from stridor.errors import FollowingError
 from stridor.modal import source as following
-from stridor.modal.assembled.problem import problem_of
+from stridor.modal.krylov.problem import problem_of
 from stridor.modal.options import Options
 from stridor.modal.quadratic import find
 from stridor.modal.quadratic.dense import all_modes

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from ..digits import measured
 
 if TYPE_CHECKING:
-    from ..modal.general import ParametricOnset, ParametricOnsets
+    from ..modal.full import ParametricOnset, ParametricOnsets
 
 MU = "mu"
 

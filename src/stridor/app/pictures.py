@@ -89,7 +89,7 @@ def _energy(system: System, modes: ComplexModes, column: int) -> Array | None:
     """Friction energy by slave node; of what does not vibrate there is none."""
     if not system.contact_nodes().count or modes.eigenvalues[0, column].imag == 0.0:
         return None
-    from ..modal.assembled import friction_energy
+    from ..modal.krylov import friction_energy
 
     return friction_energy(system, modes, 0, column).per_cycle
 

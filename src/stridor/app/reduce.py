@@ -20,7 +20,7 @@ from .arguments import INCOMPLETE, INFINITY, Call, numbers, pair, verb
 
 if TYPE_CHECKING:
     from ..case import Case
-    from ..modal.general import ParametricOnsets
+    from ..modal.full import ParametricOnsets
     from ..modal.parametric import CorrectedModes, ReducedModel, ReducedModes
     from ..typing import Array
 
@@ -89,7 +89,7 @@ def reduce(
         call.say(f"{model.problem.size} freedoms reduced to {model.size} in {seconds:.2f} s")
 
     from ..io.left_out import kept_in
-    from ..modal.general import onsets_along
+    from ..modal.full import onsets_along
 
     for note in getattr(model.problem, "notes", ()):
         call.say(f"note: {note}")

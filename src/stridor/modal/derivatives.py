@@ -27,9 +27,9 @@ from ..errors import AnalysisError, CaseError
 from ..sliding import steady_nodes
 from ..system import System
 from ..typing import Array, BoolArray, ComplexArray, IntArray, Sparse
-from .assembled.problem import problem_held
-from .assembled.steady import contact_rows, steadiness, touching_nodes
 from .inverse_iteration import Iterated, two_sided
+from .krylov.problem import problem_held
+from .krylov.steady import contact_rows, steadiness, touching_nodes
 from .options import Options
 from .pencil import Pencil
 from .quadratic.problem import times

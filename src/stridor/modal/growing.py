@@ -5,7 +5,7 @@ axis. What counts at a μ is every mode of the band there, wherever it began. It
 
     λ²M + λ(C + friction's slope) + K + (N + μS)ᵀ c⁻¹ N
 
-(rigid contact as in `general`), which shares with the followed branches nothing but these matrices.
+(rigid contact as in `full`), which shares with the followed branches nothing but these matrices.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from ..errors import AnalysisError
 from ..system import System
 from ..threads import one_thread_if_small
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .assembled.problem import problem_of
 from .complex_modes import complex_modes
-from .general.growth import growing_roots
+from .full.growth import growing_roots
+from .krylov.problem import problem_of
 from .onset import refuted
 from .onsets import Onsets, onsets
 from .options import Options

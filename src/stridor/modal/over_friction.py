@@ -17,8 +17,8 @@ from ..sliding.stretches import Stretch, stretch_words, stretches
 from ..system import System
 from ..typing import Array, ComplexArray, IntArray
 from .complex_modes import complex_modes
-from .general import general_onsets
-from .general.basis import WHOLE
+from .full import full_onsets
+from .full.basis import WHOLE
 from .growing import UNCHECKED, checked_modes, checked_onsets, growing_modes
 from .joined import TouchingChange, joined_modes, joined_onsets, rows_of
 from .onsets import Onsets, onsets
@@ -190,7 +190,7 @@ def _solved_onsets(
         return other if other.complete else found
 
     def unfollowed(held: System, between: tuple[float, float], why: str) -> Onsets:
-        found = general_onsets(
+        found = full_onsets(
             lambda _: held, between, max_frequency_hz=max_frequency_hz, damped=damped, options=options, unfollowed=why
         )
         return replace(found, source=SOURCES[-1].name)

@@ -17,7 +17,7 @@ from ..system import System
 from ..typing import BoolArray, ComplexArray, Sparse
 from .backward_error import BackwardError
 from .coupling import PointCoupling
-from .general.family import Family
+from .full.family import Family
 from .histories import Entries, StabilityChange, reported, unexplained
 from .inverse_iteration import null_vectors
 from .newton import Root, crossing, exceptional, meeting, standstill

@@ -19,9 +19,9 @@ from ..errors import AnalysisError, CaseError, FollowingError
 from ..system import System
 from ..system.uncoupled import no_complete_basis
 from ..typing import Array
-from .assembled import NotPositive, complex_modes_assembled, onsets_assembled
-from .general import general_modes, general_onsets
-from .general.reduced_source import reduced_modes, reduced_onsets
+from .full import full_modes, full_onsets
+from .full.reduced_source import reduced_modes, reduced_onsets
+from .krylov import NotPositive, krylov_modes, krylov_onsets
 from .onset import Onsets
 from .options import Options
 from .quadratic.find import WHOLE
@@ -114,7 +114,7 @@ class Krylov:
     def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
         """See `EigenSource`."""
         try:
-            return complex_modes_assembled(
+            return krylov_modes(
                 system, values, count=asked.count or 20, max_frequency_hz=asked.max_frequency_hz, damped=asked.damped,
                 vectors=asked.vectors, options=asked.options, progress=asked.progress,
             )  # fmt: skip
@@ -124,7 +124,7 @@ class Krylov:
     def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
         """See `EigenSource`."""
         try:
-            return onsets_assembled(
+            return krylov_onsets(
                 system, friction_range, max_frequency_hz=asked.band_hz, damped=asked.damped, options=asked.options,
                 follow=asked.follow,
             )  # fmt: skip
@@ -169,14 +169,14 @@ class Full:
         """See `EigenSource`."""
         if asked.max_frequency_hz is None and (why := system.not_symmetric_definite):
             raise CaseError("max_frequency_hz", None, f"missing – {why}: modes are sought in a band")
-        return general_modes(
+        return full_modes(
             lambda _: system, values, count=None, max_frequency_hz=asked.band_hz, damped=asked.damped,
             vectors=asked.vectors, options=asked.options, progress=asked.progress, unfollowed=asked.unfollowed,
         )  # fmt: skip
 
     def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
         """See `EigenSource`."""
-        return general_onsets(
+        return full_onsets(
             lambda _: system, friction_range, max_frequency_hz=asked.band_hz, damped=asked.damped,
             options=asked.options,
         )  # fmt: skip

@@ -6,8 +6,8 @@ import math
 
 from ..case import Case
 from ..errors import CaseError
-from ..modal.general import ParametricOnsets
-from ..modal.general import onsets_along as sought
+from ..modal.full import ParametricOnsets
+from ..modal.full import onsets_along as sought
 from .asked import require_frequency
 from .reduced import reduced_model
 

@@ -19,7 +19,7 @@ from ..case.matrix_checks import MU
 from ..errors import AnalysisError, CaseError
 from ..errors import Problem as Wrong
 from ..modal.complex_modes import ComplexModes, complex_modes
-from ..modal.general import ParametricOnsets, general_modes, general_onsets
+from ..modal.full import ParametricOnsets, full_modes, full_onsets
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
 from ..modal.over_friction import modes_of_band, onsets_of_band
@@ -118,7 +118,7 @@ def _modes(
     if work.varies:
         require_full(options.source)
         own = work.own_friction if work.has_contacts else None
-        result = general_modes(
+        result = full_modes(
             work.system, values, count=None, max_frequency_hz=band, damped=damped, vectors=vectors, options=options,
             own=own, progress=progress,
         )  # fmt: skip
@@ -207,7 +207,7 @@ def onsets(
     if work.varies:
         require_full(options.source)
         own = work.own_friction if work.has_contacts else None
-        result = general_onsets(
+        result = full_onsets(
             work.system, between, max_frequency_hz=limit, damped=damped, options=options, own=own
         )
         notes = _held_by_factors(work, own)

@@ -11,7 +11,7 @@ import numpy as np
 from ..case import Case
 from ..case.bodies import BeamBody, SolidBody
 from ..errors import CaseError
-from ..modal.assembled.steady import refuse_stick
+from ..modal.krylov.steady import refuse_stick
 from .asked import require_frequency
 from .measure_ranking import Ranking
 from .measure_verification import verified

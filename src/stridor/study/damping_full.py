@@ -9,8 +9,8 @@ import numpy as np
 
 from ..case import Case
 from ..errors import AnalysisError
-from ..modal.assembled.steady import touching_nodes
 from ..modal.derivatives import HeldContacts, Mode, by_friction, pencil_of, rate_of, solve_mode
+from ..modal.krylov.steady import touching_nodes
 from ..modal.onsets import Onset, onsets
 from ..modal.options import Options
 from ..modal.pencil import Pencil

@@ -16,7 +16,7 @@ import numpy as np
 from ..case import Case
 from ..case.overrides import split_path
 from ..errors import AnalysisError, CaseError
-from ..modal.general import ParametricOnset, onsets_along
+from ..modal.full import ParametricOnset, onsets_along
 from ..modal.parametric import Parameter, ReducedModel
 from ..modal.parametric.contacts import ContactsProblem
 from ..modal.parametric.dense import assembled

@@ -13,8 +13,8 @@ import numpy as np
 from ..agreement import Agreement, Store, mode_shape
 from ..case import Case
 from ..errors import AnalysisError
-from ..modal.assembled import friction_energy
 from ..modal.complex_modes import ComplexModes
+from ..modal.krylov import friction_energy
 from ..modal.onsets import Onsets
 from ..modal.source import by_receptance
 from ..sliding.surfaces import SurfaceSliding

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..errors import CaseError
-from ..modal.general.family import family_of
+from ..modal.full.family import family_of
 from ..modal.quadratic import Quadratic
 from .asked import require_friction
 from .workspace import Problem, Workspace

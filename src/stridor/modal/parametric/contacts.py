@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...typing import BoolArray
-from ..assembled.steady import contact_rows, refuse_stick, steadiness, touching_nodes
+from ..krylov.steady import contact_rows, refuse_stick, steadiness, touching_nodes
 from ..options import Options
 from .contacts_rigid import Elimination, eliminate
 from .contacts_sampling import Values

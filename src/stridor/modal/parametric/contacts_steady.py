@@ -20,7 +20,7 @@ from ...sliding import full_motion
 from ...sliding.surfaces import STILL
 from ...system import System
 from ...typing import Array, IntArray, Sparse
-from ..assembled.steady import Steadiness
+from ..krylov.steady import Steadiness
 from .contacts_equilibria import Equilibria, HeldEquilibria
 from .contacts_sampling import Sampled, Values, combined_matrices, directions, sampled
 from .family import term_of

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...typing import ComplexArray
-from ..assembled.critical import exceptional_point
-from ..assembled.follow import State
-from ..assembled.passages import Passage
 from ..dense_problem import eigenvalues
+from ..krylov.critical import exceptional_point
+from ..krylov.follow import State
+from ..krylov.passages import Passage
 from ..newton import FLAT, Root
 from ..onset import Onset
 from ..quadratic import Region, RegionModes, band_modes

@@ -42,7 +42,7 @@ class ModesAtFriction:
     sentence: str
 
 
-def general_modes(
+def full_modes(
     system_at: Callable[[float], System],
     mu: float | Sequence[float] | Array,
     *,

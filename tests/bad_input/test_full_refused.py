@@ -101,8 +101,8 @@ def test_a_run_of_matrices_that_friction_only_makes_stiffer_is_fine(tmp_path: Pa
 
 def test_too_large_for_full_solves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     for module in ("basis", "search"):
-        monkeypatch.setattr(f"stridor.modal.general.{module}.WHOLE", 1)
-    monkeypatch.setattr("stridor.modal.general.search.DENSE", 1)
+        monkeypatch.setattr(f"stridor.modal.full.{module}.WHOLE", 1)
+    monkeypatch.setattr("stridor.modal.full.search.DENSE", 1)
     assert message(st.onsets, model(tmp_path, factor="sqrt(mu)")) == (
         "no reduced model over mu can be made of these matrices (the matrices are no smooth functions of mu), and "
         "following modes by full solves is not tried with 2 unknowns, more than 1; take `stridor modes` at several mu"

@@ -13,11 +13,11 @@ from benches import paper_case
 from matrix_cases import TURN, export, exported, matrix_case
 from solid_cases import case, slider
 from stridor.errors import AnalysisError
-from stridor.modal import general
-from stridor.modal.assembled import Options
-from stridor.modal.general.basis import Projected, Whole, along
-from stridor.modal.general.family import SystemFamily
-from stridor.modal.general.follow import followed
+from stridor.modal import full
+from stridor.modal.full.basis import Projected, Whole, along
+from stridor.modal.full.family import SystemFamily
+from stridor.modal.full.follow import followed
+from stridor.modal.krylov import Options
 from stridor.system import build_system
 
 pytestmark = pytest.mark.verification
@@ -139,7 +139,7 @@ def test_numbers_where_branches_cannot_be_followed_are_said_to_count_by_frequenc
         raise AnalysisError("no way")
 
     with monkeypatch.context() as patch:
-        patch.setattr(general.numbers, "along", refuse)
+        patch.setattr(full.numbers, "along", refuse)
         found = st.modes(model, [0.2, 0.4])
     sentence = "Numbers count by frequency at each μ, since branches were not followed: no way."
     assert all(s.endswith(sentence) for s in found.completeness)

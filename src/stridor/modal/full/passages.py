@@ -10,10 +10,10 @@ import numpy as np
 import scipy.linalg as sl
 
 from ...typing import ComplexArray
-from ..assembled.critical import crossing as reduced_crossing
-from ..assembled.critical import pair_near
-from ..assembled.follow import Follower, State
-from ..assembled.passages import COMPLEX, Passage
+from ..krylov.critical import crossing as reduced_crossing
+from ..krylov.critical import pair_near
+from ..krylov.follow import Follower, State
+from ..krylov.passages import COMPLEX, Passage
 from ..newton import Root, crossing, meeting, standstill
 from ..tolerances import AT_REST, UNSTABLE_RELATIVE
 from .basis import Along, OnBasis

@@ -31,10 +31,10 @@ frictionless modes is checked by Sylvester's law of inertia.
 """
 
 from ..options import Options
-from .critical import onsets_assembled
+from .critical import krylov_onsets
 from .direct_modes import DirectModes, direct_modes
 from .energy import FrictionEnergy, friction_energy
-from .modes import complex_modes_assembled
+from .modes import krylov_modes
 from .shifted import NotPositive
 
 __all__ = [
@@ -42,8 +42,8 @@ __all__ = [
     "FrictionEnergy",
     "NotPositive",
     "Options",
-    "complex_modes_assembled",
     "direct_modes",
     "friction_energy",
-    "onsets_assembled",
+    "krylov_modes",
+    "krylov_onsets",
 ]

@@ -16,9 +16,9 @@ import stridor as st
 from benches import paper_case
 from matrix_cases import MESHED, TURN, export, exported, matrix_case, rubbing
 from solid_cases import bench_as_solids, case, slider
-from stridor.modal import general
+from stridor.modal import full
 from stridor.modal.complex_modes import complex_modes
-from stridor.modal.general.family import Family, Smooth
+from stridor.modal.full.family import Family, Smooth
 from stridor.modal.growing import checked_onsets
 from stridor.modal.newton import Border
 from stridor.modal.onsets import onsets
@@ -393,12 +393,12 @@ def test_an_onset_that_gets_lost_is_noticed(tmp_path: Path, monkeypatch: pytest.
     """What branches lose is enclosed by counting; what Newton does not find then is told, with where it is."""
     model = matrix_case(tmp_path, minimal(), 1.0)
     with monkeypatch.context() as patch:
-        patch.setattr(general.branches, "located", lambda *_: None)
+        patch.setattr(full.branches, "located", lambda *_: None)
         found = st.onsets(model)
         assert [o.mu for o in found.onsets] == pytest.approx([0.75], rel=1e-12)
         assert found.onsets[0].branches == (0, 0)
         assert found.completeness.startswith("As many roots grow at each of 97 values of μ as the onsets say: 0 modes grow")
-        patch.setattr(general.counted._Search, "_solved", lambda *_: None)
+        patch.setattr(full.counted._Search, "_solved", lambda *_: None)
         found = st.onsets(model)
     assert not found.onsets
     assert not found.complete

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import AnalysisError
-from ..assembled.follow import Follower, State
-from ..assembled.passages import Passage, crossings, meetings
 from ..histories import Entries
+from ..krylov.follow import Follower, State
+from ..krylov.passages import Passage, crossings, meetings
 from .basis import Along
 
 BEYOND = 1.1  # modes above the band may meet inside it

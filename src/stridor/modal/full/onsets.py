@@ -28,7 +28,7 @@ AGREES = 1e-5  # of |λ|: how near the followed modes are to those found in full
 
 
 @one_thread
-def general_onsets(
+def full_onsets(
     system_at: Callable[[float], System],
     friction_range: tuple[float, float] = (0.0, 1.0),
     *,

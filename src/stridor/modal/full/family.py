@@ -23,8 +23,8 @@ from ...direct import factorise
 from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...typing import Array, ComplexArray, IntArray, Sparse
-from ..assembled.problem import ContactProblem, problem_of
 from ..backward_error import common_pattern
+from ..krylov.problem import ContactProblem, problem_of
 from ..newton import Border, BorderedFactor
 from ..options import Options
 from ..parametric import Parameter, ParametricProblem, Term

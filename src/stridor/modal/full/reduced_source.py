@@ -44,7 +44,7 @@ def reduced_modes(
     system: System, values: Array, *, max_frequency_hz: float, damped: bool, vectors: bool | Literal["right"],
     options: Options, progress: Progress | None,
 ) -> ComplexModes:  # fmt: skip
-    """Modes at the friction coefficients values (k,), as `general_modes` gives them, from a reduced model over μ.
+    """Modes at the friction coefficients values (k,), as `full_modes` gives them, from a reduced model over μ.
 
     Raises Unfit where there is none, and where a mode of it is none of the full problem.
     """

@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import AnalysisError
 from ...threads import one_thread
 from ...typing import Array, ComplexArray, IntArray
-from ..assembled.follow import State
+from ..krylov.follow import State
 from ..quadratic.polish import pairs
 from ..tolerances import AT_REST
 from .basis import DECAY, Along, along, double_zeros

@@ -25,7 +25,7 @@ SAMPLES = 7
 
 
 @one_thread_if_small
-def complex_modes_assembled(
+def krylov_modes(
     system: System,
     mu: float | Sequence[float] | Array,
     *,

@@ -14,18 +14,18 @@ from benches import Slave, bench, distance_to, full_eigenvalues, paper_case
 from stridor.contact.nodes import ContactNodes
 from stridor.errors import AnalysisError, CaseError
 from stridor.laws import Coulomb, Weakening
-from stridor.modal.assembled import (
+from stridor.modal.complex_modes import complex_modes
+from stridor.modal.krylov import (
     Options,
-    complex_modes_assembled,
     direct_modes,
     friction_energy,
-    onsets_assembled,
+    krylov_modes,
+    krylov_onsets,
 )
-from stridor.modal.assembled.follow import State
-from stridor.modal.assembled.passages import crossings
-from stridor.modal.assembled.problem import Varying
-from stridor.modal.assembled.reduced import Eigenpairs
-from stridor.modal.complex_modes import complex_modes
+from stridor.modal.krylov.follow import State
+from stridor.modal.krylov.passages import crossings
+from stridor.modal.krylov.problem import Varying
+from stridor.modal.krylov.reduced import Eigenpairs
 from stridor.modal.onsets import onsets
 from stridor.sliding import friction_damping_matrix, steady_sliding_nodes
 from stridor.system import System, build_system
@@ -109,7 +109,7 @@ def eliminated(system: System, mu: float, damping=0.0, stiffness=0.0) -> np.ndar
 @pytest.mark.parametrize("compliance", [0.0, 0.1, 1e-3, np.array([0.0, 0.02, 0.0, 0.1, 0.0, 0.0, 0.05])])
 def test_random_contacts_have_the_eigenvalues_of_the_eliminated_problem(dimension, damping, compliance):
     system = scattered(dimension, compliance, damping)
-    modes = complex_modes_assembled(system, [0.0, 0.3, 1.0], count=15, damped=damping > 0)
+    modes = krylov_modes(system, [0.0, 0.3, 1.0], count=15, damped=damping > 0)
     assert modes.residual.max() < 1e-8
     for row, mu in enumerate(modes.mu):
         exact = eliminated(system, mu)
@@ -124,7 +124,7 @@ def test_friction_enters_the_mass_where_rigid_contact_is_eliminated():
     """Two freedoms, mass coupled: with x alone left, (M_xx − μ M_yx) λ² + K_xx − μ K_yx = 0."""
     mass, stiffness = np.array([[2.0, 0.3], [0.3, 1.0]]), np.array([[5.0, 1.0], [1.0, 4.0]])
     system = assembled(mass, np.zeros((2, 2)), stiffness, np.array([[0.0, 1.0]]), np.array([[1.0, 0.0]]), 0.0, [[1.0]])
-    modes = complex_modes_assembled(system, [0.0, 0.5, 2.0], count=1, damped=False)
+    modes = krylov_modes(system, [0.0, 0.5, 2.0], count=1, damped=False)
     # Slip along +x: friction on the slave is −μ p, p = (K_yx + λ² M_yx) x.
     exact = [math.sqrt((5 + mu * 1.0) / (2 + mu * 0.3)) for mu in modes.mu]
     np.testing.assert_allclose(modes.eigenvalues[:, 0], 1j * np.array(exact), rtol=1e-12)
@@ -132,9 +132,9 @@ def test_friction_enters_the_mass_where_rigid_contact_is_eliminated():
 
 def test_contact_springs_converge_to_rigid_contact_with_their_compliance():
     mu = [0.4]
-    rigid = complex_modes_assembled(scattered(3), mu, count=8, damped=False).eigenvalues
+    rigid = krylov_modes(scattered(3), mu, count=8, damped=False).eigenvalues
     errors = [
-        np.abs(complex_modes_assembled(scattered(3, c), mu, count=8, damped=False).eigenvalues - rigid).max()
+        np.abs(krylov_modes(scattered(3, c), mu, count=8, damped=False).eigenvalues - rigid).max()
         for c in (1e-4, 1e-5, 1e-6)
     ]
     np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 10.0, rtol=0.02)
@@ -145,7 +145,7 @@ def test_published_bench_as_the_complete_basis_has_it(damped):
     system = build_system(paper_case())
     mu = [0.0, 0.07, 0.0768, 0.2, 0.5]
     small = complex_modes(system, mu, count=20, damped=damped, vectors=True)
-    large = complex_modes_assembled(system, mu, count=20, damped=damped, vectors=True)
+    large = krylov_modes(system, mu, count=20, damped=damped, vectors=True)
     assert (np.abs(large.eigenvalues - small.eigenvalues) / np.abs(small.eigenvalues)).max() < 1e-8
     assert large.residual.max() < 1e-8
     assert large.branch.tolist() == small.branch.tolist()
@@ -160,7 +160,7 @@ def test_three_slaves_rigid_and_elastic(damped):
         Slave(place=0.5, lean_deg=12, stiffness="rigid"),
         Slave(place=0.8, stiffness="rigid", lean_deg=-7),
     )
-    modes = complex_modes_assembled(system, [0.05, 0.3, 0.6], max_frequency_hz=6e3, damped=damped)
+    modes = krylov_modes(system, [0.05, 0.3, 0.6], max_frequency_hz=6e3, damped=damped)
     bare = system if damped else replace(system, damping=0.0 * system.damping)
     for row, mu in enumerate(modes.mu):
         assert distance_to(modes.eigenvalues[row], full_eigenvalues(bare, mu)).max() < 1e-7
@@ -170,7 +170,7 @@ def test_three_slaves_rigid_and_elastic(damped):
 @pytest.mark.parametrize("compliance", [0.0, 0.05])
 def test_direct_solution_agrees(damped, compliance):
     system = scattered(3, compliance, 0.4)
-    modes = complex_modes_assembled(system, [0.7], count=25, damped=damped)
+    modes = krylov_modes(system, [0.7], count=25, damped=damped)
     middle = float(modes.frequency_hz[0, 11:13].mean())
     direct = direct_modes(system, 0.7, shift_hz=middle, count=6, damped=damped)
     assert direct.residual.max() < 1e-12
@@ -186,7 +186,7 @@ def test_a_body_that_floats_keeps_its_rigid_motions():
     tangent[0, 6] = 1.0
     system = assembled(np.eye(7), np.zeros((7, 7)), stiffness, normal, tangent, 0.0, [[1.0]])
     free = replace(system, stiffness=sp.csr_array(sl.block_diag(chain, chain, 1.0)))
-    found = complex_modes_assembled(free, 0.0, count=3, damped=False)
+    found = krylov_modes(free, 0.0, count=3, damped=False)
     assert abs(found.eigenvalues[0, 0]) < 1e-6
     exact = eliminated(free, 0.0)
     assert distance_to(found.eigenvalues[0, 1:], exact).max() < 1e-9
@@ -202,13 +202,13 @@ def hoffmann(c1=0.0, c2=0.0) -> System:
 
 
 def test_mode_coupling_of_two_freedoms():
-    found = onsets_assembled(hoffmann(), (0.0, 2.0), max_frequency_hz=1.0, damped=False).onsets
+    found = krylov_onsets(hoffmann(), (0.0, 2.0), max_frequency_hz=1.0, damped=False).onsets
     assert [(o.kind, o.stabilising, o.branches) for o in found] == [("flutter", False, (1, 2))]
     assert found[0].mu == pytest.approx(0.75, rel=1e-11)
     assert 2 * np.pi * found[0].frequency_hz == pytest.approx(math.sqrt(2), rel=1e-11)
     assert found[0].square_root_coefficient == pytest.approx(math.sqrt(4 / 3) / (2 * math.sqrt(2)), rel=1e-8)
     assert found[0].residual < 1e-12
-    modes = complex_modes_assembled(hoffmann(), [0.5, 1.0], count=2, damped=False)
+    modes = krylov_modes(hoffmann(), [0.5, 1.0], count=2, damped=False)
     np.testing.assert_allclose(modes.eigenvalues[0], [1.192749j, 1.605413j], atol=5e-7)
     np.testing.assert_allclose(modes.eigenvalues[1], [0.202072 + 1.428577j, -0.202072 + 1.428577j], atol=1e-6)
 
@@ -224,11 +224,11 @@ def test_mode_coupling_of_two_freedoms():
     ],
 )
 def test_uneven_damping_destabilises(c1, c2, mu):
-    found = onsets_assembled(hoffmann(c1, c2), (0.0, 1.0), max_frequency_hz=1.0).onsets
+    found = krylov_onsets(hoffmann(c1, c2), (0.0, 1.0), max_frequency_hz=1.0).onsets
     assert [(o.kind, o.stabilising, o.damped) for o in found] == [("flutter", False, True)]
     assert found[0].mu == pytest.approx(mu, abs=6e-7)
     step = 1e-5
-    around = complex_modes_assembled(hoffmann(c1, c2), [found[0].mu - step, found[0].mu + step], count=2)
+    around = krylov_modes(hoffmann(c1, c2), [found[0].mu - step, found[0].mu + step], count=2)
     slope = np.diff(around.growth_rate.max(axis=1))[0] / (2 * step)
     assert found[0].growth_slope == pytest.approx(slope, rel=1e-3)
 
@@ -237,7 +237,7 @@ def test_uneven_damping_destabilises(c1, c2, mu):
 def test_onsets_of_the_published_bench(damped):
     system = build_system(paper_case())
     small = onsets(system, (0.0, 0.9), max_frequency_hz=30e3, damped=damped)
-    large = onsets_assembled(system, (0.0, 0.9), max_frequency_hz=30e3, damped=damped)
+    large = krylov_onsets(system, (0.0, 0.9), max_frequency_hz=30e3, damped=damped)
     if not damped:
         assert large.onsets[0].mu == pytest.approx(0.0766441, abs=5e-8)
         assert large.onsets[0].frequency_hz == pytest.approx(8635.41, abs=5e-3)
@@ -265,7 +265,7 @@ def test_divergence_of_a_known_system():
     mu = (1 + k / contact) / a
     for damped in (False, True):
         case = system if not damped else replace(system, damping=system.damping + 0.1 * system.mass)
-        found = onsets_assembled(case, (0.0, 2.0), max_frequency_hz=2.0, damped=damped).onsets
+        found = krylov_onsets(case, (0.0, 2.0), max_frequency_hz=2.0, damped=damped).onsets
         assert [o.kind for o in found] == ["divergence"]
         assert found[0].mu == pytest.approx(mu, rel=1e-9)
         if not damped:
@@ -275,7 +275,7 @@ def test_divergence_of_a_known_system():
 @pytest.mark.parametrize("damping", [0.0, 0.02])
 def test_growth_changes_sign_at_the_onsets_of_many_contacts(damping):
     system = scattered(3, 0.05, damping, size=60)
-    found = onsets_assembled(system, (0.0, 0.6), max_frequency_hz=0.2, damped=damping > 0)
+    found = krylov_onsets(system, (0.0, 0.6), max_frequency_hz=0.2, damped=damping > 0)
     assert len(found.onsets) > 1
     growing = []
     for onset in found.onsets:
@@ -296,7 +296,7 @@ def test_growth_changes_sign_at_the_onsets_of_many_contacts(damping):
 @pytest.mark.parametrize("compliance", [0.0, 0.05])
 def test_power_of_friction_less_damping_is_twice_the_growth_rate(compliance):
     system = scattered(3, compliance, 0.02)
-    modes = complex_modes_assembled(system, [0.2, 0.8], count=12, vectors=True)
+    modes = krylov_modes(system, [0.2, 0.8], count=12, vectors=True)
     assert modes.growth_rate.max() > 1e-3
     for row, mode in np.ndindex(modes.eigenvalues.shape):
         energy = friction_energy(system, modes, row, mode)
@@ -323,7 +323,7 @@ def test_falling_friction_and_turning_friction_are_in_the_equations():
     along = system.contact_nodes().along(steady.sense).toarray()
     weakening = along.T @ ((steady.normal_force * slopes)[:, None] * along)
     for options, added in ((Options(), weakening), (Options(friction_damping=True), whole)):
-        modes = complex_modes_assembled(system, mu, count=8, options=options)
+        modes = krylov_modes(system, mu, count=8, options=options)
         assert modes.residual.max() < 1e-8
         assert distance_to(modes.eigenvalues[0], eliminated(system, mu, damping=added)).max() < 1e-8
         assert distance_to(modes.eigenvalues[0], eliminated(system, mu)).max() > 1e-5
@@ -333,13 +333,13 @@ def test_nodes_that_pull_open_and_take_no_part():
     system = scattered(3, 0.02, 0.1, size=40, nodes=3)
     nodes = system.surfaces[0].nodes
     system = replace(system, loads={"press": nodes.normal.T @ np.array([-3.0, 9.0, -4.0])})
-    modes = complex_modes_assembled(system, 0.3, count=8, vectors=True)
+    modes = krylov_modes(system, 0.3, count=8, vectors=True)
     touching = replace(system, surfaces=(HandMade(nodes.select(np.array([0, 2]))),))
     assert distance_to(modes.eigenvalues[0], eliminated(touching, 0.3)).max() < 1e-9
     power = friction_energy(system, modes, 0, 3).power
     assert power[1] == 0.0
     assert np.all(power[[0, 2]] != 0.0)
-    nothing = complex_modes_assembled(replace(system, surfaces=()), [0.0, 0.5], count=8)
+    nothing = krylov_modes(replace(system, surfaces=()), [0.0, 0.5], count=8)
     assert np.abs(nothing.eigenvalues[0] - nothing.eigenvalues[1]).max() < 1e-9
 
 
@@ -347,7 +347,7 @@ def test_prestress_is_added_on_demand():
     stress = sp.csr_array(np.diag(np.linspace(0.0, 0.3, 40)))
     system = replace(pressed(), stress_stiffness=lambda u: sp.csr_array(stress * (1 + np.abs(u).max())))
     mu = [0.0, 0.4]
-    modes = complex_modes_assembled(system, mu, count=8, options=Options(prestress=True))
+    modes = krylov_modes(system, mu, count=8, options=Options(prestress=True))
     for row, m in enumerate(mu):
         added = system.stress_stiffness(steady_sliding_nodes(system, mu=m).displacement).toarray()
         assert distance_to(modes.eigenvalues[row], eliminated(system, m, stiffness=added)).max() < 1e-8
@@ -356,19 +356,19 @@ def test_prestress_is_added_on_demand():
 def test_what_is_refused():
     system = scattered()
     with pytest.raises(CaseError, match="friction coefficients are numbers ≥ 0"):
-        complex_modes_assembled(system, -0.1)
+        krylov_modes(system, -0.1)
     with pytest.raises(CaseError, match="at least one mode"):
-        complex_modes_assembled(system, 0.1, count=0)
+        krylov_modes(system, 0.1, count=0)
     with pytest.raises(CaseError, match="0 ≤ a < b"):
-        onsets_assembled(system, (0.5, 0.5))
+        krylov_onsets(system, (0.5, 0.5))
     with pytest.raises(AnalysisError, match="needs the normal force"):
-        complex_modes_assembled(scattered(law=Weakening(0.2, 0.4, 1.0)), 0.1)
+        krylov_modes(scattered(law=Weakening(0.2, 0.4, 1.0)), 0.1)
     nodes = system.surfaces[0].nodes
     still = replace(system, surfaces=(HandMade(replace(nodes, tangent_lift=0.0 * nodes.tangent_lift)),))
     with pytest.raises(AnalysisError, match="pad does not slide"):
-        complex_modes_assembled(still, 0.1)
+        krylov_modes(still, 0.1)
     with pytest.raises(CaseError, match="vectors=True"):
-        friction_energy(system, complex_modes_assembled(system, 0.1, count=2), 0, 0)
+        friction_energy(system, krylov_modes(system, 0.1, count=2), 0, 0)
 
 
 def test_a_branch_that_starts_undamped_is_stable_until_it_grows():

@@ -46,7 +46,7 @@ NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
 
 
 @one_thread_if_small
-def onsets_assembled(
+def krylov_onsets(
     system: System,
     friction_range: tuple[float, float] = (0.0, 1.0),
     *,

@@ -1,6 +1,6 @@
 """Complex modes of an elastic pad on an elastic block, many contact nodes: projection against one solve for each μ.
 
-python benchmarks/assembled_modes.py [--short] [--along CELLS]   (27 cells along the pad: about 50 000 freedoms)
+python benchmarks/krylov_modes.py [--short] [--along CELLS]   (27 cells along the pad: about 50 000 freedoms)
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from stridor.contact.nodes import ContactNodes
 from stridor.laws import Coulomb
-from stridor.modal.assembled import complex_modes_assembled, direct_modes, onsets_assembled
+from stridor.modal.krylov import direct_modes, krylov_modes, krylov_onsets
 from stridor.system import System
 from stridor.system.model import PrescribedMotion
 
@@ -141,7 +141,7 @@ def main() -> None:
     print(f"{system.size} freedoms, {system.contact_nodes().count} contact nodes")
     for damped in (True,) if chosen.short else (False, True):
         start = time.perf_counter()
-        modes = complex_modes_assembled(system, np.linspace(0.0, 1.0, frictions), count=count, damped=damped)
+        modes = krylov_modes(system, np.linspace(0.0, 1.0, frictions), count=count, damped=damped)
         spent = time.perf_counter() - start
         top = float(modes.frequency_hz.max())
         print(
@@ -149,7 +149,7 @@ def main() -> None:
             f"worst backward error {modes.residual.max():.1e}, largest growth {modes.growth_rate.max():.6g} 1/s"
         )
         start = time.perf_counter()
-        found = onsets_assembled(system, (0.0, 1.0), max_frequency_hz=top, damped=damped)
+        found = krylov_onsets(system, (0.0, 1.0), max_frequency_hz=top, damped=damped)
         spent = time.perf_counter() - start
         worst = max((o.residual for o in found.onsets), default=0.0)
         print(f"  {len(found.onsets)} onsets in {spent:.1f} s, worst backward error {worst:.1e}")
