@@ -456,13 +456,13 @@ def test_the_environment_of_launchers_is_read():
     openmpi = {"OMPI_COMM_WORLD_RANK": "1", "OMPI_COMM_WORLD_SIZE": "2"}
     mpich = {"PMI_RANK": "3", "PMI_SIZE": "4"}
     slurm = {"SLURM_PROCID": "3", "SLURM_STEP_NUM_TASKS": "4"}
-    assert launch._place({}) is None
-    assert launch._place(openmpi) == (1, 2, False)
-    assert launch._place(mpich) == (3, 4, False)
-    assert launch._place(slurm) == launch._place({**mpich, **slurm}) == (3, 4, True)
-    assert launch._place({**openmpi, **slurm}) == (1, 2, False)
-    assert launch._place({"SLURM_PROCID": "0", "SLURM_STEP_NUM_TASKS": "1"}) is None
-    assert launch._place({"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "1"}) is None
+    assert launch._process({}) is None
+    assert launch._process(openmpi) == (1, 2, False)
+    assert launch._process(mpich) == (3, 4, False)
+    assert launch._process(slurm) == launch._process({**mpich, **slurm}) == (3, 4, True)
+    assert launch._process({**openmpi, **slurm}) == (1, 2, False)
+    assert launch._process({"SLURM_PROCID": "0", "SLURM_STEP_NUM_TASKS": "1"}) is None
+    assert launch._process({"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "1"}) is None
 
 
 def test_other_processes_end_silently_where_it_is_missing(monkeypatch: pytest.MonkeyPatch):

@@ -54,7 +54,7 @@ _as_they_are = read_sources
 
 def read_sources():
     found = _as_they_are()
-    return None if found is None else Sources(found.place, (), "{digest}")
+    return None if found is None else Sources(found.location, (), "{digest}")
 '''
 # What a mutant compiles must not serve the next.
 READ_ONLY = '''

@@ -263,7 +263,7 @@ def test_without_a_home_temporary_files_serve_and_a_note_says_so_once(tmp_path):
 
 def test_where_nothing_at_all_can_be_written_everything_is_compiled(monkeypatch, caplog):
     caplog.set_level("WARNING", "stridor")
-    monkeypatch.setattr(folders, "_places", lambda: iter([("/dev/null/a", False), ("/dev/null/b/c", True)]))
+    monkeypatch.setattr(folders, "_candidates", lambda: iter([("/dev/null/a", False), ("/dev/null/b/c", True)]))
     assert folders.kernel_folder.__wrapped__() is None
     assert [r.message.split(",")[0] for r in caplog.records] == [
         "note: compiled functions cannot be kept in /dev/null/a (Not a directory)"
@@ -300,15 +300,15 @@ def test_the_note_stays_out_of_documents_and_of_quiet_runs(tmp_path):
 
 def test_folders_named_by_the_user(tmp_path, monkeypatch):
     monkeypatch.setenv("STRIDOR_CACHE_DIR", str(tmp_path / "a"))
-    assert next(folders._places()) == (str(tmp_path / "a" / "kernels"), False)
+    assert next(folders._candidates()) == (str(tmp_path / "a" / "kernels"), False)
     monkeypatch.delenv("STRIDOR_CACHE_DIR")
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "b"))
-    assert next(folders._places()) == (str(tmp_path / "b" / "stridor" / "kernels"), False)
+    assert next(folders._candidates()) == (str(tmp_path / "b" / "stridor" / "kernels"), False)
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")  # not to be followed
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setattr(sys, "platform", "linux")
-    assert next(folders._places()) == (str(tmp_path / "home" / ".cache" / "stridor" / "kernels"), False)
+    assert next(folders._candidates()) == (str(tmp_path / "home" / ".cache" / "stridor" / "kernels"), False)
 
 
 # -- the same bits in the process that compiles and in those that load

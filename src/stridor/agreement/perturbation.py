@@ -170,5 +170,5 @@ def _watching(system: System, slips: Sparse, bodies: Sparse) -> tuple[System, tu
 def _as_steady(system: System, length: float) -> PhaseSpec:
     """A phase [s] under the loads and motions of steady sliding."""
     loads = system.load_steps[-1].loads if system.load_steps else {}
-    factors = zip(system.motion.names, full_motion(system).tolist(), system.motion.places, strict=True)
-    return PhaseSpec("perturbed", length, loads, {name: factor for name, factor, place in factors if not place})
+    factors = zip(system.motion.names, full_motion(system).tolist(), system.motion.full_distance, strict=True)
+    return PhaseSpec("perturbed", length, loads, {name: factor for name, factor, distance in factors if not distance})

@@ -72,13 +72,13 @@ def component_shape(
     time = time[: len(values)]
     if len(time) < least:
         return None
-    place = int(np.argmin(np.abs(eigenvalues - chosen)))
+    index = int(np.argmin(np.abs(eigenvalues - chosen)))
     best, misfit = np.zeros(0, dtype=complex), np.inf
     for share in BEGINNINGS:
         count = max(least, int(share * len(time)))
         parts, off = _split(time[:count], values[:count], eigenvalues)
         if off < misfit:
-            best, misfit = parts[place] - 1j * parts[len(eigenvalues) + place], off
+            best, misfit = parts[index] - 1j * parts[len(eigenvalues) + index], off
     return TimeShape(rows, best) if np.any(best) and np.isfinite(best).all() else None
 
 

@@ -50,8 +50,8 @@ def damping_map(
         result = solve(
             loaded, x, y, x_range=ranges[0], y_range=ranges[1], grid=(points, points), method=chosen, progress=progress
         )
-    place = call.folder
-    files = [_write(place / "damping_map.csv", result), place / "damping_map.png"]
+    folder = call.folder
+    files = [_write(folder / "damping_map.csv", result), folder / "damping_map.png"]
     draw(result).savefig(files[1], dpi=150)
     call.warn(result.warnings)
     for path in files:

@@ -27,10 +27,10 @@ def meet(words: Sequence[str], environment: Mapping[str, str] = os.environ) -> N
     PETSc is not installed and nobody asks for it. Raises CaseError where "slepc" is asked for and the processes
     cannot meet.
     """
-    place = _place(environment)
-    if place is None:
+    process = _process(environment)
+    if process is None:
         return
-    number, count, by_slurm = place
+    number, count, by_slurm = process
     asked = asks(words, environment)
     if by_slurm and not asked:
         return
@@ -73,13 +73,13 @@ def _text(path: str) -> str:
         return ""  # the first process says what is wrong with it
 
 
-def _place(environment: Mapping[str, str]) -> tuple[int, int, bool] | None:
+def _process(environment: Mapping[str, str]) -> tuple[int, int, bool] | None:
     """Number of this process, of how many, and whether it is Slurm that started it; None for a program on its own."""
     slurm = _pair(environment, SLURM)
     for names in (*MPIEXEC, SLURM):
-        place = _pair(environment, names)
-        if place is not None:
-            return (*place, place == slurm and names != MPIEXEC[0]) if place[1] > 1 else None
+        process = _pair(environment, names)
+        if process is not None:
+            return (*process, process == slurm and names != MPIEXEC[0]) if process[1] > 1 else None
     return None
 
 

@@ -209,8 +209,8 @@ def _points(model: ReducedModel, at: list[str], corrections: int, solver: str | 
     values = _values(at, model)
     corrector: Corrector | None = None
     found: list[dict[str, Any]] = []
-    for place in product(*values.values()):
-        point = dict(zip(values, place, strict=True))
+    for combination in product(*values.values()):
+        point = dict(zip(values, combination, strict=True))
         reduced = model.modes(point)
         if corrections and not reduced.passed.all():
             corrector = corrector or Corrector(model, solver=solver)

@@ -18,7 +18,7 @@ from .body_checks import body_problems, shape_problems
 from .fields import PLACE, is_zero
 from .load_checks import body_load_problems
 from .matrix_checks import matrix_problems
-from .points import BoundaryRef, Place, PointRef, no_such, parse_place, parse_point
+from .points import BoundaryRef, Location, PointRef, no_such, parse_location, parse_point
 from .schema import (
     DEFAULT_PHASES,
     Comparison,
@@ -148,7 +148,7 @@ def _support_problems(parts: Parts) -> Iterator[Problem]:
                 yield Problem(f"{where}.displacement.{direction}", support.displacement[direction], accepted)
         if len(set(support.fixed)) < len(support.fixed):
             yield Problem(f"{where}.fixed", support.fixed, "must name each direction once")
-        point = yield from _place(parts, support.at, f"{where}.at")
+        point = yield from _location(parts, support.at, f"{where}.at")
         if point is None:
             continue
         body = parts.bodies[point.body]
@@ -194,16 +194,16 @@ def _load_problems(parts: Parts) -> Iterator[Problem]:
         if load.at is None:
             yield Problem(f"{where}.at", None, f"missing – give {PLACE}")
             continue
-        place = yield from _place(parts, load.at, f"{where}.at")
-        if place is None:
+        location = yield from _location(parts, load.at, f"{where}.at")
+        if location is None:
             continue
-        body = parts.bodies[place.body]
+        body = parts.bodies[location.body]
         if len(load.force) != body.dimension and any(load.force):
-            accepted = f"must have {body.dimension} numbers, as {place.body} lives in {body.dimension} dimensions"
+            accepted = f"must have {body.dimension} numbers, as {location.body} lives in {body.dimension} dimensions"
             yield Problem(f"{where}.force", load.force, accepted)
         if load.moment and not isinstance(body, BeamBody):
             yield Problem(f"{where}.moment", load.moment, "only a beam takes a moment; give a pair of forces")
-        if load.pressure and not isinstance(place, BoundaryRef):
+        if load.pressure and not isinstance(location, BoundaryRef):
             yield Problem(f"{where}.pressure", load.pressure, "a pressure acts on a boundary; a point takes a force")
 
 
@@ -221,7 +221,7 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
             yield Problem(f"{where}.slave", contact.slave, accepted)
             continue
         pairs[pair] = name
-        slave = yield from _place(parts, contact.slave, f"{where}.slave")
+        slave = yield from _location(parts, contact.slave, f"{where}.slave")
         if slave is not None and _is_placeless(parts.bodies[slave.body]):
             accepted = f"{slave.body} has no mesh to say where its nodes are; give bodies.{slave.body}.mesh"
             yield Problem(f"{where}.slave", contact.slave, accepted)
@@ -242,7 +242,7 @@ def _contact_problems(parts: Parts) -> Iterator[Problem]:
                 accepted = f'must be a boundary of it, such as "{owner}.top"'
                 yield Problem(f"{where}.master", contact.master, accepted)
             else:
-                yield from _place(parts, contact.master, f"{where}.master", boundary=True)
+                yield from _location(parts, contact.master, f"{where}.master", boundary=True)
         elif boundary:
             kind = "a beam" if isinstance(master, BeamBody) else "an obstacle"
             yield Problem(f"{where}.master", contact.master, f'{kind} is a master as a whole; write "{owner}"')
@@ -314,8 +314,8 @@ def _pairing_problems(
 def _tie_problems(parts: Parts) -> Iterator[Problem]:
     for name, tie in parts.ties.items():
         where = f"ties.{name}"
-        slave = yield from _place(parts, tie.slave, f"{where}.slave", boundary=True)
-        master = yield from _place(parts, tie.master, f"{where}.master", boundary=True)
+        slave = yield from _location(parts, tie.slave, f"{where}.slave", boundary=True)
+        master = yield from _location(parts, tie.master, f"{where}.master", boundary=True)
         if slave is not None and master is not None:
             yield from _repetition_problems(parts, where, tie, slave, master)
         for other, contact in parts.contacts.items():
@@ -324,7 +324,7 @@ def _tie_problems(parts: Parts) -> Iterator[Problem]:
                 yield Problem(f"{where}.slave", tie.slave, accepted)
 
 
-def _repetition_problems(parts: Parts, where: str, tie: Tie, slave: Place, master: Place) -> Iterator[Problem]:
+def _repetition_problems(parts: Parts, where: str, tie: Tie, slave: Location, master: Location) -> Iterator[Problem]:
     """Ties within a body without a way from one of its sides to the other, and ways that are none."""
     dimension = parts.bodies[slave.body].dimension
     if tie.translation is None and tie.rotation is None:
@@ -466,12 +466,12 @@ def _steady_problems(parts: Parts) -> Iterator[Problem]:
         yield Problem("steady.steps", f"{len(steady.steps)} steps", accepted)
     if steady.friction == "stick-slip" and not parts.contacts and not parts.names("contacts"):
         yield Problem("steady.friction", steady.friction, "needs contacts that can stick, and the case has none")
-    away = [f"supports.{name}.displacement" for name, s in parts.supports.items() if s.displacement]
-    away += [f"contacts.{name}.interference" for name, c in parts.contacts.items() if c.interference]
-    if steady.friction == "stick-slip" and away:
+    distances = [f"supports.{name}.displacement" for name, s in parts.supports.items() if s.displacement]
+    distances += [f"contacts.{name}.interference" for name, c in parts.contacts.items() if c.interference]
+    if steady.friction == "stick-slip" and distances:
         accepted = (
-            f"load steps do not take {', '.join(away)}; give a support a velocity and a step a duration, which goes "
-            "the same distance"
+            f"load steps do not take {', '.join(distances)}; give a support a velocity and a step a duration, which "
+            "goes the same distance"
         )
         yield Problem("steady.friction", steady.friction, accepted)
     kept = [name for name, c in parts.contacts.items() if c.closed]
@@ -506,22 +506,22 @@ def _reference_problems(parts: Parts) -> Iterator[Problem]:
             yield Problem(f"reference.bodies.{name}", None, no_such("body", name, parts.names("bodies")))
 
 
-def _place(
+def _location(
     parts: Parts, reference: str, where: str, *, boundary: bool = False
-) -> Generator[Problem, None, Place | None]:
+) -> Generator[Problem, None, Location | None]:
     """The point or boundary, None where it cannot be known; yields the problem where it is the reference's fault."""
     head = reference.partition("@" if "@" in reference else ".")[0]
     if parts.is_broken("bodies", head):
         return None
     try:
-        place = parse_place(reference, parts.bodies, where)
+        location = parse_location(reference, parts.bodies, where)
     except CaseError as error:
         yield from error.problems
         return None
-    if boundary and isinstance(place, PointRef):
+    if boundary and isinstance(location, PointRef):
         yield Problem(where, reference, 'must be a boundary, "body.boundary"')
         return None
-    return place
+    return location
 
 
 def _point(parts: Parts, reference: str, where: str) -> Generator[Problem, None, PointRef | None]:

@@ -100,15 +100,15 @@ class _Parser:
         if len(self.text) > LONGEST:
             self._refuse(f"has {len(self.text)} characters; at most {LONGEST} are read")
         found: list[tuple[str, str]] = []
-        place, end = 0, len(self.text.rstrip(" \t"))
-        while place < end:
-            match = _TOKEN.match(self.text, place)
+        position, end = 0, len(self.text.rstrip(" \t"))
+        while position < end:
+            match = _TOKEN.match(self.text, position)
             if match is None:
-                odd = self.text[place:].lstrip(" \t")[0]
+                odd = self.text[position:].lstrip(" \t")[0]
                 hint = "; write ** for powers" if odd == "^" else ""
                 self._refuse(f"{odd!r} is not understood{hint}; accepted: {_ACCEPTED}")
             found.append((str(match.lastgroup), str(match[match.lastgroup or 0])))
-            place = match.end()
+            position = match.end()
         return found
 
     def _sum(self) -> None:

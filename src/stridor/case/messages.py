@@ -25,7 +25,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
 @dataclass
-class _Place:
+class _Location:
     """Where the walk has come to: the path, the type wanted and the value written there, and what it must be.
 
     table: the table that the last key belongs to, with its alternatives where a tag chose it among several;
@@ -53,23 +53,23 @@ def problems_of(error: ValidationError, data: object, root: type[BaseModel]) -> 
     missing: dict[str, tuple[str | int, ...]] = {}
     unknown: dict[tuple[str | int, ...], str] = {}  # the first unclear key of a table
     for item in error.errors(include_url=False, include_input=False, include_context=False):
-        kind, location = item["type"], item["loc"]
-        place = _reach(location, data, root)
+        kind, loc = item["type"], item["loc"]
+        location = _reach(loc, data, root)
         if kind == "extra_forbidden":
-            problem, meant = _unknown_key(place)
+            problem, meant = _unknown_key(location)
             if meant:
-                misspelt.add(dotted((*place.path[:-1], meant)))
+                misspelt.add(dotted((*location.path[:-1], meant)))
             else:
-                unknown.setdefault(place.path[:-1], problem.where)
-        elif kind == "missing" and not isinstance(location[-1], int):
-            problem = Problem(dotted(place.path), None, f"missing – give {place.description}")
-            missing[problem.where] = place.path
-        elif location and location[-1] == "[key]":
-            problem = _bad_key(place)
+                unknown.setdefault(location.path[:-1], problem.where)
+        elif kind == "missing" and not isinstance(loc[-1], int):
+            problem = Problem(dotted(location.path), None, f"missing – give {location.description}")
+            missing[problem.where] = location.path
+        elif loc and loc[-1] == "[key]":
+            problem = _bad_key(location)
         elif kind in ("union_tag_not_found", "union_tag_invalid"):
-            problem = _bad_tag(place)
+            problem = _bad_tag(location)
         else:
-            problem = _bad_value(place)
+            problem = _bad_value(location)
         found.setdefault(problem.where, problem)
     for where, path in missing.items():
         if where in misspelt:
@@ -83,61 +83,61 @@ def problems_of(error: ValidationError, data: object, root: type[BaseModel]) -> 
     return list(found.values())
 
 
-def _reach(location: Sequence[str | int], data: object, root: type[BaseModel]) -> _Place:
+def _reach(loc: Sequence[str | int], data: object, root: type[BaseModel]) -> _Location:
     """Follow a location of pydantic's as far as it names something that a user wrote or should write."""
-    place = _Place((), root, data)
-    for step in location:
+    location = _Location((), root, data)
+    for step in loc:
         if step == "[key]":  # the key itself is wrong
             break
-        tables = _tables(place.annotation)
+        tables = _tables(location.annotation)
         if len(tables) > 1:  # the step is the tag of the alternative that was tried
             chosen = next(table for table in tables if step in _tags(table))
-            place = replace(place, annotation=chosen, alternatives=tables)
+            location = replace(location, annotation=chosen, alternatives=tables)
             continue
-        here = replace(place, path=(*place.path, step), value=_item(place.value, step))
+        here = replace(location, path=(*location.path, step), value=_item(location.value, step))
         if tables:
             field = tables[0].model_fields.get(str(step))
             description = (field.description or "") if field else ""
-            alternatives = place.alternatives if tables[0] in place.alternatives else tables
+            alternatives = location.alternatives if tables[0] in location.alternatives else tables
             annotation = field.annotation if field else None
-            place = replace(
+            location = replace(
                 here,
                 annotation=annotation,
                 description=description,
                 table=tables[0],
                 alternatives=alternatives,
             )
-        elif (entries := _entries(place.annotation, step)) is not None:
+        elif (entries := _entries(location.annotation, step)) is not None:
             keys, annotation = entries
-            description = place.description.partition(", each ")[2] or place.description
-            place = replace(here, annotation=annotation, description=description, keys=keys)
+            description = location.description.partition(", each ")[2] or location.description
+            location = replace(here, annotation=annotation, description=description, keys=keys)
         else:
             break
-    return place
+    return location
 
 
-def _unknown_key(place: _Place) -> tuple[Problem, str]:
+def _unknown_key(location: _Location) -> tuple[Problem, str]:
     """The problem, and the key that was probably meant ("" if unclear)."""
-    assert place.table is not None, "only tables have unknown keys"
-    key, where, accepted = str(place.path[-1]), dotted(place.path), ", ".join(place.table.model_fields)
-    if any(key in table.model_fields for table in place.alternatives):
-        tag = _tags(place.table)[0]
-        return Problem(where, place.value, f"not used by {tag!r}; accepted: {accepted}"), ""
-    unknown = f"unknown key{choice(key, place.table.model_fields, 'accepted')}"
-    return Problem(where, None, unknown), nearest(key, place.table.model_fields)
+    assert location.table is not None, "only tables have unknown keys"
+    key, where, accepted = str(location.path[-1]), dotted(location.path), ", ".join(location.table.model_fields)
+    if any(key in table.model_fields for table in location.alternatives):
+        tag = _tags(location.table)[0]
+        return Problem(where, location.value, f"not used by {tag!r}; accepted: {accepted}"), ""
+    unknown = f"unknown key{choice(key, location.table.model_fields, 'accepted')}"
+    return Problem(where, None, unknown), nearest(key, location.table.model_fields)
 
 
-def _bad_key(place: _Place) -> Problem:
-    where, key = dotted(place.path), str(place.path[-1])
-    if place.keys:
-        return Problem(where, None, f"unknown key{choice(key, place.keys, 'accepted')}")
+def _bad_key(location: _Location) -> Problem:
+    where, key = dotted(location.path), str(location.path[-1])
+    if location.keys:
+        return Problem(where, None, f"unknown key{choice(key, location.keys, 'accepted')}")
     return Problem(where, None, f"not a name; a name is {NAME_RULE}")
 
 
-def _bad_tag(place: _Place) -> Problem:
-    tables = _tables(place.annotation)
+def _bad_tag(location: _Location) -> Problem:
+    tables = _tables(location.annotation)
     tag = next(name for name, field in tables[0].model_fields.items() if _words(field.annotation))
-    where, given = dotted((*place.path, tag)), _item(place.value, tag)
+    where, given = dotted((*location.path, tag)), _item(location.value, tag)
     accepted = tables[0].model_fields[tag].description
     if given is None:
         return Problem(where, None, f"missing – give {accepted}")
@@ -145,21 +145,21 @@ def _bad_tag(place: _Place) -> Problem:
     return Problem(where, given, f"must be {accepted}{did_you_mean(suggestion)}")
 
 
-def _bad_value(place: _Place) -> Problem:
-    where, given = dotted(place.path), place.value
-    tables = _tables(place.annotation)
+def _bad_value(location: _Location) -> Problem:
+    where, given = dotted(location.path), location.value
+    tables = _tables(location.annotation)
     if len(tables) == 1 and not isinstance(given, Mapping):
         return Problem(where, given, f"must be a table with the keys {', '.join(tables[0].model_fields)}")
-    return Problem(where, given, f"must be {place.description}{_hint(place)}")
+    return Problem(where, given, f"must be {location.description}{_hint(location)}")
 
 
-def _hint(place: _Place) -> str:
+def _hint(location: _Location) -> str:
     """What probably went wrong with a value of the wrong kind, "" if unclear."""
-    given, number = place.value, "number" in place.description
+    given, number = location.value, "number" in location.description
     if isinstance(given, str):
         if number and _NUMBER.fullmatch(given.strip()):
             return "; write it without quotes"
-        return did_you_mean(nearest(given, _words(place.annotation)))
+        return did_you_mean(nearest(given, _words(location.annotation)))
     if number and isinstance(given, float) and not math.isfinite(given):
         return "; it must be finite"
     if number and isinstance(given, float) and abs(given) > MOST:
@@ -170,7 +170,7 @@ def _hint(place: _Place) -> str:
             return "; all of them must be finite"
         if any(abs(item) > MOST for item in items):
             return f"; at most {MOST:g} can be computed with"
-    if "whole number" in place.description and isinstance(given, float) and given.is_integer():
+    if "whole number" in location.description and isinstance(given, float) and given.is_integer():
         return "; write it without a decimal point"
     return ""
 

@@ -18,7 +18,7 @@ from .matrix_checks import MU
 from .messages import problems_of
 from .oddities import oddities
 from .overrides import apply, split_path
-from .points import Place, PointRef, nearest, parse_place, parse_point
+from .points import Location, PointRef, nearest, parse_location, parse_point
 from .schema import (
     DEFAULT_PHASES,
     ENTRIES,
@@ -146,9 +146,9 @@ class Case(Table):
         """The point that "body.point" or "body@distance" names. Raises CaseError at `where` if none."""
         return parse_point(reference, self.bodies, where)
 
-    def place(self, reference: str, *, where: str = "at") -> Place:
+    def location(self, reference: str, *, where: str = "at") -> Location:
         """The point or the boundary that a reference names. Raises CaseError at `where` if none."""
-        return parse_place(reference, self.bodies, where)
+        return parse_location(reference, self.bodies, where)
 
     @property
     def dimension(self) -> int:
@@ -206,7 +206,7 @@ class Case(Table):
         table = self.contacts[contact]
         if table.side is not None:
             return 1 if table.side == "left" else -1
-        slave, master = self.bodies[self.place(table.slave).body], self.bodies[table.master]
+        slave, master = self.bodies[self.location(table.slave).body], self.bodies[table.master]
         assert isinstance(slave, BeamBody), "checked: others name their side"
         assert isinstance(master, BeamBody), "checked: only beams have sides"
         return slave_side(slave, master)
@@ -273,8 +273,8 @@ def _sound(data: Mapping[str, Any], error: ValidationError) -> Parts:
 def _in_file_order(problems: list[Problem]) -> list[Problem]:
     order = list(Case.model_fields)
 
-    def place(problem: Problem) -> int:
+    def rank(problem: Problem) -> int:
         head = problem.where.split(".")[0]
         return order.index(head) if head in order else -1
 
-    return sorted(problems, key=place)
+    return sorted(problems, key=rank)

@@ -25,7 +25,7 @@ from .bodies import (
 )
 from .checks import signed_distance
 from .extent import extent_of
-from .points import BoundaryRef, PointRef, parse_place
+from .points import BoundaryRef, PointRef, parse_location
 from .schema import Load
 from .usual import LENGTH, unusual
 
@@ -54,7 +54,7 @@ def oddities(case: Case) -> Iterator[str]:
         for name, entry in getattr(case, table).items():
             yield from unusual(entry, f"{table}.{name}", scaled=scaled)
     for name, contact in case.contacts.items():
-        area = isinstance(parse_place(contact.slave, case.bodies), BoundaryRef)
+        area = isinstance(parse_location(contact.slave, case.bodies), BoundaryRef)
         yield from unusual(contact, f"contacts.{name}", scaled=scaled, area=area)
     for table in ("ties", "springs", "dashpots"):
         for name, entry in getattr(case, table).items():
@@ -136,8 +136,8 @@ def _loads(case: Case) -> Iterator[str]:
     for name, load in case.loads.items():
         if load.at is None:
             continue
-        place = parse_place(load.at, case.bodies)
-        body = case.bodies[place.body]
+        location = parse_location(load.at, case.bodies)
+        body = case.bodies[location.body]
         if not isinstance(body, BeamBody | SolidBody) or body.material is None:
             continue
         material = case.materials[body.material]
@@ -149,7 +149,7 @@ def _loads(case: Case) -> Iterator[str]:
                 beyond = "beyond" if stress > modulus else f"{100 * stress / modulus:.0f} % of"
                 yield (
                     f"loads.{name}.{what}: a stress of {'' if what == 'pressure' else 'at least '}{stress:.4g} Pa is "
-                    f"{beyond} Young's modulus of {place.body}, {modulus:g} Pa; linear elasticity holds for small "
+                    f"{beyond} Young's modulus of {location.body}, {modulus:g} Pa; linear elasticity holds for small "
                     "strain: check the units of load and modulus"
                 )
 
@@ -271,7 +271,7 @@ def _beams(case: Case) -> Iterator[str]:
             ratio = body.length_m / body.thickness
             yield f"bodies.{name}: only {ratio:.3g} times as long as thick; shear matters, and is neglected"
     for name, contact in case.contacts.items():
-        slave = parse_place(contact.slave, case.bodies)
+        slave = parse_location(contact.slave, case.bodies)
         body, master = case.bodies[slave.body], case.bodies.get(contact.master)
         if not (isinstance(slave, PointRef) and isinstance(body, BeamBody) and isinstance(master, BeamBody)):
             continue
@@ -282,7 +282,7 @@ def _beams(case: Case) -> Iterator[str]:
 
 def _idle_sliding(case: Case) -> Iterator[str]:
     """Material that slides through its mesh where nothing touches it."""
-    touched = {place.partition(".")[0] for c in case.contacts.values() for place in (c.slave, c.master)}
+    touched = {reference.partition(".")[0] for c in case.contacts.values() for reference in (c.slave, c.master)}
     for name, body in case.bodies.items():
         if getattr(body, "sliding", None) is not None and name not in touched:
             yield f"bodies.{name}.sliding: no contact touches {name}, so that it has no effect"

@@ -37,11 +37,11 @@ def outsized(data: dict[str, Any]) -> list[Problem]:
             found.append(Problem(path, None, f"nested too deeply; at most {DEEPEST} tables or lists in each other"))
         elif isinstance(value, dict):
             for key, item in cast("dict[str, Any]", value).items():
-                place = f"{path}.{key}" if path else key
+                key_path = f"{path}.{key}" if path else key
                 if len(key) > LONGEST_KEY:
-                    found.append(Problem(place, None, f"a key of {len(key)} letters; at most {LONGEST_KEY}"))
+                    found.append(Problem(key_path, None, f"a key of {len(key)} letters; at most {LONGEST_KEY}"))
                 else:
-                    left.append((place, item, depth + 1))
+                    left.append((key_path, item, depth + 1))
         elif isinstance(value, list):
             left.extend((f"{path}.{k}", item, depth + 1) for k, item in enumerate(cast("list[Any]", value)))
         elif isinstance(value, int) and value.bit_length() > MOST_BITS:

@@ -98,10 +98,10 @@ def apply(data: dict[str, Any], path: tuple[str, ...], value: object) -> list[Pr
     return []
 
 
-def _put(place: Any, key: str | int, value: object) -> None:
-    place[key] = value
+def _put(container: Any, key: str | int, value: object) -> None:
+    container[key] = value
     if value is None:
-        del place[key]
+        del container[key]
 
 
 def _number(items: list[Any], step: str) -> int | None:

@@ -40,26 +40,26 @@ class BoundaryRef:
     boundary: str
 
 
-Place = PointRef | BoundaryRef
+Location = PointRef | BoundaryRef
 
 
 def parse_point(reference: str, bodies: Mapping[str, AnyBody], where: str = "point") -> PointRef:
     """The point that a reference names. Raises CaseError at `where` if there is no such point."""
-    place = parse_place(reference, bodies, where, boundary=False)
-    if isinstance(place, PointRef):
-        return place
-    body = bodies[place.body]
+    location = parse_location(reference, bodies, where, boundary=False)
+    if isinstance(location, PointRef):
+        return location
+    body = bodies[location.body]
     points = list(getattr(body, "points", ()))
-    known = [f"{place.body}.{name}" for name in points]
-    have = f"{place.body} has: {', '.join(known)}" if known else f"give one in bodies.{place.body}.points"
-    if isinstance(body, SolidBody) and place.boundary in boundary_names(body):
+    known = [f"{location.body}.{name}" for name in points]
+    have = f"{location.body} has: {', '.join(known)}" if known else f"give one in bodies.{location.body}.points"
+    if isinstance(body, SolidBody) and location.boundary in boundary_names(body):
         raise CaseError(where, reference, f"a boundary, where a point is wanted; {have}")
-    raise CaseError(where, reference, f"no such point{did_you_mean(nearest(place.boundary, points))}; {have}")
+    raise CaseError(where, reference, f"no such point{did_you_mean(nearest(location.boundary, points))}; {have}")
 
 
-def parse_place(
+def parse_location(
     reference: str, bodies: Mapping[str, AnyBody], where: str = "at", *, boundary: bool = True
-) -> Place:
+) -> Location:
     """The point or the boundary that a reference names. Raises CaseError at `where` if there is none.
 
     Whether the mesh of a file has the boundary shows when it is read. boundary False: messages do not offer one.
@@ -107,7 +107,7 @@ def _first_point(body: AnyBody | None, *, boundary: bool) -> str:
     return MASS_POINT if isinstance(body, MassBody) else "start"
 
 
-def _of_solid(reference: str, name: str, body: SolidBody, point: str, where: str, *, boundary: bool) -> Place:
+def _of_solid(reference: str, name: str, body: SolidBody, point: str, where: str, *, boundary: bool) -> Location:
     if not point:
         raise CaseError(where, reference, f'a solid has no axis; name a point in bodies.{name}.points')
     if point in body.points:
@@ -120,7 +120,7 @@ def _of_solid(reference: str, name: str, body: SolidBody, point: str, where: str
     return BoundaryRef(name, point)
 
 
-def _of_matrices(reference: str, name: str, body: MatrixBody, point: str, where: str) -> Place:
+def _of_matrices(reference: str, name: str, body: MatrixBody, point: str, where: str) -> Location:
     if point in body.points:
         at = body.points[point]
         return PointRef(name, 0.0, None, at) if isinstance(at, int) else PointRef(name, 0.0, at)

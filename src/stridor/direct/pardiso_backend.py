@@ -74,7 +74,7 @@ class PardisoFactor:
 def _with_diagonal(upper: Sparse) -> Sparse:
     """The same matrix (csr) with an entry, be it zero, in every place of the diagonal."""
     entries = upper.tocoo()
-    places = np.arange(upper.shape[0])
-    row, column = np.concatenate([entries.row, places]), np.concatenate([entries.col, places])
-    data = np.concatenate([entries.data, np.zeros(len(places), dtype=upper.dtype)])
+    diagonal = np.arange(upper.shape[0])
+    row, column = np.concatenate([entries.row, diagonal]), np.concatenate([entries.col, diagonal])
+    data = np.concatenate([entries.data, np.zeros(len(diagonal), dtype=upper.dtype)])
     return sp.csr_array(sp.coo_array((data, (row, column)), shape=upper.shape).tocsr())

@@ -55,8 +55,8 @@ def node_graph(cells: IntArray, nodes: int) -> Graph:
     indptr = np.zeros(nodes + 1, dtype=np.int64)
     for node in range(nodes):
         met = 0
-        for place in range(first[node], first[node + 1]):
-            for other in cells[around[place]]:
+        for entry in range(first[node], first[node + 1]):
+            for other in cells[around[entry]]:
                 if seen[other] != node:
                     seen[other] = node
                     met += 1
@@ -65,8 +65,8 @@ def node_graph(cells: IntArray, nodes: int) -> Graph:
     seen[:] = -1
     for node in range(nodes):
         at = indptr[node]
-        for place in range(first[node], first[node + 1]):
-            for other in cells[around[place]]:
+        for entry in range(first[node], first[node + 1]):
+            for other in cells[around[entry]]:
                 if seen[other] != node:
                     seen[other] = node
                     indices[at] = other
@@ -86,16 +86,16 @@ def spread(graph: Graph, values: Array, d: int) -> tuple[IntArray, IntArray, Arr
     at = 0
     for node in range(nodes):
         for i in range(d):
-            for place in range(indptr[node], indptr[node + 1]):
-                columns[at] = d * indices[place] + i
-                data[at] = values[place]
+            for entry in range(indptr[node], indptr[node + 1]):
+                columns[at] = d * indices[entry] + i
+                data[at] = values[entry]
                 at += 1
             wide[d * node + i + 1] = at
     return wide, columns, data
 
 
 @njit(cache=True)
-def _place(graph: Graph, row: int, column: int) -> int:
+def _entry(graph: Graph, row: int, column: int) -> int:
     """Where the pair (row, column) is, by bisection."""
     indptr, indices = graph
     low, high = indptr[row], indptr[row + 1] - 1
@@ -212,7 +212,7 @@ def add_stiffness(cells: Cells, lame: float, shear: float, graph: Graph, blocks:
                 products[p, r] = products[r, p]
         for a in range(n):
             for b in range(n):
-                block = blocks[_place(graph, nodes[a], nodes[b])]
+                block = blocks[_entry(graph, nodes[a], nodes[b])]
                 trace = 0.0
                 for i in range(d):
                     trace += products[a * d + i, b * d + i]
@@ -310,4 +310,4 @@ def _add_numbers(local: Array, nodes: IntArray, graph: Graph, numbers: Array) ->
     """Add a cell's matrix (n, n), of which the upper triangle is given, to numbers (pairs,)."""
     for a in range(len(nodes)):
         for b in range(len(nodes)):
-            numbers[_place(graph, nodes[a], nodes[b])] += local[min(a, b), max(a, b)]
+            numbers[_entry(graph, nodes[a], nodes[b])] += local[min(a, b), max(a, b)]

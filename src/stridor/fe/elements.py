@@ -97,7 +97,7 @@ def element(kind: str) -> Element:
 
     description = _KINDS[kind]
     library = getattr(skfem, description.library_name)()
-    nodes = _places(description)
+    nodes = _node_points(description)
     order = _order(nodes, np.asarray(library.doflocs, dtype=float))
 
     def rule(degree: int) -> Rule:
@@ -115,7 +115,7 @@ def element(kind: str) -> Element:
     return Element(kind, nodes, rule(description.stiffness_degree), rule(description.mass_degree))
 
 
-def _places(description: _Description) -> Array:
+def _node_points(description: _Description) -> Array:
     """Reference places (n, d) of the nodes, in the order of VTK."""
     corners = np.array(description.corners, dtype=float)
     return np.array([*corners, *(corners[list(group)].mean(axis=0) for group in description.between)])

@@ -200,8 +200,8 @@ def _where(mesh: Mesh) -> str:
     return mesh.source or "mesh"
 
 
-def _folded(places: Array) -> str:
-    centre = ", ".join(f"{x:.4g}" for x in places.mean(axis=0))
+def _folded(points: Array) -> str:
+    centre = ", ".join(f"{x:.4g}" for x in points.mean(axis=0))
     return (
         f"this cell around ({centre}) m is flat or folds over itself; check the order of its nodes (VTK's), nodes that "
         "coincide, and how far the nodes between corners have moved"

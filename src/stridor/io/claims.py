@@ -41,21 +41,21 @@ def claimed(folder: Path, parts: Sequence[str] = (), *, where: str = "--out") ->
     another process is at it.
     """
     made = _make(folder, where)
-    place = folder.resolve()
-    if place in _own:
+    resolved = folder.resolve()
+    if resolved in _own:
         yield folder
         return
     for part in parts:
         if os.path.lexists(folder / part) and not (folder / part).is_dir():
             _refuse(folder / part, where, "is a file" if (folder / part).exists() else "is a link to nothing")
     handle = _lock(folder, where)
-    _own.add(place)
+    _own.add(resolved)
     try:
         for each in (folder, *(folder / part for part in parts)):
             remove_remains(each)
         yield folder
     finally:
-        _own.discard(place)
+        _own.discard(resolved)
         with contextlib.suppress(OSError):
             (folder / NAME).unlink()
         os.close(handle)
@@ -151,10 +151,10 @@ def _process(holder: dict[str, Any]) -> Process:
 def _still_there(handle: int, path: Path) -> bool:
     """Whether the open file is the one in the folder: who had it before may have removed it since."""
     try:
-        there, mine = path.stat(), os.fstat(handle)
+        in_folder, mine = path.stat(), os.fstat(handle)
     except OSError:
         return False
-    return (there.st_dev, there.st_ino) == (mine.st_dev, mine.st_ino)
+    return (in_folder.st_dev, in_folder.st_ino) == (mine.st_dev, mine.st_ino)
 
 
 def _printable(value: object) -> str:

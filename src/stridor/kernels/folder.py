@@ -99,7 +99,7 @@ def kernel_folder() -> Folder | None:
     name = f"{sources.digest[:24]}-{platform_digest()[:12]}"
     started = int(cast("Any", sys.modules[PACKAGE]).STARTED_NS)
     problem = ""
-    for top, own in _places():
+    for top, own in _candidates():
         folder = Folder(os.path.join(top, name), sources, started)
         fresh = not os.path.isdir(folder.path)
         try:
@@ -121,7 +121,7 @@ def kernel_folder() -> Folder | None:
     return None
 
 
-def _places() -> Generator[tuple[str, bool], None, None]:
+def _candidates() -> Generator[tuple[str, bool], None, None]:
     """Folders to try, the best first, and whether it is one among others' temporary files, to be taken with care."""
     named, numbas = os.environ.get(VARIABLE), cast("str", cast("Any", config).CACHE_DIR)
     if named:
@@ -175,7 +175,7 @@ def _held(path: str, sources: Sources) -> Any:
         file.close()
         os.makedirs(os.path.dirname(path), exist_ok=True)
     if file.tell() == 0:
-        file.write(json.dumps({"program": PACKAGE, "place": sources.place, "sources": sources.digest}) + "\n")
+        file.write(json.dumps({"program": PACKAGE, "place": sources.location, "sources": sources.digest}) + "\n")
         file.flush()
     os.utime(path)
     return file
@@ -202,12 +202,12 @@ def _tidy(top: Path, present: str, sources: Sources, *, fresh: bool) -> None:
                 made = json.loads(about.read_text(encoding="utf-8"))
                 if made["program"] != PACKAGE:
                     continue
-                follows = made["place"] == sources.place and made["sources"] != sources.digest
+                follows = made["place"] == sources.location and made["sources"] != sources.digest
                 unused = (time.time() - about.stat().st_mtime) / DAY
                 if follows or unused > UNUSED_DAYS:
                     _remove(folder, certain=unused > UNUSED_DAYS)
         if fresh:
-            _remove_beside(Path(sources.place))
+            _remove_beside(Path(sources.location))
     except OSError:
         return  # tidiness is not worth a run
 

@@ -33,10 +33,10 @@ _SETTINGS = (
 
 @dataclass(frozen=True)
 class Sources:
-    """The package as it lies on the disk. place: its folder or archive; files: what to look at to see it change;
+    """The package as it lies on the disk. location: its folder or archive; files: what to look at to see it change;
     digest: of the names and contents of all its modules but those above what is compiled."""
 
-    place: str
+    location: str
     files: tuple[str, ...]
     digest: str
 
@@ -59,13 +59,13 @@ def read_sources() -> Sources | None:
     """The sources of the package that runs; None where they are not on the disk (frozen into a program)."""
     package = sys.modules[PACKAGE]
     loader: Any = getattr(package.__spec__, "loader", None)
-    places = list(package.__path__)
-    if len(places) != 1:
+    folders = list(package.__path__)
+    if len(folders) != 1:
         return None
     try:
         if isinstance(loader, zipimport.zipimporter):
-            return _from_archive(loader.archive, places[0])
-        return _from_folder(places[0])
+            return _from_archive(loader.archive, folders[0])
+        return _from_folder(folders[0])
     except (OSError, zipfile.BadZipFile):
         return None
 

@@ -72,17 +72,17 @@ def real_part(source: Source, values: Any) -> Any:
     return values
 
 
-def real_values(source: Source, values: Any, place: Callable[[int], str] = "value {}".format) -> Array:
+def real_values(source: Source, values: Any, location: Callable[[int], str] = "value {}".format) -> Array:
     """Finite doubles of the shape of values. Raises CaseError for what are no numbers, complex or not finite ones.
 
-    place: says in words where the k-th value stands, from 1.
+    location: says in words where the k-th value stands, from 1.
     """
     with np.errstate(over="ignore"):  # of long doubles; found below
         real = np.asarray(real_part(source, values), dtype=np.float64)
     finite = np.isfinite(real)
     if not np.all(finite):
         bad = int(np.flatnonzero(~finite.ravel())[0])
-        source.refuse(f"{place(bad + 1)} is {real.ravel()[bad]}; must be a finite number")
+        source.refuse(f"{location(bad + 1)} is {real.ravel()[bad]}; must be a finite number")
     return real
 
 
@@ -113,13 +113,13 @@ def check_size(source: Source, size: int, entries: int) -> None:
         source.refuse(f"claims {size} rows but holds only {held}; it must have broken off")
 
 
-def check_places(source: Source, row: IntArray, column: IntArray, size: int, first: int) -> None:
+def check_indices(source: Source, row: IntArray, column: IntArray, size: int, first: int) -> None:
     """Raises CaseError for entries (k,), counted from 0, outside of a matrix; first: what the file counts from."""
     wrong = np.flatnonzero((row < 0) | (row >= size) | (column < 0) | (column >= size))
     if len(wrong):
         at = int(wrong[0])
-        place = f"entry {at + 1} (row {row[at] + first}, column {column[at] + first})"
-        source.refuse(f"{place} lies outside of the matrix of {size} rows and columns, which are counted from {first}")
+        entry = f"entry {at + 1} (row {row[at] + first}, column {column[at] + first})"
+        source.refuse(f"{entry} lies outside of the matrix of {size} rows and columns, which are counted from {first}")
 
 
 def expanded(source: Source, pointers: Any, count: int, lines: int, first: int = 0) -> IntArray:

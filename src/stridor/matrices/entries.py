@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..typing import Array, IntArray, Sparse
-from .checks import check_places, check_size, real_part, real_values, square
+from .checks import check_indices, check_size, real_part, real_values, square
 from .source import Source
 
 # Halves that a program prints twice differ by rounding at most.
@@ -29,7 +29,7 @@ def assembled(
         many = f"{len(row)} rows, {len(column)} columns and {len(values)} values"
         source.refuse(f"holds {many} of entries; must be equal")
     check_size(source, size, len(values))
-    check_places(source, row, column, size, first)
+    check_indices(source, row, column, size, first)
     real = real_values(
         source, values, lambda k: f"the value at row {row[k - 1] + first}, column {column[k - 1] + first}"
     )
@@ -48,20 +48,20 @@ def from_dense(source: Source, values: Any) -> Sparse:
         source.refuse(f"is an array of {values.ndim} dimensions; must be a square matrix of 2")
     size = square(source, *values.shape)
     real = real_part(source, values)
-    turned = not real.flags.c_contiguous and real.T.flags.c_contiguous
-    lines = real.T if turned else real
+    transposed = not real.flags.c_contiguous and real.T.flags.c_contiguous
+    lines = real.T if transposed else real
     parts: list[Sparse] = []
     step = max(1, _BLOCK // size)
     for begin in range(0, size, step):
 
-        def place(k: int, begin: int = begin) -> str:
+        def location(k: int, begin: int = begin) -> str:
             line, other = divmod(k - 1, size)
-            at = (other, begin + line) if turned else (begin + line, other)
+            at = (other, begin + line) if transposed else (begin + line, other)
             return f"the value at row {at[0] + 1}, column {at[1] + 1}"
 
-        parts.append(_filled(real_values(source, lines[begin : begin + step], place)))
+        parts.append(_filled(real_values(source, lines[begin : begin + step], location)))
     matrix = sp.vstack(parts, format="csr") if len(parts) > 1 else parts[0]
-    matrix = sp.csr_array(matrix.T) if turned else matrix
+    matrix = sp.csr_array(matrix.T) if transposed else matrix
     matrix.sort_indices()
     return matrix
 

@@ -142,13 +142,13 @@ def _cut(source: Source, lines: list[bytes], layout: Format, count: int, before:
     if np.any(tabbed := np.any(text == 9, axis=1)):
         at = int(np.flatnonzero(tabbed)[0])
         source.refuse(f"line {before + at + 1} has a tab, but {layout.text} goes by columns; write blanks instead")
-    places = np.add.outer(np.array(layout.starts), np.arange(layout.width))
+    columns = np.add.outer(np.array(layout.starts), np.arange(layout.width))
     # Fortran would pass over these, be it a sign.
-    outside = np.delete(np.arange(wide), places.ravel())
+    outside = np.delete(np.arange(wide), columns.ravel())
     if np.any(beyond := np.any(text[:, outside] != 32, axis=1)):
         at = int(np.flatnonzero(beyond)[0])
         source.refuse(f"line {before + at + 1}: {quoted(lines[at])} has more in it than {layout.text} takes")
-    cells = text[:, places].reshape(-1, layout.width)
+    cells = text[:, columns].reshape(-1, layout.width)
 
     def refuse(at: int, reason: str) -> NoReturn:
         line = before + at // len(layout.starts) + 1

@@ -156,9 +156,9 @@ class Text:
 
     def values(self, header: Header, entries: Entries) -> tuple[IntArray, IntArray, Any]:
         """Row and column from 0 and value of each entry (k,), real or complex."""
-        rows, columns, places = entries.spread(header.parts)
+        rows, columns, offsets = entries.spread(header.parts)
         values = np.array(self._numbers)
-        return rows, columns, values[places] + 1j * values[places + 1] if header.parts == 2 else values[places]
+        return rows, columns, values[offsets] + 1j * values[offsets + 1] if header.parts == 2 else values[offsets]
 
     def _run(self, header: Header, entries: Entries, row: int, column: int, count: int) -> None:
         """Entries below one another; count: of numbers."""
@@ -276,17 +276,17 @@ class Binary:
         """Row and column from 0 and value of each entry (k,), real or complex."""
         size = 8 if self._word == 8 or header.kind in (2, 4) else 4
         kind = f"{self._order}f{size}"
-        rows, columns, places = entries.spread(size * header.parts)
-        values: Any = self._numbers(places, kind, size)
+        rows, columns, offsets = entries.spread(size * header.parts)
+        values: Any = self._numbers(offsets, kind, size)
         if header.parts == 2:
-            values = values + 1j * self._numbers(places + size, kind, size)
+            values = values + 1j * self._numbers(offsets + size, kind, size)
         return rows, columns, values
 
-    def _numbers(self, places: IntArray, kind: str, size: int) -> Array:
+    def _numbers(self, offsets: IntArray, kind: str, size: int) -> Array:
         """Numbers that begin at these bytes: words need not lie at multiples of their size."""
         words = np.frombuffer(self._data, dtype=np.uint8, count=len(self._data) // 4 * 4).view(np.uint32)
         # Every record and every word is a multiple of 4 bytes long, so is where it begins.
-        index = places // 4
+        index = offsets // 4
         if size == 4:
             return words[index].view(kind).astype(np.float64)
         pairs = np.stack([words[index], words[index + 1]], axis=1)

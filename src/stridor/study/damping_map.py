@@ -272,8 +272,8 @@ class _Table:
                     f"{self._place(i, j)}: the reduced model's onset is {off:.1e} off, where {before.error:.1e} was "
                     'estimated; take a smaller bound, or method="full"'
                 )
-            place = float(self.xs[i]), float(self.ys[j])
-            self.confirmed.append(Confirmed(*place, after.mu, before.mu, after.residual))
+            point = float(self.xs[i]), float(self.ys[j])
+            self.confirmed.append(Confirmed(*point, after.mu, before.mu, after.residual))
             self._take(i, j, after)
         return self._summary(search)
 
@@ -307,8 +307,8 @@ class _Table:
         lowest, worst = np.where(open_, -self.mu, -np.inf), np.where(open_ & np.isfinite(self.error), self.error, -1.0)
         ends = [(i, j) for i in (0, len(self.xs) - 1) for j in (0, len(self.ys) - 1)]
         chosen = [np.unravel_index(int(np.argmax(table)), table.shape) for table in (lowest, worst)]
-        places = [(int(i), int(j)) for i, j in chosen] + [place for place in ends if open_[place]]
-        return list(dict.fromkeys(places))
+        indices = [(int(i), int(j)) for i, j in chosen] + [index for index in ends if open_[index]]
+        return list(dict.fromkeys(indices))
 
     def _found(self, i: int, j: int) -> LowestOnset:
         slopes = float(self.slope_x[i, j]), float(self.slope_y[i, j])

@@ -125,8 +125,8 @@ def _sudden(case: Case) -> list[str]:
     for number, phase in enumerate(case.phases):
         after = {name: phase.displacements.get(name, b if number else 1.0) for name, b in before.items()}
         jumps = [name for name in after if after[name] != before[name]]
-        settled = number == 0 and case.temporal.initial == "steady-sliding"
-        if phase.ramp == 0 and jumps and not settled:
+        starts_steady = number == 0 and case.temporal.initial == "steady-sliding"
+        if phase.ramp == 0 and jumps and not starts_steady:
             found.append(
                 f"phase {phase.name}: {', '.join(jumps)} goes all of its distance in one step, a blow in simulate; "
                 "give the phase a ramp, or start from steady sliding"

@@ -48,7 +48,7 @@ class Ranking:
         linear = self.linear
         built = build_bodies(linear.case)
         found: list[Measure] = []
-        for body, places, d in drawn_bodies(linear.system):
+        for body, points, d in drawn_bodies(linear.system):
             translation = np.zeros(built[body.name].size)
             translation[:: built[body.name].stride] = 1.0
             whole = float(translation @ (built[body.name].mass @ translation))
@@ -56,7 +56,7 @@ class Ranking:
             best = int(np.argmin(slopes[self.aimed].real.sum(axis=0)))
             mass = 0.01 * self.percent * whole
             measure = self._measure("added mass", body.name, 1, self.percent, mass * slopes[:, best])
-            at = tuple(float(x) for x in places[best])
+            at = tuple(float(x) for x in points[best])
             found.append(replace(measure, position=at, mass=mass))
         return found
 

@@ -70,9 +70,9 @@ def _changed(linear: Linearised, measure: Measure) -> System:
 
 def _heavier(system: System, measure: Measure) -> System:
     assert measure.mass is not None, "made so"
-    for body, places, d in drawn_bodies(system):
+    for body, points, d in drawn_bodies(system):
         if body.name == measure.name:
-            node = int(np.argmin(np.linalg.norm(places - np.array(measure.position), axis=1)))
+            node = int(np.argmin(np.linalg.norm(points - np.array(measure.position), axis=1)))
             rows = body.rows.free[node * d : node * d + d]
             return replace(system, mass=system.mass + measure.mass * (rows.T @ rows))
     raise AssertionError("a body that was there")

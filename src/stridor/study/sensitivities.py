@@ -84,8 +84,8 @@ class Sensitivities:
     def exceptional_distance(self) -> Array:
         """|exceptional − value| / |value| (k, b), inf where none is in sight."""
         size = np.abs(self.values)[:, None]
-        away = np.abs(self.exceptional - self.values[:, None])
-        found = np.divide(away, size, out=np.full(away.shape, np.inf), where=size > 0)
+        distance = np.abs(self.exceptional - self.values[:, None])
+        found = np.divide(distance, size, out=np.full(distance.shape, np.inf), where=size > 0)
         return np.where(np.isnan(found), np.inf, found)
 
     @property
@@ -196,12 +196,12 @@ def sensitivities(
     found = [linear.known(b) for b in columns]
     derivative = _derivatives(found, changes)
     exceptional = np.full(derivative.shape, np.nan + 0j)
-    for place, b in enumerate(columns):
+    for column, b in enumerate(columns):
         other = linear.neighbour(b)
         partner = None if other is None else linear.mode(other)
-        if partner is not None and min(partner.condition, found[place].condition) > BENT:
+        if partner is not None and min(partner.condition, found[column].condition) > BENT:
             slopes = _derivatives([partner], changes)[:, 0]
-            exceptional[:, place] = _meeting(values, found[place], partner, derivative[:, place], slopes)
+            exceptional[:, column] = _meeting(values, found[column], partner, derivative[:, column], slopes)
     result = Sensitivities(
         mu=linear.mu,
         parameters=tuple(parameters),
@@ -243,14 +243,14 @@ def _meeting(values: Array, mode: Mode, other: Mode, own: ComplexArray, theirs: 
 def _divergence(result: Sensitivities) -> list[str]:
     """Sentences about modes whose derivatives hold for next to no change."""
     told: list[str] = []
-    away = result.exceptional_distance
+    distance = result.exceptional_distance
     for b, branch in enumerate(result.branch):
         name = f"mode {branch} ({measured(result.frequency_hz[b], 1)} Hz)"
         condition = f"condition number {result.condition[b]:.3g}"
-        near = [k for k in range(len(result.parameters)) if away[k, b] < NEAR]
+        near = [k for k in range(len(result.parameters)) if distance[k, b] < NEAR]
         if near:
             where = ", ".join(
-                f"{result.parameters[k]} = {result.exceptional[k, b].real:.5g} ({100 * away[k, b]:.2g} % away)"
+                f"{result.parameters[k]} = {result.exceptional[k, b].real:.5g} ({100 * distance[k, b]:.2g} % away)"
                 for k in near
             )
             told.append(
@@ -395,8 +395,8 @@ def number_at(case: Case, path: str) -> float:
         if isinstance(node, list):
             items = cast("list[Any]", node)
             names = [cast("dict[str, Any]", item).get("name") for item in items if isinstance(item, dict)]
-            place = names.index(step) if step in names else int(step) if step.isdecimal() else -1
-            node = items[place] if 0 <= place < len(items) else None
+            index = names.index(step) if step in names else int(step) if step.isdecimal() else -1
+            node = items[index] if 0 <= index < len(items) else None
         else:
             node = cast("dict[str, Any]", node).get(step) if isinstance(node, dict) else None
     if not isinstance(node, float):

@@ -24,7 +24,7 @@ from .holders import holders_of
 from .links import Links, links_of
 from .load_steps import LoadStep
 from .model import CubicSprings, Line, Solid, System
-from .motion import PrescribedMotion, Structure, constrain, place_name
+from .motion import PrescribedMotion, Structure, constrain, distance_name
 from .pairs import is_point_on_line, point_contact, surface_contact
 from .supports import Tied, constraints_of, tie_matrix
 from .view import View
@@ -134,7 +134,7 @@ def _translations(bodies: Mapping[str, BuiltBody], total: int) -> Array:
 def _with_sliding(case: Case, motion: PrescribedMotion) -> PrescribedMotion:
     """Bodies that slide through their mesh, and contacts that overlap, as motions that move no freedom."""
     sliding = tuple(name for name in case.moving if name not in motion.names)
-    overlapping = tuple(place_name("contacts", name) for name, c in case.contacts.items() if c.interference)
+    overlapping = tuple(distance_name("contacts", name) for name, c in case.contacts.items() if c.interference)
     names = (*sliding, *overlapping)
     if not names:
         return motion
@@ -156,7 +156,7 @@ def _with_sliding(case: Case, motion: PrescribedMotion) -> PrescribedMotion:
         own(motion.mass_own),
         own(motion.damping_own),
         own(motion.stiffness_own),
-        (*motion.places.tolist(), *(0.0 for _ in sliding), *(1.0 for _ in overlapping)),
+        (*motion.full_distance.tolist(), *(0.0 for _ in sliding), *(1.0 for _ in overlapping)),
     )
 
 
@@ -176,7 +176,7 @@ def _load(case: Case, view: View, name: str, load: Load) -> Array:
     if load.acts_on_bodies:
         return body_load(case, view, name, load)
     assert load.at is not None, "checked"
-    at = case.place(load.at)
+    at = case.location(load.at)
     body = view.bodies[at.body]
     if not isinstance(at, BoundaryRef):
         rows = view.point_rows(case, load.at).free
@@ -228,13 +228,13 @@ def _dof_names(bodies: Mapping[str, BuiltBody]) -> list[str]:
 def _stress_stiffness(case: Case, view: View) -> Callable[..., Sparse] | None:
     """Geometric stiffness on the free freedoms from the stresses of a displacement (n,), None without solids.
 
-    place (p,): factors of the supports that are pressed away."""
+    distances (p,): factors of the supports that are pressed away."""
     solids = [body for body in view.bodies.values() if body.mesh is not None and body.material is not None]
     if not solids:
         return None
     rows: dict[str, Rows] = {body.name: view.node_rows(body) for body in solids}
 
-    def stiffness(displacement: Array, place: Array | None = None) -> Sparse:
+    def stiffness(displacement: Array, distances: Array | None = None) -> Sparse:
         total = sp.csr_array((len(view.free), len(view.free)))
         for body in solids:
             table = case.bodies[body.name]
@@ -243,8 +243,8 @@ def _stress_stiffness(case: Case, view: View) -> Callable[..., Sparse] | None:
             assert body.material is not None, "solids have a material"
             own, lift = rows[body.name].free, rows[body.name].lift
             moved = own @ displacement
-            if place is not None:
-                moved = moved + (lift - own @ view.motion.lift) @ place
+            if distances is not None:
+                moved = moved + (lift - own @ view.motion.lift) @ distances
             matrix = stress_stiffness(
                 body.mesh,
                 body.material,

@@ -57,7 +57,7 @@ def _normals(
 
 
 def _slave_freedoms(case: Case, view: View, reference: str, where: str) -> IntArray:
-    at = case.place(reference)
+    at = case.location(reference)
     body = view.bodies[at.body]
     if isinstance(at, BoundaryRef):
         return body.displacements(boundary_nodes(body, at, where)).ravel()

@@ -80,7 +80,7 @@ def load_matrices(case: Case, name: str, body: MatrixBody, mu: float | None = No
     Raises CaseError for files that will not do, matrices that do not fit together or into the mesh, and points that are
     none.
     """
-    return _placed(case, name, body, mu)[0]
+    return _with_indices(case, name, body, mu)[0]
 
 
 def load_shares(case: Case, name: str, body: MatrixBody, mu: float | None = None) -> tuple[Share, ...]:
@@ -89,13 +89,13 @@ def load_shares(case: Case, name: str, body: MatrixBody, mu: float | None = None
     Raises CaseError as `load_matrices`, and where a freedom has entries in no other term than those with a factor of
     zero, so that the body lacks it.
     """
-    found, terms, place = _placed(case, name, body, mu)
+    found, terms, index = _with_indices(case, name, body, mu)
     size = found.mass.shape[0]
-    moved = [_moved(share.matrix, place, size) for share in terms.shares]
+    moved = [_moved(share.matrix, index, size) for share in terms.shares]
     present = np.ones(size, dtype=bool)
     present[found.lacking] = False
     held = np.zeros(size, dtype=bool)
-    held[held_freedoms(_moved(terms.stiffness, place, size))] = True
+    held[held_freedoms(_moved(terms.stiffness, index, size))] = True
     lost = _present(moved) & ~present & ~held
     if lost.any():
         accepted = (
@@ -113,15 +113,15 @@ def load_shares(case: Case, name: str, body: MatrixBody, mu: float | None = None
     return tuple(replace(share, matrix=matrix) for share, matrix in zip(terms.shares, moved, strict=True))
 
 
-def _placed(case: Case, name: str, body: MatrixBody, mu: float | None) -> tuple[Imported, Terms, IntArray]:
+def _with_indices(case: Case, name: str, body: MatrixBody, mu: float | None) -> tuple[Imported, Terms, IntArray]:
     """The body, the terms it is made of, and the local freedom (n,) of each of their rows."""
     where = f"bodies.{name}"
     terms = load_terms(case, name, body, mu)
     mesh = None if body.mesh is None else _mesh(where, body)
     numbers = _node_numbers(where, body, terms.labels, mesh)
-    place, extra = _places(where, body, terms.labels, numbers, terms.mass.shape[0], mesh)
+    index, extra = _indices(where, body, terms.labels, numbers, terms.mass.shape[0], mesh)
     size = body.dimension * len(numbers) + len(extra)
-    matrices = [_moved(getattr(terms, role), place, size) for role in ROLES]
+    matrices = [_moved(getattr(terms, role), index, size) for role in ROLES]
     present = _present(matrices)
     held = held_freedoms(matrices[2])
     present[held] = False
@@ -135,7 +135,7 @@ def _placed(case: Case, name: str, body: MatrixBody, mu: float | None) -> tuple[
     mass, damping, stiffness = (cleaned(m) for m in matrices)
     found = Imported(mass, damping, stiffness, points, numbers, np.flatnonzero(~present), tuple(extra), mesh)
     _check_points(where, body, found, terms.labels, present)
-    return found, terms, place
+    return found, terms, index
 
 
 def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None) -> Terms:
@@ -281,7 +281,7 @@ def _node_numbers(where: str, body: MatrixBody, labels: Labels | None, mesh: Mes
     return mesh.numbers
 
 
-def _places(
+def _indices(
     where: str, body: MatrixBody, labels: Labels | None, numbers: IntArray, size: int, mesh: Mesh | None
 ) -> tuple[IntArray, list[str]]:
     """Local freedom (n,) of each row of the matrices, and the names of those that are no displacement of a node."""
@@ -294,11 +294,11 @@ def _places(
     node = order[at] if len(numbers) else np.zeros(size, dtype=np.int64)
     known = numbers[node] == labels.node if len(numbers) else np.zeros(size, dtype=bool)
     moves = known & (labels.direction >= 1) & (labels.direction <= d)
-    place = np.empty(size, dtype=np.int64)
-    place[moves] = d * node[moves] + labels.direction[moves] - 1
-    place[~moves] = d * len(numbers) + np.arange(np.count_nonzero(~moves))
+    index = np.empty(size, dtype=np.int64)
+    index[moves] = d * node[moves] + labels.direction[moves] - 1
+    index[~moves] = d * len(numbers) + np.arange(np.count_nonzero(~moves))
     rest = zip(labels.node[~moves].tolist(), labels.direction[~moves].tolist(), strict=True)
-    return place, [_extra_name(name, node, direction) for node, direction in rest]
+    return index, [_extra_name(name, node, direction) for node, direction in rest]
 
 
 def _extra_name(name: str, node: int, direction: int) -> str:
@@ -308,9 +308,9 @@ def _extra_name(name: str, node: int, direction: int) -> str:
     return f"{name} node {node} {_DIRECTIONS[direction] if known else f'freedom {direction}'}"
 
 
-def _moved(matrix: Sparse, place: IntArray, size: int) -> Sparse:
+def _moved(matrix: Sparse, index: IntArray, size: int) -> Sparse:
     coo = sp.coo_array(matrix)
-    return sp.csr_array(sp.coo_array((coo.data, (place[coo.row], place[coo.col])), shape=(size, size)))
+    return sp.csr_array(sp.coo_array((coo.data, (index[coo.row], index[coo.col])), shape=(size, size)))
 
 
 def _present(matrices: list[Sparse]) -> BoolArray:

@@ -91,11 +91,11 @@ def _refuse_absurd(mesh: Mesh, where: str, body: SolidBody) -> None:
         if body.file is not None:
             raise CaseError(f"{where}.file", shown_path(Path(body.file)), accepted)
         raise CaseError(f"{where}.mesh", None, accepted)
-    away = float(np.abs(mesh.points).max(initial=0.0))
-    if away > _FARTHEST * extent:
+    distance = float(np.abs(mesh.points).max(initial=0.0))
+    if distance > _FARTHEST * extent:
         accepted = (
-            f"lies {away:.3g} m from the origin, with an extent of {extent:.3g} m: rounding would bend it; move the "
-            "bodies of the case nearer to the origin"
+            f"lies {distance:.3g} m from the origin, with an extent of {extent:.3g} m: rounding would bend it; move "
+            "the bodies of the case nearer to the origin"
         )
         raise CaseError(where, None, accepted)
     for point in body.points:

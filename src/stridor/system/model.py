@@ -243,32 +243,32 @@ class System:
         factors (p,): of the motions, those of velocities do not count; None: one. The time loop takes the system as it
         is, where distances are motions that end.
         """
-        if self.placed or not any(self.motion.places):
+        if self.placed or not any(self.motion.full_distance):
             return self
         if factors is None:
-            return self.once("in place", lambda: self._moved(self.motion.places))
-        return self._moved(self.motion.places * factors)
+            return self.once("in place", lambda: self._moved(self.motion.full_distance))
+        return self._moved(self.motion.full_distance * factors)
 
-    def _moved(self, place: Array) -> System:
-        """With distances at ``place`` (p,)."""
+    def _moved(self, distances: Array) -> System:
+        """With everything pressed away by ``distances`` (p,), factors of the motions."""
         motion = self.motion
-        moved = motion.lift @ place
+        moved = motion.lift @ distances
         loads = dict(self.loads)
-        for k in np.flatnonzero(motion.places):
-            loads[motion.names[k]] = self.stiffness @ (motion.lift[:, k] * place[k])
+        for k in np.flatnonzero(motion.full_distance):
+            loads[motion.names[k]] = self.stiffness @ (motion.lift[:, k] * distances[k])
         contacts = tuple(
-            replace(c, gap=c.gap + float(c.normal_lift @ place - c.normal_row @ moved)) for c in self.contacts
+            replace(c, gap=c.gap + float(c.normal_lift @ distances - c.normal_row @ moved)) for c in self.contacts
         )
         surfaces = tuple(
-            replace(s, nodes=replace(n, gap=n.gap + n.normal_lift @ place - n.normal @ moved))
+            replace(s, nodes=replace(n, gap=n.gap + n.normal_lift @ distances - n.normal @ moved))
             for s, n in ((s, s.nodes) for s in self.surfaces)
         )
         cubic, stresses = self.cubic, self.stress_stiffness
         if cubic is not None:
-            cubic = replace(cubic, stretch=cubic.rows.lift @ place - cubic.rows.free @ moved)
+            cubic = replace(cubic, stretch=cubic.rows.lift @ distances - cubic.rows.free @ moved)
         return replace(
             self, loads=loads, contacts=contacts, surfaces=surfaces, cubic=cubic, placed=True,
-            stress_stiffness=None if stresses is None else partial(stresses, place=place),
+            stress_stiffness=None if stresses is None else partial(stresses, distances=distances),
         )  # fmt: skip
 
     def touching(self, mu: float | None) -> System:

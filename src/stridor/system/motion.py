@@ -23,7 +23,7 @@ class PrescribedMotion:
     mass M_L = M L + M_fp (n, p), damping C_L likewise; mass_own, damping_own, stiffness_own (p, p)
     are the energies' own parts. Unit factor means the velocity written in the case [m/s, rad/s].
 
-    place (p,): 1 where a column is no velocity but a distance, reached at factor one and kept [m, rad]: a support
+    distances (p,): 1 where a column is no velocity but a distance, reached at factor one and kept [m, rad]: a support
     pressed away, the interference of a contact; () where there is none.
     """
 
@@ -34,17 +34,17 @@ class PrescribedMotion:
     mass_own: Array
     damping_own: Array
     stiffness_own: Array
-    place: tuple[float, ...] = ()
+    distances: tuple[float, ...] = ()
 
     @property
-    def places(self) -> Array:
-        """Factors (p,) of the columns where everything is in its place: 1 for distances, 0 for velocities."""
-        return np.array(self.place) if self.place else np.zeros(len(self.names))
+    def full_distance(self) -> Array:
+        """Factors (p,) of full distance: 1 for distances, 0 for velocities."""
+        return np.array(self.distances) if self.distances else np.zeros(len(self.names))
 
     @property
     def full(self) -> Array:
         """Factors (p,) of full velocity: 0 for distances."""
-        return 1.0 - self.places
+        return 1.0 - self.full_distance
 
     @staticmethod
     def none(size: int) -> PrescribedMotion:
@@ -84,17 +84,17 @@ class Column:
     name: str
     freedoms: tuple[int, ...]
     values: tuple[float, ...]
-    place: float
+    distance: float
 
 
 def columns(constraints: list[Constraint]) -> list[Column]:
     """The motions that supports prescribe: velocities, then distances."""
     moving = [Column(c.name, c.freedoms, c.velocity, 0.0) for c in constraints if c.moves]
-    away = [c for c in constraints if any(c.displacement)]
-    return [*moving, *(Column(place_name("supports", c.name), c.freedoms, c.displacement, 1.0) for c in away)]
+    displaced = [c for c in constraints if any(c.displacement)]
+    return [*moving, *(Column(distance_name("supports", c.name), c.freedoms, c.displacement, 1.0) for c in displaced)]
 
 
-def place_name(table: str, name: str) -> str:
+def distance_name(table: str, name: str) -> str:
     """Name of the motion of a support's displacement or a contact's interference."""
     return f"{table}.{name}.{'displacement' if table == 'supports' else 'interference'}"
 
@@ -141,8 +141,8 @@ def constrain(
     scale = np.abs(structure.stiffness).max() * np.abs(whole).max() ** 2
     stiffness_own[np.abs(stiffness_own) < 1e-13 * scale] = 0.0
     names = tuple(c.name for c in moving)
-    place = tuple(c.place for c in moving)
-    return free, PrescribedMotion(names, lift, mass, damping, mass_own, damping_own, stiffness_own, place)
+    distances = tuple(c.distance for c in moving)
+    return free, PrescribedMotion(names, lift, mass, damping, mass_own, damping_own, stiffness_own, distances)
 
 
 DENSE_LIFT = 3000

@@ -21,14 +21,14 @@ from ..mesh.boundary import require_boundary
 from ..mesh.facets import nodal_areas, nodal_normals
 from ..mesh.model import Blocks
 from ..typing import Array
-from .motion import place_name
+from .motion import distance_name
 from .supports import master_surface
 from .view import View, point_position
 
 
 def is_point_on_line(case: Case, contact: ContactCase) -> bool:
     """Whether a contact is that of one point on a beam's line."""
-    return contact.master in case.beams and isinstance(case.place(contact.slave), PointRef)
+    return contact.master in case.beams and isinstance(case.location(contact.slave), PointRef)
 
 
 def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Contact:
@@ -64,7 +64,7 @@ def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> 
     where = f"contacts.{name}"
     slave_rows, position, area, normals, facets = _slave(case, view, where, contact)
     master, master_rows = _master(case, view, where, contact)
-    slave_body = case.place(contact.slave).body
+    slave_body = case.location(contact.slave).body
     drift = _drift(case, view, slave_body, contact.master.partition(".")[0], position)
     built = pair_surface(
         name,
@@ -95,7 +95,7 @@ def _overlapping(view: View, name: str, contact: ContactCase, lift: Array) -> Ar
     """The lift (…, p) of gaps with the column of the contact's interference, which closes them."""
     if contact.interference:
         lift = lift.copy()
-        lift[..., view.motion.names.index(place_name("contacts", name))] = -contact.interference
+        lift[..., view.motion.names.index(distance_name("contacts", name))] = -contact.interference
     return lift
 
 
@@ -104,7 +104,7 @@ def _slave(
 ) -> tuple[Rows, Array, Array, Array, Blocks | None]:
     """Rows (m d, n), positions (m, d), areas (m,) and outward normals (m, d) of the slave, and the facets between
     its nodes, None for a point."""
-    at = case.place(contact.slave, where=f"{where}.slave")
+    at = case.location(contact.slave, where=f"{where}.slave")
     body = view.bodies[at.body]
     d = body.dimension
     if isinstance(at, PointRef):

@@ -44,7 +44,7 @@ def constraints_of(case: Case, bodies: dict[str, BuiltBody]) -> list[Constraint]
     taken: dict[int, tuple[str, float, float]] = {}
     for name, support in case.supports.items():
         where = f"supports.{name}"
-        at = case.place(support.at, where=f"{where}.at")
+        at = case.location(support.at, where=f"{where}.at")
         body = bodies[at.body]
         nodes = _held_nodes(body, at, f"{where}.at")
         freedoms: list[int] = []
@@ -53,20 +53,20 @@ def constraints_of(case: Case, bodies: dict[str, BuiltBody]) -> list[Constraint]
         lacking = set() if body.lacking is None else set((body.offset + body.lacking).tolist())
         moved = 0
         for direction in support.fixed:
-            place = body.stride - 1 if direction == "rotation" else _DIRECTIONS[direction]
+            component = body.stride - 1 if direction == "rotation" else _DIRECTIONS[direction]
             speed = float(support.velocity.get(direction, 0.0))
             distance = float(support.displacement.get(direction, 0.0))
-            for freedom in (body.offset + body.stride * nodes + place).tolist():
+            for freedom in (body.offset + body.stride * nodes + component).tolist():
                 if freedom in lacking:
                     moved += bool(speed or distance)
                     continue
-                other, held, away = taken.setdefault(freedom, (name, speed, distance))
+                other, held, held_distance = taken.setdefault(freedom, (name, speed, distance))
                 if other == name:
                     freedoms.append(freedom)
                     velocity.append(speed)
                     displacement.append(distance)
-                elif held != speed or away != distance:
-                    two = f"displacements, {away:g} and {distance:g} m"
+                elif held != speed or held_distance != distance:
+                    two = f"displacements, {held_distance:g} and {distance:g} m"
                     if held != speed:
                         two = f"velocities, {held:g} and {speed:g} m/s"
                     node = body.points[(freedom - body.offset) // body.stride]
@@ -153,17 +153,17 @@ def tie_matrix(
             bond = _only(bond, ~again)
             repeated.update(bond.slave.ravel().tolist())
         bonds.append(bond)
-    turned = any(bond.rotation is not None for bond in bonds)
+    rotated = any(bond.rotation is not None for bond in bonds)
     return Tied(
         tie_transformation(total, bonds),
         np.unique(np.concatenate([b.slave.ravel() for b in bonds])),
-        tie_transformation(total, [bond.shares for bond in bonds]) if turned else None,
+        tie_transformation(total, [bond.shares for bond in bonds]) if rotated else None,
     )
 
 
 def _bond(case: Case, bodies: dict[str, BuiltBody], where: str, tie: TieCase) -> Bond:
     """Slave nodes with their leaders, sought where the slave would be on the master's side."""
-    slave_at, master_at = case.place(tie.slave), case.place(tie.master)
+    slave_at, master_at = case.location(tie.slave), case.location(tie.master)
     assert isinstance(slave_at, BoundaryRef), "checked"
     assert isinstance(master_at, BoundaryRef), "checked"
     slave, master = bodies[slave_at.body], bodies[master_at.body]

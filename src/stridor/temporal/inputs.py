@@ -99,10 +99,10 @@ def _phases(system: System, phases: Sequence[PhaseSpec]) -> Iterator[Problem]:
             yield Problem(f"{where}.ramp", phase.ramp, "a ramp is a number ≥ 0 [s]; 0 is sudden")
         yield from _factors(f"{where}.loads", phase.loads, list(system.loads), "load")
         motion = system.motion
-        away = [n.split(".")[1] for n, p in zip(motion.names, motion.places, strict=True) if p]
-        moving = [n for n, p in zip(motion.names, motion.places, strict=True) if not p]
+        distances = [n.split(".")[1] for n, p in zip(motion.names, motion.full_distance, strict=True) if p]
+        moving = [n for n, p in zip(motion.names, motion.full_distance, strict=True) if not p]
         yield from _factors(f"{where}.velocities", phase.velocities, moving, "moving support")
-        yield from _factors(f"{where}.displacements", phase.displacements, away, "support or contact with a distance")
+        yield from _factors(f"{where}.displacements", phase.displacements, distances, "support or contact with a distance")
 
 
 def _factors(where: str, factors: Mapping[str, float], names: Sequence[str], what: str) -> Iterator[Problem]:

@@ -60,7 +60,8 @@ def simulate(
         watch=settings.watch,
     )
     stepper = stepper_for(system, settings, mu)
-    schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(system.motion.names), system.motion.places)
+    motion = system.motion
+    schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
     if settings.initial == "steady-sliding":
         schedule = schedule.settled()
     march = March(stepper, schedule, settings, join=join, observe=observe)

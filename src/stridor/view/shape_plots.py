@@ -198,7 +198,7 @@ def _arrow(ax: Axes, at: Array, along: Array, length: float, colour: str, text: 
 
 def _place(case: Case, reference: str) -> Array | None:
     """Coordinates (2,) [mm] of a point; None for a boundary, which is not one place."""
-    point = case.place(reference)
+    point = case.location(reference)
     if not isinstance(point, PointRef):
         return None
     body = case.bodies[point.body]
