@@ -102,7 +102,8 @@ def _phases(system: System, phases: Sequence[PhaseSpec]) -> Iterator[Problem]:
         distances = [n.split(".")[1] for n, p in zip(motion.names, motion.full_distance, strict=True) if p]
         moving = [n for n, p in zip(motion.names, motion.full_distance, strict=True) if not p]
         yield from _factors(f"{where}.velocities", phase.velocities, moving, "moving support")
-        yield from _factors(f"{where}.displacements", phase.displacements, distances, "support or contact with a distance")
+        kind = "support or contact with a distance"
+        yield from _factors(f"{where}.displacements", phase.displacements, distances, kind)
 
 
 def _factors(where: str, factors: Mapping[str, float], names: Sequence[str], what: str) -> Iterator[Problem]:
