@@ -29,10 +29,10 @@ from stridor.contact.coupling import (
     coupled,
 )
 from stridor.contact.curve import Curve
-from stridor.contact.facet_search import edge_place, nearest_edges, shape_of
+from stridor.contact.facet_search import edge_coordinates, nearest_edges, shape_of
 from stridor.contact.facets import FacetSurface
 from stridor.contact.interface import Rows, pair
-from stridor.contact.interpolation import _segments, _settled, element_weights
+from stridor.contact.interpolation import _refined, _segments, element_weights
 from stridor.contact.master import Location, MasterSurface
 from stridor.contact.nodes import ContactNodes, approach, stack
 from stridor.contact.obstacles import Cylinder, Flat
@@ -250,7 +250,7 @@ def test_gaps_to_flats_and_cylinders() -> None:
                     assert middle.normal[0] == pytest.approx((1.0 if on else -1.0) * np.array([-1.0 if inside else 1.0, 0]))
                 else:
                     assert middle.normal[0, 2] == 0.0
-        assert (found.nodes.shape, found.weights.shape, found.place.shape) == ((8, 0), (8, 0), (8, 0))
+        assert (found.nodes.shape, found.weights.shape, found.local.shape) == ((8, 0), (8, 0), (8, 0))
         assert found.inside.all()
         assert (cylinder.node_count, cylinder.dimension, Flat(point, normal).node_count) == (0, d, 0)
 
@@ -279,17 +279,17 @@ def test_obstacles_that_cannot_be_are_refused(make, message: str) -> None:
 
 def test_weights_of_corners_and_places_on_edges() -> None:
     rng = np.random.default_rng(7)
-    place = rng.random((10, 2)) * 0.5
+    local = rng.random((10, 2)) * 0.5
     for triangle, kind in ((True, "triangle"), (False, "quad")):
-        shape = shape_of(np.full(10, triangle), place)
-        expected, _ = shape_functions(kind, place)
+        shape = shape_of(np.full(10, triangle), local)
+        expected, _ = shape_functions(kind, local)
         assert shape[:, : expected.shape[1]] == pytest.approx(expected, rel=1e-14)
         assert not shape[:, expected.shape[1] :].any()
         corners = reference_nodes(kind)
         for edge in range(len(corners)):
             along = rng.random(3)
             expected = corners[edge] + along[:, None] * (corners[(edge + 1) % len(corners)] - corners[edge])
-            assert edge_place(np.full(3, triangle), np.full(3, edge), along) == pytest.approx(expected)
+            assert edge_coordinates(np.full(3, triangle), np.full(3, edge), along) == pytest.approx(expected)
     # Within rounding of a corner it is that corner, and what is left still sums to one.
     near = shape_of(np.array([True, True]), np.array([[0.9e-9, 0.5], [1.1e-9, 0.5]]))
     assert near[0] == pytest.approx([0.5, 0, 0.5, 0], rel=1e-8)
@@ -304,9 +304,9 @@ def test_nearest_edges_are_found_by_trying_all_their_points() -> None:
     t = np.linspace(0, 1, 20001)
     for i in range(7):
         away = np.linalg.norm(slaves[i] - begin[:, None] - t[:, None] * (end - begin)[:, None], axis=2)
-        edge, place = np.unravel_index(np.argmin(away), away.shape)
+        edge, local = np.unravel_index(np.argmin(away), away.shape)
         assert which[i] == edge
-        assert along[i] == pytest.approx(t[place], abs=1e-4)
+        assert along[i] == pytest.approx(t[local], abs=1e-4)
         assert distance[i] == pytest.approx(away.min(), rel=1e-6)
     assert {0.0, 1.0} & set(along.tolist())  # off an end as well
 
@@ -317,8 +317,8 @@ def test_elements_have_the_weights_of_the_place_below(kind: str) -> None:
     rng = np.random.default_rng(9)
     nodes = bent(kind, rng, by=0.04)
     surface = FacetSurface.from_facets(nodes, {kind: np.arange(len(nodes))[None]}, where="facet")
-    place = 0.1 + 0.4 * rng.random((12, 2)) if kind.startswith("triangle") else 0.1 + 0.8 * rng.random((12, 2))
-    expected, _ = shape_functions(kind, place)
+    local = 0.1 + 0.4 * rng.random((12, 2)) if kind.startswith("triangle") else 0.1 + 0.8 * rng.random((12, 2))
+    expected, _ = shape_functions(kind, local)
     foot = expected @ nodes
     rough = surface.locate(foot)
     points = foot + 0.01 * rng.normal(size=(12, 1)) * rough.normal
@@ -342,7 +342,7 @@ def test_a_place_that_does_not_settle_near_its_start_stays() -> None:
     to = np.array([[0.69, 0.5], [0.71, 0.5], [0.5, 0.31], [0.5, 0.29], [0.5, 1.4], [0.6, 0.5]])
     points = np.column_stack([2 * to, np.full(6, 0.3)])
     normal[5] = [1, 0, 0]
-    found = _settled("quad9", start, np.tile(nodes, (6, 1, 1)), points, normal)
+    found = _refined("quad9", start, np.tile(nodes, (6, 1, 1)), points, normal)
     assert found[[0, 2]] == pytest.approx(to[[0, 2]], abs=1e-12)
     assert found[[1, 3, 4, 5]] == pytest.approx(start[[1, 3, 4, 5]], abs=1e-15)
 
@@ -361,11 +361,11 @@ def test_segments_of_a_mixed_curve_know_their_facet_and_half() -> None:
     at = np.column_stack([np.linspace(2.1, 4.9, 13), np.full(13, 0.2)])
     location = curve.locate(at)
     element, weights = element_weights(curve, location, at, curve.positions)
-    place = curve.positions[:, 0]
-    assert np.sum(weights * place[element], axis=1) == pytest.approx(at[:, 0])
+    local = curve.positions[:, 0]
+    assert np.sum(weights * local[element], axis=1) == pytest.approx(at[:, 0])
     over = at[:, 0] < 4
-    assert np.sum(weights * place[element] ** 2, axis=1)[over] == pytest.approx(at[over, 0] ** 2)
-    assert np.sum(weights * place[element] ** 2, axis=1)[~over] == pytest.approx(9 * at[~over, 0] - 20)
+    assert np.sum(weights * local[element] ** 2, axis=1)[over] == pytest.approx(at[over, 0] ** 2)
+    assert np.sum(weights * local[element] ** 2, axis=1)[~over] == pytest.approx(9 * at[~over, 0] - 20)
 
 
 # -- bases and integrals -----------------------------------------------------------------------------------------------
@@ -401,8 +401,8 @@ def test_the_changed_basis_spans_the_same_and_has_positive_integrals(kind: str) 
         own, change, share = _shares(facets, kind)
         assert np.array_equal(own, facets.own[block])
         total, partly = np.zeros(count), np.zeros(count)
-        place, weight = quadrature(kind)
-        values, slopes = shape_functions(kind, place)
+        local, weight = quadrature(kind)
+        values, slopes = shape_functions(kind, local)
         for f in range(2):
             tangents = np.einsum("eqr,rd->eqd", slopes, positions[block[f]])
             dA = weight * np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=1)
@@ -432,9 +432,9 @@ def test_the_dual_basis_is_biorthogonal_in_its_quadrature(kind: str) -> None:
     r = len(reference_nodes(kind))
     facets = SlaveFacets.of(np.concatenate([bent(kind, rng), bent(kind, rng)]), {kind: np.arange(2 * r).reshape(2, r)}, np.arange(2 * r))  # fmt: skip
     _, change, share = _shares(facets, kind)
-    place = 0.1 + 0.4 * rng.random((40, 2))
+    local = 0.1 + 0.4 * rng.random((40, 2))
     owner, weight = np.arange(40) % 2, rng.random(40)
-    values, _ = shape_functions(kind, place)
+    values, _ = shape_functions(kind, local)
     dual = _dual(change, share, values, weight, owner)
     for f in range(2):
         mine = owner == f
@@ -447,12 +447,12 @@ def test_places_in_the_plane_are_inverted_where_there_are_any(kind: str) -> None
     rng = np.random.default_rng(12)
     flat = np.stack([bent(kind, rng, by=0.03)[:, :2] for _ in range(5)])
     owner = np.repeat(np.arange(5), 4)
-    place = 0.05 + 0.4 * rng.random((20, 2))
-    values, slopes = shape_functions(kind, place)
+    local = 0.05 + 0.4 * rng.random((20, 2))
+    values, slopes = shape_functions(kind, local)
     target = np.einsum("qr,qre->qe", values, flat[owner])
     tangents = np.einsum("aqr,qre->qea", slopes, flat[owner])
     found, slope, good = pieces._inverted(kind, flat, owner, target)
-    assert found == pytest.approx(place, abs=1e-11)
+    assert found == pytest.approx(local, abs=1e-11)
     assert slope == pytest.approx(np.abs(np.linalg.det(tangents)), rel=1e-9)
     assert good.all()
     # Beyond the facet by more than a millionth of it, in any direction, there is no place on it; its facet says so.
@@ -476,12 +476,12 @@ def test_whatever_is_called_found_is_the_place_of_its_target(kind: str) -> None:
     rng = np.random.default_rng(24)
     flat = np.stack([bent(kind, rng, by=0.25)[:, :2] for _ in range(400)])
     target = rng.random((400, 2)) @ np.array([[1.2, 0.2], [-0.3, 0.9]])
-    place, slope, good = pieces._inverted(kind, flat, np.arange(400), target)
+    local, slope, good = pieces._inverted(kind, flat, np.arange(400), target)
     assert 20 < good.sum() < 380
-    values, slopes = shape_functions(kind, place[good])
+    values, slopes = shape_functions(kind, local[good])
     assert np.einsum("qr,qre->qe", values, flat[good]) == pytest.approx(target[good], abs=1e-8)
-    assert place[good].min() > -1e-6
-    assert place[good].max() < 1 + 1e-6
+    assert local[good].min() > -1e-6
+    assert local[good].max() < 1 + 1e-6
     tangents = np.einsum("aqr,qre->qea", slopes, flat[good])
     assert slope[good] == pytest.approx(np.abs(np.linalg.det(tangents)), rel=1e-6)
 
@@ -504,7 +504,7 @@ def test_pieces_of_a_line_integrate_what_has_kinks_at_the_masters_nodes(kind: st
     below = pieces.NodeLine(nodes, cKDTree(nodes))
     under = np.column_stack([facets[:, :2, 0].mean(axis=1), np.full(4, -0.01)])
     found = pieces.pieces(kind, facets, under, below)
-    values, slopes = shape_functions(kind, found.place)
+    values, slopes = shape_functions(kind, found.local)
     at = np.einsum("qr,qr->q", values, facets[found.owner][:, :, 0])
     weight = found.weight * np.einsum("qr,qr->q", slopes[0], facets[found.owner][:, :, 0])
     fine = np.unique(np.concatenate([ends, master, np.linspace(0, 1, 20001)]))
@@ -545,7 +545,7 @@ def test_pieces_in_space_integrate_what_has_kinks_at_the_masters_edges(kind: str
     facets = np.array(facets) * [1, -1, 1] + [0, 1, 0]
     under = facets[:, : (3 if kind.startswith("tri") else 4)].mean(axis=1)
     found = pieces.pieces(kind, facets, under, pieces.outlines(master, master.positions))
-    values, slopes = shape_functions(kind, found.place)
+    values, slopes = shape_functions(kind, found.local)
     at = np.einsum("qr,qrd->qd", values, facets[found.owner])
     tangents = np.einsum("eqr,qrd->eqd", slopes, facets[found.owner])
     weight = found.weight * np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=1)
@@ -570,11 +570,11 @@ def test_facets_that_the_master_does_not_cover_get_points_that_know_nothing_of_i
         found = pieces.pieces("quad", moved[None], moved.mean(axis=0)[None] * [1, 1, 0], below)
         assert (len(found.weight) != len(plain[1])) is known
         if not known:
-            assert found.place == pytest.approx(plain[0])
+            assert found.local == pytest.approx(plain[0])
             assert found.weight == pytest.approx(plain[1])
     # Turned round it does not face the master, and is left to itself as well.
     found = pieces.pieces("quad", square[None, ::-1], square.mean(axis=0)[None] * [1, 1, 0], below)
-    assert found.place == pytest.approx(plain[0])
+    assert found.local == pytest.approx(plain[0])
 
 
 def test_pairs_are_all_that_lie_over_each_other_and_face_each_other() -> None:

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from stridor.contact.multipliers import OPEN, SLIP, STICK
 from stridor.errors import AnalysisError
 from stridor.sliding import history, points, surfaces
-from stridor.sliding.equilibrium import NEWTON_STEPS, ContactRows, Equilibrium, NodeState, changed, settle
+from stridor.sliding.equilibrium import NEWTON_STEPS, ContactRows, Equilibrium, NodeState, changed, find_touching
 from stridor.sliding.redundant import closed, redundant
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip, _Change, increments_of
 from stridor.system.load_steps import LoadStep
@@ -228,7 +228,7 @@ def hardening(cubic: tuple[float, ...], *, gap=(0.0, 0.0), load: float = 1.0) ->
 
 def test_what_hardens_but_does_not_touch_needs_no_second_step() -> None:
     away = hardening((1e9, 0.0), gap=(0.1, 0.0))
-    state, _ = settle(away, np.array([False, True]))
+    state, _ = find_touching(away, np.array([False, True]))
     assert state.displacement == pytest.approx([-1 / 100, -1 / 1100])
     assert away.factorisations == 1
 
@@ -236,7 +236,7 @@ def test_what_hardens_but_does_not_touch_needs_no_second_step() -> None:
 @pytest.mark.parametrize("load", [1.0, 1e-12, 1e6])
 def test_contact_that_hardens_balances_its_load(load: float) -> None:
     cubic = 1e9 / load**2  # the same in other units
-    state, _ = settle(hardening((cubic, 0.0), load=load))
+    state, _ = find_touching(hardening((cubic, 0.0), load=load))
     u = state.displacement[0]
     assert 100 * u - 1e3 * -u - cubic * (-u) ** 3 == pytest.approx(-load, rel=1e-9, abs=0.0)
     assert state.normal_force[0] == pytest.approx(1e3 * -u + cubic * (-u) ** 3, rel=1e-9, abs=0.0)
@@ -245,7 +245,7 @@ def test_contact_that_hardens_balances_its_load(load: float) -> None:
 
 def test_springs_that_find_no_equilibrium_are_given_sixty_steps(monkeypatch) -> None:
     stuck = hardening((1e9, 0.0))
-    monkeypatch.setattr(Equilibrium, "_settled", lambda *given: False)
+    monkeypatch.setattr(Equilibrium, "_converged", lambda *given: False)
     with pytest.raises(AnalysisError, match="find no equilibrium in 60 steps"):
         stuck.solve(np.ones(2, dtype=bool))
     assert stuck.factorisations == NEWTON_STEPS == 60

@@ -18,7 +18,7 @@ from stridor.direct import SingularMatrix
 from stridor.errors import AnalysisError
 from stridor.laws import Coulomb, Weakening
 from stridor.sliding import equilibrium, points, pressing, stretches, surfaces
-from stridor.sliding.equilibrium import NodeState, offenders, settle
+from stridor.sliding.equilibrium import NodeState, find_touching, offenders
 from stridor.sliding.redundant import redundant
 from stridor.sliding.resultants import balance, resultants
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip
@@ -198,25 +198,25 @@ class Tried:
 
 def test_settling_begins_with_the_guess_and_what_is_kept() -> None:
     table = Tried(4, lambda active, k: [1, 1, 1, 1], kept=(3,), movable=[1, 1, 0, 1])
-    state, steps = settle(table, np.array([True, False, True, False]))
+    state, steps = find_touching(table, np.array([True, False, True, False]))
     assert table.asked == [{0, 3}]
     assert steps == 1
     assert list(state.active) == [True, False, False, True]
     table = Tried(4, lambda active, k: [1, 1, -1, 1], movable=[1, 1, 0, 1])
-    settle(table)
+    find_touching(table)
     assert table.asked == [{0, 1, 3}]
     # A kept one may pull.
-    settle(Tried(2, lambda active, k: [-1, 1], kept=(0,)))
+    find_touching(Tried(2, lambda active, k: [-1, 1], kept=(0,)))
 
 
 def test_a_guess_that_does_not_hold_the_structure_is_left_for_all_nodes() -> None:
     table = Tried(3, lambda active, k: [1, 1, 1] if len(active) == 3 else None)
-    assert settle(table, np.array([True, False, False]))[1] == 2
+    assert find_touching(table, np.array([True, False, False]))[1] == 2
     assert table.asked == [{0}, {0, 1, 2}]
     assert table.starts == [None, None]
     table = Tried(3, lambda active, k: None)
     with pytest.raises(SingularMatrix):
-        settle(table, np.array([True, False, False]))
+        find_touching(table, np.array([True, False, False]))
     assert table.asked == [{0}, {0, 1, 2}]
 
 
@@ -224,26 +224,26 @@ def test_where_letting_go_frees_the_structure_the_half_that_pulls_less_is_taken_
     pulls = [1.0, -4, -1, -3, -2, 1]
     answers = {1: pulls, 2: None, 3: [1, 0, 1, 0, 1, 1]}
     table = Tried(6, lambda active, k: answers[k])
-    settle(table)
+    find_touching(table)
     assert table.asked == [{0, 1, 2, 3, 4, 5}, {0, 5}, {0, 2, 4, 5}]
     assert table.starts[0] is None
     assert [s[0] for s in table.starts[1:]] == [1.0, 1.0]  # Newton's method begins where the last answer was
     # From then on half of the worst alone changes: of two that pull the worse.
     answers = {1: pulls, 2: None, 3: [1, 0, -1, 0, -2, 1], 4: [1, 0, 1, 0, 0, 1]}
     table = Tried(6, lambda active, k: answers[k])
-    settle(table)
+    find_touching(table)
     assert table.asked[3] == {0, 2, 5}
     # One that was let go cannot be fewer.
     answers = {1: [1, -1, 1], 2: None}
     table = Tried(3, lambda active, k: answers[k])
     with pytest.raises(SingularMatrix):
-        settle(table)
+        find_touching(table)
     assert len(table.asked) == 2
     # Of three one is taken back for good, two stay let go... and a smaller part the next time.
     answers = {1: [1, -1, -2, -3], 2: None, 3: None}
     table = Tried(4, lambda active, k: answers[k])
     with pytest.raises(SingularMatrix):
-        settle(table)
+        find_touching(table)
     assert table.asked[:3] == [{0, 1, 2, 3}, {0}, {0, 1, 2}]
 
 
@@ -253,7 +253,7 @@ def test_sets_that_come_back_are_left_more_carefully_each_time() -> None:
         return [-4, -3, -2, -1] if len(active) == 4 else [-1, -2, -3, -4] if not active else [1, 1, 1, 1]
 
     table = Tried(4, answer)
-    assert settle(table)[1] == len(table.asked)
+    assert find_touching(table)[1] == len(table.asked)
     assert table.asked[:2] == [{0, 1, 2, 3}, set()]
     assert 0 < len(table.asked[-1]) < 4
 
@@ -261,12 +261,12 @@ def test_sets_that_come_back_are_left_more_carefully_each_time() -> None:
 def test_what_does_not_settle_is_told_after_its_steps() -> None:
     table = Tried(1, lambda active, k: [-1])
     with pytest.raises(AnalysisError, match="the set of touching nodes does not settle in 60 steps; turn loads that pull"):
-        settle(table)
+        find_touching(table)
     assert len(table.asked) == 60
     with pytest.raises(AnalysisError, match="in 7 steps"):
-        settle(Tried(1, lambda active, k: [-1]), limit=7)
+        find_touching(Tried(1, lambda active, k: [-1]), limit=7)
     # The seventh try may still be the one.
-    assert settle(Tried(1, lambda active, k: [-1] if k < 7 else [1]), limit=7)[1] == 7
+    assert find_touching(Tried(1, lambda active, k: [-1] if k < 7 else [1]), limit=7)[1] == 7
 
 
 def test_residual_is_the_largest_imbalance_over_the_largest_force() -> None:
@@ -352,7 +352,7 @@ def test_equilibria_are_those_that_trying_all_sets_finds(stiff: float, size: flo
         rows = equilibrium.ContactRows(sp.csr_array(normal), gap, compliance, np.zeros(4), np.zeros(4, dtype=bool))
         solver = equilibrium.Equilibrium(system, rows, sp.csr_array(push), force, symmetric=False, solver=None)
         for guess in (None, rng.random(4) < 0.5):
-            state, steps = settle(solver, guess)
+            state, steps = find_touching(solver, guess)
             assert state.displacement == pytest.approx(u, rel=1e-7, abs=1e-9 * np.abs(u).max())
             assert state.normal_force == pytest.approx(forces, rel=1e-6, abs=1e-9 * size)
             assert state.gap == pytest.approx(open_by, abs=1e-9 * np.abs(u).max())

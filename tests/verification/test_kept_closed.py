@@ -88,8 +88,8 @@ def test_signs_that_never_settle_are_told_with_what_may_help(stiffness, monkeypa
         state, tried = plain(equilibrium, guess)
         return replace(state, normal_force=signs[-1] * np.abs(state.normal_force)), tried
 
-    plain = surfaces.settle
-    monkeypatch.setattr(surfaces, "settle", alternating)
+    plain = surfaces.find_touching
+    monkeypatch.setattr(surfaces, "find_touching", alternating)
     with pytest.raises(st.AnalysisError, match=f"pull does not settle in {surfaces.SIGN_CHANGES} steps") as caught:
         st.steady_sliding(block(10.0, stiffness=stiffness))
     assert len(signs) == 1 + surfaces.SIGN_CHANGES

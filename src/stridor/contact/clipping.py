@@ -41,13 +41,13 @@ def common_triangles(
             kept = 0
             for k in range(n):
                 following = (k + 1) % n
-                here = dx * (inside[k, 1] - ay) - dy * (inside[k, 0] - ax)
-                there = dx * (inside[following, 1] - ay) - dy * (inside[following, 0] - ax)
-                if here >= 0.0:
+                side = dx * (inside[k, 1] - ay) - dy * (inside[k, 0] - ax)
+                next_side = dx * (inside[following, 1] - ay) - dy * (inside[following, 0] - ax)
+                if side >= 0.0:
                     cut[kept] = inside[k]
                     kept += 1
-                if (here > 0.0 and there < 0.0) or (here < 0.0 and there > 0.0):
-                    t = here / (here - there)
+                if (side > 0.0 and next_side < 0.0) or (side < 0.0 and next_side > 0.0):
+                    t = side / (side - next_side)
                     cut[kept] = inside[k] + t * (inside[following] - inside[k])
                     kept += 1
                 if kept >= MOST_CORNERS:

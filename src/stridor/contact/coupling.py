@@ -178,7 +178,7 @@ def _integrated(
             nodes = own[part]
             corners = positions[nodes]
             points = pieces(kind, corners, location.point[nodes].mean(axis=1), cut_by)
-            values, slopes = shape_functions(kind, points.place)
+            values, slopes = shape_functions(kind, points.local)
             at = np.einsum("qr,qrd->qd", values, corners[points.owner])
             weight = points.weight * _stretch(slopes, corners[points.owner])
             found = master.locate(at, displacement, guess=location.facet[nodes[points.owner, 0]])

@@ -299,7 +299,7 @@ def _walk_all(
     """The nearest of the points found from each start; one on the line rather than an end equally near."""
     count = slaves.shape[0]
     segments = np.empty(count, dtype=np.int64)
-    places = np.empty(count)
+    parameters = np.empty(count)
     states = np.empty(count, dtype=np.int64)
     weights = np.zeros(4)
     slopes = np.zeros(4)
@@ -327,5 +327,5 @@ def _walk_all(
                 square += 1e-9 * (square + chords[segment, 1] * chords[segment, 1] * 1e-9)
             if square < best:
                 best = square
-                segments[i], places[i], states[i] = segment, xi, state
-    return segments, places, states
+                segments[i], parameters[i], states[i] = segment, xi, state
+    return segments, parameters, states

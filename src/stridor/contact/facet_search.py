@@ -1,6 +1,7 @@
 """The compiled search of `facets`: from slave points to places on facets, facet by facet over their edges.
 
-Reference places are (ξ, η) of the triangle (0, 0), (1, 0), (0, 1) and the square [0, 1]². Edge e begins at corner e.
+Reference coordinates are (ξ, η) of the triangle (0, 0), (1, 0), (0, 1) and the square [0, 1]². Edge e begins
+at corner e.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ EDGE_TOLERANCE = 1e-6
 ROUNDING = 1e-10
 
 
-def shape_of(triangle: BoolArray, place: Array) -> Array:
-    """Weights (m, 4) of the corners at places (m, 2); a triangle's fourth is 0.
+def shape_of(triangle: BoolArray, local: Array) -> Array:
+    """Weights (m, 4) of the corners at local coordinates (m, 2); a triangle's fourth is 0.
 
     Weights within 1e-9 of nothing are set to it: a point within rounding of a node is that node.
     """
-    x, y = np.asarray(place, dtype=float).T
+    x, y = np.asarray(local, dtype=float).T
     linear = np.stack([1 - x - y, x, y, np.zeros_like(x)], axis=1)
     bilinear = np.stack([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y], axis=1)
     weights = np.where(triangle[:, None], linear, bilinear)
@@ -32,8 +33,8 @@ def shape_of(triangle: BoolArray, place: Array) -> Array:
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-def edge_place(triangle: BoolArray, edge: IntArray, along: Array) -> Array:
-    """Reference places (m, 2) at parts ``along`` (m,) in [0, 1] of the edges (m,)."""
+def edge_coordinates(triangle: BoolArray, edge: IntArray, along: Array) -> Array:
+    """Reference coordinates (m, 2) at parts ``along`` (m,) in [0, 1] of the edges (m,)."""
     t, one, zero = along, np.ones_like(along), np.zeros_like(along)
     on_triangle = np.stack([np.stack([t, zero], 1), np.stack([1 - t, t], 1), np.stack([zero, 1 - t], 1)])
     on_square = np.stack(
@@ -62,12 +63,12 @@ def nearest_edges(
                 square += side * side
                 product += side * (slaves[i, d] - begin[b, d])
             t = min(max(product / square, 0.0), 1.0)
-            away = 0.0
+            distance_squared = 0.0
             for d in range(3):
                 off = slaves[i, d] - begin[b, d] - t * (end[b, d] - begin[b, d])
-                away += off * off
-            if away < best:
-                best = away
+                distance_squared += off * off
+            if distance_squared < best:
+                best = distance_squared
                 which[i] = b
                 along[i] = t
         distance[i] = np.sqrt(best)
@@ -89,19 +90,19 @@ def _fill_shape(triangle: bool, x: float, y: float, shape: Array) -> None:  # pr
 
 @njit(cache=True)
 def _solve(
-    slave: Array, current: Array, facet: IntArray, normals: Array, place: Array, shape: Array, work: Array
+    slave: Array, current: Array, facet: IntArray, normals: Array, local: Array, shape: Array, work: Array
 ) -> bool:  # pragma: no cover - compiled
-    """x = X(ξ, η) + g N(ξ, η) on one facet by Newton's method; place (3,) takes ξ, η and g |N|.
+    """x = X(ξ, η) + g N(ξ, η) on one facet by Newton's method; local (3,) takes ξ, η and g |N|.
 
     N is the interpolated normal, not of unit length: its direction alone counts. work (6, 3) is space for the offset
     X + gN − x, the two tangents of that, N and its derivatives. False where the equations are singular or the steps
-    do not settle.
+    do not converge.
     """
     triangle = facet[3] < 0
     corners = 3 if triangle else 4
     x = y = 1.0 / 3.0 if triangle else 0.5
     g = 0.0
-    settled = False
+    converged = False
     r, a, b, n = work[0], work[1], work[2], work[3]
     for iteration in range(NEWTON_STEPS):
         _fill_shape(triangle, x, y, shape)
@@ -140,11 +141,11 @@ def _solve(
         new_y = min(max(y + step_y, -1.0), 2.0)
         moved = abs(new_x - x) + abs(new_y - y)
         x, y = new_x, new_y
-        settled = moved < 1e-6
+        converged = moved < 1e-6
         if moved < 1e-12 and iteration > 0:
             break
-    place[0], place[1], place[2] = x, y, g * np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
-    return settled
+    local[0], local[1], local[2] = x, y, g * np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
+    return converged
 
 
 @njit(cache=True)
@@ -173,19 +174,19 @@ def _walk(
     neighbours: IntArray,
     blocked: BoolArray,
     facet: int,
-    place: Array,
+    local: Array,
     shape: Array,
     work: Array,
 ) -> tuple[int, bool]:  # pragma: no cover - compiled
-    """The facet where the slave's place (3,) is, from ``facet`` on, and whether there is one."""
+    """The facet where the slave is, at the coordinates local (3,), from ``facet`` on, and whether there is one."""
     came_from = -1
     for _ in range(WALK_STEPS):
-        if not _solve(slave, current, facets[facet], normals[facet], place, shape, work):
+        if not _solve(slave, current, facets[facet], normals[facet], local, shape, work):
             return facet, False
         triangle = facets[facet, 3] < 0
         leave, worst, out = -1, ROUNDING, 0.0
         for edge in range(3 if triangle else 4):
-            over = _beyond(triangle, edge, place[0], place[1])
+            over = _beyond(triangle, edge, local[0], local[1])
             if blocked[facet, edge]:
                 out = max(out, over)
             elif over > worst:
@@ -210,15 +211,15 @@ def locate_all(
     blocked: BoolArray,
     starts: IntArray,
 ) -> tuple[IntArray, Array, BoolArray]:  # pragma: no cover - compiled
-    """Facet (m,), reference place (m, 2) and whether it is on the surface (m,), the least gap of those found.
+    """Facet (m,), reference coordinates (m, 2) and whether it is on the surface (m,), the least gap of those found.
 
     normals (f, 4, 3) at the corners; blocked (f, 4): edges not walked over; starts (m, q): facets to begin with.
     """
     count = slaves.shape[0]
     found = np.zeros(count, dtype=np.int64)
-    places = np.zeros((count, 2))
+    coordinates = np.zeros((count, 2))
     inside = np.zeros(count, dtype=np.bool_)
-    place, shape, work = np.zeros(3), np.zeros((3, 4)), np.zeros((6, 3))
+    local, shape, work = np.zeros(3), np.zeros((3, 4)), np.zeros((6, 3))
     for i in range(count):
         best = np.inf
         for j in range(starts.shape[1]):
@@ -228,11 +229,11 @@ def locate_all(
             if repeated:
                 continue
             facet, ended = _walk(
-                slaves[i], current, facets, normals, neighbours, blocked, starts[i, j], place, shape, work
+                slaves[i], current, facets, normals, neighbours, blocked, starts[i, j], local, shape, work
             )
-            if ended and abs(place[2]) < best:
-                best = abs(place[2])
+            if ended and abs(local[2]) < best:
+                best = abs(local[2])
                 inside[i] = True
                 found[i] = facet
-                places[i, 0], places[i, 1] = place[0], place[1]
-    return found, places, inside
+                coordinates[i, 0], coordinates[i, 1] = local[0], local[1]
+    return found, coordinates, inside

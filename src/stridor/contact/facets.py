@@ -23,7 +23,7 @@ from ..errors import CaseError
 from ..mesh.facets import reference_nodes, shape_functions
 from ..mesh.model import Blocks
 from ..typing import Array, BoolArray, IntArray
-from .facet_search import EDGE_TOLERANCE, edge_place, locate_all, nearest_edges, shape_of
+from .facet_search import EDGE_TOLERANCE, edge_coordinates, locate_all, nearest_edges, shape_of
 from .master import Location
 
 CANDIDATES = 4
@@ -116,8 +116,8 @@ class FacetSurface:
             """Of a cubic over its chord (f, e), from the slopes that the normals give its ends."""
             chord = np.take_along_axis(self.facets, end, axis=1), np.take_along_axis(self.facets, begin, axis=1)
             along = self.positions[chord[0]] - self.positions[chord[1]]
-            turned = np.take_along_axis(normals, end[..., None], 1) - np.take_along_axis(normals, begin[..., None], 1)
-            return np.sum(turned * along, axis=2) / 8.0
+            change = np.take_along_axis(normals, end[..., None], 1) - np.take_along_axis(normals, begin[..., None], 1)
+            return np.sum(change * along, axis=2) / 8.0
 
         following = _following(self.facets)
         own = np.broadcast_to(np.arange(4), following.shape)
@@ -162,15 +162,15 @@ class FacetSurface:
         current, slaves = np.ascontiguousarray(current), np.ascontiguousarray(slaves, dtype=float)
         normals = self.corner_normals(current)
         if guess is not None:
-            facet, place, inside = self._search(slaves, current, normals, np.asarray(guess, dtype=np.int64)[:, None])
+            facet, local, inside = self._search(slaves, current, normals, np.asarray(guess, dtype=np.int64)[:, None])
             again = np.flatnonzero(~inside)
         else:
-            facet, place = np.zeros(len(slaves), dtype=np.int64), np.zeros((len(slaves), 2))
+            facet, local = np.zeros(len(slaves), dtype=np.int64), np.zeros((len(slaves), 2))
             inside, again = np.zeros(len(slaves), dtype=bool), np.arange(len(slaves))
         if len(again):
             starts = self._nearest_facets(slaves[again], current)
-            facet[again], place[again], inside[again] = self._search(slaves[again], current, normals, starts)
-        return self._location(slaves, current, normals, facet, place, inside)
+            facet[again], local[again], inside[again] = self._search(slaves[again], current, normals, starts)
+        return self._location(slaves, current, normals, facet, local, inside)
 
     def _search(
         self, slaves: Array, current: Array, normals: Array, starts: IntArray
@@ -198,25 +198,25 @@ class FacetSurface:
         return np.column_stack([starts, facet, self.neighbours[facet, edge]])
 
     def _location(
-        self, slaves: Array, current: Array, normals: Array, facet: IntArray, place: Array, inside: BoolArray
+        self, slaves: Array, current: Array, normals: Array, facet: IntArray, local: Array, inside: BoolArray
     ) -> Location:
-        """Points and normals at places (m, 2) on facets (m,); slaves not inside go to the nearest edge."""
-        point, normal, _ = self._at(current, normals, facet, place)
+        """Points and normals at local coordinates (m, 2) on facets (m,); slaves not inside go to the nearest edge."""
+        point, normal, _ = self._at(current, normals, facet, local)
         edge = np.full(len(slaves), -1)  # of the slaves that are nearest to an edge
         borders = (self.neighbours < 0) & (self.facets >= 0)
         endless = not (borders.any() or self.sharp.any())
         lost = np.flatnonzero(~inside)
         if len(lost):
             chosen = [self.facets >= 0] if endless else [borders, self.sharp]
-            facet[lost], place[lost], edge[lost], _ = self._beside(slaves[lost], current, chosen)
+            facet[lost], local[lost], edge[lost], _ = self._beside(slaves[lost], current, chosen)
         if self.sharp.any():
             # A sharp edge may be much nearer than a facet behind it that happens to face the slave.
-            away = np.where(inside, np.abs(np.sum(normal * (slaves - point), axis=1)), 0.0)
+            distance = np.where(inside, np.abs(np.sum(normal * (slaves - point), axis=1)), 0.0)
             near = self._beside(slaves, current, [self.sharp])
-            swap = np.flatnonzero(near[3] < 0.9 * away)
-            facet[swap], place[swap], edge[swap] = near[0][swap], near[1][swap], near[2][swap]
+            swap = np.flatnonzero(near[3] < 0.9 * distance)
+            facet[swap], local[swap], edge[swap] = near[0][swap], near[1][swap], near[2][swap]
         inside = (edge < 0) | self.sharp[facet, edge] | endless
-        point, normal, weights = self._at(current, normals, facet, place)
+        point, normal, weights = self._at(current, normals, facet, local)
         rim = np.flatnonzero(~inside)
         inside[rim] = self._over_rim(facet[rim], slaves[rim] - point[rim], normal[rim], normals, current)
         corner = np.flatnonzero((edge >= 0) & self.sharp[facet, edge])
@@ -225,11 +225,11 @@ class FacetSurface:
             normal[corner] = self._edge_normals(facet[corner], across, slaves[corner] - point[corner], current)
         gap = np.sum(normal * (slaves - point), axis=1)
         nodes = np.where(weights == 0.0, 0, self.facets[facet])
-        return Location(nodes, weights, point, normal, gap, facet, inside, place)
+        return Location(nodes, weights, point, normal, gap, facet, inside, local)
 
-    def _at(self, current: Array, normals: Array, facet: IntArray, place: Array) -> tuple[Array, Array, Array]:
-        """Points (m, 3), unit normals (m, 3) and weights (m, 4) of places (m, 2) on facets (m,)."""
-        weights = shape_of(self.facets[facet, 3] < 0, place)
+    def _at(self, current: Array, normals: Array, facet: IntArray, local: Array) -> tuple[Array, Array, Array]:
+        """Points (m, 3), unit normals (m, 3) and weights (m, 4) at local coordinates (m, 2) of facets (m,)."""
+        weights = shape_of(self.facets[facet, 3] < 0, local)
         point = np.einsum("mr,mrd->md", weights, current[self.facets[facet]])
         normal = np.einsum("mr,mrd->md", weights, normals[facet])
         return point, normal / np.linalg.norm(normal, axis=1, keepdims=True), weights
@@ -237,7 +237,8 @@ class FacetSurface:
     def _beside(
         self, slaves: Array, current: Array, chosen: list[BoolArray]
     ) -> tuple[IntArray, Array, IntArray, Array]:
-        """Facet, place (m, 2), edge and distance [m] of the nearest point on the chosen edges, the first lot first."""
+        """Facet, local coordinates (m, 2), edge and distance [m] of the nearest point on the chosen edges, the first
+        lot first."""
         picked = [np.nonzero(edges) for edges in chosen]
         facet = np.concatenate([p[0] for p in picked])
         edge = np.concatenate([p[1] for p in picked])
@@ -245,7 +246,7 @@ class FacetSurface:
         end = current[self.facets[facet, _following(self.facets)[facet, edge]]]
         which, along, distance = nearest_edges(slaves, begin, end)
         facet, edge = facet[which], edge[which]
-        return facet, edge_place(self.facets[facet, 3] < 0, edge, along), edge, distance
+        return facet, edge_coordinates(self.facets[facet, 3] < 0, edge, along), edge, distance
 
     def _over_rim(self, facet: IntArray, offset: Array, normal: Array, normals: Array, current: Array) -> BoolArray:
         """Whether slaves at an offset (q, 3) from the surface's own edge stand over that edge as far as can be told.
@@ -255,8 +256,8 @@ class FacetSurface:
         angle is forgiven, once for the normal and once for the edge itself, which is as straight as the facet is flat.
         """
         corners = self.facets[facet] >= 0
-        turned = np.linalg.norm(normals[facet] - _facet_normals(current, self.facets[facet])[:, None], axis=2)
-        doubt = np.where(corners, turned, 0.0).max(axis=1, initial=0.0)
+        deviation = np.linalg.norm(normals[facet] - _facet_normals(current, self.facets[facet])[:, None], axis=2)
+        doubt = np.where(corners, deviation, 0.0).max(axis=1, initial=0.0)
         doubt[doubt < 1e-12] = 0.0
         height = np.sum(offset * normal, axis=1)
         beyond = np.linalg.norm(offset - height[:, None] * normal, axis=1)
@@ -283,9 +284,9 @@ def _splits(kind: str) -> list[list[int]]:
     return SPLITS[kind]
 
 
-def _picked(block: IntArray, places: list[int], width: int = 4) -> IntArray:
-    """Nodes (f, width) at the given places of facets (f, r), −1 where there is none."""
-    padded = [*places, *[-1] * (width - len(places))]
+def _picked(block: IntArray, columns: list[int], width: int = 4) -> IntArray:
+    """Nodes (f, width) in the given columns of facets (f, r), −1 where there is none."""
+    padded = [*columns, *[-1] * (width - len(columns))]
     return np.stack([block[:, c] if c >= 0 else np.full(len(block), -1) for c in padded], axis=1)
 
 
@@ -295,10 +296,10 @@ def _corner_tangents(kind: str, split: list[int]) -> Array:
     The first tangent leads towards the next corner of the part, the second towards the one before.
     """
     found = np.zeros((4, 2, 9))
-    places = reference_nodes(kind)[[c for c in split if c >= 0]]
-    _, slopes = shape_functions(kind, places)  # (2, q, r)
-    for j, towards in enumerate((np.roll(places, -1, axis=0), np.roll(places, 1, axis=0))):
-        found[: len(places), j, : slopes.shape[2]] = np.einsum("eqr,qe->qr", slopes, towards - places)
+    corners = reference_nodes(kind)[[c for c in split if c >= 0]]
+    _, slopes = shape_functions(kind, corners)  # (2, q, r)
+    for j, towards in enumerate((np.roll(corners, -1, axis=0), np.roll(corners, 1, axis=0))):
+        found[: len(corners), j, : slopes.shape[2]] = np.einsum("eqr,qe->qr", slopes, towards - corners)
     return found
 
 

@@ -42,30 +42,30 @@ def _on_facets(
             continue
         corners = [c for c in split if c >= 0]
         # As the corners of the linear part interpolate: exact but for curved edges and middles off the middle.
-        place = location.weights[mine][:, : len(corners)] @ reference_nodes(kind)[corners]
+        local = location.weights[mine][:, : len(corners)] @ reference_nodes(kind)[corners]
         r = len(reference_nodes(kind))
         if kind not in LINEAR:
             element = current[nodes[mine, :r]]
-            place = _settled(kind, place, element, points[mine], location.normal[mine])
-        weights[mine, :r] = shape_functions(kind, place)[0]
+            local = _refined(kind, local, element, points[mine], location.normal[mine])
+        weights[mine, :r] = shape_functions(kind, local)[0]
     weights[np.abs(weights) < 1e-12] = 0.0
     return np.where(weights == 0.0, 0, nodes), weights
 
 
 def _on_line(curve: Curve, location: Location, points: Array, current: Array) -> tuple[IntArray, Array]:
     """On a curve of which some facets are quadratic: two segments of the spline to each of those."""
-    assert location.place is not None, "a curve tells the place on its segments"
+    assert location.local is not None, "a curve tells the coordinate on its segments"
     owner, half = _segments(curve)
     facet, part = owner[location.facet], half[location.facet]
     quadratic = curve.facets[facet, 2] >= 0
-    place = np.where(part < 0, location.place[:, 0], 0.5 * (np.maximum(part, 0) + location.place[:, 0]))
+    local = np.where(part < 0, location.local[:, 0], 0.5 * (np.maximum(part, 0) + location.local[:, 0]))
     nodes = np.maximum(curve.facets[facet], 0)
     weights = np.zeros(nodes.shape)
     straight = ~quadratic
-    weights[straight, 0], weights[straight, 1] = 1.0 - place[straight], place[straight]
+    weights[straight, 0], weights[straight, 1] = 1.0 - local[straight], local[straight]
     mine = np.flatnonzero(quadratic)
-    settled = _settled("line3", place[mine, None], current[nodes[mine]], points[mine], location.normal[mine])
-    weights[mine] = shape_functions("line3", settled)[0]
+    refined = _refined("line3", local[mine, None], current[nodes[mine]], points[mine], location.normal[mine])
+    weights[mine] = shape_functions("line3", refined)[0]
     weights[np.abs(weights) < 1e-12] = 0.0
     return np.where(weights == 0.0, 0, nodes), weights
 
@@ -85,20 +85,21 @@ def _segments(curve: Curve) -> tuple[IntArray, IntArray]:
     return owner, half
 
 
-def _settled(kind: str, place: Array, element: Array, points: Array, normal: Array) -> Array:
-    """Reference places (q, e) where points (q, d) stand along normals (q, d) on elements (q, r, d), by Newton's method.
+def _refined(kind: str, local: Array, element: Array, points: Array, normal: Array) -> Array:
+    """Reference coordinates (q, e) where points (q, d) stand along normals (q, d) on elements (q, r, d), by Newton's
+    method.
 
-    A place that does not settle near its start stays there: beyond the edge of a surface the start is the answer.
+    What does not converge near its start stays there: beyond the edge of a surface the start is the answer.
     """
-    current = place.copy()
+    current = local.copy()
     for _ in range(STEPS):
         values, slopes = shape_functions(kind, current)
         offset = np.einsum("qr,qrd->qd", values, element) - points
         tangents = np.einsum("eqr,qrd->qde", slopes, element)
         system = np.concatenate([tangents, normal[:, :, None]], axis=2)
         regular = np.abs(np.linalg.det(system)) > 1e-12 * np.prod(np.linalg.norm(tangents, axis=1), axis=1)
-        step = np.zeros((len(place), system.shape[2]))
+        step = np.zeros((len(local), system.shape[2]))
         step[regular] = np.linalg.solve(system[regular], offset[regular][:, :, None])[:, :, 0]
         current = current - step[:, :-1]
-    near = np.all(np.isfinite(current), axis=1) & (np.abs(current - place).max(axis=1, initial=0.0) < 0.2)
-    return np.where(near[:, None], current, place)
+    near = np.all(np.isfinite(current), axis=1) & (np.abs(current - local).max(axis=1, initial=0.0) < 0.2)
+    return np.where(near[:, None], current, local)

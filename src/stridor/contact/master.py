@@ -15,7 +15,7 @@ class Location:
     nodes (m, r) and weights (m, r): the master point is Σ weights · node positions (r = 0 for an obstacle; unused
     places hold node 0 with weight 0). point (m, d) [m], normal (m, d) unit, out of the master. gap (m,) [m] =
     normal · (slave − point), positive when open. facet (m,): where to begin the next search. inside (m,): False where
-    the point has left the surface over its edge (the nearest point of the edge is then given). place (m, d−1):
+    the point has left the surface over its edge (the nearest point of the edge is then given). local (m, d−1):
     reference coordinates on the facet, none for an obstacle.
     """
 
@@ -26,7 +26,7 @@ class Location:
     gap: Array
     facet: IntArray
     inside: BoolArray
-    place: Array | None = None
+    local: Array | None = None
 
 
 class MasterSurface(Protocol):

@@ -119,10 +119,10 @@ def solve_kept(
     A gap that would open is the mirror image of one that would close, with the normal turned round. Where friction
     would jam the pair it closes without.
     """
-    turned = -1.0 if gap > 0.0 else 1.0
+    sign = -1.0 if gap > 0.0 else 1.0
     normal, tangential, status = solve_contact(
-        turned * gap, slip, w_nn, turned * w_nt, w_tt, law, was_sticking, step
+        sign * gap, slip, w_nn, sign * w_nt, w_tt, law, was_sticking, step
     )
     if status == OPEN:
         return (-gap / w_nn if w_nn > 0.0 else 0.0), 0.0, SLIP
-    return turned * normal, tangential, status
+    return sign * normal, tangential, status

@@ -118,7 +118,7 @@ def _location(slaves: Array, normal: Array, gap: Array) -> Location:
         gap=gap,
         facet=np.zeros(count, dtype=np.int64),
         inside=np.ones(count, dtype=bool),
-        place=np.zeros((count, 0)),
+        local=np.zeros((count, 0)),
     )
 
 

@@ -196,10 +196,10 @@ def overlap_tolerance(position: Array, normals: Array, master: MasterSurface) ->
     count = min(len(position), 2 * position.shape[1] - 1)
     if count > 1:
         near = np.asarray(cKDTree(position).query(position, k=count)[1], dtype=np.int64)[:, 1:]
-        turned = normals[near] - normals[:, None]
+        change = normals[near] - normals[:, None]
         # Across a corner of the slave there is no chord of a curve.
         smooth = np.sum(normals[near] * normals[:, None], axis=2) > np.cos(np.radians(40.0))
-        heights = np.abs(np.sum(turned * (position[near] - position[:, None]), axis=2)) / 8.0
+        heights = np.abs(np.sum(change * (position[near] - position[:, None]), axis=2)) / 8.0
         height += float(np.where(smooth, heights, 0.0).max())
     return 1.5 * height + rounding
 
@@ -213,7 +213,7 @@ def _only(location: Location, index: IntArray) -> Location:
         gap=location.gap[index],
         facet=location.facet[index],
         inside=location.inside[index],
-        place=None if location.place is None else location.place[index],
+        local=None if location.local is None else location.local[index],
     )
 
 

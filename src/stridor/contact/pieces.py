@@ -24,16 +24,16 @@ LEAST_COVER = 0.9
 MOST_COVER = 1.0 + 1e-6
 OPPOSED = -0.1  # cosine between normals that face each other
 STEPS = 12
-SETTLED = 1e-14  # step of a reference place, of the size of facets: rounding
+CONVERGED = 1e-14  # step of a reference coordinate, of the size of facets: rounding
 FINE = 4  # Gauss points along each side of a piece where facets are distorted
 
 
 @dataclass(frozen=True)
 class Points:
-    """Quadrature points: the facet (q,) each belongs to, its reference place (q, e) and weight (q,) there."""
+    """Quadrature points: the facet (q,) each belongs to, its reference coordinates (q, e) and weight (q,) there."""
 
     owner: IntArray
-    place: Array
+    local: Array
     weight: Array
 
 
@@ -86,13 +86,13 @@ def pieces(kind: str, facets: Array, under: Array, below: NodeLine | Outlines) -
     get points that know nothing of it.
     """
     cut = _on_line(kind, facets, under, below) if isinstance(below, NodeLine) else _in_space(kind, facets, under, below)
-    owner, place, weight, good = cut
+    owner, local, weight, good = cut
     keep = good[owner]
     rest = np.flatnonzero(~good)
-    plain_place, plain_weight = _composite(kind)
+    plain_local, plain_weight = _composite(kind)
     return Points(
         np.concatenate([owner[keep], np.repeat(rest, len(plain_weight))]),
-        np.concatenate([place[keep], np.tile(plain_place, (len(rest), 1))]),
+        np.concatenate([local[keep], np.tile(plain_local, (len(rest), 1))]),
         np.concatenate([weight[keep], np.tile(plain_weight, len(rest))]),
     )
 
@@ -104,9 +104,9 @@ def _on_line(
     begin, chord = facets[:, 0], facets[:, 1] - facets[:, 0]
     length = np.linalg.norm(chord, axis=1)
     along = chord / length[:, None]
-    away = np.linalg.norm(under - facets[:, :2].mean(axis=1), axis=1)
-    # Only nodes around the place below: the far side of a ring has feet on the chord as well.
-    near = line.tree.query_ball_point(under, length + 1e-9 * away)
+    distance = np.linalg.norm(under - facets[:, :2].mean(axis=1), axis=1)
+    # Only nodes around the point below: the far side of a ring has feet on the chord as well.
+    near = line.tree.query_ball_point(under, length + 1e-9 * distance)
     counts = np.array([len(n) for n in near], dtype=np.int64)
     facet = np.repeat(np.arange(len(facets)), counts)
     node = np.concatenate([np.asarray(n, dtype=np.int64) for n in near]) if len(near) else np.zeros(0, dtype=np.int64)
@@ -124,8 +124,8 @@ def _on_line(
     part = (foot[piece][:, None] + size[:, None] * x[:, 0]).ravel()
     weight = (size[:, None] * w).ravel()
     flat = np.einsum("frd,fd->fr", facets - begin[:, None], along)[:, :, None]
-    place, slope, good = _inverted(kind, flat, owner, (part * length[owner])[:, None])
-    return owner, place, weight * length[owner] / slope, good
+    local, slope, good = _inverted(kind, flat, owner, (part * length[owner])[:, None])
+    return owner, local, weight * length[owner] / slope, good
 
 
 def _in_space(
@@ -148,36 +148,36 @@ def _in_space(
     first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     twice = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
     following = np.roll(flat[:, :corner_count], -1, axis=1)
-    turned = flat[:, :corner_count, 0] * following[:, :, 1] - flat[:, :corner_count, 1] * following[:, :, 0]
-    covered = np.bincount(owner, twice, len(facets)) / np.abs(turned.sum(axis=1))
+    cross = flat[:, :corner_count, 0] * following[:, :, 1] - flat[:, :corner_count, 1] * following[:, :, 0]
+    covered = np.bincount(owner, twice, len(facets)) / np.abs(cross.sum(axis=1))
     even = _affine(kind, facets)[owner] & below.even[pair_other[which]]
     owners: list[IntArray] = []
-    places: list[Array] = []
+    coordinates: list[Array] = []
     weights: list[Array] = []
     good = (covered >= LEAST_COVER) & (covered <= MOST_COVER)
     for lot, (at, w) in ((even, quadrature("triangle6")), (~even, _fine_triangle(FINE))):
         points = triangles[lot, None, 0] + at[:, :1] * first[lot, None] + at[:, 1:] * second[lot, None]
         facet = np.repeat(owner[lot], len(w))
-        place, slope, found = _inverted(kind, flat, facet, points.reshape(-1, 2))
+        local, slope, found = _inverted(kind, flat, facet, points.reshape(-1, 2))
         owners.append(facet)
-        places.append(place)
+        coordinates.append(local)
         weights.append((twice[lot, None] * w).ravel() / slope)
         good = good & found
-    return np.concatenate(owners), np.concatenate(places), np.concatenate(weights), good
+    return np.concatenate(owners), np.concatenate(coordinates), np.concatenate(weights), good
 
 
 def _affine(kind: str, facets: Array) -> BoolArray:
     """Which facets (f, r, d) are images of the reference facet without distortion: polynomials stay polynomials."""
-    places = reference_nodes(kind)
+    nodes = reference_nodes(kind)
     last = 2 if kind.startswith("triangle") else 3
     first, second = facets[:, 1] - facets[:, 0], facets[:, last] - facets[:, 0]
-    straight = facets[:, :1] + places[:, :1] * first[:, None] + places[:, 1:] * second[:, None]
+    straight = facets[:, :1] + nodes[:, :1] * first[:, None] + nodes[:, 1:] * second[:, None]
     size = np.abs(first).max(axis=1) + np.abs(second).max(axis=1)
     return np.abs(facets - straight).max(axis=(1, 2)) <= 1e-9 * size
 
 
 def _fine_triangle(count: int) -> tuple[Array, Array]:
-    """Places (q, 2) and weights (q,) on the reference triangle: Gauss points of a square, one side drawn together."""
+    """Points (q, 2) and weights (q,) on the reference triangle: Gauss points of a square, one side drawn together."""
     x, w = np.polynomial.legendre.leggauss(count)
     x, w = 0.5 * (x + 1.0), 0.5 * w
     first, second = np.meshgrid(x, x, indexing="ij")
@@ -227,32 +227,32 @@ def _neighbours(corners: Array, under: Array, normal: Array, below: Outlines) ->
 
 
 def _inverted(kind: str, flat: Array, owner: IntArray, target: Array) -> tuple[Array, Array, BoolArray]:
-    """Reference places (q, e) of targets (q, e) in the plane of facets (f, r, e), the determinants (q,) of the map
+    """Reference coordinates (q, e) of targets (q, e) in the plane of facets (f, r, e), the determinants (q,) of the map
     there, and for which facets (f,) all were found."""
     e = flat.shape[2]
     centre = reference_nodes(kind).mean(axis=0)
-    place = np.broadcast_to(centre, (len(target), e)).copy()
+    local = np.broadcast_to(centre, (len(target), e)).copy()
     tangents = np.zeros((len(target), e, e))
     offset = np.zeros(target.shape)
     with np.errstate(all="ignore"):
         for _ in range(STEPS):
-            values, slopes = shape_functions(kind, place)
+            values, slopes = shape_functions(kind, local)
             offset = np.einsum("qr,qre->qe", values, flat[owner]) - target
             tangents = np.einsum("aqr,qre->qea", slopes, flat[owner])
             step = np.clip(_solve(tangents, offset), -0.5, 0.5)
-            place = place - step
-            if float(np.abs(step).max(initial=0.0)) <= SETTLED:
+            local = local - step
+            if float(np.abs(step).max(initial=0.0)) <= CONVERGED:
                 break
-        values, slopes = shape_functions(kind, place)
+        values, slopes = shape_functions(kind, local)
         offset = np.einsum("qr,qre->qe", values, flat[owner]) - target
         tangents = np.einsum("aqr,qre->qea", slopes, flat[owner])
         slope = np.abs(np.linalg.det(tangents))
     size = np.abs(flat).max(axis=(1, 2))
     found = np.all(np.abs(offset) <= 1e-9 * size[owner][:, None], axis=1) & (slope > 0)
-    found &= np.all((place > -1e-6) & (place < 1 + 1e-6), axis=1)
+    found &= np.all((local > -1e-6) & (local < 1 + 1e-6), axis=1)
     good = np.ones(len(flat), dtype=bool)
     good[owner[~found]] = False
-    return place, np.where(found, slope, 1.0), good
+    return local, np.where(found, slope, 1.0), good
 
 
 def _solve(matrices: Array, right: Array) -> Array:
@@ -265,7 +265,7 @@ def _solve(matrices: Array, right: Array) -> Array:
 
 
 def _composite(kind: str) -> tuple[Array, Array]:
-    """Places (q, e) and weights (q,) of a fine rule for what has kinks anywhere."""
+    """Points (q, e) and weights (q,) of a fine rule for what has kinks anywhere."""
     parts = 4
     x, w = quadrature(kind)
     cells = np.arange(parts) / parts
@@ -275,6 +275,6 @@ def _composite(kind: str) -> tuple[Array, Array]:
     if not kind.startswith("triangle"):
         return (corner[:, None] + x / parts).reshape(-1, 2), np.tile(w / parts**2, parts**2)
     upright = corner[corner.sum(axis=1) < 1.0 - 0.5 / parts]
-    turned = corner[corner.sum(axis=1) < 1.0 - 1.5 / parts] + 1.0 / parts
-    places = np.concatenate([(upright[:, None] + x / parts), (turned[:, None] - x / parts)])
-    return places.reshape(-1, 2), np.tile(w / parts**2, parts**2)
+    inverted = corner[corner.sum(axis=1) < 1.0 - 1.5 / parts] + 1.0 / parts
+    local = np.concatenate([(upright[:, None] + x / parts), (inverted[:, None] - x / parts)])
+    return local.reshape(-1, 2), np.tile(w / parts**2, parts**2)

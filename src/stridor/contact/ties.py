@@ -61,8 +61,8 @@ class Bond:
         directions."""
         weights = np.abs(self.tie.weights)
         weights = weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-300)
-        turned = None if self.rotation is None else self.rotation**2
-        return replace(self, tie=replace(self.tie, weights=weights), rotation=turned)
+        rotation = None if self.rotation is None else self.rotation**2
+        return replace(self, tie=replace(self.tie, weights=weights), rotation=rotation)
 
 
 def tie(slave_points: Array, master: MasterSurface, *, where: str, tolerance: float) -> Tie:
@@ -106,13 +106,13 @@ def check_facing(
     A bond over more than an element is none: rotations would strain it by the distance times their angle. Bodies are
     bonded where their outward normals oppose; within 60° of the same direction they turn their backs on each other.
     """
-    away = found.distance
-    if np.any(away > limit):
-        worst = int(np.argmax(away))
+    distance = found.distance
+    if np.any(distance > limit):
+        worst = int(np.argmax(distance))
         at = ", ".join(f"{x:.6g}" for x in slave_points[worst])
         accepted = (
-            f"the slave node at ({at}) m is {away[worst]:.3g} m from the master, more than an element ({limit:.3g} m); "
-            "a tie bonds surfaces that touch: bring them together, or set a smaller tolerance"
+            f"the slave node at ({at}) m is {distance[worst]:.3g} m from the master, more than an element "
+            f"({limit:.3g} m); a tie bonds surfaces that touch: bring them together, or set a smaller tolerance"
         )
         raise CaseError(where, None, accepted)
     along = np.sum(slave_normals * master.locate(slave_points).normal, axis=1)
@@ -204,12 +204,12 @@ def _on_lines(points: Array, curve: Curve) -> tuple[IntArray, Array]:
     nearest = np.concatenate([_nearest_chords(part, corners, count) for part in _portions(points, len(corners))])
     facets = corners[nearest]  # (s, q, 3, d)
     xi = _project(points[:, None, :], facets)
-    away = np.linalg.norm(np.einsum("sqr,sqrd->sqd", _line3(xi), facets) - points[:, None, :], axis=2)
-    best = np.argmin(away, axis=1)
+    distance = np.linalg.norm(np.einsum("sqr,sqrd->sqd", _line3(xi), facets) - points[:, None, :], axis=2)
+    best = np.argmin(distance, axis=1)
     each = np.arange(len(points))
-    facet, place = nearest[each, best], xi[each, best]
-    linear = np.stack([1.0 - place, place, np.zeros_like(place)], axis=1)
-    weights = np.where(quadratic[facet][:, None], _line3(place), linear)
+    facet, local = nearest[each, best], xi[each, best]
+    linear = np.stack([1.0 - local, local, np.zeros_like(local)], axis=1)
+    weights = np.where(quadratic[facet][:, None], _line3(local), linear)
     weights[np.abs(weights) < 1e-12] = 0.0
     return np.where(weights == 0.0, 0, curve.facets[facet]), weights
 
@@ -221,13 +221,13 @@ def _portions(points: Array, facets: int) -> list[Array]:
 
 def _nearest_chords(points: Array, corners: Array, count: int) -> IntArray:
     """The ``count`` facets (s, q) whose two half chords are nearest to each point."""
-    away = np.full((len(points), len(corners)), np.inf)
+    squared = np.full((len(points), len(corners)), np.inf)
     for first, second in ((0, 2), (2, 1)):
         begin, along = corners[:, first], corners[:, second] - corners[:, first]
         offset = points[:, None, :] - begin
         part = np.clip(np.sum(offset * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
-        away = np.minimum(away, np.sum((offset - part[..., None] * along) ** 2, axis=2))
-    return np.argsort(away, axis=1)[:, :count]
+        squared = np.minimum(squared, np.sum((offset - part[..., None] * along) ** 2, axis=2))
+    return np.argsort(squared, axis=1)[:, :count]
 
 
 def _project(points: Array, facets: Array) -> Array:

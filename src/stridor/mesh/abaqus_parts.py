@@ -11,7 +11,7 @@ import numpy as np
 from ..typing import Array
 from .abaqus_deck import Card, DeckLine
 
-Place = tuple[float, float, float]
+Point = tuple[float, float, float]
 
 ACCEPTED_TYPES = "CPS3, CPE3, CPS4, CPE4, CPS6, CPE6, CPS8, CPE8, C3D4, C3D8, C3D10, C3D20"
 # What may follow the number of nodes says how the element integrates, not what it looks like.
@@ -79,7 +79,7 @@ class Scope:
     """Nodes, elements, sets and surfaces (by name in capitals) that are numbered and named together."""
 
     name: str = ""
-    nodes: dict[int, Place] = field(default_factory=dict)
+    nodes: dict[int, Point] = field(default_factory=dict)
     elements: dict[int, Element] = field(default_factory=dict)
     nsets: dict[str, NamedSet] = field(default_factory=dict)
     elsets: dict[str, NamedSet] = field(default_factory=dict)

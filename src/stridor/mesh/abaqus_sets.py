@@ -31,12 +31,12 @@ class Collector:
         self._node_index: list[dict[int, int]] = []
         self._element_index: list[dict[int, int]] = []
         self._known: dict[tuple[str, int, str], IntArray] = {}
-        places: list[tuple[float, float, float]] = []
+        points: list[tuple[float, float, float]] = []
         elements: list[tuple[str, int]] = []
         cells: dict[str, list[list[int]]] = {}
         for scope in bodies:
-            nodes = {number: len(places) + k for k, number in enumerate(scope.nodes)}
-            places.extend(scope.nodes.values())
+            nodes = {number: len(points) + k for k, number in enumerate(scope.nodes)}
+            points.extend(scope.nodes.values())
             index: dict[int, int] = {}
             for number, element in scope.elements.items():
                 rows = cells.setdefault(element.kind, [])
@@ -51,7 +51,7 @@ class Collector:
                     element.line.refuse(f"element {number} uses node {missing.args[0]}, which is not defined")
             self._node_index.append(nodes)
             self._element_index.append(index)
-        self._points: Array = np.array(places, dtype=np.float64).reshape(-1, 3)
+        self._points: Array = np.array(points, dtype=np.float64).reshape(-1, 3)
         self._cells: Blocks = {kind: np.array(rows, dtype=np.int64) for kind, rows in cells.items()}
         self._kinds = list(self._cells)
         number_of = {kind: k for k, kind in enumerate(self._kinds)}

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import CaseError
 from ..typing import Array, BoolArray, IntArray
-from .kinds import FACET_CORNERS, FACET_TURNED, KINDS, corner_jacobians
+from .kinds import FACET_CORNERS, FACET_REVERSED, KINDS, corner_jacobians
 from .model import Blocks, Mesh
 
 _MOST_NAMES_SHOWN = 12
@@ -40,7 +40,7 @@ def cell_facets(cells: Blocks, points: Array) -> CellFacets:
         table = KINDS[kind]
         inverted = _inverted(kind, block, points)
         faces = block[:, np.array(table.facets)]  # (c, faces, n)
-        faces[inverted] = faces[inverted][:, :, FACET_TURNED[table.facet_kind]]
+        faces[inverted] = faces[inverted][:, :, FACET_REVERSED[table.facet_kind]]
         nodes.setdefault(table.facet_kind, []).append(faces.reshape(len(block) * len(table.facets), -1))
     joined = {kind: np.concatenate(parts) for kind, parts in nodes.items()}
     corners = [_corner_key(kind, facets) for kind, facets in joined.items()]

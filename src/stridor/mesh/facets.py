@@ -33,22 +33,22 @@ class FacetRule:
     derivatives: Array
 
 
-def shape_functions(kind: str, places: Array) -> tuple[Array, Array]:
-    """Values (q, r) and derivatives (e, q, r) of the shape functions of a kind at reference places (q, e).
+def shape_functions(kind: str, local: Array) -> tuple[Array, Array]:
+    """Values (q, r) and derivatives (e, q, r) of the shape functions of a kind at reference coordinates (q, e).
 
     The reference facet is [0, 1] for lines, the triangle (0, 0), (1, 0), (0, 1) and the square [0, 1]²; nodes in
     VTK's order: corners, then the middles of the edges in turn, then the centre. Raises KeyError for another kind.
     """
-    return _SHAPES[kind](np.asarray(places, dtype=float))
+    return _SHAPES[kind](np.asarray(local, dtype=float))
 
 
 def reference_nodes(kind: str) -> Array:
-    """Reference places (r, e) of the nodes of a kind. Raises KeyError for a kind that is no facet."""
+    """Reference coordinates (r, e) of the nodes of a kind. Raises KeyError for a kind that is no facet."""
     return _NODES[kind]
 
 
 def quadrature(kind: str) -> tuple[Array, Array]:
-    """Places (q, e) and weights (q,), exact for the pressure on a facet of that kind, curved or not."""
+    """Points (q, e) and weights (q,), exact for the pressure on a facet of that kind, curved or not."""
     if kind.startswith("line"):
         x, w = _gauss(2 if kind == "line" else 4)
         return x[:, None], w
@@ -58,8 +58,8 @@ def quadrature(kind: str) -> tuple[Array, Array]:
         # Degree 4 with six points (Strang and Fix 1973; Cowper 1973).
         a, b = 0.445948490915965, 0.091576213509771
         wa, wb = 0.5 * 0.223381589678011, 0.5 * 0.109951743655322
-        places = [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a], [b, b], [1 - 2 * b, b], [b, 1 - 2 * b]]
-        return np.array(places), np.array([wa, wa, wa, wb, wb, wb])
+        points = [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a], [b, b], [1 - 2 * b, b], [b, 1 - 2 * b]]
+        return np.array(points), np.array([wa, wa, wa, wb, wb, wb])
     x, w = _gauss(2 if kind == "quad" else 3)
     first, second = np.meshgrid(x, x, indexing="ij")
     return np.column_stack([first.ravel(), second.ravel()]), np.outer(w, w).ravel()
@@ -67,8 +67,8 @@ def quadrature(kind: str) -> tuple[Array, Array]:
 
 def facet_rule(kind: str) -> FacetRule:
     """Shape functions of a kind at its quadrature points."""
-    places, weights = quadrature(kind)
-    values, derivatives = shape_functions(kind, places)
+    points, weights = quadrature(kind)
+    values, derivatives = shape_functions(kind, points)
     return FacetRule(weights, values, derivatives)
 
 
@@ -170,9 +170,9 @@ def chain_of(points: Array, facets: Blocks, *, where: str) -> Chain:
     if not len(ends):
         raise CaseError(where, None, "has no facets; a line of them is needed")
     for column in (0, 1):
-        place, times = np.unique(ends[:, column], return_counts=True)
+        nodes, times = np.unique(ends[:, column], return_counts=True)
         if np.any(times > 1):
-            at = _coordinates(points[place[np.argmax(times > 1)]])
+            at = _coordinates(points[nodes[np.argmax(times > 1)]])
             raise CaseError(where, None, f"branches or turns its side over at {at}; a single line is needed")
     starts_here = {int(node): facet for facet, node in enumerate(ends[:, 0])}
     heads = np.setdiff1d(ends[:, 0], ends[:, 1])
@@ -245,32 +245,32 @@ def _size(directed: Array) -> Array:
 
 
 def _gauss(count: int) -> tuple[Array, Array]:
-    """Gauss–Legendre places and weights on [0, 1]."""
+    """Gauss–Legendre points and weights on [0, 1]."""
     x, w = np.polynomial.legendre.leggauss(count)
     return 0.5 * (x + 1.0), 0.5 * w
 
 
-def _line(places: Array) -> tuple[Array, Array]:
-    x = places[:, 0]
+def _line(local: Array) -> tuple[Array, Array]:
+    x = local[:, 0]
     one = np.ones_like(x)
     return np.stack([1 - x, x], axis=1), np.stack([-one, one], axis=1)[None]
 
 
-def _line3(places: Array) -> tuple[Array, Array]:
-    x = places[:, 0]
+def _line3(local: Array) -> tuple[Array, Array]:
+    x = local[:, 0]
     values = np.stack([(1 - x) * (1 - 2 * x), x * (2 * x - 1), 4 * x * (1 - x)], axis=1)
     return values, np.stack([4 * x - 3, 4 * x - 1, 4 - 8 * x], axis=1)[None]
 
 
-def _triangle(places: Array) -> tuple[Array, Array]:
-    x, y = places.T
+def _triangle(local: Array) -> tuple[Array, Array]:
+    x, y = local.T
     one, zero = np.ones_like(x), np.zeros_like(x)
     slopes = [np.stack([-one, one, zero], axis=1), np.stack([-one, zero, one], axis=1)]
     return np.stack([1 - x - y, x, y], axis=1), np.stack(slopes)
 
 
-def _triangle6(places: Array) -> tuple[Array, Array]:
-    linear, slopes = _triangle(places)
+def _triangle6(local: Array) -> tuple[Array, Array]:
+    linear, slopes = _triangle(local)
     a, b = linear, linear[:, [1, 2, 0]]
     values = np.hstack([a * (2 * a - 1), 4 * a * b])
     derivatives: list[Array] = []
@@ -280,28 +280,28 @@ def _triangle6(places: Array) -> tuple[Array, Array]:
     return values, np.stack(derivatives)
 
 
-def _tensor(places: Array, line: Callable[[Array], tuple[Array, Array]], order: Order) -> tuple[Array, Array]:
+def _tensor(local: Array, line: Callable[[Array], tuple[Array, Array]], order: Order) -> tuple[Array, Array]:
     """Products of the functions of a line along both coordinates, in the given order."""
-    (a, (da,)), (b, (db,)) = line(places[:, :1]), line(places[:, 1:])
+    (a, (da,)), (b, (db,)) = line(local[:, :1]), line(local[:, 1:])
     values = np.stack([a[:, i] * b[:, j] for i, j in order], axis=1)
     along_first = np.stack([da[:, i] * b[:, j] for i, j in order], axis=1)
     along_second = np.stack([a[:, i] * db[:, j] for i, j in order], axis=1)
     return values, np.stack([along_first, along_second])
 
 
-def _quad(places: Array) -> tuple[Array, Array]:
-    return _tensor(places, _line, [(0, 0), (1, 0), (1, 1), (0, 1)])
+def _quad(local: Array) -> tuple[Array, Array]:
+    return _tensor(local, _line, [(0, 0), (1, 0), (1, 1), (0, 1)])
 
 
-def _quad9(places: Array) -> tuple[Array, Array]:
+def _quad9(local: Array) -> tuple[Array, Array]:
     order = [(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (1, 2), (2, 1), (0, 2), (2, 2)]
-    return _tensor(places, _line3, order)
+    return _tensor(local, _line3, order)
 
 
-def _quad8(places: Array) -> tuple[Array, Array]:
+def _quad8(local: Array) -> tuple[Array, Array]:
     # Serendipity: the centre of quad9 shared out, −1/4 to each corner and +1/2 to each middle.
     share = np.array([-0.25] * 4 + [0.5] * 4)
-    values, derivatives = _quad9(places)
+    values, derivatives = _quad9(local)
     return values[:, :8] + values[:, 8:] * share, derivatives[..., :8] + derivatives[..., 8:] * share
 
 

@@ -58,7 +58,7 @@ def gather(contents: Contents, *, source: str, where: str, group: str | None = N
     if any(n.size and (n.min() < 0 or n.max() >= len(used)) for n in named):
         raise CaseError(f"{where}.file", source, "has groups that use points which are not in the file")
     new = np.cumsum(used) - 1
-    points = _places(contents.points[used], cells, f"{where}.file", source) * scale
+    points = _of_cells_dimension(contents.points[used], cells, f"{where}.file", source) * scale
     mine = turned_over({kind: new[block] for kind, block in cells.items()}, points)
     every = cell_facets(mine, points)
     boundaries: dict[str, Blocks] = {}
@@ -119,7 +119,7 @@ def _refuse_unsupported(cells: Blocks, accepted: str, where: str, source: str) -
         raise CaseError(where, source, "has cells in the plane and in space; choose those of the body by group")
 
 
-def _places(points: Array, cells: Blocks, where: str, source: str) -> Array:
+def _of_cells_dimension(points: Array, cells: Blocks, where: str, source: str) -> Array:
     """Points (k, d) [file's unit] of the dimension of the cells."""
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):

@@ -55,17 +55,17 @@ class Grid:
             for axis, rank in enumerate(ranks)
         )
         ids = np.asarray(ids, dtype=np.int64)
-        place = np.empty(ids.size, dtype=np.int64)
-        place[ids.ravel()] = np.arange(ids.size)
+        rank = np.empty(ids.size, dtype=np.int64)
+        rank[ids.ravel()] = np.arange(ids.size)
         if closed is not None:
             ids = np.concatenate([ids, np.take(ids, [0], axis=closed)], axis=closed)
-        return Grid(ids, step), place
+        return Grid(ids, step), rank
 
 
 def folded(count: int) -> IntArray:
-    """Ranks (count,) of places round a circle counted from both sides at once: 0, 1, 3, 5, …, 4, 2."""
-    place = np.arange(count)
-    return np.where(place <= count // 2, np.maximum(2 * place - 1, 0), 2 * (count - place))
+    """Ranks (count,) of points round a circle counted from both sides at once: 0, 1, 3, 5, …, 4, 2."""
+    index = np.arange(count)
+    return np.where(index <= count // 2, np.maximum(2 * index - 1, 0), 2 * (count - index))
 
 
 def cell_kind(kind: str, order: int, dimension: int, where: str) -> str:
@@ -80,20 +80,20 @@ def cell_kind(kind: str, order: int, dimension: int, where: str) -> str:
 
 
 def mesh_of_grids(
-    grids: Sequence[Grid], places: Array, kind: str, sides: Mapping[str, Side], source: str
+    grids: Sequence[Grid], points: Array, kind: str, sides: Mapping[str, Side], source: str
 ) -> Mesh:
-    """Mesh of one kind of cell on grids that share the places (k, d) [m]; places that the kind does not use are left
+    """Mesh of one kind of cell on grids that share the points (k, d) [m]; points that the kind does not use are left
     out. sides: boundaries by name."""
     templates = _templates(kind)
     cells = np.concatenate([_cells(grid, templates) for grid in grids])
-    used = np.zeros(len(places), dtype=bool)
+    used = np.zeros(len(points), dtype=bool)
     used[cells] = True
     new = np.cumsum(used) - 1
     boundaries = {
         name: {KINDS[kind].facet_kind: new[_facets(grids[side.grid], templates, kind, side)]}
         for name, side in sides.items()
     }
-    return Mesh(points=places[used], cells={kind: new[cells]}, boundaries=boundaries, source=source)
+    return Mesh(points=points[used], cells={kind: new[cells]}, boundaries=boundaries, source=source)
 
 
 def _templates(kind: str) -> list[IntArray]:
@@ -142,16 +142,16 @@ def _six_tetrahedra() -> list[list[tuple[int, ...]]]:
 def _cells(grid: Grid, templates: Sequence[IntArray], side: Side | None = None) -> IntArray:
     """Cells (c, n) of a grid, those that fill one of its cells together; on one side of it only, if one is given."""
     starts: list[IntArray] = []
-    for axis, places in enumerate(grid.ids.shape):
-        start = np.arange(0, places - 1, grid.step)
+    for axis, count in enumerate(grid.ids.shape):
+        start = np.arange(0, count - 1, grid.step)
         if side is not None and axis == side.axis:
             start = start[-1:] if side.at_end else start[:1]
         starts.append(start)
 
-    def at(place: IntArray) -> IntArray:
-        return grid.ids[np.ix_(*(s + o for s, o in zip(starts, place, strict=True)))].ravel()
+    def at(offset: IntArray) -> IntArray:
+        return grid.ids[np.ix_(*(s + o for s, o in zip(starts, offset, strict=True)))].ravel()
 
-    found = [np.stack([at(place) for place in template], axis=1) for template in templates]
+    found = [np.stack([at(offset) for offset in template], axis=1) for template in templates]
     return np.stack(found, axis=1).reshape(-1, len(templates[0]))
 
 

@@ -124,7 +124,7 @@ FACET_CORNERS: Mapping[str, int] = {
 }
 
 # The same facet seen from the other side.
-FACET_TURNED: Mapping[str, Nodes] = {
+FACET_REVERSED: Mapping[str, Nodes] = {
     "line": (1, 0),
     "line3": (1, 0, 2),
     **{name: KINDS[name].mirrored for name in ("triangle", "triangle6", "quad", "quad8", "quad9")},
@@ -138,15 +138,15 @@ def corner_jacobians(kind: str, nodes: IntArray, points: Array) -> tuple[Array, 
     The tangent of an edge at its end depends on the nodes of that edge alone, so this is exact for every kind.
     """
     table = KINDS[kind]
-    places = points[nodes]
+    coordinates = points[nodes]
     determinants = np.empty((len(nodes), table.corners))
     sizes = np.ones((len(nodes), table.corners))
     for corner, ends in enumerate(table.tangents):
-        here = places[:, corner]
+        here = coordinates[:, corner]
         tangents: list[Array] = []
         for end, middle in ends:
-            along = places[:, end] - here
-            tangents.append(along if middle < 0 else 4.0 * (places[:, middle] - here) - along)
+            along = coordinates[:, end] - here
+            tangents.append(along if middle < 0 else 4.0 * (coordinates[:, middle] - here) - along)
         if table.dimension == 2:
             a, b = tangents
             determinants[:, corner] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

@@ -77,7 +77,7 @@ def _index_problems(mesh: Mesh, where: str) -> list[Problem]:
         return [Problem(where, None, f"points of shape {points.shape}; must be (k, 2) or (k, 3)")]
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
-        first = f"the first is point {bad[0] + 1} at {_place(points[bad[0]])}"
+        first = f"the first is point {bad[0] + 1} at {_coordinates(points[bad[0]])}"
         problems.append(Problem(where, None, f"{len(bad)} of {len(points)} points have no finite place; {first}"))
     if not mesh.cell_count:
         problems.append(Problem(where, None, "no cells; a body needs some"))
@@ -97,7 +97,7 @@ def _index_problems(mesh: Mesh, where: str) -> list[Problem]:
             problems += _missing(block, len(points), where, f"facets of boundary {name}")
     if not problems and not np.all(used):
         idle = np.flatnonzero(~used)
-        first = f"the first is point {idle[0] + 1} at {_place(points[idle[0]])}"
+        first = f"the first is point {idle[0] + 1} at {_coordinates(points[idle[0]])}"
         problems.append(Problem(where, None, f"{len(idle)} points belong to no cell; {first}"))
     return problems
 
@@ -151,9 +151,9 @@ def _duplicate_problems(mesh: Mesh, where: str) -> list[Problem]:
         again = order[1:][sums[order[1:]] == sums[order[:-1]]]
         if len(again):
             cell = int(again.min())
-            place = mesh.points[block[cell, : KINDS[kind].corners]].mean(axis=0)
+            centre = mesh.points[block[cell, : KINDS[kind].corners]].mean(axis=0)
             text = f"{len(again)} of {mesh.cell_count} cells have the nodes of another cell"
-            problems.append(Problem(where, None, f"{text}; {_first(kind, cell, place)}; take them out of the file"))
+            problems.append(Problem(where, None, f"{text}; {_first(kind, cell, centre)}; take them out of the file"))
     return problems
 
 
@@ -164,7 +164,7 @@ def _overlap_problems(mesh: Mesh, where: str) -> list[Problem]:
     """
     mark = np.random.default_rng(1).integers(0, 2**62, len(mesh.points), dtype=np.uint64)
     keys: list[IntArray] = []
-    places: list[Array] = []
+    centres: list[Array] = []
     for kind, facets in cell_facets(mesh.cells, mesh.points).nodes.items():
         corners = facets[:, : FACET_CORNERS[kind]]
         lowest, each = corners.argmin(axis=1), np.arange(len(corners))
@@ -174,15 +174,15 @@ def _overlap_problems(mesh: Mesh, where: str) -> list[Problem]:
         else:
             sense = corners[each, (lowest + 1) % count] < corners[each, (lowest - 1) % count]
         keys.append(2 * mark[corners].sum(axis=1, dtype=np.uint64) + sense.astype(np.uint64))
-        places.append(mesh.points[corners].mean(axis=1))
+        centres.append(mesh.points[corners].mean(axis=1))
     key = np.concatenate(keys)
     order = np.argsort(key, kind="stable")
     again = order[1:][key[order[1:]] == key[order[:-1]]]
     if not len(again):
         return []
     side = "edges have two cells" if mesh.dimension == 2 else "faces have two cells"
-    place = _place(np.concatenate(places)[int(again.min())])
-    text = f"{len(again)} {side} on the same side of them, which overlap; the first is about {place}"
+    centre = _coordinates(np.concatenate(centres)[int(again.min())])
+    text = f"{len(again)} {side} on the same side of them, which overlap; the first is about {centre}"
     return [Problem(where, None, f"{text}; mesh the body anew, or take one of the cells out of the file")]
 
 
@@ -196,9 +196,9 @@ def _facet_problems(mesh: Mesh, where: str) -> list[Problem]:
         for kind, block in facets.items():
             flat = _without_area(kind, block, mesh.points)
             if np.any(flat):
-                place = _place(mesh.points[block[int(np.argmax(flat))]].mean(axis=0))
+                centre = _coordinates(mesh.points[block[int(np.argmax(flat))]].mean(axis=0))
                 text = f"boundary {name}: {int(flat.sum())} of {len(block)} facets have no area"
-                problems.append(Problem(where, None, f"{text}; the first is at {place}"))
+                problems.append(Problem(where, None, f"{text}; the first is at {centre}"))
         matched = match_facets(every, facets)
         if matched.stray_count:
             text = f"boundary {name}: {matched.stray_count} facets are a side of no cell"
@@ -208,22 +208,22 @@ def _facet_problems(mesh: Mesh, where: str) -> list[Problem]:
 
 def _without_area(kind: str, block: IntArray, points: Array) -> BoolArray:
     """Which facets (f,) have corners in one place or in one line."""
-    places = points[block[:, : FACET_CORNERS[kind]]]
-    first, last = places[:, 1] - places[:, 0], places[:, -1] - places[:, 0]
-    if places.shape[1] == 2:
+    corners = points[block[:, : FACET_CORNERS[kind]]]
+    first, last = corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0]
+    if corners.shape[1] == 2:
         size = np.abs(points).max(initial=0.0)
         return np.linalg.norm(first, axis=1) <= 1e-14 * size
-    if places.shape[1] == 4:  # by its diagonals: a triangle given as a quadrilateral still has area
-        first, last = places[:, 2] - places[:, 0], places[:, 3] - places[:, 1]
+    if corners.shape[1] == 4:  # by its diagonals: a triangle given as a quadrilateral still has area
+        first, last = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     product = np.linalg.norm(first, axis=1) * np.linalg.norm(last, axis=1)
     return np.linalg.norm(np.cross(first, last), axis=1) <= _FLAT * product
 
 
-def _first(kind: str, cell: int, place: Array) -> str:
-    return f"the first is {kind} cell number {cell + 1} about {_place(place)}"
+def _first(kind: str, cell: int, centre: Array) -> str:
+    return f"the first is {kind} cell number {cell + 1} about {_coordinates(centre)}"
 
 
-def _place(point: Array) -> str:
+def _coordinates(point: Array) -> str:
     return "(" + ", ".join(f"{v:.6g}" for v in point) + ")"
 
 
@@ -249,8 +249,8 @@ def _patches(cells: Blocks) -> IntArray:
     nodes = int(max(tail.max(), head.max())) + 1
     forward, backward = tail * nodes + head, head * nodes + tail
     order = np.argsort(forward, kind="stable")
-    place = np.minimum(np.searchsorted(forward[order], backward), len(order) - 1)
-    opposite = order[place]
+    index = np.minimum(np.searchsorted(forward[order], backward), len(order) - 1)
+    opposite = order[index]
     meets = forward[opposite] == backward
     pairs = (owner[meets], owner[opposite[meets]])
     graph = sp.coo_array((np.ones(len(pairs[0])), pairs), shape=(start, start))

@@ -140,6 +140,6 @@ def span(start: float, end: float, intervals: int, shares: Array | None) -> Arra
     """Places (intervals + 1,) from start to end, even or at the shares (intervals + 1,) of the way."""
     if shares is None:
         return np.linspace(start, end, intervals + 1)
-    places = start + (end - start) * shares
-    places[-1] = end
-    return places
+    positions = start + (end - start) * shares
+    positions[-1] = end
+    return positions

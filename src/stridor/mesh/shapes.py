@@ -130,11 +130,11 @@ def annulus(
     shares = shares_along(_with_divisions(grading, divisions, where), counts, step, names, where)
     closed = sweep == 360.0
     enough_around(counts[1], sweep, where)
-    grid, places = _ring(inner, outer, start, sweep, counts, step, shares)
+    grid, points = _ring(inner, outer, start, sweep, counts, step, shares)
     sides = {"inner": Side(0, 0, False), "outer": Side(0, 0, True)}
     if not closed:
         sides |= {"start": Side(0, 1, False), "end": Side(0, 1, True)}
-    return mesh_of_grids([grid], places + at, name, sides, "annulus")
+    return mesh_of_grids([grid], points + at, name, sides, "annulus")
 
 
 def block(
@@ -160,10 +160,10 @@ def block(
     shares = shares_along(_with_divisions(grading, divisions, where), counts, step, directions, where)
     axes = [span(0.0, length, step * n, part) for length, n, part in zip(lengths, counts, shares, strict=True)]
     grid, order_of = Grid.of_counts(counts, step)
-    places = np.stack([a.ravel()[order_of] for a in np.meshgrid(*axes, indexing="ij")], axis=1)
+    points = np.stack([a.ravel()[order_of] for a in np.meshgrid(*axes, indexing="ij")], axis=1)
     names = {"left": 0, "right": 0, "front": 1, "back": 1, "bottom": 2, "top": 2}
     sides = {n: Side(0, axis, n in ("right", "back", "top")) for n, axis in names.items()}
-    return mesh_of_grids([grid], places + at, name, sides, "block")
+    return mesh_of_grids([grid], points + at, name, sides, "block")
 
 
 def disc(
@@ -251,9 +251,9 @@ def _four_sided(
     s, t = (a.ravel()[order_of][:, None] for a in np.meshgrid(*axes, indexing="ij"))
     p0, p1, p2, p3 = corners
     # Written so that points on a side lie on it exactly: at s, t = 0 and 1 the other terms vanish.
-    places = (1 - t) * ((1 - s) * p0 + s * p1) + t * ((1 - s) * p3 + s * p2)
+    points = (1 - t) * ((1 - s) * p0 + s * p1) + t * ((1 - s) * p3 + s * p2)
     names = {"left": Side(0, 0, False), "right": Side(0, 0, True), "bottom": Side(0, 1, False), "top": Side(0, 1, True)}
-    return mesh_of_grids([grid], places, name, names, source)
+    return mesh_of_grids([grid], points, name, names, source)
 
 
 def _annular_block(
@@ -283,7 +283,7 @@ def _annular_block(
     enough_around(counts[1], sweep, where)
     step = 1 if KINDS[name].nodes == KINDS[name].corners else 2
     shares = shares_along(_with_divisions(grading, divisions, where), counts, step, names, where)
-    grid, places = _ring(inner, outer, start, sweep, counts, step, shares, height)
+    grid, points = _ring(inner, outer, start, sweep, counts, step, shares, height)
     sides = {
         "inner": Side(0, 0, False),
         "outer": Side(0, 0, True),
@@ -294,7 +294,7 @@ def _annular_block(
     }
     if sweep == 360.0:
         del sides["start"], sides["end"]
-    return mesh_of_grids([grid], places + at, name, sides, source)
+    return mesh_of_grids([grid], points + at, name, sides, source)
 
 
 def _ring(
@@ -307,7 +307,7 @@ def _ring(
     shares: Sequence[Array | None],
     height: float | None = None,
 ) -> tuple[Grid, Array]:
-    """Grid and places (k, d) [m] of an annulus about the origin, in space upwards from it."""
+    """Grid and points (k, d) [m] of an annulus about the origin, in space upwards from it."""
     closed = sweep_deg == 360.0
     grid, order_of = Grid.of_counts(counts, step, closed=1 if closed else None)
     radii = span(inner, outer, step * counts[0], shares[0])
@@ -363,13 +363,13 @@ def _solid_disc(
     layers[-1] = circle
     ring_ids = np.concatenate([rim[None], len(core) + np.arange(layers[..., 0].size).reshape(layers.shape[:2])])
     ring_ids = np.concatenate([ring_ids, ring_ids[:, :1]], axis=1)  # closed
-    places = np.concatenate([core, layers.reshape(-1, 2)])
+    points = np.concatenate([core, layers.reshape(-1, 2)])
     # Numbered across the disc line by line: the bandwidth is a diameter's nodes.
-    new = np.empty(len(places), dtype=np.int64)
-    new[np.lexsort((places[:, 1], np.round(places[:, 0] / radius * side)))] = np.arange(len(places))
-    ordered = np.empty_like(places)
+    new = np.empty(len(points), dtype=np.int64)
+    new[np.lexsort((points[:, 1], np.round(points[:, 0] / radius * side)))] = np.arange(len(points))
+    ordered = np.empty_like(points)
     turn = math.radians(start)
     rotation = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-    ordered[new] = places @ rotation if turn else places
+    ordered[new] = points @ rotation if turn else points
     grids = [Grid(new[core_ids], step), Grid(new[ring_ids], step)]
     return mesh_of_grids(grids, ordered + centre, name, {"outer": Side(1, 0, True)}, "annulus")

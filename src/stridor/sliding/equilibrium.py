@@ -93,7 +93,7 @@ class Equilibrium:
             tangent, extra = self._springs(before)
             self._contacts(before)
             u, normal = self._linear(active, tangent, extra)
-            if self._settled(before, u, active):
+            if self._converged(before, u, active):
                 return NodeState(active, u, normal, nodes.gap + nodes.normal @ u)
         raise AnalysisError(
             "steady sliding: the springs beyond the linear find no equilibrium in "
@@ -126,7 +126,7 @@ class Equilibrium:
         self.gap[hardens] += approach - (stiffness * approach + factor * approach**3) / tangent
         self.condensed = self.compliance * self.scale * CONDENSED > 1.0
 
-    def _settled(self, before: Array, u: Array, active: BoolArray) -> bool:
+    def _converged(self, before: Array, u: Array, active: BoolArray) -> bool:
         """Whether the ways of everything beyond the linear have stopped changing."""
         cubic, nodes = self.system.cubic, self.nodes
         hardens = active & (nodes.cubic > 0)
@@ -181,7 +181,9 @@ class Equilibrium:
         return answer[:n], normal
 
 
-def settle(equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: int = 60) -> tuple[NodeState, int]:
+def find_touching(
+    equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: int = 60
+) -> tuple[NodeState, int]:
     """Find the touching nodes: N ≥ 0 where they touch, gap ≥ 0 where they do not. Also returns the steps taken. Nodes
     of contacts kept closed touch, whichever the sign of N.
 

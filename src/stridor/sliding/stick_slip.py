@@ -31,7 +31,7 @@ from .equilibrium import ContactRows, Equilibrium, NodeState
 
 LIMIT = 120  # sets of nodes tried in one increment
 ROUNDING = 1e-11  # of the largest force or way: what does not count as a violation
-TURNED = 1e-9  # of the largest force: by how much directions of slip may still change it
+ROTATION = 1e-9  # of the largest force: by how much directions of slip may still change it
 
 
 @dataclass(frozen=True)
@@ -212,8 +212,8 @@ class StickSlip:
                 continue
             change = self._violations(before, load, state)
             if not change.any:
-                turned, direction, across = self._turn(before, load, state)
-                if turned <= TURNED:
+                rotation, direction, across = self._turn(before, load, state)
+                if rotation <= ROTATION:
                     return state, residual
                 continue
             last = (state, change)
@@ -306,7 +306,7 @@ class StickSlip:
         loose = (status == STICK) & ~pulled & (beyond > ROUNDING * force)
         slip = state.position - before.position
         back = np.sum(slip * state.direction, axis=1)
-        turned = (status == SLIP) & ~driven & ~pulled & (back > ROUNDING * way)
+        backward = (status == SLIP) & ~driven & ~pulled & (back > ROUNDING * way)
         target = status.copy()
         target[pulled] = OPEN
         # A node that would close sticks or slips as equal springs along normal and tangents would have it.
@@ -314,12 +314,12 @@ class StickSlip:
         skids = driven | (length > load.sticking * np.abs(state.gap))
         target[closing] = np.where(skids[closing], SLIP, STICK)
         target[loose] = SLIP
-        target[turned] = STICK
+        target[backward] = STICK
         severity = np.zeros(len(status))
         severity[pulled] = -normal[pulled] / max(force, 1e-300)
         severity[closing] = -state.gap[closing] / max(gap, 1e-300)
         severity[loose] = beyond[loose] / max(force, 1e-300)
-        severity[turned] = back[turned] / max(way, 1e-300)
+        severity[backward] = back[backward] / max(way, 1e-300)
         direction = state.direction.copy()
         direction[loose] = state.friction[loose] / np.maximum(size[loose], 1e-300)[:, None]
         skids &= closing

@@ -221,9 +221,9 @@ class _Search:
                 continue
             other = min(others, key=lambda k: abs(k.mu - edge.mu))
             assert other.found is not None
-            here, there = _margin(edge.found), _margin(other.found)
+            margin, other_margin = _margin(edge.found), _margin(other.found)
             with np.errstate(divide="ignore", invalid="ignore"):
-                at = edge.mu - here * (edge.mu - other.mu) / (here - there)
+                at = edge.mu - margin * (edge.mu - other.mu) / (margin - other_margin)
             inside = at[(at > low.mu) & (at < high.mu)]
             if len(inside):
                 return float(inside.min() if edge is low else inside.max())

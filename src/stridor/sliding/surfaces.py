@@ -20,7 +20,7 @@ from ..direct import SingularMatrix
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
-from .equilibrium import Equilibrium, NodeState, settle
+from .equilibrium import Equilibrium, NodeState, find_touching
 from .history import STILL, follow
 from .pattern import left_by_facets, unexplained_patterns
 from .points import full_motion, words_of_friction
@@ -120,7 +120,7 @@ def steady_sliding_nodes(
         push = sp.csr_array(nodes.normal + nodes.along(rubbing)) if rubs else nodes.normal
         equilibrium = Equilibrium(system, nodes, push, force, symmetric=symmetric, solver=solver)
         try:
-            state, tried = settle(equilibrium, guess) if held is None else (equilibrium.solve(held), 1)
+            state, tried = find_touching(equilibrium, guess) if held is None else (equilibrium.solve(held), 1)
         except SingularMatrix as error:
             raise AnalysisError(_loose(system, nodes, error.motion)) from error
         iterations += tried
