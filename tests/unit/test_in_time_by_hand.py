@@ -516,7 +516,7 @@ def test_the_energy_balance_in_words() -> None:
 
 
 def problems(phases, **changes) -> list[str]:
-    motion = SimpleNamespace(names=("belt", "supports.jaw.distance"), places=np.array([0.0, 1.0]))
+    motion = SimpleNamespace(names=("belt", "supports.jaw.distance"), full_distance=np.array([0.0, 1.0]))
     system: Any = SimpleNamespace(points={"tip": 0, "foot": 0}, loads={"P": 0}, motion=motion)
     given: dict[str, Any] = {"step": None, "beta2": 0.5, "record_every": 1, "watch": ()} | changes
     try:

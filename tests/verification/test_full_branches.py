@@ -159,7 +159,7 @@ def test_both_ways_to_eigenpairs_lead_along_the_same_branches(tmp_path: Path):
     assert isinstance(source, Projected)
     assert source.model is not None
     states = [followed(s, 0.0, 0.6, frequency).high for s in (source, Whole(family, frequency))]
-    assert len(states[0].place) == len(states[1].place)
+    assert len(states[0].index) == len(states[1].index)
     inside = np.abs(states[1].values) < frequency
     assert states[0].values[inside] == pytest.approx(states[1].values[inside], rel=1e-7)
 

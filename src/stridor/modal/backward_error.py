@@ -155,6 +155,6 @@ def common_pattern(*matrices: Sparse) -> tuple[IntArray, IntArray, Array]:
     for k, matrix in enumerate(matrices):
         coo = sp.coo_array(matrix)
         key = coo.row.astype(np.int64) * pattern.shape[1] + coo.col
-        place = np.searchsorted(rows.astype(np.int64) * pattern.shape[1] + pattern.indices, key)
-        np.add.at(data[k], place, coo.data)
+        index = np.searchsorted(rows.astype(np.int64) * pattern.shape[1] + pattern.indices, key)
+        np.add.at(data[k], index, coo.data)
     return pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64), data

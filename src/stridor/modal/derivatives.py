@@ -241,8 +241,8 @@ def solve_mode(pencil: Pencil, guess: complex, gap: float, *, solver: str | None
             found = two_sided(pencil.whole, guess, None, None, beside=shift, solver=solver)
         except SingularMatrix:
             found = None
-        settled = found is not None and found.change <= BELIEVED * abs(found.lam)
-        if found and settled and abs(found.lam - guess) <= max(BELIEVED * size, 0.3 * min(gap, 1e-3 * size)):
+        converged = found is not None and found.change <= BELIEVED * abs(found.lam)
+        if found and converged and abs(found.lam - guess) <= max(BELIEVED * size, 0.3 * min(gap, 1e-3 * size)):
             return _mode(pencil, found)
         shift *= WIDENED
     raise AnalysisError(

@@ -143,8 +143,8 @@ def missing(found: Growing, listed: ComplexArray, unstable: BoolArray) -> IntArr
     rest = np.setdiff1d(np.arange(len(found.values)), ours)
     # Growth so slow that one way of solving sees it and the other does not.
     stable = listed[~unstable & np.isfinite(listed)]
-    away = np.abs(found.values[rest][:, None] - stable).min(axis=1, initial=np.inf)
-    return rest[away > SAME * np.abs(found.values[rest])]
+    distance = np.abs(found.values[rest][:, None] - stable).min(axis=1, initial=np.inf)
+    return rest[distance > SAME * np.abs(found.values[rest])]
 
 
 def unconfirmed(found: Growing, listed: ComplexArray, unstable: BoolArray) -> int:
@@ -336,23 +336,23 @@ def _with_columns(
     for row, growing in found.items():
         if isinstance(growing, str):
             continue
-        places = missing(growing, modes.eigenvalues[row], modes.unstable[row])
-        if not len(places):
+        indices = missing(growing, modes.eigenvalues[row], modes.unstable[row])
+        if not len(indices):
             continue
-        alone[row] = len(places)
-        modes = _widened(modes, row, growing, places)
+        alone[row] = len(indices)
+        modes = _widened(modes, row, growing, indices)
     return modes, alone
 
 
-def _widened(modes: ComplexModes, row: int, found: Growing, places: IntArray) -> ComplexModes:
+def _widened(modes: ComplexModes, row: int, found: Growing, indices: IntArray) -> ComplexModes:
     """With columns that hold eigenvalues at one μ alone."""
-    shape = (len(modes.mu), len(places))
+    shape = (len(modes.mu), len(indices))
     values, residual = np.full(shape, complex(np.nan, np.nan)), np.full(shape, np.nan)
-    values[row], residual[row] = found.values[places], found.residual[places]
+    values[row], residual[row] = found.values[indices], found.residual[indices]
     right = left = None
     if modes.right is not None:
         shapes = np.full((*shape, modes.right.shape[2]), complex(np.nan, np.nan))
-        shapes[row] = found.right[:, places].T
+        shapes[row] = found.right[:, indices].T
         right = np.concatenate([modes.right, shapes], axis=1)
     if modes.left is not None:
         left = np.concatenate([modes.left, np.full((*shape, modes.left.shape[2]), complex(np.nan, np.nan))], axis=1)
@@ -361,7 +361,7 @@ def _widened(modes: ComplexModes, row: int, found: Growing, places: IntArray) ->
         modes,
         eigenvalues=np.concatenate([modes.eigenvalues, values], axis=1),
         residual=np.concatenate([modes.residual, residual], axis=1),
-        branch=np.concatenate([modes.branch, most + 1 + np.arange(len(places))]),
+        branch=np.concatenate([modes.branch, most + 1 + np.arange(len(indices))]),
         right=right,
         left=left,
     )

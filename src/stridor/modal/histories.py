@@ -39,10 +39,10 @@ class Entries:
 
     def after(self, branches: tuple[int, ...], mu: float, before: float) -> float | None:
         """The first μ in [mu, before] at which one of these branches comes into the band, to about a step."""
-        places = [
+        entering = [
             max(at, mu) for b in branches for at, step in self.found.get(b, []) if at >= mu - step and at <= before
         ]
-        return min(places, default=None)
+        return min(entering, default=None)
 
 
 def reported(
@@ -66,10 +66,10 @@ def reported(
             onset = replace(onset, enters_at=enters)
         if not any(_same(onset, other) for other in kept):
             kept.append(onset)
-    return sorted(kept, key=_place)
+    return sorted(kept, key=_order)
 
 
-def _place(onset: Onset) -> tuple[float, float]:
+def _order(onset: Onset) -> tuple[float, float]:
     return onset.mu, onset.frequency_hz
 
 

@@ -103,12 +103,12 @@ def joined_modes(parts: Sequence[ComplexModes], borders: Sequence[TouchingChange
 
     def stacked(name: str, fill: complex | float) -> Array | None:
         values: list[Array] = []
-        for part, places in zip(parts, columns, strict=True):
+        for part, indices in zip(parts, columns, strict=True):
             own = getattr(part, name)
             if own is None:
                 return None
             wide = np.full((len(part.mu), len(every), *own.shape[2:]), fill, dtype=own.dtype)
-            wide[:, places] = own
+            wide[:, indices] = own
             values.append(wide)
         return np.concatenate(values)[back]
 
@@ -155,7 +155,7 @@ def joined_onsets(
     first, last = parts[0][1], parts[-1][1]
     return replace(
         first,
-        onsets=tuple(sorted(every, key=_place)),
+        onsets=tuple(sorted(every, key=_order)),
         friction_range=between,
         at_end=last.at_end,
         unexplained=sum(found.unexplained for _, found in parts),
@@ -197,7 +197,7 @@ def _pair(names: Names, onset: Onset) -> tuple[int, int]:
     return first, second
 
 
-def _place(onset: Onset) -> tuple[float, float]:
+def _order(onset: Onset) -> tuple[float, float]:
     return onset.mu, onset.frequency_hz
 
 

@@ -193,11 +193,11 @@ def crossing(
             break
         tangent = -here.by_mu / here.by_lam
         # λ(jω, μ) moves by −g/g_λ and is to end on the axis: dRe λ/dμ δμ = −Re, and ω goes along.
-        away = -here.g / here.by_lam
+        step = -here.g / here.by_lam
         if abs(tangent.real) * (problem.high - problem.low) <= FLAT * abs(omega):
             return None
-        change = -away.real / tangent.real
-        turn = away.imag + tangent.imag * change
+        change = -step.real / tangent.real
+        turn = step.imag + tangent.imag * change
         if not between[0] - width <= mu + change <= between[1] + width:
             return None
         if off <= 0.1 * ON_AXIS and abs(change) <= SETTLED * max(abs(mu), problem.high - problem.low):

@@ -68,7 +68,7 @@ def _parts(over: tuple[Stretch, ...], values: Array) -> list[tuple[Stretch, IntA
     """The stretches with friction coefficients in them, and the places of these in ``values`` (k,)."""
     inner = np.array([s.low for s in over[1:]])
     which = np.searchsorted(inner, values, side="right")
-    return [(s, places) for k, s in enumerate(over) if len(places := np.flatnonzero(which == k))]
+    return [(s, indices) for k, s in enumerate(over) if len(indices := np.flatnonzero(which == k))]
 
 
 def _modes_of_parts(
@@ -81,7 +81,7 @@ def _modes_of_parts(
     progress: Progress | None,
 ) -> ComplexModes:
     """Modes of every stretch with its own touching nodes, joined."""
-    solid = [(s, places) for s, places in parts if not s.reason]
+    solid = [(s, indices) for s, indices in parts if not s.reason]
     if not solid:
         raise AnalysisError(parts[0][0].reason)
     found: list[ComplexModes] = []
@@ -89,7 +89,7 @@ def _modes_of_parts(
     order: list[int] = []
     left: tuple[IntArray, ComplexArray] | None = None
     stopped = False
-    for k, (stretch, places) in enumerate(solid):
+    for k, (stretch, indices) in enumerate(solid):
         # Both sides of a border are solved at its μ as well, so that branches are known again beyond it.
         ends = [s.low for s, _ in (solid[k : k + 1] if k else []) + solid[k + 1 : k + 2]]
         held, done = stretch.of(system), len(order)
@@ -99,19 +99,19 @@ def _modes_of_parts(
                 progress(min(done + at, len(values)), len(values))
 
         try:
-            whole = followed(held, np.append(values[places], ends), tell)
+            whole = followed(held, np.append(values[indices], ends), tell)
         except KeyboardInterrupt:
             if not found:
                 raise
             break  # before the first μ of this stretch: what the others have stays
         if whole.planned is not None:
             # What follows is missing too; rows of borders are no results.
-            rows = [r for r, mu in enumerate(whole.mu) if mu in values[places]]
-            keep = [int(places[np.flatnonzero(values[places] == whole.mu[r])[0]]) for r in rows]
+            rows = [r for r, mu in enumerate(whole.mu) if mu in values[indices]]
+            keep = [int(indices[np.flatnonzero(values[indices] == whole.mu[r])[0]]) for r in rows]
             stopped, own = True, rows_of(whole, rows)
         else:
-            keep, own = places.tolist(), rows_of(whole, range(len(places)))
-        sides = [(whole.branch, whole.eigenvalues[len(places) + e]) for e in range(len(ends))] if not stopped else []
+            keep, own = indices.tolist(), rows_of(whole, range(len(indices)))
+        sides = [(whole.branch, whole.eigenvalues[len(indices) + e]) for e in range(len(ends))] if not stopped else []
         if k and left is not None:
             if not sides:
                 break
@@ -129,7 +129,7 @@ def _modes_of_parts(
 
 def _with_empty(modes: ComplexModes, values: Array, parts: list[tuple[Stretch, IntArray]]) -> ComplexModes:
     """With rows of NaN at the μ where there is no steady sliding."""
-    empty = {int(k): s.reason for s, places in parts if s.reason for k in places}
+    empty = {int(k): s.reason for s, indices in parts if s.reason for k in indices}
     if not empty:
         return modes
     solid = [k for k in range(len(values)) if k not in empty]

@@ -221,9 +221,9 @@ def _limit(spectrum: ReceptanceProblem, count: int, max_frequency_hz: float | No
     poles = np.sort(np.sqrt(np.abs(spectrum.modes.stiffness)))
     if spectrum.modes.general:
         poles = np.sort(np.concatenate([poles, np.abs(spectrum.modes.poles[spectrum.modes.poles.imag >= 0])]))
-    place = count + spectrum.coupling.contacts
-    if place < len(poles):
-        return float(poles[place]) * (1 + 1e-9)
+    index = count + spectrum.coupling.contacts
+    if index < len(poles):
+        return float(poles[index]) * (1 + 1e-9)
     # All of them: contact springs raise the highest frequency by no more than they are stiff.
     soft = spectrum.coupling.compliance > 0
     normal = spectrum.receptance.real[0::2][soft]

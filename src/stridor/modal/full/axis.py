@@ -194,8 +194,8 @@ class _Walk:
         """Whether the way from ν to ν may touch the ray left of −1/width."""
         edge = -1.0 / (self.width * (1 + NEAR))
         middle, reach = 0.5 * (before + after), np.abs(after - before)
-        away = np.where(middle.real <= edge, np.abs(middle.imag), np.abs(middle - edge))
-        return away <= reach
+        distance = np.where(middle.real <= edge, np.abs(middle.imag), np.abs(middle - edge))
+        return distance <= reach
 
     def _solved(self, omega: float, s: float) -> Root | None:
         """The onset in the full problem."""
@@ -204,9 +204,9 @@ class _Walk:
             # x = A⁻¹QCz and y = A⁻ᵀRv of right and left vectors of W.
             answer = solve(self._left @ self._core(omega))
             values, left, right = sl.eig(self._right.T @ answer, left=True)
-            place = int(np.argmin(np.abs(values + 1.0 / s)))
-            x = answer @ right[:, place]
-            y = solve(self._right @ left[:, place].conj(), transpose=True)
+            index = int(np.argmin(np.abs(values + 1.0 / s)))
+            x = answer @ right[:, index]
+            y = solve(self._right @ left[:, index].conj(), transpose=True)
         reach = NEAR * self.width
         between = (max(self.low, mu - reach), min(self.high, mu + reach))
         if omega == 0.0:

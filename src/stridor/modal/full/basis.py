@@ -43,7 +43,7 @@ class Along(OverNumber):
         self.family = family
         self.at_rest = 0
 
-    def settle(self) -> None:
+    def find_at_rest(self) -> None:
         """Find out whether the structure moves as a whole at every μ: such eigenvalues are rounding about zero, in
         changing numbers, and are left out from then on."""
         least = len(self.eigenpairs(0.0).values)
@@ -68,12 +68,12 @@ class Along(OverNumber):
             found.tangents[kept], found.own,
         )  # fmt: skip
 
-    def steadied(self, found: Eigenpairs) -> Eigenpairs:
+    def without_rounding(self, found: Eigenpairs) -> Eigenpairs:
         """With growth that may be rounding taken as none: modes that nothing damps would cross the axis everywhere."""
         values = off_rounding(found.values, UNSTABLE_RELATIVE)
         return replace(found, coordinate=values, values=values)
 
-    def turned(self, found: Eigenpairs) -> Eigenpairs:
+    def squared(self, found: Eigenpairs) -> Eigenpairs:
         """λ² as the coordinate where the problem is reversible: it stays smooth where eigenvalues reach zero, and real
         as long as they are on the axis."""
         values = off_rounding(found.values, SPLIT_RELATIVE)
@@ -104,9 +104,9 @@ class OnBasis(Along, DenseProblem):
             return self._known[mu]
         found = DenseProblem.eigenpairs(self, mu)
         if not self.family.reversible:
-            found = self.steadied(found)
+            found = self.without_rounding(found)
         elif not self.family.still:
-            found = self.turned(found)
+            found = self.squared(found)
         return self.remembered(self.moving(found))
 
 
@@ -121,13 +121,13 @@ class Projected(OnBasis):
         self.model = model
         self._form = problem.form
         self._parts: list[tuple[int, int, Array]] = []
-        place = 0
+        index = 0
         for row, role in enumerate(ROLES):
             for k, matrix in enumerate(self._form[role].matrices):
                 if matrix.nnz:
-                    dense = matrix.toarray() if model is None else model.projected[place]
+                    dense = matrix.toarray() if model is None else model.projected[index]
                     self._parts.append((row, k, dense))
-                    place += 1
+                    index += 1
 
     def vectors(self, z: ComplexArray, mu: float, *, left: bool = False) -> ComplexArray:
         """V z, or z where V is the unit matrix; without the forces of rigid contact."""
@@ -146,9 +146,9 @@ class Projected(OnBasis):
 
     def matrices(self, mu: complex) -> tuple[Array, Any, Any]:
         """M, D and K (r, r) at μ − low, which may be complex."""
-        there = self.family.low + mu
-        real = complex(there).imag == 0.0
-        factors = [self._form[role].factors(there) for role in ROLES]
+        value = self.family.low + mu
+        real = complex(value).imag == 0.0
+        factors = [self._form[role].factors(value) for role in ROLES]
         return self._summed([f.real if real else f for f in factors])
 
     def changes(self, mu: complex) -> tuple[Array, Any, Any]:
@@ -180,12 +180,12 @@ class Whole(Along):
     def eigenpairs(self, mu: float) -> Eigenpairs:
         """All eigenpairs at ``mu`` up to beyond the band."""
         if mu not in self._known:
-            there = self.family.low + mu
-            problem, top = self.family.at(there), self._reach * self.frequency / (2 * np.pi)
+            value = self.family.low + mu
+            problem, top = self.family.at(value), self._reach * self.frequency / (2 * np.pi)
             region = Region.band(0.0, top, above=-self._decay * self.frequency)
             found = find_modes(problem, region, left=True, solver=self.family.options.solver, count=False)
             assert found.left is not None, "asked for"
-            change = self.family.slopes(there)
+            change = self.family.slopes(value)
             with np.errstate(all="ignore"):
                 by_mu = change.residual(found.values, found.right)
                 slope = problem.slope(found.values, found.right)
@@ -193,7 +193,8 @@ class Whole(Along):
             pairs = Eigenpairs(
                 mu, found.values, found.values, found.right, found.left, tangents, self.family.freedoms
             )
-            self.remembered(self.moving(self.turned(pairs) if self.family.reversible else self.steadied(pairs)))
+            pairs = self.squared(pairs) if self.family.reversible else self.without_rounding(pairs)
+            self.remembered(self.moving(pairs))
         return self._known[mu]
 
 
@@ -210,7 +211,7 @@ def along(family: Family, frequency: float) -> Along:
         problem = _on_basis(family)
         small = problem.form is not None and problem.size <= DENSE
         source = Projected(family, frequency, None if small else _model(family, frequency))
-        source.settle()
+        source.find_at_rest()
         return source
     except (AnalysisError, np.linalg.LinAlgError, ValueError) as error:
         return whole_or_raise(family, frequency, str(error))
@@ -225,7 +226,7 @@ def whole_or_raise(family: Family, frequency: float, reason: str) -> Whole:
             f"not tried with {unknowns} unknowns, more than {WHOLE}; take `stridor modes` at several mu"
         )
     source = Whole(family, frequency)
-    source.settle()
+    source.find_at_rest()
     return source
 
 

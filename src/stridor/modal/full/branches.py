@@ -97,8 +97,8 @@ def solved(
             continue
         one = BranchOnset(_onset(source, passage, *root), passage.branch)
         if enters is not None and abs(root[0].lam.imag) > top:
-            place = min(max(family.low + enters, one.onset.mu), between[1])
-            one = replace(one, onset=replace(one.onset, enters_at=place))
+            entry = min(max(family.low + enters, one.onset.mu), between[1])
+            one = replace(one, onset=replace(one.onset, enters_at=entry))
         if not any(_same(one.onset, other.onset, family) for other in found):
             found.append(one)
     found = without_crossings(found)
@@ -192,10 +192,10 @@ def _opening(source: Along, end: RegionModes, state: State, top: float) -> list[
     values, change = end.values, family.slopes(family.low)
     problem = family.built(family.low)
     on_axis = (np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)) & (np.abs(values) > AT_REST * top)
-    places = np.flatnonzero(on_axis & (values.imag > 0))
+    indices = np.flatnonzero(on_axis & (values.imag > 0))
     result: list[BranchOnset] = []
-    for group in groups(values[places], ALIKE * top):
-        mine = places[group]
+    for group in groups(values[indices], ALIKE * top):
+        mine = indices[group]
         if family.reversible and len(mine) < 2:
             continue
         x, y, lam = end.right[:, mine], end.left[:, mine], values[mine]

@@ -180,10 +180,10 @@ class _Search:
             np.where(np.isfinite(slope), values + way * slope, values)
             for values, slope, way in ((first, rates, half), (last, rates_to, -half))
         )
-        away = np.abs(ahead[:, None] - back)
-        rows, columns = linear_sum_assignment(away)
+        distance = np.abs(ahead[:, None] - back)
+        rows, columns = linear_sum_assignment(distance)
         near = NEARBY * np.maximum(np.abs(first[rows]), np.abs(last[columns])) + 0.1 * NEARBY * self.top
-        return bool(np.all(away[rows, columns] <= near))
+        return bool(np.all(distance[rows, columns] <= near))
 
     def _at_edge(self, low: _Count, high: _Count) -> complex | None:
         """The growing mode that passes the highest frequency between two values, if that is what changes."""
@@ -203,10 +203,10 @@ class _Search:
         fresh = np.setdiff1d(np.arange(len(mine)), known)
         if not len(fresh):
             fresh = np.arange(len(mine))
-        place = int(mine[fresh[np.argmin(more.found.values[mine[fresh]].real)]])
-        lam, mu = complex(more.found.values[place]), self.start + more.t
+        index = int(mine[fresh[np.argmin(more.found.values[mine[fresh]].real)]])
+        lam, mu = complex(more.found.values[index]), self.start + more.t
         x, y = (
-            self.source.vectors(v[:, [place]], more.t, left=left)[:, 0]
+            self.source.vectors(v[:, [index]], more.t, left=left)[:, 0]
             for v, left in ((more.found.right, False), (more.found.left, True))
         )
         between = (self.start + low.t, self.start + high.t)

@@ -187,9 +187,9 @@ class Smooth:
             open_: list[Role] = [role for role in ROLES if best[role][1] > EXACT]
             if not open_:
                 break
-            there = self.built(node)
+            problem = self.built(node)
             for role in open_:
-                new = getattr(there, role)
+                new = getattr(problem, role)
                 # Divided differences, of which each new node needs the last.
                 for j, known in enumerate(columns[role]):
                     new = sp.csr_array((new - known) / (node - nodes[j]))
@@ -197,7 +197,7 @@ class Smooth:
                 columns[role].append(new)
                 form = Form(tuple(columns[role]), tuple(nodes[: k + 1]))
                 left = max(
-                    away(form.sum(form.factors(mu)), true)
+                    deviation(form.sum(form.factors(mu)), true)
                     for mu, true in zip(tried, truth[role], strict=True)
                 )
                 if left < best[role][1]:
@@ -221,12 +221,12 @@ class Smooth:
         if self.form is not None:
             mass, damping, stiffness = (self.form[role].matrices for role in ROLES)
         else:
-            there = [self.built(self.low + p * (self.high - self.low)) for p in (0.0, *PROBES, 1.0)]
-            mass, damping, stiffness = ([getattr(q, role) for q in there] for role in ROLES)
+            problems = [self.built(self.low + p * (self.high - self.low)) for p in (0.0, *PROBES, 1.0)]
+            mass, damping, stiffness = ([getattr(q, role) for q in problems] for role in ROLES)
         if not any(d.nnz and np.any(d.data) for d in damping):
             return True
-        potential = all(away(m, sp.csr_array(m.T)) <= EXACT for m in (*mass, *stiffness))
-        return potential and all(away(d, sp.csr_array(-d.T)) <= EXACT for d in damping)
+        potential = all(deviation(m, sp.csr_array(m.T)) <= EXACT for m in (*mass, *stiffness))
+        return potential and all(deviation(d, sp.csr_array(-d.T)) <= EXACT for d in damping)
 
     @property
     def sizes(self) -> Array:
@@ -245,7 +245,7 @@ class Smooth:
     def dissipates(self) -> bool:
         """Whether anything works on velocities that is not gyroscopic."""
         mid = self.built(self.low + PROBES[0] * (self.high - self.low))
-        return away(mid.damping, sp.csr_array(-mid.damping.T)) > EXACT
+        return deviation(mid.damping, sp.csr_array(-mid.damping.T)) > EXACT
 
     @cached_property
     def still(self) -> bool:
@@ -262,7 +262,7 @@ class Smooth:
             form = self.form[role]
             for k, matrix in enumerate(form.matrices):
                 if matrix.nnz:
-                    symmetric = away(matrix, sp.csr_array(matrix.T)) <= EXACT
+                    symmetric = deviation(matrix, sp.csr_array(matrix.T)) <= EXACT
                     terms.append(Term(matrix, role, Weight(form.nodes[:k]), symmetric=symmetric))
         return ParametricProblem(tuple(terms), (Parameter(MU, self.low, self.high, (self.low + self.high) / 2),))
 
@@ -342,9 +342,10 @@ class SystemFamily(Family):
         """Whether μ changes anything."""
         if not self.varies and not self.contacts.nodes:
             return False
-        places = (self.low, self.high, *(self.low + p * (self.high - self.low) for p in PROBES))
-        first = self.built(places[0])
-        return any(away(getattr(first, role), getattr(self.built(p), role)) > 0 for p in places[1:] for role in ROLES)
+        samples = (self.low, self.high, *(self.low + p * (self.high - self.low) for p in PROBES))
+        first = self.built(samples[0])
+        others = [self.built(p) for p in samples[1:]]
+        return any(deviation(getattr(first, role), getattr(q, role)) > 0 for q in others for role in ROLES)
 
     @cached_property
     def eliminated(self) -> tuple[Smooth, Elimination] | None:
@@ -406,7 +407,7 @@ def wide(matrix: Sparse) -> Sparse:
     return sp.csr_array(matrix, dtype=np.longdouble)
 
 
-def away(one: Sparse, other: Sparse) -> float:
+def deviation(one: Sparse, other: Sparse) -> float:
     """Largest difference of two matrices, each entry over the largest of its row and column."""
     apart = sp.coo_array(one - other)
     if not apart.nnz or not np.any(apart.data):

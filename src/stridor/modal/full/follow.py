@@ -86,7 +86,7 @@ def followed(source: Along, low: float, high: float, top: float, finer: int = 1)
 
     def watch(old: State, new: State) -> None:
         passages.extend(meetings(source, old, new) if family.reversible else crossings(old, new))
-        entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.place)))
+        entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.index)))
 
     most = ENOUGH[source.whole] * min(finer, 2)
     way = follower(source, finer=finer, most=most, watch=watch, unsure=unsure.append)

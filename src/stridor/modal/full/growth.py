@@ -21,7 +21,7 @@ def off_rounding(values: ComplexArray, rounding: float) -> ComplexArray:
     return np.where(np.abs(values.real) <= rounding * np.abs(values), 1j * values.imag, values)
 
 
-def steadied(family: Family, values: ComplexArray) -> ComplexArray:
+def without_rounding(family: Family, values: ComplexArray) -> ComplexArray:
     """Eigenvalues (k,) as they are told: of a reversible problem, with every λ there is −λ̄, so that a real part without
     a partner is rounding."""
     return off_rounding(values, SPLIT_RELATIVE) if family.reversible else values

@@ -20,7 +20,7 @@ from ..parametric import Parameter, ParametricProblem, ReducedModel, Term
 from ..parametric.dense import assembled
 from ..quadratic import Quadratic
 from .basis import OnBasis
-from .family import EXACT, ROLES, Family, away, wide
+from .family import EXACT, ROLES, Family, deviation, wide
 
 
 class ParameterLine(Family):
@@ -95,12 +95,12 @@ class ParameterLine(Family):
     def _acting(self) -> list[Term]:
         """Terms that are not zero throughout."""
         tried = np.array([self.problem.factors(self.point(s)) for s in np.linspace(0.0, 1.0, 9)])
-        there = zip(self.problem.terms, np.any(tried != 0.0, axis=0), strict=True)
-        return [t for t, acts in there if acts and t.matrix.nnz and np.any(t.matrix.data)]
+        acting = zip(self.problem.terms, np.any(tried != 0.0, axis=0), strict=True)
+        return [t for t, acts in acting if acts and t.matrix.nnz and np.any(t.matrix.data)]
 
 
 def _is(one: Sparse, other: Any) -> bool:
-    return away(one, sp.csr_array(other)) <= EXACT
+    return deviation(one, sp.csr_array(other)) <= EXACT
 
 
 def of_model(model: ReducedModel, name: str, point: Mapping[str, float]) -> ParameterLine:

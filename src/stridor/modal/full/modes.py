@@ -27,7 +27,7 @@ from ..quadratic.reach import searched
 from ..results import ComplexModes, Progress, require_memory
 from .basis import DECAY
 from .family import SystemFamily, family_of
-from .growth import steadied
+from .growth import without_rounding
 from .numbers import Numbers, numbered
 
 
@@ -125,7 +125,7 @@ def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> ModesA
     n = family.freedoms
     told = spectrum.completeness.sentence
     return ModesAtFriction(
-        steadied(family, spectrum.values),
+        without_rounding(family, spectrum.values),
         unit(spectrum.right[:n]),
         None if spectrum.left is None else unit(spectrum.left[:n]),
         spectrum.residual,

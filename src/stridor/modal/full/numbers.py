@@ -105,8 +105,8 @@ def _assign(
     rest = np.setdiff1d(np.arange(len(values)), still)
     ours, theirs = pairs(values[rest], state.values, NEAR * top)
     of[rest[ours]] = own[theirs]
-    for place in rest[of[rest] == 0]:
+    for index in rest[of[rest] == 0]:
         # Born where a pair fell apart on the real axis, or come from far above.
         most += 1
-        of[place] = most
+        of[index] = most
     return most

@@ -83,10 +83,10 @@ def _checked(source: Along, ends: tuple[RegionModes, RegionModes], top: float) -
     if source.whole or (isinstance(source, Projected) and source.model is None):
         return source
     # The low end of the range need not be where following begins; the high end is the one that is furthest from it.
-    there = source.eigenpairs(family.high - family.low).values
+    at_high = source.eigenpairs(family.high - family.low).values
     known = ends[1].values[np.abs(ends[1].values) <= top]
     known = known[np.abs(known) > AT_REST * top]
-    away = np.abs(known[:, None] - there).min(axis=1, initial=np.inf)
-    if np.all(away <= AGREES * np.abs(known)):
+    distance = np.abs(known[:, None] - at_high).min(axis=1, initial=np.inf)
+    if np.all(distance <= AGREES * np.abs(known)):
         return source
     return whole_or_raise(family, source.frequency, "a reduced model lacks modes that the matrices have")

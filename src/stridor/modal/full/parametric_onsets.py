@@ -132,7 +132,7 @@ def onsets_along(
     line = of_model(model, parameter, point)
     top = model.frequency
     source = OnTerms(line, top, model.projected)
-    source.settle()
+    source.find_at_rest()
     ends = ends_of(line, 0.0, 1.0, top)
     answer = search(line, [lambda: source], (0.0, 1.0), ends, top)
     full = ParameterLine(model.problem, parameter, point, Options(solver=solver)) if confirm else None

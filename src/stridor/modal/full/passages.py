@@ -83,13 +83,13 @@ def _by_rate(source: Along, passage: Passage) -> Iterator[Guess]:
             return
         part = first / (first - last) if first != last else 0.5
         t = low + float(np.clip(part, 0.05, 0.95)) * (high - low)
-        there = Follower.resumed(source, state).advance(t)
-        place, rate = int(there.place[passage.branch]), float(there.values[passage.branch].real)
-        yield _guess(source, there, place, t)
+        new = Follower.resumed(source, state).advance(t)
+        index, rate = int(new.index[passage.branch]), float(new.values[passage.branch].real)
+        yield _guess(source, new, index, t)
         if abs(rate) <= rounding:
             rate = first
         if rate * first > 0:
-            low, first, state = t, rate, there
+            low, first, state = t, rate, new
         else:
             high, last = t, rate
 
@@ -99,16 +99,16 @@ def _by_square(source: Along, passage: Passage) -> Iterator[Guess]:
     low, high = passage.low, passage.high
     width = high - low
 
-    def there(t: float) -> tuple[float, int]:
+    def sampled(t: float) -> tuple[float, int]:
         found = source.eigenpairs(t)
         if passage.kind == "divergence":
-            place = int(np.argmin(np.abs(found.coordinate)))
-            return float(found.coordinate[place].real), place
+            index = int(np.argmin(np.abs(found.coordinate)))
+            return float(found.coordinate[index].real), index
         part = (t - passage.low) / width
         guess = (1 - part) * passage.means[0] + part * passage.means[1]
         return float(pair_near(found.coordinate, guess)[1].real), int(np.argmin(np.abs(found.coordinate - guess)))
 
-    first, last = there(low)[0], there(high)[0]
+    first, last = sampled(low)[0], sampled(high)[0]
     rounding = (COMPLEX * source.frequency**2) ** (2 if passage.kind == "meeting" else 1)
     if first * last > 0 and min(abs(first), abs(last)) <= rounding:
         # It passes zero at the very end, whichever sign rounding has given it there.
@@ -118,16 +118,16 @@ def _by_square(source: Along, passage: Passage) -> Iterator[Guess]:
             return
         part = first / (first - last) if first != last else 0.5
         t = low + float(np.clip(part, 0.02, 0.98)) * (high - low)
-        value, place = there(t)
+        value, index = sampled(t)
         # On a basis another look costs nothing beside a step in the full problem.
         if source.whole or k >= 3 or abs(value) <= 1e-6 * max(abs(first), abs(last)):
             found = source.eigenpairs(t)
-            lam = complex(found.values[place])
+            lam = complex(found.values[index])
             if passage.kind == "meeting":
                 part = (t - passage.low) / width
                 guess = (1 - part) * passage.means[0] + part * passage.means[1]
                 lam = 1j * float(np.sqrt(max(-pair_near(found.coordinate, guess)[0].real, 0.0)))
-            x, y = found.right[:, [place]], found.left[:, [place]]
+            x, y = found.right[:, [index]], found.left[:, [index]]
             yield _expanded(source, t, lam, x, y)
         if value * first > 0:
             low, first = t, value
@@ -135,9 +135,9 @@ def _by_square(source: Along, passage: Passage) -> Iterator[Guess]:
             high, last = t, value
 
 
-def _guess(source: Along, state: State, place: int, t: float) -> Guess:
+def _guess(source: Along, state: State, index: int, t: float) -> Guess:
     found = state.found
-    return _expanded(source, t, complex(found.values[place]), found.right[:, [place]], found.left[:, [place]])
+    return _expanded(source, t, complex(found.values[index]), found.right[:, [index]], found.left[:, [index]])
 
 
 def _expanded(source: Along, t: float, lam: complex, x: ComplexArray, y: ComplexArray) -> Guess:

@@ -30,7 +30,7 @@ from .basis import DECAY, Along, Projected, along
 from .branches import ends_of
 from .family import Family, SystemFamily, family_of
 from .follow import BEYOND
-from .growth import steadied, unstable
+from .growth import unstable, without_rounding
 from .modes import ModesAtFriction, family_over, modes_at_each, table_of
 from .numbers import numbered
 from .search import search
@@ -129,7 +129,7 @@ def _confirmed(
         )
     order, n = np.lexsort((lam.real, lam.imag)), family.freedoms
     lam, right, left = lam[order], unit(right[:n, order]), unit(left[:n, order])
-    return ModesAtFriction(steadied(family, lam), right, left, residual[order], "")
+    return ModesAtFriction(without_rounding(family, lam), right, left, residual[order], "")
 
 
 def _solved(

@@ -94,10 +94,10 @@ def _wanted(found: Sequence[BranchOnset], between: tuple[float, float], top: flo
         f.onset for f in found
         if low <= f.onset.mu <= high and (_in_band(f.onset, top) or f.onset.enters_at is not None)
     ]  # fmt: skip
-    return tuple(sorted(inside, key=_place))
+    return tuple(sorted(inside, key=_order))
 
 
-def _place(onset: Onset) -> tuple[float, float]:
+def _order(onset: Onset) -> tuple[float, float]:
     return onset.mu, onset.frequency_hz
 
 
@@ -112,14 +112,14 @@ def _borne_out(answer: Answer, between: tuple[float, float], top: float) -> bool
     if source.whole:
         return True  # they were solved in full at every step
     onsets = [o for o in answer.onsets if _in_band(o, top)]
-    grid = [(mu, number_at(source, mu, top)) for mu in _places(answer.onsets, between)]
+    grid = [(mu, number_at(source, mu, top)) for mu in _sampled(answer.onsets, between)]
     return not Counted(tuple(grid), (), ()).lacking(onsets)
 
 
-def _places(onsets: Sequence[Onset], between: tuple[float, float]) -> list[float]:
+def _sampled(onsets: Sequence[Onset], between: tuple[float, float]) -> list[float]:
     """Where growing roots are counted: both ends, between every two onsets, and some in equal distances."""
-    (low, high), places = between, sorted({o.mu for o in onsets})
-    middles = [0.5 * (a + b) for a, b in zip([low, *places], [*places, high], strict=True)]
+    (low, high), values = between, sorted({o.mu for o in onsets})
+    middles = [0.5 * (a + b) for a, b in zip([low, *values], [*values, high], strict=True)]
     return sorted({low, high, *middles, *np.linspace(low, high, EVEN + 2)[1:-1].tolist()})
 
 
@@ -131,9 +131,9 @@ def _walked(
     walk = walked(family, between, top, ends[0].values)
     if walk is None:
         return None
-    onsets = tuple(sorted((as_onset(family, root) for root in walk.roots), key=_place))
+    onsets = tuple(sorted((as_onset(family, root) for root in walk.roots), key=_order))
     number = _number_by(family, top)
-    grid = tuple((mu, number(mu)) for mu in _places(onsets, between))
+    grid = tuple((mu, number(mu)) for mu in _sampled(onsets, between))
     seen = Counted(grid, onsets, ())
     if seen.lacking(onsets) or not _ends_agree(family, seen, ends, top):
         return None
@@ -165,7 +165,7 @@ def _beside(family: Family, source: Along | None, top: float, why: str) -> Along
     if family.size > WHOLE:
         raise AnalysisError(why or f"the problem has {family.size} unknowns, and no reduced model")
     source = Whole(family, top, beside=True)
-    source.settle()
+    source.find_at_rest()
     return source
 
 
@@ -185,7 +185,7 @@ def _counted_answer(
         onsets = seen.onsets
     lacks = seen.lacking(onsets)
     agree = _ends_agree(family, seen, ends, top)
-    every = tuple(sorted((*onsets, *entering), key=_place))
+    every = tuple(sorted((*onsets, *entering), key=_order))
     return Answer(every, not lacks and agree, way, seen, tuple(lacks), why)
 
 

@@ -74,7 +74,7 @@ def _followed(answer: Answer, name: str, value: Callable[[float], float], where:
     how = "" if where else how
     if isinstance(source, Projected) and source.model is not None:
         how = f" on a reduced model of {source.model.size} unknowns"
-    told = f"{len(way.low.place)} branches were followed from {name} = {value(source.family.low):g}{how}"
+    told = f"{len(way.low.index)} branches were followed from {name} = {value(source.family.low):g}{how}"
     if way.unsure:
         at = ", ".join(f"{value(mu):.6g}" for mu in way.unsure[:3])
         told += f" (which is which was not clear at {name} = {at}: numbers beyond may be exchanged)"
@@ -85,13 +85,13 @@ def _lacking(answer: Answer, name: str, value: Callable[[float], float]) -> str:
     """Where what is counted is not what the onsets say."""
     if not answer.lacks:
         return "what was counted there is not the same"
-    places = [
+    differences = [
         f"between {name} = {value(lack.low):.6g} and {value(lack.high):.6g} the number of growing roots changes by "
         f"{lack.seen:+d}, and by the onsets by {lack.said:+d}"
         for lack in answer.lacks[:MOST]
     ]
-    more = len(answer.lacks) - len(places)
-    return "; ".join([*places, *([f"and in {more} more places"] if more else [])])
+    more = len(answer.lacks) - len(differences)
+    return "; ".join([*differences, *([f"and in {more} more places"] if more else [])])
 
 
 def _passing(passing: tuple[Passing, ...], name: str, value: Callable[[float], float]) -> str:

@@ -32,7 +32,7 @@ from .modes import samples
 from .passages import Passage, crossings, meetings
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import Band, projected, settle
+from .refine import Band, converge_at, projected
 from .shifted import real_columns
 
 FOLLOW = 1.1  # times the band: from where branches are followed
@@ -72,7 +72,7 @@ def krylov_onsets(
     top = searched(problem.pencil(high).condensed(), 2 * np.pi * max_frequency_hz)
     # Modes that start above the band may meet inside it.
     reduced = projected(problem, Band(1, top * follow), high)
-    settle(reduced, samples(high, SAMPLES))
+    converge_at(reduced, samples(high, SAMPLES))
     way = _way(reduced, (low, high), top)
     changes: list[StabilityChange] = []
     for passage in way.passages:
@@ -100,7 +100,7 @@ def krylov_onsets(
 
 def _numbered(state: State) -> tuple[IntArray, ComplexArray]:
     """Numbers and eigenvalues (b,) of the branches at one μ."""
-    return np.arange(1, len(state.place) + 1), state.values
+    return np.arange(1, len(state.index) + 1), state.values
 
 
 def _inside(state: State, top: float) -> BoolArray:
@@ -127,7 +127,7 @@ def _way(reduced: Reduced, between: tuple[float, float], top: float) -> _Way:
 
     def watch(old: State, new: State) -> None:
         passages.extend(crossings(old, new) if reduced.damped else meetings(reduced, old, new))
-        entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.place)))
+        entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.index)))
 
     follower = Follower(reduced, longest=max(between[0] / 4, between[1] / 30))
     start = follower.advance(between[0])
@@ -231,9 +231,9 @@ def _root(call: Callable[[float], float], low: float, high: float) -> float | No
         return None
 
 
-def pair_near(coordinate: ComplexArray, place: complex) -> tuple[complex, complex]:
+def pair_near(coordinate: ComplexArray, target: complex) -> tuple[complex, complex]:
     """Mean and squared half difference of the two eigenvalues nearest to a place."""
-    near = np.argsort(np.abs(coordinate - place))[:2]
+    near = np.argsort(np.abs(coordinate - target))[:2]
     return halves(*coordinate[near])
 
 
@@ -329,9 +329,9 @@ def _crossing_again(reduced: DenseProblem, passage: Passage, solved: Solved) -> 
 def _quick_crossing(reduced: DenseProblem, passage: Passage) -> tuple[float, complex, float] | None:
     """μ, λ on the axis and the growth's slope, following this one mode only; None where that does not settle inside."""
     start = passage.old
-    place = int(start.place[passage.branch])
-    right, left = (reduced.padded(start.found, v[:, [place]])[:, 0] for v in (start.found.right, start.found.left))
-    lam, tangent = complex(start.found.values[place]), complex(start.found.tangents[place])
+    index = int(start.index[passage.branch])
+    right, left = (reduced.padded(start.found, v[:, [index]])[:, 0] for v in (start.found.right, start.found.left))
+    lam, tangent = complex(start.found.values[index]), complex(start.found.tangents[index])
     with np.errstate(all="ignore"):
         ahead = -lam.real / tangent.real
     width = passage.high - passage.low
@@ -377,14 +377,14 @@ def _by_growth(reduced: DenseProblem, passage: Passage) -> tuple[float, complex,
         return found, int(np.argmax(np.where(near, found.values.real, -np.inf)))
 
     def growth(mu: float) -> float:
-        found, place = fastest(mu)
-        return float(found.values[place].real)
+        found, index = fastest(mu)
+        return float(found.values[index].real)
 
     mu = _root(growth, passage.low, passage.high)
     if mu is None:
         return None
-    found, place = fastest(mu)
-    lam, slope = complex(found.values[place]), float(found.tangents[place].real)
+    found, index = fastest(mu)
+    lam, slope = complex(found.values[index]), float(found.tangents[index].real)
     if abs(lam.real) > 1e-9 * abs(lam) or (slope < 0) != passage.stabilising:
         return None
     return mu, 1j * lam.imag, slope
@@ -396,9 +396,9 @@ def _again(reduced: DenseProblem, passage: Passage) -> State | None:
     if passage.old.found is found:
         return passage.old
     distance = np.abs(passage.old.coordinate[:, None] - found.coordinate)
-    place = np.argmin(distance, axis=1)
-    near = distance[passage.branch, place[passage.branch]] <= 1e-3 * np.abs(passage.old.coordinate[passage.branch])
-    return State(found, place) if near else None
+    index = np.argmin(distance, axis=1)
+    near = distance[passage.branch, index[passage.branch]] <= 1e-3 * np.abs(passage.old.coordinate[passage.branch])
+    return State(found, index) if near else None
 
 
 def exceptional_point(reduced: DenseProblem, state: State, lam: complex, mu: float) -> tuple[complex, float] | None:

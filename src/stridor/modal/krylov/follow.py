@@ -30,10 +30,10 @@ FOLLOWED = 1.25  # branches are followed up to this much above the band
 
 @dataclass(frozen=True)
 class State:
-    """Branches (b,) at one μ: their places among the eigenpairs found there."""
+    """Branches (b,) at one μ: their indices among the eigenpairs found there."""
 
     found: Eigenpairs
-    place: IntArray
+    index: IntArray
 
     @property
     def mu(self) -> float:
@@ -43,17 +43,17 @@ class State:
     @property
     def coordinate(self) -> ComplexArray:
         """x (b,): λ² without damping, else λ."""
-        return self.found.coordinate[self.place]
+        return self.found.coordinate[self.index]
 
     @property
     def values(self) -> ComplexArray:
         """λ (b,)."""
-        return self.found.values[self.place]
+        return self.found.values[self.index]
 
     @property
     def tangents(self) -> ComplexArray:
         """dx/dμ (b,)."""
-        return self.found.tangents[self.place]
+        return self.found.tangents[self.index]
 
 
 class Follower:
@@ -85,7 +85,7 @@ class Follower:
         """A follower that goes on from a state followed before, and watches nothing."""
         follower = cls.__new__(cls)
         follower.source, follower.state = source, state
-        follower.named = len(state.place)
+        follower.named = len(state.index)
         follower.longest, follower.watch, follower._step = np.inf, None, np.inf
         return follower
 
@@ -101,11 +101,11 @@ class Follower:
                 # Where modes cross or meet they are known least: a little before it they tell which is which.
                 step *= ASIDE
                 found = self.source.eigenpairs(self.state.mu + step)
-            place = matched(self.state, found, self.named, surely=step > SMALLEST_STEP)
-            if place is None:
+            index = matched(self.state, found, self.named, surely=step > SMALLEST_STEP)
+            if index is None:
                 self._step = step / 4
                 continue
-            new = _named(self.state, State(found, place))
+            new = _named(self.state, State(found, index))
             if new is None:
                 self._step = step / 4
                 continue
@@ -136,20 +136,20 @@ def matched(old: State, found: Eigenpairs, named: int, *, surely: bool = True) -
     # Of two real values at the same distance the one that grows.
     scale = float(np.abs(found.coordinate).max(initial=1.0))
     rows, columns = scipy.optimize.linear_sum_assignment(distance / scale - 1e-9 * found.coordinate.real / scale)
-    place = np.zeros(len(distance), dtype=np.int64)
-    place[rows] = columns
+    index = np.zeros(len(distance), dtype=np.int64)
+    index[rows] = columns
     if not surely:
-        return place
-    clear = _clear(old, found, place, distance)
+        return index
+    clear = _clear(old, found, index, distance)
     for i in np.flatnonzero(~clear[:named]):
         if clear[i]:
             continue
-        pair = _as_pair(old, found, int(i), place, clear)
+        pair = _as_pair(old, found, int(i), index, clear)
         if pair is None:
             return None
-        j, place[i], place[j] = pair
+        j, index[i], index[j] = pair
         clear[i] = clear[j] = True
-    return place if len(np.unique(place)) == len(place) else None
+    return index if len(np.unique(index)) == len(index) else None
 
 
 def _named(old: State, new: State) -> State | None:
@@ -159,11 +159,11 @@ def _named(old: State, new: State) -> State | None:
     Of two modes that meet the first grows beyond (`meeting`). A mode that falls apart on the real axis is the one of
     its halves that grows faster.
     """
-    place = new.place.copy()
+    index = new.index.copy()
     was, now = old.coordinate, new.coordinate
     alone = (was.imag != 0) & (now.imag == 0)
-    if np.any(alone) and len(new.found.coordinate) > len(place):
-        free = np.setdiff1d(np.flatnonzero(new.found.coordinate.imag == 0), place)
+    if np.any(alone) and len(new.found.coordinate) > len(index):
+        free = np.setdiff1d(np.flatnonzero(new.found.coordinate.imag == 0), index)
         for i in np.flatnonzero(alone):
             if not len(free):
                 break
@@ -171,15 +171,15 @@ def _named(old: State, new: State) -> State | None:
             halves_to = 0.5 * (now[i] + new.found.coordinate[free]).real
             k = int(np.argmin(np.abs(halves_to - middle)))
             if new.found.coordinate[free[k]].real > now[i].real:
-                place[i], free[k] = free[k], place[i]
+                index[i], free[k] = free[k], index[i]
     # Without damping pairs are matched by rule already.
-    if np.all(was == old.values) and not _agreed(old, new, place):
+    if np.all(was == old.values) and not _agreed(old, new, index):
         return None
-    return State(new.found, place)
+    return State(new.found, index)
 
 
-def _agreed(old: State, new: State, place: IntArray) -> bool:
-    """Exchange, in ``place``, damped modes that have met or passed one another where they bear each other's names;
+def _agreed(old: State, new: State, index: IntArray) -> bool:
+    """Exchange, in ``index``, damped modes that have met or passed one another where they bear each other's names;
     False where a shorter step must tell."""
     x, slopes, x_to, slopes_to = old.coordinate, old.tangents, new.coordinate, new.tangents
     sure = True
@@ -197,25 +197,25 @@ def _agreed(old: State, new: State, place: IntArray) -> bool:
             continue
         sure &= told.sure
         if told.exchanged:
-            place[[i, j]] = place[[j, i]]
+            index[[i, j]] = index[[j, i]]
     return sure
 
 
-def _clear(old: State, found: Eigenpairs, place: IntArray, distance: Array) -> BoolArray:
+def _clear(old: State, found: Eigenpairs, index: IntArray, distance: Array) -> BoolArray:
     """Whether each branch's match (b,) is beyond doubt."""
-    mine = distance[np.arange(len(place)), place]
+    mine = distance[np.arange(len(index)), index]
     others = distance.copy()
-    others[np.arange(len(place)), place] = np.inf
+    others[np.arange(len(index)), index] = np.inf
     own = min(old.found.own, found.own)
-    before, after = old.found.right[:own, old.place], found.right[:own, place]
+    before, after = old.found.right[:own, old.index], found.right[:own, index]
     common = np.abs(np.einsum("ij,ij->j", before.conj(), after)) ** 2
     alike = common / np.maximum(np.sum(np.abs(before) ** 2, axis=0) * np.sum(np.abs(after) ** 2, axis=0), 1e-300)
-    rounding = 1e-9 * np.abs(found.coordinate[place])
+    rounding = 1e-9 * np.abs(found.coordinate[index])
     same = others.min(axis=1, initial=np.inf) <= rounding  # identical eigenvalues: either will do
     return ((mine <= CLEAR * others.min(axis=1, initial=np.inf)) & (alike >= ALIKE)) | (same & (mine <= rounding))
 
 
-def _as_pair(old: State, found: Eigenpairs, i: int, place: IntArray, clear: BoolArray) -> tuple[int, int, int] | None:
+def _as_pair(old: State, found: Eigenpairs, i: int, index: IntArray, clear: BoolArray) -> tuple[int, int, int] | None:
     """Branch i matched together with its nearest: (j, place of i, place of j), None where they are no pair."""
     gap = np.abs(old.coordinate - old.coordinate[i])
     gap[i] = np.inf
@@ -235,7 +235,7 @@ def _as_pair(old: State, found: Eigenpairs, i: int, place: IntArray, clear: Bool
     third = float(np.abs(found.coordinate[near[2]] - mean_to)) if len(near) > 2 else np.inf
     change = abs(square_to - square)
     doubtful = abs(new_mean - mean_to) > 0.25 * third or abs(new_square - square_to) > 0.5 * change
-    taken = set(place[clear].tolist())
+    taken = set(index[clear].tolist())
     if doubtful or abs(np.sqrt(new_square)) > 0.5 * third or taken & set(both.tolist()):
         return None
     aside, strayed = _past_zero(new_square, square), abs(new_square - square_to)

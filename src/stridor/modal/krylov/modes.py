@@ -19,7 +19,7 @@ from ..tolerances import BELIEVED
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import MARGIN, Band, left_vectors, projected, settle
+from .refine import MARGIN, Band, converge_at, left_vectors, projected
 
 SAMPLES = 7
 
@@ -57,14 +57,14 @@ def krylov_modes(
     asked = None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz
     band = Band(count, None if asked is None else searched(problem.pencil(top).condensed(), asked))
     reduced = projected(problem, band, top)
-    settle(reduced, samples(top), left=vectors is True)
-    values, planned = _settled(reduced, values, progress, left=vectors is True)
+    converge_at(reduced, samples(top), left=vectors is True)
+    values, planned = _converged(reduced, values, progress, left=vectors is True)
     found = _followed(reduced, values, band, damped=damped, vectors=vectors)
     planned = found.planned if planned is None else planned
     return replace(found, max_frequency_hz=max_frequency_hz, planned=planned)
 
 
-def _settled(
+def _converged(
     reduced: Reduced, values: Array, progress: Progress | None, *, left: bool
 ) -> tuple[Array, int | None]:
     """The μ (k,) at which the band's pairs are exact, and how many there were to be where it was interrupted."""
@@ -72,7 +72,7 @@ def _settled(
     done = np.zeros(len(values), dtype=bool)
     try:
         for at, k in enumerate(order, start=1):
-            settle(reduced, [float(values[k])], tolerance=BELIEVED, left=left)
+            converge_at(reduced, [float(values[k])], tolerance=BELIEVED, left=left)
             done[k] = True
             if progress is not None:
                 progress(at, len(values))
@@ -91,7 +91,7 @@ def _followed(
     follower = Follower(reduced, longest=longest)
     start = follower.state
     if band.frequency is None:
-        branches = np.arange(min(band.count, len(start.place)))
+        branches = np.arange(min(band.count, len(start.index)))
     else:
         # What is exact there: modes of the band, and beside it those that may come into it.
         branches = np.flatnonzero(start.values.imag <= MARGIN * band.frequency)
@@ -105,13 +105,13 @@ def _followed(
         for k in np.argsort(values, kind="stable"):
             mu = float(values[k])
             state = follower.advance(mu)
-            lam, place = state.values[branches], state.place[branches]
-            u, p = reduced.expand(state.found.right[:, place])
+            lam, index = state.values[branches], state.index[branches]
+            u, p = reduced.expand(state.found.right[:, index])
             eigenvalues[k], residual[k] = lam, problem.pencil(mu).backward_error(lam, u, p)
             if vectors:
                 right[k] = u.T
             if vectors is True:
-                left[k] = left_vectors(reduced, lam, state.found.left[:, place], mu)[0].T
+                left[k] = left_vectors(reduced, lam, state.found.left[:, index], mu)[0].T
             done[k] = True
     except KeyboardInterrupt:
         if not done.any():

@@ -41,7 +41,7 @@ def crossings(old: State, new: State) -> list[Passage]:
     that grows and decays again in between."""
     step = new.mu - old.mu
     found: list[Passage] = []
-    for i in range(len(old.place)):
+    for i in range(len(old.index)):
         start, end = float(old.values[i].real), float(new.values[i].real)
         slopes = step * float(old.tangents[i].real), step * float(new.tangents[i].real)
         scale = max(abs(old.values[i]), 1e-300)

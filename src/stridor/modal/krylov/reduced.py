@@ -132,7 +132,7 @@ class Reduced(DenseProblem):
         turn[first:, first : first + beyond.shape[1]] = beyond
         turn = turn[:, : first + beyond.shape[1]]
         force_turn = _span(forces)
-        self.pairs = self.pairs.turned(turn)
+        self.pairs = self.pairs.combined(turn)
         self.forces, self.lifts = self.forces @ force_turn, self.lifts @ force_turn
         self._products = [
             (turn.T @ square @ turn, force_turn.T @ across @ turn) if len(square) else (square, across)
@@ -176,12 +176,12 @@ class Reduced(DenseProblem):
         tests = [self.pairs.u, self.lifts]
         r = self.count
         mass, damping, stiffness = np.zeros((3, r, r))
-        for place, (matrix, target) in enumerate(
+        for index, (matrix, target) in enumerate(
             ((problem.mass, mass), (problem.stiffness, stiffness), (problem.damping, damping))
         ):
             if matrix.nnz:
-                self._products[place] = _grown(self._products[place], matrix, *tests)
-                target[:own, :own], target[own:, :own] = self._products[place]
+                self._products[index] = _grown(self._products[index], matrix, *tests)
+                target[:own, :own], target[own:, :own] = self._products[index]
         normal = np.hstack([problem.normal @ t for t in tests])
         self._slide = np.hstack([problem.slide @ t for t in tests])
         self._matrices = (mass, damping, stiffness - normal.T @ force, -self._slide.T @ force)

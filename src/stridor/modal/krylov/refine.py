@@ -123,7 +123,9 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
         )
 
 
-def settle(reduced: Reduced, frictions: Iterable[float], *, tolerance: float = TOLERANCE, left: bool = False) -> None:
+def converge_at(
+    reduced: Reduced, frictions: Iterable[float], *, tolerance: float = TOLERANCE, left: bool = False
+) -> None:
     """`converge` at one μ after the other, the basis reduced to what it has found whenever it has grown large."""
     for mu in dict.fromkeys(float(mu) for mu in frictions):
         converge(reduced, [mu], tolerance=tolerance, left=left)

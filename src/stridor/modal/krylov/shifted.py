@@ -49,7 +49,7 @@ class ForcedShapes:
         """Number of columns k."""
         return int(self.u.shape[1])
 
-    def turned(self, by: Array) -> ForcedShapes:
+    def combined(self, by: Array) -> ForcedShapes:
         """Linear combinations, by (k, l)."""
         return ForcedShapes(self.u @ by, self.p @ by)
 
@@ -166,15 +166,15 @@ def _polished(shifted: Shifted, shapes: Array) -> tuple[Array, ForcedShapes]:
     found = ForcedShapes(u, p)
     # The iteration shortens each shape by its ω²: of one length again, and without what only rounding tells apart
     # where all modes of a small problem are found.
-    found = found.turned(np.diag(1.0 / np.sqrt(np.einsum("ij,ij->j", u, problem.mass @ u))))
+    found = found.combined(np.diag(1.0 / np.sqrt(np.einsum("ij,ij->j", u, problem.mass @ u))))
     lengths, axes = sl.eigh(_symmetric(found.u.T @ (problem.mass @ found.u)))
     told = lengths > APART
-    found = found.turned(axes[:, told] / np.sqrt(lengths[told]))
+    found = found.combined(axes[:, told] / np.sqrt(lengths[told]))
     stiffness = found.u.T @ (problem.stiffness @ found.u) + found.p.T @ (problem.compliance[:, None] * found.p)
     squares, turn = sl.eigh(_symmetric(stiffness))
     if squares[0] < -STANDS * shifted.shift:
         raise NotPositive
-    return squares, found.turned(turn)
+    return squares, found.combined(turn)
 
 
 def _symmetric(matrix: Array) -> Array:
@@ -192,7 +192,7 @@ def orthonormal(
     mass = problem.mass
     length = np.sqrt(np.maximum(np.einsum("ij,ij->j", block.u, mass @ block.u), 0.0))
     alive = np.flatnonzero(length > 0)
-    new = block.turned(np.eye(len(length))[:, alive] / length[alive])
+    new = block.combined(np.eye(len(length))[:, alive] / length[alive])
     weight = np.sqrt(np.maximum(mass.diagonal(), 1e-6 * mass.diagonal().mean()))[:, None]
     for last in (False, True):
         for _ in range(2):
@@ -203,14 +203,14 @@ def orthonormal(
             gram = new.u.T @ (mass @ new.u)
             squares, vectors = sl.eigh((gram + gram.T) / 2)
             good = squares > 1e-6 * squares[-1]
-            new = new.turned(vectors[:, good] / np.sqrt(squares[good]))
+            new = new.combined(vectors[:, good] / np.sqrt(squares[good]))
         else:
             # Pivoted QR in the lumped mass sees ranks down to rounding; a Gram matrix only to its root.
             r, order = sl.qr(weight * new.u, mode="r", pivoting=True)
             keep = int((np.abs(np.diag(r)) > smallest).sum())
             step = np.zeros((new.count, keep))
             step[order[:keep]] = sl.solve_triangular(r[:keep, :keep], np.eye(keep))
-            new = new.turned(step)
+            new = new.combined(step)
     return new, new.u.T @ (mass @ block.u)
 
 

@@ -43,7 +43,7 @@ class Basis:
         ]
         by_column = sp.csc_array(embedding)
         self._embeddings = [
-            tuple(sp.csr_array(by_column[:, place]) for place in (rows, columns)) for rows, columns, _ in self._parts
+            tuple(sp.csr_array(by_column[:, which]) for which in (rows, columns)) for rows, columns, _ in self._parts
         ]
         empty = np.zeros((len(problem.terms), embedding.shape[0], 0))
         self.right_sketch, self.left_sketch = empty, empty

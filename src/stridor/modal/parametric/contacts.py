@@ -27,7 +27,7 @@ from .contacts_rigid import Elimination, eliminate
 from .contacts_sampling import Values
 from .contacts_steady import FRICTION, STIFFNESS, Contacts, contacts_of, steady_terms
 from .factors import ParameterFactor, Product
-from .family import Piece, away, interpolated_terms
+from .family import Piece, deviation, interpolated_terms
 from .problem import Parameter, ParametricProblem
 
 SAME = 1e-13  # rows of rigid contact, of their largest entry
@@ -161,7 +161,7 @@ def _elimination(family: ParametricSystems, contacts_at: Callable[[Values], Cont
             other = contacts_at({**reference, p.name: value})
             same = np.array_equal(other.compliance == 0.0, own.compliance == 0.0)
             for one, two in ((own.normal, other.normal), (own.slide, other.slide)):
-                same = same and away(one[rigid], two[rigid]) <= SAME
+                same = same and deviation(one[rigid], two[rigid]) <= SAME
             if not same:
                 accepted = "moves where rigid contact touches, or the direction of its slip; give numbers that do not"
                 raise CaseError(f"box.{p.name}", value, accepted)

@@ -93,23 +93,23 @@ def eliminate(normal: Sparse, slide: Sparse, friction: Parameter | float) -> Eli
     lift = _lift(normal, slide, pivots, paired)
     slip = sp.csr_array(slide @ motion)
     largest = float(abs(slide).max() * abs(lift).max())
-    turned = _rounded(slide @ lift, largest)
-    if not turned.nnz:
+    coupling = _rounded(slide @ lift, largest)
+    if not coupling.nnz:
         change = _rounded(-(lift @ slip))
         if isinstance(friction, Parameter):
             own = Product(((friction.name, 1.0),))
             return Elimination(motion, ((own, change),) if change.nnz else ())
         return Elimination(motion, ((CONSTANT, sp.csr_array(friction * change)),) if friction and change.nnz else ())
-    return Elimination(motion, _wedged(lift, slip, turned, friction))
+    return Elimination(motion, _wedged(lift, slip, coupling, friction))
 
 
 def _wedged(
-    lift: Sparse, slip: Sparse, turned: Sparse, friction: Parameter | float
+    lift: Sparse, slip: Sparse, coupling: Sparse, friction: Parameter | float
 ) -> tuple[tuple[ParameterFactor, Sparse], ...]:
     """The changes −μ R (1 + μΦ)⁻¹ S Z where Φ is not zero, on the few nodes that it has entries of."""
-    coo = sp.coo_array(turned)
+    coo = sp.coo_array(coupling)
     rows = np.unique(np.concatenate([coo.row, coo.col]))
-    block = turned[rows][:, rows].toarray()
+    block = coupling[rows][:, rows].toarray()
     jams = _jams(block)
     low, high = (friction.low, friction.high) if isinstance(friction, Parameter) else (friction, friction)
     within = jams[(jams >= low * (1 - 1e-9)) & (jams <= high * (1 + 1e-9))]
@@ -120,7 +120,7 @@ def _wedged(
         )
 
     def inverse(mu: float) -> Sparse:
-        whole = sp.lil_array(sp.eye_array(turned.shape[0]))
+        whole = sp.lil_array(sp.eye_array(coupling.shape[0]))
         whole[np.ix_(rows, rows)] = np.linalg.inv(np.eye(len(rows)) + mu * block)
         return sp.csr_array(whole)
 
@@ -134,10 +134,10 @@ def _wedged(
     own = Product(((friction.name, 1.0),))
     pieces: list[tuple[ParameterFactor, Sparse]] = []
     for factor, entries in grid.compressed():
-        whole = sp.lil_array(turned.shape)
+        whole = sp.lil_array(coupling.shape)
         whole[np.ix_(rows, rows)] = entries.reshape(block.shape)
         pieces.append((product_of(own, factor), _rounded(-(lift @ sp.csr_array(whole) @ slip))))
-    others = sp.csr_array(sp.diags_array((~np.isin(np.arange(turned.shape[0]), rows)).astype(float)))
+    others = sp.csr_array(sp.diags_array((~np.isin(np.arange(coupling.shape[0]), rows)).astype(float)))
     pieces.append((own, _rounded(-(lift @ others @ slip))))
     return tuple((f, v) for f, v in pieces if v.nnz)
 
@@ -172,9 +172,9 @@ def _pivots(normal: Sparse, slide: Sparse) -> tuple[IntArray, IntArray]:
         at, chosen = min_weight_full_bipartite_matching(sp.csr_array((cost, (row, column)), shape=(2 * m, n + m)))
     except ValueError as error:
         raise AnalysisError(TWICE) from error
-    place = np.empty(2 * m, dtype=np.int64)
-    place[at] = chosen
-    return place[:m], np.where(place[m:] < n, place[m:], -1)
+    matched = np.empty(2 * m, dtype=np.int64)
+    matched[at] = chosen
+    return matched[:m], np.where(matched[m:] < n, matched[m:], -1)
 
 
 def _unit_rows(rows: Sparse) -> Sparse:
@@ -206,13 +206,13 @@ def _lift(normal: Sparse, slide: Sparse, pivots: IntArray, paired: IntArray) -> 
     m, n = normal.shape
     slips = _involved(slide, pivots, paired)
     rows = sp.csr_array(sp.vstack([normal, slide[slips]]))
-    places = np.concatenate([pivots, paired[slips]])
-    unit = sp.csr_array((np.ones(m), (np.arange(m), np.arange(m))), shape=(len(places), m))
-    answer = _solved(sp.csr_array(rows[:, places]), unit)
+    columns = np.concatenate([pivots, paired[slips]])
+    unit = sp.csr_array((np.ones(m), (np.arange(m), np.arange(m))), shape=(len(columns), m))
+    answer = _solved(sp.csr_array(rows[:, columns]), unit)
     if answer is None:
         return _dense_lift(normal, slide)
     coo = sp.coo_array(answer)
-    return sp.csr_array((coo.data, (places[coo.row], coo.col)), shape=(n, m))
+    return sp.csr_array((coo.data, (columns[coo.row], coo.col)), shape=(n, m))
 
 
 def _involved(slide: Sparse, pivots: IntArray, paired: IntArray) -> IntArray:

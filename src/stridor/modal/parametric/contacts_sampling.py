@@ -115,20 +115,20 @@ def combined_matrices(
 
 
 def _on_pattern(matrix: Sparse, pattern: Sparse) -> Array:
-    """Entries of a matrix at the places (k,) of a pattern that holds all of them."""
+    """Values of a matrix at the entries (k,) of a pattern that holds all of them."""
     n = pattern.shape[1]
-    keys, places = (
+    keys, pattern_keys = (
         np.repeat(np.arange(a.shape[0], dtype=np.int64), np.diff(a.indptr)) * n + a.indices for a in (matrix, pattern)
     )
-    found = np.zeros(len(places))
-    found[np.searchsorted(places, keys)] = matrix.data
+    found = np.zeros(len(pattern_keys))
+    found[np.searchsorted(pattern_keys, keys)] = matrix.data
     return found
 
 
 def _axis(parameter: Parameter, reference: Values, vector: Callable[[Values], Array], what: str) -> Axis | None:
     """As many points of a parameter as leave nothing of the vector between them; None where it does not change it."""
     name = parameter.name
-    tried = [_place(parameter, part) for part in TRIED]
+    tried = [_value_at(parameter, part) for part in TRIED]
     ends = [vector({**reference, name: end}) for end in (parameter.low, parameter.high, *tried)]
     scale = max(float(np.abs(v).max(initial=0.0)) for v in ends)
     if all(float(np.abs(v - ends[0]).max(initial=0.0)) <= UNCHANGED * scale for v in ends[1:]):
@@ -152,7 +152,7 @@ def _fewest(axis: Axis, reference: Values, vector: Callable[[Values], Array]) ->
     whole = Sampled((axis,), np.array([vector({**reference, name: p}) for p in axis.points]))
     size = float(np.abs(whole.vectors).max(initial=0.0))
     ends = Parameter(name, axis.points[0], axis.points[-1], axis.points[0])
-    checks = [*axis.points, *(_place(ends, part) for part in TRIED)]
+    checks = [*axis.points, *(_value_at(ends, part) for part in TRIED)]
     for count in range(2, len(axis.points)):
         fewer = _with_points(ends, count)
         part = Sampled((fewer,), np.array([whole.at({name: p}) for p in fewer.points]))
@@ -179,7 +179,7 @@ def _points(axes: tuple[Axis, ...]) -> list[dict[str, float]]:
     return [dict(zip(names, chosen, strict=True)) for chosen in product(*(axis.points for axis in axes))]
 
 
-def _place(parameter: Parameter, part: float) -> float:
+def _value_at(parameter: Parameter, part: float) -> float:
     """The value at a part of the range, of its logarithm's where it is positive."""
     low, high = parameter.low, parameter.high
     if low > 0:
@@ -189,11 +189,11 @@ def _place(parameter: Parameter, part: float) -> float:
 
 def _with_points(parameter: Parameter, count: int) -> Axis:
     parts = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
-    inner = [_place(parameter, float(part)) for part in parts[1:-1]]
+    inner = [_value_at(parameter, float(part)) for part in parts[1:-1]]
     return Axis(parameter.name, (parameter.low, *inner, parameter.high), logarithmic=parameter.low > 0)
 
 
 def _between(parameters: tuple[Parameter, ...]) -> list[dict[str, float]]:
     """Points of the box in no relation to any grid."""
     rng = np.random.default_rng(20061)
-    return [{p.name: _place(p, float(rng.random())) for p in parameters} for _ in range(3)]
+    return [{p.name: _value_at(p, float(rng.random())) for p in parameters} for _ in range(3)]

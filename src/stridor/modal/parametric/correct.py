@@ -148,8 +148,8 @@ class Corrector:
         r, total = basis.shape[1], basis.shape[1] + new.shape[1]
         result = np.zeros((len(projected), total, total))
         result[:, :r, :r] = projected
-        for place, term in enumerate(self.model.problem.terms):
+        for index, term in enumerate(self.model.problem.terms):
             image = term.matrix @ new
-            result[place, :r, r:], result[place, r:, r:] = basis.T @ image, new.T @ image
-            result[place, r:, :r] = result[place, :r, r:].T if term.symmetric else (term.matrix.T @ new).T @ basis
+            result[index, :r, r:], result[index, r:, r:] = basis.T @ image, new.T @ image
+            result[index, r:, :r] = result[index, :r, r:].T if term.symmetric else (term.matrix.T @ new).T @ basis
         return np.hstack([basis, new]), result

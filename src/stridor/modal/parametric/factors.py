@@ -62,11 +62,11 @@ CONSTANT = Product()
 class Lagrange:
     """A product of Lagrange's polynomials, (name, points, k) each: one at its own k-th point and zero at the others."""
 
-    places: tuple[tuple[str, tuple[float, ...], int], ...]
+    polynomials: tuple[tuple[str, tuple[float, ...], int], ...]
 
     def __call__(self, values: Mapping[str, float], /) -> float:
         result = 1.0
-        for name, grid, k in self.places:
+        for name, grid, k in self.polynomials:
             for j, other in enumerate(grid):
                 if j != k:
                     result *= (values[name] - other) / (grid[k] - other)
@@ -75,14 +75,14 @@ class Lagrange:
     def slope(self, values: Mapping[str, float], name: str) -> float:
         """Its derivative over one parameter."""
         total = 0.0
-        for place, (own, grid, k) in enumerate(self.places):
+        for index, (own, grid, k) in enumerate(self.polynomials):
             if own != name:
                 continue
-            others = Lagrange(self.places[:place] + self.places[place + 1 :])(values)
-            away = [j for j in range(len(grid)) if j != k]
-            for left in away:
+            others = Lagrange(self.polynomials[:index] + self.polynomials[index + 1 :])(values)
+            rest = [j for j in range(len(grid)) if j != k]
+            for left in rest:
                 part = 1.0 / (grid[k] - grid[left])
-                for j in away:
+                for j in rest:
                     if j != left:
                         part *= (values[name] - grid[j]) / (grid[k] - grid[j])
                 total += others * part
@@ -90,7 +90,7 @@ class Lagrange:
 
     def to_json(self) -> dict[str, Any]:
         """What `factor_from_json` makes the same factor of."""
-        return {"kind": "lagrange", "places": [[name, list(grid), k] for name, grid, k in self.places]}
+        return {"kind": "lagrange", "places": [[name, list(grid), k] for name, grid, k in self.polynomials]}
 
 
 @dataclass(frozen=True)
@@ -170,16 +170,16 @@ class Axis:
 
     def weights(self, value: float) -> Array:
         """Lagrange's polynomials (k,) at a value of the parameter (barycentric; Berrut and Trefethen, SIAM Rev. 46)."""
-        away = self._coordinate(value) - self._places
-        hit = np.flatnonzero(away == 0.0)
+        distance = self._coordinate(value) - self._nodes
+        hit = np.flatnonzero(distance == 0.0)
         if len(hit):
-            return np.eye(len(away))[hit[0]]
-        share = self._barycentric / away
+            return np.eye(len(distance))[hit[0]]
+        share = self._barycentric / distance
         return share / share.sum()
 
     def slopes(self, value: float) -> Array:
         """Their derivatives (k,) over the parameter."""
-        x, w = self._places, self._barycentric
+        x, w = self._nodes, self._barycentric
         with np.errstate(divide="ignore"):
             matrix = w[None, :] / w[:, None] / (x[:, None] - x[None, :])
         np.fill_diagonal(matrix, 0.0)
@@ -192,12 +192,12 @@ class Axis:
             return float(np.log(value)) if self.logarithmic else value
 
     @cached_property
-    def _places(self) -> Array:
+    def _nodes(self) -> Array:
         return np.array([self._coordinate(p) for p in self.points])
 
     @cached_property
     def _barycentric(self) -> Array:
-        x = self._places
+        x = self._nodes
         # In units in which products of distances neither grow nor shrink with their number.
         unit = max(float(np.ptp(x)), 1e-300) / 4
         apart = (x[:, None] - x[None, :]) / unit

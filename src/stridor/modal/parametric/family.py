@@ -69,8 +69,8 @@ def _interpolated(
         return term_of(piece.matrix, piece.role, piece.factor)
     parts: list[tuple[Sparse, Lagrange]] = []
     for chosen in product(*(range(len(g)) for g in grids.values())):
-        places = {n: (grid, k) for (n, grid), k in zip(grids.items(), chosen, strict=True)}
-        parts.append((matrix_at({n: float(grid[k]) for n, (grid, k) in places.items()}), _weight(places)))
+        nodes = {n: (grid, k) for (n, grid), k in zip(grids.items(), chosen, strict=True)}
+        parts.append((matrix_at({n: float(grid[k]) for n, (grid, k) in nodes.items()}), _weight(nodes)))
     between = {p.name: p.low + 0.37 * (p.high - p.low) for p in parameters}
     _check(parts, piece.role, between, matrix_at(between))
     return [t for matrix, weight in parts for t in term_of(matrix, piece.role, product_of(piece.factor, weight))]
@@ -81,7 +81,7 @@ def term_of(matrix: Sparse, role: Role, factor: ParameterFactor) -> list[Term]:
     csr = sp.csr_array(matrix)
     if not csr.nnz or not np.any(csr.data):
         return []
-    return [Term(csr, role, factor, symmetric=away(csr, sp.csr_array(csr.T)) <= SYMMETRIC)]
+    return [Term(csr, role, factor, symmetric=deviation(csr, sp.csr_array(csr.T)) <= SYMMETRIC)]
 
 
 def merged(terms: Iterable[Term]) -> tuple[Term, ...]:
@@ -108,14 +108,14 @@ def _points(
     """Points (k,) of a parameter that make its matrix exact, None where it does not change it."""
     name, low, high = parameter.name, parameter.low, parameter.high
     tried = low + 0.37 * (high - low)
-    if all(away(matrix_at({name: low}), matrix_at({name: other})) <= 1e-15 for other in (high, tried)):
+    if all(deviation(matrix_at({name: low}), matrix_at({name: other})) <= 1e-15 for other in (high, tried)):
         return None
     for count in range(2, MOST_POINTS + 1):
         grid = (low + high) / 2 - (high - low) / 2 * np.cos(np.pi * np.arange(count) / (count - 1))
         grid[0], grid[-1] = low, high
         weights = [_weight({name: (grid, k)})({name: tried}) for k in range(count)]
         total = sum(w * matrix_at({name: float(g)}) for w, g in zip(weights, grid, strict=True))
-        if away(sp.csr_array(total), matrix_at({name: tried})) <= EXACT:
+        if deviation(sp.csr_array(total), matrix_at({name: tried})) <= EXACT:
             return grid
     raise AnalysisError(
         f"the {role} does not depend on {name} as a polynomial of degree {MOST_POINTS - 1} or less between {low:g} and "
@@ -123,12 +123,12 @@ def _points(
     )
 
 
-def _weight(places: Mapping[str, tuple[Array, int]]) -> Lagrange:
+def _weight(nodes: Mapping[str, tuple[Array, int]]) -> Lagrange:
     """Product of Lagrange's polynomials, each one at its own point and zero at the others."""
-    return Lagrange(tuple((name, tuple(float(g) for g in grid), k) for name, (grid, k) in places.items()))
+    return Lagrange(tuple((name, tuple(float(g) for g in grid), k) for name, (grid, k) in nodes.items()))
 
 
-def away(one: Any, other: Any) -> float:
+def deviation(one: Any, other: Any) -> float:
     """Largest difference of two matrices over their largest entry."""
     size = max((float(np.abs(sp.csr_array(m).data).max(initial=0.0)) for m in (one, other)), default=0.0)
     difference = sp.csr_array(one - other)
@@ -137,5 +137,5 @@ def away(one: Any, other: Any) -> float:
 
 def _check(parts: list[tuple[Sparse, Lagrange]], role: Role, values: Mapping[str, float], truth: Sparse) -> None:
     total = sum((weight(values) * matrix for matrix, weight in parts), start=sp.csr_array(truth.shape))
-    if away(total, truth) > 10 * EXACT:
+    if deviation(total, truth) > 10 * EXACT:
         raise AnalysisError(f"the {role} is no product of polynomials in the parameters; vary fewer of them at once")

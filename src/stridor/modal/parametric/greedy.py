@@ -185,9 +185,9 @@ class Greedy:
             for side, (sketch, vectors) in enumerate(zip(sketches, (found.right, found.left), strict=True)):
                 z = vectors[:, chosen]
                 seen.append(real_and_imaginary(sketched_rests(sketch, factors, powers, lam, z)))
-                for place, (factor, power) in enumerate(zip(factors, powers, strict=True)):
-                    weights[place][side].append(factor * real_and_imaginary(lam**power * z))
-                    weights[place][1 - side].append(np.zeros((len(z), 2 * z.shape[1])))
+                for index, (factor, power) in enumerate(zip(factors, powers, strict=True)):
+                    weights[index][side].append(factor * real_and_imaginary(lam**power * z))
+                    weights[index][1 - side].append(np.zeros((len(z), 2 * z.shape[1])))
         block = np.hstack(seen)
         squares, turn = sl.eigh(block @ block.T)
         keep = np.flatnonzero(squares > max(WEAKEST**2 * squares[-1], 1e-300))[-TOGETHER:]
@@ -233,13 +233,13 @@ def _constant(model: ReducedModel, points: list[Point], exact: list[ComplexArray
     ratio = 0.0
     for point, values in zip(points, exact, strict=True):
         found = model.modes(point)
-        away = np.abs(found.values[:, None] - values).min(axis=1, initial=np.inf) / np.abs(found.values)
+        error = np.abs(found.values[:, None] - values).min(axis=1, initial=np.inf) / np.abs(found.values)
         # A mode at the very end of the band may be beyond it in one of the two.
         inner = values[np.abs(values) <= (1 - model.bound) * model.frequency]
         missed = np.abs(inner[:, None] - found.values).min(axis=1, initial=np.inf) / np.abs(inner)
-        if np.any(away > MEASURED * model.bound) or np.any(missed > MEASURED * model.bound):
+        if np.any(error > MEASURED * model.bound) or np.any(missed > MEASURED * model.bound):
             return None
-        ratio = max(ratio, float(np.max(away / np.maximum(found.error, 1e-300), initial=0.0)))
+        ratio = max(ratio, float(np.max(error / np.maximum(found.error, 1e-300), initial=0.0)))
     return max(SAFETY * ratio, 1.0)
 
 
@@ -250,8 +250,8 @@ def grid_points(problem: ParametricProblem, counts: tuple[int, ...] | None) -> l
     points = problem.corners(counts or (5 if sides == 1 else 3 if sides <= FINE else 2,) * sides)
     table = np.array([list(p.values()) for p in points])
     span = np.maximum(np.ptp(table, axis=0), 1e-300)
-    away = np.abs((table - table.mean(axis=0)) / span).sum(axis=1)
-    order: IntArray = np.argsort(-away, kind="stable")
+    distance = np.abs((table - table.mean(axis=0)) / span).sum(axis=1)
+    order: IntArray = np.argsort(-distance, kind="stable")
     return [points[k] for k in order]
 
 

@@ -177,7 +177,7 @@ def _first_answers(basis: Basis, factor: Factor, frequency: float, work: Work) -
 def embedding_of(size: int, scale: Array) -> Sparse:
     """Θ D^{-1/2} (s, n) with a sparse sign embedding Θ: NONZEROS entries ±1/√NONZEROS in each column."""
     rng = np.random.default_rng(SEED)
-    place: IntArray = rng.integers(0, SKETCH, size=(size, NONZEROS))
+    row: IntArray = rng.integers(0, SKETCH, size=(size, NONZEROS))
     sign = rng.choice([-1.0, 1.0], size=(size, NONZEROS)) / np.sqrt(NONZEROS)
     column = np.repeat(np.arange(size), NONZEROS)
-    return sp.csr_array(((sign * scale[:, None]).ravel(), (place.ravel(), column)), shape=(SKETCH, size))
+    return sp.csr_array(((sign * scale[:, None]).ravel(), (row.ravel(), column)), shape=(SKETCH, size))

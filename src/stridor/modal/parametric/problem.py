@@ -122,7 +122,7 @@ class ParametricProblem:
         """A grid over the box, ``counts`` points along each parameter, closer at the ends (Chebyshev–Lobatto)."""
         axes: list[Array] = []
         for p, count in zip(self.parameters, counts, strict=True):
-            place = (1 - np.cos(np.linspace(0, np.pi, count))) / 2 if count > 1 else np.array([0.5])
-            axes.append(p.low + (p.high - p.low) * place)
+            shares = (1 - np.cos(np.linspace(0, np.pi, count))) / 2 if count > 1 else np.array([0.5])
+            axes.append(p.low + (p.high - p.low) * shares)
         grid = np.stack([g.ravel() for g in np.meshgrid(*axes, indexing="ij")], axis=1)
         return [self.point([float(v) for v in row]) for row in grid]

@@ -65,9 +65,9 @@ def between(inner: Region, outer: Region, known: ComplexArray) -> Region:
     share = np.linspace(0.15, 0.95, PLACES)
 
     def best(name: str, parts: Array) -> float:
-        places = getattr(inner, name) + share * (getattr(outer, name) - getattr(inner, name))
-        away = np.abs(places[:, None] - parts).min(axis=1, initial=np.inf)
-        return float(places[int(np.argmax(np.minimum(away, abs(places[1] - places[0]))))])
+        candidates = getattr(inner, name) + share * (getattr(outer, name) - getattr(inner, name))
+        distance = np.abs(candidates[:, None] - parts).min(axis=1, initial=np.inf)
+        return float(candidates[int(np.argmax(np.minimum(distance, abs(candidates[1] - candidates[0]))))])
 
     return replace(
         inner, re_min=best("re_min", known.real), re_max=best("re_max", known.real),
@@ -145,8 +145,8 @@ def _odd(order: IntArray) -> int:
     for first in range(len(order)):
         if not seen[first]:
             cycles += 1
-            place = first
-            while not seen[place]:
-                seen[place] = True
-                place = int(order[place])
+            index = first
+            while not seen[index]:
+                seen[index] = True
+                index = int(order[index])
     return (len(order) - cycles) % 2

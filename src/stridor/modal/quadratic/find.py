@@ -224,22 +224,22 @@ class _Run:
         """What is reported: inside the region, each with its left vector, all to the tolerance."""
         scale = self.padded.scale
         found = self._selected(sides[0], scale)
-        found = self._settled(found, self.problem, "right")
+        found = self._converged(found, self.problem, "right")
         if not self.left:
             return found.values, found.shapes, None
         other = self._with_partners(found, sides[1])
         # Left vectors are those of the very eigenvalues reported.
         transposed = self.problem.transposed
         error = transposed.backward_error(found.values, other)
-        for place in np.flatnonzero(error > 0.1 * self.tolerance):
-            lam = complex(found.values[place])
+        for index in np.flatnonzero(error > 0.1 * self.tolerance):
+            lam = complex(found.values[index])
             near = max(float(np.abs(sides[1].values - lam).min(initial=np.inf)), SPREAD * scale)
-            other[:, place] = tuned(transposed, lam, sides[1], near)
+            other[:, index] = tuned(transposed, lam, sides[1], near)
         error = transposed.backward_error(found.values, other)
-        y = self._settled(DiscModes(found.values, other, error), transposed, "left").shapes
-        turned = biorthogonal(self.problem, found.values, found.shapes, y, scale)
-        worse = self.problem.transposed.backward_error(found.values, turned) > self.tolerance
-        return found.values, found.shapes, np.where(worse, y, turned)
+        y = self._converged(DiscModes(found.values, other, error), transposed, "left").shapes
+        dual = biorthogonal(self.problem, found.values, found.shapes, y, scale)
+        worse = self.problem.transposed.backward_error(found.values, dual) > self.tolerance
+        return found.values, found.shapes, np.where(worse, y, dual)
 
     def _cover(self) -> None:
         """Shifts until discs cover the padded region."""
@@ -352,17 +352,17 @@ class _Run:
         x = found.shapes[:, inside]
         return DiscModes(values[inside], x, self.problem.backward_error(values[inside], x))
 
-    def _settled(self, found: DiscModes, problem: Quadratic, which: str) -> DiscModes:
+    def _converged(self, found: DiscModes, problem: Quadratic, which: str) -> DiscModes:
         """With those that miss the tolerance improved one by one."""
         bad = np.flatnonzero(~(found.error <= self.tolerance))
         values, shapes, error = found.values.copy(), found.shapes.copy(), found.error.copy()
-        for place in bad[:POLISHED]:
+        for index in bad[:POLISHED]:
             lam, x, left = inverse_iteration(
-                problem, complex(values[place]), shapes[:, place], tolerance=self.tolerance, solver=self.solver
+                problem, complex(values[index]), shapes[:, index], tolerance=self.tolerance, solver=self.solver
             )
             self.factorisations += 1
-            if left < error[place] and (which == "right" or abs(lam - values[place]) <= ALIKE * self.padded.scale):
-                values[place], shapes[:, place], error[place] = lam, x[:, 0], left
+            if left < error[index] and (which == "right" or abs(lam - values[index]) <= ALIKE * self.padded.scale):
+                values[index], shapes[:, index], error[index] = lam, x[:, 0], left
         bad = np.flatnonzero(~(error <= self.tolerance))
         if len(bad):
             shown = ", ".join(f"{v:.6g}" for v in values[bad[:3]])
@@ -377,11 +377,11 @@ class _Run:
         y = np.zeros_like(found.shapes)
         ours, theirs = pairs(found.values, left.values, 1e-4 * self.padded.scale)
         y[:, ours] = left.shapes[:, theirs]
-        for place in np.setdiff1d(np.arange(len(found.values)), ours):
+        for index in np.setdiff1d(np.arange(len(found.values)), ours):
             self.factorisations += 1
-            y[:, place] = inverse_iteration(
+            y[:, index] = inverse_iteration(
                 self.problem.transposed,
-                complex(found.values[place]),
+                complex(found.values[index]),
                 None,
                 tolerance=self.tolerance,
                 solver=self.solver,
@@ -424,8 +424,8 @@ def _agree(searches: list[Search], near: float) -> bool:
     radius = min(s.disc.radius for s in searches)
     inside: list[ComplexArray] = []
     for s in searches:
-        away = np.abs(s.found.values - s.disc.centre)
-        inside.append(s.found.values[away <= (1 - 1e-6) * radius])
+        distance = np.abs(s.found.values - s.disc.centre)
+        inside.append(s.found.values[distance <= (1 - 1e-6) * radius])
     return len(inside[0]) == len(inside[1]) == len(pairs(inside[0], inside[1], near)[0])
 
 

@@ -36,10 +36,10 @@ class Columns:
     def append(self, block: ComplexArray) -> None:
         """Add columns (n, b) as they are."""
         for column in range(block.shape[1]):
-            place = self.count % WIDTH
-            if place == 0:
+            index = self.count % WIDTH
+            if index == 0:
                 self._pieces.append(np.empty((self.n, WIDTH), dtype=complex, order="F"))
-            self._pieces[-1][:, place] = block[:, column]
+            self._pieces[-1][:, index] = block[:, column]
             self.count += 1
 
     def project(self, block: ComplexArray) -> ComplexArray:

@@ -55,9 +55,9 @@ def merged(parts: list[DiscModes], scale: float) -> DiscModes:
     result = parts[0]
     for part in parts[1:]:
         ours, theirs = pairs(result.values, part.values, SPREAD * scale)
-        away = np.abs(result.values[ours] - part.values[theirs])
+        distance = np.abs(result.values[ours] - part.values[theirs])
         along = np.abs(np.einsum("ij,ij->j", result.shapes[:, ours].conj(), part.shapes[:, theirs]))
-        same = (away <= ALIKE * scale) | ((away <= SPREAD * scale) & (along > 1 - PARALLEL))
+        same = (distance <= ALIKE * scale) | ((distance <= SPREAD * scale) & (along > 1 - PARALLEL))
         ours, theirs = ours[same], theirs[same]
         values, shapes, error = result.values.copy(), result.shapes.copy(), result.error.copy()
         better = part.error[theirs] < error[ours]
@@ -76,11 +76,11 @@ def pairs(a: ComplexArray, b: ComplexArray, near: float = np.inf) -> tuple[IntAr
     """Places in a and in b of pairs no farther apart than ``near``, as many as there can be and then the closest."""
     if not len(a) or not len(b):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    away = np.abs(a[:, None] - b[None, :])
+    distance = np.abs(a[:, None] - b[None, :])
     # What is too far costs more than all others together, so that it never displaces a pair that belongs together.
-    far = away > near
+    far = distance > near
     dear = (near if np.isfinite(near) else 0.0) * (len(a) + 1)
-    rows, columns = scipy.optimize.linear_sum_assignment(np.where(far, dear, away))
+    rows, columns = scipy.optimize.linear_sum_assignment(np.where(far, dear, distance))
     kept = ~far[rows, columns]
     return np.asarray(rows)[kept], np.asarray(columns)[kept]
 
@@ -94,11 +94,11 @@ def biorthogonal(problem: Quadratic, lam: ComplexArray, x: ComplexArray, y: Comp
     for group in groups(lam, ALIKE * scale):
         if len(group) < 2:
             continue
-        there = lam[group]
+        values = lam[group]
         product = problem.mass @ x[:, group]
-        gram = y[:, group].T @ (problem.damping @ x[:, group]) + (there[:, None] + there) * (y[:, group].T @ product)
+        gram = y[:, group].T @ (problem.damping @ x[:, group]) + (values[:, None] + values) * (y[:, group].T @ product)
         size = np.abs(y[:, group]).T @ (abs(problem.damping) @ np.abs(x[:, group]))
-        size = size + 2 * np.abs(there) * (np.abs(y[:, group]).T @ (abs(problem.mass) @ np.abs(x[:, group])))
+        size = size + 2 * np.abs(values) * (np.abs(y[:, group]).T @ (abs(problem.mass) @ np.abs(x[:, group])))
         if sl.svdvals(gram)[-1] > 1e-6 * size.max():
             result[:, group] = unit(y[:, group] @ np.linalg.inv(gram).T)
     return result
@@ -129,8 +129,8 @@ def snapped(lam: ComplexArray, scale: float) -> ComplexArray:
     unsure = np.flatnonzero((result.imag != 0) & (np.abs(result.imag) <= SPREAD * scale))
     up, down = unsure[result[unsure].imag > 0], unsure[result[unsure].imag < 0]
     ours, theirs = pairs(result[up], result[down].conj())
-    away: Array = np.abs(result[up[ours]] - result[down[theirs]].conj())
-    paired = away <= np.maximum(0.5 * np.abs(result[up[ours]].imag), ALIKE * scale)
+    distance: Array = np.abs(result[up[ours]] - result[down[theirs]].conj())
+    paired = distance <= np.maximum(0.5 * np.abs(result[up[ours]].imag), ALIKE * scale)
     alone = np.setdiff1d(unsure, np.concatenate([up[ours[paired]], down[theirs[paired]]]))
     near = alone[np.abs(result[alone].imag) <= ALIKE * scale]
     result[near] = result[near].real

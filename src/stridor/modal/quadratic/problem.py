@@ -42,14 +42,14 @@ class Quadratic:
         matrices look for them each time."""
         n, parts = self.size, [sp.coo_array(m) for m in self.matrices()]
         keys = [part.row.astype(np.int64) * n + part.col for part in parts]
-        places = np.unique(np.concatenate(keys))
-        index = np.int32 if len(places) < np.iinfo(np.int32).max else np.int64
+        pattern = np.unique(np.concatenate(keys))
+        index = np.int32 if len(pattern) < np.iinfo(np.int32).max else np.int64
         entries: list[Any] = []
         for key, part in zip(keys, parts, strict=True):
-            entries.append(np.zeros(len(places), dtype=np.result_type(part.data, float)))
-            np.add.at(entries[-1], np.searchsorted(places, key), part.data)
-        rows = np.searchsorted(places, n * np.arange(n + 1, dtype=np.int64))
-        return entries, (places % max(n, 1)).astype(index), rows.astype(index)
+            entries.append(np.zeros(len(pattern), dtype=np.result_type(part.data, float)))
+            np.add.at(entries[-1], np.searchsorted(pattern, key), part.data)
+        rows = np.searchsorted(pattern, n * np.arange(n + 1, dtype=np.int64))
+        return entries, (pattern % max(n, 1)).astype(index), rows.astype(index)
 
     @cached_property
     def _sizes(self) -> tuple[Sparse, Sparse, Sparse]:

@@ -171,8 +171,8 @@ class Search:
             # The Rayleigh functional nearest the shift.
             roots = np.roots(terms)
             near = roots[np.argmin(np.abs(roots - krylov.shift))] if len(roots) else np.inf
-            away = near - krylov.shift
-            theta[k] = krylov.radius / away if abs(away) > 1e-6 * krylov.radius else 1e6
+            offset = near - krylov.shift
+            theta[k] = krylov.radius / offset if abs(offset) > 1e-6 * krylov.radius else 1e6
         mix = start(x.shape[1], width, self.seed)
         u, w = x @ (theta[:, None] * mix), x @ mix
         noise = krylov.smooth(start(p.size, width, self.seed + 1))
@@ -182,9 +182,9 @@ class Search:
 
 def _gaps(theta: ComplexArray) -> Array:
     """Distance of each to the nearest other."""
-    away = np.abs(theta[:, None] - theta[None, :])
-    np.fill_diagonal(away, np.inf)
-    return np.asarray(away.min(axis=1, initial=np.inf))
+    distance = np.abs(theta[:, None] - theta[None, :])
+    np.fill_diagonal(distance, np.inf)
+    return np.asarray(distance.min(axis=1, initial=np.inf))
 
 
 def start(rows: int, columns: int, seed: int) -> ComplexArray:
