@@ -314,13 +314,13 @@ def test_freedoms_are_laid_out_once_each_and_rows_go_with_them() -> None:
     n = 11
     system = random_structure(rng, n, 2)
     layout = storage.lay_out_freedoms(system)
-    assert len(set(layout.place.tolist())) == n
+    assert len(set(layout.index.tolist())) == n
     assert layout.size == layout.stride * layout.blocks
-    assert layout.place.max() < layout.size
-    assert (layout.place % layout.stride < layout.width).all()
+    assert layout.index.max() < layout.size
+    assert (layout.index % layout.stride < layout.width).all()
     values, rows = rng.normal(size=(2, n)), rng.normal(size=(3, n))
     spread = layout.spread(values)
-    assert spread[:, layout.place] == pytest.approx(values)
+    assert spread[:, layout.index] == pytest.approx(values)
     assert np.count_nonzero(spread) == 2 * n
     assert layout.rows(sp.csr_array(rows)).toarray() @ spread[0] == pytest.approx(rows @ values[0])
     stored = storage.upper_blocks(system.stiffness, layout)
@@ -334,7 +334,7 @@ def test_freedoms_are_laid_out_once_each_and_rows_go_with_them() -> None:
             i, j = row * layout.stride, column * layout.stride
             full[i : i + w, j : j + w] = block
             full[j : j + w, i : i + w] = block.T
-    assert full[np.ix_(layout.place, layout.place)] == pytest.approx(system.stiffness.toarray())
+    assert full[np.ix_(layout.index, layout.index)] == pytest.approx(system.stiffness.toarray())
     assert not stored.val[-1].any()
     assert stored.ptr[-1] == len(stored.val) - 1
 
@@ -397,7 +397,7 @@ def test_energies_at_the_start_are_those_that_works_are_counted_from(monkeypatch
         machine: Any = object.__new__(assembled_machine.Machine)
         machine.system = SimpleNamespace(cubic=cubic)
         machine.structure, machine.fields = None, SimpleNamespace(u=np.array([9.0, 0.5, 9.0, 0.25]))
-        machine.layout = SimpleNamespace(place=np.array([1, 3]))
+        machine.layout = SimpleNamespace(index=np.array([1, 3]))
         machine.state = SimpleNamespace(
             reference=np.zeros(2), works=np.zeros(assembled_machine.LOOP_WORKS), motion=np.array([[0.1], [4.0]])
         )
@@ -431,7 +431,7 @@ def test_rows_are_renewed_before_a_node_has_slid_a_thousandth_of_their_distance(
             tangent=np.diag([1.0, 1, 1, 1]), tangent_lift=np.array([[0.0], [0.1], [0], [0]]), count=4,
             owner=np.array([0, 1, 1, 2]),
         ),
-        fields=SimpleNamespace(q=speeds), layout=SimpleNamespace(place=np.arange(4)),
+        fields=SimpleNamespace(q=speeds), layout=SimpleNamespace(index=np.arange(4)),
         state=SimpleNamespace(motion=np.array([[5.0], [-4.0]])), scheme=SimpleNamespace(step=1e-4),
         system=SimpleNamespace(contacts=(1,), surfaces=[surface([[0, 0]]), surface([[0, 0]], sliding="small")]),
     )  # fmt: skip

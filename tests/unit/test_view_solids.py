@@ -35,7 +35,7 @@ from stridor.view import field_plots, solid_plots
 from stridor.view.animation import QUANTA, animation_gif, animation_html
 from stridor.view.depth_picture import Camera, sharp_edges, surface_picture
 from stridor.view.field_plots import MAP_COLOURS, contact_map, contact_snapshot, interface_energy
-from stridor.view.interface_places import arc_length, places_along
+from stridor.view.interface_columns import arc_length, columns_along
 from stridor.view.skin import normals, skin_of, surface_facets
 
 CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float)
@@ -488,26 +488,26 @@ def test_arc_length_follows_the_line_and_the_tangents():
 
 def test_columns_in_space():
     position, tangents, angle = ring(np.linspace(-0.3, 0.4, 8))
-    places = places_along(position, tangents, about=np.array([0.2, 0.0, 0.0]))
-    assert places.count == 8
-    assert np.allclose(np.diff(places.edges), np.degrees(0.1))
-    assert np.allclose(np.abs(np.diff(places.value)), np.abs(np.diff(np.degrees(angle))))
-    assert places_along(position, tangents).label == "position along the direction of sliding [mm]"
-    chosen = places_along(position, tangents, along=np.array([2.0, 0.0, 0.0]))
+    columns = columns_along(position, tangents, about=np.array([0.2, 0.0, 0.0]))
+    assert columns.count == 8
+    assert np.allclose(np.diff(columns.edges), np.degrees(0.1))
+    assert np.allclose(np.abs(np.diff(columns.value)), np.abs(np.diff(np.degrees(angle))))
+    assert columns_along(position, tangents).label == "position along the direction of sliding [mm]"
+    chosen = columns_along(position, tangents, along=np.array([2.0, 0.0, 0.0]))
     assert np.allclose(chosen.value, 1e3 * position[:, 0])
     for bad in ({"along": np.zeros(3)}, {"about": np.zeros(2)}):
         with pytest.raises(CaseError, match=next(iter(bad))):
-            places_along(position, tangents, **bad)
+            columns_along(position, tangents, **bad)
 
 
 def test_a_whole_ring_is_shown_over_the_angle_about_the_centre_it_turns_round():
     position, tangents, angle = ring(np.linspace(-np.pi, np.pi, 24, endpoint=False) + 0.01)
-    places = places_along(position, tangents)
-    assert places.label == "angle about the axis of sliding [°]"
-    assert places.count == 24
+    columns = columns_along(position, tangents)
+    assert columns.label == "angle about the axis of sliding [°]"
+    assert columns.count == 24
     # Both radii of one angle fall in one column, and neighbours differ by 15°: the centre was found.
-    assert np.array_equal(places.column[:24], places.column[24:])
-    assert np.allclose(np.diff(np.sort(places.value)[::2]), 15.0, atol=1e-6)
+    assert np.array_equal(columns.column[:24], columns.column[24:])
+    assert np.allclose(np.diff(np.sort(columns.value)[::2]), 15.0, atol=1e-6)
     assert len(angle) == 48
 
 

@@ -183,7 +183,7 @@ def _march_unchecked(system, step, beta2, steps):
     from stridor.temporal.steppers.sparse.products import advance
 
     machine = assembled_machine(system, scheme(step, beta2), system.contact_nodes())
-    machine.fields.u[machine.layout.place] = [1.0, -1.0]
+    machine.fields.u[machine.layout.index] = [1.0, -1.0]
     machine.show()
     seen = []
     for _ in range(steps):

@@ -35,7 +35,7 @@ class LineShape:
     every: int
     count: int
     looks: int = 0
-    turned: ComplexArray | None = None
+    modulated: ComplexArray | None = None
     plain: Array | None = None
     weights: complex = 0j
     window: Array = field(init=False)
@@ -47,10 +47,10 @@ class LineShape:
         """Add this instant."""
         if self.looks >= self.count:
             return
-        if self.turned is None or self.plain is None:
-            self.turned, self.plain = np.zeros(len(velocity), dtype=complex), np.zeros(len(velocity))
+        if self.modulated is None or self.plain is None:
+            self.modulated, self.plain = np.zeros(len(velocity), dtype=complex), np.zeros(len(velocity))
         weight = self.window[self.looks] * np.exp(-2j * np.pi * self.frequency_hz * time)
-        self.turned += weight * velocity
+        self.modulated += weight * velocity
         self.plain += velocity
         self.weights += weight
         self.looks += 1
@@ -58,7 +58,7 @@ class LineShape:
     @property
     def amplitude(self) -> ComplexArray:
         """Amplitudes (n,) [m/s, rad/s]. Raises ValueError before anything was seen."""
-        if self.turned is None or self.plain is None or not self.looks:
+        if self.modulated is None or self.plain is None or not self.looks:
             raise ValueError("nothing was seen")
         mean = self.plain / self.looks
-        return (self.turned - self.weights * mean) * 2 / float(self.window[: self.looks].sum())
+        return (self.modulated - self.weights * mean) * 2 / float(self.window[: self.looks].sum())

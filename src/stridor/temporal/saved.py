@@ -44,9 +44,9 @@ def agrees(state: Mapping[str, Any], name: str, own: Array, *, first: int | None
     return bool(np.allclose(held[:first], own, rtol=relative, atol=0.0))
 
 
-def check_done(state: Mapping[str, Any], name: str, place: int, steps: int) -> None:
+def check_done(state: Mapping[str, Any], name: str, index: int, steps: int) -> None:
     """Raise CaseError unless the counter of steps is what the trajectory says of itself; a checked state is given."""
-    counted = int(state[name][place])
+    counted = int(state[name][index])
     if counted != steps:
         _refuse(name, f"counts {counted} steps where the run has {steps}")
 

@@ -24,8 +24,8 @@ class PhaseSpec:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A phase laid out in steps: first and last step (exclusive), factors before and after its ramp; places (p,) are
-    those of prescribed distances, zero for motions with a velocity, as velocities are for distances."""
+    """A phase laid out in steps: first and last step (exclusive), factors before and after its ramp; distances (p,) are
+    those prescribed, zero for motions with a velocity, as velocities are for distances."""
 
     name: str
     first: int
@@ -35,8 +35,8 @@ class Stretch:
     loads_after: Array
     velocities_before: Array
     velocities_after: Array
-    places_before: Array
-    places_after: Array
+    distances_before: Array
+    distances_after: Array
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,10 @@ class Schedule:
         """Number of steps of the whole run."""
         return self.stretches[-1].last
 
-    def settled(self) -> Schedule:
+    def from_steady(self) -> Schedule:
         """The same where prescribed distances are in their place at the start, as in steady sliding."""
         first = self.stretches[0]
-        return Schedule(self.step, (replace(first, places_before=first.places_after), *self.stretches[1:]))
+        return Schedule(self.step, (replace(first, distances_before=first.distances_after), *self.stretches[1:]))
 
     def stretch_at(self, step: int) -> Stretch:
         """The phase that step number ``step`` belongs to."""
@@ -91,12 +91,12 @@ class Schedule:
                 change = stretch.velocities_after - stretch.velocities_before
                 values = (stretch.velocities_before + change * blend[:, None]) * self.step
                 out[np.arange(rows.start, rows.stop)[ramping]] = values
-            away = stretch.places_after - stretch.places_before
-            if np.any(away):
+            travel = stretch.distances_after - stretch.distances_before
+            if np.any(travel):
                 x = np.array([steps, steps + 1.0]) - stretch.first
                 x = np.clip(x / stretch.ramp_steps, 0.0, 1.0) if stretch.ramp_steps > 0 else np.minimum(x, 1.0)
                 done = x**3 * (10 - 15 * x + 6 * x**2)
-                out[rows] += away * (done[1] - done[0])[:, None]
+                out[rows] += travel * (done[1] - done[0])[:, None]
         return out
 
     def _pieces(self, first: int, count: int) -> Iterator[tuple[slice, Stretch, Array]]:
@@ -119,16 +119,18 @@ class Schedule:
 
 
 def lay_out(
-    phases: Sequence[PhaseSpec], step: float, loads: Sequence[str], supports: Sequence[str], places: Array | None = None
-) -> Schedule:
+    phases: Sequence[PhaseSpec], step: float, loads: Sequence[str], supports: Sequence[str],
+    distances: Array | None = None,
+) -> Schedule:  # fmt: skip
     """Phases in steps. A factor not named stays as in the phase before; before the first phase loads, velocities and
-    distances are zero, and what the first phase does not name is one. places (p,): 1 where a motion is a distance."""
+    distances are zero, and what the first phase does not name is one. distances (p,): 1 where a motion is
+    one."""
     stretches: list[Stretch] = []
     # Each is the next phase's default: without their types the checker takes half a minute to infer them in circles.
     load: Array = np.zeros(len(loads))
     velocity: Array = np.zeros(len(supports))
-    place: Array = np.zeros(len(supports))
-    is_place: Array = np.zeros(len(supports)) if places is None else places
+    distance: Array = np.zeros(len(supports))
+    is_distance: Array = np.zeros(len(supports)) if distances is None else distances
     time, first = 0.0, 0
     for number, phase in enumerate(phases):
         default_load: Array = np.ones(len(loads)) if number == 0 else load
@@ -140,19 +142,19 @@ def lay_out(
             [phase.velocities.get(name, d) for name, d in zip(supports, default_velocity, strict=True)],
             dtype=float,
         )
-        default_place: Array = np.ones(len(supports)) if number == 0 else place
-        next_place: Array = is_place * np.array(
-            [phase.displacements.get(_owner(name), d) for name, d in zip(supports, default_place, strict=True)],
+        default_distance: Array = np.ones(len(supports)) if number == 0 else distance
+        next_distance: Array = is_distance * np.array(
+            [phase.displacements.get(_owner(name), d) for name, d in zip(supports, default_distance, strict=True)],
             dtype=float,
         )
-        next_velocity = next_velocity * (1.0 - is_place)
+        next_velocity = next_velocity * (1.0 - is_distance)
         time += phase.duration
         last = max(round(time / step), first + 1)
         ramp = phase.ramp / step
         stretches.append(
-            Stretch(phase.name, first, last, ramp, load, next_load, velocity, next_velocity, place, next_place)
+            Stretch(phase.name, first, last, ramp, load, next_load, velocity, next_velocity, distance, next_distance)
         )
-        load, velocity, place, first = next_load, next_velocity, next_place, last
+        load, velocity, distance, first = next_load, next_velocity, next_distance, last
     return Schedule(step, tuple(stretches))
 
 

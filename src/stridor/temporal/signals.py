@@ -74,8 +74,8 @@ def _convolved(signal: Numbers, weights: Array) -> Numbers:
     """Signals (…, k) with weights (w,) where these overlap in full: (…, k − w + 1)."""
     count, taps = signal.shape[-1], len(weights)
     size = sf.next_fast_len(count + taps - 1)
-    there, back = (sf.fft, sf.ifft) if np.iscomplexobj(signal) else (sf.rfft, sf.irfft)
-    return back(there(signal, size) * there(weights, size), size)[..., taps - 1 : count]
+    forward, backward = (sf.fft, sf.ifft) if np.iscomplexobj(signal) else (sf.rfft, sf.irfft)
+    return backward(forward(signal, size) * forward(weights, size), size)[..., taps - 1 : count]
 
 
 def spectrum(signal: Array, sampling: float, *, window: str = "hann") -> Spectrum:
@@ -119,8 +119,8 @@ def envelope(signal: Array, sampling: float, frequency_hz: float, *, periods: fl
     weights = hann(size)
     weights = weights / weights.sum() * 2
     time = np.arange(len(signal)) * sampling
-    turned = (signal - np.mean(signal)) * np.exp(-2j * np.pi * frequency_hz * time)
-    values = np.abs(_convolved(turned, weights))
+    modulated = (signal - np.mean(signal)) * np.exp(-2j * np.pi * frequency_hz * time)
+    values = np.abs(_convolved(modulated, weights))
     hop = max(1, size // 10)
     return (np.arange(len(values)) * sampling + size * sampling / 2)[::hop], values[::hop]
 
@@ -193,8 +193,8 @@ def low_passed(signal: Array, sampling: float, max_frequency_hz: float) -> Array
     # Kaiser's rule: (A − 8)/(2.285 Δω) taps for A dB over a transition of Δω.
     taps = int((STOP_DECIBELS - 8) / (2.285 * 2 * np.pi * 0.25 * max_frequency_hz * sampling)) | 1
     taps = min(taps, (count // 3) | 1)
-    place = np.arange(taps) - taps // 2
-    low_pass = np.sinc(2 * 1.125 * max_frequency_hz * sampling * place) * np.kaiser(taps, STOP_BAND)
+    offset = np.arange(taps) - taps // 2
+    low_pass = np.sinc(2 * 1.125 * max_frequency_hz * sampling * offset) * np.kaiser(taps, STOP_BAND)
     return np.ascontiguousarray(_convolved(signal - signal.mean(axis=-1, keepdims=True), low_pass / low_pass.sum()))
 
 

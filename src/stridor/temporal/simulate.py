@@ -63,7 +63,7 @@ def simulate(
     motion = system.motion
     schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
     if settings.initial == "steady-sliding":
-        schedule = schedule.settled()
+        schedule = schedule.from_steady()
     march = March(stepper, schedule, settings, join=join, observe=observe)
     if restart is None:
         stepper.begin(schedule, settings, mu, disturbance)

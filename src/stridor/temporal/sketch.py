@@ -57,8 +57,8 @@ def differing(parts: Sequence[Part], saved: Array) -> list[Part] | None:
     rows = [part.row for part in parts]
     if saved.dtype.kind != "f" or saved.shape != (sum(len(row) for row in rows),) or not np.all(np.isfinite(saved)):
         return None
-    places = np.cumsum([len(row) for row in rows])[:-1]
-    return [part for part, row in zip(parts, np.split(saved, places), strict=True) if not part.same(row)]
+    bounds = np.cumsum([len(row) for row in rows])[:-1]
+    return [part for part, row in zip(parts, np.split(saved, bounds), strict=True) if not part.same(row)]
 
 
 def saved_row(parts: Sequence[Part], saved: Array, name: str) -> Array:

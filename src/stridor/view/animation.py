@@ -126,9 +126,9 @@ def page_data(skin: Skin, *, scale: float | None) -> dict[str, Any]:
     points (k, 3) float32 [m]; real and imag (k, 3) int16, QUANTA being the largest amplitude; facets (f, 4), edges
     (e, 2), segments (s, 2) as uint16, or uint32 where ``wide``. ``scale`` [m] is the largest amplitude as drawn.
     """
-    turned, largest = at_largest(skin.motion)
+    rotated, largest = at_largest(skin.motion)
     drawn = drawn_scale(skin, largest, scale) * largest
-    unit = turned / (largest or 1.0)
+    unit = rotated / (largest or 1.0)
     low, high = skin.points.min(axis=0), skin.points.max(axis=0)
     half = (high - low) / 2 + abs(drawn)
     wide = len(skin.points) > 65535

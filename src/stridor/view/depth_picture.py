@@ -51,17 +51,17 @@ def surface_picture(
     fine = pixels * SAMPLES
     factor = fine / max(float((high - low).max()), 1e-300)
     width, height = (max(SAMPLES, int(np.ceil(s * factor / SAMPLES)) * SAMPLES) for s in high - low)
-    place = np.column_stack([(seen[:, :2] - low) * factor, seen[:, 2] * factor])
+    drawn = np.column_stack([(seen[:, :2] - low) * factor, seen[:, 2] * factor])
     corner = colours[facets] if colours.ndim == 2 else colours
     corner = corner * _brightness(seen, facets)[:, None, None]
     depth = np.full(width * height, -np.inf)
     image = np.zeros((width * height, 4))
     quads = np.flatnonzero(facets[:, 3] != facets[:, 2])
     for chosen, which in ((np.arange(len(facets)), [0, 1, 2]), (quads, [0, 2, 3])):
-        triangles = place[facets[chosen][:, which]]
+        triangles = drawn[facets[chosen][:, which]]
         _fill(image, depth, width, height, triangles, corner[chosen][:, which])
     if lines:
-        _edges(image, depth, width, height, place, facets)
+        _edges(image, depth, width, height, drawn, facets)
     whole = image.reshape(height // SAMPLES, SAMPLES, width // SAMPLES, SAMPLES, 4)
     cover = whole[..., 3].mean(axis=(1, 3))
     colour = (whole[..., :3] * whole[..., 3:]).mean(axis=(1, 3)) / np.where(cover > 0, cover, 1.0)[..., None]
@@ -132,10 +132,10 @@ def _counted(counts: IntArray) -> tuple[IntArray, IntArray]:
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def _edges(image: Array, depth: Array, width: int, height: int, place: Array, facets: IntArray) -> None:
+def _edges(image: Array, depth: Array, width: int, height: int, drawn: Array, facets: IntArray) -> None:
     """Darken what is under the edges of facets that can be seen."""
     pairs = distinct(facet_edges(facets))[0]
-    start, along = place[pairs[:, 0]], place[pairs[:, 1]] - place[pairs[:, 0]]
+    start, along = drawn[pairs[:, 0]], drawn[pairs[:, 1]] - drawn[pairs[:, 0]]
     steps = np.ceil(np.abs(along[:, :2]).max(axis=1, initial=0.0)).astype(int) + 1
     owner, within = _counted(steps)
     at = start[owner] + along[owner] * (within / np.maximum(steps[owner] - 1, 1))[:, None]
@@ -150,10 +150,10 @@ def _edges(image: Array, depth: Array, width: int, height: int, place: Array, fa
 
 def sharp_edges(points: Array, facets: IntArray, angle_deg: float = 40.0) -> IntArray:
     """Edges (e, 2) where the surface has a border or bends by more than an angle: how a body is sketched."""
-    pairs, place, count = distinct(facet_edges(facets))
+    pairs, index, count = distinct(facet_edges(facets))
     sides = np.where(facets[:, 3] == facets[:, 2], 3, 4)
     outward = np.repeat(normals(points, facets), sides, axis=0)
-    total = np.column_stack([np.bincount(place, weights=outward[:, k], minlength=len(pairs)) for k in range(3)])
+    total = np.column_stack([np.bincount(index, weights=outward[:, k], minlength=len(pairs)) for k in range(3)])
     # Two unit normals at an angle α add up to a length of 2 cos(α/2).
     bent = np.linalg.norm(total, axis=1) < 2 * np.cos(np.radians(angle_deg) / 2)
     return pairs[(count == 1) | ((count == 2) & bent)]

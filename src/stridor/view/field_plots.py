@@ -17,7 +17,7 @@ from ..errors import CaseError
 from ..temporal.node_history import NodeHistory
 from ..temporal.trajectory import STATUS
 from ..typing import Array, BoolArray, IntArray
-from .interface_places import Places, arc_length, places_along, seen_from_normal
+from .interface_columns import Columns, arc_length, columns_along, seen_from_normal
 from .style import BLUE, GREY, INK, VERMILION, largest, legend_above, panel, styled, zero_line
 
 Quantity = Literal["pressure", "status", "slip", "gap"]
@@ -54,21 +54,21 @@ def contact_map(
         raise CaseError("quantity", quantity, f"unknown; known: {', '.join(QUANTITIES)}")
     name, nodes = chosen_nodes(history, contact)
     records = chosen_records(history.time, start, end)
-    places = places_along(
+    columns = columns_along(
         history.position[nodes],
         history.tangents[nodes],
         along=None if along is None else np.asarray(along, dtype=float),
         about=None if about is None else np.asarray(about, dtype=float),
     )
-    time, values = map_values(history, nodes, records, places, quantity)
+    time, values = map_values(history, nodes, records, columns, quantity)
     figure, ax = panel(ax, 4.2)
     sides = _time_edges(1e3 * time, 1e3 * history.time[records][[0, -1]])
     if quantity == "status":
-        _status_map(ax, places, sides, values)
+        _status_map(ax, columns, sides, values)
     else:
         area = bool(np.all(np.isfinite(history.area[nodes])))
-        _value_map(figure, ax, places, sides, values, quantity, area=area)
-    ax.set(xlabel=places.label, ylabel="time [ms]")
+        _value_map(figure, ax, columns, sides, values, quantity, area=area)
+    ax.set(xlabel=columns.label, ylabel="time [ms]")
     _headed(ax, f"contact {name}: {quantity}", above_legend=quantity == "status")
     ax.grid(False)
     return figure
@@ -168,8 +168,8 @@ def _prefix(values: Array) -> tuple[float, str]:
     """Power of a thousand that brings the largest value to 1 to 1000, and its letter."""
     letters = ("p", "n", "µ", "m", "", "k", "M", "G")
     exponent = int(np.floor(np.log10(largest(values)) / 3 + 1e-9))
-    place = int(np.clip(exponent + 4, 0, len(letters) - 1))
-    return 1000.0 ** (place - 4), letters[place]
+    index = int(np.clip(exponent + 4, 0, len(letters) - 1))
+    return 1000.0 ** (index - 4), letters[index]
 
 
 def chosen_nodes(history: NodeHistory, contact: str | None) -> tuple[str, IntArray]:
@@ -197,46 +197,46 @@ def chosen_records(time: Array, start: float | None, end: float | None) -> slice
 
 
 def map_values(
-    history: NodeHistory, nodes: IntArray, records: slice, places: Places, quantity: Quantity
+    history: NodeHistory, nodes: IntArray, records: slice, columns: Columns, quantity: Quantity
 ) -> tuple[Array, Array]:
     """Time (rows,) [s] where rows of the picture begin, and what they show (rows, columns); NaN where there is none."""
     count = len(history.time[records])
     size = -(-count // ROWS)
     begin = np.arange(0, count, size)
     if quantity == "status":
-        return history.time[records][begin], _status_rows(history.status[records, nodes], places, begin)
+        return history.time[records][begin], _status_rows(history.status[records, nodes], columns, begin)
     if quantity == "pressure":
-        rows = _pressure_columns(history, nodes, records, places)
+        rows = _pressure_columns(history, nodes, records, columns)
     else:
         field = history.gap if quantity == "gap" else history.slip_velocity[:, :, 0]
-        members = np.bincount(places.column, minlength=places.count)
-        rows = _summed(field[records, nodes], places) / members * (1e6 if quantity == "gap" else 1.0)
+        members = np.bincount(columns.column, minlength=columns.count)
+        rows = _summed(field[records, nodes], columns) / members * (1e6 if quantity == "gap" else 1.0)
     if quantity == "gap":
         return history.time[records][begin], np.maximum.reduceat(rows, begin, axis=0)
     total = np.add.reduceat(rows, begin, axis=0)
     return history.time[records][begin], total / np.diff(np.append(begin, count))[:, None]
 
 
-def _summed(values: Array, places: Places) -> Array:
+def _summed(values: Array, columns: Columns) -> Array:
     """Sums (r, columns) of values (r, m) of nodes."""
-    total = np.zeros((len(values), places.count))
-    np.add.at(total.T, places.column, values.T)
+    total = np.zeros((len(values), columns.count))
+    np.add.at(total.T, columns.column, values.T)
     return total
 
 
-def _pressure_columns(history: NodeHistory, nodes: IntArray, records: slice, places: Places) -> Array:
+def _pressure_columns(history: NodeHistory, nodes: IntArray, records: slice, columns: Columns) -> Array:
     """Force over area (r, columns) [MPa], which nodes without area cannot spoil; for point contacts force [N]."""
-    force = _summed(history.normal_force[records, nodes], places)
+    force = _summed(history.normal_force[records, nodes], columns)
     area = history.area[nodes]
     if not np.all(np.isfinite(area)):
         return force
-    whole = np.bincount(places.column, weights=area, minlength=places.count)
+    whole = np.bincount(columns.column, weights=area, minlength=columns.count)
     return np.where(whole > 0, 1e-6 * force / np.where(whole > 0, whole, 1.0), np.nan)
 
 
-def _status_rows(status: IntArray, places: Places, begin: IntArray) -> Array:
+def _status_rows(status: IntArray, columns: Columns, begin: IntArray) -> Array:
     """Status (rows, columns): in a column the most frequent, in a row the rarest of the picture that occurs."""
-    votes = np.stack([_summed((status == s).astype(float), places) for s in range(3)])
+    votes = np.stack([_summed((status == s).astype(float), columns) for s in range(3)])
     column = np.argmax(votes, axis=0)
     rarest = np.argsort([np.count_nonzero(column == s) for s in range(3)], kind="stable")
     rank = np.empty(3, dtype=np.int64)
@@ -258,15 +258,15 @@ def _time_edges(time: Array, span: Array) -> Array:
     return np.append(time, time[-1] + last)
 
 
-def _status_map(ax: Axes, places: Places, sides: Array, values: Array) -> None:
+def _status_map(ax: Axes, columns: Columns, sides: Array, values: Array) -> None:
     colours = [MAP_COLOURS[name] for name in STATUS]
     look: Any = {"cmap": ListedColormap(colours), "norm": BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3)}
-    ax.pcolormesh(places.edges, sides, values, rasterized=True, **look)
+    ax.pcolormesh(columns.edges, sides, values, rasterized=True, **look)
     legend_above(ax, [Patch(facecolor=c, edgecolor=GREY, label=n) for n, c in zip(STATUS, colours, strict=True)])
 
 
 def _value_map(
-    figure: Figure, ax: Axes, places: Places, sides: Array, values: Array, quantity: Quantity, *, area: bool
+    figure: Figure, ax: Axes, columns: Columns, sides: Array, values: Array, quantity: Quantity, *, area: bool
 ) -> None:
     known = values[~np.isnan(values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
@@ -279,7 +279,7 @@ def _value_map(
     elif quantity == "slip":
         size = largest(values)
         label, look = "slip velocity [m/s]", {"cmap": "RdBu_r", "vmin": -size, "vmax": size}
-    shown = ax.pcolormesh(places.edges, sides, values, rasterized=True, **look)
+    shown = ax.pcolormesh(columns.edges, sides, values, rasterized=True, **look)
     figure.colorbar(shown, ax=ax, pad=0.01, label=label)
 
 

@@ -65,10 +65,10 @@ def frequency_branches(
     figure, ax = panel(ax, 3.5 if len(columns) <= FEW else 5.2)
     scale, unit = (1.0, "Hz") if len(columns) <= FEW else (1e3, "kHz")
     few = len(columns) <= FEW
-    for place, b in enumerate(columns):
+    for index, b in enumerate(columns):
         values, unstable = modes.frequency_hz[:, b] / scale, modes.unstable[:, b]
-        colour = LINES[place % len(LINES)] if few else BLUE
-        style = "--" if few and place % 2 else "-"
+        colour = LINES[index % len(LINES)] if few else BLUE
+        style = "--" if few and index % 2 else "-"
         label = f"mode {modes.branch[b]}" if few else None
         ax.plot(modes.mu, values, style, color=colour, label=label, linewidth=1.5 if few else 1.1)
         _mark_unstable(ax, modes.mu, values, unstable)
@@ -101,9 +101,9 @@ def growth_branches(
     figure, ax = panel(ax, 3.5)
     few = len(columns) <= FEW
     factor = -1 / (2 * np.pi) if imaginary_frequency else 1.0
-    for place, b in enumerate(columns):
-        colour = LINES[place % len(LINES)] if few else BLUE
-        style = "--" if few and place % 2 else "-"
+    for index, b in enumerate(columns):
+        colour = LINES[index % len(LINES)] if few else BLUE
+        style = "--" if few and index % 2 else "-"
         values = factor * modes.growth_rate[:, b]
         label = f"mode {modes.branch[b]}" if few else None
         ax.plot(modes.mu, values, style, color=colour, label=label, linewidth=1.5 if few else 1.1)
@@ -122,8 +122,8 @@ def damping_branches(modes: ComplexModes, branches: Sequence[int] | None = None,
     columns = _columns(modes, branches)
     figure, ax = panel(ax, 3.5)
     few = len(columns) <= FEW
-    for place, b in enumerate(columns):
-        colour = LINES[place % len(LINES)] if few else BLUE
+    for index, b in enumerate(columns):
+        colour = LINES[index % len(LINES)] if few else BLUE
         values = 100 * modes.damping_ratio[:, b]
         label = f"mode {modes.branch[b]}" if few else None
         ax.plot(modes.mu, values, color=colour, label=label, linewidth=1.5 if few else 1.1)

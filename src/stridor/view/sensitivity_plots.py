@@ -109,8 +109,8 @@ def damping_map(result: DampingMap, *, ax: Axes | None = None) -> Figure:
             _hatched(ax, result, np.where(lowers, slope, np.maximum(slope, 0.0)).T, hatch, colour)
             handles.append(Patch(facecolor=TEAL, edgecolor=colour, hatch=hatch, label=f"more {name} lowers it"))
     if result.confirmed:
-        places = [c.x for c in result.confirmed], [c.y for c in result.confirmed]
-        (rings,) = ax.plot(*places, "o", mfc="white", mec=INK, ms=6, clip_on=False, zorder=5)
+        points = [c.x for c in result.confirmed], [c.y for c in result.confirmed]
+        (rings,) = ax.plot(*points, "o", mfc="white", mec=INK, ms=6, clip_on=False, zorder=5)
         rings.set_label("solved again in the full problem")
         handles.append(rings)
     ax.set(xlabel=result.x, ylabel=result.y)

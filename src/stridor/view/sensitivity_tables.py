@@ -49,8 +49,8 @@ def sensitivity_table(result: Sensitivities) -> Table:
     return drop_empty(Table("sensitivities", "Sensitivities", heads, tuple(rows), frozenset({3}), caption))
 
 
-def _distance(away: float) -> str:
-    text = significant(100 * away, 2)
+def _distance(distance: float) -> str:
+    text = significant(100 * distance, 2)
     return f"{text} % away" if text else ""
 
 

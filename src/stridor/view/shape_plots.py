@@ -25,8 +25,8 @@ def model_plot(system: System, case: Case | None = None, *, ax: Axes | None = No
     """The model as it stands: bodies, contacts, and with the case its supports, loads and watched points."""
     figure, ax = panel(ax, 3.4)
     reach = _extent(system)
-    for place, line in enumerate(system.lines):
-        colour = COLOURS[place % len(COLOURS)]
+    for index, line in enumerate(system.lines):
+        colour = COLOURS[index % len(COLOURS)]
         ax.plot(*(1e3 * line.coordinates.T), color=colour, linewidth=3.5, solid_capstyle="butt", zorder=2)
         middle = 1e3 * line.coordinates[len(line.coordinates) // 2]
         # Beside the line, not on it: across its direction.
@@ -110,12 +110,12 @@ def at_best_phase(shape: Shape) -> dict[str, ComplexArray]:
 
 def _draw_shape(ax: Axes, system: System, motion: Mapping[str, ComplexArray], *, arrows: bool) -> None:
     scale = 1e3 * AMPLITUDE * _extent(system)
-    for place, line in enumerate(system.lines):
+    for index, line in enumerate(system.lines):
         if line.name not in motion:
             continue
         rest = 1e3 * line.coordinates
         moved, later = rest + scale * motion[line.name].real, rest - scale * motion[line.name].imag
-        colour = COLOURS[place % len(COLOURS)]
+        colour = COLOURS[index % len(COLOURS)]
         ax.plot(*rest.T, color=GREY, linestyle=":", linewidth=1.2, zorder=2)
         ax.plot(*later.T, color=colour, linewidth=0.9, alpha=0.6, zorder=2.8)
         ax.plot(*moved.T, color=colour, linewidth=2.2, zorder=3, label=line.name)
@@ -141,7 +141,7 @@ def _draw_shape(ax: Axes, system: System, motion: Mapping[str, ComplexArray], *,
 
 def _draw_case(ax: Axes, case: Case, reach: float) -> None:
     for support in case.supports.values():
-        at = _place(case, support.at)
+        at = _position(case, support.at)
         if at is None:
             continue
         ax.plot(*at, "s", mfc="white", mec=INK, ms=8, mew=1.4, zorder=4)
@@ -159,14 +159,14 @@ def _draw_case(ax: Axes, case: Case, reach: float) -> None:
         if np.any(speed):
             beside = 0.06 * reach * np.array([-speed[1], speed[0]]) / np.hypot(*speed)
             side = beside if beside[1] >= 0 else -beside
-            _arrow(ax, at + side, speed, 0.16 * reach, GREEN, f"{np.hypot(*speed):g} m/s", away=False)
+            _arrow(ax, at + side, speed, 0.16 * reach, GREEN, f"{np.hypot(*speed):g} m/s", at_head=False)
     for load in case.loads.values():
-        at = None if load.at is None else _place(case, load.at)
+        at = None if load.at is None else _position(case, load.at)
         if any(load.force) and at is not None:
             size = f"{np.linalg.norm(load.force):g} N"
-            _arrow(ax, at, np.array(load.force), 0.16 * reach, VERMILION, size, away=True)
+            _arrow(ax, at, np.array(load.force), 0.16 * reach, VERMILION, size, at_head=True)
     for watched in case.temporal.watch:
-        at = _place(case, watched)
+        at = _position(case, watched)
         if at is None:
             continue
         ax.plot(*at, "o", mfc="white", mec=PURPLE, ms=4.5, mew=1.2, zorder=5)
@@ -175,13 +175,13 @@ def _draw_case(ax: Axes, case: Case, reach: float) -> None:
         legend_above(ax)
 
 
-def _arrow(ax: Axes, at: Array, along: Array, length: float, colour: str, text: str, *, away: bool) -> None:
-    """An arrow along a direction that ends at a point (``away``) or starts there, with its name."""
+def _arrow(ax: Axes, at: Array, along: Array, length: float, colour: str, text: str, *, at_head: bool) -> None:
+    """An arrow along a direction that ends at a point (``at_head``) or starts there, with its name."""
     unit = along / np.hypot(*along)
-    tail, head = (at - length * unit, at) if away else (at, at + length * unit)
+    tail, head = (at - length * unit, at) if at_head else (at, at + length * unit)
     style = {"arrowstyle": "-|>", "color": colour, "lw": 1.8, "shrinkA": 6, "shrinkB": 6}
     ax.annotate("", (head[0], head[1]), xytext=(tail[0], tail[1]), arrowprops=style, zorder=5)
-    end = tail if away else head
+    end = tail if at_head else head
     side = (8, 2) if abs(unit[1]) > 0.5 else (0, 8)
     ax.annotate(
         text,
@@ -196,14 +196,14 @@ def _arrow(ax: Axes, at: Array, along: Array, length: float, colour: str, text: 
     ax.plot(end[0], end[1], alpha=0)  # counts for the limits of the axes
 
 
-def _place(case: Case, reference: str) -> Array | None:
+def _position(case: Case, reference: str) -> Array | None:
     """Coordinates (2,) [mm] of a point; None for a boundary, which is not one place."""
     point = case.location(reference)
     if not isinstance(point, PointRef):
         return None
     body = case.bodies[point.body]
-    place = body.coordinates(point.distance) if isinstance(body, BeamBody) else point.coordinates
-    return None if place is None else 1e3 * np.array(place)
+    coordinates = body.coordinates(point.distance) if isinstance(body, BeamBody) else point.coordinates
+    return None if coordinates is None else 1e3 * np.array(coordinates)
 
 
 def _mark_contacts(ax: Axes, system: System, *, named: bool) -> None:

@@ -75,25 +75,25 @@ def skin_of(system: System, vector: Array | ComplexArray | None = None) -> Skin:
     edges: list[IntArray] = []
     owner: list[IntArray] = []
     start = 0
-    for place, solid in enumerate(system.solids):
+    for index, solid in enumerate(system.solids):
         found = surface_facets(solid.cells, int(solid.points.shape[1]))
-        used, place_of = np.unique(found, return_inverse=True)
-        local = place_of.reshape(found.shape) + start
+        used, inverse = np.unique(found, return_inverse=True)
+        local = inverse.reshape(found.shape) + start
         facets.append(local)
-        owner.append(np.full(len(local), place))
+        owner.append(np.full(len(local), index))
         edges.append(_outline(local) if solid.points.shape[1] == 2 else np.zeros((0, 2), dtype=np.int64))
         points.append(solid.points[used])
         motion.append((solid.rows.free @ moving).reshape(solid.points.shape)[used])
         start += len(used)
     pieces: list[IntArray] = []
     piece_owner: list[IntArray] = []
-    for place, line in enumerate(system.lines, start=len(system.solids)):
+    for index, line in enumerate(system.lines, start=len(system.solids)):
         count, width = line.coordinates.shape
         pad = ((0, 0), (0, system.dimension - width))
         points.append(np.pad(line.coordinates, pad))
         motion.append(np.pad((line.rows.free @ moving).reshape(count, width), pad))
         pieces.append(start + np.column_stack([np.arange(count - 1), np.arange(1, count)]))
-        piece_owner.append(np.full(count - 1, place))
+        piece_owner.append(np.full(count - 1, index))
         start += count
     if not points:
         raise CaseError("system", None, "has neither solids nor lines, so there is nothing to draw")
@@ -167,8 +167,8 @@ def _outline(facets: IntArray) -> IntArray:
 def distinct(pairs: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     """Pairs (e, 2) of indices each once, which of them each given one is, and how often they occur."""
     size = int(pairs.max(initial=0)) + 1
-    key, place, count = np.unique(pairs[:, 0] * size + pairs[:, 1], return_inverse=True, return_counts=True)
-    return np.column_stack([key // size, key % size]), place.ravel(), count
+    key, inverse, count = np.unique(pairs[:, 0] * size + pairs[:, 1], return_inverse=True, return_counts=True)
+    return np.column_stack([key // size, key % size]), inverse.ravel(), count
 
 
 def facet_edges(facets: IntArray) -> IntArray:

@@ -132,15 +132,15 @@ def _swept(skin: Skin, scale: float | None) -> list[Array]:
 
 def deformed_at(skin: Skin, *, scale: float | None, phase: float) -> tuple[Array, Array]:
     """Points (k, d) [m] of a moving skin as drawn at a phase [rad], and |u| (k,) relative to the largest amplitude."""
-    turned, largest = at_largest(skin.motion)
-    moved = (turned * np.exp(1j * phase)).real
+    rotated, largest = at_largest(skin.motion)
+    moved = (rotated * np.exp(1j * phase)).real
     size = np.linalg.norm(moved, axis=1) / (largest or 1.0)
     return skin.points + drawn_scale(skin, largest, scale) * moved, size
 
 
-def body_colour(place: int) -> str:
-    """The colour of body number ``place``; after the last one they begin again."""
-    return COLOURS[place % len(COLOURS)]
+def body_colour(index: int) -> str:
+    """The colour of body number ``index``; after the last one they begin again."""
+    return COLOURS[index % len(COLOURS)]
 
 
 def _camera(skin: Skin, view: tuple[float, float]) -> Camera | None:

@@ -45,7 +45,7 @@ def drop_empty(table: Table) -> Table:
         table.title,
         tuple(table.heads[k] for k in keep),
         tuple(Row(tuple(row.cells[k] for k in keep), row.kind) for row in table.rows),
-        frozenset(place for place, k in enumerate(keep) if k in table.words),
+        frozenset(index for index, k in enumerate(keep) if k in table.words),
         table.caption,
     )
 

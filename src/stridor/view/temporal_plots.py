@@ -102,14 +102,14 @@ def spectrum_plot(
     else:
         figure, axes = root_figure(ax), [ax] * len(spectra)
     top = -np.inf
-    for place, (name, spec) in enumerate(spectra.items()):
+    for index, (name, spec) in enumerate(spectra.items()):
         inside = (spec.frequency_hz > 0) & (spec.frequency_hz <= max_frequency_hz)
         level = 20 * np.log10(np.maximum(spec.amplitude[inside], 1e-300))
         top = max(top, float(level.max(initial=-np.inf)))
-        colour = COLOURS[place % len(COLOURS)]
-        axes[place].plot(spec.frequency_hz[inside] / 1e3, level, color=colour, linewidth=0.9, label=name)
+        colour = COLOURS[index % len(COLOURS)]
+        axes[index].plot(spec.frequency_hz[inside] / 1e3, level, color=colour, linewidth=0.9, label=name)
         if ax is None:
-            axes[place].set_title(name, fontsize=9, color=colour, pad=3)
+            axes[index].set_title(name, fontsize=9, color=colour, pad=3)
     for each in dict.fromkeys(axes):
         if ax is not None:
             each.set_ylabel(f"dB re 1 {unit}")

@@ -283,10 +283,10 @@ def computed_values(inputs: ReportInputs, window: Window | None) -> dict[str, tu
     if inputs.dominant_hz is not None:
         values["dominant_frequency_hz"] = (inputs.dominant_hz, "second half of the last phase")
     if window is not None:
-        there = f"in the window of the contact figure ({window.reason})"
-        values["max_normal_force"] = (window.max_normal_force, there)
-        values["max_slip_speed"] = (window.max_slip_speed, there)
-        values["stick_fraction"] = (window.stick_fraction, there)
+        origin = f"in the window of the contact figure ({window.reason})"
+        values["max_normal_force"] = (window.max_normal_force, origin)
+        values["max_slip_speed"] = (window.max_slip_speed, origin)
+        values["stick_fraction"] = (window.stick_fraction, origin)
     agreement = inputs.agreement
     if agreement is not None and agreement.comparisons:
         values["growth_rate"] = (agreement.comparisons[0].modal_eigenvalue.real, "modal")

@@ -197,8 +197,8 @@ def model_in_words(inputs: ReportInputs) -> list[str]:
         moving = [f"{v:g} {'rad/s' if d == 'rotation' else 'm/s'} ({d})" for d, v in support.velocity.items()]
         text = f"{name}: holds {_listed(list(support.fixed))} of {support.at}"
         text += f" and moves it with {_listed(moving)}" if moving else ""
-        away = [f"{v:g} {'rad' if d == 'rotation' else 'm'} ({d})" for d, v in support.displacement.items()]
-        lines.append(text + (f" and presses it away by {_listed(away)}." if away else "."))
+        displaced = [f"{v:g} {'rad' if d == 'rotation' else 'm'} ({d})" for d, v in support.displacement.items()]
+        lines.append(text + (f" and presses it away by {_listed(displaced)}." if displaced else "."))
     for name, load in case.loads.items():
         components = ", ".join(significant(f) for f in load.force)
         parts = [f"{np.linalg.norm(load.force):g} N, ({components}) N"] if any(load.force) else []

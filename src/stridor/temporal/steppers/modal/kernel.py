@@ -61,7 +61,7 @@ def _record(
         slip = gap = 0.0
         for a in range(width):
             slip += scratch.slide[c, a] * (state.rate[base + a] + two_b * scratch.moved[base + a]) / s
-            gap += scratch.shape[c, a] * scratch.place[base + a]
+            gap += scratch.shape[c, a] * scratch.displacement[base + a]
         row = record.contacts[at, c]
         row[REC_NORMAL], row[REC_TANGENTIAL], row[REC_SLIP] = state.normal[c], state.tangential[c], slip
         row[REC_GAP] = contacts.gap[c] + gap

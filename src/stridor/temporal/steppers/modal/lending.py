@@ -110,7 +110,7 @@ def lent_state(x: LoopState) -> LoopState:  # pragma: no cover - compiled
 def lent_scratch(x: Scratch) -> Scratch:  # pragma: no cover - compiled
     """The same Scratch, its arrays borrowed."""
     return Scratch(
-        borrow(x.place),
+        borrow(x.displacement),
         borrow(x.moved),
         borrow(x.shape),
         borrow(x.slide),

@@ -203,12 +203,12 @@ def _padded(sizes: list[int]) -> tuple[IntArray, IntArray]:
 
     The modes filled in have no stiffness, no drive and no rows: they stay at zero.
     """
-    places: list[int] = []
+    index: list[int] = []
     blocks = [0]
     for size in sizes:
-        places += range(blocks[-1], blocks[-1] + size)
+        index += range(blocks[-1], blocks[-1] + size)
         blocks.append(blocks[-1] + -(-size // LANES) * LANES)
-    return np.array(places, dtype=np.int64), np.array(blocks, dtype=np.int64)
+    return np.array(index, dtype=np.int64), np.array(blocks, dtype=np.int64)
 
 
 def modal_machine(system: System, scheme: Scheme, modes: UncoupledModes) -> Machine:
@@ -218,11 +218,11 @@ def modal_machine(system: System, scheme: Scheme, modes: UncoupledModes) -> Mach
     c, w2 = modes.damping, modes.stiffness
     dt, s = scheme.step, scheme.s
     effective = 1.0 + scheme.beta2 * dt * c
-    places, blocks = _padded([len(b.freedoms) for b in modes.real])
+    index, blocks = _padded([len(b.freedoms) for b in modes.real])
 
     def padded(values: Array) -> Array:
         out = np.zeros((*values.shape[:-1], int(blocks[-1])))
-        out[..., places] = values
+        out[..., index] = values
         return out
 
     arrays = ModalArrays(
@@ -233,7 +233,7 @@ def modal_machine(system: System, scheme: Scheme, modes: UncoupledModes) -> Mach
         stiffness=padded(w2),
         blocks=blocks,
     )
-    return _machine(system, scheme, table, padded(real), modal=(arrays, places))
+    return _machine(system, scheme, table, padded(real), modal=(arrays, index))
 
 
 def nodal_machine(system: System, scheme: Scheme) -> Machine:
@@ -281,7 +281,7 @@ def _machine(
         buffer=np.zeros(size),
     )
     scratch = Scratch(
-        place=np.zeros(active + 1),
+        displacement=np.zeros(active + 1),
         moved=np.zeros(active + 1),
         shape=np.zeros((m, 2 * POINTS_PER_FINITE_CONTACT)),
         slide=np.zeros((m, 2 * POINTS_PER_FINITE_CONTACT)),

@@ -67,19 +67,19 @@ def _pull(
         if left >= 3:
             r1, r2 = chosen[at + 1], chosen[at + 2]
             for i in range(lo, hi):
-                place = u[i] + d[i]
-                y0 += rows[r0, i] * place
-                y1 += rows[r1, i] * place
-                y2 += rows[r2, i] * place
+                new = u[i] + d[i]
+                y0 += rows[r0, i] * new
+                y1 += rows[r1, i] * new
+                y2 += rows[r2, i] * new
             predicted[r1] += y1
             predicted[r2] += y2
             at += 3
         elif left == 2:
             r1 = chosen[at + 1]
             for i in range(lo, hi):
-                place = u[i] + d[i]
-                y0 += rows[r0, i] * place
-                y1 += rows[r1, i] * place
+                new = u[i] + d[i]
+                y0 += rows[r0, i] * new
+                y1 += rows[r1, i] * new
             predicted[r1] += y1
             at += 2
         else:

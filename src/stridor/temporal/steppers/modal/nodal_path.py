@@ -62,11 +62,11 @@ def nodal_pass(
         d[i] = total
     _band_solve(nodal.factor, d)
     for r in range(rows.ptr.shape[0] - 1):
-        place = 0.0
+        total = 0.0
         for p in range(rows.ptr[r], rows.ptr[r + 1]):
             i = rows.col[p]
-            place += rows.val[p] * (u[i] + d[i])
-        predicted[r] = place
+            total += rows.val[p] * (u[i] + d[i])
+        predicted[r] = total
     return dissipated
 
 

@@ -73,7 +73,7 @@ class LoopState(NamedTuple):
 class Scratch(NamedTuple):
     """Work space of the loop."""
 
-    place: Array  # rows with the supports' motion added
+    displacement: Array  # rows with the supports' motion added
     moved: Array  # d/Δt of rows
     shape: Array  # (m, 10) row weights of the normal
     slide: Array  # (m, 10) row weights of the tangent
@@ -117,9 +117,9 @@ def _local_weights(
         node = segment - 1 + k
         if 0 <= node < count:
             for d in range(2):
-                nodes[k, d] = contacts.nodes[start + node, d] + scratch.place[base + 2 + 2 * k + d]
-    x = contacts.slave[c, 0] + scratch.place[base]
-    y = contacts.slave[c, 1] + scratch.place[base + 1]
+                nodes[k, d] = contacts.nodes[start + node, d] + scratch.displacement[base + 2 + 2 * k + d]
+    x = contacts.slave[c, 0] + scratch.displacement[base]
+    y = contacts.slave[c, 1] + scratch.displacement[base + 1]
     xi, on_line = _project_in(segment, count, x, y, state.xi[c], contacts, start, scratch)
     state.xi[c] = xi
     sx = sy = 0.0
@@ -219,7 +219,7 @@ def _solve_all(
                     if p != 0.0:
                         state.force[base + a] += p
                         for r in range(rows):
-                            scratch.place[r] += compliance[r, base + a] * p
+                            scratch.displacement[r] += compliance[r, base + a] * p
         if count == 1 or change <= SWEEP_TOLERANCE * max(largest, 1e-300):
             break
     for c in range(count):
@@ -269,13 +269,13 @@ def _local_problem(
 ) -> tuple[float, float, float, float, float]:  # pragma: no cover - compiled
     """Gap and slip at t_{n+1} with all present forces, and the local compliances."""
     if width == 2:
-        gap = contacts.gap[c] + scratch.place[base]
-        slip = scratch.place[base + 1] - state.value[base + 1]
+        gap = contacts.gap[c] + scratch.displacement[base]
+        slip = scratch.displacement[base + 1] - state.value[base + 1]
         return gap, slip, compliance[base, base], compliance[base, base + 1], compliance[base + 1, base + 1]
     gap = slip = 0.0
     for a in range(width):
-        gap += scratch.shape[c, a] * (_reference(c, a, contacts, state) + scratch.place[base + a])
-        slip += scratch.slide[c, a] * (scratch.place[base + a] - state.value[base + a])
+        gap += scratch.shape[c, a] * (_reference(c, a, contacts, state) + scratch.displacement[base + a])
+        slip += scratch.slide[c, a] * (scratch.displacement[base + a] - state.value[base + a])
     w_nn = w_nt = w_tt = 0.0
     for a in range(width):
         for b in range(width):
@@ -300,13 +300,13 @@ def contact_stage(
     rows = state.force.shape[0] - 1
     motions = forcing.increments.shape[1]
     for r in range(rows):
-        place = state.predicted[r]
+        total = state.predicted[r]
         for p in range(motions):
-            place += forcing.lift[r, p] * (state.motion[0, p] + forcing.increments[k, p])
-        scratch.place[r] = place
+            total += forcing.lift[r, p] * (state.motion[0, p] + forcing.increments[k, p])
+        scratch.displacement[r] = total
     off = _solve_all(contacts, scheme, compliance, state, scratch)
     for r in range(rows):
-        scratch.moved[r] = (scratch.place[r] - state.value[r]) / scheme.step
+        scratch.moved[r] = (scratch.displacement[r] - state.value[r]) / scheme.step
     return off
 
 
@@ -418,7 +418,7 @@ def advance_rows(
     """Rows and supports become those of t_{n+1}."""
     rows = state.force.shape[0] - 1
     for r in range(rows):
-        state.value[r] = scratch.place[r]
+        state.value[r] = scratch.displacement[r]
         state.rate[r] = scheme.memory * state.rate[r] + scheme.gain * scheme.step * scratch.moved[r]
     for p in range(forcing.increments.shape[1]):
         increment = forcing.increments[k, p]

@@ -29,15 +29,15 @@ def initial_state(
     if settings.initial == "steady-sliding":
         stretch = schedule.stretches[0]
         steady = steady_sliding(
-            system.in_place(stretch.places_after),
+            system.in_place(stretch.distances_after),
             load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
             motion_factors=stretch.velocities_after,
         )
         velocity = np.zeros(system.size)
         for contact in system.contacts:
             velocity += settings.perturbation * _slip_impulse(system, contact.tangent_row)
-        fields.u[:] = machine.coordinates(steady.displacement - system.motion.lift @ stretch.places_after, modes)
-        state.motion[0] = stretch.places_after
+        fields.u[:] = machine.coordinates(steady.displacement - system.motion.lift @ stretch.distances_after, modes)
+        state.motion[0] = stretch.distances_after
         fields.q[:] = machine.coordinates(velocity, modes)
         state.motion[1] = stretch.velocities_after
         state.status[:] = np.where(steady.active, 2, 0)

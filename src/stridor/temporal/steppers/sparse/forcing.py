@@ -18,8 +18,8 @@ COUNTERS = 5
 
 
 class Forcing(NamedTuple):
-    """Factors of loads (k, l) and increments of supports (k, p) by step; loads as csr rows on places with their lift
-    (l, p); mass and damping couplings (p, k) of the supports with the places near (k,), and their own matrices (p, p);
+    """Factors of loads (k, l) and increments of supports (k, p) by step; loads as csr rows on entries with their lift
+    (l, p); mass and damping couplings (p, k) of the supports with the entries near (k,), and their own matrices (p, p);
     cubic springs as csr rows with lift (s, p) and coefficient (s,)."""
 
     loads: Array
@@ -56,13 +56,13 @@ class LoopState(NamedTuple):
 
 
 class StepWork(NamedTuple):
-    """Work space of a step. Supports (p,): after, q at t_{n+1}; place, their displacement then; velocity at t_n; sent,
+    """Work space of a step. Supports (p,): after, q at t_{n+1}; displacement, theirs then; velocity at t_n; sent,
     what contacts, loads and springs send to them; coupling (2, p): inertia and damping rows on q_n. Cubic springs
     (s,): spring, their force, and spring_rate on q_n; load_rate (l,) on q_n. sums (c, 6) of contacts, status (m,) of
     nodes, watched (r, 2) rows on u_n and q_n, power (16,) of the parts of the structure."""
 
     after: Array
-    place: Array
+    displacement: Array
     velocity: Array
     sent: Array
     coupling: Array
@@ -154,7 +154,7 @@ def begin_step(k: int, a: Structure, f: Fields, g: Forcing, state: LoopState, w:
             w.load_rate[j] = dot(g.load_ptr, g.load_col, g.load_val, j, f.q)
     for p in range(w.after.shape[0]):
         w.velocity[p] = (1.0 - beta2) * state.motion[1, p] + beta2 * w.after[p]
-        w.place[p] = state.motion[0, p] + g.increments[k, p]
+        w.displacement[p] = state.motion[0, p] + g.increments[k, p]
         w.sent[p] = w.coupling[0, p] = w.coupling[1, p] = 0.0
         if w.velocity[p] != 0.0 or w.after[p] != 0.0:
             for e in range(g.near.shape[0]):

@@ -77,24 +77,24 @@ def _emit(builder: Any, d: int, ptr: Any, col: Any, val: Any, x: Any, y: Any, lo
     zero = ir.Constant(vector, [0.0] * lanes)
     sums = [cgutils.alloca_once(builder, vector) for _ in range(d)]
     with cgutils.for_range(builder, hi, start=lo, intp=INT) as row:
-        place = builder.mul(row.index, constant(lanes))
+        row_start = builder.mul(row.index, constant(lanes))
         first = builder.load(builder.gep(ptr, [row.index]))
         last = builder.load(builder.gep(ptr, [builder.add(row.index, constant(1))]))
-        own = load(x, place)
+        own = load(x, row_start)
         spread = [everywhere(builder.extract_element(own, ir.Constant(ir.IntType(32), k))) for k in range(d)]
         for k in range(d):
             builder.store(builder.fmul(block_row(first, k), own), sums[k])
         with cgutils.for_range(builder, last, start=builder.add(first, constant(1)), intp=INT) as block:
             p = block.index
-            there = builder.mul(builder.sext(builder.load(builder.gep(col, [p])), INT), constant(lanes))
+            column_start = builder.mul(builder.sext(builder.load(builder.gep(col, [p])), INT), constant(lanes))
             ahead = builder.gep(val, [builder.add(builder.mul(p, constant(d * d)), constant(AHEAD))])
             builder.call(prefetch, [builder.bitcast(ahead, BYTE), *READ_SOON])
-            other, given = load(x, there), load(y, there)
+            other, given = load(x, column_start), load(y, column_start)
             for k in range(d):
                 part = block_row(p, k)
                 builder.store(builder.call(multiply_add, [part, other, builder.load(sums[k])]), sums[k])
                 given = builder.call(multiply_add, [part, spread[k], given])
-            builder.store(given, at(y, there), align=DOUBLE_BYTES)
+            builder.store(given, at(y, column_start), align=DOUBLE_BYTES)
         total = zero
         for k in range(d):
             lane = builder.load(sums[k])
@@ -102,7 +102,7 @@ def _emit(builder: Any, d: int, ptr: Any, col: Any, val: Any, x: Any, y: Any, lo
             for other_lane in range(1, d):
                 value = builder.fadd(value, builder.extract_element(lane, ir.Constant(ir.IntType(32), other_lane)))
             total = builder.insert_element(total, value, ir.Constant(ir.IntType(32), k))
-        builder.store(builder.fadd(load(y, place), total), at(y, place), align=DOUBLE_BYTES)
+        builder.store(builder.fadd(load(y, row_start), total), at(y, row_start), align=DOUBLE_BYTES)
 
 
 rows2, rows3 = _rows(2), _rows(3)

@@ -98,9 +98,9 @@ def _part_limit(stiffness: Sparse, lagged: Sparse, beta2: float) -> tuple[float,
         square = float(x @ (stiffness @ x)) * mode.margin**2
         drag = float(x @ (lagged @ x)) * mode.margin**2 if lagged.nnz else 0.0
         found = 4.0 / beta2 / (drag / beta2 + math.sqrt((drag / beta2) ** 2 + 8.0 * square / beta2))
-        settled = found >= step * (1.0 - 1e-6)
+        converged = found >= step * (1.0 - 1e-6)
         step = min(step, found)
-        if settled or lagged.nnz == 0:
+        if converged or lagged.nnz == 0:
             break
         mode = _largest(sp.csr_array(stiffness + lagged / (beta2 * step)), mode.vector)
     return step, math.sqrt(max(square, 0.0)), mode.vector

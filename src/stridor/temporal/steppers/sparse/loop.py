@@ -1,7 +1,7 @@
 """The compiled time loop on assembled matrices.
 
 Order within step n: forces of loads and supports at t_n; what a record needs of t_n; the structure to t_{n+1} without
-contact; contact forces at t_n, which correct the few places they act on; works with velocities at t_n.
+contact; contact forces at t_n, which correct the few entries they act on; works with velocities at t_n.
 
 In terms of q alone (docs/theory-temporal.md, a and b) the scheme reads
 
@@ -37,7 +37,7 @@ from .node_stage import SWEEP_LIMIT, NodeScratch, NodeState, contact_power, solv
 from .node_table import NodeTable
 from .products import WITH_STIFFNESS, Fields, Structure, advance
 from .recording import Record, begin_record, end_record, statistics
-from .unsymmetric import MOST_PASSES, Unsymmetric, apply_force, keep_before, keep_free, powers, settled
+from .unsymmetric import MOST_PASSES, Unsymmetric, apply_force, converged, keep_before, keep_free, powers
 
 DONE, NOT_FINITE = 0, 1
 
@@ -50,10 +50,10 @@ def _correct(
     beta2, forth = a.numbers[1], a.numbers[2]
     inner = 1.0 if a.flags[2] == WITH_STIFFNESS else 0.0
     extra = 0.0
-    for c in range(table.place.shape[0]):
+    for c in range(table.indices.shape[0]):
         if work.correction[c] == 0.0:
             continue
-        i = table.place[c]
+        i = table.indices[c]
         if a.flags[2]:
             moved = beta2 * work.correction[c] / forth
             v = (1.0 - beta2) * nodes.q[c] + beta2 * f.q[i]
@@ -85,10 +85,10 @@ def _solve_contacts(
     w: StepWork,
 ) -> int:  # pragma: no cover - compiled
     """Forces at t_n from the motion to t_{n+1} without them; how many nodes took part."""
-    for c in range(table.place.shape[0]):
-        work.u[c], work.q[c] = f.u[table.place[c]], f.q[table.place[c]]
+    for c in range(table.indices.shape[0]):
+        work.u[c], work.q[c] = f.u[table.indices[c]], f.q[table.indices[c]]
     count, sweeps = solve_nodes(
-        a.numbers[0], a.numbers[2:4], w.place, increments, table, nodes, work, w.status
+        a.numbers[0], a.numbers[2:4], w.displacement, increments, table, nodes, work, w.status
     )
     state.counters[MOST_SWEEPS] = max(state.counters[MOST_SWEEPS], min(sweeps, SWEEP_LIMIT))
     state.counters[UNCONVERGED] += sweeps > SWEEP_LIMIT
@@ -131,13 +131,13 @@ def _unsymmetric_step(
         if table.gap.shape[0]:
             count = _solve_contacts(increments, a, f, table, nodes, work, state, w)
             if count:
-                for c in range(table.place.shape[0]):
-                    f.u[table.place[c]], f.q[table.place[c]] = work.u[c], work.q[c]
+                for c in range(table.indices.shape[0]):
+                    f.u[table.indices[c]], f.q[table.indices[c]] = work.u[c], work.q[c]
         passes += 1
         if passes == MOST_PASSES:
             state.counters[UNCONVERGED] += 1
             break
-        if settled(a, f, x, f.y):
+        if converged(a, f, x, f.y):
             break
     normal = friction = 0.0
     if table.gap.shape[0]:
@@ -177,12 +177,12 @@ def run_steps(
         state.works[FRICTION] -= friction * step
         state.works[NORMAL] -= normal * step
         works_of_step(k, a, f, g, state, w)
-        for c in range(table.place.shape[0]):
+        for c in range(table.indices.shape[0]):
             nodes.q[c] = work.q[c]
         for i in range(table.gap.shape[0]):
             nodes.status[i] = w.status[i]
             nodes.offset[i] *= state.reference[1]
         for p in range(w.after.shape[0]):
-            state.motion[0, p], state.motion[1, p] = w.place[p], w.after[p]
+            state.motion[0, p], state.motion[1, p] = w.displacement[p], w.after[p]
         state.counters[STEPS_DONE] += 1
     return steps, DONE

@@ -54,13 +54,13 @@ class Machine:
 
     @property
     def gain(self) -> Array:
-        """Displacement of each place over one step by a unit force [m/N]."""
+        """Displacement of each entry over one step by a unit force [m/N]."""
         return self.structure.numbers[2] * self.structure.kick
 
     @property
     def displacement(self) -> Array:
         """u (n,) [m] of the freedoms."""
-        return self.fields.u[self.layout.place]
+        return self.fields.u[self.layout.index]
 
     @property
     def threaded(self) -> bool:
@@ -76,13 +76,13 @@ class Machine:
         self.nodes = nodes
         self.table = node_table(nodes, self.layout, self.gain, self.system.motion.full)
         self.scratch = _scratch(self.table)
-        self.contacts = self.contacts._replace(q=self.fields.q[self.table.place])
+        self.contacts = self.contacts._replace(q=self.fields.q[self.table.indices])
 
     def show(self) -> None:
         """Bring what the stiffness sees up to u and q."""
         if self.structure.flags[0]:
             self.fields.shown[:] = self.fields.u + self.structure.factor * self.fields.q
-        self.contacts.q[:] = self.fields.q[self.table.place]
+        self.contacts.q[:] = self.fields.q[self.table.indices]
 
     def mark_start(self) -> None:
         """Take the energies stored at the start as those that works are counted from."""
@@ -137,7 +137,7 @@ def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Ma
         force=np.zeros((nodes.count, nodes.directions + 1)),
         status=np.zeros(nodes.count, dtype=np.int64),
         offset=np.zeros(nodes.count),
-        q=np.zeros(len(table.place)),
+        q=np.zeros(len(table.indices)),
     )
     forcing = _forcing(system, layout)
     return Machine(
@@ -211,7 +211,7 @@ def _forcing(system: System, layout: Layout) -> Forcing:
         load_col=load_col,
         load_val=load_val,
         load_lift=vectors @ motion.lift,
-        near=layout.place[near],
+        near=layout.index[near],
         mass=np.ascontiguousarray(motion.mass[near].T, dtype=float),
         damping=np.ascontiguousarray(damping[near].T),
         mass_own=np.ascontiguousarray(motion.mass_own, dtype=float),
@@ -226,11 +226,11 @@ def _forcing(system: System, layout: Layout) -> Forcing:
 
 
 def _scratch(table: NodeTable) -> NodeScratch:
-    places, nodes, t = len(table.place), len(table.gap), table.along.shape[1]
+    count, nodes, t = len(table.indices), len(table.gap), table.along.shape[1]
     return NodeScratch(
-        u=np.zeros(places),
-        q=np.zeros(places),
-        correction=np.zeros(places),
+        u=np.zeros(count),
+        q=np.zeros(count),
+        correction=np.zeros(count),
         gap=np.zeros(nodes),
         earlier=np.zeros(nodes),
         slip=np.zeros((nodes, t)),
@@ -245,7 +245,7 @@ def _step_work(forcing: Forcing, table: NodeTable, state: LoopState, record: Rec
     p, springs = forcing.increments.shape[1], len(forcing.cubic)
     return StepWork(
         after=np.zeros(p),
-        place=np.zeros(p),
+        displacement=np.zeros(p),
         velocity=np.zeros(p),
         sent=np.zeros(p),
         coupling=np.zeros((2, p)),

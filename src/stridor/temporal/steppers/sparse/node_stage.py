@@ -1,7 +1,7 @@
 """Contact forces of one step over many nodes, compiled: Gauss–Seidel on forward-increment multipliers.
 
 With the free motion at hand, only nodes that would close, or that carried force in the step before, take part. Each
-is solved exactly with the latest forces of the others; what forces change is kept as a correction of the places that
+is solved exactly with the latest forces of the others; what forces change is kept as a correction of the entries that
 contacts touch, so that G A Gᵀ is never formed. When the sweeps have settled, the nodes left out are looked at again,
 and those that the forces have closed join in.
 
@@ -33,7 +33,7 @@ NEWTON_STEPS = 60  # on the force of a layer that hardens
 
 class NodeState(NamedTuple):
     """What contacts carry from step to step: force (m, d) at the step before [N], status (m,), offset (m,) [m] of the
-    gap after a renewal of the rows, and q (l,) [m/s] of the places they touch, at t_n."""
+    gap after a renewal of the rows, and q (l,) [m/s] of the entries they touch, at t_n."""
 
     force: Array
     status: IntArray
@@ -90,7 +90,7 @@ def _take_in(
 @njit(cache=True)
 def _solve_node(
     i: int,
-    turned: float,
+    sign: float,
     gap: float,
     s1: float,
     s2: float,
@@ -101,13 +101,13 @@ def _solve_node(
     state: NodeState,
 ) -> int:  # pragma: no cover - compiled
     """Forces (d,) of node i into new from its gap and slip free of them; layer: compliance [m/N] beside its own part of
-    G A Gᵀ. turned: −1 where gap and normal force are those of the mirror image, else 1. Its status."""
+    G A Gᵀ. sign: −1 where gap and normal force are those of the mirror image, else 1. Its status."""
     block, law, stuck = table.block[i], table.friction[table.owner[i]], state.status[i] == _STICK
     w_nn = block[0, 0] + layer
     if table.row.shape[1] == 2:
-        new[0], new[1], status = _solve_contact(gap, s1, w_nn, turned * block[0, 1], block[1, 1], law, stuck, step)
+        new[0], new[1], status = _solve_contact(gap, s1, w_nn, sign * block[0, 1], block[1, 1], law, stuck, step)
     else:
-        w = (w_nn, turned * block[0, 1], turned * block[0, 2], block[1, 1], block[1, 2], block[2, 2])
+        w = (w_nn, sign * block[0, 1], sign * block[0, 2], block[1, 1], block[1, 2], block[2, 2])
         new[0], new[1], new[2], status = solve_disc(gap, s1, s2, w, law, stuck, step)
     if table.kept[i] and status == _OPEN:
         # Where friction would jam it, it closes without.
@@ -137,12 +137,12 @@ def _relax(
         if d == 3:
             s2 += table.row[p, 2] * moved
     # A gap kept closed that would open is the mirror image of one that would close, with the normal turned round.
-    turned = -1.0 if table.kept[i] and gap > 0.0 else 1.0
-    gap *= turned
+    sign = -1.0 if table.kept[i] and gap > 0.0 else 1.0
+    gap *= sign
     compliance, hardening = table.compliance[i], table.cubic[i]
     if hardening == 0.0:
-        status = _solve_node(i, turned, gap, s1, s2, 2.0 * compliance, step, new, table, state)
-        new[0] *= turned
+        status = _solve_node(i, sign, gap, s1, s2, 2.0 * compliance, step, new, table, state)
+        new[0] *= sign
         return status
     # Newton's method on the approach δ(p), which is concave: from no force on, tangents close in from below.
     scale = math.sqrt(1.0 / (3.0 * compliance * hardening))
@@ -151,11 +151,11 @@ def _relax(
         approach = 2.0 * scale * math.sinh(math.asinh(1.5 * before * compliance / scale) / 3.0)
         tangent = 1.0 / (1.0 / compliance + 3.0 * hardening * approach * approach)
         met = gap + 2.0 * (approach - tangent * before)
-        status = _solve_node(i, turned, met, s1, s2, 2.0 * tangent, step, new, table, state)
+        status = _solve_node(i, sign, met, s1, s2, 2.0 * tangent, step, new, table, state)
         if abs(new[0] - before) <= 1e-14 * new[0]:
             break
         before = new[0]
-    new[0] *= turned
+    new[0] *= sign
     return status
 
 

@@ -14,16 +14,16 @@ from .storage import Layout
 
 
 class NodeTable(NamedTuple):
-    """m nodes, d directions (normal, then tangents), l places that any of them touches, c contacts, p motions.
+    """m nodes, d directions (normal, then tangents), l entries that any of them touches, c contacts, p motions.
 
-    place (l,) among all places, gain (l,) [m/N] = displacement over the step by a unit force. Node i has entries
-    ptr[i] … ptr[i+1]: col into place and row (entries, d). lift (m, d, p), gap (m,) [m], compliance (m,) [m/N], cubic
+    indices (l,) among all entries, gain (l,) [m/N] = displacement over the step by a unit force. Node i has entries
+    ptr[i] … ptr[i+1]: col into indices and row (entries, d). lift (m, d, p), gap (m,) [m], compliance (m,) [m/N], cubic
     (m,) [N/m³], block (m, d, d) [m/N] its own part of G A Gᵀ. owner (m,), friction (c, k) numbers of the laws, along
     (m, d−1) the direction in which a contact's tangential motion is told, weight (m,) for means without force; kept
     (m,) 1 where a node is kept closed.
     """
 
-    place: IntArray
+    indices: IntArray
     gain: Array
     ptr: IntArray
     col: IntArray
@@ -41,7 +41,7 @@ class NodeTable(NamedTuple):
 
 
 def node_table(nodes: ContactNodes, layout: Layout, gain: Array, factors: Array) -> NodeTable:
-    """Pack nodes; gain (b·w,) [m/N] is the displacement of a place over one step by a unit force on it, factors (p,)
+    """Pack nodes; gain (b·w,) [m/N] is the displacement of an entry over one step by a unit force on it, factors (p,)
     are those of the motions at full velocity."""
     m, t = nodes.count, nodes.directions
     d = t + 1
@@ -49,20 +49,20 @@ def node_table(nodes: ContactNodes, layout: Layout, gain: Array, factors: Array)
     node = np.concatenate([normal.row, tangent.row // t]).astype(np.int64)
     direction = np.concatenate([np.zeros(normal.nnz, dtype=np.int64), 1 + tangent.row % t])
     value = np.concatenate([normal.data, tangent.data])
-    place, local = np.unique(np.concatenate([normal.col, tangent.col]), return_inverse=True)
-    key, entry = np.unique(node * max(len(place), 1) + local, return_inverse=True)
+    index, local = np.unique(np.concatenate([normal.col, tangent.col]), return_inverse=True)
+    key, entry = np.unique(node * max(len(index), 1) + local, return_inverse=True)
     row = np.zeros((len(key), d))
     np.add.at(row, (entry, direction), value)
-    owner, col = key // max(len(place), 1), key % max(len(place), 1)
+    owner, col = key // max(len(index), 1), key % max(len(index), 1)
     block = np.zeros((m, d, d))
-    own_gain = gain[place]
+    own_gain = gain[index]
     np.add.at(block, owner, own_gain[col][:, None, None] * row[:, :, None] * row[:, None, :])
     p = nodes.normal_lift.shape[1]
     lift = np.zeros((m, d, p))
     lift[:, 0] = nodes.normal_lift
     lift[:, 1:] = nodes.tangent_lift.reshape(m, t, p)
     return NodeTable(
-        place=place.astype(np.int64),
+        indices=index.astype(np.int64),
         gain=own_gain,
         ptr=np.searchsorted(owner, np.arange(m + 1)).astype(np.int64),
         col=col.astype(np.int64),

@@ -28,7 +28,7 @@ get_num_threads()
 
 
 class Fields(NamedTuple):
-    """Vectors on places: u, q; shown = u + b∘q, which the stiffness sees (u itself where b = 0); push f: loads and
+    """Vectors on entries: u, q; shown = u + b∘q, which the stiffness sees (u itself where b = 0); push f: loads and
     supports; y (2, size): sums under way, zero between steps."""
 
     u: Array
@@ -39,7 +39,7 @@ class Fields(NamedTuple):
 
 
 class Structure(NamedTuple):
-    """The scheme on places: K, what else of C is not proportional (empty: none), keep = 1 − Δt C_d/(M + β2ΔtC_d) of q,
+    """The scheme on entries: K, what else of C is not proportional (empty: none), keep = 1 − Δt C_d/(M + β2ΔtC_d) of q,
     kick = Δt/(M + β2ΔtC_d), factor b, mass, damping C_d; parts for the threads; flags (4,): b used, second product
     used, works wanted (0, DASHPOTS, WITH_STIFFNESS), two threads; numbers (4,): Δt, β2, Δt(1/2 + β2), Δt(β2 − 1/2)."""
 

@@ -114,10 +114,10 @@ def statistics(
 @njit(cache=True)
 def _record_contacts(
     beta2: float, velocity: Array, table: NodeTable, nodes: NodeState, work: NodeScratch, status: IntArray, sums: Array,
-    place: int, record: Record, node_place: int,
+    row: int, record: Record, node_row: int,
 ) -> None:  # pragma: no cover - compiled
-    """Contacts of one record: sums, slip speeds weighted by force, least gaps; all nodes where node_place ≥ 0."""
-    out = record.contacts[place]
+    """Contacts of one record: sums, slip speeds weighted by force, least gaps; all nodes where node_row ≥ 0."""
+    out = record.contacts[row]
     t = table.along.shape[1]
     for c in range(sums.shape[0]):
         sums[c, 3] = sums[c, 4] = 0.0
@@ -128,9 +128,9 @@ def _record_contacts(
         c = table.owner[i]
         gap = work.gap[i]
         slip = 0.0
-        if node_place >= 0:
-            record.nodes[node_place, i, 0] = nodes.force[i, 0]
-            record.node_status[node_place, i] = status[i]
+        if node_row >= 0:
+            record.nodes[node_row, i, 0] = nodes.force[i, 0]
+            record.node_status[node_row, i] = status[i]
         for p in range(table.ptr[i], table.ptr[i + 1]):
             gap += table.row[p, 0] * work.correction[table.col[p]]
         for j in range(t):
@@ -141,11 +141,11 @@ def _record_contacts(
             for m in range(velocity.shape[0]):
                 v += table.lift[i, 1 + j, m] * velocity[m]
             slip += v * table.along[i, j]
-            if node_place >= 0:
-                record.nodes[node_place, i, 1 + j] = nodes.force[i, 1 + j]
-                record.nodes[node_place, i, 1 + t + j] = v
-        if node_place >= 0:
-            record.nodes[node_place, i, 1 + 2 * t] = gap
+            if node_row >= 0:
+                record.nodes[node_row, i, 1 + j] = nodes.force[i, 1 + j]
+                record.nodes[node_row, i, 1 + t + j] = v
+        if node_row >= 0:
+            record.nodes[node_row, i, 1 + 2 * t] = gap
         out[c, REC_GAP] = min(out[c, REC_GAP], gap)
         out[c, REC_SLIP] += abs(nodes.force[i, 0]) * slip
         sums[c, 3] += table.weight[i]
@@ -189,9 +189,9 @@ def end_record(
             out[1] += lift * w.velocity[p]
             out[2] += lift * (w.after[p] - state.motion[1, p]) / step
     if table.gap.shape[0]:
-        node_place = -1
+        node_row = -1
         if record.nodes_every and state.counters[STEPS_DONE] // record.every % record.nodes_every == 0:
-            node_place = state.counters[NODES_KEPT]
+            node_row = state.counters[NODES_KEPT]
             state.counters[NODES_KEPT] += 1
-        _record_contacts(beta2, w.velocity, table, nodes, work, w.status, w.sums, at, record, node_place)
+        _record_contacts(beta2, w.velocity, table, nodes, work, w.status, w.sums, at, record, node_row)
     state.counters[KEPT] += 1

@@ -92,7 +92,7 @@ def steps_to_renewal(machine: Machine, distances: Array, last: int) -> int:
     """Steps until a node of a finitely sliding surface has slid far enough at its present speed; at most twice as many
     as the ``last`` time, for what starts from rest does not stay at its speed."""
     nodes = machine.nodes
-    q = machine.fields.q[machine.layout.place]
+    q = machine.fields.q[machine.layout.index]
     slip = (nodes.tangent @ q + nodes.tangent_lift @ machine.state.motion[1]).reshape(nodes.count, -1)
     speed = np.linalg.norm(slip, axis=1)
     points = len(machine.system.contacts)

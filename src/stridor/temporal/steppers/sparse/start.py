@@ -42,9 +42,9 @@ def begin(
     if disturbance is not None:
         u, v, a = u + disturbance[0], v + disturbance[1], a + disturbance[2]
     # q_0 = v_0 − β2 Δt a_0 starts the scheme without a jump (docs/theory-temporal.md).
-    place = machine.layout.place
-    machine.fields.u[place] = u
-    machine.fields.q[place] = v - machine.scheme.beta2 * machine.scheme.step * a
+    index = machine.layout.index
+    machine.fields.u[index] = u
+    machine.fields.q[index] = v - machine.scheme.beta2 * machine.scheme.step * a
     machine.show()
     machine.mark_start()
 
@@ -55,13 +55,13 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings, mu: float 
     if stretch.ramp_steps:
         raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
     steady = steady_sliding_nodes(
-        system.in_place(stretch.places_after),
+        system.in_place(stretch.distances_after),
         mu=mu,
         load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
         motion_factors=stretch.velocities_after,
     )
     # The loop counts from the structure that the distances carry along.
-    machine.state.motion[0] = steady.travel + stretch.places_after
+    machine.state.motion[0] = steady.travel + stretch.distances_after
     machine.state.motion[1] = stretch.velocities_after
     machine.contacts.force[:, 0] = np.where(steady.active, steady.normal_force, 0.0)
     machine.contacts.force[:, 1:] = steady.friction_force
@@ -70,7 +70,7 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings, mu: float 
     if settings.perturbation:
         for contact in range(len(machine.nodes.names)):
             velocity += settings.perturbation * _slip_impulse(system, machine.nodes, contact)
-    return np.asarray(steady.displacement) - system.motion.lift @ stretch.places_after, velocity
+    return np.asarray(steady.displacement) - system.motion.lift @ stretch.distances_after, velocity
 
 
 def _slip_impulse(system: System, nodes: ContactNodes, contact: int) -> Array:

@@ -158,13 +158,13 @@ class SparseStepper:
         machine, size = self.machine, self.system.size
         if self.finite:
             # Rows as they were last found: first at that displacement, then the state itself.
-            machine.fields.u[machine.layout.place] = restart.state["renewed_at"][:size]
+            machine.fields.u[machine.layout.index] = restart.state["renewed_at"][:size]
             machine.state.motion[0] = restart.state["renewed_at"][size:]
             surfaces, nodes, _ = renew(machine, machine.surfaces)
             take_over(machine, surfaces, nodes)
         for name, held in self.state().items():
             held[:] = restart.state[name]
-        machine.contacts.q[:] = machine.fields.q[machine.table.place]
+        machine.contacts.q[:] = machine.fields.q[machine.table.indices]
         machine.state.counters[STEPS_DONE + 3 :] = 0
         if changed:
             ratio = motion_ratio(self.parts, restart, self.system.motion.names)
@@ -197,10 +197,10 @@ class SparseStepper:
         if len(lost):
             at = self.done * self.scheme.step
             contact = machine.nodes.names[int(machine.nodes.owner[lost[0]])]
-            place = ", ".join(f"{v:.6g}" for v in machine.nodes.position[lost[0]])
+            coordinates = ", ".join(f"{v:.6g}" for v in machine.nodes.position[lost[0]])
             raise AnalysisError(
-                f"contact {contact}: the slave node at ({place}) left the master surface over an edge at t = {at:.6g} "
-                f"s (phase {phase}); shorten the phase, slow the support down or make the master larger"
+                f"contact {contact}: the slave node at ({coordinates}) left the master surface over an edge at "
+                f"t = {at:.6g} s (phase {phase}); shorten the phase, slow the support down or make the master larger"
             )
         take_over(machine, surfaces, nodes)
         interval = steps_to_renewal(machine, self.distances, int(self.renewal[1]))
@@ -209,7 +209,7 @@ class SparseStepper:
 
     def velocity(self) -> Array:
         """Velocity (n,) of the freedoms, β2 of a step before the present."""
-        return self.machine.fields.q[self.machine.layout.place]
+        return self.machine.fields.q[self.machine.layout.index]
 
     def node_history(self, start: int) -> NodeHistory | None:
         """Histories of the nodes, where there are any."""

@@ -6,7 +6,7 @@ step took 0.9 to 1.1 ms in 3×3 upper blocks on two threads (`lanes`), a product
 4.5 ms as upper scalar CSR: scalar rows read more indices and gather number by number.
 
 Freedoms are grouped into blocks node by node as far as the bodies tell their nodes, the rest in order of their
-numbers. A node that a support holds in part fills its block with places that have no stiffness: they stay at zero.
+numbers. A node that a support holds in part fills its block with entries that have no stiffness: they stay at zero.
 """
 
 from __future__ import annotations
@@ -46,33 +46,33 @@ def aligned_zeros(shape: tuple[int, ...]) -> Array:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the freedoms lie: block width w, number of blocks b, place (n,) of each freedom; from one block to the next
-    there are LANES[w] places."""
+    """Where the freedoms lie: block width w, number of blocks b, index (n,) of each freedom; from one block to the next
+    there are LANES[w] entries."""
 
     width: int
     blocks: int
-    place: IntArray
+    index: IntArray
 
     @property
     def stride(self) -> int:
-        """Places from one block to the next, w or what fills a vector register."""
+        """Entries from one block to the next, w or what fills a vector register."""
         return LANES[self.width]
 
     @property
     def size(self) -> int:
-        """Number of places, those without a freedom included."""
+        """Number of entries, those without a freedom included."""
         return self.stride * self.blocks
 
     def spread(self, values: Array) -> Array:
-        """Values (…, n) of freedoms on all places (…, size), zero where there is none."""
+        """Values (…, n) of freedoms on all entries (…, size), zero where there is none."""
         out = aligned_zeros((*values.shape[:-1], self.size))
-        out[..., self.place] = values
+        out[..., self.index] = values
         return out
 
     def rows(self, matrix: Sparse) -> Sparse:
-        """Rows (r, n) on freedoms as rows (r, size) csr on places."""
+        """Rows (r, n) on freedoms as rows (r, size) csr on entries."""
         coo = sp.coo_array(matrix)
-        return sp.csr_array((coo.data, (coo.row, self.place[coo.col])), shape=(matrix.shape[0], self.size))
+        return sp.csr_array((coo.data, (coo.row, self.index[coo.col])), shape=(matrix.shape[0], self.size))
 
 
 def lay_out_freedoms(system: System) -> Layout:
@@ -127,11 +127,11 @@ def _cheapest_width(pattern: Sparse) -> int:
 
 
 def upper_blocks(matrix: Sparse, layout: Layout) -> Blocks:
-    """A symmetric matrix (n, n) on the places of a layout."""
+    """A symmetric matrix (n, n) on the entries of a layout."""
     coo = sp.coo_array(matrix)
     w, b = layout.width, layout.blocks
     step = layout.stride
-    row, column = layout.place[coo.row], layout.place[coo.col]
+    row, column = layout.index[coo.row], layout.index[coo.col]
     keep = row // step <= column // step
     row, column, value = row[keep], column[keep], coo.data[keep]
     # The diagonal blocks always: their place is known without looking.

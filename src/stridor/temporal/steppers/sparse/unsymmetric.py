@@ -65,7 +65,7 @@ def _skew(matrix: Sparse) -> Sparse:
 
 
 class SparseRows(NamedTuple):
-    """Full csr rows on places."""
+    """Full csr rows on entries."""
 
     ptr: IntArray
     col: IntArray
@@ -73,34 +73,34 @@ class SparseRows(NamedTuple):
 
 
 class Unsymmetric(NamedTuple):
-    """N and G as rows, and vectors on places, all empty where nothing is unsymmetric: force h and the part of it that
+    """N and G as rows, and vectors on entries, all empty where nothing is unsymmetric: force h and the part of it that
     N makes; q_n; u and q at t_{n+1} without h and without contact forces."""
 
     circulatory: SparseRows
     gyroscopic: SparseRows
     force: Array
-    of_place: Array
+    of_displacement: Array
     q_before: Array
     u_free: Array
     q_free: Array
 
 
 def unsymmetric(parts: Halves, layout: Layout) -> Unsymmetric:
-    """Skew parts on the places of a layout."""
+    """Skew parts on the entries of a layout."""
     some = parts.circulatory.nnz or parts.gyroscopic.nnz
     size = layout.size if some else 0
-    force, of_place, q_before, u_free, q_free = (aligned_zeros((size,)) for _ in range(5))
+    force, of_displacement, q_before, u_free, q_free = (aligned_zeros((size,)) for _ in range(5))
     circulatory, gyroscopic = (
         _rows(m, layout) if some else SparseRows(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
         for m in (parts.circulatory, parts.gyroscopic)
     )
-    return Unsymmetric(circulatory, gyroscopic, force, of_place, q_before, u_free, q_free)
+    return Unsymmetric(circulatory, gyroscopic, force, of_displacement, q_before, u_free, q_free)
 
 
 def _rows(matrix: Sparse, layout: Layout) -> SparseRows:
     coo = sp.coo_array(matrix)
     shape = (layout.size, layout.size)
-    rows = sp.csr_array((coo.data, (layout.place[coo.row], layout.place[coo.col])), shape=shape)
+    rows = sp.csr_array((coo.data, (layout.index[coo.row], layout.index[coo.col])), shape=shape)
     rows.sort_indices()
     return SparseRows(rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data.astype(float))
 
@@ -119,10 +119,10 @@ def keep_before(f: Fields, x: Unsymmetric) -> None:  # pragma: no cover - compil
     """What the force needs of t_n, before the structure goes on; its first guess from q_n."""
     for i in range(x.force.shape[0]):
         x.q_before[i] = f.q[i]
-        x.of_place[i] = 0.0
-    _add(x.circulatory, f.u, x.of_place)
+        x.of_displacement[i] = 0.0
+    _add(x.circulatory, f.u, x.of_displacement)
     for i in range(x.force.shape[0]):
-        x.force[i] = x.of_place[i]
+        x.force[i] = x.of_displacement[i]
     _add(x.gyroscopic, x.q_before, x.force)
 
 
@@ -144,7 +144,7 @@ def apply_force(a: Structure, f: Fields, x: Unsymmetric) -> None:  # pragma: no 
 
 
 @njit(cache=True)
-def settled(a: Structure, f: Fields, x: Unsymmetric, work: Array) -> bool:  # pragma: no cover - compiled
+def converged(a: Structure, f: Fields, x: Unsymmetric, work: Array) -> bool:  # pragma: no cover - compiled
     """Whether q at t_{n+1} agrees with the force that made it; if not, the force that it makes. work (size,)."""
     if x.gyroscopic.col.shape[0] == 0:
         return True
@@ -152,7 +152,7 @@ def settled(a: Structure, f: Fields, x: Unsymmetric, work: Array) -> bool:  # pr
     velocity, new = work[0], work[1]
     for i in range(x.force.shape[0]):
         velocity[i] = (1.0 - beta2) * x.q_before[i] + beta2 * f.q[i]
-        new[i] = x.of_place[i]
+        new[i] = x.of_displacement[i]
     _add(x.gyroscopic, velocity, new)
     most = largest = 0.0
     for i in range(x.force.shape[0]):
@@ -177,8 +177,8 @@ def powers(a: Structure, f: Fields, x: Unsymmetric) -> tuple[float, float, float
         before = x.q_before[i]
         v = before + beta2 * (x.q_free[i] - before)
         moved = beta2 * (f.q[i] - x.q_free[i])
-        circulatory -= (v + moved) * x.of_place[i]
-        gyroscopic -= (v + moved) * (x.force[i] - x.of_place[i])
+        circulatory -= (v + moved) * x.of_displacement[i]
+        gyroscopic -= (v + moved) * (x.force[i] - x.of_displacement[i])
         if a.flags[2] and a.kick[i] > 0.0:
             # The force of the structure back from the free step that it made.
             y = f.push[i] - (x.q_free[i] - a.keep[i] * before) / a.kick[i]

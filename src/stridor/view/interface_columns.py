@@ -14,7 +14,7 @@ ALIGNED = 0.6  # mean length of unit tangents above which they count as one dire
 
 
 @dataclass(frozen=True)
-class Places:
+class Columns:
     """Contact nodes in columns along the interface: value (m,) of a node with its axis label, column (m,) it is in,
     and edges (c + 1,) of the c columns in the same unit."""
 
@@ -29,9 +29,9 @@ class Places:
         return len(self.edges) - 1
 
 
-def places_along(
+def columns_along(
     position: Array, tangents: Array | None, *, along: Array | None = None, about: Array | None = None
-) -> Places:
+) -> Columns:
     """Columns of contact nodes at position (m, d) [m] with tangents (m, d−1, d).
 
     In the plane: arc length through all nodes, growing along the tangents, a column for each node. In space: distance
@@ -98,10 +98,10 @@ def seen_from_normal(position: Array, tangents: Array | None) -> tuple[Array, Ar
     return from_middle @ first, from_middle @ second
 
 
-def _columns(value: Array, label: str, most: int) -> Places:
+def _columns(value: Array, label: str, most: int) -> Columns:
     """Columns of nodes by value: one for each where two nodes or more share most of them, else ``most`` alike."""
     if not len(value):
-        return Places(value, np.zeros(0, dtype=np.int64), np.array([0.0, 1.0]), label)
+        return Columns(value, np.zeros(0, dtype=np.int64), np.array([0.0, 1.0]), label)
     low, high = float(value.min()), float(value.max())
     width = (high - low) or 1.0
     fine = np.round((value - low) / width * 1e6)
@@ -110,10 +110,10 @@ def _columns(value: Array, label: str, most: int) -> Places:
         kinds, column = np.unique(np.minimum((value - low) / width * most, most - 1).astype(int), return_inverse=True)
     middle = np.bincount(column.ravel(), weights=value) / np.bincount(column.ravel())
     if len(middle) == 1:
-        return Places(value, column.ravel(), middle + np.array([-0.5, 0.5]), label)
+        return Columns(value, column.ravel(), middle + np.array([-0.5, 0.5]), label)
     inner = 0.5 * (middle[1:] + middle[:-1])
     ends = 2 * middle[[0, -1]] - inner[[0, -1]]
-    return Places(value, column.ravel(), np.concatenate([ends[:1], inner, ends[1:]]), label)
+    return Columns(value, column.ravel(), np.concatenate([ends[:1], inner, ends[1:]]), label)
 
 
 def _chain(position: Array) -> IntArray:
@@ -172,8 +172,8 @@ def _angle(position: Array, centre: Array, axis: Array) -> Array:
     east = np.eye(3)[np.argmin(np.abs(axis))]
     east = east - (east @ axis) * axis
     east /= np.linalg.norm(east)
-    away = position - centre
-    angle = np.degrees(np.arctan2(away @ np.cross(axis, east), away @ east))
+    offset = position - centre
+    angle = np.degrees(np.arctan2(offset @ np.cross(axis, east), offset @ east))
     ordered = np.sort(angle)
     gaps = np.diff(np.append(ordered, ordered[0] + 360.0))
     widest = int(np.argmax(gaps))
