@@ -20,7 +20,7 @@ _Way: Any = CompileResultCacheImpl
 _File: Any = IndexDataCacheFile
 
 
-class _Place:
+class _Location:
     """Where the code of one function lies, as numba asks for it."""
 
     def __init__(self, folder: Folder, function: Callable[..., Any]) -> None:
@@ -39,7 +39,7 @@ class _Implementation(_Way):
 
     def __init__(self, function: Callable[..., Any], folder: Folder, options: dict[str, Any]) -> None:
         self._lineno = function.__code__.co_firstlineno
-        self._locator = _Place(folder, function)
+        self._locator = _Location(folder, function)
         chosen = sorted((key, sorted(v) if isinstance(v, set) else v) for key, v in options.items())
         module = function.__module__.removeprefix(PACKAGE + ".")
         name = f"{module}.{function.__qualname__}".replace("<", "").replace(">", "")

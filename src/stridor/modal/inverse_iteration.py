@@ -16,7 +16,7 @@ from ..typing import ComplexArray
 from .quadratic.problem import Quadratic
 
 STEPS = 20
-SETTLED = 1e-14  # change of λ, relative, at which the iteration ends
+CONVERGED = 1e-14  # change of λ, relative, at which the iteration ends
 NULL_STEPS = 3
 HAIRS = (1e-8, 1e-6, 1e-4)  # of λ: how far beside it P is factorised
 STALLED = 1e-11  # and below which it ends as soon as changes do not become smaller
@@ -57,7 +57,7 @@ def two_sided(
             if not np.isfinite(lam):
                 return None
             size = abs(change)
-            if step > 2 and (size <= SETTLED * abs(lam) or (size < STALLED * abs(lam) and size >= last)):
+            if step > 2 and (size <= CONVERGED * abs(lam) or (size < STALLED * abs(lam) and size >= last)):
                 break
             last = min(last, size)
             x = x - factor.solve(problem.applied(lam, x))

@@ -26,7 +26,7 @@ from .quadratic.problem import Quadratic, times
 from .tolerances import CONFIRMED
 
 STEPS = 14
-SETTLED = 1e-13
+CONVERGED = 1e-13
 # |Re λ| / |λ| up to which an eigenvalue is on the axis; not all processors know more than double precision.
 ON_AXIS = 1e-12 if np.finfo(np.longdouble).eps < 1e-18 else 1e-9
 STALLED = 0.5  # of the smallest step so far: a longer one is made of rounding
@@ -200,7 +200,7 @@ def crossing(
         turn = step.imag + tangent.imag * change
         if not between[0] - width <= mu + change <= between[1] + width:
             return None
-        if off <= 0.1 * ON_AXIS and abs(change) <= SETTLED * max(abs(mu), problem.high - problem.low):
+        if off <= 0.1 * ON_AXIS and abs(change) <= CONVERGED * max(abs(mu), problem.high - problem.low):
             break
         mu, omega = min(max(mu + change, problem.low), problem.high), omega + turn
     if steps.kept is None or (steps.shortest > ON_AXIS and not steps.done):
@@ -231,7 +231,7 @@ def meeting(
         if not between[0] - width <= mu + by_mu.real <= between[1] + width:
             return None
         mu, omega = mu + float(by_mu.real), omega + float(by_lam.imag)
-        if off <= SETTLED:
+        if off <= CONVERGED:
             break
     if steps.kept is None or steps.shortest > 1e3 * ON_AXIS:
         return None
@@ -262,7 +262,7 @@ def exceptional(
         if not np.isfinite(by_lam + by_mu) or abs(mu - start) > reach or abs(lam - first) > 0.5 * abs(first):
             return None
         off = abs(by_lam) / max(abs(lam), 1e-300) + abs(by_mu) / max(abs(mu), 1e-3)
-        if off <= SETTLED or (off <= MET and off >= STALLED * last):
+        if off <= CONVERGED or (off <= MET and off >= STALLED * last):
             return complex(mu), complex(lam), complex(-2 * here.by_mu / here.by_lam_lam)
         last = off
     return None
@@ -296,7 +296,7 @@ def standstill(
             break
         if not between[0] - width <= mu + change <= between[1] + width:
             return None
-        if off <= SETTLED:
+        if off <= CONVERGED:
             break
         mu = mu + change
     if steps.kept is None or steps.shortest > 1e3 * ON_AXIS:

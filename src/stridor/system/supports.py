@@ -145,7 +145,7 @@ def tie_matrix(
     for name, tie in case.ties.items():
         bond = _bond(case, bodies, f"ties.{name}", tie)
         if bond.rotation is not None:
-            _refuse_turned_motion(bond, constraints)
+            _refuse_rotated_motion(bond, constraints)
         bond = _free_of_supports(bond, held)
         if tie.translation is not None:
             # A corner of a body that repeats in two directions follows by one of them; the other is implied.
@@ -204,7 +204,7 @@ def turn_of(rotation: Rotation, dimension: int) -> tuple[Array, Array]:
     return full[:dimension, :dimension], centre
 
 
-def _refuse_turned_motion(bond: Bond, constraints: Sequence[Constraint]) -> None:
+def _refuse_rotated_motion(bond: Bond, constraints: Sequence[Constraint]) -> None:
     moving = [c for c in constraints if c.moves or any(c.displacement)]
     moved = {c.name for c in moving if np.isin(c.freedoms, bond.slave).any()}
     if moved:

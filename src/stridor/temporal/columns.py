@@ -7,7 +7,7 @@ STATISTICS = 8
 DAMPING, FRICTION, NORMAL, EXTERNAL, SUPPORT = range(5)
 WORKS = 5
 # A contact record.
-REC_NORMAL, REC_TANGENTIAL, REC_SLIP, REC_GAP, REC_STATUS, REC_PLACE = range(6)
+REC_NORMAL, REC_TANGENTIAL, REC_SLIP, REC_GAP, REC_STATUS, REC_POSITION = range(6)
 CONTACT_RECORD = 6
 # Energies of a record [J]: kinetic and elastic at t_{n−1/2}, then the works up to there.
 ENERGY_RECORD = 7

@@ -35,7 +35,7 @@ from .modes import ModesAtFriction, family_over, modes_at_each, table_of
 from .numbers import numbered
 from .search import search
 
-SETTLED = 2e-11  # backward error at which a pair is taken as it is: eigenvalues are right to 1e-9 then
+CONVERGED = 2e-11  # backward error at which a pair is taken as it is: eigenvalues are right to 1e-9 then
 STRAYED = 1e-3  # of λ: what is further from the model's eigenvalue is another one
 BESIDE = (1e-8, 1e-7, 1e-6, 1e-5)  # of λ: how far beside it the full problem is factorised
 
@@ -116,7 +116,7 @@ def _confirmed(
     near = np.isfinite(better) & (np.abs(better - lam) <= STRAYED * np.abs(lam))
     lam[near] = better[near]
     residual = np.maximum(problem.backward_error(lam, right), problem.transposed.backward_error(lam, left))
-    for k in np.flatnonzero(~(residual <= SETTLED)):
+    for k in np.flatnonzero(~(residual <= CONVERGED)):
         solved = _solved(problem, complex(lam[k]), right[:, k], left[:, k], family.options.solver)
         if solved is None or abs(solved.lam - lam[k]) > STRAYED * abs(lam[k]):
             said = f"at {lam[k].imag / (2 * np.pi):.6g} Hz the reduced model has a mode that the full problem has not"

@@ -23,7 +23,7 @@ from .problem import ParametricProblem
 
 BLOCK = 24
 GUARD = 1.5  # real modes up to this much above the band take part
-SETTLED = 1e-2  # of λ²: real modes only start the basis
+CONVERGED = 1e-2  # of λ²: real modes only start the basis
 FAINT = 1e-2  # of a unit vector: first answers smaller than this are left out
 SHIFT = 0.3  # √s over the band
 SKETCH, NONZEROS = 300, 4  # rows of the random embedding, entries in each of its columns
@@ -144,7 +144,7 @@ def _krylov(factor: Factor, mass: Sparse, stiffness: Sparse, frequency: float, w
         values, shapes = sl.eigh((projected + projected.T) / 2)
         low = values[values < (GUARD * frequency) ** 2]
         enough = len(values) > len(low) and len(known) >= len(low)
-        if enough and np.all(np.abs(known[: len(low)] - low) <= SETTLED * (np.abs(low) + shift)):
+        if enough and np.all(np.abs(known[: len(low)] - low) <= CONVERGED * (np.abs(low) + shift)):
             return vectors @ shapes[:, : min(len(low) + 4, len(values))]
         if not block.shape[1] or vectors.shape[1] >= n:
             return vectors @ shapes[:, : min(len(low) + 4, len(values))]

@@ -22,7 +22,7 @@ DENSE = 150  # freedoms up to which determinants are taken of full matrices
 MOST = 600  # determinants at most
 BEND = 4.0  # by which the slope of log det, freed of what is known, may change the phase of one piece of contour [rad]
 AGREED = 0.4  # and by how much the change may differ from what the slopes at both ends expect
-PLACES = 9  # candidates for each side of the contour
+CANDIDATES = 9  # candidates for each side of the contour
 
 
 def unknown(problem: Quadratic, inner: Region, outer: Region, known: ComplexArray) -> int | None:
@@ -62,7 +62,7 @@ def unknown(problem: Quadratic, inner: Region, outer: Region, known: ComplexArra
 
 def between(inner: Region, outer: Region, known: ComplexArray) -> Region:
     """A rectangle between the two that keeps away from the ``known``."""
-    share = np.linspace(0.15, 0.95, PLACES)
+    share = np.linspace(0.15, 0.95, CANDIDATES)
 
     def best(name: str, parts: Array) -> float:
         candidates = getattr(inner, name) + share * (getattr(outer, name) - getattr(inner, name))

@@ -13,7 +13,7 @@ from ....kernels import njit
 from ....typing import Array
 from ...arithmetic import CAREFUL, FAST
 from ...beta2 import Scheme
-from ...columns import DAMPING, REC_GAP, REC_NORMAL, REC_PLACE, REC_SLIP, REC_STATUS, REC_TANGENTIAL
+from ...columns import DAMPING, REC_GAP, REC_NORMAL, REC_POSITION, REC_SLIP, REC_STATUS, REC_TANGENTIAL
 from .borrow import borrow
 from .layout import Fields, ModalRows, NodalRows, Record
 from .lending import (
@@ -66,7 +66,7 @@ def _record(
         row[REC_NORMAL], row[REC_TANGENTIAL], row[REC_SLIP] = state.normal[c], state.tangential[c], slip
         row[REC_GAP] = contacts.gap[c] + gap
         row[REC_STATUS] = state.status[c]
-        row[REC_PLACE] = state.segment[c] + state.xi[c]
+        row[REC_POSITION] = state.segment[c] + state.xi[c]
     motions = forcing.increments.shape[1]
     # Arrays out of their tuples before the inner loop: inside it each access would count as a new owner.
     u, q, rows = fields.u, fields.q, record.watch_rows

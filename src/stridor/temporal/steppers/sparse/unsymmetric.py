@@ -30,7 +30,7 @@ from ....typing import Array, IntArray, Sparse
 from .products import WITH_STIFFNESS, Fields, Structure
 from .storage import Layout, aligned_zeros
 
-SETTLED = 1e-14  # of the largest q: change by a further pass
+CONVERGED = 1e-14  # of the largest q: change by a further pass
 MOST_PASSES = 100
 
 
@@ -158,7 +158,7 @@ def converged(a: Structure, f: Fields, x: Unsymmetric, work: Array) -> bool:  # 
     for i in range(x.force.shape[0]):
         most = max(most, abs(a.kick[i] * (new[i] - x.force[i])))
         largest = max(largest, abs(f.q[i]))
-    done = not most > SETTLED * largest  # no number: ends the run elsewhere
+    done = not most > CONVERGED * largest  # no number: ends the run elsewhere
     for i in range(x.force.shape[0]):
         if not done:
             x.force[i] = new[i]
