@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .app.pipeline import run
     from .case import Case, load, loads
     from .io.datasets import open, save, to_dataset
+    from .io.export import export
     from .study.analyses import (
         body_modes,
         compare,
@@ -54,6 +55,7 @@ _HOMES = {
     "compare": ".study.analyses",
     "damping_map": ".study.damping_map",
     "describe": ".study.analyses",
+    "export": ".io.export",
     "friction_curve": ".study.analyses",
     "load": ".case",
     "loads": ".case",
@@ -88,6 +90,7 @@ __all__ = [
     "compare",
     "damping_map",
     "describe",
+    "export",
     "friction_curve",
     "load",
     "loads",

@@ -38,6 +38,7 @@ BEAMS = [
 ]
 VERBS = {
     "check": [],
+    "export": [],
     "steady": [],
     "modes": [],
     "shapes": [],

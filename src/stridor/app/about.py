@@ -1,4 +1,4 @@
-"""Verbs about a case itself: a new one, what it says, what its matrices are like."""
+"""Verbs about a case itself: a new one, what it says, what its matrices are like, the matrices as files."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import CaseError
-from .arguments import Call, Json, Quiet, Set, verb
+from .arguments import Call, Json, Quiet, Set, one_of, verb
 
 CaseOrMatrix = Annotated[
     Path, typer.Argument(metavar="CASE|FILE", help="Case file (TOML), or one matrix file.", show_default=False)
@@ -102,4 +102,43 @@ def matrices(
         stdout.print(line, markup=False)
 
 
-VERBS = {"new": new, "check": check, "matrices": matrices}
+@verb()
+def export(
+    call: Call,
+    format_: Annotated[
+        str, typer.Option("--format", metavar="mtx|npz|mat|op4", help="Matrix Market, NumPy, MATLAB, Nastran OUTPUT4.")
+    ] = "mtx",
+    mu: Annotated[
+        float | None,
+        typer.Option("--mu", min=0.0, help="μ of the contact and friction in K [default: in terms of their own]."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the files of an earlier export.")] = False,
+) -> None:
+    """Write mass, damping and stiffness as files, with loads, rows of contacts, a table of freedoms, and a case file on
+    these matrices."""
+    work = call.workspace()
+
+    from ..io.export import export as write
+    from ..io.matrix_files import FORMATS
+    from .output import stdout, table
+
+    call.check_friction(mu)
+    written = write(work, call.folder, format=one_of(format_, "--format", FORMATS), mu=mu, force=force)
+    call.warn(written.notes)
+    for path in written.files:
+        call.say(f"written: {path}")
+    if call.json:
+        call.document(written.to_json())
+        return
+    rows = [
+        [name, " × ".join(map(str, said["shape"])), said["file"], said["meaning"]]
+        for name, said in written.matrices.items()
+    ]
+    table("matrices", ["name", "shape", "file", "what it is"], rows)
+    if written.load_names:
+        stdout.print(f"columns of loads: {', '.join(written.load_names)}", markup=False)
+    if written.case is not None:
+        call.say(f"next: stridor {'modes' if mu is not None else 'onsets'} {written.case}")
+
+
+VERBS = {"new": new, "check": check, "matrices": matrices, "export": export}

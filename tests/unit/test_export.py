@@ -1,0 +1,219 @@
+"""Exported matrices: every format gives the model back, to the last bit, and a case on them has the same onsets."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io as sio
+import scipy.sparse as sp
+
+import stridor as st
+from matrix_cases import matrix_case
+from program import stridor
+from rubbing_block import rubbing_block
+from stridor.case import template_text
+from stridor.io import matrix_files
+from stridor.io.matrix_files import FORMATS, Format, write_matrices
+from stridor.matrices import read_matrix
+from stridor.typing import Sparse
+
+FEW = ["bodies.beam1.elements=6", "bodies.beam2.elements=18"]
+SLOWING = 'contacts.A.friction={law="weakening", coefficient=0.1, static_coefficient=0.2, decay_speed=0.05}'
+
+
+def beams(*sets: str) -> st.Case:
+    return st.loads(template_text("two-beams"), [*FEW, *sets])
+
+
+def read(folder: Path, name: str, form: Format) -> Sparse:
+    named = name if form in matrix_files.HOLDS_ALL else None
+    return read_matrix(folder / matrix_files.file_of(name, form), named).matrix
+
+
+def onsets(case: st.Case) -> np.ndarray:
+    found = st.onsets(case).onsets
+    return np.array([(o.mu, o.frequency_hz) for o in found])
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_the_bench_as_exported_matrices_has_the_same_onsets(form: Format, tmp_path: Path) -> None:
+    assert stridor("new", "two-beams", "--quiet", cwd=tmp_path).returncode == 0
+    done = stridor("export", "two-beams.toml", "--format", form, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert document["format"] == form
+    assert document["mu"] is None
+    assert document["loads"] == ["press"]
+    own = onsets(st.load(tmp_path / "two-beams.toml"))
+    assert len(own) == 4
+    assert onsets(st.load(tmp_path / document["case"])) == pytest.approx(own, rel=1e-10)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_matrices_at_one_friction_come_back_to_the_last_bit(form: Format, tmp_path: Path) -> None:
+    case = beams()
+    written = st.export(case, tmp_path, format=form, mu=0.3)
+    for name, matrix in zip("MCK", st.pencil(case, 0.3).matrices(), strict=True):
+        assert np.array_equal(read(tmp_path, name, form).toarray(), matrix.toarray()), name
+    assert written.case is not None
+    own, imported = (st.modes(c, mu).frequency_hz[0] for c, mu in ((case, 0.3), (st.load(written.case), None)))
+    assert np.sort(imported)[:10] == pytest.approx(np.sort(own)[:10], rel=1e-9)
+
+
+def test_rigid_contact_brings_its_force_as_an_unknown(tmp_path: Path) -> None:
+    case = beams('contacts.A.stiffness="rigid"')
+    written = st.export(case, tmp_path)
+    assert written.case is not None
+    last = rows(tmp_path / "freedoms.csv")[-1]
+    assert (last["body"], last["direction"], last["number"]) == ("A", "normal force", str(written.freedoms))
+    assert rows(tmp_path / "contacts.csv")[0]["stiffness_n_m"] == "rigid"
+    assert onsets(st.load(written.case)) == pytest.approx(onsets(case), rel=1e-10)
+
+
+def test_contact_over_a_surface_and_its_tables(tmp_path: Path) -> None:
+    case = st.loads(rubbing_block("max_frequency_hz = 60e3")).with_({"loads": None})  # so that all nodes touch
+    system = st.build_system(case)
+    written = st.export(case, tmp_path, format="npz")
+    assert written.case is not None
+    own = onsets(case)
+    assert len(own)
+    assert onsets(st.load(written.case)) == pytest.approx(own, rel=1e-10)
+    table = rows(tmp_path / "freedoms.csv")
+    assert [f"{r['body']} node {r['node']} {r['direction']}" for r in table] == list(system.dof_names)
+    block = next(s for s in system.solids if s.name == "block")
+    for row in table:
+        if row["body"] == "block":
+            assert (float(row["x_m"]), float(row["y_m"])) == tuple(block.points[int(row["node"])])
+    # What the contact adds is what its rows say.
+    normal, tangent = (sp.load_npz(tmp_path / f"{name}.npz") for name in ("normal", "tangent"))
+    springs = sp.diags_array([float(r["stiffness_n_m"]) for r in rows(tmp_path / "contacts.csv")])
+    closed, rubbing = (sp.load_npz(tmp_path / f"{name}.npz") for name in ("Kc", "Kf"))
+    assert abs(normal.T @ springs @ normal - closed).max() <= 1e-12 * abs(closed).max()
+    assert abs(tangent.T @ springs @ normal + rubbing).max() <= 1e-12 * abs(rubbing).max()
+
+
+def test_rows_of_contacts_make_a_system(tmp_path: Path) -> None:
+    """Friction opposes slip along +tangent, as `System.from_matrices` takes it."""
+    case = beams()
+    st.export(case, tmp_path)
+    mass, damping, stiffness = (read(tmp_path, name, "mtx") for name in "MCK")
+    contact = rows(tmp_path / "contacts.csv")[0]
+    normal, tangent = (_row(tmp_path / f"{name}.mtx") for name in ("normal", "tangent"))
+    friction = {"law": "coulomb", "coefficient": float(contact["friction_coefficient"])}
+    table = {"normal": normal, "tangent": tangent, "stiffness": float(contact["stiffness_n_m"]), "friction": friction}
+    system = st.System.from_matrices(mass, damping, stiffness, contacts={"A": table})
+    found = st.onsets(st.Workspace(system, modal={"max_frequency_hz": 40e3})).onsets
+    assert [o.mu for o in found] == pytest.approx(onsets(case)[:, 0], rel=1e-9)
+
+
+def _row(path: Path) -> np.ndarray:
+    return sio.mmread(path).toarray()[0]
+
+
+def test_what_is_no_straight_line_over_friction_is_exported_at_one_friction_only(tmp_path: Path) -> None:
+    case = beams(SLOWING)
+    over, at = st.export(case, tmp_path / "over"), st.export(case, tmp_path / "at", mu=0.2)
+    assert over.case is None
+    assert "friction that changes with speed" in over.notes[0]
+    assert set(over.matrices) == {"M", "C", "K", "normal", "tangent", "loads"}
+    assert at.case is not None
+    own = np.sort(st.modes(case, 0.2).growth_rate[0])[-3:]
+    found = np.sort(st.modes(st.load(at.case)).growth_rate[0])[-3:]
+    assert found == pytest.approx(own, rel=1e-8)
+
+
+def test_a_note_where_other_nodes_touch_at_another_friction(tmp_path: Path) -> None:
+    case = st.loads(rubbing_block("max_frequency_hz = 30e3"))
+    assert any(o.kind == "contact" for o in st.onsets(case).onsets)
+    written = st.export(case, tmp_path)
+    assert len(written.notes) == 1
+    assert written.notes[0].startswith("other contact nodes touch at mu = ")
+    assert written.load_names == ("press",)
+    load = sio.mmread(tmp_path / "loads.mtx").toarray()[:, 0]
+    assert np.array_equal(load, st.build_system(case).loads["press"])
+
+
+def test_a_second_export_replaces_the_first_only_if_asked(tmp_path: Path) -> None:
+    assert stridor("new", "two-beams", "--quiet", cwd=tmp_path).returncode == 0
+    words = ("export", "two-beams.toml", "--quiet", *(w for s in FEW for w in ("--set", s)))
+    assert stridor(*words, cwd=tmp_path).returncode == 0
+    folder = tmp_path / "two-beams.out"
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert "Kf.mtx" in before
+    again = stridor(*words, "--mu", "0.2", cwd=tmp_path)
+    assert again.returncode == 2
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    assert stridor(*words, "--mu", "0.2", "--force", cwd=tmp_path).returncode == 0
+    after = {path.name for path in folder.iterdir()}
+    assert before.keys() - after == {"Kc.mtx", "Kf.mtx"}
+    assert "mu = 0.2" in (folder / "matrices.toml").read_text(encoding="utf-8")
+
+
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_matrices(tmp_path, {"M": sp.eye_array(3)}, "mtx")
+    before = (tmp_path / "M.mtx").read_bytes()
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(matrix_files.sio, "mmwrite", full)
+    with pytest.raises(st.AnalysisError, match=r"cannot write .*M\.mtx: No space left on device"):
+        write_matrices(tmp_path, {"M": 2 * sp.eye_array(3)}, "mtx")
+    assert [path.name for path in tmp_path.iterdir()] == ["M.mtx"]
+    assert (tmp_path / "M.mtx").read_bytes() == before
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_matrices_of_any_kind_come_back(form: Format, tmp_path: Path) -> None:
+    size = 70_000  # more rows than a short word counts
+    random = np.random.default_rng(5)
+    at = random.integers(0, size, (2, 500))
+    given = {
+        "A": sp.csr_array(sp.coo_array((random.standard_normal(500) * 10.0 ** random.integers(-300, 300, 500), at),
+                                       shape=(size, size))),
+        "B": sp.csr_array((3, 3)),
+        "C": sp.csr_array([[1.0 / 3.0, 2.0, 0.0], [2.0, 0.0, -5e-300], [0.0, -5e-300, 1e300]]),
+        "D": sp.csr_array([[0.0, 1.0, 2.0], [3.0, 0.0, 4.0], [5.0, 6.0, 7.0]]),
+        "E": sp.csr_array([[1.0, 2.0]]),
+    }  # fmt: skip
+    write_matrices(tmp_path, given, form)
+    for name in "ABCD":
+        assert not (read(tmp_path, name, form) - given[name]).count_nonzero(), name
+
+
+def test_an_imported_body_keeps_its_numbers(tmp_path: Path) -> None:
+    named = [(7, 1), (7, 6), (1201, 1), (1201, 2), (-3, 0)]
+    (tmp_path / "dof.txt").write_text("".join(f"{n} {d}\n" for n, d in named), encoding="utf-8")
+    matrix_case(tmp_path, [(np.eye(5), "mass", ""), (1e6 * np.diag(np.arange(1.0, 6.0)), "stiffness", "")], 1e4)
+    terms = [{"file": "A0.npz", "role": "mass"}, {"file": "A1.npz", "role": "stiffness"}]
+    body = {"type": "matrices", "dimension": 2, "terms": terms, "labels": "dof.txt"}
+    with contextlib.chdir(tmp_path):
+        case = st.Case(bodies={"brake": body}, modal={"max_frequency_hz": 1e4})
+    st.export(case, tmp_path / "out")
+    lines = (tmp_path / "out" / "labels.txt").read_text(encoding="utf-8").splitlines()
+    labels = [tuple(map(int, line.split())) for line in lines]
+    assert sorted(labels) == sorted([*named[:4], (-1, 0)])
+    stiffness = read(tmp_path / "out", "K", "mtx").diagonal()
+    assert stiffness[labels.index((1201, 2))] == 4e6
+    assert stiffness[labels.index((7, 6))] == 2e6
+
+
+def test_a_system_alone_can_be_exported(tmp_path: Path) -> None:
+    friction = {"law": "coulomb", "coefficient": 0.3}
+    table = {"normal": [0, 1], "tangent": [1, 0], "stiffness": 10.0, "friction": friction}
+    block = st.System.from_matrices(np.eye(2), None, [[20.0, 4.0], [4.0, 15.0]], contacts={"belt": table})
+    work = st.Workspace(block, modal={"max_frequency_hz": 10.0})
+    written = st.export(work, tmp_path)
+    assert written.case is not None
+    assert [r["direction"] for r in rows(tmp_path / "freedoms.csv")] == ["freedom 0", "freedom 1"]
+    assert st.onsets(st.load(written.case)).onsets[0].mu == pytest.approx(0.55625, rel=1e-12)
