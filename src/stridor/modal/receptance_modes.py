@@ -57,7 +57,8 @@ def modes_by_receptance(
     if not damped:
         system = system.undamped()
     spectrum, coupling, open_contacts = prepare(system, mu=float(values.max()) if len(values) == 1 else None)
-    if spectrum.modes.indefinite or (spectrum.unseen and coupling.contacts):
+    apart = not coupling.contacts and not spectrum.modes.proportional
+    if spectrum.modes.indefinite or apart or (spectrum.unseen and coupling.contacts):
         raise Unfit(unfit_words(spectrum), max_frequency_hz or _limit(spectrum, count, None) / (2 * np.pi))
     limit = _limit(spectrum, count, max_frequency_hz)
     if not limit > 0.0:
@@ -235,4 +236,6 @@ def unfit_words(spectrum: ReceptanceProblem) -> str:
     """Why roots of the receptance are not sought."""
     if spectrum.modes.indefinite:
         return "a motion of the structure has a stiffness that is not positive"
+    if not spectrum.coupling.contacts:
+        return "nothing is in contact, and damping that is not proportional leaves no real modes"
     return "modes of the structure that no contact sees have no stiffness to tell them by"

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..case import Case
 from ..case.bodies import BeamBody, SolidBody
+from ..case.matrix_checks import MU
 from ..errors import CaseError
 from ..modal.krylov.steady import refuse_stick
 from .asked import require_frequency
@@ -42,11 +43,12 @@ def rank_countermeasures(
     """Rank changes of a case by the growth rate that they take away per per cent of change.
 
     target: the number of an unstable branch, or "sum" of all unstable ones. numbers: paths to try (default: moduli and
-    densities of all materials, the damping that bodies have, contact stiffnesses). added_mass: a point mass at the best
-    node of each body. chamfers: how many rows of contact nodes are taken away at most, at the leading edge (which
-    meets the other body's material first) and at the trailing one. percent: change that consequences are predicted
-    for; margin: damping ratio. The best ``verify`` are solved again with that change made. watch: "unstable" does not
-    look after the stable modes, which saves a factorisation for each.
+    densities of all materials, the damping that bodies have, contact stiffnesses, of imported matrices their factors
+    and the parameters in them). added_mass: a point mass at the best node of each body. chamfers: how many rows of
+    contact nodes are taken away at most, at the leading edge (which meets the other body's material first) and at the
+    trailing one. percent: change that consequences are predicted for; margin: damping ratio. The best ``verify`` are
+    solved again with that change made. watch: "unstable" does not look after the stable modes, which saves a
+    factorisation for each.
 
     Predictions are of first order; a pair of modes near its exceptional point is predicted by its mean and squared
     half difference, which go through it smoothly. Touching nodes are held in predictions, solved for anew in
@@ -58,7 +60,7 @@ def rank_countermeasures(
     require_frequency(max_frequency_hz)
     work = Workspace.of(problem)
     case = work.case("the ranking of countermeasures")
-    refuse_stick(work.system(), "the ranking of countermeasures")
+    refuse_stick(work.system(mu), "the ranking of countermeasures")
     linear = Linearised.of(work, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
     unstable = linear.columns("unstable")
     if not unstable:
@@ -76,6 +78,7 @@ def rank_countermeasures(
     if chamfers > 0:
         found += ranking.chamfers(chamfers)
     helping = sorted((m for m in found if m.removed_per_percent > 0), key=lambda m: -m.removed_per_percent)
+    told = [] if helping else [_none_helps(case, len(found))]
     checked = [verified(ranking, m, count, max_frequency_hz) for m in helping[:verify]]
     return Countermeasures(
         linear.mu,
@@ -84,7 +87,7 @@ def rank_countermeasures(
         ranking.eigenvalues,
         tuple(checked + helping[verify:]),
         margin,
-        tuple(linear.warnings),
+        (*linear.warnings, *told),
         provenance(work, "countermeasures", time.perf_counter() - started, mu=linear.mu),
     )
 
@@ -95,4 +98,17 @@ def _default_numbers(case: Case) -> list[str]:
     for name, body in case.bodies.items():
         if isinstance(body, BeamBody | SolidBody):
             paths += [f"bodies.{name}.damping.{n}" for n in ("mass", "stiffness") if getattr(body.damping, n) > 0]
+    for name, body in case.imported.items():
+        factors = enumerate(term.factor for term in body.terms)
+        paths += [f"bodies.{name}.terms.{k}.factor" for k, factor in factors if not isinstance(factor, str)]
+    # Friction is what makes it squeal, and no change of the structure.
+    paths += [f"parameters.{name}.value" for name in case.parameters if name in case.factor_names and name != MU]
     return paths + [f"contacts.{name}.stiffness" for name, c in case.contacts.items() if c.stiffness != "rigid"]
+
+
+def _none_helps(case: Case, tried: int) -> str:
+    """What is said where something grows and no change takes any of it away."""
+    if tried:
+        return f"none of {tried} changes tried takes growth away"
+    why = ": factors of imported matrices that are numbers, or parameters in them, would be" if case.imported else ""
+    return f"there is nothing to change{why}"

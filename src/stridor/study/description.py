@@ -82,8 +82,11 @@ def describe(problem: Case | Workspace) -> Description:
         if contact.interference
     ]
     lines += _contact_lines(case, system, data)
-    if why := _untimed(case, system):
-        what = system.not_symmetric_definite
+    if case.imported and not case.contacts:
+        lines.append(_purpose(case))
+    beyond = _with_friction(work, system)
+    if why := _untimed(case, beyond):
+        what = beyond.not_symmetric_definite
         lines.append(f"{what}: `stridor modes` and `stridor onsets` take that, time loops do not: {why}")
     else:
         lines += _time_lines(case, system, data)
@@ -107,6 +110,25 @@ def describe(problem: Case | Workspace) -> Description:
             "contacts as closed"
         )
     return Description(tuple(lines), data, tuple(warnings))
+
+
+def _purpose(case: Case) -> str:
+    """What can be asked of matrices that stridor makes no contact for."""
+    told = "`stridor modes`, `stridor sensitivities` and `stridor countermeasures`"
+    if MU in case.factor_names:
+        low, high = case.modal.friction_range
+        onsets = f"`stridor onsets` (mu from {low:g} to {high:g}, modal.friction_range)"
+        return f"mu is in factors of matrices: for {onsets}, {told} (--mu); comparisons take constant matrices only"
+    along = [name for name in case.parameters if name in case.factor_names]
+    onsets = f", and `stridor onsets --along {along[0]}`" if along else ""
+    return f"no contact, and mu in no factor: for {told}{onsets}; there is no critical mu to solve for"
+
+
+def _with_friction(work: Workspace, system: System) -> System:
+    """The system with friction in its matrices where factors depend on μ and nothing gives one: at 0 it is in none."""
+    case = work.case("describe")
+    unsaid = work.varies and MU not in case.parameters and not case.contacts
+    return work.system(case.modal.friction_range[1]) if unsaid else system
 
 
 def _untimed(case: Case, system: System) -> str:

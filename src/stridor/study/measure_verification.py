@@ -49,7 +49,7 @@ def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequenc
 
 def _solved(system: System, linear: Linearised, band: float) -> ComplexModes:
     """The modes of the band of a changed system, and what was checked of them."""
-    damped, options = linear.modes.damped, linear.options
+    damped, options = linear.damped, linear.options
     if options.source is None and system.symmetric_definite:
         # Sparse matrices for small systems too: a mass at one node leaves their complete basis no proportional damping.
         with suppress(Unfit):
@@ -62,7 +62,7 @@ def _changed(linear: Linearised, measure: Measure) -> System:
     if measure.kind == "number":
         value = number_at(linear.case, measure.name) if measure.name != "mu" else linear.mu
         factor = 1 + 0.01 * measure.direction * measure.percent
-        return linear.built(linear.case.with_({measure.name: factor * value}))
+        return linear.varied(measure.name, factor * value)
     if measure.kind == "added mass":
         return _heavier(linear.system, measure)
     return _chamfered(linear, measure)

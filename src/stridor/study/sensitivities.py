@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, cast
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..case import Case
 from ..case.overrides import split_path
@@ -16,12 +17,10 @@ from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.derivatives import Mode, PencilChange, by_compliance, by_friction, hold, pencil_of, rate_of, solve_mode
 from ..modal.growing import doubt
-from ..modal.options import Options
-from ..modal.over_friction import modes_of_band
 from ..modal.pencil import Pencil
-from ..system import System, build_system
+from ..system import System
 from ..typing import Array, ComplexArray, IntArray
-from .asked import require_frequency
+from .analyses import modes as modes_at
 from .provenance import provenance
 from .workspace import Workspace
 
@@ -31,6 +30,7 @@ ILL = 30.0  # condition number that is worth a sentence by itself
 REPEATED = 1e-9  # of |λ|: eigenvalues nearer to each other are one
 
 Choice = Literal["unstable", "all"] | Sequence[int]
+_FRICTION = ("mu", "parameters.mu.value")
 
 
 @dataclass(frozen=True)
@@ -176,16 +176,18 @@ def sensitivities(
 ) -> Sensitivities:
     """dλ/dp of complex modes over numbers of the case, each named by the path that overrides it.
 
-    "mu" is the friction coefficient of every contact, "contacts.NAME.friction.coefficient" that of one;
-    "contacts.NAME.compliance" is 1/K_c, which rigid contact has too. Every other path is a number of the case, such as
-    "materials.iron.density" or "bodies.pad.thickness". mu: the friction coefficient (default: the case's own).
+    "mu" is the friction coefficient of every contact and in the factors of imported matrices,
+    "contacts.NAME.friction.coefficient" that of one contact; "contacts.NAME.compliance" is 1/K_c, which rigid contact
+    has too. Every other path is a number of the case, such as "materials.iron.density", "bodies.pad.thickness" or
+    "bodies.brake.terms.1.factor". mu: the friction coefficient (default: the case's own).
 
     modes: "unstable", "all" of the band, or numbers of branches. count, max_frequency_hz, damped: as in `modes`.
     steps: by how much a number is changed to see what the matrices do, where a thousandth of it will not do.
 
     The touching nodes and the directions of sliding stay as they are at the case itself: what a number does by opening
-    or closing contact is not in the derivative. Raises CaseError for paths that lead to no number, AnalysisError where
-    steady sliding does not exist. A mode without derivatives is left out, and a warning says so.
+    or closing contact is not in the derivative. Raises CaseError for paths that lead to no number and for "mu" where
+    nothing depends on it, AnalysisError where steady sliding does not exist. A mode without derivatives is left out,
+    and a warning says so.
     """
     started = time.perf_counter()
     work = Workspace.of(problem)
@@ -267,11 +269,13 @@ class Linearised:
     """A case at one μ with the modes of its band, what each number does to its matrices, and the modes' vectors as
     they are asked for."""
 
-    def __init__(self, case: Case, system: System, mu: float, modes: ComplexModes, options: Options) -> None:
-        self.case, self.system, self.mu, self.modes, self.options = case, system, mu, modes, options
+    def __init__(self, work: Workspace, mu: float, modes: ComplexModes, *, damped: bool) -> None:
+        self.work, self.mu, self.modes, self.damped = work, mu, modes, damped
+        self.case, self.options = work.case("a sensitivity"), work.options
+        self.system = self._as_asked(work.system(mu))
         self.eigenvalues: ComplexArray = modes.eigenvalues[0]
-        self.held = hold(system, mu, options)
-        self.pencil = pencil_of(system, mu, self.held, options)
+        self.held = hold(self.system, mu, self.options)
+        self.pencil = pencil_of(self.system, mu, self.held, self.options)
         doubtful = doubt(modes.completeness[0]) if modes.completeness else ""
         self.warnings: list[str] = [f"modes at μ = {mu:g}: {doubtful}"] if doubtful else []
         self._solved: dict[int, Mode | None] = {}
@@ -287,23 +291,18 @@ class Linearised:
     ) -> Linearised:
         """At ``mu`` (default: the case's own friction), settings as `sensitivities` takes them."""
         work = Workspace.of(problem)
-        case, value = work.case("a sensitivity"), work.own_friction if mu is None else float(mu)
+        work.case("a sensitivity")
+        value = work.own_friction if mu is None else float(mu)
         if value is None:
             raise CaseError("mu", None, "one friction coefficient for all contacts: the case gives them different ones")
-        settings = case.modal
-        options, system = work.options, work.system()
-        damped = settings.damped if damped is None else damped
-        require_frequency(max_frequency_hz)
-        band = max_frequency_hz or settings.max_frequency_hz
-        modes = modes_of_band(system, value, band, damped=damped, options=options)
-        if max_frequency_hz is None:
-            modes = modes.lowest(settings.modes if count is None else count)
-        return Linearised(case, system if damped else system.undamped(), value, modes, options)
+        damped = work.modal.damped if damped is None else damped
+        modes = modes_at(work, value, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
+        return Linearised(work, value, modes, damped=damped)
 
     def value(self, path: str) -> float:
         """The number at a path. Raises CaseError where there is none."""
         contact = _contact_of(self.case, path)
-        if path == "mu" or (contact and path.endswith(".friction.coefficient")):
+        if path in _FRICTION or (contact and path.endswith(".friction.coefficient")):
             return self.mu
         if contact and path.endswith(".compliance"):
             stiffness = self.case.contacts[contact].stiffness
@@ -313,15 +312,15 @@ class Linearised:
     def change(self, path: str, step: float | None = None) -> PencilChange:
         """What the number at a path does to the matrices, per unit of it."""
         contact = _contact_of(self.case, path)
-        if path == "mu":
-            return by_friction(self.system, self.mu, self.held, self.options)
+        if path in _FRICTION:
+            return self._by_friction(path)
         if contact and path.endswith(".friction.coefficient"):
             return by_friction(self.system, self.mu, self.held, self.options, contact=contact)
         if contact and path.endswith(".compliance"):
             return by_compliance(self.system, self.held, contact)
 
         def at(value: float) -> Pencil:
-            return pencil_of(self.built(self.case.with_({path: value})), self.mu, self.held, self.options)
+            return pencil_of(self.varied(path, value), self.mu, self.held, self.options)
 
         try:
             return rate_of(at, self.value(path), step)[0]
@@ -329,10 +328,32 @@ class Linearised:
             accepted = f"a number that can be varied a little ({error.problems[0].accepted})"
             raise CaseError(path, self.value(path), accepted) from error
 
-    def built(self, case: Case) -> System:
-        """The system of a varied case, with or without damping as this one."""
-        system = build_system(case)
-        return system if self.modes.damped else system.undamped()
+    def varied(self, path: str, value: float) -> System:
+        """The system with another number at a path, with or without damping as this one. Raises CaseError."""
+        steps = split_path(path)
+        # The range of a parameter says where onsets are sought; a little beyond its end nothing is amiss.
+        beyond = {".".join([*steps[:2], "range"]): None} if steps[0] == "parameters" else {}
+        return self._as_asked(Workspace(self.case.with_({**beyond, path: value})).system(self.mu))
+
+    def _as_asked(self, system: System) -> System:
+        """The system with damping or without; gyroscopic forces are none."""
+        if self.damped or system.symmetric_definite:
+            return system if self.damped else system.undamped()
+        return replace(system, damping=sp.csr_array((system.damping - system.damping.T) / 2))
+
+    def _by_friction(self, path: str) -> PencilChange:
+        """Change of P per unit of μ, in contacts and in factors of imported matrices."""
+
+        def at(mu: float) -> Pencil:
+            return pencil_of(self._as_asked(self.work.system(mu)), mu, self.held, self.options)
+
+        if self.work.varies:
+            return rate_of(at, self.mu)[0]
+        if not self.held.nodes:
+            example = next((f"bodies.{name}.terms.0.factor" for name in self.case.imported), "materials.steel.density")
+            accepted = "there are no contacts and no factor of a matrix has mu in it; give another number of the case"
+            raise CaseError(path, None, f"nothing depends on it: {accepted}, such as {example} (--parameter)")
+        return by_friction(self.system, self.mu, self.held, self.options)
 
     def columns(self, choice: Choice) -> list[int]:
         """Columns of the modes chosen. Raises CaseError for numbers that no branch has."""

@@ -1,0 +1,141 @@
+"""Sensitivities and counter-measures of imported matrices, symmetric or not, against differences and meshed models."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stridor as st
+from matrix_cases import TURN, matrix_case
+from program import stridor
+from stridor.case import template_text
+from stridor.study.sensitivities import Sensitivities
+
+pytestmark = pytest.mark.verification
+
+FEW = ["bodies.beam1.elements=6", "bodies.beam2.elements=18"]
+ONE = np.eye(2)
+OBLIQUE = np.array([[2.0, 1.0], [1.0, 2.0]])
+BELT = np.array([[0.0, -4 / 3], [0.0, 0.0]])
+DAMPED = np.array([[0.02, 0.005], [0.005, 0.03]])
+SPIN = "[parameters]\nOmega = { value = 0.4, range = [0.1, 0.4] }\nmu = { value = 0.8, range = [0.0, 1.0] }\n"
+
+
+def friction(folder: Path) -> st.Case:
+    """Two masses on a belt, K not symmetric, friction in a factor."""
+    terms = [(ONE, "mass", ""), (DAMPED, "damping", ""), (OBLIQUE, "stiffness", ""), (BELT, "stiffness", "mu")]
+    return matrix_case(folder, terms, 1.0)
+
+
+def turning(folder: Path) -> st.Case:
+    """The same in a frame that turns, μ and the speed parameters with factors that are no straight lines."""
+    terms = [
+        (ONE, "mass", ""), (DAMPED, "damping", "1 + Omega"), (TURN, "damping", "2*Omega"), (OBLIQUE, "stiffness", ""),
+        (-ONE, "stiffness", "Omega**2"), (BELT, "stiffness", "mu + 0.1*mu**2"),
+    ]  # fmt: skip
+    return matrix_case(folder, terms, 1.0, more=SPIN)
+
+
+def symmetric(folder: Path) -> st.Case:
+    """Negative damping drives a motion; everything is symmetric, and damping is not proportional."""
+    driven = np.array([[0.05, 0.02], [0.02, -0.03]])
+    return matrix_case(folder, [(ONE, "mass", ""), (driven, "damping", ""), (OBLIQUE, "stiffness", "")], 1.0)
+
+
+def differences(case: st.Case, path: str, found: Sensitivities, mu: float, damped: bool) -> np.ndarray:
+    """dλ/dp of the modes of ``found`` by central differences of fourth order."""
+    value = mu if path == "mu" else float(found.values[found.parameters.index(path)])
+    h = 1e-3 * abs(value)
+
+    def at(step: float) -> np.ndarray:
+        changed, friction = case, mu
+        if path == "mu":
+            friction = mu + step
+        else:
+            free = {".".join([*path.split(".")[:2], "range"]): None} if path.startswith("parameters") else {}
+            changed = case.with_({**free, path: value + step})
+        solved = st.modes(changed, friction, damped=damped).eigenvalues[0]
+        return np.array([solved[np.argmin(np.abs(solved - lam))] for lam in found.eigenvalues])
+
+    return (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h)
+
+
+@pytest.mark.parametrize("damped", [True, False])
+@pytest.mark.parametrize(
+    ("make", "paths"),
+    [
+        (friction, ["mu", *(f"bodies.matrices.terms.{k}.factor" for k in (0, 1, 2))]),
+        (turning, ["mu", "parameters.Omega.value", "bodies.matrices.terms.0.factor", "bodies.matrices.terms.3.factor"]),
+        (symmetric, [f"bodies.matrices.terms.{k}.factor" for k in (0, 1, 2)]),
+    ],
+)
+def test_derivatives_are_what_differences_say(tmp_path: Path, make: object, paths: list[str], damped: bool) -> None:
+    case = make(tmp_path)  # type: ignore[operator]
+    mu = 0.0 if make is symmetric else 0.8
+    found = st.sensitivities(case, paths, mu=mu, modes="all", damped=damped)
+    assert len(found.branch) == 2
+    assert found.residual.max() < 1e-13
+    for k, path in enumerate(paths):
+        expected = differences(case, path, found, mu, damped)
+        assert found.derivative[k] == pytest.approx(expected, rel=1e-7, abs=1e-9), path
+
+
+def test_the_parameter_mu_is_friction(tmp_path: Path) -> None:
+    case = turning(tmp_path)
+    found = st.sensitivities(case, ["mu", "parameters.mu.value"], modes="all")
+    assert found.mu == 0.8
+    assert np.all(found.derivative[0] == found.derivative[1])
+
+
+def test_the_bench_as_matrices_answers_as_the_bench(tmp_path: Path) -> None:
+    case = st.loads(template_text("two-beams"), FEW)
+    written = st.export(case, tmp_path, format="npz")
+    assert written.case is not None
+    imported = st.load(written.case)
+    own, found = (st.sensitivities(c, ["mu"], mu=0.2) for c in (case, imported))
+    assert list(found.branch) == list(own.branch)
+    assert len(own.branch)
+    assert found.derivative == pytest.approx(own.derivative, rel=1e-7)
+    # 1 + x of the contact's term is that of its stiffness.
+    stiffer = st.sensitivities(imported.with_({"bodies.matrices.terms.4.factor": "mu"}), ["mu"], mu=0.2)
+    assert stiffer.derivative == pytest.approx(found.derivative, rel=1e-12)
+
+
+def test_countermeasures_of_matrices_are_solved_again(tmp_path: Path) -> None:
+    for make, mu in ((friction, 1.0), (turning, 1.0), (symmetric, None)):
+        found = st.rank_countermeasures(make(tmp_path), mu=mu, percent=0.1, verify=3)
+        assert found.measures, found.warnings
+        for measure in found.measures[:3]:
+            assert measure.verified is not None
+            assert measure.verified.removed == pytest.approx(measure.removed, rel=0.05)
+        names = {measure.name for measure in found.measures}
+        assert all(name.endswith(".factor") or name == "parameters.Omega.value" for name in names)
+
+
+def test_the_program_on_imported_matrices(tmp_path: Path) -> None:
+    friction(tmp_path)
+    for verb in ("sensitivities", "countermeasures"):
+        done = stridor(verb, "case.toml", "--mu", "0.8", "--json", "--quiet", cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert json.loads(done.stdout)["mu"] == 0.8
+    symmetric(tmp_path)
+    done = stridor("sensitivities", "case.toml", "--quiet", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "stridor: mu: nothing depends on it: there are no contacts and no factor of a matrix has mu in it; give another "
+        "number of the case, such as bodies.matrices.terms.0.factor (--parameter)\n"
+    )
+    done = stridor("modes", "case.toml", "--quiet", cwd=tmp_path)
+    assert done.returncode == 0
+
+
+def test_where_nothing_can_be_changed(tmp_path: Path) -> None:
+    case = friction(tmp_path)
+    fixed = {f"bodies.matrices.terms.{k}.factor": "1" for k in range(3)}
+    found = st.rank_countermeasures(case.with_(fixed), mu=1.0)
+    assert not found.measures
+    expected = "there is nothing to change: factors of imported matrices that are numbers, or parameters in them, would be"
+    assert found.warnings[-1] == expected
