@@ -13,15 +13,16 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 import stridor as st
-from benches import paper_case
+from benches import bench, paper_case
 from matrix_cases import MESHED, TURN, export, exported, matrix_case, rubbing
 from solid_cases import bench_as_solids, case, slider
 from stridor.modal import full
 from stridor.modal.complex_modes import complex_modes
-from stridor.modal.full.family import Family, Smooth
+from stridor.modal.full.family import Family, Smooth, family_of
 from stridor.modal.growing import checked_onsets
 from stridor.modal.newton import Border
 from stridor.modal.onsets import onsets
+from stridor.modal.options import Options
 from stridor.modal.quadratic import Quadratic
 from stridor.system import build_system
 
@@ -410,6 +411,43 @@ def test_an_onset_that_gets_lost_is_noticed(tmp_path: Path, monkeypatch: pytest.
     document = st.onsets(model).to_json()
     assert document["completeness"].startswith("Complete")
     assert document["onsets"][0]["mu"] == pytest.approx(0.75)
+
+
+@pytest.mark.parametrize("damping", [0.0, 4e-4])
+def test_growth_between_two_values_that_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damping: float):
+    """λ² + cλ = −2 ± √(d² − q²) with d = μ − 0.5052: two modes meet and part within 2q, or growth of the one that c
+    leaves lasts as long as q² − d² is more than 2c². The nearest values that are counted lie 1/96 apart, beside it."""
+    apart, middle = 2e-3, 48.5 / 96
+    terms = [
+        (ONE, "mass", ""), (np.array([[2.0 - middle, apart], [-apart, 2.0 + middle]]), "stiffness", ""),
+        (np.diag([1.0, -1.0]), "stiffness", "mu"), *([(damping * ONE, "damping", "")] if damping else []),
+    ]  # fmt: skip
+
+    def refused(*_):
+        raise st.AnalysisError("branches are not followed here")
+
+    monkeypatch.setattr(full.search, "solved", refused)
+    found = st.onsets(matrix_case(tmp_path, terms, 1.0))
+    assert "branches are not followed here" in found.completeness
+    half = math.sqrt(apart**2 - 2 * damping**2)
+    assert half < 0.5 / 96
+    np.testing.assert_allclose([o.mu for o in found.onsets], [middle - half, middle + half], rtol=0, atol=1e-11)
+    assert [o.roots for o in found.onsets] == [2, -2]
+
+
+def test_what_turning_beams_leaves_of_symmetry_is_not_gyroscopic():
+    """Without damping onsets are where modes meet, whatever rounding has put into D; what is gyroscopic stays."""
+    system = bench()
+    turning = sp.csr_array(([1.0, -1.0], ([0, 1], [1, 0])), shape=system.damping.shape)
+
+    def family(skew: float):
+        turned = replace(system, damping=sp.csr_array(system.damping + skew * turning))
+        return family_of(lambda _: turned, (0.0, 1.0), Options(), damped=False, own=0.0)
+
+    rounding = family(1e-17 * float(np.abs(system.damping[:2, :2].data).max()))
+    assert rounding.still
+    assert rounding.reversible
+    assert abs(family(1e-3).built(0.5).damping - 1e-3 * turning)[:2, :2].max() < 1e-15
 
 
 def test_growth_that_comes_into_the_band_from_above_is_told(tmp_path: Path):

@@ -83,7 +83,7 @@ def along_the_axis(system: System, between: tuple[float, float], hz: float, *, d
     )
 
 
-AXIS = [1, 16, 25, 32, 33, 48]
+AXIS = [1, 16, 25, 32, 33, 48, 1832]
 MORE = [pytest.param(range(k, k + 100), marks=pytest.mark.slow) for k in range(0, 2000, 100)]
 
 

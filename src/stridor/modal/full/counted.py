@@ -2,8 +2,8 @@
 
 Branches that damping beyond critical tangles on the real axis cannot always be told apart; what grows at a value can.
 Between neighbours on a grid the growing roots up to |λ| = ω_max are counted; where the numbers differ, or where slopes
-say that a mode crosses the axis between them, the interval is halved until one mode changes in it, and Newton solves
-for it in the full problem. A mode that passes |λ| = ω_max while it grows is no onset, and is told.
+say that a mode crosses the axis between them or that two meet, the interval is halved until one mode changes in it, and
+Newton solves for it in the full problem. A mode that passes |λ| = ω_max while it grows is no onset, and is told.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from ...typing import BoolArray, ComplexArray
-from ..dense_problem import Eigenpairs
+from ...typing import BoolArray, ComplexArray, IntArray
+from ..dense_problem import Eigenpairs, upper_root
 from ..newton import Root, crossing, meeting, standstill
 from ..onset import Onset
 from ..quadratic.polish import pairs
@@ -31,6 +31,7 @@ SMALLEST = 1e-9  # of the range: no interval is halved further
 ALONE = 1e-4  # of the range: an interval in which one mode changes is short enough for Newton from here on
 SLOWEST = 1e-8  # of the highest frequency: growth slower than that is rounding
 STILL = 1e-3  # of the highest frequency: slower than that may be divergence
+TOGETHER = 0.25  # of the square of half the difference of two modes: what is left of it where they come together
 NEARBY = 0.05  # of |λ|: how far from where slopes lead it to a growing mode may be in the next interval's end
 EDGE = 1e-3  # of the highest frequency: modes that come in or leave there are no onsets
 ALIKE = 1e-7  # of the highest frequency: onsets at one value whose frequencies are no further apart are one
@@ -162,11 +163,52 @@ class _Search:
         yield from self._changes(middle, high)
 
     def _foretold(self, at: _Count, step: float) -> bool:
-        """Whether a mode would cross the axis within a step if it were straight."""
-        lam, ahead = at.found.values, at.found.values + step * _rates(at.found)
-        inside = (np.abs(lam) <= self.top) & (np.abs(lam) > SLOWEST * self.top) & np.isfinite(ahead)
-        off = np.abs(lam.real) > UNSTABLE_RELATIVE * np.abs(lam)
-        return bool(np.any(inside & off & ((lam.real > 0) != (ahead.real > 0))))
+        """Whether within a step a mode would begin or cease to grow if it were straight, or two that come together, one
+        and its conjugate too, if their mean and the square of half their difference were, which are smooth where they
+        meet: what little or nothing damps stays beside the axis until then, and its own slope tells nothing of it."""
+        one, other = self._pairs(at.found)
+        half, turn = (one - other) / 2
+        square, change = half * half, 2 * half * turn
+        # How near to zero the square comes within the step.
+        with np.errstate(all="ignore"):
+            part = -np.real(square * change.conj()) / np.abs(change) ** 2
+        nearest = square + np.clip(np.nan_to_num(part / step), 0.0, 1.0) * step * change
+        together = np.abs(nearest) <= TOGETHER * np.abs(square)
+        return bool(np.any(together & (self._roots(one, other, step) != self._roots(one, other, 0.0))))
+
+    def _pairs(self, found: Eigenpairs) -> tuple[ComplexArray, ComplexArray]:
+        """Coordinates and slopes (2, k) of modes that may meet, of which one at least is in the band: every mode with
+        itself, with its conjugate and with others; λ² that are real with their neighbours alone."""
+        squares = self.source.family.reversible
+        size = np.abs(found.values)
+        known = np.flatnonzero(np.isfinite(found.tangents) & (size > SLOWEST * self.top))
+        inside = known[size[known] <= self.top]
+        both = np.array([found.coordinate, found.tangents])
+        alone, axis = inside, both[0].imag == 0
+        if squares:
+            real = known[axis[known]]
+            real = real[np.argsort(both[0, real].real)]
+            one, other = real[:-1], real[1:]
+        else:
+            # One that is on the axis leaves it to either side; two may still meet there.
+            alone = inside[np.abs(found.values[inside].real) > UNSTABLE_RELATIVE * size[inside]]
+            one, other = (known[k] for k in np.triu_indices(len(known), 1))
+        near = np.minimum(size[one], size[other]) <= self.top
+        turned = inside[~axis[inside]]
+        first = np.concatenate([alone, turned, one[near]])
+        second = np.hstack([both[:, alone], both[:, turned].conj(), both[:, other[near]]])
+        return both[:, first], second
+
+    def _roots(self, one: ComplexArray, other: ComplexArray, step: float) -> IntArray:
+        """How many roots (k,) of pairs of coordinates and their slopes (2, k) grow a step on."""
+        half, turn = (one - other) / 2
+        mean = (one[0] + other[0] + step * (one[1] + other[1])) / 2
+        apart = np.sqrt(half * (half + 2 * step * turn))
+        ahead: ComplexArray = np.array([mean + apart, mean - apart])
+        values = upper_root(ahead) if self.source.family.reversible else ahead
+        grows = unstable(self.source.family, values, self.top, SLOWEST)
+        roots: IntArray = np.sum(np.where(grows, np.where(values.imag != 0, 2, 1), 0), axis=0)
+        return roots
 
     def _are_those(self, low: _Count, high: _Count) -> bool:
         """Whether as many growing modes are the same ones: where one begins and another ends their number says nothing.

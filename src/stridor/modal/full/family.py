@@ -367,8 +367,11 @@ class SystemFamily(Family):
     def _damped(self, found: Quadratic) -> Quadratic:
         if self._whole_damping:
             return found
-        # Gyroscopic forces do no work and are no damping.
-        return replace(found, damping=sp.csr_array((found.damping - found.damping.T) / 2))
+        # Gyroscopic forces do no work and are no damping; what turning beams leaves of symmetry is none of either.
+        damping = found.damping
+        if deviation(damping, sp.csr_array(damping.T)) <= EXACT:
+            return replace(found, damping=sp.csr_array(damping.shape))
+        return replace(found, damping=sp.csr_array((damping - damping.T) / 2))
 
     def _problem(self, mu: float) -> ContactProblem:
         if not self.varies:
