@@ -245,7 +245,7 @@ def test_the_command_prints_a_table_and_writes_one(block, tmp_path):
     assert "written: block.out/damping_map.csv" in done.stderr
     assert (tmp_path / "block.out" / "damping_map.png").stat().st_size > 10_000
     rows = list(csv.DictReader((tmp_path / "block.out" / "damping_map.csv").open(encoding="utf-8")))
-    assert list(rows[0])[:4] == [X, Y, "onset μ [1]", "frequency [Hz]"]
+    assert list(rows[0])[:4] == [X, Y, "mu", "frequency_hz"]
     assert len(rows) == 4
-    assert f"{float(rows[0]['onset μ [1]']):.6f}" == lines[2].split()[1]
-    assert float(rows[0]["estimated error of μ [1]"]) < 1e-7
+    assert f"{float(rows[0]['mu']):.6f}" == lines[2].split()[1]
+    assert float(rows[0]["mu_error"]) < 1e-7

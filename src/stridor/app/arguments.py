@@ -21,6 +21,7 @@ from ..errors import AnalysisError, CaseError, StridorError
 
 if TYPE_CHECKING:
     from ..case import Case
+    from ..io.csv_files import Tabled
     from ..io.datasets import Result
     from ..study.workspace import Workspace
 P = ParamSpec("P")
@@ -155,6 +156,14 @@ class Call:
         from .output import say
 
         say(text, quiet=self.quiet)
+
+    def tabulate(self, result: Tabled, name: str) -> Path:
+        """Save a result as a CSV file in the folder, and say so."""
+        from ..io.csv_files import write_csv
+
+        path = write_csv(result, self.folder / name)
+        self.say(f"written: {path}")
+        return path
 
     def keep(self, result: Result, name: str) -> None:
         """Save a result as a dataset in the folder, and say so."""

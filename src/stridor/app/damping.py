@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -40,6 +37,7 @@ def damping_map(
     """The lowest onset over two dampings, and where more damping lowers it."""
     loaded = call.case()
 
+    from ..io.atomic import replacing
     from ..study.damping_map import damping_map as solve
     from ..view.sensitivity_plots import damping_map as draw
     from .output import progress_bar, stdout
@@ -50,12 +48,11 @@ def damping_map(
         result = solve(
             loaded, x, y, x_range=ranges[0], y_range=ranges[1], grid=(points, points), method=chosen, progress=progress
         )
-    folder = call.folder
-    files = [_write(folder / "damping_map.csv", result), folder / "damping_map.png"]
-    draw(result).savefig(files[1], dpi=150)
+    files = [call.tabulate(result, "damping_map.csv"), call.folder / "damping_map.png"]
+    with replacing(files[1]) as temporary:
+        draw(result).savefig(temporary, dpi=150)
+    call.say(f"written: {files[1]}")
     call.warn(result.warnings)
-    for path in files:
-        call.say(f"written: {path}")
     if call.json:
         call.document(result.to_json() | {"files": [str(f) for f in files]})
         return
@@ -104,33 +101,3 @@ def _words(result: DampingMap) -> list[str]:
         below = int(result.below_undamped.sum())
         lines.append(f"without damping: μ = {result.undamped_mu:.9g}; {below} of {known.size} points lie below that")
     return lines
-
-
-def _write(path: Path, result: DampingMap) -> Path:
-    """One line for each point, all digits, under a line of heads; empty where there is nothing."""
-    import numpy as np
-
-    from ..io.atomic import write_text
-
-    text = io.StringIO()
-    lines = csv.writer(text, lineterminator="\n")
-    lines.writerow(
-        [
-            result.x,
-            result.y,
-            "onset μ [1]",
-            "frequency [Hz]",
-            f"dμ / d {result.x}",
-            f"dμ / d {result.y}",
-            "residual [1]",
-            "estimated error of μ [1]",
-        ]
-    )
-    error = np.full_like(result.onset_mu, np.nan) if result.error is None else result.error
-    tables = (result.onset_mu, result.frequency_hz, result.slope_x, result.slope_y, result.residual, error)
-    for i, j in np.ndindex(result.onset_mu.shape):
-        numbers = (float(t[i, j]) for t in tables)
-        cells = (repr(v) if math.isfinite(v) else "" for v in numbers)
-        lines.writerow([repr(float(result.x_values[i])), repr(float(result.y_values[j])), *cells])
-    write_text(path, text.getvalue())
-    return path

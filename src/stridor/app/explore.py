@@ -36,6 +36,7 @@ def sensitivities(
 
     call.check_friction(mu)
     result = solve(work, parameter or ["mu"], mu=mu, modes="unstable" if branch is None else (branch,))
+    call.tabulate(result, "sensitivities.csv")
     drawn = sensitivity_bars(result) if len(result.branch) else None
     _show(call, result, sensitivity_table(result))
     _draw(call, drawn, "sensitivities.png")
@@ -59,6 +60,7 @@ def countermeasures(
     call.check_friction(mu)
     target: Any = "sum" if branch is None else branch
     result = rank_countermeasures(work, mu=mu, target=target, percent=percent, verify=verify)
+    call.tabulate(result, "countermeasures.csv")
     _show(call, result, countermeasure_table(result))
     drawn = countermeasure_bars(result) if result.measures else None
     _draw(call, drawn, "countermeasures.png")
@@ -77,10 +79,12 @@ def _show(call: Call, result: Any, shown: Table) -> None:
 
 
 def _draw(call: Call, figure: Any, name: str) -> None:
+    from ..io.atomic import replacing
+
     if figure is not None:
         path = call.folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=150)
+        with replacing(path) as temporary:
+            figure.savefig(temporary, dpi=150)
         call.say(f"written: {path}")
 
 

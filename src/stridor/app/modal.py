@@ -122,6 +122,7 @@ def modes(
             work, values, count=count, damped=False if undamped else None, progress=progress
         )
     call.keep(result, "modes.nc")
+    call.tabulate(result, "modes.csv")
     if result.interrupted:
         call.say(f"interrupted: {len(result.mu)} of {result.planned} friction coefficients, which are kept")
     if call.json:
@@ -193,6 +194,7 @@ def onsets(
     call.warn(resolution_warnings(loaded))
     result = analyses.onsets(work, chosen, max_frequency_hz=max_frequency, damped=False if undamped else None)
     call.keep(result, "onsets.nc")
+    call.tabulate(result, "onsets.csv")
     if call.json:
         call.document(result.to_json())
     else:
@@ -211,6 +213,7 @@ def _onsets_along(
     call.warn(resolution_warnings(case))
     chosen = None if call.solver in (None, "auto") else call.solver
     found = onsets_along(case, name, between, max_frequency_hz=max_frequency, solver=chosen, said="--between")
+    call.tabulate(found, "onsets-along.csv")
     if call.json:
         call.document(found.to_json())
     else:

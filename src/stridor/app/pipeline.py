@@ -15,7 +15,10 @@ from ..case import Case
 from ..digits import measured
 from ..errors import StridorError
 from ..io.atomic import write_text
+from ..io.csv_files import write_csv
 from ..io.datasets import load_trajectory, save
+from ..modal.complex_modes import ComplexModes
+from ..modal.onsets import Onsets
 from ..study.everything import Everything, compute_everything
 from ..study.provenance import versions
 from ..study.workspace import Workspace
@@ -92,9 +95,11 @@ def run(
     files: list[Path] = []
 
     def keep(name: str, result: Any) -> None:
-        path = save(result, target / f"{name}.nc")
-        if path not in files:  # a run is kept again and again while it goes on
-            files.append(path)
+        written = [save(result, target / f"{name}.nc")]
+        if isinstance(result, ComplexModes | Onsets):
+            written.append(write_csv(result, target / f"{name}.csv"))
+        # A run is kept again and again while it goes on.
+        files.extend(path for path in written if path not in files)
 
     write_text(target / "case.toml", case.text)
     everything = compute_everything(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping
 from itertools import product
@@ -35,7 +33,7 @@ Model = Annotated[
 ]
 
 
-@verb(Model, writes=False)
+@verb(Model)
 def reduce(
     call: Call,
     box: Annotated[
@@ -96,14 +94,15 @@ def reduce(
     files = [] if save is None else [_saved(model, save, origin, keep)]
     chosen = None if call.solver in (None, "auto") else call.solver
     points = _points(model, at or [], corrections if kept_in(model) == "all" else 0, chosen)
-    if call.out is not None and at:
-        files.append(_write(call.out / "reduced.csv", model, points))
+    if at:
+        files.append(_write(call.folder / "reduced.csv", model, points))
     for path in files:
         call.say(f"written: {path}")
     confirm = kept_in(model) == "all"
     onsets: ParametricOnsets | None = None
     if along is not None:
         onsets = onsets_along(model, along, _first(at or [], model, along), confirm=confirm, solver=chosen)
+        files.append(call.tabulate(onsets, "reduced-onsets.csv"))
     if call.json:
         document = _about(model) | {"modes": points, "onsets": [onset_document(o) for o in onsets or ()]}
         if onsets is not None:
@@ -253,21 +252,20 @@ def _about(model: ReducedModel) -> dict[str, Any]:
 
 
 def _write(path: Path, model: ReducedModel, document: list[dict[str, Any]]) -> Path:
-    """One line for each mode of each point, all digits, under a line of heads."""
-    from ..io.atomic import write_text
+    """One line for each mode of each point, columns of the model's parameters first."""
+    from ..io.csv_files import MODE, mode_cells, write_rows
 
-    text = io.StringIO()
-    lines = csv.writer(text, lineterminator="\n")
-    names = [f"{p.name} [1]" if p.name in CONTACTS else p.name for p in model.problem.parameters]
-    heads = ("frequency [Hz]", "growth rate [1/s]", "error of λ [1]", "residual [1]", "unstable", "inside the box")
-    lines.writerow([*names, *heads])
-    for point in document:
-        for mode in _modes(point):
-            numbers_ = (mode["frequency_hz"], mode["growth_rate"], mode["error"], mode["residual"])
-            marks = int(mode["unstable"]), int(point["inside"])
-            lines.writerow([*(repr(v) for v in (*point["point"].values(), *numbers_)), *marks])
-    write_text(path, text.getvalue())
-    return path
+    heads = (*(p.name for p in model.problem.parameters), *MODE, "error", "residual", "inside", "corrections")
+    rows = (
+        (
+            *point["point"].values(),
+            *mode_cells(mode["frequency_hz"], mode["growth_rate"], unstable=mode["unstable"]),
+            mode["error"], mode["residual"], point["inside"], point["corrections"],
+        )
+        for point in document
+        for mode in _modes(point)
+    )  # fmt: skip
+    return write_rows(path, heads, rows)
 
 
 def _modes(point: Mapping[str, Any]) -> list[dict[str, Any]]:

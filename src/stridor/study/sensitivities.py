@@ -19,8 +19,9 @@ from ..modal.derivatives import Mode, PencilChange, by_compliance, by_friction, 
 from ..modal.growing import doubt
 from ..modal.pencil import Pencil
 from ..system import System
-from ..typing import Array, ComplexArray, IntArray
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .analyses import modes as modes_at
+from .measures import growing
 from .provenance import provenance
 from .workspace import Workspace
 
@@ -69,6 +70,11 @@ class Sensitivities:
     def growth_rate(self) -> Array:
         """Re λ (b,) [1/s], positive when unstable."""
         return self.eigenvalues.real
+
+    @property
+    def unstable(self) -> BoolArray:
+        """Which modes (b,) grow, beyond rounding."""
+        return growing(self.eigenvalues)
 
     @property
     def growth_per_percent(self) -> Array:
