@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy.linalg as sl
+from scipy.optimize import linear_sum_assignment
 
 import stridor as st
 from benches import Slave, bench, by_hand, full_eigenvalues
@@ -24,7 +25,9 @@ KINDS = ("beams", "belt", "column", "symmetric", "gyroscopic", "circulatory", "b
 GRID = 60
 FAINT = 1e-6  # of |λ|: growth that either side may take for rounding
 STILL = 1e-4  # of the band: growth so slow may be taken for a motion as a whole
-NEAR_EDGE = 0.02  # of the band
+NOTHING = 1e-9  # of |λ|, or of the band: rounding
+ON_EDGE = 1e-6  # of the band
+FINEST = 1e-6  # of the range: how closely a mode that passes the end of the band is looked at
 
 
 @dataclass(frozen=True)
@@ -186,38 +189,76 @@ def _imported(name: str, rng: np.random.Generator, *, small: bool) -> Problem:
 
 def disagreement(problem: Problem, folder: Path) -> tuple[str, str]:
     """What the onsets say otherwise than the eigenvalues at some value, and why there is no whole answer; "" for
-    neither. Not judged are values where a growing mode is near the end of the band or growth may be rounding."""
+    neither. Not judged are values where a mode is on the end of the band or growth may be rounding."""
     try:
         found = problem.solve(folder)
     except st.AnalysisError as error:
         return "", f"{problem.name}: {error}"
     if not found.complete:
         return "", f"{problem.name}: {found.completeness}"
-    base: int | None = None
-    outside: int | None = None
-    crossed = False
     inside = [o for o in found.onsets if 2 * np.pi * o.frequency_hz <= problem.top]
-    before = 0.0
-    for p in np.linspace(problem.low, problem.high, GRID + 1)[1:-1] + 1.234e-5 * (problem.high - problem.low):
-        values = problem.eigenvalues(float(p))
-        size = np.abs(values)
-        if np.any((size <= STILL * problem.top) & (values.real > 1e-9 * problem.top)):
+    # How many more grow than the onsets say: as many as at the start, and those that have come into the band.
+    base: int | None = None
+    before: tuple[float, np.ndarray] | None = None
+    for p in judged_at(problem):
+        values = problem.eigenvalues(p)
+        if unsure(values, problem.top):
             continue
-        grows = values.real > FAINT * size
-        if np.any(grows & (np.abs(size / problem.top - 1.0) < NEAR_EDGE)):
-            crossed = True  # one may pass it here
-            continue
-        if np.any((np.abs(values.real) <= 30 * FAINT * size) & (values.real > 1e-9 * size) & (size <= problem.top)):
-            continue
-        count, beyond = int(np.sum(grows & (size <= problem.top))), int(np.sum(grows & (size > problem.top)))
-        left, outside = beyond - (beyond if outside is None else outside), beyond
+        if before is not None and base is not None:
+            came = passing(problem, before, (p, values))
+            base = None if came is None else base + came
+        before = p, values
+        count = int(np.sum((values.real > FAINT * np.abs(values)) & (np.abs(values) <= problem.top)))
         said = sum(o.roots for o in inside if o.mu < p)
-        if base is None or (crossed and not any(before < o.mu < p for o in inside)):
+        if base is None:
             base = count - said
-        elif count - said == base - left:
-            base -= left  # one has passed it since the last value, whatever else began there
-        crossed, before = False, float(p)
         if count - said != base:
             onsets = [(round(o.mu, 6), o.kind, "-" if o.stabilising else "+", round(o.frequency_hz, 4)) for o in found.onsets]
             return f"{problem.name}: {count} roots grow at {p:.6g}, onsets say {said + base}: {onsets} {found.completeness}", ""
     return "", ""
+
+
+def judged_at(problem: Problem) -> list[float]:
+    """Both ends and between them values of a grid on which nothing of the problem is likely to fall."""
+    width = problem.high - problem.low
+    grid = np.linspace(problem.low, problem.high, GRID + 1)[1:-1] + 1.234e-5 * width
+    return [problem.low, *grid.tolist(), problem.high]
+
+
+def unsure(values: np.ndarray, top: float) -> bool:
+    """Whether the number of growing roots in the band hangs on rounding: a mode on its end, or on the axis but for little
+    or for rounding. Where the spectrum is its own image in the axis modes stay on it, but for rounding, until two meet."""
+    size = np.abs(values)
+    if np.any((size <= STILL * top) & (values.real > NOTHING * top)):
+        return True
+    if np.any((values.real > 0) & (np.abs(size / top - 1.0) < ON_EDGE)):
+        return True
+    real = np.sort(values.real)
+    image = np.all(np.abs(real + real[::-1]) <= NOTHING * size.max())
+    least = NOTHING * size * (1.0 if image else -1.0)
+    return bool(np.any((np.abs(values.real) <= 30 * FAINT * size) & (values.real > least) & (size <= top)))
+
+
+def passing(problem: Problem, one: tuple[float, np.ndarray], other: tuple[float, np.ndarray]) -> int | None:
+    """By how many more growing roots are in the band at the other value because they have come in over its end; None
+    where it cannot be told whether one that does grows."""
+    (low, first), (high, last) = one, other
+    top = problem.top
+    rows, columns = linear_sum_assignment(np.abs(first[:, None] - last))
+    first, last = first[rows], last[columns]
+    step, was, now = np.abs(first - last), np.abs(first), np.abs(last)
+    near = (np.minimum(was, now) - step <= top) & (np.maximum(was, now) + step >= top)
+    near &= np.maximum(first.real, last.real) + step > 0
+    if not near.any():
+        return 0
+    if high - low > FINEST * (problem.high - problem.low):
+        middle = 0.5 * (low + high)
+        here = middle, problem.eigenvalues(middle)
+        parts = passing(problem, one, here), passing(problem, here, other)
+        return None if None in parts else sum(parts)
+    across = (was <= top) != (now <= top)
+    growth = np.array([first.real, last.real])[:, across] / top
+    grows = growth > 30 * FAINT
+    if np.any(~grows & (growth > NOTHING)) or np.any(grows[0] != grows[1]):
+        return None
+    return int(np.sum(np.where(now <= top, 1, -1)[across][grows[0]]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +125,19 @@ def test_an_axis_that_is_not_walked_closely_is_noticed(tmp_path: Path, monkeypat
     assert again.complete
     assert "imaginary axis" not in again.completeness
     np.testing.assert_allclose([o.mu for o in again.onsets], [o.mu for o in whole.onsets], rtol=1e-9)
+
+
+# One comes into the band beside an onset, while others grow above it; growth that may be rounding beside an onset.
+@pytest.mark.parametrize("seed", [1568, 1934])
+def test_the_truth_sees_each_onset_that_is_lost(seed: int, tmp_path: Path) -> None:
+    problem = random_problem(seed)
+    found = problem.solve(tmp_path)
+    inside = [o for o in found.onsets if 2 * np.pi * o.frequency_hz <= problem.top]
+    assert not disagreement(replace(problem, solve=lambda _: found), tmp_path)[0]
+    assert len(inside) >= 6
+    for lost in inside:
+        others = replace(found, onsets=tuple(o for o in found.onsets if o is not lost))
+        assert disagreement(replace(problem, solve=lambda _, others=others: others), tmp_path)[0]
 
 
 def test_the_truth_tells_a_wrong_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
