@@ -13,7 +13,7 @@ import random_onsets
 from random_onsets import KINDS, disagreement, random_problem
 from stridor.modal.full import branches, counted, full_onsets, search
 from stridor.modal.full.axis import _Walk
-from stridor.modal.onset import Onsets
+from stridor.modal.onset import Onset, Onsets
 from stridor.modal.options import Options
 from stridor.system import System
 
@@ -63,6 +63,31 @@ def test_one_that_begins_where_another_ends(tmp_path: Path) -> None:
     around = [problem.eigenvalues(mu) for o in close for mu in (o.mu - 1e-6, o.mu + 1e-6)]
     count = [int(np.sum(values.real > 1e-9 * np.abs(values))) for values in around]
     assert [count[1] - count[0], count[3] - count[2]] == [2, -2]
+
+
+def test_all_that_opens_at_the_very_start(tmp_path: Path) -> None:
+    """Five modes that nothing damps begin to grow at μ = 0 at once; branches do not lead to the end of one that diverges
+    later, so that growing roots are counted, from the start on."""
+    problem = random_problem(1246)
+    found = problem.solve(tmp_path)
+    assert [(o.kind, o.roots) for o in found.onsets] == [("flutter", 2)] * 5 + [("divergence", 1), ("divergence", -1)]
+    assert [o.mu for o in found.onsets[:5]] == [0.0] * 5
+    assert found.complete
+    assert not disagreement(replace(problem, solve=lambda _: found), tmp_path)[0]
+
+
+def test_what_is_counted_at_both_ends_is_held_against_onsets_on_them() -> None:
+    def onset(mu: float, *, stabilising: bool = False) -> Onset:
+        return Onset(mu, 1.0, "flutter", False, stabilising, (0, 0), 0.0, None, None)
+
+    seen = counted.Counted(((0.0, 0), (0.5, 4), (1.0, 2)), (), ())
+    begins, ends = onset(0.0), onset(1.0, stabilising=True)
+    assert not seen.lacking([begins, onset(1e-8), ends])
+    assert [(k.low, k.high, k.seen, k.said) for k in seen.lacking([begins, ends])] == [(0.0, 0.5, 4, 2)]
+    assert [(k.low, k.high, k.seen, k.said) for k in seen.lacking([begins, onset(0.25)])] == [(0.5, 1.0, -2, 0)]
+    # One that ends at once, or begins at the very end, may or may not be counted there.
+    for others in ([onset(0.0, stabilising=True)], [onset(1.0)], []):
+        assert not seen.lacking([begins, onset(0.25), ends, *others])
 
 
 @pytest.mark.slow

@@ -66,15 +66,27 @@ class Counted:
     passing: tuple[Passing, ...]
 
     def lacking(self, onsets: Sequence[Onset]) -> list[Lack]:
-        """Between which values these onsets do not say what is counted; values that lie on an onset are not judged."""
-        width = self.grid[-1][0] - self.grid[0][0]
-        judged = [(mu, n) for mu, n in self.grid if all(abs(o.mu - mu) > ON_IT * width for o in onsets)]
+        """Between which values these onsets do not say what is counted; values that lie on an onset are not judged, but
+        for both ends: what is counted there may hold what changes on them, or not."""
+        low, high = self.grid[0][0], self.grid[-1][0]
+        near = ON_IT * (high - low)
+        judged = [
+            (mu, n) for mu, n in self.grid if mu in (low, high) or all(abs(o.mu - mu) > near for o in onsets)
+        ]
         lacks: list[Lack] = []
-        for (low, before), (high, after) in pairwise(judged):
-            said = sum(o.roots for o in onsets if low < o.mu < high)
-            said += sum(p.roots for p in self.passing if low < p.mu <= high)
-            if after - before != said:
-                lacks.append(Lack(low, high, after - before, said))
+        for (before, number), (after, later) in pairwise(judged):
+            start, stop = before - near * (before == low), after + near * (after == high)
+            inside = [o for o in onsets if start <= o.mu <= stop]
+            said = sum(o.roots for o in inside) + sum(p.roots for p in self.passing if before < p.mu <= after)
+            # Nothing grows yet where growth begins at the low end, nor any more where it ends at the high one.
+            open_ = [
+                o.roots for o in inside
+                if (o.mu <= low + near and (o.stabilising or o.mu < low))
+                or (o.mu >= high - near and (o.mu > high or not o.stabilising))
+            ]  # fmt: skip
+            least, most = (sum(side(roots, 0) for roots in open_) for side in (min, max))
+            if not said - most <= later - number <= said - least:
+                lacks.append(Lack(before, after, later - number, said))
         return lacks
 
 
