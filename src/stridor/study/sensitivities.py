@@ -19,6 +19,7 @@ from ..modal.derivatives import Mode, PencilChange, by_compliance, by_friction, 
 from ..modal.growing import doubt
 from ..modal.pencil import Pencil
 from ..system import System
+from ..system.imported import cleaned
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .analyses import modes as modes_at
 from .measures import growing
@@ -345,7 +346,8 @@ class Linearised:
         """The system with damping or without; gyroscopic forces are none."""
         if self.damped or system.symmetric_definite:
             return system if self.damped else system.undamped()
-        return replace(system, damping=sp.csr_array((system.damping - system.damping.T) / 2))
+        damping = cleaned(system.damping)  # what rounding leaves of symmetry is no gyroscopic force
+        return replace(system, damping=sp.csr_array((damping - damping.T) / 2))
 
     def _by_friction(self, path: str) -> PencilChange:
         """Change of P per unit of μ, in contacts and in factors of imported matrices."""
