@@ -10,7 +10,7 @@ import pytest
 import scipy.linalg as sl
 
 import stridor as st
-from benches import by_hand, full_eigenvalues, paper_case
+from benches import Slave, bench, by_hand, full_eigenvalues, paper_case
 from hidden_modes import HZ_OF_POINTS, MU_OF_BLOCK, MU_OF_POINTS, entering_points, hidden_block
 from matrix_cases import matrix_case
 from rubbing_block import rubbing_block
@@ -266,3 +266,29 @@ def test_the_last_digits_of_a_slow_mode_do_not_grow(source: str) -> None:
     grow = [np.sort(m.eigenvalues[m.unstable & m.in_band].imag) for m in (found, truth)]
     assert grow[0] == pytest.approx(grow[1], rel=1e-9)
     assert "no branch from" not in found.completeness[0]
+
+
+def test_a_mode_that_no_branch_leads_to_is_as_good_as_the_others() -> None:
+    """A slow motion that diverges, the other half of one that fell apart on the real axis: the search that finds it ends
+    at a backward error of 1e-10, which is 1e-8 of it."""
+    system = bench(
+        Slave(place=0.55223, lean_deg=4.7387, length=0.0318, thickness=1.3105e-3, stiffness=1e7, end="clamped"),
+        Slave(place=0.85552, lean_deg=9.8097, length=0.04616, thickness=1.3117e-3, stiffness=1e9, end="clamped"),
+    )
+    found = modes_of_band(system, [0.2, 0.8], 20e3)
+    assert "of which no branch from μ = 0 was seen to lead to" in found.completeness[1]
+    lam = found.eigenvalues[1, -1]
+    assert lam.imag == 0.0
+    assert found.residual[1, -1] < 1e-14
+    whole = problem_of(system, None, Options()).pencil(0.8).condensed()
+    mass, damping, stiffness = (a.toarray() for a in (whole.mass, whole.damping, whole.stiffness))
+    wide = [a.astype(np.longdouble) for a in (mass, damping, stiffness)]
+    exact, x, y = float(lam.real), np.ones(len(mass)), np.ones(len(mass))
+    for _ in range(6):
+        near = exact * (1 + 1e-8)
+        matrix = near**2 * mass + near * damping + stiffness
+        x, y = np.linalg.solve(matrix, x), np.linalg.solve(matrix.T, y)
+        x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
+        rest = y @ (exact**2 * (wide[0] @ x) + exact * (wide[1] @ x) + wide[2] @ x)
+        exact -= float(rest / (y @ (2 * exact * mass + damping) @ x))
+    assert abs(lam.real - exact) < 1e-10 * exact

@@ -21,6 +21,7 @@ from ..threads import one_thread_if_small
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .complex_modes import complex_modes
 from .full.growth import growing_roots
+from .inverse_iteration import solved_beside
 from .krylov.problem import problem_of
 from .onset import refuted
 from .onsets import Onsets, onsets
@@ -196,7 +197,7 @@ def checked_modes(
         if not _lacking(modes, found):
             break
         modes = _followed_from(system, modes, wider, max_frequency_hz, options) or modes
-    modes, alone = _with_columns(modes, found)
+    modes, alone = _with_columns(system, modes, found, touching, options)
     told = tuple(
         _sentence(modes, row, found.get(row), max_frequency_hz, began, alone.get(row, 0))
         for row in range(len(modes.mu))
@@ -329,7 +330,7 @@ def _followed_from(
 
 
 def _with_columns(
-    modes: ComplexModes, found: dict[int, Growing | str]
+    system: System, modes: ComplexModes, found: dict[int, Growing | str], touching: float | None, options: Options
 ) -> tuple[ComplexModes, dict[int, int]]:
     """With a column for each growing mode that no branch leads to, and how many those are by row."""
     alone: dict[int, int] = {}
@@ -340,8 +341,27 @@ def _with_columns(
         if not len(indices):
             continue
         alone[row] = len(indices)
-        modes = _widened(modes, row, growing, indices)
+        problem = problem_of(system if modes.damped else system.undamped(), touching, options)
+        whole = problem.pencil(growing.mu).condensed()
+        modes = _widened(modes, row, _sharpened(whole, growing, indices, options.solver), indices)
     return modes, alone
+
+
+def _sharpened(problem: Quadratic, found: Growing, indices: IntArray, solver: str | None) -> Growing:
+    """With the modes at these places (k,) as good as those that branches lead to: the search ends where backward errors
+    are small, which leaves slow modes of stiff meshes right to eight digits."""
+    values, right, residual = found.values.copy(), found.right.copy(), found.residual.copy()
+    for k in indices:
+        old = complex(values[k])
+        solved = solved_beside(problem, old, None, None, solver=solver)
+        if solved is None or abs(solved.lam - old) > SAME * abs(old):
+            continue
+        lam = solved.lam if old.imag else complex(solved.lam.real)
+        error = float(problem.backward_error(np.array([lam]), solved.right[:, None])[0])
+        if error <= residual[k]:
+            x = solved.right[: len(right)]
+            values[k], right[:, k], residual[k] = lam, x / max(float(np.linalg.norm(x)), 1e-300), error
+    return replace(found, values=values, right=right, residual=residual)
 
 
 def _widened(modes: ComplexModes, row: int, found: Growing, indices: IntArray) -> ComplexModes:

@@ -17,6 +17,7 @@ from .quadratic.problem import Quadratic
 
 STEPS = 20
 CONVERGED = 1e-14  # change of λ, relative, at which the iteration ends
+BESIDE = (1e-8, 1e-7, 1e-6, 1e-5)  # of λ: how far beside it P is factorised where one singular there does not serve
 NULL_STEPS = 3
 HAIRS = (1e-8, 1e-6, 1e-4)  # of λ: how far beside it P is factorised
 STALLED = 1e-11  # and below which it ends as soon as changes do not become smaller
@@ -63,6 +64,20 @@ def two_sided(
             x = x - factor.solve(problem.applied(lam, x))
             y = y - factor.solve(problem.transposed.applied(lam, y), transpose=True)
     return Iterated(lam, x / np.linalg.norm(x), y / np.linalg.norm(y), complex(slope), size)
+
+
+def solved_beside(
+    problem: Quadratic, lam: complex, right: ComplexArray | None, left: ComplexArray | None, *,
+    solver: str | None = None,
+) -> Iterated | None:  # fmt: skip
+    """The same, P factorised ever further beside λ where it is singular nearer to it; None where it is at all of them,
+    too."""
+    for part in BESIDE:
+        try:
+            return two_sided(problem, lam, right, left, beside=part * lam, solver=solver)
+        except SingularMatrix:
+            continue
+    return None
 
 
 def null_vectors(problem: Quadratic, lam: complex) -> tuple[ComplexArray, ComplexArray] | None:

@@ -13,16 +13,14 @@ from typing import Literal
 
 import numpy as np
 
-from ...direct import SingularMatrix
 from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...threads import one_thread
-from ...typing import Array, ComplexArray
-from ..inverse_iteration import Iterated, two_sided
+from ...typing import Array
+from ..inverse_iteration import solved_beside
 from ..onset import Onsets
 from ..options import Options
 from ..quadratic.dense import unit
-from ..quadratic.problem import Quadratic
 from ..quadratic.reach import searched
 from ..results import ComplexModes, Progress
 from ..unfit import Unfit
@@ -37,7 +35,6 @@ from .search import search
 
 CONVERGED = 2e-11  # backward error at which a pair is taken as it is: eigenvalues are right to 1e-9 then
 STRAYED = 1e-3  # of λ: what is further from the model's eigenvalue is another one
-BESIDE = (1e-8, 1e-7, 1e-6, 1e-5)  # of λ: how far beside it the full problem is factorised
 
 
 def reduced_modes(
@@ -117,7 +114,7 @@ def _confirmed(
     lam[near] = better[near]
     residual = np.maximum(problem.backward_error(lam, right), problem.transposed.backward_error(lam, left))
     for k in np.flatnonzero(~(residual <= CONVERGED)):
-        solved = _solved(problem, complex(lam[k]), right[:, k], left[:, k], family.options.solver)
+        solved = solved_beside(problem, complex(lam[k]), right[:, k], left[:, k], solver=family.options.solver)
         if solved is None or abs(solved.lam - lam[k]) > STRAYED * abs(lam[k]):
             said = f"at {lam[k].imag / (2 * np.pi):.6g} Hz the reduced model has a mode that the full problem has not"
             raise Unfit(f"{said}, at μ = {mu:g}", band_hz)
@@ -130,14 +127,3 @@ def _confirmed(
     order, n = np.lexsort((lam.real, lam.imag)), family.freedoms
     lam, right, left = lam[order], unit(right[:n, order]), unit(left[:n, order])
     return ModesAtFriction(without_rounding(family, lam), right, left, residual[order], "")
-
-
-def _solved(
-    problem: Quadratic, lam: complex, right: ComplexArray, left: ComplexArray, solver: str | None
-) -> Iterated | None:
-    for part in BESIDE:
-        try:
-            return two_sided(problem, lam, right, left, beside=part * lam, solver=solver)
-        except SingularMatrix:
-            continue
-    return None
