@@ -23,7 +23,7 @@ from ..temporal.shapes import operating_shape
 from ..temporal.signals import Components, Growth, growth, low_passed, spectrum
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
-from ..threads import one_thread_if_small
+from ..threads import one_thread
 from ..typing import IntArray
 from .critical import compare_critical
 from .kept import Plain, Store, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
@@ -54,7 +54,7 @@ def chosen_parts(only: Collection[str] | None, *, critical: bool) -> set[str]:
     return set(only) | ({"growth"} if "run" in only else set())
 
 
-@one_thread_if_small
+@one_thread
 def compare(
     system: System,
     phases: Sequence[PhaseSpec],

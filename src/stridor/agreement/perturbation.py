@@ -26,7 +26,7 @@ from ..temporal.schedule import PhaseSpec
 from ..temporal.settings import Settings, choose_step
 from ..temporal.signals import components
 from ..temporal.simulate import plan, simulate
-from ..threads import one_thread_if_small
+from ..threads import one_thread
 from ..typing import Array, ComplexArray, IntArray, Sparse
 from .shapes import component_shape, node_rows
 from .small_motion import PERTURBATION, Perturbation, linear_part, whole
@@ -56,7 +56,7 @@ def modes_as_in_time(
     return modes_of_band(system, mu, max_frequency_hz, vectors="right", options=chosen)
 
 
-@one_thread_if_small
+@one_thread
 def perturb(
     system: System,
     mu: float,

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import CaseError
 from ..system import System
-from ..threads import one_thread_if_small
+from ..threads import one_thread
 from ..typing import Array
 from .options import Options
 from .results import UNSTABLE_RELATIVE, ComplexModes, Progress, grows
@@ -18,7 +18,7 @@ from .source import Asked, answered
 __all__ = ["UNSTABLE_RELATIVE", "ComplexModes", "Progress", "complex_modes", "grows"]
 
 
-@one_thread_if_small
+@one_thread
 def complex_modes(
     system: System,
     mu: float | Sequence[float] | Array,

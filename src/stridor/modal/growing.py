@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import AnalysisError
 from ..system import System
-from ..threads import one_thread_if_small
+from ..threads import one_thread
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .complex_modes import complex_modes
 from .full.growth import growing_roots
@@ -66,7 +66,7 @@ class Growing:
         return modes_grow(self.values)
 
 
-@one_thread_if_small
+@one_thread
 def growing_modes(
     system: System,
     mu: float,

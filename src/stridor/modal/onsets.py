@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import CaseError
 from ..system import System
-from ..threads import one_thread_if_small
+from ..threads import one_thread
 from .onset import Onset, Onsets
 from .options import Options
 from .source import Asked, answered
@@ -16,7 +16,7 @@ __all__ = ["Onset", "Onsets", "onsets"]
 FOLLOW = 1.1  # times the band: from where branches are followed
 
 
-@one_thread_if_small
+@one_thread
 def onsets(
     system: System,
     friction_range: tuple[float, float] = (0.0, 1.0),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..system import System
-from ..threads import one_thread_if_small
+from ..threads import one_thread
 from .beta2 import StepLimit, step_limit
 from .inputs import check_inputs
 from .march import Checkpoint, March, Progress
@@ -21,7 +21,7 @@ from .trajectory import Trajectory
 __all__ = ["Checkpoint", "Progress", "Settings", "plan", "simulate"]
 
 
-@one_thread_if_small
+@one_thread
 def simulate(
     system: System,
     phases: Sequence[PhaseSpec],

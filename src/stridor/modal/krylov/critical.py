@@ -16,7 +16,7 @@ import scipy.linalg as sl
 
 from ...errors import CaseError
 from ...system import System
-from ...threads import one_thread_if_small
+from ...threads import one_thread
 from ...typing import BoolArray, ComplexArray, IntArray
 from ..dense_problem import DenseProblem, Eigenpairs
 from ..histories import Entries, StabilityChange, reported, unexplained
@@ -45,7 +45,7 @@ NEIGHBOURS = 12  # eigenvectors that span the surroundings of an eigenvalue
 NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
 
 
-@one_thread_if_small
+@one_thread
 def krylov_onsets(
     system: System,
     friction_range: tuple[float, float] = (0.0, 1.0),

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import CaseError
 from ...system import System
-from ...threads import one_thread_if_small
+from ...threads import one_thread
 from ...typing import Array, BoolArray
 from ..options import Options
 from ..quadratic.reach import searched
@@ -24,7 +24,7 @@ from .refine import MARGIN, Band, converge_at, left_vectors, projected
 SAMPLES = 7
 
 
-@one_thread_if_small
+@one_thread
 def krylov_modes(
     system: System,
     mu: float | Sequence[float] | Array,
