@@ -1,12 +1,15 @@
 """The order of elimination that fills factors least: nested dissection by METIS, where it is installed.
 
-Minimum degree, which SciPy brings, fills the factors of solid meshes about twice as much and takes four times as long.
+Beside minimum degree, which SciPy brings, factors of thick meshes are smaller: 0.78 of the entries for a block of
+24 000 freedoms, 0.59 and less than a third of the time for a brake disc with its pad, 52 000 freedoms; of thin regular
+plates they are about the same.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -14,7 +17,7 @@ import scipy.sparse as sp
 
 from ..typing import IntArray, Sparse
 
-WORTHWHILE = 1500  # unknowns below which dissecting takes longer than it saves
+WORTHWHILE = 5000  # unknowns below which dissecting takes longer than it saves
 REMEMBERED = 6  # patterns: of one analysis, which factorises each many times
 
 _known: OrderedDict[bytes, IntArray] = OrderedDict()
@@ -29,7 +32,7 @@ def nested_dissection(matrix: Sparse) -> IntArray | None:
     if n < WORTHWHILE:
         return None
     try:
-        import pymetis
+        metis: Any = import_module("pymetis")
     except ImportError:
         return None
     csc = sp.csc_array(matrix)
@@ -39,14 +42,14 @@ def nested_dissection(matrix: Sparse) -> IntArray | None:
     if key in _known:
         _known.move_to_end(key)
         return _known[key]
-    order = _ordered(csc, pymetis)
+    order = _ordered(csc, metis)
     _known[key] = order
     if len(_known) > REMEMBERED:
         _known.popitem(last=False)
     return order
 
 
-def _ordered(matrix: Sparse, pymetis: Any) -> IntArray:
+def _ordered(matrix: Sparse, metis: Any) -> IntArray:
     n = matrix.shape[0]
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
     pattern = sp.csr_array(pattern + pattern.T + sp.eye_array(n))
@@ -57,8 +60,10 @@ def _ordered(matrix: Sparse, pymetis: Any) -> IntArray:
     graph = sp.csr_array(gather @ pattern @ gather.T)
     graph.setdiag(0)
     graph.eliminate_zeros()
-    adjacency = pymetis.CSRAdjacency(adj_starts=graph.indptr.astype(np.int32), adjacent=graph.indices.astype(np.int32))
-    new_to_old, _ = pymetis.nested_dissection(adjacency)
+    if not graph.nnz:  # nothing is coupled, or all with all: any order will do
+        return np.argsort(group, kind="stable")
+    adjacency = metis.CSRAdjacency(adj_starts=graph.indptr.astype(np.int32), adjacent=graph.indices.astype(np.int32))
+    new_to_old, _ = metis.nested_dissection(adjacency)
     rank = np.empty(count, dtype=np.int64)
     rank[np.asarray(new_to_old)] = np.arange(count)
     return np.argsort(rank[group], kind="stable")

@@ -13,6 +13,7 @@ from ...typing import Array, BoolArray, ComplexArray
 
 NEAR = (1.6, 4.0)  # modes up to this much above the band are solved for together: first try, second try
 SMALL = 1e-13
+HIDDEN = 0.3  # share of their stiffness that damping of modes far away may reach at the end of the band
 ANSWERS = 6
 FEW = 20  # modes that others' answers leave unsettled, solved for one by one
 OFF = 1e-10  # of λ: how far beside it is factorised, so that the matrix is not singular
@@ -113,7 +114,12 @@ def _with_damping(
     z, w = inner_right @ inner.right, inner_left @ inner.left
     z, w = z / np.linalg.norm(z, axis=0), w / np.linalg.norm(w, axis=0)
     # Answer of the modes further away: (λ²M + K)⁻¹ is a sum over modes.
-    weight = np.einsum("ij,ij->j", left[:, far], mass @ right[:, far])
+    weight = np.einsum("ij,ij->j", left, mass @ right)
+    top = reach * frequency
+    scale = np.where(finite, 1.0 / (np.sqrt(np.abs(weight)) * np.maximum(np.sqrt(np.abs(squares)), top)), 0.0)
+    if top * _coupling(damping, right[:, far] * scale[far], left * scale) > HIDDEN:
+        return None
+    weight = weight[far]
     number, open_modes = len(lam) + 1, np.ones(len(lam), dtype=bool)
     for _ in range(ANSWERS):
         inverse = 1.0 / ((lam**2 - squares[far, None]) * weight[:, None])
@@ -136,6 +142,19 @@ def _with_damping(
     if number and _unsettled(lam, z, w, matrices).any():
         return None
     return None if np.any(np.abs(lam) > reach * frequency * 1.001) else DenseModes(lam, z, w, whole=False)
+
+
+def _coupling(damping: Array, right: ComplexArray, left: ComplexArray) -> float:
+    """The norm of leftᵀ D right by a power iteration. Of modes scaled to unit stiffness, and far from the band: damping
+    as strong as that, dashpots beyond critical, would bring them into the band as others."""
+    x = np.random.default_rng(3).standard_normal((right.shape[1], 2)) + 0j
+    norm = 0.0
+    for _ in range(4):
+        x = x / np.maximum(np.linalg.norm(x, axis=0), 1e-300)
+        y = left.T @ (damping @ (right @ x))
+        norm = max(norm, float(np.linalg.norm(y, axis=0).max(initial=0.0)))
+        x = right.conj().T @ (damping.T @ (left.conj() @ y))
+    return norm
 
 
 def _unsettled(lam: ComplexArray, z: ComplexArray, w: ComplexArray, matrices: tuple[Array, Array, Array]) -> BoolArray:
