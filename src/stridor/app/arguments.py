@@ -6,6 +6,8 @@ import inspect
 import json
 import logging
 import os
+import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack, suppress
@@ -18,6 +20,7 @@ import typer
 
 from .. import interrupts
 from ..errors import AnalysisError, CaseError, StridorError
+from .heartbeat import beating
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -40,6 +43,9 @@ Set = Annotated[
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results [default: CASE.out].")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else there.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No log and no progress on stderr.")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", help="Say on stderr which methods are chosen and why, and every stage.")
+]
 Solver = Annotated[
     str | None,
     typer.Option(
@@ -188,10 +194,21 @@ class Call:
 
 
 def _common(
-    case: CaseFile, set_: Set = None, solver: Solver = None, out: Out = None, json: Json = False, quiet: Quiet = False
-) -> Call:
-    logging.getLogger("stridor").setLevel(logging.ERROR if quiet else logging.NOTSET)
-    return Call(case, set_, solver, out, json, quiet)
+    case: CaseFile, set_: Set = None, solver: Solver = None, out: Out = None, json: Json = False,
+    quiet: Quiet = False, verbose: Verbose = False,
+) -> Call:  # fmt: skip
+    if quiet and verbose:
+        raise CaseError("--verbose", None, "says what --quiet leaves out; take one of them")
+    log = logging.getLogger("stridor")
+    log.setLevel(logging.ERROR if quiet else logging.DEBUG if verbose else logging.NOTSET)
+    call = Call(case, set_, solver, out, json, quiet)
+    if verbose:
+        from .output import Log
+
+        handler = Log()
+        log.addHandler(handler)
+        call.stack.callback(log.removeHandler, handler)
+    return call
 
 
 def verb(
@@ -216,7 +233,8 @@ def verb(
                 writes=writes,
                 parts=parts,
             )
-            with call.stack:
+            width = shutil.get_terminal_size().columns
+            with beating(quiet=call.quiet, terminal=sys.stderr.isatty(), width=width), call.stack:
                 function(call, **given)  # type: ignore[call-arg]
             call.warn(call.idle)
             interrupts.check()

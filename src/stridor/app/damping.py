@@ -63,7 +63,7 @@ def damping_map(
 
 def _show(result: DampingMap) -> None:
     """The onsets over the grid, x downwards, y across, with letters where more of one of them lowers the onset."""
-    from .output import table
+    from .output import stdout, table
 
     nx, ny = result.onset_mu.shape
     if ny > WIDEST:
@@ -77,7 +77,7 @@ def _show(result: DampingMap) -> None:
     heads = ["x \\ y", *(f"{y:.4g}   " for y in result.y_values)]
     table(f"Lowest onset μ; x: {result.x}, y: {result.y}", heads, rows)
     if any(where.any() for _, where in lowers):
-        print("  x, y: more of it lowers the onset there")
+        stdout.print("  x, y: more of it lowers the onset there")
 
 
 def _words(result: DampingMap) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import time
 from collections.abc import Generator, Sequence
@@ -12,10 +13,22 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from .heartbeat import hush, silent
+
 BETWEEN_LINES = 10.0  # seconds
 
-stdout = Console(highlight=False, soft_wrap=True)
-stderr = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+class _Screen(Console):
+    """A console that takes back the line that says what is being computed before it prints."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        hush()
+        super().print(*objects, **options)
+
+
+stdout = _Screen(highlight=False, soft_wrap=True)
+stderr = _Screen(stderr=True, highlight=False, soft_wrap=True)
 
 
 def plain(value: Any) -> Any:
@@ -31,6 +44,7 @@ def plain(value: Any) -> Any:
 
 def print_json(document: dict[str, Any]) -> None:
     """One document, nothing else."""
+    hush()
     print(json.dumps(plain(document), indent=2, allow_nan=False, ensure_ascii=False), flush=True)
 
 
@@ -40,9 +54,25 @@ def say(text: str, *, quiet: bool) -> None:
         stderr.print(text, markup=False)
 
 
+class Log(logging.Handler):
+    """The log of the package as lines on stderr; of stages that differ in their numbers alone, the first."""
+
+    _before = ""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """One record."""
+        text = record.getMessage()
+        words = text[: next((k for k, c in enumerate(text) if c.isdigit()), len(text))]
+        if record.levelno > logging.DEBUG or words != self._before:
+            kind = "" if record.levelno == logging.DEBUG else f"{record.levelname.lower()}: "
+            stderr.print(kind + text, markup=False)
+        self._before = words
+
+
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table on stdout, right-aligned, never cut: it may go into a file as well as to a screen."""
     widths = [max(len(line[k]) for line in (columns, *rows)) for k in range(len(columns))]
+    hush()
     print(title)
     for line in (columns, *rows):
         print("  " + "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
@@ -64,7 +94,7 @@ def progress_bar(text: str, *, quiet: bool) -> Generator[Any, None, None]:
         console=stderr,
         transient=True,
     )
-    with bar:
+    with silent(), bar:
         task = bar.add_task(text, total=None)
 
         def advance(done: int, planned: int) -> None:
@@ -85,7 +115,8 @@ def counting(text: str, *, quiet: bool, worth: bool = True) -> Generator[Any, No
         with progress_bar(text, quiet=quiet) as progress:
             yield progress
     else:
-        yield _Lines(text)
+        with silent():
+            yield _Lines(text)
 
 
 class _Lines:

@@ -14,6 +14,7 @@ from ..io.atomic import replacing, write_text
 from ..io.vtk import write_vtk
 from ..modal.complex_modes import ComplexModes
 from ..sliding.surfaces import SurfaceSliding
+from ..stages import stage
 from ..study import analyses
 from ..study.workspace import Problem, Workspace
 from ..system import System
@@ -56,6 +57,7 @@ def _chosen(modes: ComplexModes, branches: Sequence[int] | None) -> IntArray:
 
 
 def _write_one(system: System, modes: ComplexModes, column: int, folder: Path, *, gif: bool) -> dict[str, Any]:
+    stage(f"drawing mode {modes.branch[column]}")
     from ..view.animation import animation_gif, animation_html
     from ..view.solid_plots import mode_shape
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from types import TracebackType
 from typing import Any
@@ -14,8 +15,11 @@ from ..typing import Array, ComplexArray, Sparse
 from .backends import choose, start
 from .interface import Backend, Breakdown
 
+_log = logging.getLogger("stridor")
+
 # Solvers keep a copy of the block they work on; wider blocks win nothing more.
 BLOCK = 64
+TOLD = 5000  # unknowns from which on the log speaks of factors
 BACKWARD_ERROR = 1e-14
 REFINEMENTS = 5
 # A matrix that a relative change of its entries of this size makes singular is singular for us.
@@ -219,6 +223,8 @@ def factorise(
             ratio, motion = 0.0, factor.unresisted()[1]
         except Breakdown as error:
             raise SingularMatrix("the matrix is singular: elimination meets a pivot of zero") from error
+    if held.shape[0] >= TOLD:
+        _log.info("%s: %d unknowns in %.1f s, %.0f MB", name, held.shape[0], factor.seconds, factor.memory_bytes / 1e6)
     if ratio < SINGULAR:
         factor.free()
         at = "" if motion is None else f"; nothing resists a motion of freedom {int(np.argmax(np.abs(motion)))}"

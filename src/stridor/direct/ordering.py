@@ -36,8 +36,8 @@ def nested_dissection(matrix: Sparse) -> IntArray | None:
     except ImportError:
         return None
     csc = sp.csc_array(matrix)
-    mark = hashlib.blake2b(np.ascontiguousarray(csc.indptr), digest_size=16)
-    mark.update(np.ascontiguousarray(csc.indices))
+    mark = hashlib.blake2b(csc.indptr.tobytes(), digest_size=16)
+    mark.update(csc.indices.tobytes())
     key = mark.digest()
     if key in _known:
         _known.move_to_end(key)

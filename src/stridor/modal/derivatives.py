@@ -25,6 +25,7 @@ import scipy.sparse as sp
 from ..direct import SingularMatrix, factorise
 from ..errors import AnalysisError, CaseError
 from ..sliding import steady_nodes
+from ..stages import stage
 from ..system import System
 from ..typing import Array, BoolArray, ComplexArray, IntArray, Sparse
 from .inverse_iteration import Iterated, two_sided
@@ -233,6 +234,7 @@ def solve_mode(pencil: Pencil, guess: complex, gap: float, *, solver: str | None
 
     Raises AnalysisError where two eigenvalues are one to working precision, or where the iteration goes elsewhere.
     """
+    stage(f"mode at {abs(guess.imag) / 6.283185307179586:.6g} Hz with both vectors")
     size = max(abs(guess), 1e-300)
     shift = float(np.clip(0.02 * gap, LEAST_SHIFT * size, MOST_SHIFT * size))
     widest = max(min(gap / 3, 1e-2 * size), 1.01 * shift)

@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from ..errors import AnalysisError
+from ..stages import stage
 from ..system import System
 from ..threads import one_thread
 from ..typing import Array, BoolArray, ComplexArray, IntArray
@@ -89,6 +90,7 @@ def growing_modes(
 def _searched_for(
     system: System, mu: float, max_frequency_hz: float, touching_at: float | None, damped: bool, options: Options
 ) -> Growing:
+    stage(f"growing modes sought anew at μ = {mu:.6g}")
     problem = problem_of(system if damped else system.undamped(), touching_at, options)
     whole = problem.pencil(mu).condensed()
     top = searched(whole, 2 * np.pi * max_frequency_hz)

@@ -11,6 +11,7 @@ source asked for by name is the only one. That all give the same is tested (`tes
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, TypeVar
@@ -29,6 +30,8 @@ from .receptance_modes import modes_by_receptance
 from .receptance_onsets import onsets_by_receptance
 from .results import ComplexModes, Progress
 from .unfit import Unfit
+
+_log = logging.getLogger("stridor")
 
 Answer = TypeVar("Answer", ComplexModes, Onsets)
 
@@ -227,8 +230,10 @@ def answered(
     *first, last = sources_for(system, asked.options.source)
     for source in first:
         try:
+            _log.info("source %s, the fastest that takes %d freedoms", source.name, system.size)
             return replace(ask(source, asked), source=source.name)
         except Unfit as error:
+            _log.info("source %s does not serve: %s", source.name, error)
             band = asked.max_frequency_hz
             if band is None and error.band_hz is None:
                 raise
@@ -237,9 +242,12 @@ def answered(
         except FollowingError as error:
             if not without_following or asked.max_frequency_hz is None or system.size > WHOLE:
                 raise
+            _log.info("source %s follows branches that cannot be told apart: %s", source.name, error)
             # What is the matter, without the advice, which is for those who get no answer.
             asked = replace(asked, count=None, unfollowed=str(error).partition(";")[0])
     try:
+        chosen = "asked for" if not first and asked.options.source else "which takes any matrices"
+        _log.info("source %s, %s", last.name, chosen)
         return replace(ask(last, asked), source=last.name)
     except Unfit as error:
         raise Unfit(f"source {last.name}: {error}; {_others(system)}") from error

@@ -18,6 +18,7 @@ from ..contact.multipliers import OPEN, SLIP
 from ..contact.nodes import ContactNodes
 from ..direct import SingularMatrix
 from ..errors import AnalysisError
+from ..stages import stage
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .equilibrium import Equilibrium, NodeState, find_touching
@@ -114,6 +115,7 @@ def steady_sliding_nodes(
     rubs = bool(np.any(coefficient[:, None] * sense))
     symmetric = not rubs and system.symmetric_definite
     sign, iterations = np.ones(nodes.count), 0
+    stage("steady sliding" if mu is None else f"steady sliding at μ = {mu:.6g}")
     for _ in range(SIGN_CHANGES):
         # Friction is μ|N| against the slip: where a contact kept closed pulls, it goes with −N.
         rubbing = (sign * coefficient)[:, None] * sense

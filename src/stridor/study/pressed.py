@@ -8,7 +8,7 @@ import numpy as np
 
 from ..case import Case
 from ..errors import AnalysisError
-from ..sliding import least_force, nothing_presses, steady_sliding_nodes
+from ..sliding import least_force, nothing_presses, steady_nodes, steady_sliding_nodes
 from ..system import System
 from ..typing import Array
 from .workspace import Workspace
@@ -87,13 +87,12 @@ def _net(system: System, factors: Mapping[str, float]) -> Array:
 def _press(case: Case, system: System, factors: Mapping[str, float], phase: int) -> bool:
     """Whether loads that do not cancel give a contact some force in steady sliding; yes where there is none, since
     bodies that fly or swing may meet."""
-    motions = case.velocity_factors()[phase]
+    motion = np.array([case.velocity_factors()[phase].get(name, 1.0) for name in system.motion.names])
     try:
-        steady = steady_sliding_nodes(
-            system,
-            load_factors=dict(factors),
-            motion_factors=np.array([motions.get(name, 1.0) for name in system.motion.names]),
-        )
+        if np.all(motion == 1.0) and all(factors.get(name, 1.0) == 1.0 for name in system.loads):
+            steady = steady_nodes(system)  # which others ask for as well
+        else:
+            steady = steady_sliding_nodes(system, load_factors=dict(factors), motion_factors=motion)
     except AnalysisError:
         return True
     return not nothing_presses(system, steady.normal_force)

@@ -16,6 +16,7 @@ from ..errors import CaseError
 from ..fe.solid import stress_stiffness
 from ..mesh.boundary import require_boundary
 from ..mesh.facets import facet_areas, pressure_load, traction_load
+from ..stages import stage
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody, build_bodies
 from .body_loads import body_load
@@ -35,6 +36,7 @@ def build_system(case: Case, mu: float | None = None) -> System:
 
     Raises CaseError where a mesh or a matrix will not do or bodies that shall touch do not.
     """
+    stage("matrices of the bodies")
     bodies = build_bodies(case, mu)
     total = sum(body.size for body in bodies.values())
     links = links_of(case, bodies, total)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..stages import stage
 from ..system import System
 from ..threads import one_thread
 from .beta2 import StepLimit, step_limit
@@ -49,6 +50,7 @@ def simulate(
     path does not take and a restart that does not fit, AnalysisError where motion blows up or a slave leaves its
     master; what was computed is then in the error's ``trajectory``.
     """
+    stage("time loop; the first one of a version is compiled for up to a minute")
     settings = settings_of_restart(settings or Settings(), restart)
     system = settings.system(system)
     check_inputs(

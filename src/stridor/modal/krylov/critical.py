@@ -15,6 +15,7 @@ import scipy
 import scipy.linalg as sl
 
 from ...errors import CaseError
+from ...stages import stage
 from ...system import System
 from ...threads import one_thread
 from ...typing import BoolArray, ComplexArray, IntArray
@@ -76,6 +77,7 @@ def krylov_onsets(
     way = _way(reduced, (low, high), top)
     changes: list[StabilityChange] = []
     for passage in way.passages:
+        stage(f"onset {len(changes) + 1}, solved in the full problem")
         concerned = (passage.branch, passage.partner) if passage.kind == "meeting" else (passage.branch,)
         # What begins beyond the band counts where it comes into it.
         matters = not passage.stabilising and way.entries.after(concerned, passage.low, np.inf) is not None

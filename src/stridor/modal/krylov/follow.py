@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from ...stages import stage
 from ...typing import Array, BoolArray, ComplexArray, IntArray
 from ..dense_problem import Eigenpairs, OverNumber
 from ..meeting import beyond
@@ -96,6 +97,7 @@ class Follower:
             step = min(self._step, self.longest)
             # No sliver is left over for rounding to make.
             step = left if left <= 1.01 * step else step
+            stage(f"branches followed from μ = {self.state.mu:.6g}, to {mu:.6g}")
             found = self.source.eigenpairs(mu if step == left else self.state.mu + step)
             if step < left and _coincide(self.state, found):
                 # Where modes cross or meet they are known least: a little before it they tell which is which.

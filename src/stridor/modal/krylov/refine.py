@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from ...direct import factorise
 from ...errors import AnalysisError, FollowingError
+from ...stages import stage
 from ...typing import Array, BoolArray, ComplexArray, IntArray, Sparse
 from ..dense_problem import Eigenpairs
 from ..pencil import tiny
@@ -101,6 +102,7 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
     for _ in range(SWEEPS):
         if not pending:
             break
+            stage(f"modes at {len(pending)} friction coefficients, {reduced.count} unknowns")
         for mu in list(pending):
             worst[mu], force, opening = unbalanced(reduced, mu, tolerance, left=left)
             if not force.shape[1] and not opening.shape[1]:

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from ...direct import Factor, factorise
 from ...errors import AnalysisError
+from ...stages import stage
 from ...typing import Array
 from .problem import ContactProblem
 
@@ -126,6 +127,7 @@ def frictionless_modes(shifted: Shifted, enough: Callable[[Array, int], bool]) -
     Block Lanczos with every vector kept: one block solve brings BLOCK vectors, and multiple frequencies come as they
     are. ``enough`` is asked with all converged ω² below the first that is not, and the number of vectors so far.
     """
+    stage("modes without friction")
     mass = shifted.problem.mass
     empty = ForcedShapes(np.zeros((shifted.problem.size, 0)), np.zeros((0, 0)))
     block, _ = orthonormal(shifted.problem, empty, _start(shifted))

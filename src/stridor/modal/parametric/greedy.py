@@ -17,6 +17,7 @@ import scipy.linalg as sl
 
 from ...direct import Factor
 from ...errors import AnalysisError
+from ...stages import stage
 from ...typing import Array, ComplexArray, IntArray, Sparse
 from .basis import Basis, real_and_imaginary
 from .dense import DenseModes, assembled, dense_modes
@@ -90,6 +91,7 @@ class Greedy:
                     failing.append((point, found, error))
                 else:
                     self.passed.append((point, found))
+            stage(f"reduced model: {len(failing)} of {len(pending)} points to be answered, {self.basis.count} unknowns")
             if not failing:
                 return
             self._answer(failing)

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 
 from ...direct import Factor, factorise
 from ...errors import AnalysisError, CaseError
+from ...stages import stage
 from ...threads import one_thread
 from ...typing import Array, IntArray, Sparse
 from .basis import Basis, Indefinite
@@ -51,6 +52,7 @@ def reduce(
     frequency = 2 * np.pi * max_frequency_hz
     work = Work()
     mass, stiffness = symmetric_parts(problem)
+    stage(f"reduced model of {problem.size} freedoms: factors and modes at rest")
     operator, scale = static_operator(mass, stiffness, frequency)
     embedding = embedding_of(problem.size, scale)
     with factorise(operator, symmetric=True, solver=solver) as factor:

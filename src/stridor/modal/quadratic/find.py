@@ -12,6 +12,7 @@ import numpy as np
 
 from ...direct import Factor, SingularMatrix, factorise
 from ...errors import AnalysisError
+from ...stages import stage
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from .count import undamped_count, unknown
@@ -269,6 +270,7 @@ class _Run:
         """One factorisation, and all it gives."""
         problem, rng = self.problem, np.random.default_rng(3)
         for _ in range(MOVES):
+            stage(f"all modes around {abs(shift) / 6.283185307179586:.4g} Hz, {problem.size} unknowns")
             radius = MARGIN * cell.farthest(shift)
             try:
                 factor = factorise(problem.at(complex(shift)), solver=self.solver)

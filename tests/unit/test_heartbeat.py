@@ -1,0 +1,119 @@
+"""What a verb is at is told while it is silent, and never where something else is printed."""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import stridor
+from stridor.app import heartbeat, output
+from stridor.app.cli import app
+from stridor.app.heartbeat import ERASED, Heartbeat, beating, hush, silent
+from stridor.errors import CaseError
+from stridor.stages import _listeners, heard, stage
+
+TEMPLATE = Path(stridor.__file__).parent / "case" / "templates" / "two-beams.toml"
+
+
+@pytest.fixture(autouse=True)
+def fast(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, seconds in (("PATIENCE", 0.02), ("BETWEEN_LINES", 0.05), ("REDRAWN", 0.01)):
+        monkeypatch.setattr(heartbeat, name, seconds)
+
+
+def test_lines_in_a_log_say_stage_and_time(capsys: pytest.CaptureFixture[str]) -> None:
+    with beating(quiet=False, terminal=False, width=80):
+        time.sleep(0.1)  # nothing has begun: nothing is said
+        stage("steady sliding at μ = 0.3")
+        time.sleep(0.2)
+    said = capsys.readouterr()
+    assert said.out == ""
+    lines = said.err.splitlines()
+    assert 2 <= len(lines) <= 4
+    assert all(line.endswith("s: steady sliding at μ = 0.3, for 0 s") for line in lines)
+    assert not _listeners
+
+
+def test_a_terminal_has_one_line_that_is_taken_back(capsys: pytest.CaptureFixture[str]) -> None:
+    with beating(quiet=False, terminal=True, width=30):
+        stage("modes without friction of a structure")
+        time.sleep(0.1)
+        output.stdout.print("result")
+        time.sleep(0.1)  # printed: no word until the next stage
+    said = capsys.readouterr()
+    assert said.out == "result\n"
+    drawn = said.err.split(ERASED)
+    assert said.err.endswith(ERASED)
+    assert set(drawn[1:-1]) == {"0 s: modes without friction o"}  # never beyond the edge
+
+
+@pytest.mark.parametrize("inner", ["quiet", "bar", "hushed"])
+def test_nothing_where_it_would_disturb(inner: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with beating(quiet=inner == "quiet", terminal=False, width=80):
+        if inner == "bar":
+            with silent():
+                stage("time loop")
+                time.sleep(0.15)
+        else:
+            stage("time loop")
+            hush()
+            time.sleep(0.15)
+    assert capsys.readouterr().err == ""
+
+
+def test_an_error_ends_it_and_a_closed_stderr_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails() -> None:
+        with beating(quiet=False, terminal=True, width=80):
+            stage("assembling")
+            raise ValueError("model")
+
+    with pytest.raises(ValueError, match="model"):
+        fails()
+    assert not _listeners
+    assert not heartbeat._beating
+
+    class Closed:
+        def write(self, text: str) -> None:
+            raise BrokenPipeError
+
+    monkeypatch.setattr("sys.stderr", Closed())
+    beat = Heartbeat(terminal=False)
+    beat.at("assembling")
+    beat._thread.join(timeout=5)
+    assert not beat._thread.is_alive()
+    beat.end()
+
+
+def test_stages_go_to_listeners_and_to_the_log(caplog: pytest.LogCaptureFixture) -> None:
+    found: list[str] = []
+    with caplog.at_level(logging.DEBUG, logger="stridor"):
+        with heard(found.append):
+            stage("one")
+        stage("two")
+    assert found == ["one"]
+    assert [r.getMessage() for r in caplog.records] == ["one", "two"]
+
+
+def test_verbose_says_what_was_chosen_and_stages_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = logging.getLogger("stridor")
+    monkeypatch.setattr(log, "handlers", [])
+    monkeypatch.setattr(log, "level", log.level)
+    monkeypatch.setattr(output, "stderr", output._Screen(stderr=True, soft_wrap=True, highlight=False))
+    words = ["modes", str(TEMPLATE), "--mu", "0.2", "--json", "--verbose", "--out", str(tmp_path)]
+    found = CliRunner().invoke(app, words, catch_exceptions=False)
+    assert json.loads(found.stdout)["mu"] == [0.2]
+    assert "info: source receptance, the fastest that takes " in found.stderr
+    assert found.stderr.count("growing modes sought anew") == 1
+    handler = output.Log()
+    for text in ("branches at 0.1", "branches at 0.2", "modes"):
+        handler.emit(logging.LogRecord("stridor", logging.DEBUG, "", 0, text, None, None))
+    assert capsys.readouterr().err.splitlines()[-2:] == ["branches at 0.1", "modes"]
+    with pytest.raises(CaseError, match="--verbose: says what --quiet leaves out; take one of them"):
+        CliRunner().invoke(app, [*words, "--quiet"], catch_exceptions=False)
