@@ -56,6 +56,19 @@ def test_a_step_that_begins_where_they_meet(low, turned):
         assert told == Beyond(exchanged=turned, sure=True)
 
 
+@pytest.mark.parametrize("beside", [1e-10, 1e-9, 3e-9])
+@pytest.mark.parametrize("first", [True, False])
+def test_one_that_meets_its_own_conjugate_exchanges_no_name(beside, first):
+    """It falls apart on the real axis with a slope that knows no bounds, and the other passes by as if nothing were."""
+    apart, middle, rate = 7e9, 10861.0 + 0j, -2e4 + 3e4j
+    mus = np.array([0.3 - beside, 0.3 + 1e-9])
+    mine = middle + np.sqrt(apart * (mus - 0.3) + 0j)
+    other = 6917.0 + 9575j + rate * (mus - 0.3)
+    values = [(m, o) if first else (o, m) for m, o in zip(mine, other, strict=True)]
+    by_mu = [(apart / (2 * (m - middle)), rate) if first else (rate, apart / (2 * (m - middle))) for m in mine]
+    assert beyond(values[0], by_mu[0], values[1], by_mu[1], float(mus[1] - mus[0])) is None
+
+
 @pytest.mark.parametrize("zero", [0.3 + 2e-3j, 0.3 - 2e-3j, 0.3 + 5e-4j])
 @pytest.mark.parametrize("bend", [0.0, 0.4 - 0.3j])
 def test_beside_a_meeting_names_go_along_the_real_axis(zero, bend):

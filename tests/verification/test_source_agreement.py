@@ -15,6 +15,7 @@ from rubbing_block import rubbing_block
 from stridor.case import template_text
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.full.basis import DECAY
+from stridor.modal.growing import checked_onsets
 from stridor.modal.options import Options
 from stridor.modal.over_friction import modes_of_band, onsets_of_band
 from stridor.modal.source import SOURCES, sources_for
@@ -115,6 +116,25 @@ def test_random_benches_by_every_source(seed):
     ]  # fmt: skip
     slaves = [replace(s, stiffness="rigid" if np.isinf(s.stiffness) else float(s.stiffness), end=str(s.end)) for s in slaves]
     assert_same(bench(*slaves), NAMES, end=0.8)
+
+
+def test_a_mode_that_falls_apart_on_the_real_axis_leaves_others_their_names():
+    """At μ = 0.4065 one of a flutter pair meets its conjugate; another pair is near. Of its halves branches lead to one, and
+    the other is no mode that is lacking, but where onsets do not say how many roots grow."""
+    slave = Slave(
+        place=0.5395834615, lean_deg=9.1741467929, length=0.0384246998, thickness=0.0010827249, stiffness="rigid", end="clamped"
+    )
+    system = bench(slave)
+    found = {name: onsets_of_band(system, (0.0, 0.8), BAND, options=Options(source=name)) for name in NAMES[:2]}
+    for answer in found.values():
+        assert [o.branches for o in answer.onsets] == [(9, 10), (1, 2), (5, 6), (5, 6)]
+        assert answer.complete
+        assert sum(not lam.imag for lam in answer.at_end) == 2
+    krylov = found["krylov"]
+    lossy = replace(krylov, onsets=krylov.onsets[1:], at_end=tuple(v for v in krylov.at_end if v.imag or v.real > 1e4))
+    assert checked_onsets(system, replace(lossy, onsets=krylov.onsets), damped=True, follow=()).complete
+    told = checked_onsets(system, lossy, damped=True, follow=()).completeness
+    assert "no branch was seen to lead to 0 Hz (+1124 1/s) at μ = 0.8" in told
 
 
 @pytest.mark.slow

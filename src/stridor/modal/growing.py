@@ -227,7 +227,7 @@ def checked_onsets(
     except AnalysisError as error:
         return replace(found, completeness=f"{UNCHECKED}: {error}.")
     for wider in follow:
-        if not len(_not_in(ends[1], found.at_end)) and not found.unexplained:
+        if not len(_unled(found, *ends)[1]) and not found.unexplained:
             break
         try:
             found = onsets(
@@ -250,13 +250,29 @@ def _not_in(found: Growing, known: tuple[complex, ...]) -> IntArray:
     return missing(found, values, np.ones(len(values), dtype=bool))
 
 
+def _unled(found: Onsets, start: Growing, end: Growing) -> list[ComplexArray]:
+    """Growing modes at both ends that no branch leads to. Of a branch that has fallen apart on the real axis the other
+    half is led to as well, where as many roots grow as the onsets say."""
+    whole = found.followed is not None and not _roots_amiss(found, start, end)
+    result: list[ComplexArray] = []
+    for k, (growing, known) in enumerate(((start, found.at_start), (end, found.at_end))):
+        lacking = growing.values[_not_in(growing, known)]
+        if whole and found.followed is not None:
+            branches = found.followed[k][1]
+            fallen = (branches.imag == 0) & (branches.real > AT_REST * growing.top)
+            if np.count_nonzero(lacking.imag == 0) <= np.count_nonzero(fallen):
+                lacking = lacking[lacking.imag != 0]
+        result.append(lacking)
+    return result
+
+
 def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
     """What the full problem says of both ends, beside the onsets."""
     low, high = found.friction_range
     numbers = f"{start.words} at μ = {low:g} and {end.words} at μ = {high:g}, sought anew in the full problem"
     wrong: list[str] = []
-    for growing, known, mu in ((start, found.at_start, low), (end, found.at_end, high)):
-        lacking = growing.values[_not_in(growing, known)]
+    sides = zip((start, end), (found.at_start, found.at_end), (low, high), _unled(found, start, end), strict=True)
+    for growing, known, mu, lacking in sides:
         values = np.array(known, dtype=complex)
         extra = unconfirmed(growing, values, np.ones(len(values), dtype=bool))
         if len(lacking):

@@ -16,6 +16,7 @@ from ..typing import ComplexArray
 
 MET = 1e-6  # of μ: how far off the real axis modes may meet that count as meeting on it
 AT_IT = 1e-5  # of μ: how near a step may end to a meeting and be said to end there
+OPPOSITE = 0.5  # of their difference: the sum of the slopes of two modes beside the place where they meet, at most
 FAINT = 1e-12  # of the largest coefficient: one that says nothing
 KNOWN = 1e-3  # of a step: how well the cubic knows how far off the axis its zero is
 SHORT = 1e-4  # of μ: steps in which it is known to better than MET
@@ -44,8 +45,10 @@ def beyond(
     slope, slope_to = before * (old_slopes[0] - old_slopes[1]), after * (new_slopes[0] - new_slopes[1])
     if not (np.isfinite(slope) and np.isfinite(slope_to)):
         return None
-    # A step that ended where they meet has left the names to the next.
-    from_there = abs(square) <= AT_IT * abs(slope) and abs(square) < abs(square_to)
+    # A step that ended where they meet has left the names to the next. Both slopes are beyond all bounds there, and
+    # their sum is not; one alone is where that mode meets its own conjugate.
+    each_other = abs(old_slopes[0] + old_slopes[1]) <= OPPOSITE * abs(old_slopes[0] - old_slopes[1])
+    from_there = each_other and abs(square) <= AT_IT * abs(slope) and abs(square) < abs(square_to)
     if not ((square_to * square.conjugate()).real < 0 or from_there):
         return None
     zeros = _zeros(square, square_to, step * slope, step * slope_to)
