@@ -9,6 +9,7 @@ import pytest
 import scipy.sparse as sp
 
 from stridor import direct
+from stridor.direct import factor
 from stridor.errors import AnalysisError, CaseError
 
 solvers = pytest.mark.parametrize("solver", direct.available())
@@ -184,3 +185,18 @@ def test_a_missing_package_says_how_to_install_it(monkeypatch):
         direct.factorise(plate(), solver="mumps")
     with pytest.raises(CaseError, match=r"pip install \"stridor\[pardiso\]\""):
         direct.factorise(plate(), solver="pardiso")
+
+
+def test_what_is_faster_than_superlu_is_said_once_where_it_is_slow(monkeypatch, caplog):
+    matrix = sp.csr_array(sp.diags_array(np.arange(1.0, 9.0)))
+    factor._say_what_is_faster.cache_clear()
+    direct.factorise(matrix, solver="superlu")
+    assert not caplog.records
+    monkeypatch.setattr(factor, "SLOW", -1.0)
+    monkeypatch.setattr(factor, "installed", lambda _: False)
+    for _ in range(2):
+        direct.factorise(matrix, solver="superlu")
+    (said,) = caplog.records
+    assert said.levelname == "WARNING"
+    assert 'MUMPS takes about a third: pip install "stridor[mumps]"' in said.getMessage()
+    factor._say_what_is_faster.cache_clear()

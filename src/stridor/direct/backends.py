@@ -17,7 +17,8 @@ VARIABLE = "STRIDOR_SOLVER"
 PACKAGES = {
     "mumps": (
         ("mumps",),
-        'pip install "stridor[mumps]" (on Debian after apt install libmumps-seq-dev gfortran pkg-config)',
+        'pip install "stridor[mumps]" (on Debian after apt install libmumps-seq-dev libopenblas-dev gfortran '
+        "pkg-config)",
     ),
     "pardiso": (("pypardiso",), 'pip install "stridor[pardiso]"'),
     "superlu": (("scipy",), "comes with SciPy"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from functools import cache
 from types import TracebackType
 from typing import Any
 
@@ -12,13 +13,14 @@ import scipy.sparse as sp
 
 from ..errors import AnalysisError
 from ..typing import Array, ComplexArray, Sparse
-from .backends import choose, start
+from .backends import PACKAGES, choose, installed, start
 from .interface import Backend, Breakdown
 
 _log = logging.getLogger("stridor")
 
 # Solvers keep a copy of the block they work on; wider blocks win nothing more.
 BLOCK = 64
+SLOW = 10.0  # seconds for one factorisation by SuperLU, from which on it is said what would be faster
 TOLD = 5000  # unknowns from which on the log speaks of factors
 BACKWARD_ERROR = 1e-14
 REFINEMENTS = 5
@@ -225,11 +227,19 @@ def factorise(
             raise SingularMatrix("the matrix is singular: elimination meets a pivot of zero") from error
     if held.shape[0] >= TOLD:
         _log.info("%s: %d unknowns in %.1f s, %.0f MB", name, held.shape[0], factor.seconds, factor.memory_bytes / 1e6)
+    if name == "superlu" and factor.seconds > SLOW and not installed("mumps"):
+        _say_what_is_faster()
     if ratio < SINGULAR:
         factor.free()
         at = "" if motion is None else f"; nothing resists a motion of freedom {int(np.argmax(np.abs(motion)))}"
         raise SingularMatrix(f"the matrix is singular to working precision{at}", motion)
     return factor
+
+
+@cache
+def _say_what_is_faster() -> None:
+    """Once in a process: a block of 95 000 freedoms takes MUMPS 7.5 s where SuperLU takes 25 s (docs/validation.md)."""
+    _log.warning("SuperLU is slow on matrices as large as these; MUMPS takes about a third: %s", PACKAGES["mumps"][1])
 
 
 def _largest(matrix: Sparse) -> tuple[Array, Array]:
