@@ -7,6 +7,7 @@ import pytest
 import stridor as st
 from stridor.case import Case, loads, template_text
 from stridor.errors import AnalysisError, CaseError
+from stridor.sliding import surfaces
 
 MASS = """
 [bodies.m]
@@ -113,6 +114,18 @@ def test_supports_that_take_the_freedoms_are_named() -> None:
             call(case)
         who = "contacts.A, contacts.B, supports.under, supports.below"
         assert str(caught.value) == f"{TWICE}1 of the 2 conditions of rigid contact follows from the others ({who}){TAIL}"
+
+
+def test_they_are_named_where_rounding_keeps_the_touching_nodes_from_settling(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a solver makes of a singular matrix is rounding, which differs between libraries."""
+
+    def unsettled(*_: object) -> None:
+        raise AnalysisError("steady sliding: the set of touching nodes does not settle")
+
+    monkeypatch.setattr(surfaces, "find_touching", unsettled)
+    for normals, said in (([(0.0, 1.0)] * 2, TWICE), ([(0.0, 1.0)], "steady sliding: the set of touching nodes")):
+        with pytest.raises(AnalysisError, match=f"^{said}"):
+            st.steady_sliding(loads(flats(*normals)))
 
 
 def test_a_contact_that_cannot_move_along_its_normal_is_refused() -> None:

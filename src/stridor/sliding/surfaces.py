@@ -125,6 +125,11 @@ def steady_sliding_nodes(
             state, tried = find_touching(equilibrium, guess) if held is None else (equilibrium.solve(held), 1)
         except SingularMatrix as error:
             raise AnalysisError(_loose(system, nodes, error.motion)) from error
+        except AnalysisError as error:
+            # Forces that no equation tells are rounding: which nodes seem to pull changes from step to step.
+            if twice := redundant(system, nodes, nodes.compliance == 0.0):
+                raise AnalysisError(twice) from error
+            raise
         iterations += tried
         found = np.where(nodes.kept & (state.normal_force < 0.0), -1.0, 1.0)
         if not rubs or np.array_equal(found, sign):
