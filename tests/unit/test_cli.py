@@ -256,7 +256,7 @@ def test_run_writes_a_self_contained_report(folder: Path) -> None:
         (
             ("onsets", "two-beams.toml", "--range", "1:0"),
             2,
-            "stridor: friction_range: [1.0, 0.0] – two numbers 0 ≤ a < b",
+            "stridor: --range: '1:0' – low:high, two friction coefficients 0 ≤ low < high",
         ),
         (
             ("simulate", "two-beams.toml", "--set", "temporal.step=3e-8"),

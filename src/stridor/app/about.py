@@ -8,7 +8,9 @@ from typing import Annotated
 import typer
 
 from ..errors import CaseError
-from .arguments import Call, Json, Quiet, Set, one_of, verb
+from .arguments import Call, verb
+from .option_table import Force, Json, Mu, Out, Quiet, Set
+from .values import one_of
 
 CaseOrMatrix = Annotated[
     Path, typer.Argument(metavar="CASE|FILE", help="Case file (TOML), or one matrix file.", show_default=False)
@@ -17,10 +19,8 @@ CaseOrMatrix = Annotated[
 
 def new(
     template: Annotated[str, typer.Argument(metavar="TEMPLATE", help="Name of a template, e.g. two-beams.")],
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder to write into [default: here].")
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    out: Out = None,
+    force: Force = False,
     set_: Set = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -108,22 +108,19 @@ def export(
     format_: Annotated[
         str, typer.Option("--format", metavar="mtx|npz|mat|op4", help="Matrix Market, NumPy, MATLAB, Nastran OUTPUT4.")
     ] = "mtx",
-    mu: Annotated[
-        float | None,
-        typer.Option("--mu", min=0.0, help="μ of the contact and friction in K [default: in terms of their own]."),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the files of an earlier export.")] = False,
+    mu: Mu = None,
+    force: Force = False,
 ) -> None:
     """Write mass, damping and stiffness as files, with loads, rows of contacts, a table of freedoms, and a case file on
-    these matrices."""
+    these matrices. With --mu contact and friction are in K, without it in terms of their own."""
     work = call.workspace()
 
     from ..io.export import export as write
     from ..io.matrix_files import FORMATS
     from .output import stdout, table
 
-    call.check_friction(mu)
-    written = write(work, call.folder, format=one_of(format_, "--format", FORMATS), mu=mu, force=force)
+    friction = call.one_friction(mu)
+    written = write(work, call.folder, format=one_of(format_, "--format", FORMATS), mu=friction, force=force)
     call.warn(written.notes)
     for path in written.files:
         call.say(f"written: {path}")

@@ -21,6 +21,8 @@ import typer
 from .. import interrupts
 from ..errors import AnalysisError, CaseError, StridorError
 from .heartbeat import beating
+from .option_table import Json, Out, Quiet, Set, Solver, Verbose
+from .values import INFINITY, numbers, pair
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -28,42 +30,9 @@ if TYPE_CHECKING:
     from ..io.datasets import Result
     from ..study.workspace import Workspace
 P = ParamSpec("P")
-INFINITY = float("inf")
 INCOMPLETE = 3  # exit code: what was checked says that something may be missing from what was printed
 
 CaseFile = Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML).", show_default=False)]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Change a value of the case, e.g. contacts.A.friction.coefficient=0.3. Repeatable.",
-    ),
-]
-Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for results [default: CASE.out].")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else there.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="No log and no progress on stderr.")]
-Verbose = Annotated[
-    bool, typer.Option("--verbose", help="Say on stderr which methods are chosen and why, and every stage.")
-]
-Solver = Annotated[
-    str | None,
-    typer.Option(
-        "--solver",
-        metavar="NAME",
-        help="Sparse direct solver: mumps, pardiso, superlu; slepc for all processes of mpiexec [default: the case's].",
-    ),
-]
-Source = Annotated[
-    str | None,
-    typer.Option(
-        "--source",
-        metavar="NAME",
-        help="Where eigenpairs come from: receptance, krylov, reduced, full [default: modal.source, what suits].",
-    ),
-]
-Undamped = Annotated[bool, typer.Option("--undamped", help="Leave structural damping out.")]
-
 
 @dataclass(frozen=True)
 class Call:
@@ -94,19 +63,35 @@ class Call:
         if self.writes or self.out is not None:
             self.stack.enter_context(claimed(self.folder, self.parts))
 
-    def case(self, source: str | None = None) -> Case:
+    def case(self, **asked: Any) -> Case:
         """The case of `workspace`."""
-        return self.workspace(source).case(self.verb)
+        return self.workspace(**asked).case(self.verb)
 
-    def workspace(self, source: str | None = None) -> Workspace:
+    def workspace(
+        self,
+        source: str | None = None,
+        max_frequency: float | None = None,
+        friction_range: str | None = None,
+        *,
+        undamped: bool = False,
+    ) -> Workspace:
         """The case in the file with overrides, its warnings printed and its folder claimed; settings without effect are
-        told with the results. source: another modal.source. Raises CaseError.
+        told with the results. source, max_frequency [Hz], friction_range ("low:high"), undamped: options that stand for
+        a setting of [modal], which the case then has. Raises CaseError.
 
         A verb asks for it before it imports what it computes with: what is wrong with the file is said at once."""
         from ..case import load
 
         named = {"solver": self.solver, "source": source}
         own = [f"modal.{key}={json.dumps(name)}" for key, name in named.items() if name is not None]
+        if max_frequency is not None:
+            if not 0.0 < max_frequency < INFINITY:
+                raise CaseError("--max-frequency", max_frequency, "a highest frequency is a finite number > 0 [Hz]")
+            own.append(f"modal.max_frequency_hz={max_frequency!r}")
+        if friction_range is not None:
+            own.append(f"modal.friction_range={list(self.range_of_friction(friction_range))}")
+        if undamped:
+            own.append("modal.damped=false")
         case = load(self.path, [*(self.set_ or ()), *own])
         if self.solver is not None and self.solver != "auto":
             os.environ["STRIDOR_SOLVER"] = self.solver
@@ -151,6 +136,24 @@ class Call:
             if not 0.0 <= value < INFINITY:
                 raise CaseError(where, value, "a friction coefficient is a finite number ≥ 0")
             self.warn([friction_oddity(where, value)])
+
+    def range_of_friction(self, text: str, where: str = "--range") -> tuple[float, float]:
+        """Two friction coefficients from "low:high", of which unusual ones are told. Raises CaseError."""
+        low, high = pair(text, where)
+        if not 0.0 <= low < high < INFINITY:
+            raise CaseError(where, text, "low:high, two friction coefficients 0 ≤ low < high")
+        self.check_friction((low, high), where)
+        return low, high
+
+    def one_friction(self, text: str | None) -> float | None:
+        """The friction coefficient of --mu where a verb takes one; unusual ones are told. Raises CaseError."""
+        values = None if text is None else numbers(text, "--mu")
+        if values is None:
+            return None
+        if len(values) > 1:
+            raise CaseError("--mu", text, f"one friction coefficient for {self.verb}; modes and compare take several")
+        self.check_friction(values)
+        return values[0]
 
     @property
     def folder(self) -> Path:
@@ -247,43 +250,3 @@ def verb(
         return called
 
     return made
-
-
-def numbers(text: str, name: str, *, least: float = 0.0) -> list[float]:
-    """Numbers from "0.1", "0.1,0.2" or "start:stop:count", none below ``least``. Raises CaseError."""
-    accepted = "a number, numbers with commas, or start:stop:count"
-    if least > -INFINITY:
-        accepted += f", each number ≥ {least:g}"
-    try:
-        if ":" in text:
-            start, stop, count = text.split(":")
-            amount = int(count)
-            if amount < 1 or amount > 1_000_000:
-                raise ValueError
-            low, high = float(start), float(stop)
-            step = (high - low) / max(amount - 1, 1)
-            values = [low + k * step for k in range(amount)]
-        else:
-            values = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise CaseError(name, text, accepted) from None
-    if not all(least <= v < INFINITY and v > -INFINITY for v in values):
-        raise CaseError(name, text, accepted)
-    return values
-
-
-def one_of(text: str, name: str, accepted: tuple[str, ...]) -> str:
-    """The text, one of some words. Raises CaseError."""
-    if text not in accepted:
-        raise CaseError(name, text, " or ".join(accepted))
-    return text
-
-
-def pair(text: str, name: str) -> tuple[float, float]:
-    """Two numbers from "low:high". Raises CaseError."""
-    parts = text.split(":")
-    try:
-        low, high = (float(p) for p in parts)
-    except ValueError:
-        raise CaseError(name, text, "two numbers, low:high") from None
-    return low, high

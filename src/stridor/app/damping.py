@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..digits import measured
-from .arguments import Call, pair, verb
+from .arguments import Call, verb
+from .option_table import MaxFrequency, Range, Source
+from .values import pair
 
 if TYPE_CHECKING:
     from ..study.damping_map import DampingMap
@@ -33,9 +35,12 @@ def damping_map(
             "solved again in the full problem; auto: reduced where that is faster and possible.",
         ),
     ] = "auto",
+    friction_range: Range = None,
+    max_frequency: MaxFrequency = None,
+    source: Source = None,
 ) -> None:
     """The lowest onset over two dampings, and where more damping lowers it."""
-    loaded = call.case()
+    loaded = call.case(source=source, max_frequency=max_frequency, friction_range=friction_range)
 
     from ..io.atomic import replacing
     from ..study.damping_map import damping_map as solve

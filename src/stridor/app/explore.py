@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..errors import CaseError
 from .arguments import Call, verb
 from .damping import damping_map
+from .option_table import Band, Branch, MaxFrequency, Mu, Source, Undamped
 from .reduce import reduce
+from .values import band_of
 
 if TYPE_CHECKING:
     from ..view.tables import Table
 
-Friction = Annotated[float | None, typer.Option("--mu", help="Friction coefficient [default: the case's own].")]
-Branch = Annotated[int | None, typer.Option("--branch", help="One branch only [default: all unstable ones].")]
 
 
 @verb()
@@ -24,18 +25,22 @@ def sensitivities(
         list[str] | None,
         typer.Option("--parameter", metavar="PATH", help="A number of the case, or mu. Repeatable [default: mu]."),
     ] = None,
-    mu: Friction = None,
+    mu: Mu = None,
     branch: Branch = None,
+    band: Band = None,
+    max_frequency: MaxFrequency = None,
+    undamped: Undamped = False,
+    source: Source = None,
 ) -> None:
     """What a per cent of any number of the case does to each mode's growth and frequency."""
-    work = call.workspace()
+    work = call.workspace(source, max_frequency, undamped=undamped)
 
     from ..study.sensitivities import sensitivities as solve
     from ..view.sensitivity_plots import sensitivity_bars
     from ..view.sensitivity_tables import sensitivity_table
 
-    call.check_friction(mu)
-    result = solve(work, parameter or ["mu"], mu=mu, modes="unstable" if branch is None else (branch,))
+    friction, chosen = call.one_friction(mu), band_of(band, work.modal.max_frequency_hz, branch)
+    result = solve(work, parameter or ["mu"], mu=friction, modes=branch or "unstable", band_hz=chosen)
     call.tabulate(result, "sensitivities.csv")
     drawn = sensitivity_bars(result) if len(result.branch) else None
     _show(call, result, sensitivity_table(result))
@@ -45,21 +50,26 @@ def sensitivities(
 @verb()
 def countermeasures(
     call: Call,
-    mu: Friction = None,
+    mu: Mu = None,
     branch: Branch = None,
     percent: Annotated[float, typer.Option("--percent", help="Size of the change that is predicted.")] = 5.0,
     verify: Annotated[int, typer.Option("--verify", help="How many of the best are solved again.")] = 3,
+    max_frequency: MaxFrequency = None,
+    undamped: Undamped = False,
+    source: Source = None,
 ) -> None:
     """Changes ranked by the growth rate they take away per per cent, the best ones solved again."""
-    work = call.workspace()
+    if branch and len(branch) > 1:
+        given = ", ".join(map(str, branch))
+        raise CaseError("--branch", given, "one mode; without --branch all unstable ones together")
+    work = call.workspace(source, max_frequency, undamped=undamped)
 
     from ..study.countermeasures import rank_countermeasures
     from ..view.sensitivity_plots import countermeasure_bars
     from ..view.sensitivity_tables import countermeasure_table
 
-    call.check_friction(mu)
-    target: Any = "sum" if branch is None else branch
-    result = rank_countermeasures(work, mu=mu, target=target, percent=percent, verify=verify)
+    target: Any = branch[0] if branch else "sum"
+    result = rank_countermeasures(work, mu=call.one_friction(mu), target=target, percent=percent, verify=verify)
     call.tabulate(result, "countermeasures.csv")
     _show(call, result, countermeasure_table(result))
     drawn = countermeasure_bars(result) if result.measures else None

@@ -9,7 +9,9 @@ import typer
 from ..digits import readable
 from ..errors import CaseError
 from .along import MU, show_onsets_along
-from .arguments import INCOMPLETE, Call, Source, Undamped, numbers, one_of, pair, verb
+from .arguments import INCOMPLETE, Call, verb
+from .option_table import Band, Branch, MaxFrequency, Mu, Range, Sort, Source, Undamped, Unstable
+from .values import band_of, numbers, one_of, pair
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 NOT_ALONG = {
     "--range": "their range is that of --between",
     "--undamped": "they are sought with the damping of the case; set that to zero",
+    "--band": "they are few; --max-frequency is",
     "--source": "they are sought on a reduced model and in the full problem",
 }
 WORTH_A_BAR = 20  # friction coefficients
@@ -24,21 +27,14 @@ INTERRUPTED = 130  # exit code
 
 
 @verb()
-def steady(
-    call: Call,
-    mu: Annotated[
-        float | None,
-        typer.Option("--mu", min=0.0, help="Friction coefficient of every contact [default: the case's]."),
-    ] = None,
-) -> None:
+def steady(call: Call, mu: Mu = None) -> None:
     """Steady sliding: which nodes touch, resultants of each contact, pressure as pictures and ParaView files."""
     work = call.workspace()
 
     from ..study.analyses import steady_sliding
     from .pictures import steady_document, write_steady
 
-    call.check_friction(mu)
-    found = steady_sliding(work, mu)
+    found = steady_sliding(work, call.one_friction(mu))
     call.warn(found.warnings)
     files = write_steady(work, found, call.folder)
     for path in files:
@@ -55,31 +51,29 @@ def steady(
 @verb()
 def shapes(
     call: Call,
-    mu: Annotated[
-        float | None,
-        typer.Option("--mu", min=0.0, help="Friction coefficient of every contact [default: the case's]."),
-    ] = None,
-    branch: Annotated[
-        list[int] | None,
-        typer.Option("--branch", metavar="NUMBER", help="Mode by its number. Repeatable [default: the unstable ones]."),
-    ] = None,
+    mu: Mu = None,
+    branch: Branch = None,
+    band: Band = None,
     gif: Annotated[bool, typer.Option("--gif", help="Also an animated GIF of each.")] = False,
+    max_frequency: MaxFrequency = None,
+    undamped: Undamped = False,
+    source: Source = None,
 ) -> None:
     """Shapes of modes: picture, animated page, ParaView file, and where friction feeds them."""
-    work = call.workspace()
+    work = call.workspace(source, max_frequency, undamped=undamped)
 
     from ..study.unit_warnings import resolution_warnings
     from .output import table
     from .pictures import write_shapes
 
-    call.check_friction(mu)
+    friction, chosen = call.one_friction(mu), band_of(band, work.modal.max_frequency_hz, branch)
     call.warn(resolution_warnings(work.case(call.verb)))
-    documents = write_shapes(work, call.folder, mu=mu, branches=branch or None, gif=gif)
+    documents = write_shapes(work, call.folder, mu=friction, branches=branch or None, band_hz=chosen, gif=gif)
     for document in documents:
         for path in document["files"]:
             call.say(f"written: {path}")
     if call.json:
-        call.document({"modes": documents})
+        call.document({"modes": documents, **({} if chosen is None else {"band_hz": list(chosen)})})
         return
     rows = [[str(d["branch"]), readable(d["frequency_hz"]), readable(d["growth_rate"])] for d in documents]
     table("shapes", ["branch", "frequency [Hz]", "growth [1/s]"], rows)
@@ -88,24 +82,25 @@ def shapes(
 @verb()
 def modes(
     call: Call,
-    mu: Annotated[
-        str | None,
-        typer.Option("--mu", metavar="μ|a,b|start:stop:count", help="Friction coefficients [default: the case's]."),
-    ] = None,
+    mu: Mu = None,
     count: Annotated[
         int | None,
-        typer.Option("--count", min=1, help="How many branches; unstable ones come on top [default: modal.modes]."),
+        typer.Option(
+            "--count",
+            min=1,
+            help="How many branches; unstable ones come on top [default: modal.modes, with --band all of it].",
+        ),
     ] = None,
-    unstable: Annotated[bool, typer.Option("--unstable", help="List unstable modes alone.")] = False,
-    sort: Annotated[
-        str, typer.Option("--sort", metavar="frequency|growth", help="What comes first: lowest or fastest growing.")
-    ] = "frequency",
+    band: Band = None,
+    unstable: Unstable = False,
+    sort: Sort = "frequency",
+    max_frequency: MaxFrequency = None,
     undamped: Undamped = False,
     source: Source = None,
 ) -> None:
-    """Complex modes at one or many friction coefficients, branches followed from μ = 0. Every unstable mode of the band
-    up to modal.max_frequency_hz is among them."""
-    work = call.workspace(source)
+    """Complex modes at one or many friction coefficients, branches followed from μ = 0. Every unstable mode up to
+    modal.max_frequency_hz is among them, with --band every mode of the band."""
+    work = call.workspace(source, max_frequency, undamped=undamped)
 
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
@@ -114,13 +109,12 @@ def modes(
 
     values = None if mu is None else numbers(mu, "--mu")
     call.check_friction(values)
+    chosen = band_of(band, work.modal.max_frequency_hz)
     call.warn(resolution_warnings(work.case(call.verb)))
     order: Literal["frequency", "growth"]
     order = "growth" if one_of(sort, "--sort", ("frequency", "growth")) == "growth" else "frequency"
     with counting("modes, friction coefficients", quiet=call.quiet, worth=len(values or ()) > WORTH_A_BAR) as progress:
-        result = analyses.modes(
-            work, values, count=count, damped=False if undamped else None, progress=progress
-        )
+        result = analyses.modes(work, values, count=count, band_hz=chosen, progress=progress)
     call.keep(result, "modes.nc")
     call.tabulate(result, "modes.csv")
     if result.interrupted:
@@ -136,19 +130,9 @@ def modes(
 @verb()
 def onsets(
     call: Call,
-    friction_range: Annotated[
-        str | None,
-        typer.Option("--range", metavar="low:high", help="Range of μ [default: modal.friction_range]."),
-    ] = None,
-    max_frequency: Annotated[
-        float | None,
-        typer.Option(
-            "--max-frequency",
-            metavar="HZ",
-            min=0.0,
-            help="Highest frequency [default: modal.max_frequency_hz].",
-        ),
-    ] = None,
+    friction_range: Range = None,
+    max_frequency: MaxFrequency = None,
+    band: Band = None,
     undamped: Undamped = False,
     along: Annotated[
         str | None,
@@ -160,12 +144,12 @@ def onsets(
     ] = None,
     between: Annotated[
         str | None,
-        typer.Option("--between", metavar="low:high", help="Its range [default: that of the parameter in the case]."),
+        typer.Option("--between", metavar="LOW:HIGH", help="Its range [default: that of the parameter in the case]."),
     ] = None,
     source: Source = None,
 ) -> None:
     """Every critical friction coefficient in range, or critical value of another number: solved, not bracketed."""
-    work = call.workspace(source)
+    work = call.workspace(source, max_frequency, undamped=undamped)
     loaded = work.case(call.verb)
     if along is not None or between is not None:
         name = MU if along is None else along
@@ -177,22 +161,23 @@ def onsets(
         else:
             given = {
                 "--range": friction_range,
-                "--undamped": undamped or not loaded.modal.damped,
+                "--undamped": not loaded.modal.damped,
+                "--band": band,
                 "--source": source,
             }
             for option in [option for option, value in given.items() if value]:
                 raise CaseError(option, None, f"is not for onsets along {name}: {NOT_ALONG[option]}")
-            _onsets_along(call, loaded, name, None if between is None else pair(between, "--between"), max_frequency)
+            _onsets_along(call, loaded, name, None if between is None else pair(between, "--between"))
             return
 
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
     from .show_modes import show_onsets
 
-    chosen = None if friction_range is None else pair(friction_range, "--range")
-    call.check_friction(chosen, "--range")
+    said = "--range" if along is None else "--between"
+    chosen = None if friction_range is None else call.range_of_friction(friction_range, said)
     call.warn(resolution_warnings(loaded))
-    result = analyses.onsets(work, chosen, max_frequency_hz=max_frequency, damped=False if undamped else None)
+    result = analyses.onsets(work, chosen, band_hz=band_of(band, loaded.modal.max_frequency_hz))
     call.keep(result, "onsets.nc")
     call.tabulate(result, "onsets.csv")
     if call.json:
@@ -203,16 +188,14 @@ def onsets(
         raise typer.Exit(INCOMPLETE)
 
 
-def _onsets_along(
-    call: Call, case: Case, name: str, between: tuple[float, float] | None, max_frequency: float | None
-) -> None:
+def _onsets_along(call: Call, case: Case, name: str, between: tuple[float, float] | None) -> None:
     """Onsets along a number of the case: sought on a model reduced over its range, each solved in the full problem."""
     from ..study.along import onsets_along
     from ..study.unit_warnings import resolution_warnings
 
     call.warn(resolution_warnings(case))
     chosen = None if call.solver in (None, "auto") else call.solver
-    found = onsets_along(case, name, between, max_frequency_hz=max_frequency, solver=chosen, said="--between")
+    found = onsets_along(case, name, between, solver=chosen, said="--between")
     call.tabulate(found, "onsets-along.csv")
     if call.json:
         call.document(found.to_json())

@@ -23,9 +23,16 @@ from ..typing import Array, IntArray
 
 
 def write_shapes(
-    problem: Problem, folder: Path, *, mu: float | None = None, branches: Sequence[int] | None = None, gif: bool = False
+    problem: Problem,
+    folder: Path,
+    *,
+    mu: float | None = None,
+    branches: Sequence[int] | None = None,
+    band_hz: tuple[float, float] | None = None,
+    gif: bool = False,
 ) -> list[dict[str, Any]]:
-    """PNG, animated page and VTK file of modes (default: all unstable ones, else the one that decays slowest).
+    """PNG, animated page and VTK file of modes (default: all unstable ones, else the one that decays slowest; of those
+    with frequencies in a band, where one is given).
 
     Returns a document for each: branch, frequency, growth and the files. Raises CaseError for branches that are not
     in the list of modes.
@@ -33,6 +40,8 @@ def write_shapes(
     work = Workspace.of(problem)
     system = work.system(mu)
     modes = analyses.modes(work, mu, max_frequency_hz=work.modal.max_frequency_hz, vectors="right")
+    if band_hz is not None and branches is None:
+        modes = modes.between(*band_hz)
     chosen = _chosen(modes, branches)
     documents: list[dict[str, Any]] = []
     for column in chosen:

@@ -14,7 +14,9 @@ from ..digits import measured
 from ..errors import CaseError
 from ..reading import is_reduced_file
 from .along import onset_document, show_onsets_along
-from .arguments import INCOMPLETE, INFINITY, Call, numbers, pair, verb
+from .arguments import INCOMPLETE, Call, verb
+from .option_table import At, Box, MaxFrequency
+from .values import INFINITY, numbers, pair
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -36,21 +38,10 @@ Model = Annotated[
 @verb(Model)
 def reduce(
     call: Call,
-    box: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--box",
-            metavar="NAME=LOW:HIGH",
-            help="A range of mu, contact_stiffness, a parameter or a number's path. Repeatable "
-            "[default: the ranges of [parameters], else mu over modal.friction_range].",
-        ),
-    ] = None,
+    box: Box = None,
     along: Annotated[str | None, typer.Option("--onsets", metavar="NAME", help="Solve for onsets along it.")] = None,
-    at: Annotated[
-        list[str] | None,
-        typer.Option("--at", metavar="NAME=VALUES", help="Values to solve at: 0.1,0.2 or start:stop:count."),
-    ] = None,
-    max_frequency: Annotated[float | None, typer.Option("--max-frequency", help="Highest frequency [Hz].")] = None,
+    at: At = None,
+    max_frequency: MaxFrequency = None,
     bound: Annotated[
         float | None, typer.Option("--bound", help="Relative error of eigenvalues [default: 1e-8].")
     ] = None,

@@ -68,10 +68,15 @@ def _listed(result: ComplexModes, row: int, shown: int, *, unstable: bool) -> st
     """How many are listed, as in "20 of 276 modes listed; 3 unstable": those are always among them."""
     total, growing = int(result.total[row]), int(np.count_nonzero(result.unstable[row] & result.in_band[row]))
     band = "" if result.max_frequency_hz is None else f" up to {result.max_frequency_hz:g} Hz"
+    beyond = ""
+    if result.band_hz is not None and result.unstable_outside is not None:
+        band = " from {:g} to {:g} Hz".format(*result.band_hz)
+        others = int(result.unstable_outside[row])
+        beyond = f"; {others} more unstable outside of it, up to {result.max_frequency_hz:g} Hz" if others else ""
     if unstable:
-        return f"{shown} unstable of {total} modes{band}"
+        return f"{shown} unstable of {total} modes{band}{beyond}"
     said = f"{shown} of {total} modes{band} listed" if shown < total else f"all {total} modes{band} listed"
-    return f"{said}; {growing} unstable" + (", none left out" if growing and shown < total else "")
+    return f"{said}; {growing} unstable" + (", none left out" if growing and shown < total else "") + beyond
 
 
 def show_onsets(result: Onsets) -> None:
@@ -82,13 +87,17 @@ def show_onsets(result: Onsets) -> None:
         stdout.print(line, markup=False)
     low, high = result.friction_range
     if not result.onsets:
-        stdout.print(f"no onset for μ in {low:g} … {high:g} up to {result.max_frequency_hz:g} Hz", markup=False)
+        stdout.print(f"no onset for μ in {low:g} … {high:g} {result.frequencies}", markup=False)
     else:
         kind = "damped" if result.damped else "undamped"
         table(f"onsets, {kind}", ONSET_HEADS, [_onset(o) for o in result.onsets])
         stdout.print("κ: growth opens as κ √(μ − μ_c) without damping; slope: d growth/dμ at a damped onset")
         for line in result.from_above_words:
             stdout.print(line, markup=False)
+    if result.outside:
+        stdout.print(
+            f"{result.outside} more at frequencies outside of {result.frequencies.removeprefix('from ')}", markup=False
+        )
     for line in (result.completeness, *result.notes):
         if line:
             stdout.print(line, markup=False)

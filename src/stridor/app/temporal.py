@@ -9,7 +9,9 @@ import typer
 
 from ..errors import AnalysisError, CaseError
 from ..interrupts import held
-from .arguments import Call, Source, numbers, verb
+from .arguments import Call, verb
+from .option_table import MaxFrequency, Mu, Range, Source
+from .values import numbers
 
 if TYPE_CHECKING:
     from ..io.kept_parts import KeptParts
@@ -29,10 +31,7 @@ Only = Annotated[
 @verb()
 def simulate(
     call: Call,
-    mu: Annotated[
-        float | None,
-        typer.Option("--mu", min=0.0, help="Friction coefficient of every contact [default: the case's]."),
-    ] = None,
+    mu: Mu = None,
     restart: Annotated[
         Path | None,
         typer.Option("--restart", metavar="FILE", help="Go on from the file of an earlier run of the same model."),
@@ -54,7 +53,7 @@ def simulate(
     from ..study.touching import decided_by_meshes
     from .output import progress_bar
 
-    call.check_friction(mu)
+    friction = call.one_friction(mu)
     path = call.folder / "simulate.nc"
     if copies and restart is not None:
         raise CaseError("--copies", copies, "a run from its start; not with --restart")
@@ -66,7 +65,7 @@ def simulate(
     if restart is not None and before is not None and path.exists() and path.samefile(restart):
         _check_records(work, before, path)
 
-    call.warn(decided_by_meshes(work.system(mu), mu))
+    call.warn(decided_by_meshes(work.system(friction), friction))
 
     def checkpoint(part: Trajectory) -> None:
         try:
@@ -79,7 +78,7 @@ def simulate(
         try:
             with progress_bar("simulate", quiet=call.quiet) as progress:
                 run = analyses.simulate(
-                    work, mu, progress=progress, checkpoint=checkpoint, restart=before, changed=changed
+                    work, friction, progress=progress, checkpoint=checkpoint, restart=before, changed=changed
                 )
         except AnalysisError as error:
             part = getattr(error, "trajectory", None)
@@ -97,7 +96,7 @@ def simulate(
         from ..study.copies import perturbed_copies
 
         with progress_bar("copies", quiet=call.quiet) as progress:
-            document["copies"] = perturbed_copies(work, run, mu, count=copies, progress=progress).to_json()
+            document["copies"] = perturbed_copies(work, run, friction, count=copies, progress=progress).to_json()
     if call.json:
         call.document(document)
     else:
@@ -125,10 +124,7 @@ def _check_records(work: Workspace, before: Trajectory, path: Path) -> None:
 @verb()
 def compare(
     call: Call,
-    mu: Annotated[
-        str | None,
-        typer.Option("--mu", metavar="μ|a,b|start:stop:count", help="Friction coefficients [default: comparison.mu]."),
-    ] = None,
+    mu: Mu = None,
     critical: Annotated[
         bool | None,
         typer.Option(
@@ -138,13 +134,15 @@ def compare(
         ),
     ] = None,
     only: Only = None,
+    friction_range: Range = None,
+    max_frequency: MaxFrequency = None,
     source: Source = None,
 ) -> None:
     """Agreement of both approaches, as a table and a verdict.
 
     Each part is kept as soon as it is there; a second call on the same case takes what is finished. Ctrl-C prints it.
     """
-    work = call.workspace(source)
+    work = call.workspace(source, max_frequency, friction_range)
 
     from ..study import analyses
 
@@ -189,9 +187,15 @@ def _kept(call: Call, work: Workspace) -> KeptParts:
 
 
 @verb(parts=("figures",))
-def run(call: Call, only: Only = None) -> None:
+def run(
+    call: Call,
+    only: Only = None,
+    friction_range: Range = None,
+    max_frequency: MaxFrequency = None,
+    source: Source = None,
+) -> None:
     """Everything: modes, onsets, simulate, compare, and the report. A second call takes what is finished in time."""
-    work = call.workspace()
+    work = call.workspace(source, max_frequency, friction_range)
 
     from .output import progress_bar, stdout
     from .pipeline import run as run_all

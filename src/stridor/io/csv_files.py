@@ -30,20 +30,26 @@ MODE = ("frequency_hz", "growth_1_s", "damping_percent", "unstable")
 def write_csv(result: Tabled, path: Path) -> Path:
     """Write a result as a table, in one piece. Raises AnalysisError where the file cannot be written."""
     if isinstance(result, ComplexModes):
-        return write_rows(path, *_modes(result))
+        return write_rows(path, *_modes(result), band_hz=result.band_hz)
     if isinstance(result, Onsets):
-        return write_rows(path, _ONSET, (_onset("mu", o.mu, o) for o in result.onsets))
+        return write_rows(path, _ONSET, (_onset("mu", o.mu, o) for o in result.onsets), band_hz=result.band_hz)
     if isinstance(result, ParametricOnsets):
         return write_rows(path, _ONSET, (_parametric(result)))
     if isinstance(result, Sensitivities):
-        return write_rows(path, *_sensitivities(result))
+        return write_rows(path, *_sensitivities(result), band_hz=result.band_hz)
     if isinstance(result, Countermeasures):
         return write_rows(path, *_countermeasures(result))
     return write_rows(path, *_damping_map(result))
 
 
-def write_rows(path: Path, heads: Sequence[str], rows: Iterable[Sequence[Cell]]) -> Path:
-    """Write lines under a line of heads, in one piece. Raises AnalysisError where the file cannot be written."""
+def write_rows(
+    path: Path, heads: Sequence[str], rows: Iterable[Sequence[Cell]], *, band_hz: tuple[float, float] | None = None
+) -> Path:
+    """Write lines under a line of heads, in one piece. band_hz: the frequencies that were asked for, which the last two
+    columns then say. Raises AnalysisError where the file cannot be written."""
+    if band_hz is not None:
+        ends = band_hz
+        heads, rows = (*heads, "band_low_hz", "band_high_hz"), ((*row, *ends) for row in rows)
     text = io.StringIO()
     lines = csv.writer(text, lineterminator="\n")
     lines.writerow(heads)

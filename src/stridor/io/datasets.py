@@ -190,6 +190,8 @@ def _modes(result: ComplexModes) -> Any:
     data.attrs["modes_in_band"] = json.dumps([int(n) for n in result.total])
     if result.max_frequency_hz is not None:
         data.attrs["max_frequency_hz"] = result.max_frequency_hz
+    if result.band_hz is not None:
+        data.attrs["band_hz"] = list(result.band_hz)
     return data
 
 
@@ -217,6 +219,8 @@ def _onsets(result: Onsets) -> Any:
     data = _dataset("onsets", variables, {}, result)
     data.attrs.update(damped=int(result.damped), max_frequency_hz=result.max_frequency_hz)
     data.attrs["friction_range"] = list(result.friction_range)
+    if result.band_hz is not None:
+        data.attrs["band_hz"] = list(result.band_hz)
     for name in ("at_start", "at_end"):
         values = getattr(result, name)
         data.attrs[f"growing_{name}"] = json.dumps([[v.real, v.imag] for v in values])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import pi
 from typing import Any, Literal
 
@@ -79,7 +79,9 @@ class Onsets:
     others, "" where nothing was checked. notes: what else is to be known. contact_state: where contacts may stick, how
     many nodes stick, slip and are open, and at which μ; it is held over the range. followed: numbers and eigenvalues
     (b,) of the branches at both ends, where branches were followed; saved nowhere.
-    source: where the eigenpairs come from, a name of `modal.source`.
+    source: where the eigenpairs come from, a name of `modal.source`. band_hz: the frequencies asked for (`between`),
+    None for all, and ``outside``, how many onsets there are at others; what grows at both ends, and completeness, are
+    of all up to max_frequency_hz.
     """
 
     onsets: tuple[Onset, ...]
@@ -96,6 +98,8 @@ class Onsets:
     provenance: dict[str, Any] = field(default_factory=dict)
     source: str = ""
     followed: tuple[Branches, Branches] | None = field(default=None, repr=False, compare=False)
+    band_hz: tuple[float, float] | None = None
+    outside: int = 0
 
     def _repr_html_(self) -> str:
         heads = ("μ", "frequency [Hz]", "what", "modes", "growth", "slope [1/s]", "residual")
@@ -109,9 +113,21 @@ class Onsets:
         ]  # fmt: skip
         low, high = self.friction_range
         many = f"{len(self.onsets) or 'No'} onset{'' if len(self.onsets) == 1 else 's'}"
-        title = f"{many} for μ from {low:g} to {high:g}, up to {hertz(self.max_frequency_hz)}"
+        title = f"{many} for μ from {low:g} to {high:g}, {self.frequencies}"
         lines = (*self.at_start_words, *self.from_above_words, self.completeness, self.contact_state, *self.notes)
         return html_table(title, heads, rows, lines)
+
+    @property
+    def frequencies(self) -> str:
+        """Of which frequencies these are, in words."""
+        if self.band_hz is None:
+            return f"up to {hertz(self.max_frequency_hz)}"
+        return "from {:g} to {:g} Hz".format(*self.band_hz)
+
+    def between(self, low_hz: float, high_hz: float) -> Onsets:
+        """The onsets with a frequency from low_hz to high_hz."""
+        inside = tuple(o for o in self.onsets if low_hz <= o.frequency_hz <= high_hz)
+        return replace(self, onsets=inside, band_hz=(low_hz, high_hz), outside=len(self.onsets) - len(inside))
 
     @property
     def first(self) -> Onset | None:
@@ -120,10 +136,12 @@ class Onsets:
 
     @property
     def at_start_words(self) -> list[str]:
-        """What grows before any onset, a line each."""
+        """What grows before any onset, at a frequency of the band, a line each."""
         low = self.friction_range[0]
         lines: list[str] = []
-        for lam in sorted(self.at_start, key=_by_growth):
+        bottom, top = self.band_hz or (0.0, float("inf"))
+        inside = [lam for lam in self.at_start if bottom <= lam.imag / (2 * pi) <= top]
+        for lam in sorted(inside, key=_by_growth):
             if lam.imag == 0.0:
                 lines.append(f"diverges already at μ = {low:g}: λ = +{readable(lam.real)} 1/s")
             else:
@@ -156,6 +174,7 @@ class Onsets:
             **({"contact_state": self.contact_state} if self.contact_state else {}),
             "friction_range": list(self.friction_range),
             "max_frequency_hz": self.max_frequency_hz,
+            **({} if self.band_hz is None else {"band_hz": list(self.band_hz), "onsets_outside_band": self.outside}),
             "damped": self.damped,
             **({"source": self.source} if self.source else {}),
             "open_contacts": list(self.open_contacts),

@@ -35,7 +35,8 @@ class ComplexModes:
     band there are at each μ, where not all of them are kept here. notes: what else is to be known. planned: how many μ
     were asked for, where it was interrupted before the last. contact_state: where contacts may stick, how many nodes
     stick, slip and are open, and at which μ; they do so at every μ of the list. source: where the eigenpairs come from,
-    a name of `modal.source`.
+    a name of `modal.source`. band_hz: the frequencies asked for (`between`), None for all, and unstable_outside (k,):
+    how many modes up to max_frequency_hz grow at each μ at other ones.
     """
 
     mu: Array
@@ -54,6 +55,8 @@ class ComplexModes:
     notes: tuple[str, ...] = ()
     planned: int | None = None
     source: str = ""
+    band_hz: tuple[float, float] | None = None
+    unstable_outside: IntArray | None = None
 
     @property
     def frequency_hz(self) -> Array:
@@ -88,9 +91,12 @@ class ComplexModes:
     def in_band(self) -> BoolArray:
         """Whether a mode is known at a μ and of a frequency of the band (k, b)."""
         known = np.isfinite(self.eigenvalues)
-        if self.max_frequency_hz is None:
-            return known
-        return known & (self.frequency_hz <= self.max_frequency_hz * (1 + BORDER))
+        if self.max_frequency_hz is not None:
+            known = known & (self.frequency_hz <= self.max_frequency_hz * (1 + BORDER))
+        return known if self.band_hz is None else known & self._within(*self.band_hz)
+
+    def _within(self, low: float, high: float) -> BoolArray:
+        return (self.frequency_hz >= low * (1 - BORDER)) & (self.frequency_hz <= high * (1 + BORDER))
 
     @property
     def total(self) -> IntArray:
@@ -129,10 +135,18 @@ class ComplexModes:
         return html_table(f"Complex modes at {len(self.mu)} friction coefficients", heads, rows, self._told)
 
     @property
+    def _of_band(self) -> dict[str, Any]:
+        """What a document says of the band where one was asked for."""
+        if self.band_hz is None or self.unstable_outside is None:
+            return {}
+        return {"band_hz": list(self.band_hz), "unstable_outside_band": self.unstable_outside.tolist()}
+
+    @property
     def _told(self) -> list[str]:
         """What is to be known beside the numbers, a line each."""
         cut = [] if self.planned is None else [f"interrupted: {len(self.mu)} of {self.planned} friction coefficients"]
-        return [*cut, *self.completeness, self.contact_state, *self.notes]
+        band = [] if self.band_hz is None else ["only modes from {:g} to {:g} Hz".format(*self.band_hz)]
+        return [*band, *cut, *self.completeness, self.contact_state, *self.notes]
 
     def chosen(self, columns: IntArray) -> ComplexModes:
         """These columns (c,) alone."""
@@ -150,6 +164,20 @@ class ComplexModes:
         unstable = np.any(self.unstable & self.in_band, axis=0)
         first = np.arange(len(self.branch)) < count
         return replace(self.chosen(np.flatnonzero(first | unstable)), held=self.total)
+
+    def between(self, low_hz: float, high_hz: float) -> ComplexModes:
+        """The branches with a frequency from low_hz to high_hz at one of these μ at least, under their own numbers.
+
+        What is counted, listed and said to be in the band at a μ is what lies there at that μ. Takes modes of which
+        none was left out: `modes` with max_frequency_hz. Raises CaseError for others.
+        """
+        if self.held is not None and np.any(self.held != self.in_band.sum(axis=1)):
+            raise CaseError("band_hz", [low_hz, high_hz], "goes before the choice of the lowest modes, not after it")
+        inside = self.in_band & self._within(low_hz, high_hz)
+        growing = self.unstable & self.in_band
+        kept = self.chosen(np.flatnonzero(inside.any(axis=0)))
+        outside = np.count_nonzero(growing & ~inside, axis=1)
+        return replace(kept, held=None, band_hz=(low_hz, high_hz), unstable_outside=outside)
 
     def order(self, row: int, sort: Literal["frequency", "growth"] = "frequency") -> IntArray:
         """Columns of the modes of the band at one μ, by frequency, or the fastest growing first."""
@@ -188,6 +216,7 @@ class ComplexModes:
             "unstable_modes": np.sum(marks & self.in_band, axis=1).tolist(),
             "modes_in_band": self.total.tolist(),
             "max_frequency_hz": self.max_frequency_hz,
+            **self._of_band,
             "damped": self.damped,
             **({"source": self.source} if self.source else {}),
             "open_contacts": list(self.open_contacts),

@@ -34,7 +34,7 @@ from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
 from .along import onsets_along
-from .asked import require_frequency, require_friction
+from .asked import require_band, require_frequency, require_friction
 from .body_modes import BodyModes, body_modes
 from .description import Description, describe
 from .fingerprint import check_restart, fingerprint
@@ -72,6 +72,7 @@ def modes(
     *,
     count: int | None = None,
     max_frequency_hz: float | None = None,
+    band_hz: tuple[float, float] | None = None,
     damped: bool | None = None,
     vectors: bool | Literal["right"] = False,
     check: bool = True,
@@ -80,7 +81,8 @@ def modes(
     """Complex modes at one or many friction coefficients (default: the problem's own).
 
     All modes with frequencies up to modal.max_frequency_hz are found; kept are the ``count`` lowest (default
-    modal.modes) and every unstable one, with max_frequency_hz all up to that. check: whether what grows in the band is
+    modal.modes) and every unstable one, with max_frequency_hz all up to that. band_hz: of all found, those between two
+    frequencies, under the same numbers; without ``count`` every one of them. check: whether what grows in the band is
     sought anew in the full problem (`checked_modes`). progress is called with the number of friction coefficients done
     and of all. A workspace keeps the modes, with vectors those at one μ. Raises CaseError for a bad μ, AnalysisError
     where the steady sliding state does not exist.
@@ -90,6 +92,7 @@ def modes(
     values = work.one_friction() if mu is None else mu
     damped = work.modal.damped if damped is None else damped
     band = max_frequency_hz or work.modal.max_frequency_hz
+    require_band(band_hz, band)
     asked = ("modes", *np.shape(values), *np.ravel(values).tolist(), band, damped, check)
     # What has vectors serves who wants none.
     more = {False: (False, "right", True), "right": ("right", True), True: (True,)}[vectors]
@@ -100,7 +103,11 @@ def modes(
         if not result.interrupted and (not vectors or len(result.mu) == 1):
             work.answers.keep((*asked, vectors), result)
     result = replace(result, right=result.right if vectors else None, left=result.left if vectors is True else None)
-    return result if max_frequency_hz is not None else result.lowest(work.modal.modes if count is None else count)
+    if band_hz is not None:
+        result = result.between(*band_hz)
+    if count is None:
+        count = work.modal.modes if band_hz is None else len(result.branch)
+    return result if max_frequency_hz is not None else result.lowest(count)
 
 
 def _modes(
@@ -167,6 +174,7 @@ def onsets(
     *,
     along: None = None,
     max_frequency_hz: float | None = None,
+    band_hz: tuple[float, float] | None = None,
     damped: bool | None = None,
     check: bool = True,
 ) -> Onsets: ...
@@ -184,14 +192,16 @@ def onsets(
     *,
     along: str | None = None,
     max_frequency_hz: float | None = None,
+    band_hz: tuple[float, float] | None = None,
     damped: bool | None = None,
     check: bool = True,
 ) -> Onsets | ParametricOnsets:
     """Every critical friction coefficient in range (defaults from [modal]), or every critical value of another number.
 
     along: a number of the case by its path ("bodies.beam1.length") or a parameter of its matrices; the range is then
-    that of this number. check: whether what grows at both ends of the range is sought anew in the full problem
-    (`checked_onsets`). Raises CaseError for a range or a number that is none.
+    that of this number. band_hz: of all found, those with a frequency between these. check: whether what grows at both
+    ends of the range is sought anew in the full problem (`checked_onsets`). Raises CaseError for a range or a number
+    that is none.
     """
     if along is not None:
         case = Workspace.of(problem).case("along")
@@ -202,6 +212,7 @@ def onsets(
     work = Workspace.of(problem)
     between = work.modal.friction_range if friction_range is None else friction_range
     limit = max_frequency_hz or work.modal.max_frequency_hz
+    require_band(band_hz, limit)
     damped = work.modal.damped if damped is None else damped
     options = work.options
     if work.varies:
@@ -218,7 +229,8 @@ def onsets(
         result = solve_onsets(work.system(), between, max_frequency_hz=limit, damped=damped, **asdict(options))
         notes = taken_as_closed(work.system())
     made = provenance(work, "onsets", time.perf_counter() - started)
-    return replace(result, notes=(*result.notes, *notes), provenance=made)
+    result = replace(result, notes=(*result.notes, *notes), provenance=made)
+    return result if band_hz is None else result.between(*band_hz)
 
 
 def simulate(

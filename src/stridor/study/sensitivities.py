@@ -22,6 +22,7 @@ from ..system import System
 from ..system.imported import cleaned
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .analyses import modes as modes_at
+from .asked import require_band
 from .measures import growing
 from .provenance import provenance
 from .workspace import Workspace
@@ -44,7 +45,8 @@ class Sensitivities:
     bounds at an exceptional point. nearest (b,) [1/s]: distance to the nearest other eigenvalue of the band.
     exceptional (k, b): complex value of the number at which that neighbour is met, extrapolated; NaN where none is in
     sight. |exceptional − value| is how far a first-order prediction can reach at all. residual (b,): componentwise
-    backward error of right and left pairs. warnings: sentences, where derivatives must not be trusted.
+    backward error of right and left pairs. warnings: sentences, where derivatives must not be trusted. band_hz: the
+    frequencies that were asked for, None for all.
     """
 
     mu: float
@@ -61,6 +63,7 @@ class Sensitivities:
     warnings: tuple[str, ...] = ()
     open_contacts: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
+    band_hz: tuple[float, float] | None = None
 
     @property
     def frequency_hz(self) -> Array:
@@ -132,6 +135,7 @@ class Sensitivities:
             "mu": self.mu,
             "damped": self.damped,
             "modes": modes,
+            **({} if self.band_hz is None else {"band_hz": list(self.band_hz)}),
             "warnings": list(self.warnings),
             "open_contacts": list(self.open_contacts),
         }
@@ -178,6 +182,7 @@ def sensitivities(
     modes: Choice = "unstable",
     count: int | None = None,
     max_frequency_hz: float | None = None,
+    band_hz: tuple[float, float] | None = None,
     damped: bool | None = None,
     steps: Mapping[str, float] | None = None,
 ) -> Sensitivities:
@@ -188,7 +193,8 @@ def sensitivities(
     has too. Every other path is a number of the case, such as "materials.iron.density", "bodies.pad.thickness" or
     "bodies.brake.terms.1.factor". mu: the friction coefficient (default: the case's own).
 
-    modes: "unstable", "all" of the band, or numbers of branches. count, max_frequency_hz, damped: as in `modes`.
+    modes: "unstable", "all" of the band, or numbers of branches; band_hz: of these, what has a frequency between the
+    two. count, max_frequency_hz, damped: as in `modes`.
     steps: by how much a number is changed to see what the matrices do, where a thousandth of it will not do.
 
     The touching nodes and the directions of sliding stay as they are at the case itself: what a number does by opening
@@ -201,7 +207,9 @@ def sensitivities(
     linear = Linearised.of(work, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
     values = np.array([linear.value(path) for path in parameters])
     changes = [linear.change(path, (steps or {}).get(path)) for path in parameters]
-    columns = [b for b in linear.columns(modes) if linear.mode(b) is not None]
+    require_band(band_hz, max_frequency_hz or work.modal.max_frequency_hz)
+    chosen = _inside(linear, linear.columns(modes), band_hz)
+    columns = [b for b in chosen if linear.mode(b) is not None]
     found = [linear.known(b) for b in columns]
     derivative = _derivatives(found, changes)
     exceptional = np.full(derivative.shape, np.nan + 0j)
@@ -225,11 +233,19 @@ def sensitivities(
         damped=linear.modes.damped,
         open_contacts=linear.modes.open_contacts,
         provenance=provenance(work, "sensitivities", time.perf_counter() - started, mu=linear.mu),
+        band_hz=band_hz,
     )
     told = list(linear.warnings)
-    if not columns and modes == "unstable" and not linear.columns(modes):
-        told.append(f"no mode is unstable at μ = {linear.mu:g}: name branches to see what stable ones do")
+    if not chosen and modes == "unstable":
+        where = "" if band_hz is None else " from {:g} to {:g} Hz".format(*band_hz)
+        told.append(f"no mode{where} is unstable at μ = {linear.mu:g}: name branches to see what stable ones do")
     return replace(result, warnings=(*told, *_divergence(result)))
+
+
+def _inside(linear: Linearised, columns: list[int], band_hz: tuple[float, float] | None) -> list[int]:
+    """Of these columns those with a frequency [Hz] in the band."""
+    low, high = band_hz or (0.0, np.inf)
+    return [b for b in columns if low <= linear.eigenvalues[b].imag / (2 * np.pi) <= high]
 
 
 def _derivatives(found: Sequence[Mode], changes: Sequence[PencilChange]) -> ComplexArray:
