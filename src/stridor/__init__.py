@@ -22,7 +22,7 @@ from .errors import AnalysisError, CaseError, StridorError
 
 if TYPE_CHECKING:
     from . import view as plot
-    from .app.pipeline import run
+    from .app.pipeline import report, run
     from .case import Case, load, loads
     from .io.datasets import open, save, to_dataset
     from .io.export import export
@@ -67,6 +67,7 @@ _HOMES = {
     "plot": ".view",
     "rank_countermeasures": ".study.countermeasures",
     "reduced_model": ".study.reduced",
+    "report": ".app.pipeline",
     "run": ".app.pipeline",
     "save": ".io.datasets",
     "sensitivities": ".study.sensitivities",
@@ -102,6 +103,7 @@ __all__ = [
     "plot",
     "rank_countermeasures",
     "reduced_model",
+    "report",
     "run",
     "save",
     "sensitivities",

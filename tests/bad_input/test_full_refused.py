@@ -17,7 +17,7 @@ pytestmark = pytest.mark.bad_input
 
 ONE, SPRINGS = np.eye(2), np.array([[2.0, 1.0], [1.0, 2.0]])
 BELT = np.array([[0.0, -4 / 3], [0.0, 0.0]])
-WORKS = "what works for these is `stridor modes`, `stridor onsets` and `stridor steady`"
+WORKS = "what works for these is `stridor report`, `stridor modes`, `stridor onsets` and `stridor steady`"
 
 
 def model(folder: Path, *more: tuple, factor: str = "mu", extra: str = "") -> st.Case:

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 COMPUTING = (
-    "steady", "shapes", "modes", "onsets", "simulate", "compare", "run", "sensitivities", "countermeasures",
+    "steady", "shapes", "modes", "onsets", "simulate", "compare", "run", "report", "sensitivities", "countermeasures",
     "damping-map", "reduce",
 )  # fmt: skip
 ABOUT = ("new", "check", "matrices", "export")  # verbs about the case itself
@@ -51,7 +51,7 @@ Mu = Annotated[
         "Friction coefficient of every contact; modes and compare take several: a,b or start:stop:count [default: the "
         "case's own, of compare comparison.mu].",
         metavar="MU",
-        on="steady shapes modes simulate compare sensitivities countermeasures export",
+        on="steady shapes modes simulate compare report sensitivities countermeasures export",
         lacks="onsets=sought run=--range damping-map=sought reduce=--at",
     ),
 ]
@@ -61,7 +61,7 @@ Range = Annotated[
         "--range",
         "Range of μ in which onsets are sought [default: modal.friction_range].",
         metavar="LOW:HIGH",
-        on="onsets compare run damping-map",
+        on="onsets compare run report damping-map",
         lacks="steady=--mu shapes=--mu modes=--mu simulate=--mu sensitivities=--mu countermeasures=--mu reduce=--box",
     ),
 ]
@@ -81,7 +81,7 @@ Band = Annotated[
         "Only what has a frequency [Hz] in this band; numbers of modes stay those of the whole list.",
         metavar="LOW:HIGH",
         on="modes shapes onsets sensitivities",
-        lacks="steady=static simulate=time compare=pairs run=report countermeasures=sum damping-map=lowest "
+        lacks="steady=static simulate=time compare=pairs run=page report=page countermeasures=sum damping-map=lowest "
         "reduce=unnumbered",
     ),
 ]
@@ -92,7 +92,7 @@ Branch = Annotated[
         "Mode by its number in `modes`. Repeatable [default: the unstable ones].",
         metavar="NUMBER",
         on="shapes sensitivities countermeasures",
-        lacks="steady=static modes=--band onsets=--band simulate=time compare=fastest run=fastest damping-map=lowest "
+        lacks="steady=static modes=--band onsets=--band simulate=time compare=fastest run=fastest report=fastest damping-map=lowest "
         "reduce=unnumbered",
     ),
 ]
@@ -102,7 +102,7 @@ Unstable = Annotated[
         "--unstable",
         "List unstable modes alone.",
         on="modes",
-        lacks="steady=static shapes=default onsets=all simulate=time compare=fastest run=report "
+        lacks="steady=static shapes=default onsets=all simulate=time compare=fastest run=page report=page "
         "sensitivities=default countermeasures=default damping-map=lowest reduce=unnumbered",
     ),
 ]
@@ -113,7 +113,7 @@ Sort = Annotated[
         "What comes first: lowest or fastest growing.",
         metavar="frequency|growth",
         on="modes",
-        lacks="steady=static shapes=growth onsets=μ simulate=time compare=μ run=report sensitivities=growth "
+        lacks="steady=static shapes=growth onsets=μ simulate=time compare=μ run=page report=page sensitivities=growth "
         "countermeasures=effect damping-map=grid reduce=frequency",
     ),
 ]
@@ -132,7 +132,7 @@ Undamped = Annotated[
         "--undamped",
         "Leave structural damping out.",
         on="modes shapes onsets sensitivities countermeasures",
-        lacks="steady=static simulate=time compare=time run=both damping-map=damping reduce=kept",
+        lacks="steady=static simulate=time compare=time run=both report=both damping-map=damping reduce=kept",
     ),
 ]
 Box = Annotated[
@@ -143,7 +143,7 @@ Box = Annotated[
         "[parameters], else mu over modal.friction_range].",
         metavar="NAME=LOW:HIGH",
         on="reduce",
-        lacks="steady=--mu shapes=--mu modes=--mu onsets=--between simulate=--mu compare=--range run=--range "
+        lacks="steady=--mu shapes=--mu modes=--mu onsets=--between simulate=--mu compare=--range run=--range report=--mu "
         "sensitivities=--mu countermeasures=--mu damping-map=--x-range",
     ),
 ]
@@ -154,7 +154,7 @@ At = Annotated[
         "Values to solve at: 0.1,0.2 or start:stop:count. Repeatable.",
         metavar="NAME=VALUES",
         on="reduce",
-        lacks="steady=--set shapes=--set modes=--set onsets=--set simulate=--set compare=--set run=--set "
+        lacks="steady=--set shapes=--set modes=--set onsets=--set simulate=--set compare=--set run=--set report=--set "
         "sensitivities=--set countermeasures=--set damping-map=--set",
     ),
 ]

@@ -1,4 +1,4 @@
-"""`stridor run`: every analysis of a case, its files, its report."""
+"""`stridor run` and `stridor report`: the analyses of a case, their files, their page."""
 
 from __future__ import annotations
 
@@ -11,15 +11,19 @@ from typing import Any
 import numpy as np
 
 from ..agreement import Store, modal_assurance
-from ..case import Case
+from ..case import Case, load
 from ..digits import measured
-from ..errors import StridorError
+from ..errors import CaseError, StridorError
 from ..io.atomic import write_text
 from ..io.csv_files import write_csv
 from ..io.datasets import load_trajectory, save
+from ..io.finished import FOLDER, FinishedParts
+from ..io.kept_parts import NAME, KeptParts
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
+from ..study.asked import require_friction
 from ..study.everything import Everything, compute_everything
+from ..study.parts import OF_REPORT, Parts, chosen_parts
 from ..study.provenance import versions
 from ..study.workspace import Workspace
 from ..temporal.signals import low_passed, spectrogram, spectrum
@@ -27,51 +31,60 @@ from ..temporal.simulate import Progress
 from ..temporal.trajectory import Trajectory
 from ..view.inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
 from ..view.report import write_report
+from ..view.words import verdict
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run left: where the report and the files are, everything computed, one verdict."""
+    """What a run left: where the report (None: skipped) and the files are, everything computed, one verdict."""
 
-    report: Path
+    report: Path | None
     files: tuple[Path, ...]
     everything: Everything
 
     @property
     def interrupted(self) -> bool:
         """Whether the simulation or the comparison was cut short."""
-        agreement = self.everything.agreement
-        return self.everything.run.interrupted or (agreement is not None and agreement.interrupted)
+        run, agreement = self.everything.run, self.everything.agreement
+        return (run is not None and run.interrupted) or (agreement is not None and agreement.interrupted)
 
     @property
     def verdict(self) -> str:
         """One sentence."""
-        agreement = self.everything.agreement
+        agreement, onsets = self.everything.agreement, self.everything.onsets_damped
         if agreement is not None:
             return agreement.verdict
-        first = self.everything.onsets_damped.first
-        if self.everything.onsets_damped.at_start:
-            return "; ".join(self.everything.onsets_damped.at_start_words)
-        if first is None:
+        if onsets is None:
+            return verdict(report_inputs(self.everything)).headline
+        if onsets.at_start:
+            return "; ".join(onsets.at_start_words)
+        if onsets.first is None:
             return "no onset in range"
+        first = onsets.first
         return (
             f"modal onset at μ = {measured(first.mu, 5)}, {measured(first.frequency_hz, 1)} Hz; no comparison was made"
         )
 
     def to_json(self) -> dict[str, Any]:
-        """The documents of all verbs under their names, and where the report is."""
+        """The documents of all verbs under their names, None where there is none, and where the report is."""
         e = self.everything
         listed = e.sweep_damped if e.own is None else e.own.lowest(e.case.modal.modes)
+        documents = {
+            "modes": listed,
+            "onsets": e.onsets_damped,
+            "sensitivities": e.sensitivities,
+            "countermeasures": e.measures,
+            "simulate": e.summary,
+            "compare": e.agreement,
+        }
         return {
             "verdict": self.verdict,
-            "report": str(self.report),
+            "report": None if self.report is None else str(self.report),
             "files": [str(f) for f in self.files],
             "check": e.description.to_json(),
-            "modes": listed.to_json(),
-            "onsets": e.onsets_damped.to_json(),
-            "simulate": e.summary.to_json(),
-            "compare": None if e.agreement is None else e.agreement.to_json(),
+            **{name: None if result is None else result.to_json() for name, result in documents.items()},
             "seconds": dict(e.seconds),
+            "taken": list(e.taken),
             "notes": list(e.notes),
         }
 
@@ -83,14 +96,62 @@ def run(
     progress: Progress | None = None,
     log: Callable[[str], None] | None = None,
     only: Collection[str] | None = None,
+    skip: Collection[str] | None = None,
+    fresh: bool = False,
     kept: Store | None = None,
 ) -> Outcome:
     """Compute everything, keep each result as soon as it is there, write the report into ``folder``.
 
-    only and kept are those of `analyses.compare`. A simulate.nc of the same case that is in the folder already is
-    taken, and gone on from where Ctrl-C cut it.
+    only, skip: parts (`study.parts`) that alone are computed, or are not: modes, onsets, simulate, compare, report, and
+    sensitivities and countermeasures, which are computed where they are named. What an earlier call on the same case,
+    by the same program, has left in the folder is taken, a run that was cut is gone on from; with ``fresh`` nothing is.
+    kept: where finished parts of the comparison are put and sought instead of in the folder. Raises CaseError for parts
+    that there are none of.
     """
-    work, target = Workspace.of(problem), Path(folder)
+    parts = chosen_parts(only, skip)
+    return _run(Workspace.of(problem), Path(folder), parts, progress=progress, log=log, fresh=fresh, kept=kept)
+
+
+def report(
+    problem: Case | Workspace | str | Path,
+    folder: str | Path | None = None,
+    *,
+    mu: float | None = None,
+    log: Callable[[str], None] | None = None,
+    skip: Collection[str] | None = None,
+    fresh: bool = False,
+    kept: Store | None = None,
+) -> Outcome:
+    """The page of a case without any run in time: modes, onsets, sensitivities, counter-measures, shapes.
+
+    problem: a case, or the path of its file, beside which the page then goes (CASE.out) unless a folder is named. mu:
+    the friction coefficient of modes and changes, where it is not to be the case's own. Results in time that are in the
+    folder already and belong to this case are shown, none are computed. skip, fresh and kept as `run` takes them. What
+    a model has nothing to show for (shapes without coordinates of nodes) is left out, and the notes say so.
+    """
+    if isinstance(problem, str | Path):
+        case = load(problem)
+        folder = Path(problem).with_suffix(".out") if folder is None else folder
+    else:
+        case = problem
+    if folder is None:
+        raise CaseError("folder", None, "where the page goes, unless the case is given by the path of its file")
+    require_friction(mu)
+    parts = chosen_parts(None, skip, OF_REPORT)
+    return _run(Workspace.of(case), Path(folder), parts, mu=mu, log=log, fresh=fresh, kept=kept)
+
+
+def _run(
+    work: Workspace,
+    target: Path,
+    parts: Parts,
+    *,
+    mu: float | None = None,
+    progress: Progress | None = None,
+    log: Callable[[str], None] | None = None,
+    fresh: bool,
+    kept: Store | None,
+) -> Outcome:
     case = work.case("run")
     files: list[Path] = []
 
@@ -104,17 +165,20 @@ def run(
     write_text(target / "case.toml", case.text)
     everything = compute_everything(
         work,
+        parts=parts,
+        mu=mu,
         progress=progress,
         log=log,
         keep=keep,
-        before=_before(work, target / "simulate.nc"),
-        only=only,
-        kept=kept,
+        before=None if fresh else _before(work, target / "simulate.nc"),
+        kept=KeptParts(target / NAME, work.key, fresh=fresh) if kept is None else kept,
+        shelf=FinishedParts(target / FOLDER, work.key, fresh=fresh),
     )
+    if "report" not in parts:
+        return Outcome(None, tuple(files), everything)
     if log is not None:
         log("report")
-    report = write_report(report_inputs(everything), target)
-    return Outcome(report, tuple(files), everything)
+    return Outcome(write_report(report_inputs(everything), target), tuple(files), everything)
 
 
 def _before(work: Workspace, path: Path) -> Trajectory | None:
@@ -147,12 +211,12 @@ def report_inputs(e: Everything) -> ReportInputs:
         undamped_pair=e.zoom_undamped,
         damped_pair=e.zoom_damped,
         body_modes={name: BodyModes(b.frequency_hz, b.labels) for name, b in e.bodies.items()},
-        coupled_hz=np.sort(e.coupled.frequency_hz[0]),
+        coupled_hz=None if e.coupled is None else np.sort(e.coupled.frequency_hz[0]),
         undamped_onsets=e.onsets_undamped,
         damped_onsets=e.onsets_damped,
         curve=None if e.curve is None else FrictionCurve(mu=e.curve[1], frequency_hz=e.curve[0]),
         trajectory=e.run,
-        energy=e.summary.energy,
+        energy=None if e.summary is None else e.summary.energy,
         **_signals(e),
         **shapes,
         agreement=agreement,
@@ -167,12 +231,16 @@ def report_inputs(e: Everything) -> ReportInputs:
         notes=e.notes,
         shape_vector=e.vector,
         friction_energy=e.energy,
+        sensitivities=e.sensitivities,
+        measures=e.measures,
     )
 
 
 def _signals(e: Everything) -> dict[str, Any]:
     """Spectra of the accelerations along x and the spectrogram of a velocity, from the last phase."""
     run = e.run
+    if run is None:
+        return {}
     part = run.phase_slice()
     start, stop = part.start, part.stop
     if stop - start < 64 or not run.watch_names:
@@ -194,7 +262,7 @@ def _shapes(e: Everything) -> dict[str, Any]:
     if e.operating is None:
         return {"unstable_shape": NamedShape(e.shape_mode.imag / (2 * np.pi), e.shape, e.shape_mode.real)}
     by_body = {name: modal_assurance(e.operating[name], e.shape[name]) for name in e.operating}
-    dominant = e.summary.dominant_frequency_hz or 0.0
+    dominant = 0.0 if e.summary is None else e.summary.dominant_frequency_hz or 0.0
     return {
         "operating_shape": NamedShape(dominant, e.operating),
         "unstable_shape": NamedShape(e.shape_mode.imag / (2 * np.pi), e.shape, e.shape_mode.real),
@@ -205,6 +273,6 @@ def _shapes(e: Everything) -> dict[str, Any]:
 def _values(e: Everything) -> dict[str, float]:
     """Computed values by the names that a case's reference values may carry."""
     values: dict[str, float] = {}
-    if e.summary.dominant_frequency_hz is not None:
+    if e.summary is not None and e.summary.dominant_frequency_hz is not None:
         values["dominant_frequency_hz"] = e.summary.dominant_frequency_hz
     return values

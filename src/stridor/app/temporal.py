@@ -17,14 +17,23 @@ if TYPE_CHECKING:
     from ..io.kept_parts import KeptParts
     from ..study.workspace import Workspace
     from ..temporal.trajectory import Trajectory
+    from .pipeline import Outcome
 
 Only = Annotated[
     list[str] | None,
     typer.Option(
         "--only",
-        metavar="PART",
-        help="Of the comparison only growth (small perturbations), run (the full run too) or critical. Repeatable.",
+        metavar="PART,…",
+        help="Parts that alone are computed: of comparisons growth (small perturbations), run (the full run too), "
+        "critical; of run these, and modes, onsets, sensitivities, countermeasures, simulate, compare. Repeatable.",
     ),
+]
+Skip = Annotated[
+    list[str] | None,
+    typer.Option("--skip", metavar="PART,…", help="Parts that are not computed. Repeatable."),
+]
+Fresh = Annotated[
+    bool, typer.Option("--fresh", help="Compute anew what the folder holds from earlier calls on the same case.")
 ]
 
 
@@ -147,6 +156,7 @@ def compare(
     from ..study import analyses
 
     values = None if mu is None else numbers(mu, "--mu")
+    only = None if only is None else [name.strip() for text in only for name in text.split(",")]
     call.check_friction(values)
     if critical is not None and only and critical != ("critical" in only):
         word = "--critical" if critical else "--no-critical"
@@ -174,11 +184,11 @@ def compare(
         raise typer.Exit(130)
 
 
-def _kept(call: Call, work: Workspace) -> KeptParts:
+def _kept(call: Call, work: Workspace, *, fresh: bool = False) -> KeptParts:
     """Parts of the comparison that earlier calls into the same folder have finished."""
     from ..io.kept_parts import NAME, KeptParts
 
-    kept = KeptParts(call.folder / NAME, work.key)
+    kept = KeptParts(call.folder / NAME, work.key, fresh=fresh)
     if kept.others:
         call.say(f"{kept.path} also holds parts of other cases or of another version; they are left alone")
     if kept.damaged:
@@ -186,31 +196,66 @@ def _kept(call: Call, work: Workspace) -> KeptParts:
     return kept
 
 
-@verb(parts=("figures",))
+@verb(parts=("figures", "parts"))
 def run(
     call: Call,
     only: Only = None,
+    skip: Skip = None,
+    fresh: Fresh = False,
     friction_range: Range = None,
     max_frequency: MaxFrequency = None,
     source: Source = None,
 ) -> None:
-    """Everything: modes, onsets, simulate, compare, and the report. A second call takes what is finished in time."""
+    """Everything: modes, onsets, simulate, compare, and the report. A second call takes what is there of the same case
+    and goes on where the first was cut."""
     work = call.workspace(source, max_frequency, friction_range)
 
-    from .output import progress_bar, stdout
+    from .output import progress_bar
     from .pipeline import run as run_all
 
     with progress_bar("simulate", quiet=call.quiet) as progress:
+        kept = _kept(call, work, fresh=fresh)
         outcome = run_all(
-            work, call.folder, progress=progress, log=call.say, only=only, kept=_kept(call, work)
+            work, call.folder, progress=progress, log=call.say, only=only, skip=skip, fresh=fresh, kept=kept
         )
+    _told(call, outcome)
+
+
+@verb(parts=("figures", "parts"))
+def report(
+    call: Call,
+    mu: Mu = None,
+    skip: Skip = None,
+    fresh: Fresh = False,
+    friction_range: Range = None,
+    max_frequency: MaxFrequency = None,
+    source: Source = None,
+) -> None:
+    """The page without any run in time: modes, root locus, onsets, shapes, sensitivities, counter-measures. Takes
+    models that no time loop takes, too."""
+    work = call.workspace(source, max_frequency, friction_range)
+
+    from .pipeline import report as write
+
+    kept, friction = _kept(call, work, fresh=fresh), call.one_friction(mu)
+    _told(call, write(work, call.folder, mu=friction, log=call.say, skip=skip, fresh=fresh, kept=kept))
+
+
+def _told(call: Call, outcome: Outcome) -> None:
+    """The verdict and where the page is, or the document of all of it."""
+    from .output import stdout
+
     if call.json:
         call.document(outcome.to_json())
     else:
         stdout.print(outcome.verdict, markup=False)
-        stdout.print(f"report: {outcome.report}", markup=False)
+        for note in outcome.everything.notes:
+            if not note.startswith("Taken"):  # which the log has told
+                call.say(f"note: {note}")
+        if outcome.report is not None:
+            stdout.print(f"report: {outcome.report}", markup=False)
     if outcome.interrupted:
         raise typer.Exit(130)
 
 
-VERBS = {"simulate": simulate, "compare": compare, "run": run}
+VERBS = {"simulate": simulate, "compare": compare, "run": run, "report": report}

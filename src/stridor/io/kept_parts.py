@@ -21,14 +21,15 @@ LONGEST = 1 << 28  # characters of a line; no part is as long
 
 
 class KeptParts:
-    """Parts of one case, ``key`` (`study.case_key`), in a file. Reads it once; ``others`` counts lines of other cases,
-    ``damaged`` those that are cut or changed."""
+    """Parts of one case, ``key`` (`study.case_key`), in a file. Reads it once, with ``fresh`` not at all; ``others``
+    counts lines of other cases, ``damaged`` those that are cut or changed."""
 
-    def __init__(self, path: Path, key: str) -> None:
+    def __init__(self, path: Path, key: str, *, fresh: bool = False) -> None:
         self.path, self.key = path, key
         self.others = self.damaged = 0
         self._parts: dict[tuple[str, float | None], Mapping[str, Any]] = {}
-        self._read()
+        if not fresh:
+            self._read()
 
     def get(self, part: str, mu: float | None) -> Mapping[str, Any] | None:
         """What was put there for this case, None if nothing was."""

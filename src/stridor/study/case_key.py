@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..case import Case
+from .fingerprint import contents
 
 # What says where to look, not what is there: a part at some μ is the same whatever else is asked for.
 ELSEWHERE = ("title", "comparison", "reference")
@@ -21,7 +22,7 @@ def case_key(case: Case) -> str:
     sources of this program, since another version may give other numbers."""
     data = case.model_dump(mode="json", exclude_none=True)
     kept = {name: value for name, value in data.items() if name not in ELSEWHERE}
-    files = {path: _digest(Path(path)) for path in sorted(set(_files(kept)))}
+    files = {path: contents(Path(path)) for path in sorted(set(_files(kept)))}
     text = json.dumps({"case": kept, "files": files, "sources": _sources()}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -37,20 +38,6 @@ def _files(value: Any) -> Iterator[str]:
     elif isinstance(value, list):
         for item in cast("list[Any]", value):
             yield from _files(item)
-
-
-def _digest(path: Path) -> str | None:
-    """SHA-256 of a file, None where it cannot be read; a deck that includes others counts with its folder's decks."""
-    digest = hashlib.sha256()
-    decks = sorted(path.parent.glob("*.inp")) if path.suffix.lower() == ".inp" else [path]
-    try:
-        for file in decks:
-            with file.open("rb") as stream:
-                for block in iter(lambda stream=stream: stream.read(1 << 24), b""):
-                    digest.update(block)
-    except OSError:
-        return None
-    return digest.hexdigest()
 
 
 @cache

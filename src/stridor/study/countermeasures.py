@@ -72,7 +72,7 @@ def rank_countermeasures(
         raise CaseError("target", target, accepted)
     band = linear.columns("all") if watch == "all" else unstable
     ranking = Ranking(linear, [b for b in band if linear.mode(b) is not None], target, percent, margin)
-    found = ranking.numbers(_default_numbers(case) if numbers is None else list(numbers))
+    found = ranking.numbers(default_numbers(case) if numbers is None else list(numbers))
     if added_mass:
         found += ranking.masses()
     if chamfers > 0:
@@ -92,7 +92,8 @@ def rank_countermeasures(
     )
 
 
-def _default_numbers(case: Case) -> list[str]:
+def default_numbers(case: Case) -> list[str]:
+    """Paths of the numbers that changes are tried on: of materials, damping, factors, contact stiffnesses."""
     used = dict.fromkeys(getattr(body, "material", None) for body in case.bodies.values())
     paths = [f"materials.{m}.{n}" for m in used if m in case.materials for n in ("young_modulus", "density")]
     for name, body in case.bodies.items():

@@ -25,7 +25,9 @@ ELSEWHERE = ("title", "modal", "comparison", "reference")
 RECORDING = ("temporal.record_every", "temporal.watch")
 PHASE = "phases"
 _FILE = re.compile(r"^bodies\..*\.?(file|labels|mesh)$")
-_INPUT = re.compile(rb"^\*[^\n]*\bINPUT\s*=\s*\"?([^,\"\r\n]+)", re.IGNORECASE | re.MULTILINE)
+# On the line of its keyword or on the next; what is no such line costs a look at a file.
+_INPUT = re.compile(rb"\bINPUT\s*=\s*\"?([^,\"\r\n]+)", re.IGNORECASE)
+_LONGEST = 1 << 12  # bytes of a name, which may lie across two blocks
 _LINES = 12
 
 
@@ -52,7 +54,8 @@ def fingerprint(case: Case, mu: float | None) -> dict[str, Any]:
         for path, value in _flat(case.model_dump(mode="json", exclude_none=True), ())
         if path.split(".")[0] not in ELSEWHERE
     }
-    files = {path: _hash(Path(value)) for path, value in values.items() if _FILE.match(path) and isinstance(value, str)}
+    named = {path: value for path, value in values.items() if _FILE.match(path) and isinstance(value, str)}
+    files = {path: contents(Path(value)) for path, value in named.items()}
     return {"values": {k: v for k, v in values.items() if k not in files}, "mu": mu, "files": files}
 
 
@@ -194,25 +197,27 @@ def _flat(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
         yield ".".join(path), list(value) if isinstance(value, tuple) else value
 
 
-def _hash(file: Path, above: tuple[Path, ...] = ()) -> str | None:
-    """SHA-256 of a file and of what an Abaqus deck includes; None where it cannot be read."""
+def contents(file: Path, above: tuple[Path, ...] = ()) -> str | None:
+    """SHA-256 of a file and of what an Abaqus deck includes, whatever that is called; None where it cannot be read."""
     digest = hashlib.sha256()
     included: list[Path] = []
     try:
         if irregular(file) is not None:
             return None  # said by whoever reads it
         with file.open("rb") as stream:
-            deck = file.suffix.lower() == ".inp"
+            deck = bool(above) or file.suffix.lower() == ".inp"
+            before = b""
             for block in iter(lambda: stream.read(1 << 24), b""):
                 digest.update(block)
                 if deck:
-                    names = (found.decode("utf-8", "replace").strip() for found in _INPUT.findall(block))
+                    names = (found.decode("utf-8", "replace").strip() for found in _INPUT.findall(before + block))
                     included += [file.parent / name for name in names]
+                    before = block[-_LONGEST:]
     except (OSError, ValueError):
         return None
-    for other in included:
+    for other in dict.fromkeys(included):
         if other not in (file, *above):
-            digest.update((_hash(other, (file, *above)) or "").encode())
+            digest.update((contents(other, (file, *above)) or "").encode())
     return digest.hexdigest()
 
 

@@ -25,7 +25,10 @@ from ..system.pairs import is_point_on_line
 from .workspace import Workspace
 
 IN_TIME = ("simulate", "compare", "run")
-MODAL = ("steady", "modes", "shapes", "onsets", "run", "sensitivities", "countermeasures", "damping_map", "reduce")
+MODAL = (
+    "steady", "modes", "shapes", "onsets", "run", "sensitivities", "countermeasures", "damping_map", "reduce",
+    "report",
+)
 
 
 def without_effect(problem: Case | Workspace, verb: str, *, solver: str | None = None) -> list[str]:

@@ -30,7 +30,7 @@ from .case_key import case_key
 from .options import options_of
 
 SYSTEMS = 16  # kept at the same time, of a case whose matrices depend on μ
-WORKS = "what works for these is `stridor modes`, `stridor onsets` and `stridor steady`"
+WORKS = "what works for these is `stridor report`, `stridor modes`, `stridor onsets` and `stridor steady`"
 
 
 class _Settings(Table):

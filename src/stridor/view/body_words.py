@@ -60,18 +60,19 @@ def _sliding_words(sliding: SlidingTable | None) -> str:
     return ", whose material slides through it " + " and ".join(parts or ["not"])
 
 
-def contact_words(name: str, contact: Contact, *, on_line: bool) -> str:
-    """One sentence about a contact; on_line: of a point on a beam, whose stiffness only the modes take."""
+def contact_words(name: str, contact: Contact, *, area: bool | None, timed: bool = True) -> str:
+    """One sentence about a contact; area: whether its stiffness is one per area or that of a point, None: either;
+    timed: whether the time loop has its stiffness as well."""
     friction = contact.friction.model_dump(exclude_none=True)
     law = friction.pop("law")
     settings = ", ".join(f"{key.replace('_', ' ')} {_setting(value)}" for key, value in friction.items())
-    unit = "N/m" if on_line else "N/m (of a point) or N/m³ (per area)"
-    where = " in the modal approach" if on_line else ""
+    unit = {True: "N/m³", False: "N/m", None: "N/m (of a point) or N/m³ (per area)"}[area]
+    where = "" if timed or contact.stiffness == "rigid" else " in the modal approach"
     stiffness = "rigid" if contact.stiffness == "rigid" else (
         f"with a stiffness of {significant(contact.stiffness)} {unit}"
     )
     if contact.cubic:
-        cube = "N/m³ (of a point) or N/m⁵ (per area)"
+        cube = {True: "N/m⁵", False: "N/m³", None: "N/m³ (of a point) or N/m⁵ (per area)"}[area]
         stiffness += f" and {significant(contact.cubic)} {cube} times the cube of the approach"
     stiffness += ", kept closed" if contact.closed else ""
     return (

@@ -10,6 +10,8 @@ from ..case import Case
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
 from ..sliding.surfaces import SurfaceSliding
+from ..study.measures import Countermeasures
+from ..study.sensitivities import Sensitivities
 from ..system import System
 from ..temporal.energy import EnergyBalance
 from ..temporal.signals import Spectrogram, Spectrum
@@ -56,8 +58,9 @@ class ReportInputs:
     give; value_notes: what each of them is. source_places: where in the source of case.reference something is
     found, by the name of the figure or table here ("frequency-pair": "figure 3").
     steady: equilibrium of every contact node; shape_vector (n,): the mode that grows fastest, friction_energy (m,):
-    what friction feeds into it at each slave node. timings [s] by analysis; versions by program; case_text: the case
-    file as written; created: date and time; warnings and notes in words.
+    what friction feeds into it at each slave node. sensitivities, measures: what changes of the case do. timings [s]
+    by analysis; versions by program; case_text: the case file as written; created: date and time; warnings and notes in
+    words.
     """
 
     case: Case
@@ -98,6 +101,8 @@ class ReportInputs:
     notes: tuple[str, ...] = ()
     shape_vector: ComplexArray | None = None
     friction_energy: Array | None = None
+    sensitivities: Sensitivities | None = None
+    measures: Countermeasures | None = None
 
     @property
     def max_frequency_hz(self) -> float:

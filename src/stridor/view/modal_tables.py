@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..case.schema import ReferenceFrequency, ReferenceOnset
 from ..digits import measured, readable
 from ..modal.complex_modes import UNSTABLE_RELATIVE, ComplexModes
@@ -33,6 +35,8 @@ def frequency_tables(inputs: ReportInputs) -> list[Table]:
         body_table(name, modes, reference.bodies.get(name, ()) if reference else ())
         for name, modes in inputs.body_modes.items()
     ]
+    # A stiff body has none in the band.
+    tables = [table for table in tables if table.rows]
     if inputs.coupled_hz is not None:
         printed = reference.coupled if reference else ()
         tables.append(coupled_table(inputs.coupled_hz, printed, inputs.undamped_onsets))
@@ -52,10 +56,16 @@ def body_table(name: str, modes: BodyModes, printed: tuple[ReferenceFrequency, .
         computed = float(modes.frequency_hz[i]) if i is not None else None
         rows.append(_frequency_row((label,), computed, other, bool(printed)))
     heads = ("mode", "computed [Hz]", "printed [Hz]", "difference", "note")
-    caption = "F: bending, T: traction."
-    if printed:
-        caption += " " + PRINTED
+    caption = " ".join(filter(None, [_label_words(modes.labels), PRINTED if printed else ""]))
     return drop_empty(Table(f"frequencies-{name}", f"{name} alone", heads, tuple(rows), frozenset({0, 4}), caption))
+
+
+def _label_words(labels: Sequence[str]) -> str:
+    """What the letters of these labels are."""
+    letters = {label.rstrip("0123456789") for label in labels}
+    words = {"F": "F: bending", "T": "T: traction", "FT": "FT: both", "E": "E: elastic"}
+    said = ", ".join(word for letter, word in words.items() if letter in letters)
+    return f"{said}." if said else ""
 
 
 def coupled_table(frequencies: Array, printed: tuple[ReferenceFrequency, ...], onsets: Onsets | None) -> Table:

@@ -16,6 +16,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from .body_words import bodies_table
+from .change_parts import change_figures, change_tables, change_words, mechanism_table
 from .figures import ReportFigure, agreement_figures, modal_figures, model_figures, temporal_figures
 from .inputs import ReportInputs
 from .modal_tables import frequency_tables, modes_table, onset_tables
@@ -120,6 +121,7 @@ def sections(inputs: ReportInputs) -> list[Section]:
         ),
         Section("frequencies", "Natural frequencies", parts=tuple(frequency_tables(inputs))),
         _modal(inputs),
+        _changes(inputs),
         _temporal(inputs, window),
         _agreement(inputs),
         _reference(inputs, window),
@@ -142,6 +144,8 @@ def _window(inputs: ReportInputs) -> Window | None:
 def _modal(inputs: ReportInputs) -> Section:
     parts: list[Table | ReportFigure] = [*onset_tables(inputs), *modal_figures(inputs)]
     parts.extend(shape_figures(inputs))
+    mechanisms = mechanism_table(inputs)
+    parts.extend(() if mechanisms is None else (mechanisms,))
     if inputs.modes is not None:
         mu = float(inputs.modes.mu[0]) if inputs.mu is None else inputs.mu
         parts.append(modes_table(inputs.modes, mu, inputs.max_frequency_hz))
@@ -164,6 +168,12 @@ def _modal(inputs: ReportInputs) -> Section:
             "the frequency Im λ/2π. A mode with positive growth rate is potentially unstable.",
         )
     return Section("modal", "Modal approach", tuple(said), parts=tuple(parts))
+
+
+def _changes(inputs: ReportInputs) -> Section:
+    """What a change of the case would do: derivatives, and counter-measures ranked by them."""
+    parts = (*change_tables(inputs), *change_figures(inputs))
+    return Section("changes", "What a change would do", change_words(inputs), parts=parts)
 
 
 def _temporal(inputs: ReportInputs, window: Window | None) -> Section:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..digits import readable
 from ..study.countermeasures import Countermeasures, Measure
 from ..study.sensitivities import Sensitivities
-from .tables import Row, Table, drop_empty, number, significant
+from .tables import Row, Table, drop_empty, quantity, significant
 
 BADLY_CONDITIONED = 10.0
 
@@ -16,8 +16,8 @@ def sensitivity_table(result: Sensitivities) -> Table:
         Row(
             (
                 str(int(result.branch[b])),
-                number(float(result.frequency_hz[b]), 1),
-                number(float(result.growth_rate[b]), 2),
+                quantity(float(result.frequency_hz[b]), 1),
+                quantity(float(result.growth_rate[b]), 2),
                 name,
                 significant(float(result.growth_per_percent[k, b])),
                 significant(float(result.frequency_per_percent_hz[k, b])),

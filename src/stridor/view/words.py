@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..agreement import GOOD_FREQUENCY, GOOD_GROWTH
+from ..case import Case
+from ..case.matrix_checks import MU
 from ..case.schema import Load
 from ..digits import measured
 from ..study.fingerprint import changes_of
@@ -30,20 +32,32 @@ class Verdict:
 def verdict(inputs: ReportInputs) -> Verdict:
     """Will it squeal, at which frequency, from which friction on, and do both approaches say so?"""
     growing = _growing(inputs)
-    at = f" at μ = {inputs.mu:g}" if inputs.mu is not None else ""
+    at = f" at μ = {inputs.mu:g}" if inputs.mu is not None and _rubs(inputs.case) else ""
     agreement = inputs.agreement
     agrees = None if agreement is None else agreement.agree
-    parts = [_modal_sentence(growing, at), _onset_sentence(inputs), _run_sentence(inputs), _agreement_sentence(inputs)]
+    state = f"Steady sliding{at}" if inputs.case.contacts else f"The structure{at}"
+    parts = [
+        _modal_sentence(growing, state), _onset_sentence(inputs), _run_sentence(inputs), _agreement_sentence(inputs),
+    ]  # fmt: skip
     paragraph = " ".join(part for part in parts if part)
     squeals = None if growing is None else bool(growing)
     if growing is None:
-        return Verdict("Not decided: no modes at the friction of the case", paragraph, None, agrees)
+        return Verdict(_undecided(inputs), paragraph, None, agrees)
     if not growing:
         return Verdict(f"It does not squeal{at}", paragraph, squeals, agrees)
     answering = _answering(inputs)
     frequency = max(growing, key=_growth_of)[0] if answering is None else answering
     may = "squeals" if answering is not None or agrees else "may squeal"
     return Verdict(f"It {may}{at}, at {measured(frequency, 0)} Hz", paragraph, squeals, agrees)
+
+
+def _undecided(inputs: ReportInputs) -> str:
+    """The headline where there are no modes at one friction coefficient."""
+    onsets = inputs.damped_onsets or inputs.undamped_onsets
+    first = None if onsets is None else onsets.first
+    if first is not None:
+        return f"It may squeal from μ = {measured(first.mu, 4)} on, at {measured(first.frequency_hz, 0)} Hz"
+    return "Not decided: no modes at the friction of the case"
 
 
 def _growth_of(pair: tuple[float, float]) -> float:
@@ -75,16 +89,21 @@ def _growing(inputs: ReportInputs) -> list[tuple[float, float]] | None:
     return None
 
 
-def _modal_sentence(growing: list[tuple[float, float]] | None, at: str) -> str:
+def _rubs(case: Case) -> bool:
+    """Whether anything depends on friction."""
+    return bool(case.contacts) or MU in case.factor_names
+
+
+def _modal_sentence(growing: list[tuple[float, float]] | None, state: str) -> str:
     if growing is None:
         return ""
     if not growing:
-        return f"Steady sliding{at} is stable: no mode in the range of frequencies grows."
+        return f"{state} is stable: no mode in the range of frequencies grows."
     named = [
         f"{measured(f, 0)} Hz (growth {measured(g, 0)} 1/s)" for f, g in sorted(growing, key=_growth_of, reverse=True)
     ]
     modes = "one mode grows" if len(named) == 1 else f"{len(named)} modes grow"
-    return f"Steady sliding{at} is unstable: {modes}, {_listed(named)}."
+    return f"{state} is unstable: {modes}, {_listed(named)}."
 
 
 def _onset_sentence(inputs: ReportInputs) -> str:
@@ -209,7 +228,8 @@ def model_in_words(inputs: ReportInputs) -> list[str]:
         else:
             lines.append(f"{name}: pushes {load.at} with {_listed(parts or ['nothing'])}.")
     lines += [
-        contact_words(name, contact, on_line=contact.master in case.beams) for name, contact in case.contacts.items()
+        contact_words(name, contact, area=_has_area(inputs, name), timed=case.temporal.contact != "rigid")
+        for name, contact in case.contacts.items()
     ]
     if inputs.system is not None:
         lines.append(f"In all {inputs.system.size} freedoms that are not held.")
@@ -230,6 +250,14 @@ def model_in_words(inputs: ReportInputs) -> list[str]:
                 f"In steady sliding contact {name} carries {force:.4g} N and slips at {most}{speeds.max():.4g} m/s."
             )
     return lines
+
+
+def _has_area(inputs: ReportInputs, name: str) -> bool | None:
+    """Whether the nodes of a contact have areas, None where there is no system to tell."""
+    if inputs.system is None or name not in inputs.system.contact_nodes().names:
+        return None
+    nodes = inputs.system.contact_nodes()
+    return not bool(np.isnan(nodes.area[nodes.owner == nodes.names.index(name)]).any())
 
 
 def _body_load(load: Load) -> str:
