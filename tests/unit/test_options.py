@@ -167,7 +167,7 @@ def test_bands_in_python(folder: Path) -> None:
     assert modes.branch.tolist() == [7, 8, 9, 10]
     assert modes.total.tolist() == [4]
     assert np.array_equal(modes.residual, st.modes(work, 0.1, count=19).residual[:, 6:10])
-    with pytest.raises(CaseError, match="band_hz: .*goes before the choice of the lowest modes"):
+    with pytest.raises(CaseError, match=r"band_hz: .*goes before the choice of the lowest modes"):
         st.modes(work, 0.1, count=3).between(100.0, 200.0)
     with pytest.raises(CaseError, match="band_hz: '0:50000'"):
         st.onsets(work, band_hz=(0.0, 5e4))

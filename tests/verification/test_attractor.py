@@ -136,7 +136,8 @@ def test_copies_on_the_command_line(tmp_path):
     assert document["copies"]["runs"] == 3
     assert document["copies"]["contacts"]["A"]["mean"].keys() == document["settled"]["A"]["averages"].keys()
     printed = CliRunner().invoke(app, [*words, "--quiet"], catch_exceptions=False).stdout
-    for line in ("mean of 3  ± one run", "contact A: largest recorded N from ", "largest values are of this one trajectory"):
+    printed = " ".join(printed.split())
+    for line in ("mean of 3 ± one run", "contact A: largest recorded N from ", "largest values are of this one trajectory"):
         assert line in printed
     with pytest.raises(CaseError, match="--copies: 2 – a run from its start; not with --restart"):
         CliRunner().invoke(app, [*words, "--restart", str(tmp_path / "simulate.nc")], catch_exceptions=False)

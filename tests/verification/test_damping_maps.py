@@ -236,16 +236,16 @@ def test_the_command_prints_a_table_and_writes_one(block, tmp_path):
     done = stridor(*words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert lines[0] == f"Lowest onset μ; x: {X}, y: {Y}"
-    assert lines[1].split() == ["x", "\\", "y", "1e-09", "5e-08"]
-    assert lines[2].split()[0] == "1e-09"
+    assert lines[:3] == ["Lowest onset μ", f"  x: {X}", f"  y: {Y}"]
+    assert lines[3].split() == ["x", "\\", "y", "1e-09", "5e-08"]
+    assert lines[4].split()[0] == "1e-09"
     assert any(line.startswith("lowest: μ = 0.0") for line in lines)
     assert any(line.startswith("without damping: μ = 0.0") for line in lines)
-    assert lines[-1].startswith("4 onsets from a reduced model of ")
+    assert any(line.startswith("4 onsets from a reduced model of ") for line in lines)
     assert "written: block.out/damping_map.csv" in done.stderr
     assert (tmp_path / "block.out" / "damping_map.png").stat().st_size > 10_000
     rows = list(csv.DictReader((tmp_path / "block.out" / "damping_map.csv").open(encoding="utf-8")))
     assert list(rows[0])[:4] == [X, Y, "mu", "frequency_hz"]
     assert len(rows) == 4
-    assert f"{float(rows[0]['mu']):.6f}" == lines[2].split()[1]
+    assert f"{float(rows[0]['mu']):.6f}" == lines[4].split()[1]
     assert float(rows[0]["mu_error"]) < 1e-7

@@ -28,7 +28,8 @@ def new(
     """Write a commented case file, ready to edit."""
     from ..case import loads, template_text
     from ..io.atomic import write_text
-    from .output import print_json, say
+    from .closing import command
+    from .output import literal, print_json, say, stdout
 
     text = template_text(template)
     if set_:
@@ -40,7 +41,9 @@ def new(
     write_text(path, text)
     if json:
         print_json({"case": str(path)})
-    say(f"written: {path}\nnext: stridor check {path}, then stridor run {path}", quiet=quiet)
+    say(f"written: {path}", quiet=quiet)
+    if not (json or quiet):
+        literal(f"Next: {command(['stridor', 'check', str(path)], stdout.page - 6)}")
 
 
 @verb(writes=False)
@@ -61,7 +64,8 @@ def check(call: Call) -> None:
         call.document(description.to_json())
         return
     for line in description.lines:
-        stdout.print(line, markup=False)
+        stdout.print(line)
+    call.suggest("onsets" if work.has_contacts else "modes")
 
 
 @verb(CaseOrMatrix, writes=False)
@@ -82,7 +86,7 @@ def matrices(
         if call.json:
             print_json({str(call.path): {"text": lines}})
         else:
-            stdout.print("\n".join([f"{call.path}:", *(f"  {line}" for line in lines)]), markup=False)
+            stdout.print("\n".join([f"{call.path}:", *(f"  {line}" for line in lines)]))
         return
     case = call.case()
 
@@ -99,7 +103,7 @@ def matrices(
         print_json({name: {"text": r.lines(), "warnings": list(r.matrices.warnings)} for name, r in found.items()})
         return
     for line in text:
-        stdout.print(line, markup=False)
+        stdout.print(line)
 
 
 @verb()
@@ -117,7 +121,8 @@ def export(
 
     from ..io.export import export as write
     from ..io.matrix_files import FORMATS
-    from .output import stdout, table
+    from .output import stdout
+    from .tables import table
 
     friction = call.one_friction(mu)
     written = write(work, call.folder, format=one_of(format_, "--format", FORMATS), mu=friction, force=force)
@@ -131,11 +136,11 @@ def export(
         [name, " × ".join(map(str, said["shape"])), said["file"], said["meaning"]]
         for name, said in written.matrices.items()
     ]
-    table("matrices", ["name", "shape", "file", "what it is"], rows)
+    table("matrices", ["name", "shape", "file", "what it is"], rows, words=["what it is"], kept_in="the JSON document")
     if written.load_names:
-        stdout.print(f"columns of loads: {', '.join(written.load_names)}", markup=False)
+        stdout.print(f"columns of loads: {', '.join(written.load_names)}")
     if written.case is not None:
-        call.say(f"next: stridor {'modes' if mu is not None else 'onsets'} {written.case}")
+        call.suggest("modes" if mu is not None else "onsets", path=Path(written.case))
 
 
 VERBS = {"new": new, "check": check, "matrices": matrices, "export": export}

@@ -24,12 +24,12 @@ def onset_document(onset: ParametricOnset) -> dict[str, Any]:
 
 def show_onsets_along(onsets: ParametricOnsets, *, confirmed: bool) -> None:
     """A table, and what was checked."""
-    from .output import stdout, table
+    from .output import stdout
+    from .tables import table
 
-    along, (low, high), top = onsets.parameter, onsets.between, onsets.max_frequency_hz
+    along = onsets.parameter
     if not onsets:
-        stdout.print(f"no onset along {along} in {low:g} … {high:g} up to {top:g} Hz", markup=False)
-        stdout.print(f"  {onsets.sentence}", markup=False)
+        stdout.print(f"  {onsets.sentence}")
         return
     how = "confirmed in the full model" if confirmed else "of the reduced model alone: its file has no full matrices"
     rows = [
@@ -42,7 +42,8 @@ def show_onsets_along(onsets: ParametricOnsets, *, confirmed: bool) -> None:
         ]
         for o in onsets
     ]
-    table(f"Onsets along {along}, {how}", [along, "frequency [Hz]", "kind", "turns", "residual"], rows)
+    heads = [along, "frequency [Hz]", "kind", "turns", "residual"]
+    table(f"Onsets along {along}, {how}", heads, rows, drop=["residual"], kept_in="the CSV file")
     for line in onsets.from_above_words():
-        stdout.print(f"  {line}", markup=False)
-    stdout.print(f"  {onsets.sentence}", markup=False)
+        stdout.print(f"  {line}")
+    stdout.print(f"  {onsets.sentence}")

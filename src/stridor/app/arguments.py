@@ -21,7 +21,7 @@ import typer
 from .. import interrupts
 from ..errors import AnalysisError, CaseError, StridorError
 from .heartbeat import beating
-from .option_table import Json, Out, Quiet, Set, Solver, Verbose
+from .option_table import TABLE, Json, Out, Quiet, Set, Solver, Verbose
 from .values import INFINITY, numbers, pair
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..io.csv_files import Tabled
     from ..io.datasets import Result
     from ..study.workspace import Workspace
+    from .closing import Conclusion
 P = ParamSpec("P")
 INCOMPLETE = 3  # exit code: what was checked says that something may be missing from what was printed
 
@@ -40,6 +41,7 @@ class Call:
 
     solver: the one for everything that the program factorises, whatever case and environment say. told: warnings so
     far, each of which is said once; idle: settings without effect on what the verb computes, told with its results.
+    asked: options that stand for settings of the case, as they were given.
     """
 
     path: Path
@@ -51,6 +53,7 @@ class Call:
     told: list[str] = field(default_factory=list[str])
     verb: str = ""
     idle: list[str] = field(default_factory=list[str])
+    asked: list[tuple[str, ...]] = field(default_factory=list[tuple[str, ...]])
     writes: bool = True
     parts: tuple[str, ...] = ()
     stack: ExitStack = field(default_factory=ExitStack)
@@ -83,6 +86,9 @@ class Call:
         from ..case import load
 
         named = {"solver": self.solver, "source": source}
+        given = {"--source": source, "--max-frequency": max_frequency, "--range": friction_range}
+        self.asked.extend((name, str(value)) for name, value in given.items() if value is not None)
+        self.asked.extend([("--undamped",)] if undamped else [])
         own = [f"modal.{key}={json.dumps(name)}" for key, name in named.items() if name is not None]
         if max_frequency is not None:
             if not 0.0 < max_frequency < INFINITY:
@@ -165,6 +171,30 @@ class Call:
         from .output import say
 
         say(text, quiet=self.quiet)
+
+    def conclude(self, found: Conclusion) -> None:
+        """The last lines on stdout: the result in a sentence and, unless quiet, the command that comes next."""
+        from .output import stdout
+
+        if found.sentence:
+            stdout.print(found.sentence)
+        if found.verb:
+            self.suggest(found.verb, *found.options)
+
+    def suggest(self, verb: str, *options: str, path: Path | None = None) -> None:
+        """Name the command that makes sense next, with the options that were given to this one; of another file those
+        that say how to compute. Silent with --quiet."""
+        from .closing import command
+        from .output import literal, stdout
+
+        if self.quiet:
+            return
+        given = [(name, value) for name, value in (("--solver", self.solver), ("--out", self.out)) if value is not None]
+        changes = [("--set", change) for change in self.set_ or ()]
+        kept = [] if path is not None else [*self.asked, *changes, *given]
+        words = ["stridor", verb, str(path or self.path), *options]
+        words += [str(word) for option in kept if verb in TABLE[option[0]].on for word in option]
+        literal(f"Next: {command(words, stdout.page - 6)}")
 
     def tabulate(self, result: Tabled, name: str) -> Path:
         """Save a result as a CSV file in the folder, and say so."""

@@ -9,6 +9,7 @@ import typer
 
 from ..digits import measured
 from .arguments import Call, verb
+from .closing import Conclusion
 from .option_table import MaxFrequency, Range, Source
 from .values import pair
 
@@ -63,12 +64,27 @@ def damping_map(
         return
     _show(result)
     for line in (*_words(result), *result.notes):
-        stdout.print(line, markup=False)
+        stdout.print(line)
+    call.conclude(_conclusion(result))
+
+
+def _conclusion(result: DampingMap) -> Conclusion:
+    """Between which values the onset lies; then the onsets where it is lowest."""
+    import numpy as np
+
+    if not np.isfinite(result.onset_mu).any():
+        return Conclusion("no onset at any point of the map", "onsets")
+    i, j = (int(k) for k in np.unravel_index(int(np.nanargmin(result.onset_mu)), result.onset_mu.shape))
+    low, high = float(result.onset_mu[i, j]), float(np.nanmax(result.onset_mu))
+    said = f"over the two dampings the lowest onset goes from μ = {low:.6f} to {high:.6f}"
+    there = (f"{result.x}={result.x_values[i]:.6g}", f"{result.y}={result.y_values[j]:.6g}")
+    return Conclusion(said, "onsets", ("--set", there[0], "--set", there[1]))
 
 
 def _show(result: DampingMap) -> None:
     """The onsets over the grid, x downwards, y across, with letters where more of one of them lowers the onset."""
-    from .output import stdout, table
+    from .output import stdout
+    from .tables import table
 
     nx, ny = result.onset_mu.shape
     if ny > WIDEST:
@@ -80,7 +96,10 @@ def _show(result: DampingMap) -> None:
         cells = [measured(mu, 6) if math.isfinite(mu) else "–" for mu in result.onset_mu[i]]
         rows.append([f"{result.x_values[i]:.4g}", *(f"{c} {m}" for c, m in zip(cells, marks, strict=True))])
     heads = ["x \\ y", *(f"{y:.4g}   " for y in result.y_values)]
-    table(f"Lowest onset μ; x: {result.x}, y: {result.y}", heads, rows)
+    title = f"Lowest onset μ\n  x: {result.x}\n  y: {result.y}"
+    # Every second column, then three of four: what is left is a map still.
+    thinned = [heads[2:-1:2], [head for k, head in enumerate(heads[1:-1]) if k % 4], heads[2:-1]]
+    table(title, heads, rows, drop=thinned, kept_in="damping_map.csv")
     if any(where.any() for _, where in lowers):
         stdout.print("  x, y: more of it lowers the onset there")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -38,13 +39,16 @@ def sensitivities(
     from ..study.sensitivities import sensitivities as solve
     from ..view.sensitivity_plots import sensitivity_bars
     from ..view.sensitivity_tables import sensitivity_table
+    from .conclusions import of_sensitivities
 
     friction, chosen = call.one_friction(mu), band_of(band, work.modal.max_frequency_hz, branch)
     result = solve(work, parameter or ["mu"], mu=friction, modes=branch or "unstable", band_hz=chosen)
     call.tabulate(result, "sensitivities.csv")
     drawn = sensitivity_bars(result) if len(result.branch) else None
-    _show(call, result, sensitivity_table(result))
     _draw(call, drawn, "sensitivities.png")
+    _show(call, result, sensitivity_table(result), ["condition", "frequency per % [Hz]", "growth rate [1/s]"])
+    if not call.json:
+        call.conclude(of_sensitivities(result, mu))
 
 
 @verb()
@@ -65,27 +69,36 @@ def countermeasures(
     work = call.workspace(source, max_frequency, undamped=undamped)
 
     from ..study.countermeasures import rank_countermeasures
+    from ..study.sensitivities import number_at
     from ..view.sensitivity_plots import countermeasure_bars
     from ..view.sensitivity_tables import countermeasure_table
+    from .conclusions import of_countermeasures
 
     target: Any = branch[0] if branch else "sum"
     result = rank_countermeasures(work, mu=call.one_friction(mu), target=target, percent=percent, verify=verify)
     call.tabulate(result, "countermeasures.csv")
-    _show(call, result, countermeasure_table(result))
     drawn = countermeasure_bars(result) if result.measures else None
     _draw(call, drawn, "countermeasures.png")
+    _show(call, result, countermeasure_table(result), ["of all, per % [1/s]", "removed, predicted [1/s]"])
+    if not call.json:
+        case = work.case(call.verb)
+        call.conclude(of_countermeasures(result, partial(number_at, case), mu))
 
 
-def _show(call: Call, result: Any, shown: Table) -> None:
-    from .output import stdout, table
+def _show(call: Call, result: Any, shown: Table, drop: list[str]) -> None:
+    from .output import stdout
+    from .tables import table
 
     if call.json:
         call.document(result.to_json())
         return
     if shown.rows:
-        table(shown.title, shown.heads, [row.cells for row in shown.rows])
+        words = [shown.heads[k] for k in shown.words]
+        cells, bad = [row.cells for row in shown.rows], [k for k, row in enumerate(shown.rows) if row.kind == "bad"]
+        name = f"{shown.name}.csv"
+        table(shown.title, shown.heads, cells, drop=drop, words=words, marked=bad, kept_in=name)
     for warning in result.warnings:
-        stdout.print(warning, markup=False)
+        stdout.print(warning)
 
 
 def _draw(call: Call, figure: Any, name: str) -> None:

@@ -46,6 +46,7 @@ def steady(call: Call, mu: Mu = None) -> None:
     from .show import show_steady
 
     show_steady(document)
+    call.suggest("modes", *(() if mu is None else ("--mu", mu)))
 
 
 @verb()
@@ -63,8 +64,9 @@ def shapes(
     work = call.workspace(source, max_frequency, undamped=undamped)
 
     from ..study.unit_warnings import resolution_warnings
-    from .output import table
+    from .conclusions import of_shapes
     from .pictures import write_shapes
+    from .tables import table
 
     friction, chosen = call.one_friction(mu), band_of(band, work.modal.max_frequency_hz, branch)
     call.warn(resolution_warnings(work.case(call.verb)))
@@ -76,7 +78,9 @@ def shapes(
         call.document({"modes": documents, **({} if chosen is None else {"band_hz": list(chosen)})})
         return
     rows = [[str(d["branch"]), readable(d["frequency_hz"]), readable(d["growth_rate"])] for d in documents]
-    table("shapes", ["branch", "frequency [Hz]", "growth [1/s]"], rows)
+    red = [k for k, d in enumerate(documents) if d["unstable"]]
+    table("shapes", ["branch", "frequency [Hz]", "growth [1/s]"], rows, marked=red, kept_in="the JSON document")
+    call.conclude(of_shapes(documents, mu))
 
 
 @verb()
@@ -104,6 +108,7 @@ def modes(
 
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
+    from .conclusions import of_modes
     from .output import counting
     from .show_modes import show_modes
 
@@ -123,6 +128,7 @@ def modes(
         call.document(result.to_json(sort=order, unstable=unstable))
     else:
         show_modes(result, sort=order, unstable=unstable, say=call.say)
+        call.conclude(of_modes(result, mu))
     if result.interrupted:
         raise typer.Exit(INTERRUPTED)
 
@@ -172,6 +178,7 @@ def onsets(
 
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
+    from .conclusions import of_onsets
     from .show_modes import show_onsets
 
     said = "--range" if along is None else "--between"
@@ -184,6 +191,7 @@ def onsets(
         call.document(result.to_json())
     else:
         show_onsets(result)
+        call.conclude(of_onsets(result))
     if not result.complete:
         raise typer.Exit(INCOMPLETE)
 
@@ -192,6 +200,7 @@ def _onsets_along(call: Call, case: Case, name: str, between: tuple[float, float
     """Onsets along a number of the case: sought on a model reduced over its range, each solved in the full problem."""
     from ..study.along import onsets_along
     from ..study.unit_warnings import resolution_warnings
+    from .conclusions import of_onsets_along
 
     call.warn(resolution_warnings(case))
     chosen = None if call.solver in (None, "auto") else call.solver
@@ -203,6 +212,7 @@ def _onsets_along(call: Call, case: Case, name: str, between: tuple[float, float
         for note in found.notes:
             call.say(f"note: {note}")
         show_onsets_along(found, confirmed=True)
+        call.conclude(of_onsets_along(found))
     if not found.complete:
         raise typer.Exit(INCOMPLETE)
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import logging
 import math
+import os
+import re
+import textwrap
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Any
 
@@ -16,19 +19,51 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from .heartbeat import hush, silent
 
 BETWEEN_LINES = 10.0  # seconds
-
+_TOGETHER = re.compile(r"(?<=\d) (?=(?:Hz|1/s|%|[smNJ])(?:\W|$))|(?<=μ) (?==)|(?<=μ =) ")  # a number and its unit
+PAGE = 80  # columns of a line where no terminal says how many
 
 
 class _Screen(Console):
-    """A console that takes back the line that says what is being computed before it prints."""
+    """A console that takes back the line that says what is being computed before it prints, and prints sentences in
+    lines no longer than the page, no word broken: a path stays whole, however long. On stderr, a log where it is no
+    terminal, a sentence is a line."""
 
     def print(self, *objects: Any, **options: Any) -> None:
         hush()
+        if all(isinstance(thing, str) for thing in objects):
+            options.setdefault("markup", False)
+            text = " ".join(objects)
+            objects = (text if self.stderr and not self.is_terminal else _filled(text, self.page),)
         super().print(*objects, **options)
+
+    @property
+    def page(self) -> int:
+        """Columns of a line: those of the terminal; elsewhere COLUMNS, or 80."""
+        if self.is_terminal:
+            return self.width
+        columns = os.environ.get("COLUMNS", "")
+        return int(columns) if columns.isdigit() and int(columns) else PAGE
+
+
+def _filled(text: str, width: int) -> str:
+    """Lines of text no longer than the page, what goes on indented."""
+    lines: list[str] = []
+    for line in _TOGETHER.sub("\N{NO-BREAK SPACE}", text).splitlines():
+        indent = line[: len(line) - len(line.lstrip())]
+        lines += textwrap.wrap(
+            line, width, subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False
+        ) or [""]
+    return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 
 stdout = _Screen(highlight=False, soft_wrap=True)
 stderr = _Screen(stderr=True, highlight=False, soft_wrap=True)
+
+
+def literal(text: str) -> None:
+    """A text on stdout as it is, to be copied: a command."""
+    hush()
+    print(text)
 
 
 def plain(value: Any) -> Any:
@@ -51,7 +86,7 @@ def print_json(document: dict[str, Any]) -> None:
 def say(text: str, *, quiet: bool) -> None:
     """A line of log."""
     if not quiet:
-        stderr.print(text, markup=False)
+        stderr.print(text)
 
 
 class Log(logging.Handler):
@@ -65,17 +100,8 @@ class Log(logging.Handler):
         words = text[: next((k for k, c in enumerate(text) if c.isdigit()), len(text))]
         if record.levelno > logging.DEBUG or words != self._before:
             kind = "" if record.levelno == logging.DEBUG else f"{record.levelname.lower()}: "
-            stderr.print(kind + text, markup=False)
+            stderr.print(kind + text)
         self._before = words
-
-
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table on stdout, right-aligned, never cut: it may go into a file as well as to a screen."""
-    widths = [max(len(line[k]) for line in (columns, *rows)) for k in range(len(columns))]
-    hush()
-    print(title)
-    for line in (columns, *rows):
-        print("  " + "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
 
 
 @contextmanager
@@ -132,7 +158,7 @@ class _Lines:
             return
         self.last = now
         left = (now - self.started) / done * (planned - done)
-        stderr.print(f"{self.text}: {done} of {planned}, about {duration(left)} left", markup=False)
+        stderr.print(f"{self.text}: {done} of {planned}, about {duration(left)} left")
 
 
 def duration(seconds: float) -> str:

@@ -56,7 +56,7 @@ def _chosen(modes: ComplexModes, branches: Sequence[int] | None) -> IntArray:
             if branch not in known:
                 raise CaseError("--branch", branch, f"one of the modes up to modal.max_frequency_hz: 1 to {max(known)}")
         return np.array([known.index(b) for b in branches])
-    unstable = np.flatnonzero(modes.unstable[0])
+    unstable = np.flatnonzero(modes.unstable[0] & modes.in_band[0])
     if len(unstable):
         return unstable[np.argsort(modes.growth_rate[0][unstable])[::-1]]
     vibrating = np.flatnonzero(modes.frequency_hz[0] > 0)
@@ -93,7 +93,13 @@ def _write_one(system: System, modes: ComplexModes, column: int, folder: Path, *
         vectors={"displacement": vector},
         contact_data=None if energy is None else {"friction_energy": energy},
     )
-    return {"branch": branch, "frequency_hz": frequency, "growth_rate": growth, "files": [str(f) for f in files]}
+    return {
+        "branch": branch,
+        "frequency_hz": frequency,
+        "growth_rate": growth,
+        "unstable": bool(modes.unstable[0, column]),
+        "files": [str(f) for f in files],
+    }
 
 
 def _energy(system: System, modes: ComplexModes, column: int) -> Array | None:

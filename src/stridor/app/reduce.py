@@ -67,6 +67,8 @@ def reduce(
 ) -> None:
     """Reduce the model once over ranges of its numbers, then solve anywhere in them within milliseconds."""
     _check_file(save, keep)
+    call.asked.extend(("--box", item) for item in box or ())
+    call.asked.extend([("--max-frequency", f"{max_frequency}")] if max_frequency else [])
     if is_reduced_file(call.path):
         given = {"--box": box, "--set": call.set_, "--max-frequency": max_frequency, "--bound": bound}
         call.claim()
@@ -79,6 +81,7 @@ def reduce(
 
     from ..io.left_out import kept_in
     from ..modal.full import onsets_along
+    from .conclusions import of_reduced
 
     for note in getattr(model.problem, "notes", ()):
         call.say(f"note: {note}")
@@ -104,8 +107,7 @@ def reduce(
             _show_modes(model, points)
         if along is not None and onsets is not None:
             show_onsets_along(onsets, confirmed=confirm)
-        if not (at or along or save):
-            call.say("next: --at mu=0.3 for modes, --onsets mu for onsets, --save model.npz to keep the model")
+        call.conclude(of_reduced(points, onsets, {p.name: f"{p.low:g}:{p.high:g}:5" for p in model.problem.parameters}))
     if onsets is not None and not onsets.complete:
         raise typer.Exit(INCOMPLETE)
 
@@ -266,7 +268,7 @@ def _modes(point: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
-    from .output import table
+    from .tables import table
 
     rows: list[list[str]] = []
     for point in document:
@@ -288,4 +290,6 @@ def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
                 ]
             )
     heads = [*(p.name for p in model.problem.parameters), "frequency [Hz]", "growth [1/s]", "error", "residual", ""]
-    table("Modes of the reduced model", heads, rows)
+    red = [k for k, mode in enumerate(mode for point in document for mode in _modes(point)) if mode["unstable"]]
+    gone = ["residual", "error"]
+    table("Modes of the reduced model", heads, rows, drop=gone, words=[""], marked=red, kept_in="reduced.csv")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ..digits import measured
-from .output import stdout, table
+from .output import stdout
+from .tables import table
 
 
 def show_run(summary: dict[str, Any]) -> None:
@@ -24,18 +25,11 @@ def show_run(summary: dict[str, Any]) -> None:
         for name, c in phase["contacts"].items()
     ]
     columns = ["phase", "contact", "max N [N]", "max slip [m/s]", "stick [%]", "slip [%]", "open [%]"]
-    table("contacts", columns, rows)
+    table("contacts", columns, rows, drop=["max slip [m/s]", "stick [%]"], kept_in="simulate.nc")
     _show_settled(summary)
-    if summary["dominant_frequency_hz"] is not None:
-        state = "saturated" if summary["saturated"] else "not saturated"
-        rate = summary["growth_rate"]
-        growth = "nowhere exponential growth" if rate is None else f"growth {measured(rate, 1)} 1/s where exponential"
-        stdout.print(f"last phase: {measured(summary['dominant_frequency_hz'], 1)} Hz dominates, {growth}, {state}")
-    else:
-        stdout.print("last phase: too few records for a dominant frequency, or nothing vibrates")
     for change in summary["changed"]:
-        stdout.print(f"changed in the middle of the run: {change}", markup=False)
-    stdout.print(summary["energy"]["words"], markup=False)
+        stdout.print(f"changed in the middle of the run: {change}")
+    stdout.print(summary["energy"]["words"])
     stdout.print(
         f"{summary['steps']} steps of {summary['dt']:.4g} s in {summary['wall_seconds']:.1f} s, {summary['path']} path"
     )
@@ -73,11 +67,11 @@ def _show_settled(summary: dict[str, Any]) -> None:
             low, high = found["largest_normal_force"]
             ends = f"{measured(low, 2)} to {measured(high, 2)} N"
             said.append(f"contact {name}: largest recorded N from {ends} over {copies['runs']} runs")
-    table("after the first separation in the last phase", columns, rows)
+    table("after the first separation in the last phase", columns, rows, words=["average"], kept_in="simulate.nc")
     for line in said:
-        stdout.print(line, markup=False)
+        stdout.print(line)
     stdout.print(
-        "contacts separate, and such motion is as a rule chaotic: largest values are of this one trajectory and\n"
+        "contacts separate, and such motion is as a rule chaotic: largest values are of this one trajectory and "
         "differ on another machine; averages belong to the motion it settles to"
         + ("" if copies is not None else " (--copies 4 tells how far they scatter)")
     )
@@ -104,7 +98,7 @@ def show_steady(document: dict[str, Any]) -> None:
         for name, c in document["contacts"].items()
     ]
     columns = ["contact", "force on the slave [N]", "moment [N m]", "area [m²]", "largest pressure [Pa]"]
-    table("steady sliding", columns, rows)
+    table("steady sliding", columns, rows, drop=["area [m²]", "moment [N m]"], kept_in="the JSON document")
     stdout.print(
         f"{document['touching_nodes']} of {document['nodes']} slave nodes touch, {document['status']['stick']} stick "
         f"and {document['status']['slip']} slip; every freedom is in equilibrium to "
@@ -144,12 +138,14 @@ def show_agreement(document: dict[str, Any]) -> None:
         "MAC of run",
     ]
     if rows:
-        table("modal against temporal", columns, rows)
+        red = [k for k, c in enumerate(document["comparisons"]) if (c["modal"]["growth_rate"] or 0.0) > 0.0]
+        gone = ["MAC of run", "run answers [Hz]", "MAC"]
+        table("modal against temporal", columns, rows, drop=gone, marked=red, kept_in="compare.nc")
     if document["critical_mu_modal"] is not None:
         stdout.print(
             f"critical μ: {measured(document['critical_mu_modal'], 6)} modal, "
             f"{shown(document['critical_mu_temporal'], 6)} temporal"
         )
     for note in document["notes"]:
-        stdout.print(f"note: {note}", markup=False)
-    stdout.print(document["verdict"], markup=False)
+        stdout.print(f"note: {note}")
+    stdout.print(document["verdict"])

@@ -10,11 +10,14 @@ import numpy as np
 from ..digits import fixed, readable
 from ..modal.complex_modes import UNSTABLE_RELATIVE, ComplexModes
 from ..modal.onsets import Onset, Onsets
-from .output import stdout, table
+from .output import stdout
+from .tables import table
 
 SHOWN = 5  # friction coefficients up to which all tables are printed
 
 MODE_HEADS = ["branch", "frequency [Hz]", "growth [1/s]", "damping [%]", "", "residual"]
+MODES_LEFT_OUT = ["residual", "damping [%]"]  # where the page is too narrow
+ONSETS_LEFT_OUT = ["residual", "κ [1/s]", "slope [1/s]", "modes"]
 ONSET_HEADS = ["critical μ", "frequency [Hz]", "kind", "modes", "growth", "κ [1/s]", "slope [1/s]", "residual"]
 
 
@@ -27,14 +30,16 @@ def show_modes(
         columns = result.order(row, sort)
         if unstable:
             columns = columns[result.unstable[row, columns]]
-        table(f"μ = {result.mu[row]:g}", MODE_HEADS, [_mode(result, row, int(b)) for b in columns])
-        stdout.print(f"  {_listed(result, row, len(columns), unstable=unstable)}", markup=False)
+        rows = [_mode(result, row, int(b)) for b in columns]
+        red = [k for k, b in enumerate(columns) if result.unstable[row, b]]
+        table(f"μ = {result.mu[row]:g}", MODE_HEADS, rows, drop=MODES_LEFT_OUT, marked=red, kept_in="modes.csv")
+        stdout.print(f"  {_listed(result, row, len(columns), unstable=unstable)}")
         if result.completeness:
-            stdout.print(f"  {result.completeness[row]}", markup=False)
+            stdout.print(f"  {result.completeness[row]}")
     if result.contact_state:
-        stdout.print(f"{result.contact_state}; held so at every μ", markup=False)
+        stdout.print(f"{result.contact_state}; held so at every μ")
     for note in result.notes:
-        stdout.print(note, markup=False)
+        stdout.print(note)
     if many:
         most = result.unstable & result.in_band
         growing = most.sum(axis=1)
@@ -42,7 +47,6 @@ def show_modes(
         stdout.print(
             f"{len(result.mu)} friction coefficients, first and last shown, all in the file; most modes grow at "
             f"μ = {result.mu[peak]:g}: {int(growing[peak])}",
-            markup=False,
         )
         for said in dict.fromkeys(result.completeness[1:-1]):
             at = [k for k in range(1, len(result.mu) - 1) if result.completeness[k] == said]
@@ -82,25 +86,26 @@ def _listed(result: ComplexModes, row: int, shown: int, *, unstable: bool) -> st
 def show_onsets(result: Onsets) -> None:
     """Critical friction coefficients, what grows before any, and what was checked."""
     if result.contact_state:
-        stdout.print(f"{result.contact_state}; held so over the range of μ", markup=False)
+        stdout.print(f"{result.contact_state}; held so over the range of μ")
     for line in result.at_start_words:
-        stdout.print(line, markup=False)
-    low, high = result.friction_range
-    if not result.onsets:
-        stdout.print(f"no onset for μ in {low:g} … {high:g} {result.frequencies}", markup=False)
-    else:
+        stdout.print(line)
+    if result.onsets:
         kind = "damped" if result.damped else "undamped"
-        table(f"onsets, {kind}", ONSET_HEADS, [_onset(o) for o in result.onsets])
-        stdout.print("κ: growth opens as κ √(μ − μ_c) without damping; slope: d growth/dμ at a damped onset")
+        rows = [_onset(o) for o in result.onsets]
+        gone = table(f"onsets, {kind}", ONSET_HEADS, rows, drop=ONSETS_LEFT_OUT, kept_in="onsets.csv")
+        if "κ [1/s]" not in gone:
+            stdout.print("κ: growth opens as κ √(μ − μ_c) without damping")
+        if "slope [1/s]" not in gone:
+            stdout.print("slope: d growth/dμ at a damped onset")
         for line in result.from_above_words:
-            stdout.print(line, markup=False)
+            stdout.print(line)
     if result.outside:
         stdout.print(
-            f"{result.outside} more at frequencies outside of {result.frequencies.removeprefix('from ')}", markup=False
+            f"{result.outside} more at frequencies outside of {result.frequencies.removeprefix('from ')}"
         )
     for line in (result.completeness, *result.notes):
         if line:
-            stdout.print(line, markup=False)
+            stdout.print(line)
 
 
 def _onset(onset: Onset) -> list[str]:

@@ -109,9 +109,14 @@ def simulate(
     if call.json:
         call.document(document)
     else:
+        from .closing import Conclusion
+        from .conclusions import of_run
         from .show import show_run
 
         show_run(document)
+        done = f"interrupted after {run.steps} of {run.planned_steps} steps"
+        told = Conclusion(done, "simulate", ("--restart", str(path)))
+        call.conclude(told if run.interrupted else of_run(document))
     if run.interrupted:
         raise typer.Exit(130)
 
@@ -180,6 +185,8 @@ def compare(
         from .show import show_agreement
 
         show_agreement(result.to_json())
+        if not result.interrupted:
+            call.suggest("run")
     if result.interrupted:
         raise typer.Exit(130)
 
@@ -248,12 +255,14 @@ def _told(call: Call, outcome: Outcome) -> None:
     if call.json:
         call.document(outcome.to_json())
     else:
-        stdout.print(outcome.verdict, markup=False)
         for note in outcome.everything.notes:
             if not note.startswith("Taken"):  # which the log has told
                 call.say(f"note: {note}")
         if outcome.report is not None:
-            stdout.print(f"report: {outcome.report}", markup=False)
+            stdout.print(f"report: {outcome.report}")
+        stdout.print(outcome.verdict)
+        if not outcome.interrupted:
+            call.suggest("shapes")
     if outcome.interrupted:
         raise typer.Exit(130)
 

@@ -1,0 +1,161 @@
+"""The last lines of a verb: its result in a sentence, and which command makes sense next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..digits import fixed, measured, readable
+from .closing import Conclusion
+
+if TYPE_CHECKING:
+    from ..modal.full import ParametricOnsets
+    from ..modal.onsets import Onsets
+    from ..modal.results import ComplexModes
+    from ..study.measures import Countermeasures
+    from ..study.sensitivities import Sensitivities
+
+BEYOND = 1.1  # times an onset: where its growth is well to be seen
+
+
+def fastest(frequency_hz: float, growth: float) -> str:
+    """A growing mode in a few words."""
+    return f"{readable(frequency_hz)} Hz, +{readable(growth)} 1/s"
+
+
+def _is_are(count: int, of: str) -> str:
+    return f"{count or 'none'} of {of} {'are' if count > 1 else 'is'} unstable"
+
+
+def of_modes(result: ComplexModes, mu: str | None) -> Conclusion:
+    """How many are unstable and which is the fastest; then its shape, or where growth begins. mu: as the
+    user gave it."""
+    from ..modal.growing import doubt
+
+    growing = result.unstable & result.in_band
+    rate = np.where(growing, result.growth_rate, -np.inf)
+    unsure = any(doubt(said) for said in result.completeness)
+    caution = "; not all of it was checked, see above" if unsure else ""
+    if len(result.mu) > 1:
+        some = growing.any(axis=1)
+        sentence = f"unstable modes at {int(some.sum()) or 'none'} of {len(result.mu)} friction coefficients"
+        if some.any():
+            row, b = (int(k) for k in np.unravel_index(int(rate.argmax()), rate.shape))
+            first = float(result.mu[int(np.argmax(some))])
+            top = fastest(float(result.frequency_hz[row, b]), float(rate[row, b]))
+            sentence += f", the lowest {first:g}; the fastest at μ = {result.mu[row]:g}: {top}"
+        return Conclusion(sentence + caution, "onsets")
+    band = "" if result.max_frequency_hz is None else f" up to {result.max_frequency_hz:g} Hz"
+    band = " from {:g} to {:g} Hz".format(*result.band_hz) if result.band_hz is not None else band
+    sentence = f"{_is_are(int(growing.sum()), f'{result.total[0]} modes{band}')} at μ = {result.mu[0]:g}"
+    if not growing.any():
+        return Conclusion(sentence + caution, "onsets")
+    b = int(rate[0].argmax())
+    sentence += f"; the fastest {fastest(float(result.frequency_hz[0, b]), float(rate[0, b]))}"
+    own = ("--mu", mu) if mu is not None else ()
+    return Conclusion(sentence + caution, "shapes", (*own, "--branch", str(result.branch[b])))
+
+
+def of_onsets(result: Onsets) -> Conclusion:
+    """From which μ on something grows; then the modes there."""
+    low, high = result.friction_range
+    over = f"for μ in {low:g} … {high:g} {result.frequencies}"
+    if result.at_start_words:
+        return Conclusion(f"unstable from the start of the range, μ = {low:g}", "modes", ("--mu", f"{low:g}"))
+    first = result.first
+    if first is None:
+        return Conclusion(f"no onset {over}" + ("" if result.complete else ", but see above"), "modes")
+    count = f"{len(result.onsets)} onsets" if len(result.onsets) > 1 else "1 onset"
+    said = f"{count} {over}; growth begins at μ = {fixed(first.mu, 6)}, {readable(first.frequency_hz)} Hz"
+    return Conclusion(said, "modes", ("--mu", f"{min(BEYOND * first.mu, high):.3g}"))
+
+
+def of_onsets_along(found: ParametricOnsets) -> Conclusion:
+    """From which value of a number on something grows; then the modes there."""
+    name, (low, high) = found.parameter, found.between
+    over = f"along {name} in {low:g} … {high:g} up to {found.max_frequency_hz:g} Hz"
+    begins = [o for o in found if not o.stabilising]
+    if not found:
+        return Conclusion(f"no onset {over}" + ("" if found.complete else ", but see above"))
+    count = f"{len(found)} onsets" if len(found) > 1 else "1 onset"
+    if not begins:
+        return Conclusion(f"{count} {over}; growth ends at {found[0].value:.6g}, {readable(found[0].frequency_hz)} Hz")
+    first = begins[0]
+    return Conclusion(f"{count} {over}; growth begins at {first.value:.6g}, {readable(first.frequency_hz)} Hz")
+
+
+def of_shapes(documents: Sequence[dict[str, Any]], mu: str | None) -> Conclusion:
+    """What was drawn; then what changes the fastest mode."""
+    own = ("--mu", mu) if mu is not None else ()
+    growing = [d for d in documents if d["unstable"]]
+    drawn = f"{len(documents)} mode{'' if len(documents) == 1 else 's'} drawn"
+    if not growing:
+        return Conclusion(f"{drawn}, none of them unstable", "onsets")
+    top = max(growing, key=lambda d: d["growth_rate"])
+    said = f"{drawn}; the fastest: mode {top['branch']}, {fastest(top['frequency_hz'], top['growth_rate'])}"
+    return Conclusion(said, "countermeasures", (*own, "--branch", str(top["branch"])))
+
+
+def of_sensitivities(result: Sensitivities, mu: str | None) -> Conclusion:
+    """Which number the growth of which mode answers to most; then changes that help."""
+    change = np.abs(result.growth_per_percent)
+    if not np.isfinite(change).any():
+        return Conclusion("", "modes", ("--mu", mu) if mu is not None else ())  # the warnings say why
+    k, b = (int(i) for i in np.unravel_index(int(np.nanargmax(change)), change.shape))
+    rate = float(result.growth_per_percent[k, b])
+    name, mode = result.parameters[k], result.branch[b]
+    said = f"a per cent more of {name} changes the growth of mode {mode} most: {rate:+.4g} 1/s"
+    return Conclusion(said, "countermeasures", ("--mu", mu) if mu is not None else ())
+
+
+def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float], mu: str | None) -> Conclusion:
+    """The change that takes away most per cent for per cent, as it was solved again or is predicted; then the modes
+    with the best change of a number made. value_of: what a number of the case is."""
+    own = ("--mu", mu) if mu is not None else ()
+    if not result.measures:
+        return Conclusion("", "modes", own)  # the warnings say why
+    best = result.measures[0]
+    if best.verified is None:
+        said = f"best: {best.words}, predicted to take {readable(best.removed, 4)} 1/s away"
+    else:
+        left = len(best.verified.unstable_hz)
+        rest = f"{left} unstable mode{'' if left == 1 else 's'} left" if left else "nothing grows then"
+        said = f"best: {best.words}, takes {readable(best.verified.removed, 4)} 1/s away, solved again; {rest}"
+    number = next((m for m in result.measures if m.kind == "number"), None)
+    if number is None:
+        return Conclusion(said)
+    new = value_of(number.name) * (1 + number.direction * number.percent / 100)
+    return Conclusion(said, "modes", (*own, "--set", f"{number.name}={new:.6g}"))
+
+
+def of_run(summary: dict[str, Any]) -> Conclusion:
+    """What vibrates at the end of a run in time; then both approaches side by side."""
+    if summary["dominant_frequency_hz"] is None:
+        return Conclusion("last phase: too few records for a dominant frequency, or nothing vibrates", "modes")
+    state = "saturated" if summary["saturated"] else "not saturated"
+    rate = summary["growth_rate"]
+    growth = "nowhere exponential growth" if rate is None else f"growth {measured(rate, 1)} 1/s where exponential"
+    said = f"last phase: {measured(summary['dominant_frequency_hz'], 1)} Hz dominates, {growth}, {state}"
+    return Conclusion(said, "compare")
+
+
+def of_reduced(
+    document: Sequence[dict[str, Any]], found: ParametricOnsets | None, ranges: Mapping[str, str]
+) -> Conclusion:
+    """What grows at the points that were asked for, and where growth begins; then the other of the two. ranges: of each
+    parameter, as --at takes them."""
+    first = next(iter(ranges))
+    onsets = None if found is None else of_onsets_along(found).sentence
+    if not document:
+        return Conclusion(onsets or "", "reduce", ("--at", f"{first}={ranges[first]}"))
+    some = sum(any(point["unstable"]) for point in document)
+    modes = [(g, f) for p in document for g, f in zip(p["growth_rate"], p["frequency_hz"], strict=True)]
+    said = f"unstable modes at {some or 'none'} of {len(document)} point{'' if len(document) == 1 else 's'}"
+    if some:
+        rate, frequency = max(modes)
+        said += f"; the fastest {fastest(frequency, rate)}"
+    if onsets is None:
+        return Conclusion(said, "reduce", ("--onsets", first))
+    return Conclusion(f"{said}\n{onsets}")

@@ -1,0 +1,209 @@
+"""What is printed fits a page of 80 columns, ends with the result in a sentence, and says which command comes next."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import re
+import shlex
+import struct
+import subprocess
+import sys
+import termios
+from pathlib import Path
+
+import pytest
+
+from program import stridor
+from stridor.app import tables
+from stridor.app.closing import command
+from stridor.app.output import _filled, stdout
+
+COARSE = [
+    "--set", "bodies.beam1.elements=6", "--set", "bodies.beam2.elements=18", "--set", "temporal.step=4e-7",
+    "--set", "temporal.record_every=5", "--set", "phases.press.duration=0.002", "--set", "phases.slide.duration=0.004",
+]  # fmt: skip
+DAMPING = "bodies.beam1.damping.stiffness", "bodies.beam2.damping.stiffness"
+MAP = ["--x", DAMPING[0], "--y", DAMPING[1], "--x-range", "1e-9:5e-8", "--y-range", "1e-9:5e-8", "--points", "9"]
+NEXT = "Next: stridor "
+
+# What each verb ends with, and what it names as the next command.
+ENDS = {
+    "check two-beams.toml": ("time loop: modal path ", "onsets two-beams.toml"),
+    "check pad-on-disc.toml": ("time loop: assembled path ", "onsets pad-on-disc.toml"),
+    "steady pad-on-disc.toml": ("458 of 465 slave nodes touch, 0 stick and 458 slip; ", "modes pad-on-disc.toml"),
+    "modes two-beams.toml": (
+        "1 of 19 modes up to 40000 Hz is unstable at μ = 0.1; the fastest 8641.12 Hz, +637.328 1/s",
+        "shapes two-beams.toml --branch 8",
+    ),
+    "modes two-beams.toml --mu 0.2 --band 100:9000": (
+        "1 of 10 modes from 100 to 9000 Hz is unstable at μ = 0.2; the fastest 8667.05 Hz, +1547.32 1/s",
+        "shapes two-beams.toml --mu 0.2 --branch 8",
+    ),
+    "modes two-beams.toml --mu 0.01 --max-frequency 9e3": (
+        "none of 10 modes up to 9000 Hz is unstable at μ = 0.01", "onsets two-beams.toml --max-frequency 9000.0"
+    ),
+    "modes two-beams.toml --mu 0:0.2:11": (
+        "unstable modes at 7 of 11 friction coefficients, the lowest 0.08; the fastest at μ = 0.2: ",
+        "onsets two-beams.toml",
+    ),
+    "onsets two-beams.toml": (
+        "4 onsets for μ in 0 … 1 up to 40000 Hz; growth begins at μ = 0.076725, 8635.43 Hz",
+        "modes two-beams.toml --mu 0.0844",
+    ),
+    "onsets two-beams.toml --range 0:0.05": ("no onset for μ in 0 … 0.05 up to 40000 Hz", "modes two-beams.toml"),
+    "onsets two-beams.toml --range 0.1:0.12": (
+        "unstable from the start of the range, μ = 0.1", "modes two-beams.toml --mu 0.1"
+    ),
+    "shapes two-beams.toml": (
+        "1 mode drawn; the fastest: mode 8, 8641.12 Hz, +637.328 1/s", "countermeasures two-beams.toml --branch 8"
+    ),
+    "shapes two-beams.toml --mu 0.01": ("1 mode drawn, none of them unstable", "onsets two-beams.toml"),
+    "sensitivities two-beams.toml --parameter materials.steel.young_modulus --parameter mu": (
+        "a per cent more of mu changes the growth of mode 8 most: +14.63 1/s", "countermeasures two-beams.toml"
+    ),
+    "countermeasures two-beams.toml --verify 1": (
+        "best: add 0.000293 kg to beam1 at (0.1, 0) m, takes 637.33 1/s away, solved again; nothing grows then",
+        "modes two-beams.toml --set materials.steel.young_modulus=1.9e+11",
+    ),
+    "countermeasures two-beams.toml --mu 0.01": (
+        "no mode is unstable at μ = 0.01: there is nothing to remove", "modes two-beams.toml --mu 0.01"
+    ),
+    "reduce two-beams.toml --box mu=0:0.3 --box contact_stiffness=0.5:2 --at mu=0.05,0.1,0.4": (
+        "unstable modes at 2 of 3 points; the fastest ",
+        "reduce two-beams.toml --onsets mu --box mu=0:0.3 --box contact_stiffness=0.5:2",
+    ),
+    "reduce two-beams.toml --onsets mu": (
+        "4 onsets along mu in 0 … 1 up to 40000 Hz; growth begins at 0.0767252, 8635.43 Hz",
+        "reduce two-beams.toml --at mu=0:1:5",
+    ),
+    f"damping-map two-beams.toml {' '.join(MAP)}": (
+        "over the two dampings the lowest onset goes from μ = 0.076493 to 0.077144",
+        f"onsets two-beams.toml --set {DAMPING[0]}=1e-09 --set {DAMPING[1]}=5e-08",
+    ),
+    "simulate two-beams.toml COARSE": ("last phase: 5970.1 Hz dominates, ", "compare two-beams.toml COARSE"),
+    "compare two-beams.toml --no-critical COARSE": (
+        "agree: μ = 0.1: both unstable at 8651.1 Hz, growth 642.2 against 641.6 1/s (0.1 %)",
+        "run two-beams.toml COARSE",
+    ),
+    "export two-beams.toml --out there": ("columns of loads: press", "onsets there/matrices.toml"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("page")
+    for name in ("two-beams", "pad-on-disc"):
+        done = stridor("new", name, cwd=path)
+        assert done.stdout == f"{NEXT}check {name}.toml\n"
+        done = stridor("new", name, "--quiet", "--force", cwd=path)
+        assert (done.stdout, done.stderr) == ("", "")
+    return path
+
+
+def words_of(text: str) -> list[str]:
+    return shlex.split(text.replace("COARSE", " ".join(COARSE)))
+
+
+LONG = "check pad-on-disc.toml", f"damping-map two-beams.toml {' '.join(MAP)}"
+
+
+@pytest.mark.parametrize("words", [pytest.param(w, marks=[pytest.mark.slow] if w in LONG else []) for w in ENDS])
+def test_every_verb_fits_the_page_and_ends_with_its_result(
+    folder: Path, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    done = stridor(*words_of(words), cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert "…" not in done.stdout.replace(" … ", "")  # no cell is cut
+    result, following = ENDS[words]
+    body, _, hint = done.stdout.partition(NEXT)
+    assert shlex.split(hint.replace("\\\n", " ")) == words_of(following)
+    assert " ".join(body.split()).rpartition(result)[1] == result
+    assert " ".join(body.splitlines()[-4:]).count(result.split()[0]), "the result stands last"
+
+
+def test_hints_are_quiet_and_documents_have_none(folder: Path) -> None:
+    quiet = stridor("modes", "two-beams.toml", "--quiet", cwd=folder)
+    assert quiet.stdout.splitlines()[-1].split()[-1] == "1/s"
+    assert "Next" not in quiet.stdout
+    assert "Next" not in stridor("modes", "two-beams.toml", "--json", cwd=folder).stdout
+
+
+def test_what_was_asked_for_goes_into_the_next_command(folder: Path) -> None:
+    asked = ["--set", "title='a, b'", "--max-frequency", "9000", "--undamped", "--source", "receptance", "--out", "x y"]
+    done = stridor("modes", "two-beams.toml", "--mu", "0.2", *asked, cwd=folder)
+    hint = shlex.split(done.stdout.partition("Next: ")[2].replace("\\\n", " "))
+    assert hint[:4] == ["stridor", "shapes", "two-beams.toml", "--mu"]
+    assert {"--undamped", "--source", "receptance", "--max-frequency", "9000.0", "title='a, b'", "x y"} <= set(hint)
+    assert stridor(*hint[1:], "--quiet", cwd=folder).returncode == 0
+    # What the next verb does not take is left out.
+    steady = stridor("onsets", "two-beams.toml", "--range", "0:0.05", cwd=folder).stdout
+    assert "--range" not in steady.partition("Next: ")[2]
+
+
+def test_a_command_breaks_between_options_only() -> None:
+    text = command(["stridor", "modes", "a b.toml", "--mu", "0.3", "--set", "x.y=1", "--undamped", "--out", "f"], 40)
+    assert text == "stridor modes 'a b.toml' --mu 0.3 \\\n    --set x.y=1 --undamped --out f"
+
+
+def test_sentences_break_between_words_and_keep_numbers_with_their_units() -> None:
+    text = _filled("  the fastest at μ = 0.2 is 8641.12 Hz, +637.328 1/s and a/very/long/path/that/is/whole.toml", 27)
+    assert text.splitlines() == [
+        "  the fastest at μ = 0.2 is", "    8641.12 Hz,", "    +637.328 1/s and", "    a/very/long/path/that/is/whole.toml"
+    ]  # fmt: skip
+
+
+def test_columns_go_by_importance_and_are_named(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heads, rows = ["name", "growth rate [1/s]", "residual", "what it is"], [["a", "1.5", "1e-16", "words that go on"]]
+    for width, expected in (
+        (60, ["  name  growth rate [1/s]  residual  what it is", "     a                1.5     1e-16  words that go on"]),
+        (50, ["        growth rate", "  name        [1/s]  residual  what it is"]),
+        (46, ["        growth", "          rate", "  name   [1/s]  residual  what it is"]),
+        (40, ["        growth rate", "  name        [1/s]  what it is", "     a          1.5  words that go on"]),
+    ):
+        monkeypatch.setenv("COLUMNS", str(width))
+        gone = tables.table("T", heads, rows, drop=["residual"], words=["what it is"], kept_in="a.csv")
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0] == "T"
+        assert lines[1 : 1 + len(expected)] == expected
+        assert max(map(len, lines)) <= width
+        assert (gone == ["residual"]) == (width == 40)
+        assert ("not shown, for want of room: residual; in a.csv" in " ".join(" ".join(lines).split())) == bool(gone)
+
+
+@pytest.mark.parametrize("colours", [True, False])
+def test_a_terminal_has_unstable_modes_in_red_unless_no_color_is_set(folder: Path, *, colours: bool) -> None:
+    shown = on_terminal(["modes", "two-beams.toml"], folder, {} if colours else {"NO_COLOR": "1"})
+    red = re.findall(r"\x1b\[31m([^\x1b]*)", shown)
+    assert ("8641.12" in " ".join(red)) == colours
+    assert not colours or not any("-716.799" in text for text in red)
+    lines = re.sub(r"\x1b\[[0-9;]*[A-Za-z]", "", shown).replace("\r\n", "\n").split("\n")
+    assert max(len(line.rpartition("\r")[2]) for line in lines) <= 80
+    assert stdout.page == 80  # of a pipe, as here
+
+
+def on_terminal(words: list[str], cwd: Path, more: dict[str, str]) -> str:
+    """What stands on a terminal of 80 columns."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+    environment = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "COLUMNS")} | {"TERM": "xterm"} | more
+    command = [sys.executable, "-m", "stridor", *words]
+    with subprocess.Popen(command, cwd=cwd, stdin=theirs, stdout=theirs, stderr=theirs, env=environment) as process:
+        os.close(theirs)
+        text = b""
+        while True:
+            try:
+                part = os.read(ours, 65536)
+            except OSError:  # the other end is closed
+                break
+            if not part:
+                break
+            text += part
+    os.close(ours)
+    assert process.returncode == 0
+    return text.decode()
