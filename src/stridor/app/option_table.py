@@ -92,8 +92,8 @@ Branch = Annotated[
         "Mode by its number in `modes`. Repeatable [default: the unstable ones].",
         metavar="NUMBER",
         on="shapes sensitivities countermeasures",
-        lacks="steady=static modes=--band onsets=--band simulate=time compare=fastest run=fastest report=fastest damping-map=lowest "
-        "reduce=unnumbered",
+        lacks="steady=static modes=--band onsets=--band simulate=time compare=fastest run=fastest report=fastest "
+        "damping-map=lowest reduce=unnumbered",
     ),
 ]
 Unstable = Annotated[
@@ -143,8 +143,8 @@ Box = Annotated[
         "[parameters], else mu over modal.friction_range].",
         metavar="NAME=LOW:HIGH",
         on="reduce",
-        lacks="steady=--mu shapes=--mu modes=--mu onsets=--between simulate=--mu compare=--range run=--range report=--mu "
-        "sensitivities=--mu countermeasures=--mu damping-map=--x-range",
+        lacks="steady=--mu shapes=--mu modes=--mu onsets=--between simulate=--mu compare=--range run=--range "
+        "report=--mu sensitivities=--mu countermeasures=--mu damping-map=--x-range",
     ),
 ]
 At = Annotated[
