@@ -18,6 +18,7 @@ import meshio
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection, QuadMesh
 from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.figure import Figure
@@ -37,6 +38,7 @@ from stridor.view.depth_picture import Camera, sharp_edges, surface_picture
 from stridor.view.field_plots import MAP_COLOURS, contact_map, contact_snapshot, interface_energy
 from stridor.view.interface_columns import arc_length, columns_along
 from stridor.view.skin import normals, skin_of, surface_facets
+from stridor.view.style import lay_out
 
 CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float)
 
@@ -745,3 +747,70 @@ def test_vtk_replaces_an_old_file_only_with_a_whole_one(tmp_path, monkeypatch):
         write_vtk(plane_system(), old)
     assert old.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["mode.vtu"]
+
+
+@pytest.mark.parametrize("size", [(0.12, 0.04), (0.04, 0.04), (0.02, 0.1)])
+def test_titles_and_labels_of_a_contact_lie_within_the_picture(size: tuple[float, float]):
+    x, y = (v.ravel() for v in np.meshgrid(np.linspace(0, size[0], 9), np.linspace(0, size[1], 5)))
+    position = np.column_stack([x, y, np.zeros(len(x))])
+    tangents = np.tile(np.eye(3)[:2], (len(x), 1, 1))
+    slip = np.tile([2.0, 0.0], (len(x), 1))
+    run = history(position, tangents)
+    for figure in (
+        interface_energy(position, x - 0.01, tangents=tangents, slip=slip, quantity="energy per cycle", unit=""),
+        contact_snapshot(NodeHistory(**{**run.__dict__, "slip_velocity": np.tile(slip, (40, 1, 1))}), 0.0),
+    ):
+        lay_out(figure)
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        ax = figure.axes[0]
+        for text in (ax._left_title, ax.xaxis.label, ax.yaxis.label, *ax.texts):
+            box = text.get_window_extent(renderer)
+            # Measured in the reader's style, which has longer ticks: two points more are no cut.
+            outside = max(-box.x0, -box.y0, box.x1 - figure.bbox.width, box.y1 - figure.bbox.height)
+            assert not text.get_text() or outside < 3.0, text.get_text()
+
+
+def test_the_leading_edge_is_ahead_of_the_slave():
+    place, along, _ = ring(np.linspace(-0.3, 0.3, 5))
+    for sign in (1.0, -1.0):
+        slip = np.zeros((len(place), along.shape[1]))
+        slip[:, 0] = 3.0 * sign
+        ax = interface_energy(place, np.ones(len(place)), tangents=along, slip=slip).axes[0]
+        at = {text.get_text(): text.get_position()[0] for text in ax.texts if text.get_text()}
+        assert set(at) == {"leading edge", "trailing edge"}
+        # The picture has the first tangents across.
+        assert (at["leading edge"] > at["trailing edge"]) == (sign > 0)
+        # Material of the other body comes in there and goes out behind, the other way.
+        arrows = [text for text in ax.texts if getattr(text, "arrow_patch", None) is not None]
+        assert len(arrows) == 2
+        assert all((arrow.xy[0] - arrow.get_position()[0]) * sign < 0 for arrow in arrows)
+    position, tangents = on_line(5)
+    ax = interface_energy(position, np.ones(5), tangents=tangents, slip=np.full((5, 1), -1.0)).axes[0]
+    assert [text.get_text() for text in ax.texts] == ["→ leading edge", "trailing edge →"]
+    # All round a ring no edge leads.
+    place, along, _ = ring(np.linspace(-np.pi, np.pi, 36, endpoint=False))
+    slip = np.tile([1.0, 0.0], (len(place), 1))
+    assert not interface_energy(place, np.ones(len(place)), tangents=along, slip=slip).axes[0].texts
+
+
+def test_a_steady_picture_has_no_time():
+    position, tangents = on_line()
+    figure = contact_snapshot(history(position, tangents), 0.0, title="contact pad in steady sliding")
+    assert figure.axes[0].get_title(loc="left") == "contact pad in steady sliding"
+
+
+def test_one_moving_corner_does_not_leave_the_rest_dark():
+    system = space_system()
+    skin = skin_of(system)
+    even = np.ones(system.size, dtype=complex)
+    assert not solid_plots.concentrated(skin_of(system, even))
+    corner = np.full(system.size, 0.04, dtype=complex)
+    corner[:3] = 1.0
+    bent = solid_plots.mode_shape(system, corner)
+    assert solid_plots.concentrated(skin_of(system, corner))
+    bar = bent.axes[1]
+    assert 0.05 in np.round(bar.get_yticks(), 3)
+    assert len(skin.points)
+    # What moves by 4 % is drawn a fifth of the way up the colours.
+    norm = bent.axes[1]._colorbar.norm
+    assert float(norm(0.04)) == pytest.approx(0.2)

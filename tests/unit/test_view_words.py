@@ -7,11 +7,16 @@ from typing import Any
 
 import numpy as np
 
+import stridor as st
+from rubbing_block import rubbing_block
 from stridor.agreement import Agreement, Comparison, Perturbation
+from stridor.case import template_text
 from stridor.modal.complex_modes import ComplexModes
 from stridor.modal.onsets import Onsets
 from stridor.temporal.signals import Components
-from stridor.view.words import _agreement_sentence, _onset_sentence
+from stridor.view.inputs import BodyModes, ReportInputs
+from stridor.view.modal_tables import body_table, frequency_tables
+from stridor.view.words import _agreement_sentence, _onset_sentence, model_in_words
 
 
 def report(**more: Any) -> Any:
@@ -51,3 +56,23 @@ def test_growth_at_two_frequencies_is_not_one() -> None:
         "The modal and the temporal approach do not agree: at μ = 0.1 both find growth, but at 9000 Hz with 400 1/s by "
         "the modes and at 5000 Hz with 100 1/s in time."
     )
+
+
+def test_a_contacts_stiffness_has_the_unit_of_what_it_is() -> None:
+    case = st.loads(rubbing_block("max_frequency_hz = 30e3"))
+    surface = model_in_words(ReportInputs(case=case, system=st.build_system(case)))
+    assert any("with a stiffness of 10¹² N/m³;" in line for line in surface)
+    beams = st.loads(template_text("two-beams"))
+    point = model_in_words(ReportInputs(case=beams, system=st.build_system(beams)))
+    assert any("with a stiffness of 10¹⁰ N/m in the modal approach;" in line for line in point)
+    timed = beams.with_({"temporal.contact": "as given"})
+    assert any("10¹⁰ N/m;" in line for line in model_in_words(ReportInputs(case=timed, system=st.build_system(timed))))
+
+
+def test_letters_of_modes_are_those_that_there_are() -> None:
+    beam = body_table("beam", BodyModes(np.array([1.0, 2.0]), ("F1", "T1")), ())
+    solid = body_table("disc", BodyModes(np.array([1.0]), ("E1",)), ())
+    assert (beam.caption, solid.caption) == ("F: bending, T: traction.", "E: elastic.")
+    case = st.loads(rubbing_block("max_frequency_hz = 30e3"))
+    inputs = ReportInputs(case=case, body_modes={"stiff": BodyModes(np.zeros(0), ())})
+    assert frequency_tables(inputs) == []

@@ -13,6 +13,7 @@ from ..errors import CaseError
 from ..io.atomic import replacing, write_text
 from ..io.vtk import write_vtk
 from ..modal.complex_modes import ComplexModes
+from ..modal.options import Options
 from ..sliding.surfaces import SurfaceSliding
 from ..stages import stage
 from ..study import analyses
@@ -45,7 +46,7 @@ def write_shapes(
     chosen = _chosen(modes, branches)
     documents: list[dict[str, Any]] = []
     for column in chosen:
-        documents.append(_write_one(system, modes, int(column), folder, gif=gif))
+        documents.append(_write_one(system, modes, int(column), folder, work.options, gif=gif))
     return documents
 
 
@@ -65,7 +66,9 @@ def _chosen(modes: ComplexModes, branches: Sequence[int] | None) -> IntArray:
     return vibrating[[int(np.argmax(modes.growth_rate[0][vibrating]))]]
 
 
-def _write_one(system: System, modes: ComplexModes, column: int, folder: Path, *, gif: bool) -> dict[str, Any]:
+def _write_one(
+    system: System, modes: ComplexModes, column: int, folder: Path, options: Options, *, gif: bool
+) -> dict[str, Any]:
     stage(f"drawing mode {modes.branch[column]}")
     from ..view.animation import animation_gif, animation_html
     from ..view.solid_plots import mode_shape
@@ -84,9 +87,9 @@ def _write_one(system: System, modes: ComplexModes, column: int, folder: Path, *
         files.append(folder / f"{stem}.gif")
         with replacing(files[-1]) as temporary:
             temporary.write_bytes(animation_gif(system, vector, frequency_hz=frequency, growth_rate=growth))
-    energy = _energy(system, modes, column)
+    energy = _energy(system, modes, column, options)
     if energy is not None and len(energy) > 1:
-        files.append(_energy_picture(system, energy, folder / f"{stem}-friction-energy.png"))
+        files += _energy_pictures(system, energy, folder / f"{stem}-friction-energy.png")
     files += write_vtk(
         system,
         folder / f"{stem}.vtu",
@@ -102,29 +105,26 @@ def _write_one(system: System, modes: ComplexModes, column: int, folder: Path, *
     }
 
 
-def _energy(system: System, modes: ComplexModes, column: int) -> Array | None:
+def _energy(system: System, modes: ComplexModes, column: int, options: Options) -> Array | None:
     """Friction energy by slave node; of what does not vibrate there is none."""
     if not system.contact_nodes().count or modes.eigenvalues[0, column].imag == 0.0:
         return None
     from ..modal.krylov import friction_energy
 
-    return friction_energy(system, modes, 0, column).per_cycle
+    return friction_energy(system, modes, 0, column, options=options).per_cycle
 
 
-def _energy_picture(system: System, energy: Array, path: Path) -> Path:
-    from ..view.field_plots import interface_energy
+def _energy_pictures(system: System, energy: Array, path: Path) -> list[Path]:
+    """One for each contact over several nodes; of several the name is in the file's."""
+    from ..view.field_plots import contact_energies
 
-    nodes = system.contact_nodes()
-    figure = interface_energy(
-        nodes.position,
-        energy,
-        tangents=nodes.tangents,
-        quantity="energy per cycle / that of the mode",
-        unit="",
-    )
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=180)
-    return path
+    drawn = contact_energies(system, energy)
+    files: list[Path] = []
+    for name, figure in drawn.items():
+        files.append(path if len(drawn) == 1 else path.with_stem(f"{path.stem}-{name}"))
+        with replacing(files[-1]) as temporary:
+            figure.savefig(temporary, dpi=180)
+    return files
 
 
 def write_steady(problem: Problem, steady: SurfaceSliding, folder: Path) -> list[Path]:
@@ -151,7 +151,7 @@ def write_steady(problem: Problem, steady: SurfaceSliding, folder: Path) -> list
         if np.count_nonzero(nodes.owner == k) < 2:
             continue
         path = folder / f"steady-{name}.png"
-        figure = contact_snapshot(history, 0.0, name)
+        figure = contact_snapshot(history, 0.0, name, title=f"contact {name} in steady sliding")
         with replacing(path) as temporary:
             figure.savefig(temporary, dpi=180)
         files.append(path)

@@ -83,6 +83,7 @@ class Outcome:
             "files": [str(f) for f in self.files],
             "check": e.description.to_json(),
             **{name: None if result is None else result.to_json() for name, result in documents.items()},
+            "unsaturated": None if e.unsaturated is None else e.unsaturated.to_json(),
             "seconds": dict(e.seconds),
             "taken": list(e.taken),
             "notes": list(e.notes),
@@ -233,6 +234,7 @@ def report_inputs(e: Everything) -> ReportInputs:
         friction_energy=e.energy,
         sensitivities=e.sensitivities,
         measures=e.measures,
+        unsaturated=e.unsaturated,
     )
 
 

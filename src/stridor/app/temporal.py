@@ -258,6 +258,8 @@ def _told(call: Call, outcome: Outcome) -> None:
         for note in outcome.everything.notes:
             if not note.startswith("Taken"):  # which the log has told
                 call.say(f"note: {note}")
+        if outcome.everything.unsaturated is not None:
+            call.say("note: the full run is too short, its vibration still grows; the report says how to go on")
         if outcome.report is not None:
             stdout.print(f"report: {outcome.report}")
         stdout.print(outcome.verdict)

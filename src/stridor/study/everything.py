@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
@@ -27,6 +27,7 @@ from .clock import Clock, Log, Shelf
 from .measures import Countermeasures
 from .modal_parts import ModalParts
 from .parts import Parts, chosen_parts
+from .saturation import Unsaturated, unsaturated
 from .sensitivities import Sensitivities
 from .workspace import Workspace
 
@@ -44,7 +45,8 @@ class Everything:
     source but receptance) there are no undamped sweeps, no curve and no operating shape. steady is the equilibrium,
     vector (n,) the mode that grows fastest (or decays slowest) and energy (m,) what friction feeds into it at each
     node. mu is the friction of the case and own the modes there, None where contacts have different coefficients.
-    taken: parts that came from an earlier call on the same case.
+    taken: parts that came from an earlier call on the same case. unsaturated: of a run that still grows, whose loudest
+    line is that of its start: it has no dominant frequency, and nothing of it is compared.
     """
 
     case: Case
@@ -74,6 +76,7 @@ class Everything:
     energy: Array | None = None
     sensitivities: Sensitivities | None = None
     measures: Countermeasures | None = None
+    unsaturated: Unsaturated | None = None
     taken: tuple[str, ...] = ()
 
 
@@ -113,10 +116,13 @@ class _Temporal:
         self.keep("simulate", run)
         return run
 
-    def compare(self, run: Trajectory | None) -> Agreement | None:
-        """The comparison, the run of the case's own friction handed in; of what is not asked for, what is there."""
+    def compare(self, run: Trajectory | None, *, growing: bool) -> Agreement | None:
+        """The comparison, the run of the case's own friction handed in; of what is not asked for, what is there.
+        growing: that run still grows, so that it answers with no mode."""
         wanted, own = "compare" in self.parts, self.work.own_friction
-        parts = self.parts.comparison(critical=self.work.comparison.critical, run=run is not None or not wanted)
+        alone = set(self.work.comparison.mu) <= {own}
+        answers = not (growing and alone) and (run is not None or not wanted)
+        parts = self.parts.comparison(critical=self.work.comparison.critical, run=answers)
         kept = self.kept if wanted or self.kept is None else _Finished(self.kept)
         if not parts or (kept is None and not wanted):
             return None
@@ -191,11 +197,14 @@ def compute_everything(
     temporal = _Temporal(work, parts, clock, progress, keep, before, kept, notes)
     run = None if mu is not None else temporal.run()
     summary = None if run is None else analyses.summarise(work, run)
+    still = None if run is None else unsaturated(work, run, modal.own)
+    if still is not None and summary is not None:
+        summary = replace(summary, dominant_frequency_hz=None)
     shape, mode, operating, agreement = _shape(system, modal), _eigenvalue(modal), None, None
     if mu is None and (run is None or not run.interrupted):
-        agreement = _or_note(lambda: temporal.compare(run), notes, "no comparison")
+        agreement = _or_note(lambda: temporal.compare(run, growing=still is not None), notes, "no comparison")
         through = modal.cheap and (agreement is None or not agreement.interrupted)
-        if through and run is not None and summary is not None:
+        if through and run is not None and summary is not None and still is None:
             shapes = lambda: _shapes(work, modal.own, run, summary)  # noqa: E731
             found = clock.part("compare", "shapes", shapes, "shapes", wanted="compare" in parts)
             operating, shape, mode = found or (None, shape, mode)
@@ -227,6 +236,7 @@ def compute_everything(
         energy=None if modal.squealing is None else modal.squealing.energy,
         sensitivities=modal.sensitivities,
         measures=modal.measures,
+        unsaturated=still,
         taken=tuple(clock.taken),
     )
 

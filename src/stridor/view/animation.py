@@ -24,7 +24,7 @@ from ..system import System
 from ..typing import Array, ComplexArray
 from .depth_picture import sharp_edges
 from .skin import Skin, at_largest, distinct, drawn_scale, facet_edges, mode_title, skin_of
-from .solid_plots import AMPLITUDES, EDGES_UP_TO, VIEW, body_colour, draw_frame
+from .solid_plots import AMPLITUDES, EDGES_UP_TO, VIEW, body_colour, concentrated, draw_frame
 from .style import styled
 
 QUANTA = 32767  # steps of a displacement in the page, from none to the largest amplitude
@@ -124,7 +124,8 @@ def page_data(skin: Skin, *, scale: float | None) -> dict[str, Any]:
     """What the page's script reads: the skin about its middle, arrays as base64 in the machine's usual byte order.
 
     points (k, 3) float32 [m]; real and imag (k, 3) int16, QUANTA being the largest amplitude; facets (f, 4), edges
-    (e, 2), segments (s, 2) as uint16, or uint32 where ``wide``. ``scale`` [m] is the largest amplitude as drawn.
+    (e, 2), segments (s, 2) as uint16, or uint32 where ``wide``. ``scale`` [m] is the largest amplitude as drawn;
+    bent: whether colours go with the root of the amplitude (`solid_plots.concentrated`).
     """
     rotated, largest = at_largest(skin.motion)
     drawn = drawn_scale(skin, largest, scale) * largest
@@ -147,6 +148,7 @@ def page_data(skin: Skin, *, scale: float | None) -> dict[str, Any]:
         "elevation": VIEW[0],
         "azimuth": VIEW[1],
         "scale": drawn,
+        "bent": concentrated(skin),
         "half": [float(h) for h in _padded(half[None])[0]],
         "colours": _bytes(colours),
         "pale": _bytes(0.65 * colours + 0.35),

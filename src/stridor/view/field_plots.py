@@ -14,11 +14,14 @@ from matplotlib.tri import Triangulation
 from scipy.spatial import cKDTree
 
 from ..errors import CaseError
+from ..sliding import full_motion
+from ..system import System
 from ..temporal.node_history import NodeHistory
 from ..temporal.trajectory import STATUS
 from ..typing import Array, BoolArray, IntArray
 from .interface_columns import Columns, arc_length, columns_along, seen_from_normal
-from .style import BLUE, GREY, INK, VERMILION, largest, legend_above, panel, styled, zero_line
+from .sliding_marks import mark_on_line, mark_on_patch
+from .style import BLUE, GREY, INK, VERMILION, WIDTH, largest, legend_above, panel, styled, zero_line
 
 Quantity = Literal["pressure", "status", "slip", "gap"]
 QUANTITIES = ("pressure", "status", "slip", "gap")
@@ -76,12 +79,14 @@ def contact_map(
 
 @styled
 def contact_snapshot(
-    history: NodeHistory, at: float, contact: str | None = None, *, ax: Axes | None = None
+    history: NodeHistory, at: float, contact: str | None = None, *, title: str | None = None, ax: Axes | None = None
 ) -> Figure:
-    """Pressure and status of a contact at the record nearest to time ``at`` [s].
+    """Pressure and status of a contact at the record nearest to time ``at`` [s], which stands in the title unless
+    another is given.
 
-    In space the contact as seen along its normal, in the plane pressure over the position along the contact. Point
-    contacts show their normal force. Raises CaseError for a contact that does not exist or a time outside the run.
+    In space the contact as seen along its normal, in the plane pressure over the position along the contact, with its
+    leading edge, which material of the other body meets first, and arrows the way that goes. Point contacts show their
+    normal force. Raises CaseError for a contact that does not exist or a time outside the run.
     """
     name, nodes = chosen_nodes(history, contact)
     first, last = float(history.time[0]), float(history.time[-1])
@@ -90,22 +95,24 @@ def contact_snapshot(
     record = int(np.argmin(np.abs(history.time - at)))
     values, label = _pressure_or_force(history, nodes, slice(record, record + 1))
     status = history.status[record, nodes]
-    figure, ax = panel(ax, 4.0)
-    position, tangents = history.position[nodes], history.tangents[nodes]
+    position, tangents, slip = history.position[nodes], history.tangents[nodes], history.slip_velocity[record, nodes]
+    figure, ax = panel(ax, _height(position, tangents, 4.0))
     if position.shape[1] == 2:
         _along_line(ax, 1e3 * arc_length(position, tangents), values[0], status)
         ax.set(xlabel="position along the contact [mm]", ylabel=label)
         zero_line(ax)
+        mark_on_line(ax, tangents, slip)
     else:
         x, y = (1e3 * c for c in seen_from_normal(position, tangents))
         shown = _patch(ax, x, y, values[0])
         figure.colorbar(shown, ax=ax, pad=0.02, shrink=0.85, label=label)
         _status_markers(ax, x, y, status)
         ax.set(xlabel="along the first tangent [mm]", ylabel="along the second tangent [mm]")
-        ax.set_aspect("equal", adjustable="box")
+        ax.set_aspect("equal", adjustable="datalim")  # a box of its own is not laid out with its title
         ax.grid(False)
+        mark_on_patch(ax, position, tangents, slip)
     legend_above(ax)
-    _headed(ax, f"contact {name} at {1e3 * float(history.time[record]):.6g} ms")
+    _headed(ax, title or f"contact {name} at {1e3 * float(history.time[record]):.6g} ms")
     return figure
 
 
@@ -117,13 +124,15 @@ def interface_energy(
     tangents: Array | None = None,
     quantity: str = "friction energy per cycle",
     unit: str = "J",
+    slip: Array | None = None,
     ax: Axes | None = None,
 ) -> Figure:
     """Energy (m,) that friction brings in at contact nodes at position (m, d) [m]: where the squeal is made.
 
     Positive energies feed the motion (red), negative ones are taken from it (blue). In the plane a stem over the
     position along the contact, in space the nodes as seen along the normal. ``tangents`` (m, d−1, d) orient both;
-    ``quantity`` is what the energy is called, ``unit`` its unit, "" for energies relative to another.
+    ``quantity`` is what the energy is called, ``unit`` its unit, "" for energies relative to another. ``slip``
+    (m, d−1) [m/s], the slip velocity of the slave against the master along the tangents: marks its leading edge.
     Raises CaseError where the shapes do not fit.
     """
     position, energy = np.asarray(position, dtype=float), np.asarray(energy, dtype=float)
@@ -132,7 +141,7 @@ def interface_energy(
         raise CaseError("energy", given, "one energy (m,) for each position (m, 2) or (m, 3)")
     power, prefix = _prefix(energy) if unit else (1.0, "")
     energy, label = energy / power, f"{quantity} [{prefix}{unit}]" if unit else quantity
-    figure, ax = panel(ax, 3.6)
+    figure, ax = panel(ax, _height(position, tangents, 3.6))
     colours = [VERMILION if e > 0 else BLUE for e in energy]
     if position.shape[1] == 2:
         x = 1e3 * arc_length(position, tangents)
@@ -147,9 +156,11 @@ def interface_energy(
         dots = ax.scatter(x, y, c=energy, s=area, cmap="RdBu_r", vmin=-size, vmax=size, edgecolors=GREY, linewidths=0.4)
         figure.colorbar(dots, ax=ax, pad=0.02, shrink=0.85, label=label)
         ax.set(xlabel="along the first tangent [mm]", ylabel="along the second tangent [mm]")
-        ax.set_aspect("equal", adjustable="box")
+        ax.set_aspect("equal", adjustable="datalim")  # a box of its own is not laid out with its title
         ax.margins(0.08)
         ax.grid(False)
+    if slip is not None and tangents is not None:
+        (mark_on_line(ax, tangents, slip) if position.shape[1] == 2 else mark_on_patch(ax, position, tangents, slip))
     handles = [
         Line2D([], [], color=c, marker="o", ms=4.5, linestyle="none", label=text)
         for c, text in ((VERMILION, "feeds the motion"), (BLUE, "takes from it"))
@@ -157,6 +168,38 @@ def interface_energy(
     legend_above(ax, handles)
     _headed(ax, f"{quantity}: {float(np.nansum(energy)):+.3g} {prefix}{unit}".rstrip() + " in total")
     return figure
+
+
+def contact_energies(system: System, energy: Array) -> dict[str, Figure]:
+    """`interface_energy` of each contact over several nodes by its name: energy (m,) of a mode at the contact nodes of
+    a system, over the energy of the mode, with the edges of the slave as it slides."""
+    nodes = system.contact_nodes()
+    slip = nodes.slip_velocity(full_motion(system))
+    figures: dict[str, Figure] = {}
+    for k, name in enumerate(nodes.names):
+        mine = nodes.owner == k
+        if np.count_nonzero(mine) < 2:
+            continue
+        figures[name] = interface_energy(
+            nodes.position[mine],
+            energy[mine],
+            tangents=nodes.tangents[mine],
+            quantity="energy per cycle / that of the mode",
+            unit="",
+            slip=slip[mine],
+        )
+        if len(nodes.names) > 1:
+            ax = figures[name].axes[0]
+            ax.set_title(f"contact {name}: {ax.get_title(loc='left')}", loc="left", pad=22.0)
+    return figures
+
+
+def _height(position: Array, tangents: Array | None, line: float) -> float:
+    """Height of a figure [inches] in which a contact in space fills its width, ``line`` for one in the plane."""
+    if position.shape[1] == 2 or len(position) < 2:
+        return line
+    wide, high = (float(np.ptp(c)) for c in seen_from_normal(position, tangents))
+    return float(np.clip((WIDTH - 1.8) * (high / max(1.3 * wide, 1e-12)) + 1.5, 2.8, 6.0))
 
 
 def _headed(ax: Axes, title: str, *, above_legend: bool = True) -> None:

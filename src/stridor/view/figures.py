@@ -209,8 +209,8 @@ def _spectra(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "spectrum",
             f"Spectrum of {inputs.spectra_of.split(' over ')[0]}",
             f"Of {inputs.spectra_of}; {spec.window} window, bins every {measured(spec.resolution_hz, 1)} Hz, a line is "
-            f"{measured(spec.bandwidth_hz, 1)} Hz wide at −6 dB. 0 dB is an amplitude of 1 {inputs.spectra_unit}. "
-            "Dotted: the dominant frequency and its multiples.",
+            f"{measured(spec.bandwidth_hz, 1)} Hz wide at −6 dB. 0 dB is an amplitude of 1 {inputs.spectra_unit}."
+            + (" Dotted: the dominant frequency and its multiples." if inputs.dominant_hz is not None else ""),
             f"Amplitude spectra of {', '.join(inputs.spectra)}.",
             plots.spectrum_plot(
                 inputs.spectra,

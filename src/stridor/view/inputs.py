@@ -11,6 +11,7 @@ from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
 from ..sliding.surfaces import SurfaceSliding
 from ..study.measures import Countermeasures
+from ..study.saturation import Unsaturated
 from ..study.sensitivities import Sensitivities
 from ..system import System
 from ..temporal.energy import EnergyBalance
@@ -58,7 +59,8 @@ class ReportInputs:
     give; value_notes: what each of them is. source_places: where in the source of case.reference something is
     found, by the name of the figure or table here ("frequency-pair": "figure 3").
     steady: equilibrium of every contact node; shape_vector (n,): the mode that grows fastest, friction_energy (m,):
-    what friction feeds into it at each slave node. sensitivities, measures: what changes of the case do. timings [s]
+    what friction feeds into it at each slave node. sensitivities, measures: what changes of the case do;
+    unsaturated: that the run still grows. timings [s]
     by analysis; versions by program; case_text: the case file as written; created: date and time; warnings and notes in
     words.
     """
@@ -103,6 +105,7 @@ class ReportInputs:
     friction_energy: Array | None = None
     sensitivities: Sensitivities | None = None
     measures: Countermeasures | None = None
+    unsaturated: Unsaturated | None = None
 
     @property
     def max_frequency_hz(self) -> float:
@@ -111,7 +114,10 @@ class ReportInputs:
 
     @property
     def dominant_hz(self) -> float | None:
-        """Dominant frequency of the run at mu, from the comparison or the operating shape [Hz]."""
+        """Dominant frequency of the run at mu, from the comparison or the operating shape [Hz]; of a run that still
+        grows there is none."""
+        if self.unsaturated is not None:
+            return None
         for comparison in self.agreement.comparisons if self.agreement is not None else ():
             same = self.mu is None or abs(comparison.mu - self.mu) <= 1e-12
             if same and comparison.dominant_frequency_hz is not None:

@@ -118,7 +118,7 @@ def damping_map(result: DampingMap, *, ax: Axes | None = None) -> Figure:
         # A common power of ten would stand where the legend does.
         axis.set_major_formatter("{x:.3g}")
     # Paths are long: one to a line, or the legend is wider than the map.
-    legend_above(ax, handles, columns=1)
+    legend_above(ax, handles, columns=1, height=1.5)
     return figure
 
 

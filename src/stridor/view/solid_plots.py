@@ -12,7 +12,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import Normalize, to_rgb
+from matplotlib.colors import Normalize, PowerNorm, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -29,6 +29,7 @@ VIEW = (28.0, -58.0)  # elevation and azimuth [degrees]
 EDGES_UP_TO = 6000  # facets; with more of them their edges would cover the colours
 AMPLITUDES = "viridis"
 PIXELS = 1100  # of a solid in space, along the longer side
+CONCENTRATED = 0.15  # of the largest amplitude: three quarters of the nodes move less where one corner moves
 
 
 @styled
@@ -101,6 +102,9 @@ def draw_frame(
     reach = np.concatenate([_shown(points, camera) for points in _swept(skin, scale)])
     figure, ax = _axes(ax, reach)
     colours = colormaps[AMPLITUDES]
+    # Of one moving corner the rest would be one dark colour: roots show small amplitudes, too.
+    bent = concentrated(skin)
+    size = np.sqrt(size) if bent else size
     if camera is None:
         _smooth(ax, skin, deformed, size)
         outline = np.concatenate([skin.edges, skin.segments])
@@ -114,15 +118,23 @@ def draw_frame(
     _lengths(ax, camera)
     ax.plot([], [], color=GREY, linestyle=":", linewidth=1.2, label="at rest")
     legend_above(ax)
-    shown = ScalarMappable(Normalize(0.0, 1.0), colours)
+    shown = ScalarMappable(PowerNorm(0.5, 0.0, 1.0) if bent else Normalize(0.0, 1.0), colours)
     bar = figure.colorbar(
         shown, ax=ax, shrink=0.8, pad=0.02, panchor=False, anchor=(0.0, 0.5), label="|u| / largest amplitude"
     )
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    if bent:
+        bar.set_ticks([0.0, 0.01, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0])
     if title:
         # Above the legend, which stands above the frame.
         ax.set_title(title, pad=22.0)
     return figure
+
+
+def concentrated(skin: Skin) -> bool:
+    """Whether the amplitudes of a cycle are small nearly everywhere."""
+    amplitude = np.linalg.norm(np.abs(skin.motion), axis=1)
+    return bool(len(amplitude)) and float(np.quantile(amplitude, 0.75)) < CONCENTRATED * float(amplitude.max())
 
 
 def _swept(skin: Skin, scale: float | None) -> list[Array]:

@@ -20,7 +20,7 @@ from ..typing import Array
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9"
 INK, GREY, FAINT = "#222222", "#767676", "#D9D9D9"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
-STATUS_COLOURS = {"stick": "#C7DDF0", "slip": "#FFFFFF", "separation": "#F6CFA8"}
+STATUS_COLOURS = {"stick": "#C7DDF0", "slip": "#F8F3DF", "separation": "#F6CFA8"}
 
 WIDTH = 7.6  # inches: the text width of a report
 DRAWN_COLUMNS = 1400  # pieces that a long history is drawn in
@@ -146,11 +146,14 @@ def root_figure(ax: Axes) -> Figure:
     return figure
 
 
-def legend_above(ax: Axes, handles: Sequence[Artist] | None = None, *, columns: int = 4) -> None:
-    """A legend above the frame, where it hides nothing."""
+def legend_above(
+    ax: Axes, handles: Sequence[Artist] | None = None, *, columns: int = 4, height: float | None = None
+) -> None:
+    """A legend above the frame, where it hides nothing; height: of its patches, in letters, where hatches must show."""
     shown = ax.get_legend_handles_labels()[0] if handles is None else list(handles)
     if shown:
-        ax.legend(handles=shown, loc="lower left", bbox_to_anchor=(0, 1.0), ncols=columns, borderaxespad=0.2)
+        more = {} if height is None else {"handleheight": height, "handlelength": 2.2 * height}
+        ax.legend(handles=shown, loc="lower left", bbox_to_anchor=(0, 1.0), ncols=columns, borderaxespad=0.2, **more)
 
 
 def zero_line(ax: Axes) -> None:

@@ -6,8 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..agreement import mode_shape
 from ..digits import measured
+from ..system import System
+from ..typing import ComplexArray
 from . import plots
+from .field_plots import contact_energies
 from .figures import ReportFigure
 from .inputs import ReportInputs
 from .tables import Row, Table, number, significant
@@ -25,26 +29,36 @@ def shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "mode",
             f"The mode at {measured(shape.frequency_hz, 1)} Hz",
             f"At the friction of the case this mode {said}. Drawn at the instant of largest motion, exaggerated, "
-            "coloured by the displacement.",
+            f"coloured by the displacement. {_shares(system, inputs.shape_vector)}",
             f"Deformed meshes in the mode at {measured(shape.frequency_hz, 0)} Hz.",
             plots.solid_mode_shape(system, inputs.shape_vector, frequency_hz=shape.frequency_hz, growth_rate=growth),
         )
     nodes = system.contact_nodes()
-    if inputs.friction_energy is not None and nodes.count > 1:
+    if inputs.friction_energy is None or nodes.count < 2:
+        return
+    drawn = contact_energies(system, inputs.friction_energy)
+    for name, figure in drawn.items():
+        one = len(drawn) == 1
         yield ReportFigure(
-            "friction-energy",
-            "Where the squeal is made",
+            "friction-energy" if one else f"friction-energy-{name}",
+            "Where the squeal is made" if one else f"Where the squeal is made, contact {name}",
             "Energy that friction feeds into this mode at each slave node in one cycle (red) or takes from it (blue), "
-            "relative to the energy of the mode.",
-            "Map of the energy that friction feeds in over the contact.",
-            plots.interface_energy(
-                nodes.position,
-                inputs.friction_energy,
-                tangents=nodes.tangents,
-                quantity="energy per cycle / that of the mode",
-                unit="",
-            ),
+            "relative to the energy of the mode. Arrows: how the material of the other body goes, which meets the "
+            "leading edge first.",
+            f"Map of the energy that friction feeds in over contact {name}.",
+            figure,
         )
+
+
+def _shares(system: System, vector: ComplexArray) -> str:
+    """The largest amplitude of each body, relative to that of all."""
+    shapes = mode_shape(system, vector)
+    sizes = {name: float(np.linalg.norm(shape, axis=1).max(initial=0.0)) for name, shape in shapes.items()}
+    most = max(sizes.values(), default=0.0)
+    if most == 0.0 or len(sizes) < 2:
+        return ""
+    shares = ", ".join(f"{name} {100 * size / most:.2g} %" for name, size in sizes.items())
+    return f"Largest amplitude of each body: {shares}."
 
 
 def contact_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:

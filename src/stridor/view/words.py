@@ -12,6 +12,7 @@ from ..case.matrix_checks import MU
 from ..case.schema import Load
 from ..digits import measured
 from ..study.fingerprint import changes_of
+from ..study.saturation import Unsaturated
 from .body_words import body_words, contact_words
 from .inputs import ReportInputs
 from .tables import Row, Table, drop_empty, significant
@@ -45,6 +46,11 @@ def verdict(inputs: ReportInputs) -> Verdict:
         return Verdict(_undecided(inputs), paragraph, None, agrees)
     if not growing:
         return Verdict(f"It does not squeal{at}", paragraph, squeals, agrees)
+    if inputs.unsaturated is not None:
+        still = inputs.unsaturated
+        hz = measured(still.frequency_hz, 0)
+        headline = f"Steady sliding is unstable{at}, and a vibration of {hz} Hz grows for longer than the run lasts"
+        return Verdict(headline, paragraph, squeals, agrees)
     answering = _answering(inputs)
     frequency = max(growing, key=_growth_of)[0] if answering is None else answering
     may = "squeals" if answering is not None or agrees else "may squeal"
@@ -157,10 +163,29 @@ def _run_sentence(inputs: ReportInputs) -> str:
     text += f"{'s' if len(shares) > 1 else ''} {_listed(shares)}"
     if inputs.dominant_hz is not None:
         text += f"; the dominant frequency is {measured(inputs.dominant_hz, 0)} Hz"
+    if inputs.unsaturated is not None:
+        text += f". {_growing_words(inputs.unsaturated)}"
     changed = changes_of(run)
     if changed:
         text += f". In its middle the model was changed ({'; '.join(changed)}): it is no run of one model"
     return text + (". It was interrupted before its planned end." if run.interrupted else ".")
+
+
+def _growing_words(still: Unsaturated) -> str:
+    """That a run is too short, and how to go on with it."""
+    text = (
+        "It is too short to show what the vibration settles to: in its last quarter no node of the contacts changes "
+        "between stick, slip and separation, so that it still grows as the modes say and what is loudest is a rest of "
+        "the start"
+    )
+    if still.seconds_left is None:
+        return f"{text}. Make the phase “{still.phase}” longer"
+    return (
+        f"{text}. Growing by {measured(still.growth_rate, 0)} 1/s, it takes at least another "
+        f"{significant(1e3 * still.seconds_left, 2)} ms until it is as large as the slip itself. To go on from there: "
+        f"phases.{still.phase}.duration = {still.duration:g} in the case, then stridor simulate CASE --restart "
+        "CASE.out/simulate.nc, and stridor run CASE"
+    )
 
 
 def _agreement_sentence(inputs: ReportInputs) -> str:

@@ -51,7 +51,8 @@ function move(amplitude) {
       sum += u * u;
       moved[i] = points[i] + amplitude * data.scale * u;
     }
-    size[k] = Math.min(1, Math.sqrt(sum));
+    const share = Math.min(1, Math.sqrt(sum));
+    size[k] = data.bent ? Math.sqrt(share) : share;
   }
 }
 
@@ -202,7 +203,7 @@ function legend() {
     item.append(patch, text);
     box.append(item);
   };
-  if (control("colours").value === "size") entry("|u| from 0 to the largest amplitude", "", "scale");
+  if (control("colours").value === "size") entry(`|u| from 0 to the largest amplitude${data.bent ? ", its root" : ""}`, "", "scale");
   else {
     data.names.forEach((name, k) => {
       const colour = k < data.meshed ? data.pale[k] : data.colours[k];
