@@ -7,6 +7,7 @@ import logging
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -15,7 +16,8 @@ from stridor.app import heartbeat, output
 from stridor.app.cli import app
 from stridor.app.heartbeat import ERASED, Heartbeat, beating, hush, silent
 from stridor.errors import CaseError
-from stridor.stages import _listeners, heard, stage
+from stridor.modal import dense_problem
+from stridor.stages import Stage, _listeners, heard, passing, stage
 
 TEMPLATE = Path(stridor.__file__).parent / "case" / "templates" / "two-beams.toml"
 
@@ -83,7 +85,7 @@ def test_an_error_ends_it_and_a_closed_stderr_does_not(monkeypatch: pytest.Monke
 
     monkeypatch.setattr("sys.stderr", Closed())
     beat = Heartbeat(terminal=False)
-    beat.at("assembling")
+    beat.at(Stage("assembling", time.monotonic()))
     beat._thread.join(timeout=5)
     assert not beat._thread.is_alive()
     beat.end()
@@ -92,11 +94,58 @@ def test_an_error_ends_it_and_a_closed_stderr_does_not(monkeypatch: pytest.Monke
 def test_stages_go_to_listeners_and_to_the_log(caplog: pytest.LogCaptureFixture) -> None:
     found: list[str] = []
     with caplog.at_level(logging.DEBUG, logger="stridor"):
-        with heard(found.append):
+        with heard(lambda now: found.append("" if now is None else now.what)):
             stage("one")
+            stage("often", logged=False)
         stage("two")
-    assert found == ["one"]
+    assert found == ["one", "often"]
     assert [r.getMessage() for r in caplog.records] == ["one", "two"]
+
+
+def test_a_stage_ends_with_the_function_that_named_it(caplog: pytest.LogCaptureFixture) -> None:
+    heard_of: list[Stage | None] = []
+
+    @passing()
+    def sliding() -> float:
+        stage("steady sliding")
+        stage("steady sliding once more")
+        return 1.0
+
+    @passing()
+    def fails() -> None:
+        stage("modes")
+        sliding()
+        raise ValueError("model")
+
+    with caplog.at_level(logging.DEBUG, logger="stridor"), heard(heard_of.append):
+        assert sliding() == 1.0
+        with pytest.raises(ValueError, match="model"):
+            fails()
+    told = ["" if now is None else now.what for now in heard_of]
+    both = ["steady sliding", "steady sliding once more"]
+    assert told == [*both, "", "modes", *both, "modes", ""]
+    assert heard_of[6] is heard_of[3]  # it goes on: since when it has been under way, too
+    assert [r.getMessage() for r in caplog.records] == [*both, "modes", *both]  # the end of one is no line of a log
+
+
+def test_between_stages_the_verb_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    with beating(quiet=False, terminal=False, width=80, verb="modes"):
+        with passing():
+            stage("steady sliding")
+            time.sleep(0.08)
+        time.sleep(0.12)
+    lines = [line.partition(": ")[2] for line in capsys.readouterr().err.splitlines()]
+    assert lines[0] == "steady sliding, for 0 s"
+    assert lines[-1] == "modes, for 0 s"
+
+
+def test_dense_problems_are_named_when_they_take_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[str] = []
+    monkeypatch.setattr(dense_problem, "LONG", 20)
+    with heard(lambda now: found.append("" if now is None else now.what)):
+        for size in (5, 12):
+            dense_problem.eigenvalues(np.eye(size), 0.1 * np.eye(size), np.diag(np.arange(1.0, size + 1)), 1.0)
+    assert found == ["all eigenvalues of a dense matrix of 24 rows", ""]
 
 
 def test_verbose_says_what_was_chosen_and_stages_once(
@@ -110,7 +159,8 @@ def test_verbose_says_what_was_chosen_and_stages_once(
     found = CliRunner().invoke(app, words, catch_exceptions=False)
     assert json.loads(found.stdout)["mu"] == [0.2]
     assert "info: source receptance, the fastest that takes " in found.stderr
-    assert found.stderr.count("growing modes sought anew") == 1
+    # Not those of the heartbeat, which say since when.
+    assert sum(line.startswith("growing modes sought anew") for line in found.stderr.splitlines()) == 1
     handler = output.Log()
     for text in ("branches at 0.1", "branches at 0.2", "modes"):
         handler.emit(logging.LogRecord("stridor", logging.DEBUG, "", 0, text, None, None))

@@ -267,7 +267,7 @@ def verb(
                 parts=parts,
             )
             width = shutil.get_terminal_size().columns
-            with beating(quiet=call.quiet, terminal=sys.stderr.isatty(), width=width), call.stack:
+            with beating(quiet=call.quiet, terminal=sys.stderr.isatty(), width=width, verb=call.verb), call.stack:
                 function(call, **given)  # type: ignore[call-arg]
             call.warn(call.idle)
             interrupts.check()

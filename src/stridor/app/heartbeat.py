@@ -8,7 +8,7 @@ import time
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from ..stages import heard
+from ..stages import Stage, heard
 
 PATIENCE = 1.5  # seconds of silence before the first word on a terminal
 BETWEEN_LINES = 10.0  # seconds, elsewhere
@@ -19,23 +19,24 @@ ERASED = "\r\x1b[2K"
 class Heartbeat:
     """Tells the stage and the time on stderr, from a thread of its own, until something is printed or `end`.
 
-    bars: how many bars are drawn, beside which it says nothing.
+    verb: what is said where no stage is under way, "" for nothing. bars: how many bars are drawn, beside which it says
+    nothing.
     """
 
-    def __init__(self, *, terminal: bool, width: int = 80) -> None:
+    def __init__(self, *, terminal: bool, width: int = 80, verb: str = "") -> None:
         self._terminal, self._width = terminal, width
         self._started = self._last = time.monotonic()
-        self._stage, self._began = "", self._started
+        self._verb = self._stage = Stage(verb, self._started)
         self._drawn, self._hushed, self.bars = False, False, 0
         self._lock = threading.RLock()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
         self._thread.start()
 
-    def at(self, stage: str) -> None:
-        """A stage begins."""
+    def at(self, stage: Stage | None) -> None:
+        """A stage begins, or one that was interrupted by others goes on; None: nothing that has a name."""
         with self._lock:
-            self._stage, self._began, self._hushed = stage, time.monotonic(), False
+            self._stage, self._hushed = stage or self._verb, False
 
     def hush(self) -> None:
         """Something is printed: no word until the next stage begins."""
@@ -53,7 +54,7 @@ class Heartbeat:
     def _beat(self) -> None:
         while not self._over.wait(REDRAWN):
             with self._lock:
-                if self._hushed or self.bars or not self._stage:
+                if self._hushed or self.bars or not self._stage.what:
                     continue
                 now = time.monotonic()
                 if self._terminal and now - self._last >= PATIENCE:
@@ -64,7 +65,7 @@ class Heartbeat:
                     self._last = now
 
     def _words(self, now: float) -> str:
-        return f"{now - self._started:.0f} s: {self._stage}, for {now - self._began:.0f} s"
+        return f"{now - self._started:.0f} s: {self._stage.what}, for {now - self._stage.began:.0f} s"
 
     def _erase(self) -> None:
         if self._drawn:
@@ -102,12 +103,12 @@ def silent() -> Generator[None, None, None]:
 
 
 @contextmanager
-def beating(*, quiet: bool, terminal: bool, width: int) -> Generator[None, None, None]:
-    """Tell on stderr what is being computed within."""
+def beating(*, quiet: bool, terminal: bool, width: int, verb: str = "") -> Generator[None, None, None]:
+    """Tell on stderr what is being computed within. verb: what is said between the stages."""
     if quiet:
         yield
         return
-    beat = Heartbeat(terminal=terminal, width=width)
+    beat = Heartbeat(terminal=terminal, width=width, verb=verb)
     _beating.append(beat)
     try:
         with heard(beat.at):

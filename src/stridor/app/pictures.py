@@ -15,7 +15,7 @@ from ..io.vtk import write_vtk
 from ..modal.complex_modes import ComplexModes
 from ..modal.options import Options
 from ..sliding.surfaces import SurfaceSliding
-from ..stages import stage
+from ..stages import passing, stage
 from ..study import analyses
 from ..study.workspace import Problem, Workspace
 from ..system import System
@@ -66,6 +66,7 @@ def _chosen(modes: ComplexModes, branches: Sequence[int] | None) -> IntArray:
     return vibrating[[int(np.argmax(modes.growth_rate[0][vibrating]))]]
 
 
+@passing()
 def _write_one(
     system: System, modes: ComplexModes, column: int, folder: Path, options: Options, *, gif: bool
 ) -> dict[str, Any]:

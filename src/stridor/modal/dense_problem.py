@@ -12,10 +12,12 @@ import scipy.linalg as sl
 
 from ..direct.dense import lu_factors
 from ..errors import AnalysisError
+from ..stages import passing, stage
 from ..typing import Array, ComplexArray
 from .newton import Border
 from .quadratic.problem import Quadratic
 
+LONG = 500  # rows of a matrix from which all its eigenvalues take seconds
 REACH = 1.8  # eigenpairs up to this much above the band are looked at
 REMEMBERED = 300  # values of μ whose eigenpairs are kept
 
@@ -206,10 +208,12 @@ def upper_root(squares: ComplexArray) -> ComplexArray:
     return np.where((root.imag < 0) | ((root.imag == 0) & (root.real < 0)), -root, root)
 
 
+@passing()
 def _linear(
     mass: Array, damping: Array, stiffness: Array, frequency: float, *, upper: bool
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """x = λ² and right and left vectors of (xM + K) z = 0, shifted and inverted at x = frequency²."""
+    _said(len(mass))
     shift = frequency**2
     factor = _factor(stiffness + shift * mass)
     theta, left, right = sl.eig(sl.lu_solve(factor, shift * mass), left=True, right=True)
@@ -219,11 +223,13 @@ def _linear(
     return x[chosen], right[:, chosen], _transposed_solve(factor, left[:, chosen].conj())
 
 
+@passing()
 def _quadratic(
     mass: Array, damping: Array, stiffness: Array, frequency: float, *, upper: bool
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """x = λ and right and left vectors of (x²M + xC + K) z = 0, shifted and inverted at x = frequency; ``upper`` leaves
     out the lower half plane."""
+    _said(2 * len(mass))
     companion, factor = _companion(mass, damping, stiffness, frequency)
     r = len(mass)
     theta, left, right = sl.eig(companion, left=True, right=True)
@@ -235,9 +241,11 @@ def _quadratic(
     return x[chosen], z, _transposed_solve(factor, left[:r, chosen].conj())
 
 
+@passing()
 def eigenvalues(mass: Array, damping: Array, stiffness: Array, frequency: float) -> ComplexArray:
     """All finite λ (k,) of (λ²M + λC + K) z = 0, without damping one of each ±λ, shifted and inverted at λ = frequency:
     those of about that size are as good as can be, whatever else there is. The mass need not be regular."""
+    _said(len(mass) * (2 if np.any(damping) else 1))
     if not np.any(damping):
         shift = frequency**2
         theta = sl.eigvals(sl.lu_solve(_factor(stiffness + shift * mass), shift * mass))
@@ -248,6 +256,12 @@ def eigenvalues(mass: Array, damping: Array, stiffness: Array, frequency: float)
     with np.errstate(all="ignore"):
         values: ComplexArray = frequency * (1 + 1 / theta)
     return values[np.isfinite(values)]
+
+
+def _said(unknowns: int) -> None:
+    """Name what takes seconds from some hundred unknowns on; one of many, so no line of a log."""
+    if unknowns >= LONG:
+        stage(f"all eigenvalues of a dense matrix of {unknowns} rows", logged=False)
 
 
 def _companion(mass: Array, damping: Array, stiffness: Array, frequency: float) -> tuple[Array, tuple[Array, Array]]:

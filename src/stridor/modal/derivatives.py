@@ -25,7 +25,7 @@ import scipy.sparse as sp
 from ..direct import SingularMatrix, factorise
 from ..errors import AnalysisError, CaseError
 from ..sliding import steady_nodes
-from ..stages import stage
+from ..stages import passing, stage
 from ..system import System
 from ..typing import Array, BoolArray, ComplexArray, IntArray, Sparse
 from .inverse_iteration import Iterated, two_sided
@@ -229,6 +229,7 @@ def rate_of(at: Callable[[float], Pencil], value: float, step: float | None = No
     return _combined(((-2 / 3, low), (2 / 3, high), *farther), h), False
 
 
+@passing()
 def solve_mode(pencil: Pencil, guess: complex, gap: float, *, solver: str | None = None) -> Mode:
     """The mode whose eigenvalue is near ``guess``, with both vectors; gap: distance [1/s] to the nearest other one.
 

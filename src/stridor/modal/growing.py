@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from ..errors import AnalysisError
-from ..stages import stage
+from ..stages import passing, stage
 from ..system import System
 from ..threads import one_thread
 from ..typing import Array, BoolArray, ComplexArray, IntArray
@@ -87,6 +87,7 @@ def growing_modes(
     return system.once(asked, lambda: _searched_for(system, mu, max_frequency_hz, touching_at, damped, chosen))
 
 
+@passing()
 def _searched_for(
     system: System, mu: float, max_frequency_hz: float, touching_at: float | None, damped: bool, options: Options
 ) -> Growing:

@@ -18,7 +18,7 @@ from ..contact.multipliers import OPEN, SLIP
 from ..contact.nodes import ContactNodes
 from ..direct import SingularMatrix
 from ..errors import AnalysisError
-from ..stages import stage
+from ..stages import passing, stage
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .equilibrium import Equilibrium, NodeState, find_touching
@@ -76,6 +76,7 @@ class SurfaceSliding:
         return (self.status == SLIP) & np.any(self.sense != 0.0, axis=1) & (self.slip_speed == 0.0)
 
 
+@passing()
 def steady_sliding_nodes(
     system: System,
     *,

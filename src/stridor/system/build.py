@@ -16,7 +16,7 @@ from ..errors import CaseError
 from ..fe.solid import stress_stiffness
 from ..mesh.boundary import require_boundary
 from ..mesh.facets import facet_areas, pressure_load, traction_load
-from ..stages import stage
+from ..stages import passing, stage
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody, build_bodies
 from .body_loads import body_load
@@ -31,6 +31,7 @@ from .supports import Tied, constraints_of, tie_matrix
 from .view import View
 
 
+@passing()
 def build_system(case: Case, mu: float | None = None) -> System:
     """Assemble a case; mu is that in the factors of imported matrices (None: the case's own), and nothing else.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..stages import stage
+from ..stages import passing, stage
 from ..system import System
 from ..threads import one_thread
 from .beta2 import StepLimit, step_limit
@@ -22,6 +22,7 @@ from .trajectory import Trajectory
 __all__ = ["Checkpoint", "Progress", "Settings", "plan", "simulate"]
 
 
+@passing()
 @one_thread
 def simulate(
     system: System,

@@ -15,7 +15,7 @@ import scipy
 import scipy.linalg as sl
 
 from ...errors import CaseError
-from ...stages import stage
+from ...stages import passing, stage
 from ...system import System
 from ...threads import one_thread
 from ...typing import BoolArray, ComplexArray, IntArray
@@ -46,6 +46,7 @@ NEIGHBOURS = 12  # eigenvectors that span the surroundings of an eigenvalue
 NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
 
 
+@passing()
 @one_thread
 def krylov_onsets(
     system: System,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ...stages import stage
+from ...stages import passing, stage
 from ...typing import Array, BoolArray, ComplexArray, IntArray
 from ..dense_problem import Eigenpairs, OverNumber
 from ..meeting import beyond
@@ -90,6 +90,7 @@ class Follower:
         follower.longest, follower.watch, follower._step = np.inf, None, np.inf
         return follower
 
+    @passing()
     def advance(self, mu: float) -> State:
         """Follow to ``mu``, not below the present one."""
         while self.state.mu < mu:

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from ...direct import factorise
 from ...errors import AnalysisError, FollowingError
-from ...stages import stage
+from ...stages import passing, stage
 from ...typing import Array, BoolArray, ComplexArray, IntArray, Sparse
 from ..dense_problem import Eigenpairs
 from ..pencil import tiny
@@ -91,6 +91,7 @@ def wanted(reduced: Reduced, found: Eigenpairs) -> IntArray:
     return np.flatnonzero(np.abs(found.values) <= MARGIN * reduced.frequency)
 
 
+@passing()
 def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float = TOLERANCE, left: bool = False) -> None:
     """Enrich the basis until the band's eigenpairs at all ``frictions`` satisfy the sparse problem.
 

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from ...direct import Factor, factorise
 from ...errors import AnalysisError
-from ...stages import stage
+from ...stages import passing, stage
 from ...typing import Array
 from .problem import ContactProblem
 
@@ -121,6 +121,7 @@ def shift_for(problem: ContactProblem, frequency: float | None) -> float:
     return 1e-6 * largest
 
 
+@passing()
 def frictionless_modes(shifted: Shifted, enough: Callable[[Array, int], bool]) -> tuple[Array, ForcedShapes]:
     """ω² (k,) [1/s²] ascending, and the modes as pairs of unit modal mass.
 

@@ -17,7 +17,7 @@ import scipy.linalg as sl
 
 from ...direct import Factor
 from ...errors import AnalysisError
-from ...stages import stage
+from ...stages import passing, stage
 from ...typing import Array, ComplexArray, IntArray, Sparse
 from .basis import Basis, real_and_imaginary
 from .dense import DenseModes, assembled, dense_modes
@@ -76,6 +76,7 @@ class Greedy:
         """What is reduced."""
         return self.basis.problem
 
+    @passing()
     def enrich(self, points: list[Point]) -> None:
         """Answers to what the modes at all points leave, together, until every mode at every point passes. Raises
         AnalysisError where they do not settle."""

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from ...direct import Factor, factorise
 from ...errors import AnalysisError, CaseError
-from ...stages import stage
+from ...stages import passing, stage
 from ...threads import one_thread
 from ...typing import Array, IntArray, Sparse
 from .basis import Basis, Indefinite
@@ -30,6 +30,7 @@ SHIFT = 0.3  # √s over the band
 SKETCH, NONZEROS = 300, 4  # rows of the random embedding, entries in each of its columns
 
 
+@passing()
 @one_thread
 def reduce(
     problem: ParametricProblem,

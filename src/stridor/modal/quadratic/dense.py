@@ -6,19 +6,24 @@ import numpy as np
 import scipy.linalg as sl
 
 from ...errors import AnalysisError
+from ...stages import passing, stage
 from ...typing import ComplexArray
 from .problem import Quadratic, times
 
 ALONE = 1e-4  # of the way to the next eigenvalue: by how much one is corrected at most
+LONG = 300  # unknowns from which it takes seconds
 SMALL = 1e-13  # of the matrices: α and β below it at once are those of a pencil that is singular for every λ
 
 
+@passing()
 def all_modes(problem: Quadratic) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Finite λ (k,) [1/s], right and left vectors (n, k) of unit norm.
 
     Scaled as Fan, Lin and Van Dooren (2004) do: λ = γμ with γ² = ‖K‖/‖M‖, and all by 2/(‖K‖ + γ‖D‖). Raises
     AnalysisError where det P(λ) is zero for every λ.
     """
+    if problem.size >= LONG:
+        stage(f"all modes of {problem.size} unknowns, dense", logged=False)
     m, d, k = (np.asarray(a.toarray(), dtype=float) for a in (problem.mass, problem.damping, problem.stiffness))
     sizes = [float(np.linalg.norm(a, 2)) for a in (m, d, k)]
     gamma = float(np.sqrt(sizes[2] / sizes[0])) if sizes[0] > 0 and sizes[2] > 0 else 1.0

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...direct import Factor, SingularMatrix, factorise
 from ...errors import AnalysisError
-from ...stages import stage
+from ...stages import passing, stage
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from .count import undamped_count, unknown
@@ -266,6 +266,7 @@ class _Run:
         for site in self.sites:
             site.factor.free()
 
+    @passing()
     def _visit(self, cell: Region, shift: complex) -> _Site:
         """One factorisation, and all it gives."""
         problem, rng = self.problem, np.random.default_rng(3)
