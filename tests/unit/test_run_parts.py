@@ -195,7 +195,9 @@ def test_nothing_of_another_case_is_taken(tmp_path: Path) -> None:
 
     # Another number of the case.
     other = written(tmp_path, text=TEXT.replace("0.3", "0.31"))
-    after = st.run(st.load(other), tmp_path / "out", **ask).everything
+    said: list[str] = []
+    after = st.run(st.load(other), tmp_path / "out", **ask, log=said.append).everything
+    assert "onsets: damped: what is there is of another case or version, or damaged; computed anew" in said
     assert after.taken == ()
     assert after.own.mu[0] == 0.31
 

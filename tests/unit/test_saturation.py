@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -45,14 +44,15 @@ def test_a_run_that_still_grows_says_how_long_it_takes(case: st.Case, outcome) -
     assert still is not None
     fastest = int(np.argmax(np.where(modes.frequency_hz[0] > 0, modes.growth_rate[0], -np.inf)))
     assert still.growth_rate == modes.growth_rate[0, fastest] > 0
-    slip = run.slip_speed[-max(16, len(run.time) // 4) :, 0]
-    expected = math.log(slip.mean() / np.abs(slip - slip.mean()).max()) / still.growth_rate
-    assert still.seconds_left == pytest.approx(expected, rel=0.02)
     assert still.duration == pytest.approx(5e-4 + 1.5 * still.seconds_left, rel=0.1)
     # Marched as long as that the nodes begin to stick or open, and not before.
     longer = case.with_({"phases.slide.duration": still.duration})
     gone_on = st.simulate(longer, restart=run)
     assert unsaturated(st.Workspace(longer), gone_on, modes) is None
+    # The first node to change does so before nearly all have, and not at once.
+    changed = np.any(gone_on.nodes.status != run.nodes.status[-1], axis=1)
+    first = gone_on.nodes.time[np.argmax(changed)] - run.time[-1]
+    assert 0.3 * still.seconds_left < first < 2.0 * still.seconds_left
 
 
 def test_nothing_of_it_is_called_the_response(outcome) -> None:
@@ -74,6 +74,11 @@ def test_what_settles_or_does_not_grow_is_not_told_so(case: st.Case, outcome) ->
     run, modes = outcome.everything.run, outcome.everything.own
     work = st.Workspace(case)
     assert unsaturated(work, run, modes) is not None
+    # One node of many that hardly presses says nothing.
+    lightly = run.nodes.status.copy()
+    assert run.nodes.normal_force[-1, -1] == 0.0
+    lightly[-1, -1] = 2
+    assert unsaturated(work, replace(run, nodes=replace(run.nodes, status=lightly)), modes) is not None
     changing = run.nodes.status.copy()
     changing[-1, 0] = 1 - changing[-1, 0]
     assert unsaturated(work, replace(run, nodes=replace(run.nodes, status=changing)), modes) is None

@@ -11,7 +11,10 @@ Log = Callable[[str], None]
 
 
 class Shelf(Protocol):
-    """Where finished parts are put, and sought before they are computed."""
+    """Where finished parts are put, and sought before they are computed. stale: names of parts that are there, but not
+    of this case and these versions, or damaged."""
+
+    stale: list[str]
 
     def get(self, name: str) -> Any:
         """The part that was put there for the same case, None where there is none."""
@@ -48,6 +51,8 @@ class Clock:
             return found
         if not wanted:
             return None
+        if self.shelf is not None and label in self.shelf.stale:
+            self.log(f"{_said(name, what)}: what is there is of another case or version, or damaged; computed anew")
         result = self(name, call, what)
         if self.shelf is not None and result is not None and not getattr(result, "interrupted", False):
             self.shelf.put(label, result)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -128,15 +129,15 @@ class _Temporal:
             return None
         runs = {} if own is None or run is None else {own: run}
         try:
-            result = self.clock(
-                "compare",
-                lambda: analyses.compare(self.work, runs=runs, progress=self.clock.log, only=parts, kept=kept),
-                "" if wanted else "what is there of it",
-            )
+            say = self.clock.log if wanted else _silent
+            call = partial(analyses.compare, self.work, runs=runs, progress=say, only=parts, kept=kept)
+            result = self.clock("compare", call) if wanted else call()
         except (_MissingError, AnalysisError):
             if wanted:
                 raise
             return None
+        if not wanted:
+            self.clock.took("compare")
         self.keep("compare", result)
         return result
 

@@ -10,23 +10,25 @@ import numpy as np
 
 from ..modal.complex_modes import ComplexModes
 from ..temporal.trajectory import Trajectory
-from ..typing import IntArray
+from ..typing import Array, IntArray
 from .workspace import Workspace
 
 LEAST_RECORDS = 32  # of the last phase
 TAIL = 0.25  # of the last phase: what is looked at
 SLIP = 2
+FEW = 0.1  # of the normal force: what nodes that change may carry, as those do at an edge that hardly presses
 ROOM = 1.5  # times what is left: how much longer a run is proposed to be
 
 
 @dataclass(frozen=True)
 class Unsaturated:
-    """A run in whose last quarter no contact node changed between stick, slip and separation while modes grow.
+    """A run in whose last quarter next to no contact node (by a tenth of the normal force) changed between stick, slip
+    and separation while modes grow.
 
-    growth_rate [1/s] and frequency_hz of the mode that grows fastest; seconds_left: how long it takes at least until
-    the vibration of the slip speed is as large as the slip itself, where nodes begin to stick or open: ln(slip speed /
-    amplitude)/growth rate, with the amplitude of all that vibrates at the end; None where that cannot be said. phase:
-    the last one, and duration [s], what it would have to last about.
+    growth_rate [1/s] and frequency_hz of the mode that grows fastest; seconds_left: about how long it takes until the
+    vibration of the contact forces, or of the slip, is as large as these are, where nodes open or stick: ln(1/share of
+    the vibration at the end)/growth rate, rests of other modes counted in; None where that cannot be said. phase: the
+    last one, and duration [s], what it would have to last about.
     """
 
     growth_rate: float
@@ -66,20 +68,31 @@ def unsaturated(work: Workspace, run: Trajectory, modes: ComplexModes | None) ->
 
 
 def _unchanged(run: Trajectory, since: float) -> bool:
-    """Whether every contact node, some of which slip, stays as it is from a time [s] on."""
-    if run.nodes is not None:
-        status: IntArray = run.nodes.status[run.nodes.time >= since]
-    else:
-        status = run.status[run.time >= since]
-    return bool(len(status)) and bool(np.all(status == status[0])) and bool(np.any(status == SLIP))
+    """Whether the contact nodes, some of which slip, stay as they are from a time [s] on, but for few."""
+    of = run if run.nodes is None else run.nodes
+    late = of.time >= since
+    status: IntArray = of.status[late]
+    if not len(status) or not np.any(status == SLIP):
+        return False
+    force = np.abs(of.normal_force[late]).mean(axis=0)
+    changed = np.any(status != status[0], axis=0)
+    return float(force[changed].sum()) <= FEW * float(force.sum())
 
 
 def _seconds_left(run: Trajectory, tail: slice, rate: float) -> float | None:
-    slip = run.slip_speed[tail]
-    mean = np.abs(slip.mean(axis=0))
-    swing = np.abs(slip - slip.mean(axis=0)).max(axis=0)
-    known = (swing > 0) & (mean > swing)
-    return float(np.min(np.log(mean[known] / swing[known]))) / rate if known.any() else None
+    of = run if run.nodes is None else run.nodes
+    force = np.abs(of.normal_force[of.time >= run.time[tail][0]])
+    share = _share(force, 0.0)
+    for slip in run.slip_speed[tail].T:
+        share = _share(slip[:, None], share)
+    return float(np.log(1.0 / share)) / rate if 0.0 < share < 1.0 else None
+
+
+def _share(values: Array, least: float) -> float:
+    """How far values (s, m) swing about their means, over the means, all together; at least so much."""
+    mean = values.mean(axis=0)
+    whole = float(np.abs(mean).sum())
+    return max(least, float(np.abs(values - mean).max(axis=0).sum()) / whole) if whole > 0.0 else least
 
 
 def _rounded(value: float) -> float:

@@ -174,15 +174,16 @@ def _run_sentence(inputs: ReportInputs) -> str:
 def _growing_words(still: Unsaturated) -> str:
     """That a run is too short, and how to go on with it."""
     text = (
-        "It is too short to show what the vibration settles to: in its last quarter no node of the contacts changes "
-        "between stick, slip and separation, so that it still grows as the modes say and what is loudest is a rest of "
-        "the start"
+        "It is too short to show what the vibration settles to: in its last quarter hardly a node of the contacts "
+        "changes between stick, slip and separation, so that it still grows as the modes say and what is loudest is a "
+        "rest of the start"
     )
     if still.seconds_left is None:
         return f"{text}. Make the phase “{still.phase}” longer"
     return (
-        f"{text}. Growing by {measured(still.growth_rate, 0)} 1/s, it takes at least another "
-        f"{significant(1e3 * still.seconds_left, 2)} ms until it is as large as the slip itself. To go on from there: "
+        f"{text}. Growing by {measured(still.growth_rate, 0)} 1/s, it takes about another "
+        f"{significant(1e3 * still.seconds_left, 2)} ms until the contact forces or the slip vibrate as much as they "
+        f"are large. To go on from there: "
         f"phases.{still.phase}.duration = {still.duration:g} in the case, then stridor simulate CASE --restart "
         "CASE.out/simulate.nc, and stridor run CASE"
     )
