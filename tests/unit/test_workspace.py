@@ -175,7 +175,8 @@ def test_a_system_alone_has_the_settings_of_an_empty_case(case: st.Case) -> None
 def test_what_cannot_do_without_a_case_says_so(case: st.Case, call, what: str) -> None:
     with pytest.raises(CaseError) as said:
         call(st.build_system(case))
-    assert str(said.value) == f"case: missing – {what} takes a Case, or a Workspace of one, not a System alone"
+    takes = "takes a Case, the path of its file or a Workspace of one, not a System alone"
+    assert str(said.value) == f"case: missing – {what} {takes}"
     assert not Path("nowhere").exists()
 
 

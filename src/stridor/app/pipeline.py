@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from datetime import datetime
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..agreement import Store, modal_assurance
-from ..case import Case, load
 from ..digits import measured
 from ..errors import CaseError, StridorError
 from ..io.atomic import write_text
@@ -25,7 +25,7 @@ from ..study.asked import require_friction
 from ..study.everything import Everything, compute_everything
 from ..study.parts import OF_REPORT, Parts, chosen_parts
 from ..study.provenance import versions
-from ..study.workspace import Workspace
+from ..study.workspace import Problem, Workspace
 from ..temporal.signals import low_passed, spectrogram, spectrum
 from ..temporal.simulate import Progress
 from ..temporal.trajectory import Trajectory
@@ -91,8 +91,8 @@ class Outcome:
 
 
 def run(
-    problem: Case | Workspace,
-    folder: str | Path,
+    problem: Problem,
+    folder: str | Path | None = None,
     *,
     progress: Progress | None = None,
     log: Callable[[str], None] | None = None,
@@ -103,18 +103,19 @@ def run(
 ) -> Outcome:
     """Compute everything, keep each result as soon as it is there, write the report into ``folder``.
 
-    only, skip: parts (`study.parts`) that alone are computed, or are not: modes, onsets, simulate, compare, report, and
-    sensitivities and countermeasures, which are computed where they are named. What an earlier call on the same case,
-    by the same program, has left in the folder is taken, a run that was cut is gone on from; with ``fresh`` nothing is.
-    kept: where finished parts of the comparison are put and sought instead of in the folder. Raises CaseError for parts
-    that there are none of.
+    problem: a case, the path of its file, beside which everything then goes (CASE.out) unless a folder is named, or a
+    workspace of either. only, skip: parts (`study.parts`) that alone are computed, or are not: modes, onsets, simulate,
+    compare, report, and sensitivities and countermeasures, which are computed where they are named. What an earlier
+    call on the same case, by the same program, has left in the folder is taken, a run that was cut is gone on from;
+    with ``fresh`` nothing is. kept: where finished parts of the comparison are put and sought instead of in the folder.
+    Raises CaseError for parts that there are none of.
     """
-    parts = chosen_parts(only, skip)
-    return _run(Workspace.of(problem), Path(folder), parts, progress=progress, log=log, fresh=fresh, kept=kept)
+    parts, work = chosen_parts(only, skip), Workspace.of(problem)
+    return _run(work, _folder(problem, folder), parts, progress=progress, log=log, fresh=fresh, kept=kept)
 
 
 def report(
-    problem: Case | Workspace | str | Path,
+    problem: Problem,
     folder: str | Path | None = None,
     *,
     mu: float | None = None,
@@ -130,16 +131,19 @@ def report(
     folder already and belong to this case are shown, none are computed. skip, fresh and kept as `run` takes them. What
     a model has nothing to show for (shapes without coordinates of nodes) is left out, and the notes say so.
     """
-    if isinstance(problem, str | Path):
-        case = load(problem)
-        folder = Path(problem).with_suffix(".out") if folder is None else folder
-    else:
-        case = problem
-    if folder is None:
-        raise CaseError("folder", None, "where the page goes, unless the case is given by the path of its file")
+    work = Workspace.of(problem)
     require_friction(mu)
     parts = chosen_parts(None, skip, OF_REPORT)
-    return _run(Workspace.of(case), Path(folder), parts, mu=mu, log=log, fresh=fresh, kept=kept)
+    return _run(work, _folder(problem, folder), parts, mu=mu, log=log, fresh=fresh, kept=kept)
+
+
+def _folder(problem: Problem, folder: str | Path | None) -> Path:
+    """Where files go: the folder that was named, else that beside the case file."""
+    if folder is not None:
+        return Path(folder)
+    if isinstance(problem, str | PathLike):
+        return Path(problem).with_suffix(".out")
+    raise CaseError("folder", None, "where the page goes, unless the case is given by the path of its file")
 
 
 def _run(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from collections.abc import Sequence
 from importlib import resources
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,9 +23,11 @@ _POSITION = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\
 _KEYS = re.compile(r"\('[^)]*',?\)")  # how tomllib names a table
 
 
-def load(path: str | Path, overrides: Sequence[str] = ()) -> Case:
+def load(path: str | PathLike[str], overrides: Sequence[str] = ()) -> Case:
     """The case in a TOML file, with overrides such as "phases.1.duration=0.01" applied. Raises CaseError."""
-    source = str(path)
+    if not isinstance(path, str | PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise CaseError("path", f"a {type(path).__name__}", "the path of a case file")
+    source = os.fspath(path)
     try:
         if reason := irregular(Path(path), LARGEST):
             told = reason.replace("is a folder", "is a directory")

@@ -1,7 +1,7 @@
 """A case in, a result out: the calls behind `import stridor as st` and behind every verb.
 
-Each takes a Case, a System alone (with the settings that a case has by default), or a Workspace of either, which keeps
-what was computed on the way for the next call.
+Each takes a Case, the path of its file, a System alone (with the settings that a case has by default), or a Workspace,
+which keeps what was computed on the way for the next call.
 """
 
 from __future__ import annotations

@@ -19,13 +19,13 @@ from .measure_verification import verified
 from .measures import Countermeasures, Measure, Target, Verified
 from .provenance import provenance
 from .sensitivities import Linearised
-from .workspace import Workspace
+from .workspace import Problem, Workspace
 
 __all__ = ["Countermeasures", "Measure", "Verified", "rank_countermeasures"]
 
 
 def rank_countermeasures(
-    problem: Case | Workspace,
+    problem: Problem,
     *,
     mu: float | None = None,
     target: Target = "sum",

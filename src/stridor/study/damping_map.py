@@ -16,7 +16,6 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..case import Case
 from ..errors import AnalysisError, CaseError
 from ..modal.source import by_receptance
 from ..system import build_system
@@ -25,6 +24,7 @@ from .damping_full import FullSearch, LowestOnset
 from .damping_reduced import ReducedSearch
 from .provenance import provenance
 from .sensitivities import number_at
+from .workspace import Problem, Workspace
 
 MOST_POINTS = 10_000
 ROUNDING = 1e-9
@@ -156,7 +156,7 @@ class DampingMap:
 
 
 def damping_map(
-    case: Case,
+    problem: Problem,
     x: str,
     y: str,
     *,
@@ -184,6 +184,8 @@ def damping_map(
     Raises CaseError for paths that lead to no number and for "reduced" where there is no reduced model.
     """
     started = time.perf_counter()
+    work = Workspace.of(problem)
+    case = work.case("the map of dampings")
     if method not in get_args(Method):
         raise CaseError("method", method, f"one of {', '.join(get_args(Method))}")
     low, high = case.modal.friction_range if mu_range is None else mu_range
@@ -204,7 +206,7 @@ def damping_map(
         x, y, xs, ys, (low, high), top, table.mu, table.frequency, table.slope_x, table.slope_y, table.residual,
         None if undamped is None else undamped.mu,
         tuple(table.warnings),
-        provenance(case, "damping map", time.perf_counter() - started, method=method, bound=bound),
+        provenance(work, "damping map", time.perf_counter() - started, method=method, bound=bound),
         "reduced" if isinstance(search, ReducedSearch) else "full",
         table.error if isinstance(search, ReducedSearch) else None,
         tuple(table.confirmed),

@@ -26,7 +26,7 @@ from .matrix_reports import matrix_reports
 from .pressed import unpressed_in_time
 from .settings import settings_of
 from .unit_warnings import resolution_warnings, unit_warnings
-from .workspace import Workspace
+from .workspace import Problem, Workspace
 
 MOST_THROUGH = 0.2  # of a sliding velocity through a surface: facets on a curve make little of it
 
@@ -43,7 +43,7 @@ class Description:
         return {**self.data, "text": list(self.lines), "warnings": list(self.warnings)}
 
 
-def describe(problem: Case | Workspace) -> Description:
+def describe(problem: Problem) -> Description:
     """Build the model, find its steady sliding and its step limit, and say it in words."""
     work = Workspace.of(problem)
     case, system = work.case("describe"), work.system()

@@ -17,6 +17,7 @@ from ..sliding.stretches import elsewhere_words, stretches
 from ..system import System, build_system
 from ..system.imported import Share
 from ..system.shares import system_shares
+from .workspace import Problem, Workspace
 
 if TYPE_CHECKING:
     from ..modal.parametric import Parameter, ReducedModel
@@ -29,7 +30,7 @@ DAMPED = "modal.damped = false does not hold here: a reduced model keeps the dam
 
 
 def reduced_model(
-    case: Case,
+    problem: Problem,
     box: Mapping[str, tuple[float, float]],
     *,
     max_frequency_hz: float | None = None,
@@ -49,10 +50,11 @@ def reduced_model(
     """
     from ..modal.parametric import reduce
 
-    problem = parametric_problem(case, box)
+    case = Workspace.of(problem).case("a reduced model")
     settings = case.modal
     limit = settings.max_frequency_hz if max_frequency_hz is None else max_frequency_hz
-    return reduce(problem, limit, bound=bound, solver=None if settings.solver == "auto" else settings.solver)
+    solver = None if settings.solver == "auto" else settings.solver
+    return reduce(parametric_problem(case, box), limit, bound=bound, solver=solver)
 
 
 def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> ContactsProblem:

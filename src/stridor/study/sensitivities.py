@@ -25,7 +25,7 @@ from .analyses import modes as modes_at
 from .asked import require_band
 from .measures import growing
 from .provenance import provenance
-from .workspace import Workspace
+from .workspace import Problem, Workspace
 
 NEAR = 0.05  # relative change of a number within which an exceptional point is told of
 BENT = 2.0  # condition number from which two close modes are on their way to an exceptional point
@@ -175,7 +175,7 @@ def _complex(value: complex) -> list[float] | None:
 
 
 def sensitivities(
-    problem: Case | Workspace,
+    problem: Problem,
     parameters: Sequence[str] = ("mu",),
     *,
     mu: float | None = None,

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, lru_cache, partial
+from os import PathLike
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from ..case import Case
+from ..case import Case, load
 from ..case.fields import Table
 from ..case.matrix_checks import MU
 from ..case.messages import problems_of
@@ -30,6 +31,7 @@ from .case_key import case_key
 from .options import options_of
 
 SYSTEMS = 16  # kept at the same time, of a case whose matrices depend on μ
+ACCEPTED = "a case, the path of its file, a system or a workspace"
 WORKS = "what works for these is `stridor report`, `stridor modes`, `stridor onsets` and `stridor steady`"
 
 
@@ -45,13 +47,18 @@ class _Settings(Table):
 class Workspace:
     """A case, or a system alone, and what has been computed for it.
 
-    Every analysis takes one in place of a case; what it needs and is there already is not computed again. A case is
-    frozen: one that is varied is another workspace. With a system alone the tables [modal], [temporal], [comparison]
-    and [[phases]] of a case may be given by name, as mappings; they have the defaults of a case. answers: what was
-    computed, by what was asked. Raises CaseError for tables that are wrong, or given beside a case.
+    problem: a Case, the path of its file, or a System. Every analysis takes a workspace in place of these; what it
+    needs and is there already is not computed again. A case is frozen: one that is varied is another workspace. With a
+    system alone the tables [modal], [temporal], [comparison] and [[phases]] of a case may be given by name, as
+    mappings; they have the defaults of a case. answers: what was computed, by what was asked. Raises CaseError for
+    tables that are wrong, or given beside a case, and for what is no problem.
     """
 
-    def __init__(self, problem: Case | System, /, **tables: Any) -> None:
+    def __init__(self, problem: Case | System | str | PathLike[str], /, **tables: Any) -> None:
+        if isinstance(problem, str | PathLike):
+            problem = load(problem)
+        if not isinstance(problem, Case | System):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise CaseError("problem", f"a {type(problem).__name__}", ACCEPTED)
         self._case = problem if isinstance(problem, Case) else None
         if isinstance(problem, Case):
             for name in tables:
@@ -72,7 +79,7 @@ class Workspace:
 
     @staticmethod
     def of(problem: Problem) -> Workspace:
-        """The workspace itself, or a new one of a case or a system."""
+        """The workspace itself, or a new one of a case, its file or a system. Raises CaseError for anything else."""
         return problem if isinstance(problem, Workspace) else Workspace(problem)
 
     @property
@@ -83,7 +90,8 @@ class Workspace:
     def case(self, what: str) -> Case:
         """The case. Raises CaseError of a system alone, with what it is that cannot do without one."""
         if self._case is None:
-            raise CaseError("case", None, f"missing – {what} takes a Case, or a Workspace of one, not a System alone")
+            takes = "takes a Case, the path of its file or a Workspace of one, not a System alone"
+            raise CaseError("case", None, f"missing – {what} {takes}")
         return self._case
 
     @cached_property
@@ -177,5 +185,5 @@ class Workspace:
         return system
 
 
-Problem = Case | System | Workspace
-"""What every analysis takes."""
+Problem = Case | System | Workspace | str | PathLike[str]
+"""What every analysis takes; a text is the path of a case file."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from os import PathLike
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..case import Case
+from ..case import Case, load
 from ..case.bodies import MassBody, SolidBody
 from ..case.points import BoundaryRef
 from ..case.schema import Load, SteadyStep
@@ -32,11 +33,17 @@ from .view import View
 
 
 @passing()
-def build_system(case: Case, mu: float | None = None) -> System:
-    """Assemble a case; mu is that in the factors of imported matrices (None: the case's own), and nothing else.
+def build_system(case: Case | str | PathLike[str], mu: float | None = None) -> System:
+    """Assemble a case, or that in the file at a path; mu is that in the factors of imported matrices (None: the case's
+    own), and nothing else.
 
     Raises CaseError where a mesh or a matrix will not do or bodies that shall touch do not.
     """
+    if isinstance(case, str | PathLike):
+        case = load(case)
+    if not isinstance(case, Case):  # pyright: ignore[reportUnnecessaryIsInstance]
+        accepted = "a case or the path of its file; the system of a workspace is work.system()"
+        raise CaseError("case", f"a {type(case).__name__}", accepted)
     stage("matrices of the bodies")
     bodies = build_bodies(case, mu)
     total = sum(body.size for body in bodies.values())
