@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from dataclasses import dataclass
 from functools import cache
 from types import TracebackType
 from typing import Any
@@ -38,6 +39,38 @@ class SingularMatrix(AnalysisError):
         self.motion = motion
 
 
+@dataclass(frozen=True)
+class Sizes:
+    """What backward errors are measured against: |A| (n, n), and its largest entries by rows and by columns (n,)."""
+
+    entries: Sparse
+    rows: Array
+    columns: Array
+
+    @staticmethod
+    def of(matrix: Sparse, largest: tuple[Array, Array] | None = None) -> Sizes:
+        """Those of a matrix in csr form, whose largest entries may be known."""
+        entries = sp.csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+        return Sizes(entries, *(largest or _largest(matrix)))
+
+    @property
+    def transposed(self) -> Sizes:
+        """Those of Aᵀ."""
+        return Sizes(self.entries.T, self.columns, self.rows)
+
+    def residual(self, matrix: Sparse, right: Any, answer: Any) -> tuple[Any, float]:
+        """b − A x (n, r) and max |b − A x| / (|A| |x| + |b|) over all rows (Arioli, Demmel and Duff 1989)."""
+        with np.errstate(all="ignore"):
+            residual = right - matrix @ answer
+            length = np.abs(answer)
+            terms = self.entries @ length + np.abs(right)
+            # Rows whose terms are nothing but rounding are measured against the largest that they could be.
+            largest = self.rows[:, None] * length.max(axis=0, initial=0.0)
+            terms = np.where(terms < 1e3 * np.finfo(float).eps * largest, terms + largest, terms)
+            ratio = np.abs(residual) / np.where(terms > 0, terms, 1.0)
+        return residual, float(np.max(ratio, initial=0.0)) if np.isfinite(ratio).all() else np.inf
+
+
 class Factor:
     """A factorised matrix (n, n). Use it in a `with` block, or call `free`, where memory is short.
 
@@ -48,18 +81,15 @@ class Factor:
     solver: str
     seconds: float
     memory_bytes: int
-    inertia: int | None
 
     def __init__(
         self, matrix: Sparse, backend: Backend, solver: str, started: float, largest: tuple[Array, Array]
     ) -> None:
         self._matrix = matrix
-        self._sizes: Sparse = sp.csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
-        self._largest, self._largest_transposed = largest
+        self._sizes = Sizes.of(matrix, largest)
         self._backend: Backend | None = backend
         self.solver = solver
         self.memory_bytes = backend.memory_bytes
-        self.inertia = backend.inertia
         self.seconds = time.perf_counter() - started
 
     def solve(self, right: Array | ComplexArray, *, transpose: bool = False, refine: bool = True) -> Any:
@@ -84,6 +114,13 @@ class Factor:
         else:
             answer = self._solve_block(block.astype(self._matrix.dtype), transpose, refine)
         return answer[:, 0] if given.ndim == 1 else answer
+
+    @property
+    def inertia(self) -> int | None:
+        """See the class. Raises ValueError once the factors are freed."""
+        if self._backend is None:
+            raise ValueError("this factor has been freed")
+        return self._backend.inertia
 
     def free(self) -> None:
         """Give the memory of the factors back; solving is over then."""
@@ -136,18 +173,9 @@ class Factor:
         return answer
 
     def _residual(self, right: Any, answer: Any, transpose: bool) -> tuple[Any, float]:
-        """b − A x and max |b − A x| / (|A| |x| + |b|) over all rows (Arioli, Demmel and Duff 1989)."""
-        matrix, sizes = (self._matrix.T, self._sizes.T) if transpose else (self._matrix, self._sizes)
-        with np.errstate(all="ignore"):
-            residual = right - matrix @ answer
-            length = np.abs(answer)
-            terms = sizes @ length + np.abs(right)
-            # Rows whose terms are nothing but rounding are measured against the largest that they could be.
-            widest = self._largest_transposed if transpose else self._largest
-            largest = widest[:, None] * length.max(axis=0, initial=0.0)
-            terms = np.where(terms < 1e3 * np.finfo(float).eps * largest, terms + largest, terms)
-            ratio = np.abs(residual) / np.where(terms > 0, terms, 1.0)
-        return residual, float(np.max(ratio, initial=0.0)) if np.isfinite(ratio).all() else np.inf
+        """See `Sizes.residual`."""
+        matrix, sizes = (self._matrix.T, self._sizes.transposed) if transpose else (self._matrix, self._sizes)
+        return sizes.residual(matrix, right, answer)
 
     def unresisted(self) -> tuple[float, Any]:
         """How near the matrix is to a singular one, ‖A x‖ / ‖|A| |x|‖ row by row scaled, and that motion x (n,).
@@ -160,7 +188,7 @@ class Factor:
         n = self._matrix.shape[0]
         sign = np.where(np.random.default_rng(1).random(n) < 0.5, -1.0, 1.0)
         with np.errstate(all="ignore"):
-            motion = self._backend.solve((sign * self._largest).astype(self._matrix.dtype)[:, None], False)[:, 0]
+            motion = self._backend.solve((sign * self._sizes.rows).astype(self._matrix.dtype)[:, None], False)[:, 0]
             motion = motion / np.abs(motion).max(initial=0.0)
             if not np.isfinite(motion).all():
                 raise Breakdown("elimination overflows")
@@ -178,8 +206,9 @@ class Factor:
             return ratio, motion
 
     def _resistance(self, motion: Any) -> float:
-        left = np.abs(self._matrix @ motion) / self._largest
-        return float(left.max() / ((self._sizes @ np.abs(motion)) / self._largest).max())
+        rows = self._sizes.rows
+        left = np.abs(self._matrix @ motion) / rows
+        return float(left.max() / ((self._sizes.entries @ np.abs(motion)) / rows).max())
 
 
 def factorise(

@@ -9,7 +9,11 @@ class Backend(Protocol):
     """A factorised matrix of n rows as one of the programs keeps it."""
 
     memory_bytes: int
-    inertia: int | None
+
+    @property
+    def inertia(self) -> int | None:
+        """Number of negative pivots of a real symmetric matrix; None where it is not told."""
+        ...
 
     def solve(self, right: Any, transpose: bool) -> Any:
         """One unrefined solve of right (n, r), of the matrix's own type; may overwrite it."""

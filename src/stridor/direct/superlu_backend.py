@@ -14,25 +14,26 @@ from .ordering import nested_dissection
 
 
 class SuperluFactor:
-    """LU factors of the equilibrated matrix. SuperLU tells no inertia."""
+    """LU factors of the equilibrated matrix. inertia is the count of negative pivots where the matrix is real and symmetric
+    and all of them were taken from the diagonal; to look costs a copy of the factors. pivots: how small one may be beside
+    its column before another is taken."""
 
-    def __init__(self, matrix: Sparse, symmetric: bool, saddle: bool) -> None:
-        self.inertia: int | None = None
+    def __init__(self, matrix: Sparse, symmetric: bool, saddle: bool, *, pivots: float | None = None) -> None:
+        self._symmetric = symmetric and matrix.dtype.kind == "f"
         self._row, self._column = equilibrate(matrix)
         scaled = sp.csc_array(sp.diags_array(self._row) @ matrix @ sp.diags_array(self._column))
         # An order for A + Aᵀ with pivots kept to the diagonal fills in far less than SciPy's default, and nested
         # dissection less than minimum degree. Where a multiplier's diagonal is zero SuperLU takes another pivot of its
         # column: 20 % more fill than with a diagonal made up for it, but exact, so that no solve needs a second one to
         # refine it.
+        pivots = (0.01 if saddle else 1e-3) if pivots is None else pivots
         options = {"SymmetricMode": True, "PrintStat": False, "Equil": False}
         self._order = nested_dissection(scaled)
         spec = "MMD_AT_PLUS_A" if self._order is None else "NATURAL"
         if self._order is not None:
             scaled = sp.csc_array(scaled[self._order][:, self._order])
         try:
-            self._factor: Any = spl.splu(
-                scaled, permc_spec=spec, diag_pivot_thresh=0.01 if saddle else 1e-3, options=options
-            )
+            self._factor: Any = spl.splu(scaled, permc_spec=spec, diag_pivot_thresh=pivots, options=options)
         except RuntimeError as error:
             raise Breakdown(str(error)) from error
         width = scaled.dtype.itemsize + 4
@@ -47,6 +48,13 @@ class SuperluFactor:
         answer = np.empty_like(scaled)
         answer[self._order] = self._factor.solve(np.ascontiguousarray(scaled[self._order]), trans=trans)
         return answer * after[:, None]
+
+    @property
+    def inertia(self) -> int | None:
+        """A = L U with rows and columns in one order is L D Lᵀ, and D has the signs of the eigenvalues (Sylvester)."""
+        straight = self._symmetric and np.array_equal(self._factor.perm_r, self._factor.perm_c)
+        # Rows and columns are scaled alike where the matrix is symmetric, by positive numbers.
+        return int(np.count_nonzero(self._factor.U.diagonal() < 0.0)) if straight else None
 
     def free(self) -> None:
         """SuperLU frees its memory with the object."""

@@ -209,12 +209,18 @@ def checked_modes(
 
 
 def checked_onsets(
-    system: System, found: Onsets, *, damped: bool, options: Options | None = None, follow: Sequence[float] = WIDER
+    system: System,
+    found: Onsets,
+    *,
+    damped: bool,
+    options: Options | None = None,
+    follow: Sequence[float] = WIDER,
+    numbered_at: float = 0.0,
 ) -> Onsets:
     """The onsets with what grows at both ends of the range sought anew in the full problem.
 
     found: as `onsets` gives them; where a mode grows in the band at the high end that branches do not lead to, they are
-    solved again with branches from further above. ``completeness`` says what came of it, ``at_start`` and ``at_end``
+    solved again with branches from further above, from ``numbered_at`` on as in `onsets`. ``completeness`` says what came of it, ``at_start`` and ``at_end``
     are what the full problem has.
     """
     options = options or Options()
@@ -233,7 +239,7 @@ def checked_onsets(
         try:
             found = onsets(
                 system, found.friction_range, max_frequency_hz=found.max_frequency_hz, damped=damped, follow=wider,
-                **asdict(options),
+                numbered_at=numbered_at, **asdict(options),
             )  # fmt: skip
         except AnalysisError:
             break

@@ -7,6 +7,7 @@ import numpy as np
 from ..errors import CaseError
 from ..system import System
 from ..threads import one_thread
+from .krylov import Carried
 from .onset import Onset, Onsets
 from .options import Options
 from .source import Asked, answered
@@ -28,11 +29,14 @@ def onsets(
     solver: str | None = None,
     source: str | None = None,
     follow: float = FOLLOW,
+    numbered_at: float = 0.0,
+    carried: Carried | None = None,
 ) -> Onsets:
     """Every critical μ in ``friction_range`` with a frequency up to ``max_frequency_hz``.
 
     Those above the band are among them where the mode that begins to grow there comes into it. follow: branches are
-    followed that start up to so many times the band. friction_damping, prestress, solver and source as in
+    followed that start up to so many times the band. numbered_at: the μ from which on branches may be followed, 0 where
+    their numbers are to be those of the frictionless modes; carried: what stretches of μ hand on. friction_damping, prestress, solver and source as in
     `complex_modes`. Nothing is sought anew here: `growing.checked_onsets` does that. Raises CaseError for an empty
     range or a source that there is none of, AnalysisError where branches cannot be followed.
     """
@@ -42,5 +46,7 @@ def onsets(
     if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     options = Options(friction_damping, prestress, solver, source)
-    asked = Asked(max_frequency_hz, damped=damped, options=options, follow=follow)
+    asked = Asked(
+        max_frequency_hz, damped=damped, options=options, follow=follow, numbered_at=numbered_at, carried=carried
+    )
     return answered(system, asked, lambda source, a: source.onsets(system, (low, high), a), without_following=False)

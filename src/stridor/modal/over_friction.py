@@ -21,6 +21,7 @@ from .full import full_onsets
 from .full.basis import WHOLE
 from .growing import UNCHECKED, checked_modes, checked_onsets, growing_modes
 from .joined import TouchingChange, joined_modes, joined_onsets, rows_of
+from .krylov import Carried
 from .onsets import Onsets, onsets
 from .options import Options
 from .results import ComplexModes, Progress
@@ -170,17 +171,22 @@ def onsets_of_band(
 def _solved_onsets(
     system: System, friction_range: tuple[float, float], max_frequency_hz: float, damped: bool, options: Options
 ) -> Onsets:
-    def solved(held: System, between: tuple[float, float]) -> Onsets:
+    carried = Carried()
+
+    def solved(held: System, between: tuple[float, float], *, first: bool = True) -> Onsets:
+        # Behind a border branches have the names that they had before it.
+        numbered_at = 0.0 if first else between[0]
         try:
             found = onsets(
-                held, between, max_frequency_hz=max_frequency_hz, damped=damped, **asdict(options)
-            )
+                held, between, max_frequency_hz=max_frequency_hz, damped=damped, numbered_at=numbered_at,
+                carried=carried, **asdict(options),
+            )  # fmt: skip
         except FollowingError as error:
             if held.size > WHOLE or options.source is not None:
                 raise
             return unfollowed(held, between, str(error).partition(";")[0])
         if not found.completeness:
-            found = checked_onsets(held, found, damped=damped, options=options)
+            found = checked_onsets(held, found, damped=damped, options=options, numbered_at=numbered_at)
         if found.complete or held.size > WHOLE or options.source is not None:
             return found
         try:
@@ -204,7 +210,7 @@ def _solved_onsets(
     solid = [s for s in over if not s.reason]
     if not solid:
         raise AnalysisError(over[0].reason)
-    parts = [(s, solved(s.of(system), (s.low, s.high))) for s in solid]
+    parts = [(s, solved(s.of(system), (s.low, s.high), first=s is solid[0])) for s in solid]
 
     def border(k: int) -> TouchingChange:
         mu = parts[k + 1][0].low

@@ -22,7 +22,7 @@ from ..system.uncoupled import no_complete_basis
 from ..typing import Array
 from .full import full_modes, full_onsets
 from .full.reduced_source import reduced_modes, reduced_onsets
-from .krylov import NotPositive, krylov_modes, krylov_onsets
+from .krylov import Carried, NotPositive, krylov_modes, krylov_onsets
 from .onset import Onsets
 from .options import Options
 from .quadratic.find import WHOLE
@@ -40,7 +40,9 @@ Answer = TypeVar("Answer", ComplexModes, Onsets)
 class Asked:
     """What is asked of a source: the band (None: as many branches as ``count``), whether C is used, what is kept.
 
-    follow: branches are followed that start up to so many times the band. unfollowed: why they were not, where another
+    follow: branches are followed that start up to so many times the band. numbered_at: the μ from which on they may be
+    followed, where their names are of no matter; sources that follow from 0 whatever is asked go on doing so. carried:
+    what one stretch of μ hands on to the next. unfollowed: why they were not, where another
     source tried.
     """
 
@@ -51,6 +53,8 @@ class Asked:
     vectors: bool | Literal["right"] = False
     progress: Progress | None = None
     follow: float = 1.1
+    numbered_at: float = 0.0
+    carried: Carried | None = None
     unfollowed: str = ""
 
     @property
@@ -129,7 +133,7 @@ class Krylov:
         try:
             return krylov_onsets(
                 system, friction_range, max_frequency_hz=asked.band_hz, damped=asked.damped, options=asked.options,
-                follow=asked.follow,
+                follow=asked.follow, numbered_at=asked.numbered_at, carried=asked.carried,
             )  # fmt: skip
         except NotPositive as error:
             raise Unfit(str(error), asked.max_frequency_hz) from error

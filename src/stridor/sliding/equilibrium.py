@@ -70,7 +70,7 @@ class Equilibrium:
         # Of Newton's step: contact with a cubic term has another compliance, and meets its force from another gap.
         self.compliance, self.gap = nodes.compliance, nodes.gap
         self.condensed: BoolArray = nodes.compliance * self.scale * CONDENSED > 1.0
-        self.factorisations = 0
+        self.solved = 0
         cubic = system.cubic
         self.stretched: Array | float = 0.0 if cubic is None else cubic.stretch
         if cubic is not None and travel is not None:
@@ -152,7 +152,7 @@ class Equilibrium:
 
     def _linear(self, active: BoolArray, tangent: Sparse | None, extra: Array | None) -> tuple[Array, Array]:
         nodes, n = self.nodes, self.system.size
-        springs, rigid = np.flatnonzero(active & self.condensed), np.flatnonzero(active & ~self.condensed)
+        springs, rigid = np.flatnonzero(active & self.condensed), np.flatnonzero(~self.condensed)
         stiffness = self.system.stiffness if tangent is None else self.system.stiffness + tangent
         right = self.force if extra is None else self.force + extra
         if len(springs):
@@ -162,18 +162,19 @@ class Equilibrium:
             right = right - pushing @ self.gap[springs]
         matrix: Any = stiffness
         if len(rigid):
-            # Multipliers are scaled to the stiffness so that the bordered matrix is well balanced.
-            s = self.scale
-            softness = sp.diags_array(-self.compliance[rigid] * s * s)
+            # Multipliers are scaled to the stiffness so that the bordered matrix is well balanced. Those of open nodes
+            # are kept at zero, so that matrices of other touching nodes have the same unknowns.
+            s, touches = self.scale, active[rigid]
+            held = sp.diags_array(np.where(touches, s, 0.0))
+            softness = sp.diags_array(np.where(touches, -self.compliance[rigid] * s * s, -s))
             matrix = sp.block_array(
-                [[stiffness, -s * self.push[rigid].T], [-s * nodes.normal[rigid], softness]], format="csr"
+                [[stiffness, -(held @ self.push[rigid]).T], [-held @ nodes.normal[rigid], softness]], format="csr"
             )
-            right = np.concatenate([right, s * self.gap[rigid]])
-        self.factorisations += 1
-        with direct.factorise(
-            sp.csr_array(matrix), symmetric=self.symmetric, saddle=len(rigid) > 0, solver=self.solver
-        ) as factor:
-            answer = factor.solve(right)
+            right = np.concatenate([right, np.where(touches, s * self.gap[rigid], 0.0)])
+        self.solved += 1
+        answer = self.system.of_matrices.once("factors nearby", direct.Nearby).solve(
+            sp.csr_array(matrix), right, symmetric=self.symmetric, saddle=len(rigid) > 0, solver=self.solver
+        )
         normal = np.zeros(nodes.count)
         normal[rigid] = answer[n:] * self.scale
         if len(springs):

@@ -52,7 +52,7 @@ def follow(system: System, *, mu: float | None, solver: str | None) -> History:
             raise AnalysisError(f"static equilibrium, {where}: {error}") from error
         residual = max(residual, left)
     assert load is not None, "a system with load steps has at least one"
-    return History(state, load, slip, residual, solution.factorisations)
+    return History(state, load, slip, residual, solution.solved)
 
 
 def _loading(

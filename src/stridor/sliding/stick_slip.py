@@ -162,14 +162,14 @@ def increments_of(steps: tuple[LoadStep, ...], names: tuple[str, ...]) -> list[t
 
 
 class StickSlip:
-    """Increments of a system's contact with friction, one after the other. factorisations counts what was solved."""
+    """Increments of a system's contact with friction, one after the other. solved counts equilibria."""
 
     def __init__(self, system: System, *, solver: str | None) -> None:
         self.system, self.solver = system, solver
         self.nodes = nodes = system.contact_nodes()
         self.sticks = StickRows(nodes)
         self.movable: BoolArray = np.diff(nodes.normal.indptr) > 0
-        self.factorisations = 0
+        self.solved = 0
 
     def start(self) -> Frictional:
         """Before the first increment: no force anywhere; what can touch does."""
@@ -272,7 +272,7 @@ class StickSlip:
             travel=load.travel,
         )
         state = equilibrium.solve(np.concatenate([status != OPEN, np.ones(q, dtype=bool)]), before.displacement)
-        self.factorisations += equilibrium.factorisations
+        self.solved += equilibrium.solved
         return self._found(load, status, direction, state, node, along), equilibrium.residual(state)
 
     def _found(

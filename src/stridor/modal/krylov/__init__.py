@@ -31,6 +31,7 @@ frictionless modes is checked by Sylvester's law of inertia.
 """
 
 from ..options import Options
+from .carried import Carried
 from .critical import krylov_onsets
 from .direct_modes import DirectModes, direct_modes
 from .energy import FrictionEnergy, friction_energy
@@ -38,6 +39,7 @@ from .modes import krylov_modes
 from .shifted import NotPositive
 
 __all__ = [
+    "Carried",
     "DirectModes",
     "FrictionEnergy",
     "NotPositive",

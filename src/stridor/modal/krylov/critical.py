@@ -28,17 +28,19 @@ from ..options import Options
 from ..quadratic.reach import searched
 from ..results import grows
 from ..tolerances import BELIEVED, UNSTABLE_RELATIVE
+from .carried import Carried
 from .follow import Follower, State, halves
 from .modes import samples
 from .passages import Passage, crossings, meetings
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import Band, converge_at, projected
+from .refine import GUARD, Band, converge_at, projected
 from .shifted import real_columns
 
 FOLLOW = 1.1  # times the band: from where branches are followed
 MOST_ABOVE = 1.25  # times that: onsets above the band are solved for up to there
-SAMPLES = 9
+SAMPLES = 9  # from no friction on
+FEWEST = 3
 ROUNDS = 6
 ONSET_TOLERANCE = 1e-12  # backward error at which an onset counts as found
 CLEARLY_ABOVE = 1.02
@@ -56,10 +58,13 @@ def krylov_onsets(
     damped: bool = True,
     options: Options | None = None,
     follow: float = FOLLOW,
+    numbered_at: float = 0.0,
+    carried: Carried | None = None,
 ) -> Onsets:
     """Every critical μ in ``friction_range`` with a frequency up to ``max_frequency_hz``, as `onsets` gives them.
 
-    Raises CaseError for an empty range or no frequency, AnalysisError where the modes do not settle.
+    numbered_at: the μ at which branches get their numbers, and from which they are followed. carried: what the basis of
+    the stretch of μ before hands on, and this one to the next. Raises CaseError for an empty range or no frequency, AnalysisError where the modes do not settle.
     """
     low, high = (float(v) for v in friction_range)
     if not (0 <= low < high and np.isfinite(high)):
@@ -73,9 +78,11 @@ def krylov_onsets(
         return Onsets((), (low, high), max_frequency_hz, problem.damped, problem.open_contacts)
     top = searched(problem.pencil(high).condensed(), 2 * np.pi * max_frequency_hz)
     # Modes that start above the band may meet inside it.
-    reduced = projected(problem, Band(1, top * follow), high)
-    converge_at(reduced, samples(high, SAMPLES))
-    way = _way(reduced, (low, high), top)
+    reduced = projected(problem, Band(1, top * follow), high, carried)
+    converge_at(reduced, numbered_at + samples(high - numbered_at, _count_of_samples(numbered_at, high)))
+    if carried is not None:
+        carried.take(reduced, GUARD)
+    way = _way(reduced, (low, high), top, numbered_at)
     changes: list[StabilityChange] = []
     for passage in way.passages:
         stage(f"onset {len(changes) + 1}, solved in the full problem")
@@ -101,6 +108,11 @@ def krylov_onsets(
     )
 
 
+def _count_of_samples(low: float, high: float) -> int:
+    """Friction coefficients at which modes are made exact: in a small part of what friction may be fewer do."""
+    return max(FEWEST, round(SAMPLES * (1.0 - low / high)))
+
+
 def _numbered(state: State) -> tuple[IntArray, ComplexArray]:
     """Numbers and eigenvalues (b,) of the branches at one μ."""
     return np.arange(1, len(state.index) + 1), state.values
@@ -123,8 +135,8 @@ class _Way:
     from_start: list[int]
 
 
-def _way(reduced: Reduced, between: tuple[float, float], top: float) -> _Way:
-    """What following sees in the range; from μ = 0 up to it branches are only brought their names."""
+def _way(reduced: Reduced, between: tuple[float, float], top: float, numbered_at: float) -> _Way:
+    """What following sees in the range; from where they are numbered up to it branches are only brought their names."""
     passages: list[Passage] = []
     entries = Entries(top)
 
@@ -132,7 +144,7 @@ def _way(reduced: Reduced, between: tuple[float, float], top: float) -> _Way:
         passages.extend(crossings(old, new) if reduced.damped else meetings(reduced, old, new))
         entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.index)))
 
-    follower = Follower(reduced, longest=max(between[0] / 4, between[1] / 30))
+    follower = Follower(reduced, start=numbered_at, longest=max(between[0] / 4, between[1] / 30))
     start = follower.advance(between[0])
     first = np.flatnonzero(grows(start.values, top)).tolist()
     follower.longest, follower.watch = between[1] / 30, watch

@@ -58,7 +58,7 @@ class State:
 
 
 class Follower:
-    """Follows branches, numbered by frequency at μ = 0, towards larger μ in steps up to ``longest``.
+    """Follows branches, numbered by frequency at μ = ``start``, towards larger μ in steps up to ``longest``.
 
     watch, where given, is called with each accepted pair of neighbouring states. Only the first ``named`` branches (all
     by default) must be beyond doubt at every step.
@@ -68,13 +68,14 @@ class Follower:
         self,
         source: OverNumber,
         *,
+        start: float = 0.0,
         longest: float = 0.05,
         named: int | None = None,
         watch: Callable[[State, State], None] | None = None,
     ) -> None:
         self.source = source
         self.longest, self.watch = longest, watch
-        found = source.eigenpairs(0.0)
+        found = source.eigenpairs(start)
         followed = np.flatnonzero(np.abs(found.values) <= FOLLOWED * source.frequency)
         order = np.lexsort((np.abs(found.values[followed]), np.abs(found.values[followed].imag)))
         self.state = State(found, followed[order])

@@ -122,6 +122,17 @@ class Reduced(DenseProblem):
         shapes = np.hstack([_padded(u, own) for u, _ in self._kept])
         return shapes, np.hstack([_padded(p, self.forces.shape[1]) for _, p in self._kept])
 
+    @property
+    def exact(self) -> Array:
+        """Orthonormal columns (k, l) on the pairs that span the shapes of all vectors kept."""
+        return _span(self._all_kept()[0])
+
+    @property
+    def stiffness(self) -> Array:
+        """UᵀKU + PᵀcP (k, k) of the pairs, whose mass is one: what they are without friction."""
+        own = self.pairs.count
+        return self._matrices[2][:own, :own]
+
     def compress(self) -> None:
         """Reduce the basis to the frictionless modes and the span of the vectors kept, which stay exact."""
         own, first = self.pairs.count, self._modes

@@ -17,6 +17,7 @@ from ..dense_problem import Eigenpairs
 from ..pencil import tiny
 from ..quadratic.problem import times
 from ..tolerances import BELIEVED
+from .carried import Carried
 from .problem import ContactProblem
 from .reduced import Reduced
 from .shifted import Shifted, frictionless_modes, modes_below, real_columns, shift_for
@@ -55,10 +56,18 @@ class Band:
         return float(np.sqrt(max(highest, 1e-12 * float(squares[-1])))) or 1.0
 
 
-def projected(problem: ContactProblem, band: Band, highest: float) -> Reduced:
+def projected(
+    problem: ContactProblem, band: Band, highest: float, carried: Carried | None = None
+) -> Reduced:
     """The problem on its frictionless modes up to beyond the band, and on what their friction forces do to it, for μ
-    up to ``highest``."""
+    up to ``highest``; on what was carried from a neighbouring problem where that holds all of its modes."""
     shifted = Shifted(problem, shift_for(problem, band.frequency))
+    if carried is not None and band.frequency is not None and carried.fit(problem, band.frequency):
+        reduced, squares = carried.basis(problem, shifted, band.frequency, highest)
+        # Far above the band the values of this basis are nobody's.
+        counted = _counted(problem, squares[squares <= (GUARD * band.frequency) ** 2], band.frequency)
+        if counted is not None and counted.number == counted.found:
+            return reduced
     squares, modes = frictionless_modes(shifted, band.enough)
     top = band.top(squares)
     if problem.size <= COUNTED:
@@ -72,18 +81,33 @@ def projected(problem: ContactProblem, band: Band, highest: float) -> Reduced:
 
 
 def _require_all(problem: ContactProblem, squares: Array, top: float) -> None:
-    """Raise AnalysisError where block Lanczos has missed a mode: their number is known without finding them."""
+    """Raise AnalysisError where block Lanczos has missed a mode."""
+    told = _counted(problem, squares, top)
+    if told is not None and told.number != told.found:
+        raise AnalysisError(
+            f"{told.number} frictionless modes lie below {told.below_hz:.6g} Hz but {told.found} were found; change "
+            "max_frequency_hz or the number of modes slightly"
+        )
+
+
+@dataclass(frozen=True)
+class _Counted:
+    """How many frictionless modes there are below a frequency a little above the band, and how many were found."""
+
+    number: int
+    found: int
+    below_hz: float
+
+
+def _counted(problem: ContactProblem, squares: Array, top: float) -> _Counted | None:
+    """The number of frictionless modes, known without finding them, beside ω² (k,) found; None where it is not told."""
     above = np.flatnonzero(squares > top**2)
     if len(above) < 2:
-        return
+        return None
     # Between the two modes that are furthest apart, so that rounding does not decide which side they are on.
     k = int(above[np.argmax(np.diff(squares[above]))])
     number = modes_below(problem, float(squares[k] + squares[k + 1]) / 2)
-    if number is not None and number != k + 1:
-        raise AnalysisError(
-            f"{number} frictionless modes lie below {np.sqrt(squares[k]) / (2 * np.pi):.6g} Hz but {k + 1} were found; "
-            "change max_frequency_hz or the number of modes slightly"
-        )
+    return None if number is None else _Counted(number, k + 1, float(np.sqrt(squares[k])) / (2 * np.pi))
 
 
 def wanted(reduced: Reduced, found: Eigenpairs) -> IntArray:

@@ -14,10 +14,10 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from ...direct import Factor, factorise
+from ...direct import factorise, negative_eigenvalues
 from ...errors import AnalysisError
 from ...stages import passing, stage
-from ...typing import Array
+from ...typing import Array, Sparse
 from .problem import ContactProblem
 
 BLOCK = 24  # right sides solved for at once while modes are sought
@@ -72,7 +72,8 @@ class Shifted:
     def __init__(self, problem: ContactProblem, shift: float) -> None:
         self.problem = problem
         self.shift = shift
-        self._factor, self._scale = _factorised(problem, shift)
+        matrix, self._scale = _matrix(problem, shift)
+        self._factor = factorise(matrix, symmetric=True, saddle=problem.nodes > 0, solver=problem.solver)
 
     def solve(self, force: Any, opening: Any = None) -> tuple[Any, Any]:
         """u (n, k), p (m, k) with (K + sM) u − Nᵀp = force (n, k) and N u + c p = opening (m, k), zero by default."""
@@ -85,15 +86,16 @@ class Shifted:
         return answer[:n], self._scale * answer[n:]
 
 
-def _factorised(problem: ContactProblem, shift: float) -> tuple[Factor, float]:
-    """Factors of A₀, and the scale of its multipliers."""
+def _matrix(problem: ContactProblem, shift: float) -> tuple[Sparse, float]:
+    """A₀, and the scale of its multipliers."""
     matrix = sp.csr_array(problem.stiffness + shift * problem.mass)
     scale = float(np.abs(matrix.diagonal()).mean()) or 1.0
     if problem.nodes:
         normal = sp.csr_array(-scale * problem.normal)
         corner = sp.diags_array(-(scale**2) * problem.compliance, format="csr")
         matrix = sp.block_array([[matrix, normal.T], [normal, corner]], format="csr")
-    return factorise(matrix, symmetric=True, saddle=problem.nodes > 0, solver=problem.solver), scale
+    return matrix, scale
+
 
 # Squared length, of one, that a shape must have apart from the others.
 APART = 1e-8
@@ -104,8 +106,9 @@ def modes_below(problem: ContactProblem, square: float) -> int | None:
 
     None where the solver does not tell them.
     """
-    with _factorised(problem, -square)[0] as factor:
-        return None if factor.inertia is None else factor.inertia - problem.nodes
+    matrix, _ = _matrix(problem, -square)
+    told = negative_eigenvalues(matrix, saddle=problem.nodes > 0, solver=problem.solver)
+    return None if told is None else told - problem.nodes
 
 
 def shift_for(problem: ContactProblem, frequency: float | None) -> float:

@@ -7,8 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.linalg as sl
 
+from ...direct import negative_eigenvalues
+from ...errors import AnalysisError
 from ...typing import Array
 from .find import DENSE, RegionModes, find_modes
 from .polish import pairs
@@ -32,7 +33,7 @@ def band_modes(
     """
     found = find_modes(problem, Region.band(0.0, max_hz, above=above), left=left, solver=solver)
     top = 2 * np.pi * max_hz
-    if problem.size <= DENSE or is_stiff(still, QUIET * top):
+    if problem.size <= DENSE or is_stiff(still, QUIET * top, solver):
         return found
     cut = f" Growth rates above {found.completeness.searched.re_max:.6g} 1/s were not searched."
     for low, high in pairwise(FASTER):
@@ -43,22 +44,16 @@ def band_modes(
     return replace(found, completeness=replace(told, sentence=told.sentence.replace(cut, last)))
 
 
-def is_stiff(problem: Quadratic, rate: float) -> bool:
+def is_stiff(problem: Quadratic, rate: float, solver: str | None = None) -> bool:
     """Whether xᵀ(σ²M + K)x > 0 of every real x at σ = ``rate`` [1/s], so that nothing diverges faster unless friction
     or damping drives it. Rows without mass (multipliers of rigid contacts, which only hold) are left out."""
     moving = np.flatnonzero(problem.mass.diagonal() > 0.0)
     whole = rate**2 * problem.mass + problem.stiffness
     part = sp.csr_array(whole)[moving][:, moving]
     try:
-        # Pivots from the diagonal alone have the signs of the eigenvalues (Sylvester).
-        factors = sl.splu(
-            sp.csc_array(0.5 * (part + part.T)), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )  # fmt: skip
-    except RuntimeError:
+        return negative_eigenvalues(sp.csr_array(0.5 * (part + part.T)), solver=solver) == 0
+    except AnalysisError:
         return False
-    straight = np.array_equal(factors.perm_r, factors.perm_c)
-    return straight and bool(np.all(factors.U.diagonal() > 0.0))
 
 
 def _joined(slow: RegionModes, fast: RegionModes, near: float) -> RegionModes:

@@ -40,16 +40,18 @@ class Quadratic:
     def _aligned(self) -> tuple[list[Any], IntArray, IntArray]:
         """Entries of M, D and K on the places of all three, and these places as a csr matrix has them: sums of sparse
         matrices look for them each time."""
-        n, parts = self.size, [sp.coo_array(m) for m in self.matrices()]
-        keys = [part.row.astype(np.int64) * n + part.col for part in parts]
-        pattern = np.unique(np.concatenate(keys))
-        index = np.int32 if len(pattern) < np.iinfo(np.int32).max else np.int64
+        n, parts = self.size, [sp.csr_array(m) for m in self.matrices()]
+        # The sum of the patterns has them all, in order; the entries of each are found in it by row and column.
+        ones = [sp.csr_array((np.ones(part.nnz), part.indices, part.indptr), shape=part.shape) for part in parts]
+        whole = sp.csr_array(ones[0] + ones[1] + ones[2])
+        whole.sum_duplicates()
+        places = _places(whole, n)
         entries: list[Any] = []
-        for key, part in zip(keys, parts, strict=True):
-            entries.append(np.zeros(len(pattern), dtype=np.result_type(part.data, float)))
-            np.add.at(entries[-1], np.searchsorted(pattern, key), part.data)
-        rows = np.searchsorted(pattern, n * np.arange(n + 1, dtype=np.int64))
-        return entries, (pattern % max(n, 1)).astype(index), rows.astype(index)
+        for part in parts:
+            part.sum_duplicates()
+            entries.append(np.zeros(whole.nnz, dtype=np.result_type(part.data, float)))
+            entries[-1][np.searchsorted(places, _places(part, n))] = part.data
+        return entries, whole.indices, whole.indptr
 
     @cached_property
     def _sizes(self) -> tuple[Sparse, Sparse, Sparse]:
@@ -85,6 +87,12 @@ class Quadratic:
             rest = np.abs(self.residual(lam[part], x[:, part])).max(axis=0)
             result[part] = rest / np.maximum(scale.max(axis=0), 1e-300)
         return result
+
+
+def _places(matrix: Sparse, n: int) -> IntArray:
+    """Numbers (nnz,) of the entries of a csr matrix (n, n), row by row."""
+    rows = np.repeat(np.arange(n, dtype=np.int64), np.diff(matrix.indptr))
+    return rows * n + matrix.indices
 
 
 def times(matrix: Sparse, block: Any) -> Any:
