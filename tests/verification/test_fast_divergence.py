@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 import scipy.linalg as sl
@@ -10,8 +12,7 @@ import scipy.sparse as sp
 
 import stridor as st
 from stridor.case import template_text
-from stridor.modal.quadratic import Quadratic, band_modes
-from stridor.modal.quadratic.band import is_stiff
+from stridor.modal.quadratic import Quadratic, band_modes, is_stiff
 
 pytestmark = pytest.mark.verification
 
@@ -89,7 +90,7 @@ def test_the_band_holds_what_diverges_at_any_rate(drive: float):
     hz = 1.3 / (2 * np.pi)
     dense = np.linalg.eigvalsh(problem.stiffness.toarray())
     exact = np.sqrt(-dense[dense < 0])
-    found = band_modes(problem, hz, above=-0.1, still=problem)
+    found = band_modes(problem, hz, above=-0.1, stands=partial(is_stiff, problem))
     growing = found.values[(found.values.imag == 0) & (found.values.real > 1e-6)].real
     assert growing == pytest.approx(np.sort(exact), rel=1e-8)
     assert len(found.values) == np.count_nonzero((dense > 0) & (dense < 1.3**2)) + len(exact)

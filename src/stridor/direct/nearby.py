@@ -8,6 +8,8 @@ factorisation. The answer is as good as a factorisation's, or it is not taken.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Hashable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -37,21 +39,36 @@ class Nearby:
         self._asked: tuple[int, str | None] = (0, None)
         self._length = 0.0
         self._answers: deque[Array] = deque(maxlen=REMEMBERED)
+        self._regular: set[Hashable] = set()
 
     def solve(
-        self, matrix: Sparse, right: Array, *, symmetric: bool = False, saddle: bool = False, solver: str | None = None
+        self,
+        matrix: Sparse,
+        right: Array,
+        *,
+        kind: Hashable = None,
+        symmetric: bool = False,
+        saddle: bool = False,
+        solver: str | None = None,
     ) -> Array:
         """A⁻¹ b (n,), to the backward error of `Factor.solve`. symmetric, saddle and solver are those of `factorise`.
 
-        Raises SingularMatrix where it has no inverse.
+        kind: what matrices that are regular or singular together have in common; the first of a kind is tried with
+        another right side as well, which a singular one cannot answer. Raises SingularMatrix where A has no inverse.
         """
         asked = len(right), solver
-        found = self._by_earlier(matrix, right) if self._factor is not None and asked == self._asked else None
-        if found is not None:
-            self._answers.append(found)
-            return found
         if asked != self._asked:
             self._answers.clear()
+            self._regular.clear()
+            self.free()
+        found = self._by_earlier(matrix, right, self._answers) if self._factor is not None else None
+        if found is not None and kind not in self._regular:
+            probe = float(np.linalg.norm(right)) * _start(len(right))
+            found = None if self._by_earlier(matrix, probe, ()) is None else found
+        if found is not None:
+            self._answers.append(found)
+            self._regular.add(kind)
+            return found
         self.free()
         self.factorisations += 1
         factor = factorise(matrix, symmetric=symmetric, saddle=saddle, solver=solver)
@@ -61,6 +78,7 @@ class Nearby:
         else:
             self._factor, self._asked, self._length = factor, asked, float(np.linalg.norm(found))
             self._answers.append(found)
+            self._regular.add(kind)
         return found
 
     def free(self) -> None:
@@ -69,13 +87,14 @@ class Nearby:
             self._factor.free()
             self._factor = None
 
-    def _by_earlier(self, matrix: Sparse, right: Array) -> Array | None:
-        """The answer by the factors at hand; None where they do not lead to it."""
+    def _by_earlier(self, matrix: Sparse, right: Array, known: Sequence[Array]) -> Array | None:
+        """The answer by the factors at hand, from known ones (n,) on; None where they do not lead to it."""
         factor, n = self._factor, len(right)
         assert factor is not None, "asked for where there is one"
-        before: Any = sla.LinearOperator((n, n), matvec=lambda v: factor.solve(v, refine=False), dtype=float)  # pyright: ignore[reportCallIssue]
+        before: Any = sla.LinearOperator((n, n), matvec=partial(factor.solve, refine=False), dtype=float)  # type: ignore[call-arg]
         sizes = Sizes.of(matrix)
-        answer = self._nearest(matrix, right)
+        longest = GROWN * max(self._length, float(np.linalg.norm(before @ right)))
+        answer = _nearest(matrix, right, known)
         for _ in range(ROUNDS):
             rest, error = sizes.residual(matrix, right[:, None], answer[:, None])
             if error <= BACKWARD_ERROR:
@@ -84,13 +103,22 @@ class Nearby:
             enough = min(max(ENOUGH * float(np.linalg.norm(right)) / left, 1e-13), 1e-3)
             step: Any = sla.gmres(matrix, rest[:, 0], M=before, rtol=enough, atol=0.0, restart=STEPS, maxiter=1)[0]
             answer = answer + step
-            if not float(np.linalg.norm(answer)) <= GROWN * self._length:
+            if not float(np.linalg.norm(answer)) <= longest:
                 return None
         error = sizes.residual(matrix, right[:, None], answer[:, None])[1]
         return answer if error <= BACKWARD_ERROR else None
 
-    def _nearest(self, matrix: Sparse, right: Array) -> Array:
-        """The combination (n,) of the last answers that leaves least of the right side."""
-        known = np.stack(self._answers, axis=1)
-        weights: Any = np.linalg.lstsq(matrix @ known, right, rcond=1e-14)[0]
-        return known @ weights
+
+def _nearest(matrix: Sparse, right: Array, known: Sequence[Array]) -> Array:
+    """The combination (n,) of known answers that leaves least of the right side."""
+    if not known:
+        return np.zeros(len(right))
+    answers = np.stack(known, axis=1)
+    weights: Any = np.linalg.lstsq(matrix @ answers, right, rcond=1e-14)[0]
+    return answers @ weights
+
+
+def _start(n: int) -> Array:
+    """An arbitrary right side (n,) of unit length."""
+    block = np.random.default_rng(5).standard_normal(n)
+    return block / float(np.linalg.norm(block))

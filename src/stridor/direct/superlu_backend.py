@@ -14,9 +14,9 @@ from .ordering import nested_dissection
 
 
 class SuperluFactor:
-    """LU factors of the equilibrated matrix. inertia is the count of negative pivots where the matrix is real and symmetric
-    and all of them were taken from the diagonal; to look costs a copy of the factors. pivots: how small one may be beside
-    its column before another is taken."""
+    """LU factors of the equilibrated matrix. inertia is the count of negative pivots where the matrix is real and
+    symmetric and all of them were taken from the diagonal; to look costs a copy of the factors. pivots: how small one
+    may be beside its column before another is taken."""
 
     def __init__(self, matrix: Sparse, symmetric: bool, saddle: bool, *, pivots: float | None = None) -> None:
         self._symmetric = symmetric and matrix.dtype.kind == "f"

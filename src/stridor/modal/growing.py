@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -23,11 +24,13 @@ from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .complex_modes import complex_modes
 from .full.growth import growing_roots
 from .inverse_iteration import solved_beside
+from .joined import matched
+from .krylov import Carried
 from .krylov.problem import problem_of
 from .onset import refuted
 from .onsets import Onsets, onsets
 from .options import Options
-from .quadratic import Quadratic, band_modes
+from .quadratic import Quadratic, band_modes, is_stiff
 from .quadratic.polish import pairs
 from .quadratic.problem import times
 from .quadratic.reach import searched
@@ -39,7 +42,7 @@ ROWS = 5  # friction coefficients up to which every one is checked, of more the 
 BESIDE = 1e-3  # of the band: how much faster than that modes may decay that are looked at
 NEAR = 1e-3  # of the band: eigenvalues further apart are not the same mode
 SAME = 1e-6  # of |λ|: what two ways of solving leave of one eigenvalue
-UNCHECKED = "Not checked"
+CHECKED, UNCHECKED = "Checked at", "Not checked"
 SURE = 3.0  # times a correction: growth that is more than what is left to correct
 WIDER = (1.4, 2.0)  # times the band: from where branches are followed that are missing in it
 
@@ -50,6 +53,7 @@ class Growing:
 
     beside (l,): eigenvalues within rounding and a little below of the axis. complete: whether the search vouches for
     there being no other; sentence: what speaks for that. top [1/s]: how far the band had to be searched.
+    sought: whether it was; else these are branches, which agree with what was found beside them.
     """
 
     mu: float
@@ -60,6 +64,7 @@ class Growing:
     complete: bool
     sentence: str
     top: float
+    sought: bool = True
 
     @property
     def words(self) -> str:
@@ -95,10 +100,12 @@ def _searched_for(
     problem = problem_of(system if damped else system.undamped(), touching_at, options)
     whole = problem.pencil(mu).condensed()
     top = searched(whole, 2 * np.pi * max_frequency_hz)
-    found = band_modes(
-        whole, top / (2 * np.pi), above=-BESIDE * top, still=problem.pencil(0.0).condensed(),
-        solver=options.solver,
-    )  # fmt: skip
+
+    def stands(rate: float) -> bool:
+        asked = ("stands", rate, touching_at, damped, options)
+        return system.once(asked, lambda: is_stiff(problem.pencil(0.0).condensed(), rate, options.solver))
+
+    found = band_modes(whole, top / (2 * np.pi), above=-BESIDE * top, stands=stands, solver=options.solver)
     size = np.abs(found.values)
     rounding = UNSTABLE_RELATIVE if problem.damped else SPLIT_RELATIVE
     grows = (found.values.real > rounding * size) & (size > AT_REST * top)
@@ -216,36 +223,62 @@ def checked_onsets(
     options: Options | None = None,
     follow: Sequence[float] = WIDER,
     numbered_at: float = 0.0,
+    carried: Carried | None = None,
+    before: Sequence[complex] | None = None,
 ) -> Onsets:
     """The onsets with what grows at both ends of the range sought anew in the full problem.
 
     found: as `onsets` gives them; where a mode grows in the band at the high end that branches do not lead to, they are
-    solved again with branches from further above, from ``numbered_at`` on as in `onsets`. ``completeness`` says what came of it, ``at_start`` and ``at_end``
+    solved again with branches from further above, from ``numbered_at`` on and with ``carried`` as in `onsets`. before:
+    what the full problem has at the low end with the nodes that touch below it; where the branches say the same of this
+    side, nothing is sought there again. ``completeness`` says what came of it, ``at_start`` and ``at_end``
     are what the full problem has.
     """
     options = options or Options()
     if not affordable(system):
         return replace(found, completeness=f"{UNCHECKED}: {_too_large(system)}.")
     try:
-        ends = [
-            growing_modes(system, mu, found.max_frequency_hz, touching_at=None, damped=damped, options=options)
+        low, high = (
+            partial(growing_modes, system, mu, found.max_frequency_hz, touching_at=None, damped=damped, options=options)
             for mu in found.friction_range
-        ]
+        )
+        end = high()
+        start = _as_before(found, before, end.top) or low()
     except AnalysisError as error:
         return replace(found, completeness=f"{UNCHECKED}: {error}.")
     for wider in follow:
-        if not len(_unled(found, *ends)[1]) and not found.unexplained:
+        if not len(_unled(found, start, end)[1]) and not found.unexplained:
             break
         try:
             found = onsets(
                 system, found.friction_range, max_frequency_hz=found.max_frequency_hz, damped=damped, follow=wider,
-                numbered_at=numbered_at, **asdict(options),
+                numbered_at=numbered_at,
+                carried=carried, **asdict(options),
             )  # fmt: skip
         except AnalysisError:
             break
-    said = _ends_sentence(found, ends[0], ends[1])
-    start, end = (tuple(complex(v) for v in e.values) for e in ends)
-    return replace(found, at_start=start, at_end=end, completeness=said)
+    values = (tuple(complex(v) for v in e.values) for e in (start, end))
+    return replace(found, at_start=next(values), at_end=next(values), completeness=_ends_sentence(found, start, end))
+
+
+def _as_before(found: Onsets, before: Sequence[complex] | None, top: float) -> Growing | None:
+    """What the branches say of the low end, where it is what grows in the full problem with the nodes that touch below
+    it; None where they differ, or where that is not known."""
+    values = np.array(found.at_start, dtype=complex)
+    known = np.array(before or (), dtype=complex)
+    if before is None or len(known) != len(values) or len(matched(known, values)) < len(values):
+        return None
+    nothing = np.zeros((0, len(values)), dtype=complex)
+    low = found.friction_range[0]
+    return Growing(low, values, nothing, np.zeros(len(values)), values[:0], True, "", top, sought=False)
+
+
+def sought_at_end(found: Onsets | None, mu: float) -> tuple[complex, ...] | None:
+    """What was found to grow in the full problem where a range with all its onsets ends; None where it does not end at
+    ``mu`` or was not checked."""
+    if found is None or found.friction_range[1] != mu or not found.completeness.startswith(CHECKED):
+        return None
+    return found.at_end
 
 
 def _too_large(system: System) -> str:
@@ -277,6 +310,11 @@ def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
     """What the full problem says of both ends, beside the onsets."""
     low, high = found.friction_range
     numbers = f"{start.words} at μ = {low:g} and {end.words} at μ = {high:g}, sought anew in the full problem"
+    if not start.sought:
+        numbers = (
+            f"{end.words} at μ = {high:g}, sought anew in the full problem, and {start.words} at μ = {low:g}, as "
+            "below it"
+        )
     wrong: list[str] = []
     sides = zip((start, end), (found.at_start, found.at_end), (low, high), _unled(found, start, end), strict=True)
     for growing, known, mu, lacking in sides:
@@ -296,7 +334,8 @@ def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
         sentence = start.sentence if not start.complete else end.sentence
         return f"NOT COMPLETE: {numbers}, as the onsets say, but {sentence}"
     return (
-        f"Checked at both ends: {numbers}, and each of them goes back to an onset listed or grew from the start. "
+        f"{CHECKED} {'both ends' if start.sought else 'the high end'}: {numbers}, and each of them goes back to an "
+        f"onset listed or grew from the start. "
         f"{end.sentence} What grows and ends again between them rests on the branches followed."
     )
 

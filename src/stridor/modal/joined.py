@@ -6,6 +6,7 @@ near each other there are the same branch; a mode that grows on one side of it o
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -205,6 +206,19 @@ def _told(parts: Sequence[tuple[Stretch, Onsets]]) -> str:
     """What was checked in each stretch; nothing where nothing was in any."""
     if not any(found.completeness for _, found in parts):
         return ""
-    said = [f"({s.low:.6g} to {s.high:.6g}) {found.completeness or 'Not checked.'}" for s, found in parts]
     held = "with the nodes of its middle" if any(s.others for s, _ in parts) else "with the nodes that touch there"
-    return f"{len(parts)} stretches of μ, each {held}. {' '.join(said)}"
+    return f"{len(parts)} stretches of μ, each {held}. {' '.join(_by_stretch(parts))}"
+
+
+def _by_stretch(parts: Sequence[tuple[Stretch, Onsets]]) -> list[str]:
+    """What was checked by stretch; sentences that all of them share once, behind the others."""
+    said = [_sentences(found.completeness or "Not checked.") for _, found in parts]
+    shared = [s for s in said[-1] if all(s in other for other in said)]
+    own = [" ".join(s for s in other if s not in shared) for other in said]
+    told = [f"({s.low:.6g} to {s.high:.6g}) {words}" for (s, _), words in zip(parts, own, strict=True) if words]
+    lead = "In each of them: " if told and shared else ""
+    return told + ([lead + " ".join(shared)] if shared else [])
+
+
+def _sentences(text: str) -> list[str]:
+    return re.split(r"(?<=\.) (?=[A-Z])", text)

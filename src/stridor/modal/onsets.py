@@ -35,10 +35,11 @@ def onsets(
     """Every critical μ in ``friction_range`` with a frequency up to ``max_frequency_hz``.
 
     Those above the band are among them where the mode that begins to grow there comes into it. follow: branches are
-    followed that start up to so many times the band. numbered_at: the μ from which on branches may be followed, 0 where
-    their numbers are to be those of the frictionless modes; carried: what stretches of μ hand on. friction_damping, prestress, solver and source as in
-    `complex_modes`. Nothing is sought anew here: `growing.checked_onsets` does that. Raises CaseError for an empty
-    range or a source that there is none of, AnalysisError where branches cannot be followed.
+    followed that start up to so many times the band. numbered_at: the μ from which on branches may be followed, 0
+    where their numbers are to be those of the frictionless modes; carried: what stretches of μ hand on.
+    friction_damping, prestress, solver and source as in `complex_modes`. Nothing is sought anew here:
+    `growing.checked_onsets` does that. Raises CaseError for an empty range or a source that there is none of,
+    AnalysisError where branches cannot be followed.
     """
     low, high = (float(v) for v in friction_range)
     if not (0 <= low < high and np.isfinite(high)):

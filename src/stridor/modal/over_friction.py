@@ -19,7 +19,7 @@ from ..typing import Array, ComplexArray, IntArray
 from .complex_modes import complex_modes
 from .full import full_onsets
 from .full.basis import WHOLE
-from .growing import UNCHECKED, checked_modes, checked_onsets, growing_modes
+from .growing import UNCHECKED, checked_modes, checked_onsets, growing_modes, sought_at_end
 from .joined import TouchingChange, joined_modes, joined_onsets, rows_of
 from .krylov import Carried
 from .onsets import Onsets, onsets
@@ -173,9 +173,9 @@ def _solved_onsets(
 ) -> Onsets:
     carried = Carried()
 
-    def solved(held: System, between: tuple[float, float], *, first: bool = True) -> Onsets:
+    def solved(held: System, between: tuple[float, float], before: Onsets | None = None) -> Onsets:
         # Behind a border branches have the names that they had before it.
-        numbered_at = 0.0 if first else between[0]
+        numbered_at = 0.0 if before is None else between[0]
         try:
             found = onsets(
                 held, between, max_frequency_hz=max_frequency_hz, damped=damped, numbered_at=numbered_at,
@@ -186,7 +186,10 @@ def _solved_onsets(
                 raise
             return unfollowed(held, between, str(error).partition(";")[0])
         if not found.completeness:
-            found = checked_onsets(held, found, damped=damped, options=options, numbered_at=numbered_at)
+            found = checked_onsets(
+                held, found, damped=damped, options=options, numbered_at=numbered_at, carried=carried,
+                before=sought_at_end(before, between[0]),
+            )  # fmt: skip
         if found.complete or held.size > WHOLE or options.source is not None:
             return found
         try:
@@ -210,7 +213,9 @@ def _solved_onsets(
     solid = [s for s in over if not s.reason]
     if not solid:
         raise AnalysisError(over[0].reason)
-    parts = [(s, solved(s.of(system), (s.low, s.high), first=s is solid[0])) for s in solid]
+    parts: list[tuple[Stretch, Onsets]] = []
+    for s in solid:
+        parts.append((s, solved(s.of(system), (s.low, s.high), parts[-1][1] if parts else None)))
 
     def border(k: int) -> TouchingChange:
         mu = parts[k + 1][0].low

@@ -173,8 +173,9 @@ class Equilibrium:
             right = np.concatenate([right, np.where(touches, s * self.gap[rigid], 0.0)])
         self.solved += 1
         answer = self.system.of_matrices.once("factors nearby", direct.Nearby).solve(
-            sp.csr_array(matrix), right, symmetric=self.symmetric, saddle=len(rigid) > 0, solver=self.solver
-        )
+            sp.csr_array(matrix), right, kind=active.tobytes(), symmetric=self.symmetric, saddle=len(rigid) > 0,
+            solver=self.solver,
+        )  # fmt: skip
         normal = np.zeros(nodes.count)
         normal[rigid] = answer[n:] * self.scale
         if len(springs):

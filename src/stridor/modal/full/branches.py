@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from ..krylov.follow import State
 from ..krylov.passages import Passage
 from ..newton import FLAT, Root
 from ..onset import Onset
-from ..quadratic import Region, RegionModes, band_modes
+from ..quadratic import Region, RegionModes, band_modes, is_stiff
 from ..quadratic.find import Completeness
 from ..quadratic.polish import groups, pairs
 from ..tolerances import AT_REST, SPLIT_RELATIVE
@@ -45,9 +46,10 @@ class BranchOnset:
 def ends_of(family: Family, low: float, high: float, top: float) -> tuple[RegionModes, RegionModes]:
     """All modes of the band at both ends, in the full problem."""
     band, least, solver, still = top / (2 * np.pi), -DECAY * top, family.options.solver, family.built(low)
+    stands = partial(is_stiff, still, solver=solver)
     return (
-        band_modes(still, band, above=least, still=still, left=True, solver=solver),
-        band_modes(family.built(high), band, above=least, still=still, left=False, solver=solver),
+        band_modes(still, band, above=least, stands=stands, left=True, solver=solver),
+        band_modes(family.built(high), band, above=least, stands=stands, left=False, solver=solver),
     )
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -21,7 +22,7 @@ from ...errors import CaseError
 from ...system import System
 from ...typing import Array, ComplexArray
 from ..options import Options
-from ..quadratic import band_modes
+from ..quadratic import band_modes, is_stiff
 from ..quadratic.dense import unit
 from ..quadratic.reach import searched
 from ..results import ComplexModes, Progress, require_memory
@@ -119,8 +120,8 @@ def family_over(
 
 def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> ModesAtFriction:
     spectrum = band_modes(
-        family.built(mu), top / (2 * np.pi), above=-DECAY * top, still=family.built(family.low), left=left,
-        solver=family.options.solver,
+        family.built(mu), top / (2 * np.pi), above=-DECAY * top, left=left, solver=family.options.solver,
+        stands=partial(is_stiff, family.built(family.low), solver=family.options.solver),
     )  # fmt: skip
     n = family.freedoms
     told = spectrum.completeness.sentence

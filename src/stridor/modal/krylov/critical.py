@@ -64,7 +64,8 @@ def krylov_onsets(
     """Every critical μ in ``friction_range`` with a frequency up to ``max_frequency_hz``, as `onsets` gives them.
 
     numbered_at: the μ at which branches get their numbers, and from which they are followed. carried: what the basis of
-    the stretch of μ before hands on, and this one to the next. Raises CaseError for an empty range or no frequency, AnalysisError where the modes do not settle.
+    the stretch of μ before hands on, and this one to the next. Raises CaseError
+    for an empty range or no frequency, AnalysisError where the modes do not settle.
     """
     low, high = (float(v) for v in friction_range)
     if not (0 <= low < high and np.isfinite(high)):

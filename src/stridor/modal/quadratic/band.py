@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -22,18 +23,25 @@ SAME = 1e-8  # of the band: one eigenvalue, found from both sides of a border
 
 
 def band_modes(
-    problem: Quadratic, max_hz: float, *, above: float, still: Quadratic, left: bool = False, solver: str | None = None
+    problem: Quadratic,
+    max_hz: float,
+    *,
+    above: float,
+    stands: Callable[[float], bool],
+    left: bool = False,
+    solver: str | None = None,
 ) -> RegionModes:
     """All eigenvalues with frequencies up to ``max_hz`` [Hz] and growth rates over ``above`` [1/s].
 
     `find_modes` cuts an endless region off at the size of its frequencies, which holds all where stiffness is positive.
-    A negative one lets motions diverge at any rate, at frequency zero and so in every band. still: the problem at the
-    least friction; where that may diverge, rates up to 64 times 2π max_hz are searched too, with one more factorisation
-    for each factor of eight. Small problems are solved whole. What was not searched the completeness says.
+    A negative one lets motions diverge at any rate, at frequency zero and so in every band. stands: whether the problem
+    at the least friction diverges at no more than a rate [1/s] (`is_stiff`); where it may, rates up to 64 times
+    2π max_hz are searched too, with one more factorisation for each factor of eight. Small problems are solved whole.
+    What was not searched the completeness says.
     """
     found = find_modes(problem, Region.band(0.0, max_hz, above=above), left=left, solver=solver)
     top = 2 * np.pi * max_hz
-    if problem.size <= DENSE or is_stiff(still, QUIET * top, solver):
+    if problem.size <= DENSE or stands(QUIET * top):
         return found
     cut = f" Growth rates above {found.completeness.searched.re_max:.6g} 1/s were not searched."
     for low, high in pairwise(FASTER):
