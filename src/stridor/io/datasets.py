@@ -224,6 +224,7 @@ def _onsets(result: Onsets) -> Any:
     for name in ("at_start", "at_end"):
         values = getattr(result, name)
         data.attrs[f"growing_{name}"] = json.dumps([[v.real, v.imag] for v in values])
+    data.attrs["growing_above_band_at_start"] = json.dumps([[v.real, v.imag, mu] for v, mu in result.entering])
     data.attrs["enters_band_at"] = json.dumps([o.enters_at for o in result.onsets])
     if result.completeness:
         data.attrs["completeness"] = result.completeness

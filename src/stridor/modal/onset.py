@@ -75,6 +75,7 @@ class Onsets:
 
     Those that begin above the band are among them where the growing mode comes into it (`Onset.enters_at`). damped:
     whether anything works on velocities. at_start, at_end: eigenvalues [1/s] that grow in the band at a and at b;
+    entering: those followed that grow above it at a, and the μ (to about a step) at which they come into it;
     unexplained: how many of the latter none of the onsets accounts for. completeness: what speaks for there being no
     others, "" where nothing was checked. notes: what else is to be known. contact_state: where contacts may stick, how
     many nodes stick, slip and are open, and at which μ; it is held over the range. followed: numbers and eigenvalues
@@ -92,6 +93,7 @@ class Onsets:
     completeness: str = ""
     at_start: tuple[complex, ...] = ()
     at_end: tuple[complex, ...] = ()
+    entering: tuple[tuple[complex, float], ...] = ()
     unexplained: int = 0
     notes: tuple[str, ...] = ()
     contact_state: str = ""
@@ -148,6 +150,11 @@ class Onsets:
                 lines.append(
                     f"grows already at μ = {low:g}: {readable(lam.imag / (2 * pi))} Hz, +{readable(lam.real)} 1/s"
                 )
+        for lam, mu in self.entering:
+            lines.append(
+                f"grows already at μ = {low:g} above the band: {readable(lam.imag / (2 * pi))} Hz, "
+                f"+{readable(lam.real)} 1/s; comes into it at μ ≈ {mu:.3g}"
+            )
         return lines
 
     @property
@@ -168,6 +175,9 @@ class Onsets:
         """The document that `stridor onsets --json` prints."""
         return {
             "growing_at_start": [_plain(lam) for lam in self.at_start],
+            "growing_above_band_at_start": [
+                {"eigenvalue": _plain(lam), "enters_band_at": mu} for lam, mu in self.entering
+            ],
             "growing_at_end": [_plain(lam) for lam in self.at_end],
             "unexplained": self.unexplained,
             "onsets": [o.to_json() for o in self.onsets],
@@ -184,7 +194,8 @@ class Onsets:
         }
 
 
-REFUTED = ("NOT COMPLETE", "NOT CONFIRMED", "INCOMPLETE", "Not complete")
+NOT_COMPLETE = "NOT COMPLETE"
+REFUTED = (NOT_COMPLETE, "NOT CONFIRMED", "INCOMPLETE", "Not complete")
 
 
 def refuted(completeness: str) -> bool:

@@ -17,6 +17,7 @@ from ..sliding.stretches import Stretch, stretch_words, stretches
 from ..system import System
 from ..typing import Array, ComplexArray, IntArray
 from .complex_modes import complex_modes
+from .from_above import WIDER, with_origins
 from .full import full_onsets
 from .full.basis import WHOLE
 from .growing import UNCHECKED, checked_modes, checked_onsets, growing_modes, sought_at_end
@@ -230,14 +231,20 @@ def _solved_onsets(
         )
         return TouchingChange(mu, (before.branch, before.eigenvalues[0]), (after.branch, after.eigenvalues[0]))
 
+    def wider(stretch: Stretch, hz: float) -> Onsets:
+        return onsets(
+            stretch.of(system), (stretch.low, stretch.high), max_frequency_hz=hz, damped=damped,
+            numbered_at=0.0 if stretch is solid[0] else stretch.low, **asdict(options),
+        )  # fmt: skip
+
     def residual(stretch: Stretch, mu: float, lam: complex) -> float:
+        highest = max(max_frequency_hz, WIDER * abs(lam.imag) / (2 * np.pi))
         try:
-            found = growing_modes(
-                stretch.of(system), mu, max_frequency_hz, touching_at=None, damped=damped, options=options
-            )
+            found = growing_modes(stretch.of(system), mu, highest, touching_at=None, damped=damped, options=options)
         except AnalysisError:
             return np.nan
         return float(found.residual[int(np.argmin(np.abs(found.values - lam)))]) if len(found.values) else np.nan
 
+    parts = with_origins(parts, wider, residual)
     found = joined_onsets(parts, (solid[0].low, solid[-1].high), border, residual)
     return replace(found, notes=(*found.notes, *stretch_words(over)))

@@ -103,6 +103,7 @@ def krylov_onsets(
         problem.open_contacts,
         at_start=tuple(way.start.values[_inside(way.start, top)].tolist()),
         at_end=tuple(way.end.values[_inside(way.end, top)].tolist()),
+        entering=_entering(way, changes, low),
         contact_state=problem.contact_state,
         unexplained=unexplained(np.flatnonzero(_inside(way.end, top)), way.from_start, changes),
         followed=(_numbered(way.start), _numbered(way.end)),
@@ -117,6 +118,18 @@ def _count_of_samples(low: float, high: float) -> int:
 def _numbered(state: State) -> tuple[IntArray, ComplexArray]:
     """Numbers and eigenvalues (b,) of the branches at one μ."""
     return np.arange(1, len(state.index) + 1), state.values
+
+
+def _entering(way: _Way, changes: list[StabilityChange], low: float) -> tuple[tuple[complex, float], ...]:
+    """λ of branches that grow above the band where the range begins, and the μ at which they come into it growing."""
+    found: list[tuple[complex, float]] = []
+    for branch in way.from_start:
+        lam = complex(way.start.values[branch])
+        ends = (c.onset.mu for c in changes if c.onset is not None and c.onset.stabilising and branch in c.branches)
+        mu = way.entries.after((branch,), low, min(ends, default=np.inf))
+        if lam.imag > way.entries.top and mu is not None:
+            found.append((lam, mu))
+    return tuple(found)
 
 
 def _inside(state: State, top: float) -> BoolArray:
