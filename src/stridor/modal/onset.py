@@ -175,9 +175,7 @@ class Onsets:
         """The document that `stridor onsets --json` prints."""
         return {
             "growing_at_start": [_plain(lam) for lam in self.at_start],
-            "growing_above_band_at_start": [
-                {"eigenvalue": _plain(lam), "enters_band_at": mu} for lam, mu in self.entering
-            ],
+            "growing_above_band_at_start": [{**_plain(lam), "enters_band_at": mu} for lam, mu in self.entering],
             "growing_at_end": [_plain(lam) for lam in self.at_end],
             "unexplained": self.unexplained,
             "onsets": [o.to_json() for o in self.onsets],
