@@ -280,7 +280,7 @@ def test_residual_is_the_largest_imbalance_over_the_largest_force() -> None:
             coefficient=coefficient, stretch=np.array([0.3, -0.2]),
             rows=SimpleNamespace(free=sp.csr_array(rows), lift=lift),
         )  # fmt: skip
-        system = SimpleNamespace(stiffness=sp.csr_array(stiffness), cubic=springs if cubic else None, size=n)
+        system = SimpleNamespace(of_matrices=Answers(), stiffness=sp.csr_array(stiffness), cubic=springs if cubic else None, size=n)
         nodes = SimpleNamespace(compliance=np.zeros(m), gap=np.zeros(m))
         found = equilibrium.Equilibrium(
             system, nodes, sp.csr_array(push), force, symmetric=False, solver=None, travel=np.array([0.4])
@@ -299,7 +299,7 @@ def test_residual_is_the_largest_imbalance_over_the_largest_force() -> None:
             )  # fmt: skip
         assert found.residual(given) == pytest.approx(max(map(abs, imbalance)) / max(terms), rel=1e-12)
     still = equilibrium.Equilibrium(
-        SimpleNamespace(stiffness=sp.csr_array(stiffness), cubic=None, size=n), nodes, sp.csr_array(push), np.zeros(n),
+        SimpleNamespace(of_matrices=Answers(), stiffness=sp.csr_array(stiffness), cubic=None, size=n), nodes, sp.csr_array(push), np.zeros(n),
         symmetric=False, solver=None,
     )  # fmt: skip
     assert still.residual(NodeState(np.ones(m, dtype=bool), np.zeros(n), np.zeros(m), np.zeros(m))) == 0.0
@@ -348,7 +348,7 @@ def test_equilibria_are_those_that_trying_all_sets_finds(stiff: float, size: flo
             continue
         tried += 1
         u, forces, open_by = right[0]
-        system: Any = SimpleNamespace(stiffness=sp.csr_array(stiffness), cubic=None, size=6, symmetric_definite=True)
+        system: Any = SimpleNamespace(of_matrices=Answers(), stiffness=sp.csr_array(stiffness), cubic=None, size=6, symmetric_definite=True)
         rows = equilibrium.ContactRows(sp.csr_array(normal), gap, compliance, np.zeros(4), np.zeros(4, dtype=bool))
         solver = equilibrium.Equilibrium(system, rows, sp.csr_array(push), force, symmetric=False, solver=None)
         for guess in (None, rng.random(4) < 0.5):

@@ -245,7 +245,7 @@ def test_before_the_first_increment_all_that_can_touch_sticks_without_force() ->
     assert (state.displacement.shape, state.friction.shape, state.travel.shape) == ((3,), (2, 1), (2,))
     for part in (state.displacement, state.normal_force, state.friction, state.direction, state.position, state.travel):
         assert not part.any()
-    assert search.factorisations == 0
+    assert search.solved == 0
 
 
 def test_an_open_node_that_stays_open_is_no_change() -> None:
@@ -343,7 +343,7 @@ def test_the_way_through_the_steps_is_told_where_it_ends(monkeypatch) -> None:
     class Search:
         def __init__(self, system, *, solver) -> None:
             assert solver == "some"
-            self.nodes, self.factorisations = plate(), 17
+            self.nodes, self.solved = plate(), 17
 
         def start(self):
             return replace(start([STICK] * 4), travel=np.array([5.0, 6.0]))
