@@ -217,7 +217,8 @@ def test_negative_eigenvalues_are_counted_whichever_solver_there_is(solver, ties
         more = 2
     exact = int(np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0))
     told = direct.negative_eigenvalues(matrix, saddle=bool(more), solver=solver)
-    assert told == exact or (solver == "superlu" and ties == "rigid" and told is None)
+    # Pivots of zero on the diagonal: only a solver that counts for itself tells.
+    assert told == exact or (solver in ("superlu", "slepc") and ties == "rigid" and told is None)
     with pytest.raises(direct.SingularMatrix):
         direct.negative_eigenvalues(plate(held=False), solver=solver)
 

@@ -161,6 +161,7 @@ def test_a_run_that_was_changed_says_so_in_its_report(case: st.Case, part: Traje
     class Inputs:
         trajectory = on
         dominant_hz = None
+        unsaturated = None
 
     assert "it is no run of one model" in _run_sentence(Inputs())  # type: ignore[arg-type]
 

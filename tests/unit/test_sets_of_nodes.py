@@ -17,6 +17,7 @@ from stridor.sliding.equilibrium import NEWTON_STEPS, ContactRows, Equilibrium, 
 from stridor.sliding.redundant import closed, redundant
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip, _Change, increments_of
 from stridor.system.load_steps import LoadStep
+from stridor.system.model import Answers
 
 
 def nodes_like(count: int, directions: int) -> StickSlip:
@@ -218,7 +219,7 @@ def test_a_body_that_moves_a_million_times_its_size_is_loose(monkeypatch, size: 
 def hardening(cubic: tuple[float, ...], *, gap=(0.0, 0.0), load: float = 1.0) -> Equilibrium:
     """Two masses on springs of 100 N/m, each pressed with 1 N, or another load, on a contact of 1 mm/N."""
     system = SimpleNamespace(
-        size=2, stiffness=sp.csr_array(np.diag([100.0, 100.0])), cubic=None, symmetric_definite=True,
+        of_matrices=Answers(), size=2, stiffness=sp.csr_array(np.diag([100.0, 100.0])), cubic=None, symmetric_definite=True,
     )  # fmt: skip
     rows = ContactRows(
         sp.csr_array(np.eye(2)), np.array(gap), np.full(2, 1e-3), np.array(cubic), np.zeros(2, dtype=bool)
