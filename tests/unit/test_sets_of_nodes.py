@@ -231,7 +231,7 @@ def test_what_hardens_but_does_not_touch_needs_no_second_step() -> None:
     away = hardening((1e9, 0.0), gap=(0.1, 0.0))
     state, _ = find_touching(away, np.array([False, True]))
     assert state.displacement == pytest.approx([-1 / 100, -1 / 1100])
-    assert away.factorisations == 1
+    assert away.solved == 1
 
 
 @pytest.mark.parametrize("load", [1.0, 1e-12, 1e6])
@@ -249,7 +249,7 @@ def test_springs_that_find_no_equilibrium_are_given_sixty_steps(monkeypatch) -> 
     monkeypatch.setattr(Equilibrium, "_converged", lambda *given: False)
     with pytest.raises(AnalysisError, match="find no equilibrium in 60 steps"):
         stuck.solve(np.ones(2, dtype=bool))
-    assert stuck.factorisations == NEWTON_STEPS == 60
+    assert stuck.solved == NEWTON_STEPS == 60
 
 
 # -- forces that cannot be told apart ----------------------------------------------------------------------------------
