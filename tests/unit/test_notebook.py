@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import sys
 import xml.etree.ElementTree as tree
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +16,7 @@ import scipy.sparse.linalg
 import stridor as st
 from stridor.agreement import Agreement, Comparison, Perturbation
 from stridor.case import template_text
+from stridor.io.csv_files import write_csv
 from stridor.modal.complex_modes import ComplexModes
 from stridor.modal.onsets import Onset, Onsets
 from stridor.notebook import MOST_ROWS, html_table
@@ -111,3 +115,71 @@ def test_tables_of_nothing_and_of_long_words() -> None:
     empty = replace(ONSETS, onsets=(), notes=())
     assert "No onsets for μ from 0 to 1, up to 40000 Hz" in empty._repr_html_()
     assert "<table" not in empty._repr_html_()
+
+
+def test_modes_are_a_sequence_of_branches() -> None:
+    sweep = replace(MODES, mu=np.array([0.1, 0.3]), eigenvalues=np.vstack([MODES.eigenvalues, MODES.eigenvalues - 700]),
+                    residual=np.repeat(MODES.residual, 2, axis=0), max_frequency_hz=12e3)  # fmt: skip
+    assert len(sweep) == 3
+    assert [branch.number for branch in sweep] == [1, 8, 9]
+    last = sweep[1]
+    assert last.frequency_hz == pytest.approx([54300 / (2 * np.pi)] * 2)
+    assert last.growth_rate == pytest.approx([637.25, -62.75])
+    assert last.damping_ratio == pytest.approx([-0.011735, 0.0011556], rel=1e-4)
+    assert last.unstable.tolist() == [True, False]
+    assert repr(last) == "<Branch: mode 8 at 2 μ: 8642.11 Hz to 8642.11 Hz, unstable at 1 of them, from μ = 0.1>"
+    assert repr(sweep[-1]) == "<Branch: mode 9, not known at any of these μ>"
+    assert repr(MODES[1]) == "<Branch: mode 8 at μ = 0.1: 8642.11 Hz, +637.2 1/s, unstable>"
+    assert [b.number for b in sweep[1:]] == [8, 9]
+    assert sweep[1:].total.tolist() == sweep.total.tolist()  # of the band, as of `lowest`
+    assert repr(sweep) == "<ComplexModes: 3 modes at 2 friction coefficients, 0.1 to 0.3; 1 unstable>"
+    with pytest.raises(IndexError):
+        sweep[3]
+    frame = sweep[1].to_dataframe()
+    assert frame["growth_1_s"].tolist() == last.growth_rate.tolist()
+
+
+def test_onsets_are_a_sequence_of_onsets() -> None:
+    assert len(ONSETS) == 1
+    assert ONSETS[0] is ONSETS.onsets[0] is next(iter(ONSETS))
+    assert ONSETS[:1] == ONSETS.onsets
+    assert repr(ONSETS[0]) == "<Onset: μ = 0.076600, 8635.4 Hz, flutter of modes 8 and 10>"
+    ends = replace(ONSETS[0], stabilising=True, kind="divergence", branches=(3, 3))
+    assert ends.words == "μ = 0.076600, 8635.4 Hz, divergence of mode 3, where growth ends"
+    assert not replace(ONSETS, onsets=())
+    assert repr(replace(ONSETS, onsets=())) == "<Onsets: none for μ from 0 to 1, up to 40000 Hz>"
+
+
+def test_data_frames_have_the_columns_of_the_csv_files(tmp_path: Path) -> None:
+    for thing in (MODES, ONSETS, agreement()):
+        frame = thing.to_dataframe()
+        path = write_csv(thing, tmp_path / "table.csv")
+        with path.open(encoding="utf-8", newline="") as lines:
+            written = list(csv.DictReader(lines))
+        assert list(frame.columns) == list(written[0])
+        assert len(frame) == len(written)
+        assert float(written[0]["mu" if "mu" in frame else "value"]) == frame.iloc[0]["mu" if "mu" in frame else "value"]
+    assert np.isnan(ONSETS.to_dataframe()["enters_band_at"][0])
+
+
+def test_runs_are_columns_over_time() -> None:
+    frame = replace(run(), contact_names=("A",), watch_names=("tip",), velocity=np.ones((3, 1, 2)),
+                    displacement=np.zeros((3, 1, 2)), acceleration=np.zeros((3, 1, 2))).to_dataframe()  # fmt: skip
+    assert frame.index.tolist() == [0.0, 1.0, 2.0]
+    assert frame.index.name == "time_s"
+    assert frame["A.status"].tolist() == ["separation"] * 3
+    assert frame["tip.velocity_y_m_s"].tolist() == [1.0] * 3
+    assert "A.normal_force_n" in frame
+    assert "kinetic_j" in frame
+
+
+def test_without_pandas_the_way_out_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(st.AnalysisError, match="needs pandas, which is not installed: pip install pandas"):
+        ONSETS.to_dataframe()
+
+
+def test_datasets_are_those_of_files() -> None:
+    for thing in (MODES, ONSETS, agreement(), run()):
+        assert thing.to_xarray().identical(st.to_dataset(thing))
+        assert thing.to_xarray().attrs["format"] == "stridor results 1"

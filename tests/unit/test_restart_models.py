@@ -17,7 +17,7 @@ from stridor.app.cli import app
 from stridor.case import template_text
 from stridor.errors import CaseError
 from stridor.io.result_files import open_results
-from stridor.study.fingerprint import changes_of
+from stridor.temporal.changes import changes_of
 from stridor.temporal.trajectory import Trajectory
 from stridor.view.words import _run_sentence
 

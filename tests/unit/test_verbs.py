@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as tree
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import stridor as st
 from stridor.case import template_text
+from stridor.notebook import MOST_LETTERS
 
 COARSE = {
     "bodies.beam1.elements": 3, "bodies.beam2.elements": 6, "modal.max_frequency_hz": 12e3,
@@ -66,6 +69,9 @@ def test_each_verb_is_looked_at() -> None:
 def test_kinds_of_problem(verb: str, file: Path, tmp_path: Path) -> None:
     call, case = VERBS[verb], st.load(file)
     work, kinds = st.Workspace(case), set[type]()
+    result = call(file, tmp_path / "first")
+    for part in result.values() if isinstance(result, dict) else [] if isinstance(result, np.ndarray) else [result]:
+        short(part)
     settings = {"modal": case.modal, "temporal": case.temporal, "phases": case.phases, "comparison": case.comparison}
     tables = {name: [t.model_dump() for t in v] if name == "phases" else v.model_dump() for name, v in settings.items()}
     for number, problem in enumerate((str(file), file, case, work)):
@@ -76,6 +82,33 @@ def test_kinds_of_problem(verb: str, file: Path, tmp_path: Path) -> None:
     else:
         kinds.add(type(call(st.Workspace(work.system(), **tables), tmp_path / "system")))
     assert len(kinds) == 1
+
+
+def short(thing: Any) -> None:
+    """What is printed is one line without arrays, what a notebook shows a small table."""
+    line = repr(thing)
+    assert "\n" not in line
+    assert "array(" not in line
+    assert len(line) <= MOST_LETTERS
+    assert line.startswith(f"<{type(thing).__name__}: ")
+    page = thing._repr_html_()
+    assert 20 < len(page) < 4000
+    tree.fromstring(page)
+
+
+def test_parts_of_results_are_short_as_well(file: Path) -> None:
+    case = st.load(file)
+    sweep = st.modes(case, [0.1, 0.3], vectors=True)
+    model = st.reduced_model(case, {"mu": (0.0, 0.2)}, bound=1e-4)
+    parts = (
+        case, st.build_system(case), sweep, sweep[-1], st.onsets(case)[0], model.modes({"mu": 0.1}),
+        st.rank_countermeasures(case, mu=0.3, verify=1, added_mass=False, chamfers=0).measures[0],
+        st.compare(case, [0.3], only=["growth"]).comparisons[0],
+    )  # fmt: skip
+    for part in parts:
+        short(part)
+    assert str(case) == repr(case)
+    short(case.with_({"title": "a\nlong " + 1000 * "t"}))
 
 
 @pytest.mark.parametrize("wrong", [None, 3, {"bodies": {}}, ["a"]], ids=repr)

@@ -84,8 +84,8 @@ def test_what_a_reduced_map_says_of_its_onsets(maps):
     assert document["method"] == "reduced"
     assert document["confirmed"][0]["difference"] == reduced.confirmed[0].difference
     assert np.array(document["error"]) == pytest.approx(reduced.error)
-    assert "error" in reduced.to_dataset()
-    assert "error" not in full.to_dataset()
+    assert "error" in reduced.to_xarray()
+    assert "error" not in full.to_xarray()
     words = [t.get_text() for t in sensitivity_plots.damping_map(reduced).axes[0].get_legend().get_texts()]
     assert "solved again in the full problem" in words
 

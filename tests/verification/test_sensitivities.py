@@ -296,7 +296,7 @@ def test_nothing_unstable_is_said():
 
 def test_documents_and_datasets():
     found = sensitivities(loads(MINIMAL), ["mu", "dashpots.x.damping"], mu=0.6)
-    data = found.to_dataset()
+    data = found.to_xarray()
     assert data["growth_derivative"].shape == (2, 1)
     part = found.to_json()["modes"][0]["parameters"][0]
     assert part["growth_per_percent"] == pytest.approx(0.006 * found.of("mu")[0].real)

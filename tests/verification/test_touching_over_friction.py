@@ -6,6 +6,7 @@ other as μ grows. The truth is the answer for one μ alone, and a count on a fi
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from itertools import pairwise
 
@@ -277,6 +278,7 @@ def test_growth_from_above_the_band_is_told_whichever_stretch_or_range_it_began_
     assert growing(case, enters + 0.04)[0] == 1
     assert "above the band" in " ".join(part.at_start_words)
     assert part.to_json()["growing_above_band_at_start"][0]["enters_band_at"] == enters
+    assert part.to_xarray().attrs["growing_above_band_at_start"] == json.dumps([[lam.real, lam.imag, enters]])
 
 
 def test_where_an_onset_above_the_band_is_not_found_the_list_is_not_complete() -> None:

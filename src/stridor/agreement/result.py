@@ -10,7 +10,8 @@ import numpy as np
 
 from ..digits import measured, readable
 from ..modal.onset import refuted
-from ..notebook import html_table
+from ..notebook import Shown, html_table
+from ..tabular import Cell, Rows, Tabular, dataset, split
 from ..temporal.signals import Growth
 from .small_motion import Perturbation
 
@@ -18,8 +19,8 @@ GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
 AGREE, DISAGREE, UNDECIDED = "agree: ", "disagree: ", "not decided: "
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Shown):
     """Both approaches at one μ.
 
     modal_eigenvalue: the mode that belongs to what the temporal side shows growing fastest (or decaying
@@ -46,6 +47,10 @@ class Comparison:
     verdict: str
     growth_mac: float | None = None
     completeness: str = ""
+
+    @property
+    def _line(self) -> str:
+        return self.verdict
 
     def to_json(self) -> dict[str, Any]:
         """Plain values of one comparison."""
@@ -75,8 +80,8 @@ class Comparison:
         }
 
 
-@dataclass(frozen=True)
-class Agreement:
+@dataclass(frozen=True, repr=False)
+class Agreement(Tabular):
     """Comparisons at several μ and the critical friction coefficients of both approaches.
 
     critical_mu_temporal is the middle of the last bracket of the bisection, bracket its ends and
@@ -97,6 +102,46 @@ class Agreement:
     def agree(self) -> bool | None:
         """Whether all that was compared agrees, None where that is not decided."""
         return True if self.verdict.startswith(AGREE) else False if self.verdict.startswith(DISAGREE) else None
+
+    @property
+    def _line(self) -> str:
+        return self.verdict
+
+    def table(self) -> Rows:
+        """Heads and rows: a row for each μ."""
+        heads = (
+            "mu", "frequency_hz", "growth_1_s", "frequency_in_time_hz", "growth_in_time_1_s", "frequency_error",
+            "growth_error", "growth_mac", "dominant_frequency_hz", "mac", "agrees", "verdict",
+        )  # fmt: skip
+        rows: list[tuple[Cell, ...]] = []
+        for c in self.comparisons:
+            ends = [(lam.imag / (2 * np.pi), lam.real) for lam in (c.modal_eigenvalue, c.perturbation.eigenvalue)]
+            errors = c.frequency_error, c.growth_rate_error, c.growth_mac, c.dominant_frequency_hz, c.mac
+            rows.append((c.mu, *ends[0], *ends[1], *errors, c.agrees, c.verdict))
+        return heads, rows
+
+    def to_xarray(self) -> Any:
+        """xarray.Dataset with dimension mu, as `st.save` writes it."""
+        rows = self.comparisons
+
+        def column(values: list[float | None]) -> list[float]:
+            return [np.nan if v is None else float(v) for v in values]
+
+        variables: dict[str, Any] = {
+            "modal_eigenvalue": split(("mu",), [c.modal_eigenvalue for c in rows], {"units": "1/s"}),
+            "temporal_eigenvalue": split(("mu",), [c.perturbation.eigenvalue for c in rows], {"units": "1/s"}),
+            "frequency_error": ("mu", [c.frequency_error for c in rows], {"units": "1"}),
+            "growth_rate_error": ("mu", [c.growth_rate_error for c in rows], {"units": "1"}),
+            "growth_mac": ("mu", column([c.growth_mac for c in rows]), {"units": "1"}),
+            "mac": ("mu", column([c.mac for c in rows]), {"units": "1"}),
+            "dominant_frequency": ("mu", column([c.dominant_frequency_hz for c in rows]), {"units": "Hz"}),
+        }
+        data = dataset("compare", variables, {"mu": ("mu", [c.mu for c in rows], {"units": "1"})}, self.provenance)
+        for name in ("critical_mu_modal", "critical_mu_temporal"):
+            value = getattr(self, name)
+            data.attrs[name] = np.nan if value is None else value
+        data.attrs["verdict"] = self.verdict
+        return data
 
     def _repr_html_(self) -> str:
         heads = ("μ", "modes [Hz]", "[1/s]", "in time [Hz]", "[1/s]", "verdict")

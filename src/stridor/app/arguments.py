@@ -26,9 +26,9 @@ from .values import INFINITY, numbers, pair
 
 if TYPE_CHECKING:
     from ..case import Case
-    from ..io.csv_files import Tabled
     from ..io.datasets import Result
     from ..study.workspace import Workspace
+    from ..tabular import Tabular
     from .closing import Conclusion
 P = ParamSpec("P")
 INCOMPLETE = 3  # exit code: what was checked says that something may be missing from what was printed
@@ -196,7 +196,7 @@ class Call:
         words += [str(word) for option in kept if verb in TABLE[option[0]].on for word in option]
         literal(f"Next: {command(words, stdout.page - 6)}")
 
-    def tabulate(self, result: Tabled, name: str) -> Path:
+    def tabulate(self, result: Tabular, name: str) -> Path:
         """Save a result as a CSV file in the folder, and say so."""
         from ..io.csv_files import write_csv
 

@@ -21,6 +21,7 @@ from ..io.finished import FOLDER, FinishedParts
 from ..io.kept_parts import NAME, KeptParts
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
+from ..notebook import Shown, html_table
 from ..study.asked import require_friction
 from ..study.everything import Everything, compute_everything
 from ..study.parts import OF_REPORT, Parts, chosen_parts
@@ -34,13 +35,22 @@ from ..view.report import write_report
 from ..view.words import verdict
 
 
-@dataclass(frozen=True)
-class Outcome:
+@dataclass(frozen=True, repr=False)
+class Outcome(Shown):
     """What a run left: where the report (None: skipped) and the files are, everything computed, one verdict."""
 
     report: Path | None
     files: tuple[Path, ...]
     everything: Everything
+
+    @property
+    def _line(self) -> str:
+        return self.verdict if self.report is None else f"{self.verdict}; {self.report}"
+
+    def _repr_html_(self) -> str:
+        where = [] if self.report is None else [("report", str(self.report))]
+        rows = [*where, *(("file", str(path)) for path in self.files)]
+        return html_table(self.verdict, ("", "path"), rows, self.everything.notes)
 
     @property
     def interrupted(self) -> bool:

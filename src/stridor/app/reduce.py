@@ -246,7 +246,8 @@ def _about(model: ReducedModel) -> dict[str, Any]:
 
 def _write(path: Path, model: ReducedModel, document: list[dict[str, Any]]) -> Path:
     """One line for each mode of each point, columns of the model's parameters first."""
-    from ..io.csv_files import MODE, mode_cells, write_rows
+    from ..io.csv_files import write_rows
+    from ..tabular import MODE, mode_cells
 
     heads = (*(p.name for p in model.problem.parameters), *MODE, "error", "residual", "inside", "corrections")
     rows = (

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from ..errors import CaseError, Problem
-from ..notebook import html_table
+from ..notebook import Shown, counted, html_table
 from .bodies import BeamBody, MatrixBody
 from .checks import Parts, problems_between, slave_side
 from .expression import parse_expression
@@ -42,7 +42,7 @@ from .schema import (
 )
 
 
-class Case(Table):
+class Case(Shown, Table):
     """Bodies, what holds and loads them, where they slide, and the settings of the analyses. SI units.
 
     Case(bodies={…}, contacts={…}, …) takes the tables of a case file (docs/case-file.md) as dictionaries and lists,
@@ -104,6 +104,14 @@ class Case(Table):
     def warnings(self) -> list[str]:
         """One line for each value that is allowed but probably not meant (units, digits)."""
         return list(oddities(self))
+
+    @property
+    def _line(self) -> str:
+        bodies = "1 body" if len(self.bodies) == 1 else f"{len(self.bodies)} bodies"
+        return f"{f'{self.title}, ' if self.title else ''}{bodies}, {counted(len(self.contacts), 'contact')}"
+
+    def __str__(self) -> str:
+        return repr(self)
 
     def _repr_html_(self) -> str:
         rows = [(name, f"{body.type} {getattr(body, 'material', None) or ''}") for name, body in self.bodies.items()]

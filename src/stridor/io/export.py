@@ -13,6 +13,7 @@ from typing import Any
 
 from ..case import loads
 from ..errors import CaseError
+from ..notebook import Shown, html_table
 from ..study.exported import ExportedModel, exported_model
 from ..study.workspace import Problem, Workspace
 from ..typing import Sparse
@@ -37,8 +38,8 @@ _MEANING = {
 _AXES = ("x_m", "y_m", "z_m")
 
 
-@dataclass(frozen=True)
-class Export:
+@dataclass(frozen=True, repr=False)
+class Export(Shown):
     """What was written: files, the case file among them that computes with the matrices (None where matrices do not say
     all), the matrices by name with shape, meaning and file, names of the loads' columns, and what else is to be known.
     """
@@ -52,6 +53,19 @@ class Export:
     load_names: tuple[str, ...]
     freedoms: int
     notes: tuple[str, ...]
+
+    @property
+    def _line(self) -> str:
+        at = "" if self.mu is None else f" at μ = {self.mu:g}"
+        return f"{', '.join(self.matrices)}{at} of {self.freedoms} freedoms in {self.folder}"
+
+    def _repr_html_(self) -> str:
+        heads = ("matrix", "what it is", "shape", "file")
+        rows = [
+            (name, said["meaning"], " × ".join(map(str, said["shape"])), said["file"])
+            for name, said in self.matrices.items()
+        ]
+        return html_table(f"Export: {self._line}", heads, rows, self.notes)
 
     def to_json(self) -> dict[str, Any]:
         """The document that `stridor export --json` prints."""

@@ -12,10 +12,10 @@ from typing import Any
 
 from ..errors import CaseError
 from ..reading import bounded, irregular, largest_unfolded, size_words
+from ..tabular import FORMAT
 from .result_checks import check_results
 from .seals import CONTENTS, broken
 
-FORMAT = "stridor results 1"
 _KIND = "stridor results "
 HDF5 = b"\x89HDF\r\n\x1a\n"
 _FOREIGN = "no results of stridor; give a results file written by stridor (netCDF-4/HDF5)"

@@ -206,7 +206,8 @@ def checked_modes(
     for wider in WIDER:
         if not _lacking(modes, found):
             break
-        modes = _followed_from(system, modes, wider, max_frequency_hz, options) or modes
+        further = _followed_from(system, modes, wider, max_frequency_hz, options)
+        modes = modes if further is None else further
     modes, alone = _with_columns(system, modes, found, touching, options)
     told = tuple(
         _sentence(modes, row, found.get(row), max_frequency_hz, began, alone.get(row, 0))

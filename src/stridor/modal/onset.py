@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from math import pi
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
-from ..digits import fixed, hertz, readable
-from ..notebook import html_table
+from ..digits import fixed, hertz, measured, readable
+from ..notebook import Shown, counted, html_table
+from ..tabular import Rows, Tabular
 from ..typing import ComplexArray, IntArray
+from .tables import onsets_dataset, onsets_rows
 
 Branches = tuple[IntArray, ComplexArray]
 
 
-@dataclass(frozen=True)
-class Onset:
+@dataclass(frozen=True, repr=False)
+class Onset(Shown):
     """One critical friction coefficient.
 
     mu, frequency_hz: where; kind: flutter (two modes meet), divergence (a mode at zero frequency) or contact (from
@@ -39,6 +42,19 @@ class Onset:
     growth_slope: float | None
     exceptional_mu: complex | None = None
     enters_at: float | None = None
+
+    @property
+    def words(self) -> str:
+        """Where it is, at which frequency, and what happens there."""
+        modes = ""
+        if any(self.branches):
+            modes = f" of mode{'s' if self.kind == 'flutter' else ''} {self.branch_words(' and ')}"
+        ends = ", where growth ends" if self.stabilising else ""
+        return f"μ = {fixed(self.mu, 6)}, {measured(self.frequency_hz, 1)} Hz, {self.kind}{modes}{ends}"
+
+    @property
+    def _line(self) -> str:
+        return self.words
 
     @property
     def roots(self) -> int:
@@ -69,9 +85,9 @@ class Onset:
         }
 
 
-@dataclass(frozen=True)
-class Onsets:
-    """All onsets in friction_range [a, b] of modes with frequencies up to max_frequency_hz, by μ.
+@dataclass(frozen=True, repr=False)
+class Onsets(Tabular):
+    """All onsets in friction_range [a, b] of modes with frequencies up to max_frequency_hz, by μ: a sequence of them.
 
     Those that begin above the band are among them where the growing mode comes into it (`Onset.enters_at`). damped:
     whether anything works on velocities. at_start, at_end: eigenvalues [1/s] that grow in the band at a and at b;
@@ -103,6 +119,34 @@ class Onsets:
     band_hz: tuple[float, float] | None = None
     outside: int = 0
 
+    def __len__(self) -> int:
+        return len(self.onsets)
+
+    @overload
+    def __getitem__(self, which: int) -> Onset: ...
+    @overload
+    def __getitem__(self, which: slice) -> tuple[Onset, ...]: ...
+    def __getitem__(self, which: int | slice) -> Onset | tuple[Onset, ...]:
+        return self.onsets[which]
+
+    def __iter__(self) -> Iterator[Onset]:
+        return iter(self.onsets)
+
+    def table(self) -> Rows:
+        """Heads and rows, as its CSV file has them: a row for each onset."""
+        return onsets_rows(self)
+
+    def to_xarray(self) -> Any:
+        """xarray.Dataset with dimension onset, as `st.save` writes it."""
+        return onsets_dataset(self)
+
+    @property
+    def _line(self) -> str:
+        low, high = self.friction_range
+        first = "" if self.first is None else f"; growth begins at {self.first.words}"
+        already = "; something grows from the start" if self.at_start else ""
+        return f"{len(self) or 'none'} for μ from {low:g} to {high:g}, {self.frequencies}{already}{first}"
+
     def _repr_html_(self) -> str:
         heads = ("μ", "frequency [Hz]", "what", "modes", "growth", "slope [1/s]", "residual")
         rows = [
@@ -114,8 +158,8 @@ class Onsets:
             for o in self.onsets
         ]  # fmt: skip
         low, high = self.friction_range
-        many = f"{len(self.onsets) or 'No'} onset{'' if len(self.onsets) == 1 else 's'}"
-        title = f"{many} for μ from {low:g} to {high:g}, {self.frequencies}"
+        many = counted(len(self.onsets), "onset")
+        title = f"{many[0].upper()}{many[1:]} for μ from {low:g} to {high:g}, {self.frequencies}"
         lines = (*self.at_start_words, *self.from_above_words, self.completeness, self.contact_state, *self.notes)
         return html_table(title, heads, rows, lines)
 

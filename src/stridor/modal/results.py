@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
 
 from ..digits import readable
 from ..errors import CaseError
-from ..notebook import html_table
+from ..notebook import counted, html_table
+from ..tabular import Rows, Tabular
 from ..typing import Array, BoolArray, ComplexArray, IntArray
+from .branch import Branch
+from .tables import modes_dataset, modes_rows
 from .tolerances import UNSTABLE_RELATIVE
 
 MOST_BYTES = 4e9  # of eigenvalues and vectors held at one time
@@ -21,9 +24,9 @@ BORDER = 1e-12  # of the band: what rounding may put a mode outside by
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True)
-class ComplexModes:
-    """Modes over μ (k,), one column per branch (b,).
+@dataclass(frozen=True, repr=False)
+class ComplexModes(Tabular):
+    """Modes over μ (k,), one column per branch (b,): a sequence of `Branch`, and of a slice of it modes again.
 
     eigenvalues λ (k, b) [1/s]: growth rate + j angular frequency. branch (b,) numbers the modes from
     1 by frequency at μ = 0. residual (k, b): componentwise backward error in the assembled matrices.
@@ -107,6 +110,42 @@ class ComplexModes:
     def interrupted(self) -> bool:
         """Whether friction coefficients that were asked for are missing."""
         return self.planned is not None
+
+    def __len__(self) -> int:
+        return len(self.branch)
+
+    @overload
+    def __getitem__(self, which: int) -> Branch: ...
+    @overload
+    def __getitem__(self, which: slice) -> ComplexModes: ...
+    def __getitem__(self, which: int | slice) -> Branch | ComplexModes:
+        if isinstance(which, slice):
+            kept = self.chosen(np.arange(len(self))[which])
+            return replace(kept, held=self.total)
+        b = range(len(self))[which]
+        return Branch(
+            int(self.branch[b]), self.mu, self.eigenvalues[:, b], self.residual[:, b], self.unstable[:, b],
+            None if self.right is None else self.right[:, b], None if self.left is None else self.left[:, b],
+        )  # fmt: skip
+
+    def __iter__(self) -> Iterator[Branch]:
+        return (self[b] for b in range(len(self)))
+
+    def table(self) -> Rows:
+        """Heads and rows, as its CSV file has them: a row for each mode of the band at each μ."""
+        return modes_rows(self)
+
+    def to_xarray(self) -> Any:
+        """xarray.Dataset with dimensions mu and branch, as `st.save` writes it."""
+        return modes_dataset(self)
+
+    @property
+    def _line(self) -> str:
+        growing = int(np.any(self.unstable & self.in_band, axis=0).sum())
+        at = f"at μ = {self.mu[0]:g}" if len(self.mu) == 1 else f"at {len(self.mu)} friction coefficients"
+        if len(self.mu) > 1:
+            at += f", {self.mu.min():g} to {self.mu.max():g}"
+        return f"{counted(len(self), 'mode')} {at}; {growing or 'none'} unstable"
 
     def _repr_html_(self) -> str:
         marks = self.unstable & self.in_band

@@ -14,10 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
-from ..contact.multipliers import OPEN, SLIP
+from ..contact.multipliers import OPEN, SLIP, STICK
 from ..contact.nodes import ContactNodes
+from ..digits import readable
 from ..direct import SingularMatrix
 from ..errors import AnalysisError
+from ..notebook import Shown, counted, html_table
 from ..stages import passing, stage
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
@@ -32,8 +34,8 @@ SIGN_CHANGES = 30
 STEADY = "steady sliding of nodes"
 
 
-@dataclass(frozen=True)
-class SurfaceSliding:
+@dataclass(frozen=True, repr=False)
+class SurfaceSliding(Shown):
     """Equilibrium under friction of m contact nodes in d = 2 or 3 dimensions.
 
     displacement (n,) [m] relative to the moving supports. normal_force (m,) [N] in compression; friction_force
@@ -64,6 +66,26 @@ class SurfaceSliding:
     resultants: Mapping[str, Resultant] = field(default_factory=dict)
     balance: Balance = Balance(np.nan, np.nan)
     warnings: tuple[str, ...] = ()
+
+    @property
+    def _line(self) -> str:
+        stick, slip = (int(np.count_nonzero(self.status == kind)) for kind in (STICK, SLIP))
+        closed = int(np.count_nonzero(self.active))
+        return (
+            f"{closed} of {counted(len(self.active), 'contact node')} {'carries' if closed == 1 else 'carry'} load "
+            f"({stick} stick, {slip} slip), N = {readable(float(self.normal_force.sum()), 4)} N"
+        )
+
+    def _repr_html_(self) -> str:
+        heads = ("contact", "force on the slave [N]", "pressed area [m²]", "largest pressure [Pa]")
+        rows = [
+            (
+                name, ", ".join(readable(f, 4) for f in r.force),
+                *("" if np.isnan(x) else readable(x, 4) for x in (r.area, r.largest_pressure)),
+            )
+            for name, r in self.resultants.items()
+        ]  # fmt: skip
+        return html_table(f"Steady sliding: {self._line}", heads, rows, self.warnings)
 
     @property
     def slip_speed(self) -> Array:

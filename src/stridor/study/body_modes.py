@@ -10,24 +10,37 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
+from ..digits import hertz, readable
 from ..direct import factorise
 from ..fe.assembly import connected_components
+from ..notebook import Shown, counted, html_table
 from ..system import System
 from ..system.model import Line, Solid
 from ..typing import Array, Sparse
 from .workspace import Problem, Workspace
 
 DENSE = 1500  # freedoms up to which all modes are computed
+FEW = 3  # modes named in one line
 MOST = 40  # modes of a larger body
 
 
-@dataclass(frozen=True)
-class BodyModes:
+@dataclass(frozen=True, repr=False)
+class BodyModes(Shown):
     """Undamped modes of one body alone, supports included: frequency_hz (k,) and what they are
     ("rigid", of beams "F1" bending, "T1" traction, "FT3" mixed, of others "E1"), by frequency."""
 
     frequency_hz: Array
     labels: tuple[str, ...]
+
+    @property
+    def _line(self) -> str:
+        few = zip(self.labels[:FEW], self.frequency_hz[:FEW], strict=True)
+        some = ", ".join(f"{label} {hertz(frequency, 4)}" for label, frequency in few)
+        return some + (f", … {len(self.labels)} in all" if len(self.labels) > FEW else "")
+
+    def _repr_html_(self) -> str:
+        rows = [(label, readable(f)) for label, f in zip(self.labels, self.frequency_hz, strict=True)]
+        return html_table(counted(len(rows), "mode").capitalize(), ("mode", "frequency [Hz]"), rows)
 
 
 def body_modes(problem: Problem, *, max_frequency_hz: float | None = None) -> Mapping[str, BodyModes]:

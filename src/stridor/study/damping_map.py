@@ -11,23 +11,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from ..errors import AnalysisError, CaseError
 from ..modal.source import by_receptance
 from ..system import build_system
-from ..typing import Array, BoolArray
+from ..typing import Array
 from .damping_full import FullSearch, LowestOnset
 from .damping_reduced import ReducedSearch
+from .damping_result import ROUNDING, Confirmed, DampingMap
 from .provenance import provenance
 from .sensitivities import number_at
 from .workspace import Problem, Workspace
 
 MOST_POINTS = 10_000
-ROUNDING = 1e-9
 LARGE = 1000  # freedoms from which a reduced model pays
 MANY = 6  # points of the map, too
 
@@ -35,124 +34,6 @@ Method = Literal["auto", "full", "reduced"]
 FOLLOWED = (
     "onsets are those of modes followed from mu = 0, not sought anew at each point; `stridor onsets` does that for one"
 )
-
-
-@dataclass(frozen=True)
-class Confirmed:
-    """An onset of the reduced model that was solved for again in the full problem: at which x and y, onset_mu there
-    and what the reduced model had said, and the backward error."""
-
-    x: float
-    y: float
-    onset_mu: float
-    reduced_mu: float
-    residual: float
-
-    @property
-    def difference(self) -> float:
-        """By how much the reduced model was off."""
-        return abs(self.onset_mu - self.reduced_mu)
-
-
-@dataclass(frozen=True)
-class DampingMap:
-    """Lowest onset over two numbers x, y of a case: paths, values (nx,) and (ny,).
-
-    onset_mu (nx, ny), frequency_hz there, NaN where nothing grows up to the largest μ. slope_x, slope_y (nx, ny):
-    ∂μ_c/∂x, ∂μ_c/∂y, NaN without onset and where the onset is a double root (no damping at all), whose slope is
-    infinite. undamped_mu: the onset without any damping, None where there is none.
-
-    residual (nx, ny): backward error of each onset in the full problem. method: "full", every point solved there, or
-    "reduced": all onsets are those of one reduced model, error (nx, ny) is what it estimates them to be off, and those
-    in ``confirmed`` were solved for again in the full problem; elsewhere residual is NaN. notes: sentences on how it
-    was done; warnings: on what went wrong.
-    """
-
-    x: str
-    y: str
-    x_values: Array
-    y_values: Array
-    mu_range: tuple[float, float]
-    max_frequency_hz: float
-    onset_mu: Array
-    frequency_hz: Array
-    slope_x: Array
-    slope_y: Array
-    residual: Array
-    undamped_mu: float | None
-    warnings: tuple[str, ...] = ()
-    provenance: dict[str, Any] = field(default_factory=dict)
-    method: Literal["full", "reduced"] = "full"
-    error: Array | None = None
-    confirmed: tuple[Confirmed, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @property
-    def more_x_lowers(self) -> BoolArray:
-        """Where (nx, ny) more of x lowers the onset."""
-        return self._lowers(self.slope_x, self.x_values)
-
-    @property
-    def more_y_lowers(self) -> BoolArray:
-        """Where (nx, ny) more of y lowers the onset."""
-        return self._lowers(self.slope_y, self.y_values)
-
-    @property
-    def below_undamped(self) -> BoolArray:
-        """Where (nx, ny) the damped onset lies below the one without any damping."""
-        if self.undamped_mu is None:
-            return np.isfinite(self.onset_mu)
-        return self.onset_mu < self.undamped_mu * (1 - 1e-9)
-
-    def _lowers(self, slope: Array, values: Array) -> BoolArray:
-        # Over the whole range of the map; what lowers the onset by less than rounding does not lower it.
-        return slope * float(np.ptp(values)) < -ROUNDING * np.nan_to_num(self.onset_mu, nan=np.inf)
-
-    def to_json(self) -> dict[str, Any]:
-        """The document that `stridor damping-map --json` prints; None stands for what does not exist."""
-
-        def plain(values: Array) -> list[list[float | None]]:
-            return [[float(v) if np.isfinite(v) else None for v in row] for row in values]
-
-        return {
-            "x": self.x,
-            "y": self.y,
-            "x_values": self.x_values.tolist(),
-            "y_values": self.y_values.tolist(),
-            "onset_mu": plain(self.onset_mu),
-            "frequency_hz": plain(self.frequency_hz),
-            "slope_x": plain(self.slope_x),
-            "slope_y": plain(self.slope_y),
-            "residual": plain(self.residual),
-            "undamped_mu": self.undamped_mu,
-            "friction_range": list(self.mu_range),
-            "max_frequency_hz": self.max_frequency_hz,
-            "method": self.method,
-            "error": None if self.error is None else plain(self.error),
-            "confirmed": [vars(c) | {"difference": c.difference} for c in self.confirmed],
-            "notes": list(self.notes),
-            "warnings": list(self.warnings),
-        }
-
-    def to_dataset(self) -> Any:
-        """xarray.Dataset with dimensions x and y."""
-        import xarray as xr
-
-        both = ("x", "y")
-        table = {
-            "onset_mu": (self.onset_mu, "lowest critical friction coefficient"),
-            "frequency": (self.frequency_hz, "frequency of the onset [Hz]"),
-            "slope_x": (self.slope_x, f"d onset / d {self.x}"),
-            "slope_y": (self.slope_y, f"d onset / d {self.y}"),
-            "residual": (self.residual, "componentwise backward error"),
-        }
-        if self.error is not None:
-            table["error"] = (self.error, "estimated error of the onset")
-        return xr.Dataset(
-            {name: xr.Variable(both, data, {"long_name": words}) for name, (data, words) in table.items()},
-            coords={"x": self.x_values, "y": self.y_values},
-            attrs={"analysis": "damping map", "x_path": self.x, "y_path": self.y, "method": self.method},
-        )
 
 
 def damping_map(

@@ -16,6 +16,7 @@ from ..case.usual import USUAL
 from ..errors import AnalysisError
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths, pieces
+from ..notebook import Shown, counted, html_table
 from ..sliding import steady_nodes
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
@@ -30,13 +31,21 @@ from .workspace import Problem, Workspace
 
 MOST_THROUGH = 0.2  # of a sliding velocity through a surface: facets on a curve make little of it
 
-@dataclass(frozen=True)
-class Description:
+@dataclass(frozen=True, repr=False)
+class Description(Shown):
     """The model in words and numbers, as `stridor check` prints it."""
 
     lines: tuple[str, ...]
     data: dict[str, Any]
     warnings: tuple[str, ...]
+
+    @property
+    def _line(self) -> str:
+        more = f"; {counted(len(self.warnings), 'warning')}" if self.warnings else ""
+        return self.lines[0] + more
+
+    def _repr_html_(self) -> str:
+        return html_table(self.lines[0], (), (), (*self.lines[1:], *self.warnings))
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""

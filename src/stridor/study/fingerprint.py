@@ -9,15 +9,15 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..case import Case
-from ..errors import CaseError, Problem, shown
+from ..errors import CaseError, Problem
 from ..reading import irregular
+from ..temporal.changes import Difference, as_given
 from ..temporal.trajectory import Trajectory
 
 # Nothing of these reaches the time loop.
@@ -29,22 +29,6 @@ _FILE = re.compile(r"^bodies\..*\.?(file|labels|mesh)$")
 _INPUT = re.compile(rb"\bINPUT\s*=\s*\"?([^,\"\r\n]+)", re.IGNORECASE)
 _LONGEST = 1 << 12  # bytes of a name, which may lie across two blocks
 _LINES = 12
-
-
-@dataclass(frozen=True)
-class Difference:
-    """One number, text or file that another run had: its path in the case, as it was and as it is; None: not given."""
-
-    path: str
-    before: Any
-    after: Any
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain values."""
-        return {"path": self.path, "before": self.before, "after": self.after}
-
-    def __str__(self) -> str:
-        return f"{self.path}: {_shown(self.before)} → {_shown(self.after)}"
 
 
 def fingerprint(case: Case, mu: float | None) -> dict[str, Any]:
@@ -113,28 +97,17 @@ def check_restart(case: Case, mu: float | None, before: Trajectory, *, changed: 
     }
 
 
-def changes_of(run: Trajectory) -> list[str]:
-    """In words, what was changed in the middle of a run, restart by restart; none for a run of one model."""
-    lines: list[str] = []
-    for restart in run.provenance.get("restarts", []):
-        at = f"at t = {restart['time']:.6g} s"
-        lines += [f"{at} {Difference(d['path'], d['before'], d['after'])}" for d in restart["changed"]]
-        if not restart["known"]:
-            lines.append(f"{at} gone on from a file that does not tell its model")
-    return lines
-
-
 def _refused(found: Sequence[Difference]) -> Iterator[Problem]:
     """A line each, and what to do."""
     for number, difference in enumerate(found[:_LINES]):
-        accepted = f"was {_shown(difference.before)} in the run that is gone on from"
+        accepted = f"was {as_given(difference.before)} in the run that is gone on from"
         if number == min(len(found), _LINES) - 1:
             more = f" ({len(found) - _LINES} more differ)" if len(found) > _LINES else ""
             accepted += (
                 f"{more}; a restart takes the model as it was (durations of phases not yet over and what is recorded "
                 "may change); --changed (changed=True) goes on with what differs and records it"
             )
-        yield Problem(f"restart: {difference.path}", _Given(_shown(difference.after)), accepted)
+        yield Problem(f"restart: {difference.path}", _Given(as_given(difference.after)), accepted)
 
 
 class _Given(str):
@@ -225,5 +198,3 @@ def _short(digest: Any) -> Any:
     return f"SHA-256 {digest[:12]}…" if isinstance(digest, str) else digest
 
 
-def _shown(value: Any) -> str:
-    return "not given" if value is None else shown(value)

@@ -7,7 +7,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..digits import readable
 from ..modal.complex_modes import UNSTABLE_RELATIVE
+from ..notebook import Shown, counted, html_table
+from ..tabular import Cell, Rows, Tabular
 from ..typing import BoolArray, ComplexArray, IntArray
 
 Kind = Literal["number", "added mass", "chamfer"]
@@ -28,8 +31,8 @@ class Verified:
     doubt: str = ""
 
 
-@dataclass(frozen=True)
-class Measure:
+@dataclass(frozen=True, repr=False)
+class Measure(Shown):
     """One change of a case.
 
     name: path of a number, body that gets mass, or contact that is chamfered and where. direction: +1 raise, −1 lower.
@@ -55,6 +58,11 @@ class Measure:
     verified: Verified | None = None
 
     @property
+    def _line(self) -> str:
+        again = "" if self.verified is None else f", {self.verified.removed:.4g} 1/s when solved again"
+        return f"{self.words}: takes {self.removed:.4g} 1/s of growth away{again}"
+
+    @property
     def words(self) -> str:
         """The change in words."""
         if self.kind == "added mass":
@@ -65,8 +73,8 @@ class Measure:
         return f"{'raise' if self.direction > 0 else 'lower'} {self.name} by {self.percent:g} %"
 
 
-@dataclass(frozen=True)
-class Countermeasures:
+@dataclass(frozen=True, repr=False)
+class Countermeasures(Tabular):
     """Changes by growth removed per per cent, best first. target: number of a branch, or "sum" of all unstable ones.
 
     branch (b,) and eigenvalues (b,) [1/s] of the modes watched, as the case is; margin: damping ratio below which a
@@ -81,6 +89,43 @@ class Countermeasures:
     margin: float
     warnings: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
+
+    def table(self) -> Rows:
+        """Heads and rows, as its CSV file has them: a row for each change, the best first."""
+        heads = (
+            "mu", "target", "kind", "name", "change", "percent", "mass_kg", "removed_per_percent_1_s",
+            "removed_sum_per_percent_1_s", "removed_1_s", "makes_unstable", "brings_close", "verified_removed_1_s",
+            "verified_frequency_hz", "verified_growth_1_s",
+        )  # fmt: skip
+        rows: list[tuple[Cell, ...]] = []
+        for m in self.measures:
+            again = (None, None, None)
+            if m.verified is not None:
+                again = m.verified.removed, m.verified.frequency_hz, m.verified.growth_rate
+            branches = (" ".join(map(str, numbers)) for numbers in (m.makes_unstable, m.brings_close))
+            rows.append(
+                (
+                    self.mu, str(self.target), m.kind, m.name, m.words, m.direction * m.percent, m.mass,
+                    m.removed_per_percent, m.removed_sum_per_percent, m.removed, *branches, *again,
+                )
+            )  # fmt: skip
+        return heads, rows
+
+    @property
+    def _line(self) -> str:
+        best = f"; best: {self.measures[0].words}" if self.measures else ""
+        return f"{counted(len(self.measures), 'change')} at μ = {self.mu:g}{best}"
+
+    def _repr_html_(self) -> str:
+        heads = ("change", "growth removed per % [1/s]", "removed [1/s]", "solved again [1/s]", "makes unstable")
+        rows = [
+            (
+                m.words, readable(m.removed_per_percent, 4), readable(m.removed, 4),
+                "" if m.verified is None else readable(m.verified.removed, 4), ", ".join(map(str, m.makes_unstable)),
+            )
+            for m in self.measures
+        ]  # fmt: skip
+        return html_table(f"Counter-measures at μ = {self.mu:g}", heads, rows, self.warnings)
 
     def to_json(self) -> dict[str, Any]:
         """The document that `stridor countermeasures --json` prints."""

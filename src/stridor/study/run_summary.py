@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from html import escape
 from typing import Any
 
 import numpy as np
 
 from ..agreement import dominant_response, linear_part
+from ..digits import hertz
+from ..notebook import Shown
 from ..sliding import full_motion, slip_speeds
 from ..temporal.attractor import settled
+from ..temporal.changes import changes_of
 from ..temporal.energy import EnergyBalance, energy_balance
 from ..temporal.signals import Growth, components
 from ..temporal.trajectory import Trajectory
-from .fingerprint import changes_of
 from .workspace import Problem, Workspace
 
 EXPONENTIAL = 0.5  # rms of ln amplitude about the fitted line, above which nothing is called exponential
 LEAST_RECORDS = 128  # from which on components are sought in a run
 
 
-@dataclass(frozen=True)
-class RunSummary:
+@dataclass(frozen=True, repr=False)
+class RunSummary(Shown):
     """What `stridor simulate` prints: the last phase in numbers, the energies, the cost."""
 
     dominant_frequency_hz: float | None
@@ -29,6 +32,16 @@ class RunSummary:
     energy: EnergyBalance
     trajectory: Trajectory
     linear: complex | None = None
+
+    @property
+    def _line(self) -> str:
+        loudest = "no dominant frequency" if self.dominant_frequency_hz is None else hertz(self.dominant_frequency_hz)
+        grows = "" if self.growth_rate is None else f", growth {self.growth_rate:+.4g} 1/s"
+        return f"{loudest}{grows}, energies within {self.energy.error:.0e}"
+
+    def _repr_html_(self) -> str:
+        table = self.trajectory._repr_html_()  # pyright: ignore[reportPrivateUsage]
+        return f"<div><strong>{escape(repr(self)[1:-1])}</strong>{table}</div>"
 
     @property
     def growth_rate(self) -> float | None:

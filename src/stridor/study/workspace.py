@@ -22,6 +22,7 @@ from ..case.messages import problems_of
 from ..case.schema import DEFAULT_PHASES, Comparison, Modal, Phase, Phases, Temporal
 from ..errors import AnalysisError, CaseError
 from ..modal.options import Options
+from ..notebook import Shown, counted
 from ..sliding import full_motion
 from ..sliding.surfaces import SurfaceSliding, steady_nodes
 from ..system import System, build_system
@@ -44,7 +45,7 @@ class _Settings(Table):
     comparison: Comparison = Comparison()
 
 
-class Workspace:
+class Workspace(Shown):
     """A case, or a system alone, and what has been computed for it.
 
     problem: a Case, the path of its file, or a System. Every analysis takes a workspace in place of these; what it
@@ -81,6 +82,16 @@ class Workspace:
     def of(problem: Problem) -> Workspace:
         """The workspace itself, or a new one of a case, its file or a system. Raises CaseError for anything else."""
         return problem if isinstance(problem, Workspace) else Workspace(problem)
+
+    @property
+    def _line(self) -> str:
+        of = self.system() if self._case is None else self._case
+        return f"of {of!r}, {counted(self.answers.count, 'answer')} kept"
+
+    def _repr_html_(self) -> str:
+        of = self.system() if self._case is None else self._case
+        table = of._repr_html_()  # pyright: ignore[reportPrivateUsage]
+        return f"<div>{table}<div>{counted(self.answers.count, 'answer')} kept</div></div>"
 
     @property
     def given(self) -> Case | None:

@@ -17,7 +17,7 @@ from ..contact.interface import Contact, Rows
 from ..contact.nodes import ContactNodes, stack
 from ..contact.surfaces import SurfaceContact
 from ..fe.assembly import connected_components
-from ..notebook import html_table
+from ..notebook import Shown, counted, html_table
 from ..typing import Array, IntArray, Sparse
 from .given_matrices import contacts_given, not_symmetric_definite, points_given, square_matrices, vectors_given
 from .load_steps import LoadStep
@@ -33,6 +33,11 @@ class Answers:
     def __init__(self, of: tuple[Sparse, ...] = ()) -> None:
         self.of = of
         self._known: dict[Hashable, Any] = {}
+
+    @property
+    def count(self) -> int:
+        """How many are known."""
+        return len(self._known)
 
     def once(self, asked: Hashable, answer: Callable[[], T]) -> T:
         """What ``answer`` gives, computed when it is asked for first; what raises is computed again."""
@@ -88,8 +93,8 @@ class CubicSprings:
     stretch: Array | float = 0.0
 
 
-@dataclass(frozen=True)
-class System:
+@dataclass(frozen=True, repr=False)
+class System(Shown):
     """Free freedoms only: mass, damping, stiffness (n, n) csr, contacts not included.
 
     contacts: the sliding pairs. loads: name → force vector (n,) at factor one. motion: moving
@@ -189,6 +194,13 @@ class System:
             dof_names=tuple(f"freedom {k}" for k in range(size)), contact_cubic=cubic,
             not_symmetric_definite=not_symmetric_definite(m, c, k),
         )  # fmt: skip
+
+    @property
+    def _line(self) -> str:
+        points, nodes = len(self.contacts), sum(s.nodes.count for s in self.surfaces)
+        contacts = [counted(points, "point contact")] if points or not nodes else []
+        contacts += [counted(nodes, "contact node")] if nodes else []
+        return f"{self.size} freedoms, {', '.join(contacts)}"
 
     def _repr_html_(self) -> str:
         matrices = (("mass", self.mass), ("damping", self.damping), ("stiffness", self.stiffness))

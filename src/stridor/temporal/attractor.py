@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..digits import readable
+from ..notebook import Shown, html_table
 from ..typing import Array
 from .trajectory import Trajectory
 
@@ -53,8 +55,8 @@ class Settled:
     averages: Averages
 
 
-@dataclass(frozen=True)
-class Spread:
+@dataclass(frozen=True, repr=False)
+class Spread(Shown):
     """Averages over a run and its perturbed copies: runs, perturbation (relative), seed; mean and standard deviation
     (of one run about the mean) of each by contact and name; largest: the lowest and the highest largest normal
     force [N] of all."""
@@ -65,6 +67,19 @@ class Spread:
     mean: dict[str, dict[str, float]]
     deviation: dict[str, dict[str, float]]
     largest: dict[str, tuple[float, float]]
+
+    @property
+    def _line(self) -> str:
+        contacts = ", ".join(self.mean) or "no contact"
+        return f"{self.runs} runs whose starts differ by {self.perturbation:g}, of {contacts}"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (contact, name, readable(value, 4), readable(self.deviation[contact][name], 2))
+            for contact, means in self.mean.items()
+            for name, value in means.items()
+        ]
+        return html_table(f"Spread: {self._line}", ("contact", "what", "mean", "standard deviation"), rows)
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""

@@ -6,6 +6,19 @@ from dataclasses import dataclass
 
 from ..typing import Array, IntArray
 
+# Dimensions and units of what is kept of the nodes.
+NODE_FIELDS = {
+    "owner": (("slave_node",), "1"),
+    "position": (("slave_node", "direction"), "m"),
+    "area": (("slave_node",), "m2"),
+    "tangents": (("slave_node", "tangent", "direction"), "1"),
+    "normal_force": (("node_time", "slave_node"), "N"),
+    "tangential_force": (("node_time", "slave_node", "tangent"), "N"),
+    "slip_velocity": (("node_time", "slave_node", "tangent"), "m/s"),
+    "gap": (("node_time", "slave_node"), "m"),
+    "status": (("node_time", "slave_node"), "1"),
+}
+
 
 @dataclass(frozen=True)
 class NodeHistory:

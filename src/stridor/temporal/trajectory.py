@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..digits import readable
-from ..notebook import html_table
+from ..notebook import Shown, html_table
 from ..typing import Array, IntArray
 from .node_history import NodeHistory
+from .tables import STATUS, run_dataset, run_frame
 
-STATUS = ("separation", "stick", "slip")
+__all__ = ["HISTORIES", "STATUS", "ContactStatistics", "PhaseResult", "Trajectory"]
+
 # Fields of a Trajectory with a row for each record, beside its works.
 HISTORIES = (
     "time",
@@ -60,8 +62,8 @@ class PhaseResult:
     contacts: Mapping[str, ContactStatistics]
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, repr=False)
+class Trajectory(Shown):
     """A temporal run. r records, m contacts, w watched points.
 
     time (r,) [s]; normal_force, tangential_force (r, m) [N], slip_speed (r, m) [m/s], gap (r, m) [m],
@@ -103,6 +105,22 @@ class Trajectory:
     state: Mapping[str, Array] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
     nodes: NodeHistory | None = None
+
+    def to_xarray(self) -> Any:
+        """xarray.Dataset of all that was recorded, as `st.save` writes it."""
+        return run_dataset(self)
+
+    def to_dataframe(self) -> Any:
+        """pandas.DataFrame over time [s]: "A.normal_force_n", "beam1.tip.velocity_x_m_s", energies and works [J].
+        Raises AnalysisError where pandas, which comes with xarray, is missing."""
+        return run_frame(self)
+
+    @property
+    def _line(self) -> str:
+        end = float(self.time[-1]) if len(self.time) else 0.0
+        cut = f", interrupted after {self.steps} of {self.planned_steps} steps" if self.interrupted else ""
+        phases = ", ".join(phase.name for phase in self.phases)
+        return f"{phases} up to t = {end:g} s, {len(self.time)} records every {self.sampling:g} s{cut}"
 
     def _repr_html_(self) -> str:
         heads = ("phase", "contact", "stick", "slip", "separation", "largest N [N]", "largest slip speed [m/s]")

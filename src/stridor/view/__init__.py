@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from . import plots
     from .inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
     from .plots import (
+        Animation,
         acceleration_history,
+        animate,
         contact_force_and_velocity,
         contact_history,
         contact_map,
@@ -25,7 +27,9 @@ if TYPE_CHECKING:
         growth_comparison,
         interface_energy,
         mesh,
+        mode,
         mode_shape,
+        model,
         model_plot,
         perturbation_growth,
         phase_portrait,
@@ -40,11 +44,13 @@ if TYPE_CHECKING:
     from .sensitivity_plots import countermeasure_bars, damping_map, sensitivity_bars
 
 __all__ = [
+    "Animation",
     "BodyModes",
     "FrictionCurve",
     "NamedShape",
     "ReportInputs",
     "acceleration_history",
+    "animate",
     "contact_force_and_velocity",
     "contact_history",
     "contact_map",
@@ -59,7 +65,9 @@ __all__ = [
     "growth_comparison",
     "interface_energy",
     "mesh",
+    "mode",
     "mode_shape",
+    "model",
     "model_plot",
     "perturbation_growth",
     "phase_portrait",

@@ -20,7 +20,7 @@ NEAR = 0.05  # of the frequency: an onset whose modes have no numbers belongs to
 def mechanism_table(inputs: ReportInputs) -> Table | None:
     """How each mode that grows at the friction of the case comes to do so, by the onset it goes back to; None where
     nothing grows or no onsets were solved."""
-    modes, onsets = inputs.modes, inputs.damped_onsets or inputs.undamped_onsets
+    modes, onsets = inputs.modes, inputs.onsets
     if modes is None or onsets is None:
         return None
     mu = float(modes.mu[0])

@@ -58,8 +58,8 @@ def first_onset(inputs: ReportInputs) -> Onset | None:
 def modal_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     """Branches over friction, the pair that meets first, the friction curve, the root locus."""
     onset = first_onset(inputs)
-    undamped = inputs.undamped_pair or inputs.undamped_sweep
-    damped = inputs.damped_pair or inputs.damped_sweep
+    undamped = inputs.undamped_sweep if inputs.undamped_pair is None else inputs.undamped_pair
+    damped = inputs.damped_sweep if inputs.damped_pair is None else inputs.damped_pair
     if onset is not None and onset.kind == "flutter":
         if undamped is not None and _holds(undamped, onset):
             yield from _undamped_pair(inputs, undamped, onset)

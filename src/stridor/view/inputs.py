@@ -113,6 +113,11 @@ class ReportInputs:
         return self.case.modal.max_frequency_hz
 
     @property
+    def onsets(self) -> Onsets | None:
+        """The damped onsets, else the undamped ones."""
+        return self.undamped_onsets if self.damped_onsets is None else self.damped_onsets
+
+    @property
     def dominant_hz(self) -> float | None:
         """Dominant frequency of the run at mu, from the comparison or the operating shape [Hz]; of a run that still
         grows there is none."""

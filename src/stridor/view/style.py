@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import wraps
+from io import BytesIO
 from typing import ParamSpec, TypeVar
 
 import matplotlib as mpl
@@ -22,6 +23,7 @@ INK, GREY, FAINT = "#222222", "#767676", "#D9D9D9"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 STATUS_COLOURS = {"stick": "#C7DDF0", "slip": "#F8F3DF", "separation": "#F6CFA8"}
 
+SCREEN_DPI = 110  # in notebooks
 WIDTH = 7.6  # inches: the text width of a report
 DRAWN_COLUMNS = 1400  # pieces that a long history is drawn in
 DRAWN_POINTS = 20 * DRAWN_COLUMNS  # histories shorter than this are drawn as they are
@@ -113,9 +115,18 @@ def lay_out(figure: Figure) -> None:
     figure.set_layout_engine(None)
 
 
+class ShownFigure(Figure):
+    """A figure that notebooks show by itself, without pyplot and without a word to the kernel before."""
+
+    def _repr_png_(self) -> bytes:
+        held = BytesIO()
+        self.savefig(held, format="png", dpi=SCREEN_DPI)
+        return held.getvalue()
+
+
 def new_figure(height: float = 3.6, width: float = WIDTH) -> Figure:
     """An empty figure [inches] that belongs to no window and needs no display."""
-    return Figure(figsize=(width, height), layout="constrained")
+    return ShownFigure(figsize=(width, height), layout="constrained")
 
 
 def panel(ax: Axes | None, height: float = 3.6, width: float = WIDTH) -> tuple[Figure, Axes]:

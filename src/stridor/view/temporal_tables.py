@@ -292,7 +292,7 @@ def computed_values(inputs: ReportInputs, window: Window | None) -> dict[str, tu
         values["growth_rate"] = (agreement.comparisons[0].modal_eigenvalue.real, "modal")
     if agreement is not None and agreement.critical_mu_temporal is not None:
         values["critical_mu_temporal"] = (agreement.critical_mu_temporal, "bisection in time")
-    first = inputs.damped_onsets.first if inputs.damped_onsets else None
+    first = None if inputs.damped_onsets is None else inputs.damped_onsets.first
     if first is not None:
         values["critical_mu_modal"] = (first.mu, "first damped onset")
     elif agreement is not None and agreement.critical_mu_modal is not None:

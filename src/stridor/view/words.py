@@ -11,8 +11,8 @@ from ..case import Case
 from ..case.matrix_checks import MU
 from ..case.schema import Load
 from ..digits import measured
-from ..study.fingerprint import changes_of
 from ..study.saturation import Unsaturated
+from ..temporal.changes import changes_of
 from .body_words import body_words, contact_words
 from .inputs import ReportInputs
 from .tables import Row, Table, drop_empty, significant
@@ -59,7 +59,7 @@ def verdict(inputs: ReportInputs) -> Verdict:
 
 def _undecided(inputs: ReportInputs) -> str:
     """The headline where there are no modes at one friction coefficient."""
-    onsets = inputs.damped_onsets or inputs.undamped_onsets
+    onsets = inputs.onsets
     first = None if onsets is None else onsets.first
     if first is not None:
         return f"It may squeal from μ = {measured(first.mu, 4)} on, at {measured(first.frequency_hz, 0)} Hz"
@@ -113,7 +113,7 @@ def _modal_sentence(growing: list[tuple[float, float]] | None, state: str) -> st
 
 
 def _onset_sentence(inputs: ReportInputs) -> str:
-    onsets = inputs.damped_onsets or inputs.undamped_onsets
+    onsets = inputs.onsets
     if onsets is None:
         return ""
     low, high = onsets.friction_range

@@ -11,7 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from ...digits import hertz, readable
 from ...errors import CaseError
+from ...notebook import Shown, counted, html_table
+from ...tabular import Rows, Tabular
 from ...threads import one_thread
 from ...typing import ComplexArray
 from ..newton import Root, crossing, meeting, standstill
@@ -19,6 +22,7 @@ from ..onset import Onset, from_above
 from ..options import Options
 from ..parametric import ReducedModel
 from ..parametric.basis import expanded
+from ..tables import ONSET
 from .branches import ends_of
 from .counted import ends as turns
 from .line import OnTerms, ParameterLine, of_model
@@ -29,8 +33,8 @@ from .words import sentence
 NEAR = 1e-3  # of the range and of λ: how far from the reduced model's onset the full problem's may be
 
 
-@dataclass(frozen=True)
-class ParametricOnset:
+@dataclass(frozen=True, repr=False)
+class ParametricOnset(Shown):
     """A mode becomes unstable (or stable, ``stabilising``, as the parameter grows) at ``value`` of ``parameter``.
 
     point: values of all parameters there. kind: "flutter" or "divergence". growth_slope: dRe λ/dp [1/s per unit], None
@@ -52,6 +56,11 @@ class ParametricOnset:
     square_root_coefficient: float | None = None
     enters_at: float | None = None
 
+    @property
+    def _line(self) -> str:
+        ends = ", where growth ends" if self.stabilising else ""
+        return f"{self.parameter} = {self.value:.6g}, {hertz(self.frequency_hz)}, {self.kind}{ends}"
+
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
         return {
@@ -66,7 +75,7 @@ class ParametricOnset:
         }
 
 
-class ParametricOnsets(tuple[ParametricOnset, ...]):
+class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
     """Onsets in ascending order, of a parameter over a range up to max_frequency_hz. complete: whether as many roots
     grow, wherever that was looked at, as they say; sentence: that in words. notes: what else was taken how."""
 
@@ -100,6 +109,37 @@ class ParametricOnsets(tuple[ParametricOnset, ...]):
             "complete": self.complete,
             "notes": list(self.notes),
         }
+
+    def table(self) -> Rows:
+        """Heads and rows, as its CSV file has them: a row for each onset."""
+        return ONSET, [
+            (
+                o.parameter, o.value, o.frequency_hz, o.kind, o.stabilising, None, None, o.growth_slope,
+                o.square_root_coefficient, o.enters_at, o.residual,
+            )
+            for o in self
+        ]  # fmt: skip
+
+    @property
+    def _line(self) -> str:
+        low, high = self.between
+        first = next((o for o in self if not o.stabilising), None)
+        begins = "" if first is None else f"; growth begins at {first.value:.6g}, {hertz(first.frequency_hz)}"
+        return f"{len(self) or 'none'} for {self.parameter} from {low:g} to {high:g}{begins}"
+
+    def _repr_html_(self) -> str:
+        heads = (self.parameter, "frequency [Hz]", "what", "growth", "slope [1/s]", "residual")
+        rows = [
+            (
+                f"{o.value:.6g}", readable(o.frequency_hz), o.kind, "ends" if o.stabilising else "begins",
+                "" if o.growth_slope is None else readable(o.growth_slope, 4),
+                "" if o.residual is None else f"{o.residual:.0e}",
+            )
+            for o in self
+        ]  # fmt: skip
+        low, high = self.between
+        title = f"{counted(len(self), 'onset')} for {self.parameter} from {low:g} to {high:g}"
+        return html_table(title, heads, rows, (*self.from_above_words(), self.sentence, *self.notes))
 
     def from_above_words(self) -> list[str]:
         """Onsets above the band whose mode comes into it, a line each."""

@@ -18,6 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...digits import hertz, readable
+from ...notebook import Shown, counted, html_table
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from ..tolerances import UNSTABLE_RELATIVE
@@ -28,8 +30,8 @@ from .problem import ParametricProblem
 REACH = 1.0 + 1e-9
 
 
-@dataclass(frozen=True)
-class ReducedModes:
+@dataclass(frozen=True, repr=False)
+class ReducedModes(Shown):
     """Modes at one point of the box: λ (k,) [1/s], residual (k,) of the full problem (scaled, both sides' larger one),
     error (k,) estimated of λ, relative; passed (k,): whether that is below the bound asked for. point: the values of
     the parameters; inside: whether they lie in the box. right, left (r, k) are the vectors on the basis."""
@@ -42,6 +44,21 @@ class ReducedModes:
     inside: bool
     right: ComplexArray
     left: ComplexArray
+
+    @property
+    def _line(self) -> str:
+        point = ", ".join(f"{name} = {value:g}" for name, value in self.point.items())
+        growing = int(self.unstable.sum())
+        return f"{counted(len(self.values), 'mode')} at {point}; {growing or 'none'} unstable"
+
+    def _repr_html_(self) -> str:
+        heads = ("frequency [Hz]", "growth [1/s]", "", "estimated error")
+        rows = [
+            (readable(f), readable(g, 4), "unstable" if u else "", f"{e:.0e}")
+            for f, g, u, e in zip(self.frequency_hz, self.growth_rate, self.unstable, self.error, strict=True)
+        ]
+        outside = "" if self.inside else "outside the box of the model"
+        return html_table(f"Reduced modes: {self._line}", heads, rows, (outside,))
 
     @property
     def frequency_hz(self) -> Array:
@@ -59,8 +76,8 @@ class ReducedModes:
         return self.values.real > UNSTABLE_RELATIVE * np.abs(self.values)
 
 
-@dataclass(frozen=True)
-class ReducedModel:
+@dataclass(frozen=True, repr=False)
+class ReducedModel(Shown):
     """Basis V (n, r), projected terms (t, r, r), sketches (t, s, r) of the scaled A_jV and A_jᵀV; frequency [1/s]:
     modes up to it are promised. constant: of the error estimate; bound: the relative error promised in the box;
     seconds and solves that making it took, by part; whole: damping is so strong that points take the whole companion
@@ -77,6 +94,16 @@ class ReducedModel:
     seconds: Mapping[str, float]
     solves: int
     whole: bool = False
+
+    @property
+    def _line(self) -> str:
+        ranges = ", ".join(f"{p.name} from {p.low:g} to {p.high:g}" for p in self.problem.parameters)
+        full = f"{self.size} of {self.vectors.shape[0]} unknowns"
+        return f"{full} over {ranges}, modes up to {hertz(self.frequency / (2 * np.pi))} within {self.bound:g}"
+
+    def _repr_html_(self) -> str:
+        rows = [(p.name, f"{p.low:g}", f"{p.high:g}") for p in self.problem.parameters]
+        return html_table(f"Reduced model: {self._line}", ("number", "from", "to"), rows)
 
     @property
     def size(self) -> int:

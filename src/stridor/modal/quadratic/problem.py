@@ -9,18 +9,24 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ...notebook import Shown
 from ...typing import Array, ComplexArray, IntArray, Sparse
 
 CHUNK = 64  # columns worked on at a time
 
 
-@dataclass(frozen=True)
-class Quadratic:
+@dataclass(frozen=True, repr=False)
+class Quadratic(Shown):
     """(λ²M + λD + K) x = 0 with real csr matrices (n, n), of which none needs symmetry or full rank."""
 
     mass: Sparse
     damping: Sparse
     stiffness: Sparse
+
+    @property
+    def _line(self) -> str:
+        entries = ", ".join(f"{name} {m.nnz}" for name, m in zip("MDK", self.matrices(), strict=True))
+        return f"λ²M + λD + K of {self.size} unknowns, entries: {entries}"
 
     @property
     def size(self) -> int:
