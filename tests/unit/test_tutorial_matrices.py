@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
-import shlex
 import shutil
 from pathlib import Path
 
@@ -12,12 +10,10 @@ import numpy as np
 import pytest
 
 import stridor as st
-from program import stridor
+from pages import ROOT, Page
 from rubbing_block import rubbing_block
 
-DOCS = Path(__file__).parents[2] / "docs"
-BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-SHOWN = "$ "  # before a command whose output follows
+DOCS = ROOT / "docs"
 
 
 @pytest.fixture(scope="module")
@@ -26,45 +22,14 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
     folder = tmp_path_factory.mktemp("tutorial")
     for file in (DOCS / "tutorial-matrices").iterdir():
         shutil.copy(file, folder)
-    printed: dict[str, str] = {}
-    for language, text in BLOCK.findall((DOCS / "tutorial-matrices.md").read_text(encoding="utf-8")):
-        if language == "toml":
-            name = re.match(r"# (\S+\.toml)\n", text)
-            assert name, f"which file is this?\n{text}"
-            (folder / name[1]).write_text(text, encoding="utf-8")
-        elif language == "python":
-            with contextlib.chdir(folder):
-                exec(compile(text, "tutorial-matrices.md", "exec"), {})
-        else:
-            for line in text.splitlines():
-                command = line.removeprefix(SHOWN)
-                if command.startswith("stridor "):
-                    done = stridor(*shlex.split(command)[1:], cwd=folder)
-                    assert done.returncode == 0, f"{command}\n{done.stderr}"
-                    assert "note" not in done.stderr
-                    printed[command] = done.stdout
-                    if line != command:
-                        _assert_shown(text.splitlines()[1:], done.stdout)
-    return folder, printed
-
-
-def _assert_shown(lines: list[str], output: str) -> None:
-    """What is shown stands at the beginning of the output; of numbers below 1e-9 it is that they are."""
-    for shown, printed in zip(lines, output.splitlines(), strict=False):
-        words, own = shown.split(), printed.split()
-        assert len(words) == len(own), (shown, printed)
-        for word, mine in zip(words, own, strict=True):
-            try:
-                values = float(word), float(mine)
-            except ValueError:
-                assert word == mine
-            else:
-                assert values[0] == pytest.approx(values[1], rel=1e-3, abs=1e-9)
+    page = Page(DOCS / "tutorial-matrices.md", folder, slow=False).follow()
+    assert "note" not in page.warned
+    return folder, page.printed
 
 
 def test_every_command_is_run(followed: tuple[Path, dict[str, str]]) -> None:
     verbs = [command.split()[1] for command in followed[1]]
-    assert verbs == ["new", "export", "matrices", "modes", "modes", "export", "onsets", "modes", "check", "onsets"]
+    assert verbs == ["new", "export", "matrices", "modes", "sensitivities", "countermeasures", "modes", "export", "onsets", "modes", "check", "onsets"]
 
 
 def test_what_the_text_says(followed: tuple[Path, dict[str, str]]) -> None:
