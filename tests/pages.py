@@ -2,8 +2,8 @@
 
 Fenced blocks without a language, or `sh`, hold commands: `stridor …` is run, lines after `$ stridor …` are its output. `toml`
 blocks that begin with a comment `# name.toml` are written as that file; others are parts of case files, whose keys and values
-must be known. `python` blocks run in one namespace; `expression  # → value` shows what comes out. Notes for this engine are
-comments of the page, before a block unless said otherwise:
+must be known. `python` blocks run in one namespace; `expression  # → value` shows what comes out, on a line of its own
+`# → value` what the line above gives. Notes for this engine are comments of the page, before a block unless said otherwise:
 
     <!-- not run: why -->                  the options of its commands are read, its Python is compiled, no more
     <!-- slow -->, <!-- slow: run -->      the block, or commands of these verbs, in the weekly run alone
@@ -141,10 +141,12 @@ class Page:
     def _python(self, code: str) -> None:
         with contextlib.chdir(self.folder):
             exec(compile(code, self.path.name, "exec"), self.names)
+            before = ""
             for line in code.splitlines():
                 expression, shows, value = line.partition("# → ")
                 if shows:
-                    assert_shown([value], str(eval(expression.strip(), self.names)), half=True)
+                    assert_shown([value], str(eval(expression.strip() or before, self.names)), half=True)
+                before = line
 
     def _held(self, numbers: list[str], paragraph: str) -> None:
         output = self.printed[str(self.last)]
