@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import pickle
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import BaseModel
 from scipy.interpolate import PchipInterpolator
 
 from stridor.case import Case, PointRef, load, loads, template_text, templates
@@ -217,6 +221,29 @@ def test_copies_take_numpy_numbers_and_tables(bench: Case):
 def test_cases_are_frozen(bench: Case):
     with pytest.raises(ValueError, match="frozen"):
         bench.title = "other"  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@pytest.mark.parametrize("name", templates())
+def test_what_a_case_holds_is_frozen_in_copies_too(name: str):
+    case = loads(template_text(name))
+    for kept in (case, pickle.loads(pickle.dumps(case)), copy.deepcopy(case), case.model_copy()):
+        assert kept == case
+        table: Any = kept.contacts
+        name = next(iter(table))
+        changes = {"update": ({"B": table[name]},), "pop": (name,), "__setitem__": (name, None), "__delitem__": (name,),
+                   "__ior__": ({},), "setdefault": ("B", None), "clear": (), "popitem": ()}  # fmt: skip
+        for method, given in changes.items():
+            with pytest.raises(TypeError, match=r"a case is frozen; vary it by copy: case\.with_"):
+                getattr(table, method)(*given)
+        assert not set(map(type, held(kept))) & {dict, list, set}
+
+
+def held(value: object) -> Iterator[object]:
+    """Everything in a case, tables left to their defaults too."""
+    yield value
+    parts = vars(value).values() if isinstance(value, BaseModel) else value.values() if isinstance(value, dict) else ()
+    for part in parts if not isinstance(value, tuple) else value:
+        yield from held(part)
 
 
 # -- the text ------------------------------------------------------------------------------------------------

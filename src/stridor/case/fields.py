@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, NoReturn
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -33,7 +33,24 @@ def is_zero(vector: tuple[float, ...]) -> bool:
     return max(map(abs, vector)) < 1.0 / MOST
 
 
+class FrozenTable(dict[str, Any]):
+    """A table by names that does not change: a dict that refuses, pickled and copied as one."""
+
+    def _refused(self, *_: object, **__: object) -> NoReturn:
+        raise TypeError('a case is frozen; vary it by copy: case.with_({"contacts.A.friction.coefficient": 0.3})')
+
+    __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refused  # pyright: ignore
+
+    def __reduce__(self) -> tuple[type[FrozenTable], tuple[dict[str, Any]]]:
+        return FrozenTable, (dict(self),)  # item by item, as dicts are, would be refused
+
+
 class Table(BaseModel):
-    """A table of the case file: frozen, and without keys it does not know."""
+    """A table of the case file: frozen, with what it holds, and without keys it does not know."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Freeze tables by names, of which defaults pass no validator."""
+        values = vars(self)
+        values.update({name: FrozenTable(value) for name, value in values.items() if isinstance(value, dict)})
