@@ -51,6 +51,17 @@ class Answer:
         """Growing modes that pass the highest frequency, where that was counted."""
         return () if self.seen is None else self.seen.passing
 
+    @property
+    def unplaced(self) -> tuple[Passing, ...]:
+        """Those that come into the band, none having left it before, whose growth no onset that is listed begins."""
+        came: list[Passing] = []
+        left, listed = 0, sum(o.enters_at is not None for o in self.onsets)
+        for one in self.passing:
+            if one.roots > 0 and not left:
+                came.append(one)
+            left = max(0, left - np.sign(one.roots))
+        return tuple(came[listed:])
+
 
 def search(
     family: Family, make: Sequence[Callable[[], Along]], between: tuple[float, float],

@@ -1,8 +1,9 @@
 """Shapes that the basis of one stretch of μ hands on to the next, in which a few other nodes touch.
 
 Where contact has a stiffness, a shape u is one of every set of touching nodes, with the forces p = −N u / c that these
-have of it. So the next basis begins with the modes of the last one and what friction made of them, and is enriched
-from there. Whether no frictionless mode lacks is counted anew, whichever way a basis began.
+have of it: nodes that touched before keep theirs, which are right to more digits. So the next basis begins with the
+modes of the last one and what friction made of them, and is enriched from there. Whether no frictionless mode lacks is
+counted anew, whichever way a basis began.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 import scipy.linalg as sl
 
 from ...errors import AnalysisError
-from ...typing import Array
+from ...typing import Array, IntArray
 from .problem import ContactProblem
 from .reduced import Reduced
 from .shifted import ForcedShapes, Shifted
@@ -23,16 +24,17 @@ STIFFEST = 1e3  # times the structure's stiffness: forces of contact stiffer tha
 
 @dataclass
 class Carried:
-    """Shapes (n, k) that the last basis had, frictionless modes first, of which there are ``modes``, for a band up to
-    ``frequency`` [1/s]; empty at first."""
+    """Shapes that the last basis had, with forces of the nodes that ``touching`` names, frictionless modes first, of
+    which there are ``modes``, for a band up to ``frequency`` [1/s]; empty at first."""
 
-    shapes: Array | None = None
+    shapes: ForcedShapes | None = None
+    touching: IntArray | None = None
     modes: int = 0
     frequency: float = 0.0
 
     def fit(self, problem: ContactProblem, frequency: float) -> bool:
         """Whether a basis of the problem up to a frequency [1/s] can begin with them."""
-        if self.shapes is None or frequency != self.frequency or len(self.shapes) != problem.size:
+        if self.shapes is None or frequency != self.frequency or len(self.shapes.u) != problem.size:
             return False
         softest = 1.0 / (STIFFEST * float(np.abs(problem.stiffness.data).max(initial=0.0)) or 1.0)
         return bool(np.all(problem.compliance >= softest))
@@ -40,7 +42,11 @@ class Carried:
     def basis(self, problem: ContactProblem, shifted: Shifted, top: float, highest: float) -> tuple[Reduced, Array]:
         """The problem on them, and ω² (k,) of its modes without friction, ascending."""
         assert self.shapes is not None, "only where they fit"
-        every = ForcedShapes(self.shapes, -(problem.normal @ self.shapes) / problem.compliance[:, None])
+        assert self.touching is not None, "they have forces"
+        forces = -(problem.normal @ self.shapes.u) / problem.compliance[:, None]
+        _, now, before = np.intersect1d(problem.touching, self.touching, return_indices=True)
+        forces[now] = self.shapes.p[before]
+        every = ForcedShapes(self.shapes.u, forces)
         first = np.eye(every.count)[:, : self.modes]
         reduced = Reduced(problem, shifted, every.combined(first), top, highest)
         reduced.add(every.combined(np.eye(every.count)[:, self.modes :]))
@@ -50,7 +56,8 @@ class Carried:
         """Keep the modes without friction up to ``beyond`` times the band, and what the basis has found to be exact."""
         squares, vectors = _frictionless(reduced)
         near = vectors[:, squares <= (beyond * reduced.frequency) ** 2]
-        self.shapes = reduced.pairs.u @ np.hstack([near, reduced.exact])
+        self.shapes = reduced.pairs.combined(np.hstack([near, reduced.exact]))
+        self.touching = reduced.problem.touching
         self.modes, self.frequency = near.shape[1], reduced.frequency
 
 

@@ -88,8 +88,8 @@ def krylov_onsets(
     for passage in way.passages:
         stage(f"onset {len(changes) + 1}, solved in the full problem")
         concerned = (passage.branch, passage.partner) if passage.kind == "meeting" else (passage.branch,)
-        # What begins beyond the band counts where it comes into it.
-        matters = not passage.stabilising and way.entries.after(concerned, passage.low, np.inf) is not None
+        # What begins beyond the band counts where it comes into it, unless it ends before.
+        matters = way.entries.after(concerned, passage.low, np.inf) is not None
         if _is_above(passage, top * CLEARLY_ABOVE) and not matters:
             continue
         limit = max_frequency_hz * (follow * MOST_ABOVE if matters else 1.0)

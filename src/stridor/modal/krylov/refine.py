@@ -25,6 +25,7 @@ from .shifted import Shifted, frictionless_modes, modes_below, real_columns, shi
 TOLERANCE = 2e-11  # backward error at which an eigenpair counts as found: eigenvalues are right to 1e-9 then
 LARGEST_REST = 1e-4  # and what it may leave of the lumped inertia forces
 SWEEPS = 40
+IDLE = 4  # sweeps in a row that do not halve what is left: it is rounding
 WIDEST = 64  # right sides of one enrichment
 WEAKEST = 1e-3  # of the strongest direction: residuals below it wait for the next sweep
 COUNTED = 20_000  # freedoms up to which the number of frictionless modes is checked, by one more factorisation
@@ -124,6 +125,8 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
     stuck: list[float] = []
     pending = list(dict.fromkeys(float(mu) for mu in frictions))
     worst: dict[float, float] = dict.fromkeys(pending, np.inf)
+    least = dict(worst)
+    idle = dict.fromkeys(pending, 0)
     for _ in range(SWEEPS):
         if not pending:
             break
@@ -131,6 +134,13 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
         for mu in list(pending):
             worst[mu], force, opening = unbalanced(reduced, mu, tolerance, left=left)
             if not force.shape[1] and not opening.shape[1]:
+                pending.remove(mu)
+                found = reduced.eigenpairs(mu)
+                reduced.keep(found.right[:, wanted(reduced, found)])
+                continue
+            idle[mu] = 0 if worst[mu] < 0.5 * least[mu] else idle[mu] + 1
+            least[mu] = min(least[mu], worst[mu])
+            if idle[mu] >= IDLE and worst[mu] <= BELIEVED:  # rounding, which basis vectors are not made of
                 pending.remove(mu)
                 found = reduced.eigenpairs(mu)
                 reduced.keep(found.right[:, wanted(reduced, found)])
