@@ -658,7 +658,7 @@ OVERRIDES = {
     "contacts.B.friction.coefficient=0.3": "contacts.B: no such contact; the case has: A",
     "contacts.A.friction.coeficient=0.3": "contacts.A.friction.coeficient: unknown key; did you mean 'coefficient'? accepted: law, coefficient",
     "phases.2.duration=1": "phases.2: no such item; the list has: 0 (press), 1 (slide)",
-    "phases.slid.duration=1": "phases.slid: no such item; the list has: 0 (press), 1 (slide)",
+    "phases.slid.duration=1": "phases.slid: no such item; did you mean 'slide'? the list has: 0 (press), 1 (slide)",
     "bodies.pin.length.x=1": "bodies.pin.length.x: bodies.pin.length is 0.05, not a table",
     "contcts.A.stiffness=1": "contcts: unknown key; did you mean 'contacts'? accepted: title, units, parameters, materials, bodies, supports, loads, contacts, ties, springs, dashpots, phases, steady, modal, temporal, comparison, reference",
     "contacts.A.friction.coefficient=.3": "contacts.A.friction.coefficient: '.3' – not a value; accepted: a number such as 0.3, true, false, a word, \"a text\", [a, list], { a = table }",

@@ -29,7 +29,8 @@ class _Location:
     """Where the walk has come to: the path, the type wanted and the value written there, and what it must be.
 
     table: the table that the last key belongs to, with its alternatives where a tag chose it among several;
-    keys: the only keys accepted here, where they are words of a list rather than names.
+    around: the table that holds that one; keys: the only keys accepted here, where they are words of a list rather than
+    names.
     """
 
     path: tuple[str | int, ...]
@@ -38,6 +39,7 @@ class _Location:
     description: str = ""
     table: type[BaseModel] | None = None
     alternatives: tuple[type[BaseModel], ...] = ()
+    around: type[BaseModel] | None = None
     keys: tuple[str, ...] = ()
 
 
@@ -106,6 +108,7 @@ def _reach(loc: Sequence[str | int], data: object, root: type[BaseModel]) -> _Lo
                 description=description,
                 table=tables[0],
                 alternatives=alternatives,
+                around=location.table,
             )
         elif (entries := _entries(location.annotation, step)) is not None:
             keys, annotation = entries
@@ -120,11 +123,28 @@ def _unknown_key(location: _Location) -> tuple[Problem, str]:
     """The problem, and the key that was probably meant ("" if unclear)."""
     assert location.table is not None, "only tables have unknown keys"
     key, where, accepted = str(location.path[-1]), dotted(location.path), ", ".join(location.table.model_fields)
+    if (problem := _too_deep(location.path[:-1], key, location.value, location.around)) is not None:
+        return problem, ""
     if any(key in table.model_fields for table in location.alternatives):
         tag = _tags(location.table)[0]
         return Problem(where, location.value, f"not used by {tag!r}; accepted: {accepted}"), ""
     unknown = f"unknown key{choice(key, location.table.model_fields, 'accepted')}"
     return Problem(where, None, unknown), nearest(key, location.table.model_fields)
+
+
+def _known(key: str, tables: Sequence[type[BaseModel]]) -> bool:
+    return any(key in table.model_fields for table in tables)
+
+
+def _too_deep(
+    path: tuple[str | int, ...], key: str, value: object, around: type[BaseModel] | None
+) -> Problem | None:
+    """The problem of a key in the table at a path that belongs to the table around it; None where it does not."""
+    if around is None or len(path) < 2 or key not in around.model_fields or path[-1] not in around.model_fields:
+        return None
+    instead = ", instead of mesh" if (path[-1], key) == ("mesh", "file") else ""
+    accepted = f"belongs one table further out: {dotted((*path[:-1], key))}{instead}"
+    return Problem(dotted((*path, key)), value, accepted)
 
 
 def _bad_key(location: _Location) -> Problem:
@@ -140,7 +160,9 @@ def _bad_tag(location: _Location) -> Problem:
     where, given = dotted((*location.path, tag)), _item(location.value, tag)
     accepted = tables[0].model_fields[tag].description
     if given is None:
-        return Problem(where, None, f"missing – give {accepted}")
+        keys = [key for key in cast("Mapping[str, object]", location.value) if not _known(key, tables)]
+        deep = (_too_deep(location.path, key, _item(location.value, key), location.table) for key in keys)
+        return next((problem for problem in deep if problem), Problem(where, None, f"missing – give {accepted}"))
     suggestion = nearest(str(given), [word for table in tables for word in _tags(table)])
     return Problem(where, given, f"must be {accepted}{did_you_mean(suggestion)}")
 

@@ -77,7 +77,10 @@ class Case(Shown, Table):
     comparison: Comparison = Field(default=Comparison(), description="a table [comparison]")
     reference: Reference | None = Field(default=None, description="a table [reference]")
 
-    def __init__(self, /, **tables: Any) -> None:
+    def __init__(self, /, *unnamed: object, **tables: Any) -> None:
+        if unnamed:
+            accepted = "tables are given by name, Case(bodies={…}, contacts={…}); stridor.load takes the path of a file"
+            raise CaseError("case", f"a {type(unnamed[0]).__name__}", accepted)
         data = as_written(tables)
         try:
             super().__init__(**data)

@@ -14,7 +14,7 @@ from typing import Any, cast
 
 from ..errors import CaseError, Problem, shown
 from .outsized import deep_line
-from .points import no_such
+from .points import choice, did_you_mean, nearest, no_such
 from .schema import DEFAULT_PHASES, SINGULAR
 
 _HOW = "write an override as path=value, such as contacts.A.friction.coefficient=0.3"
@@ -80,7 +80,7 @@ def apply(data: dict[str, Any], path: tuple[str, ...], value: object) -> list[Pr
             items = cast("list[Any]", node)
             number = _number(items, step)
             if number is None:
-                return [Problem(here, None, _no_item(items))]
+                return [Problem(here, None, _no_item(items, step))]
             if last:
                 _put(items, number, value)
             else:
@@ -98,6 +98,30 @@ def apply(data: dict[str, Any], path: tuple[str, ...], value: object) -> list[Pr
     return []
 
 
+def number_at(data: dict[str, Any], path: str) -> float:
+    """The number with decimals at a dotted path of the data of a case. Raises CaseError where there is none."""
+    node: Any = data
+    steps = split_path(path)
+    for depth, step in enumerate(steps):
+        here, before = ".".join(steps[: depth + 1]), ".".join(steps[:depth]) or "the case"
+        if isinstance(node, list):
+            items = cast("list[Any]", node)
+            number = _number(items, step)
+            if number is None:
+                raise CaseError(here, None, _no_item(items, step))
+            node = items[number]
+        elif isinstance(node, dict) and step in node:
+            node = cast("dict[str, Any]", node)[step]
+        else:
+            known = cast("dict[str, Any]", node) if isinstance(node, dict) else ()
+            raise CaseError(here, None, f"no such number{choice(step, known, f'{before} has')}")
+    if not isinstance(node, float):
+        given = None if isinstance(node, dict) else node
+        accepted = "the path of a number of the case that may have decimals, such as materials.steel.density"
+        raise CaseError(path, given, accepted)
+    return node
+
+
 def _put(container: Any, key: str | int, value: object) -> None:
     container[key] = value
     if value is None:
@@ -110,10 +134,11 @@ def _number(items: list[Any], step: str) -> int | None:
     return number if 0 <= number < len(items) else None
 
 
-def _no_item(items: list[Any]) -> str:
-    names = [f" ({name})" if name else "" for name in _names(items)]
-    listed = ", ".join(f"{number}{name}" for number, name in enumerate(names))
-    return f"no such item; the list has: {listed or 'none'}"
+def _no_item(items: list[Any], step: str) -> str:
+    names = _names(items)
+    listed = ", ".join(f"{number} ({name})" if name else f"{number}" for number, name in enumerate(names))
+    question = did_you_mean(nearest(step, filter(None, names)))
+    return f"no such item{question or ';'} the list has: {listed or 'none'}"
 
 
 def _names(items: list[Any]) -> list[str]:

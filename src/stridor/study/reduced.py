@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from ..case import Case
 from ..case.expression import parse_expression
 from ..case.matrix_checks import MU
+from ..case.points import choice
 from ..errors import CaseError
 from ..sliding.stretches import elsewhere_words, stretches
 from ..system import System, build_system
@@ -117,6 +118,9 @@ def _parameters(case: Case, box: Mapping[str, tuple[float, float]]) -> tuple[Par
             raise CaseError(f"box.{name}", None, f"call it {steps[1]}")
         elif name.endswith(".friction.coefficient") and (FRICTION in box or FRICTION in case.factor_names):
             raise CaseError(f"box.{name}", None, "give a range of mu, the friction coefficient of all contacts")
+        elif len(steps) == 1:
+            known = (FRICTION, STIFFNESS, *case.parameters, "the path of a number such as materials.steel.density")
+            raise CaseError(f"box.{name}", None, f"no such number{choice(name, known, 'a range is that of')}")
         else:
             found.append(Parameter(name, low, high, value=(low + high) / 2))
     return tuple(found)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, cast
+from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..case import Case
+from ..case.overrides import number_at as number_of
 from ..case.overrides import split_path
+from ..case.points import choice
 from ..digits import measured
 from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
@@ -192,6 +194,9 @@ class Linearised:
         if contact and path.endswith(".compliance"):
             stiffness = self.case.contacts[contact].stiffness
             return 0.0 if stiffness == "rigid" else 1.0 / stiffness
+        if "." not in path:
+            known = ("mu", "the path of one such as materials.steel.density")
+            raise CaseError(path, None, f"no such number{choice(path, known, 'a number is')}")
         return number_at(self.case, path)
 
     def change(self, path: str, step: float | None = None) -> PencilChange:
@@ -297,16 +302,4 @@ def _contact_of(case: Case, path: str) -> str | None:
 
 def number_at(case: Case, path: str) -> float:
     """The number at a dotted path of a case, defaults included. Raises CaseError where there is none."""
-    node: Any = case.model_dump(mode="json", exclude_none=True)
-    for step in split_path(path):
-        if isinstance(node, list):
-            items = cast("list[Any]", node)
-            names = [cast("dict[str, Any]", item).get("name") for item in items if isinstance(item, dict)]
-            index = names.index(step) if step in names else int(step) if step.isdecimal() else -1
-            node = items[index] if 0 <= index < len(items) else None
-        else:
-            node = cast("dict[str, Any]", node).get(step) if isinstance(node, dict) else None
-    if not isinstance(node, float):
-        accepted = "the path of a number of the case that may have decimals, such as materials.steel.density"
-        raise CaseError(path, node, accepted)
-    return node
+    return number_of(case.model_dump(mode="json", exclude_none=True), path)

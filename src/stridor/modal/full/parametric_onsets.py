@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ...case.points import choice
 from ...digits import hertz, readable
 from ...errors import CaseError
 from ...notebook import Shown, counted, html_table
@@ -167,7 +168,7 @@ def onsets_along(
     """
     names = [p.name for p in model.problem.parameters]
     if parameter not in names:
-        raise CaseError("parameter", parameter, f"no such parameter; there are: {', '.join(names)}")
+        raise CaseError("parameter", parameter, f"no such parameter{choice(parameter, names, 'there are')}")
     point = model.problem.point(fixed or {})
     line = of_model(model, parameter, point)
     top = model.frequency

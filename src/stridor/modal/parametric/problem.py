@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 import scipy.sparse as sp
 
+from ...case.points import choice
 from ...errors import CaseError
 from ...typing import Array, Sparse
 from ..quadratic.problem import Quadratic
@@ -77,7 +78,7 @@ class ParametricProblem:
         given = dict(zip(names, values, strict=True)) if not isinstance(values, Mapping) else dict(values)
         for name, value in given.items():
             if name not in names:
-                raise CaseError("values", name, f"no such parameter; there are: {', '.join(names)}")
+                raise CaseError("values", name, f"no such parameter{choice(name, names, 'there are')}")
             if not np.isfinite(value):
                 raise CaseError(f"values.{name}", value, "a finite number")
         return {**self.reference, **{k: float(v) for k, v in given.items()}}
