@@ -43,6 +43,13 @@ def test_page_can_be_followed_in_whole(page: Path, tmp_path: Path) -> None:
     follow(page, tmp_path, slow=True)
 
 
+@pytest.mark.parametrize("page", [p for p in PAGES if p.parent == DOCS], ids=lambda page: page.stem)
+def test_page_opens_with_a_picture(page: Path) -> None:
+    opening = re.match(r"(\([\w-]+\)=\n)?# [^\n]+\n\n```\{image\} (images/\S+)\n:alt: \S", page.read_text(encoding="utf-8"))
+    assert opening
+    assert 5_000 < (DOCS / opening[2]).stat().st_size < 150_000
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_files_that_a_page_names_exist(page: Path) -> None:
     named = re.findall(

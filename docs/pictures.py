@@ -1,0 +1,84 @@
+"""Draws the pictures with which pages of the documentation open and that no example draws: python docs/pictures.py"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from matplotlib import pyplot as plt
+from PIL import Image
+
+import stridor as st
+
+STRIDOR = str(Path(sys.executable).parent / "stridor")
+IMAGES = Path(__file__).parent / "images"
+case = st.loads(st.case.template_text("two-beams"))
+pad = st.loads(st.case.template_text("pad-on-disc"))
+coarse = {"disc": [4, 48, 1], "lining": [6, 12, 2], "plate": [6, 12, 1]}
+pad = pad.with_({f"bodies.{name}.mesh.divisions": value for name, value in coarse.items()})
+
+
+def save(figure, name: str, size: tuple[float, float]) -> None:
+    """A PNG of a figure, which is closed."""
+    figure.set_size_inches(*size)
+    figure.savefig(IMAGES / f"{name}.png", dpi=80)
+    plt.close(figure)
+
+
+def terminal(name: str, command: str, text: str) -> None:
+    """What a command prints, as on a terminal: rows of unstable modes are red there, too."""
+    lines = [f"$ {command}", *text.splitlines()]
+    figure = plt.figure(facecolor="#1e1e1e")
+    for k, line in enumerate(lines):
+        colour = "#ff6b6b" if "  unstable  " in line else "#e0e0e0"
+        figure.text(0.02, 1 - (k + 1) / (len(lines) + 1), line, family="monospace", size=9, color=colour)
+    save(figure, name, (7.8, 0.185 * (len(lines) + 1)))
+
+
+def imported_branches() -> None:
+    """Onsets of matrices, which stridor has exported itself."""
+    with tempfile.TemporaryDirectory() as folder:
+        st.export(case, folder)
+        own = st.load(Path(folder) / "matrices.toml")
+        modes = st.modes(own, np.linspace(0, 1, 81), max_frequency_hz=20e3)
+        save(st.plot.frequency_branches(modes, onsets=st.onsets(own)), "imported-branches", (7, 3.6))
+
+
+def steady_pressure() -> None:
+    """What `stridor steady` draws of the pad, coarse."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "pad.toml").write_text(pad.to_toml(), encoding="utf-8")
+        subprocess.run([STRIDOR, "steady", "pad.toml"], cwd=folder, check=True, capture_output=True)
+        with Image.open(Path(folder) / "pad.out" / "steady-face.png") as drawn:
+            drawn.convert("RGB").reduce(2).save(IMAGES / "steady.png", optimize=True)
+
+
+def factors() -> None:
+    """Memory of factors by the rule of the page, through what was measured on the pad on the disc."""
+    freedoms = np.geomspace(1e4, 1e7, 50)
+    figure, ax = plt.subplots(layout="constrained")
+    ax.loglog(freedoms, 0.7 * (freedoms / 52e3) ** (4 / 3), label="grows as the power 4/3")
+    ax.plot(52e3, 0.7, "o", color="C3", label="pad on disc, measured")
+    ax.axhline(64, color="0.5", ls="--", lw=1)
+    ax.annotate("64 GB", (1.1e4, 70), color="0.4")
+    ax.set(xlabel="degrees of freedom", ylabel="factors [GB]")
+    ax.grid(alpha=0.3)
+    ax.legend(loc="lower right")
+    save(figure, "factors", (6, 3))
+
+
+def listing() -> None:
+    """What `stridor modes` prints."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "two-beams.toml").write_text(st.case.template_text("two-beams"), encoding="utf-8")
+        words = ["modes", "two-beams.toml", "--band", "5000:20000"]
+        done = subprocess.run([STRIDOR, *words], cwd=folder, check=True, capture_output=True, text=True)
+        terminal("terminal", " ".join(["stridor", *words]), done.stdout)
+
+
+if __name__ == "__main__":
+    save(st.plot.model(case), "two-beams", (8, 3.4))
+    save(st.plot.model(pad), "pad-on-disc", (7, 4.4))
+    for draw in (imported_branches, steady_pressure, factors, listing):
+        draw()
