@@ -15,6 +15,7 @@ must be known. `python` blocks run in one namespace; `expression  # → value` s
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import re
 import shlex
@@ -139,14 +140,18 @@ class Page:
             assert not wrong, f"{self.path.name}: {wrong}"
 
     def _python(self, code: str) -> None:
+        lines = [*code.splitlines(), ""]
         with contextlib.chdir(self.folder):
-            exec(compile(code, self.path.name, "exec"), self.names)
-            before = ""
-            for line in code.splitlines():
-                expression, shows, value = line.partition("# → ")
-                if shows:
-                    assert_shown([value], str(eval(expression.strip() or before, self.names)), half=True)
-                before = line
+            for statement in ast.parse(code, self.path.name).body:
+                end = int(statement.end_lineno or 0)
+                below = lines[end] if lines[end].startswith("# → ") else ""
+                value = (below or lines[end - 1]).partition("# → ")[2]
+                if value:
+                    assert isinstance(statement, ast.Expr), f"{self.path.name}: no expression shows {value}"
+                    found = eval(compile(ast.Expression(statement.value), self.path.name, "eval"), self.names)
+                    assert_shown([value], str(found), half=True)
+                else:
+                    exec(compile(ast.Module([statement], []), self.path.name, "exec"), self.names)
 
     def _held(self, numbers: list[str], paragraph: str) -> None:
         output = self.printed[str(self.last)]

@@ -67,6 +67,8 @@ def test_files_that_a_page_names_exist(page: Path) -> None:
         ("<!-- slow -->\n```\nstridor dance a.toml\n```\n", "no such verb"),
         ("```\n$ stridor new two-beams\nwritten: three-beams.toml\n```\n", "not printed"),
         ("<!-- first: x = 2.0 -->\n```python\nx + 1  # → 4\n```\n", "not printed"),
+        ("```python\nx = 3\nx + 1\n# → 5\n```\n", "not printed"),
+        ("```python\nx = 3  # → 3\n```\n", "no expression shows 3"),
         ("<!-- holds: 1 == 2 -->\n", "1 == 2"),
         ("```toml\n[supports.a]\nat = 'b.c'\nfixd = ['x']\n```\n", "fixd"),
         ("```\nstridor check nothing.toml\n```\n", "nothing.toml"),

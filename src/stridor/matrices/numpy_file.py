@@ -1,6 +1,8 @@
 """NumPy's .npz and .npy files.
 
 Nothing is unpickled: arrays are made from their own bytes, after what a header claims was held against what there is.
+`numpy.load` allocates what a header claims, and `scipy.sparse.load_npz` believes pointers and indices, refuses files
+without a format, and cannot convert numbers of half precision: neither would tell where such a file is wrong.
 """
 
 from __future__ import annotations
