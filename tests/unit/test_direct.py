@@ -182,13 +182,22 @@ def test_a_missing_package_says_how_to_install_it(monkeypatch):
     monkeypatch.delenv("STRIDOR_SOLVER", raising=False)
     assert direct.available() == ("superlu",)
     assert direct.factorise(plate()).solver == "superlu"
-    with pytest.raises(CaseError, match=r"is not installed; pip install \"stridor\[mumps\]\".*libmumps-seq-dev"):
+    with pytest.raises(CaseError, match=r"is not installed; pip install \"python-mumps.*libmumps-seq-dev"):
         direct.factorise(plate(), solver="mumps")
-    with pytest.raises(CaseError, match=r"pip install \"stridor\[pardiso\]\""):
+    with pytest.raises(CaseError, match=r"pip install \"pypardiso>="):
         direct.factorise(plate(), solver="pardiso")
 
 
-def test_what_is_faster_than_superlu_is_said_once_where_it_is_slow(monkeypatch, caplog):
+@pytest.mark.parametrize(
+    ("machine", "said_of_it"),
+    [
+        ("x86_64", 'PARDISO takes about a third: pip install "pypardiso>=0.4.6"'),
+        ("arm64", 'MUMPS takes about a third: pip install "python-mumps>=0.0.4"'),
+    ],
+)
+def test_what_is_faster_than_superlu_is_said_once_where_it_is_slow(machine, said_of_it, monkeypatch, caplog):
+    monkeypatch.setattr(factor.sys, "platform", "linux")
+    monkeypatch.setattr(factor.platform, "machine", lambda: machine)
     matrix = sp.csr_array(sp.diags_array(np.arange(1.0, 9.0)))
     factor._say_what_is_faster.cache_clear()
     direct.factorise(matrix, solver="superlu")
@@ -199,7 +208,7 @@ def test_what_is_faster_than_superlu_is_said_once_where_it_is_slow(monkeypatch, 
         direct.factorise(matrix, solver="superlu")
     (said,) = caplog.records
     assert said.levelname == "WARNING"
-    assert 'MUMPS takes about a third: pip install "stridor[mumps]"' in said.getMessage()
+    assert said_of_it in said.getMessage()
     factor._say_what_is_faster.cache_clear()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import sys
 from collections.abc import Callable
@@ -18,7 +19,7 @@ app = typer.Typer(
     name="stridor",
     help="Will these sliding bodies squeal? Complex modes, solved onsets and explicit dynamics of one model, compared.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -43,6 +44,10 @@ def _top(
 def main() -> None:
     """Entry point: errors as plain lines, no traceback. Exit codes: docs/results.md."""
     interrupts.install()
+    for stream in (sys.stdout, sys.stderr):
+        # Pipes of Windows know no μ.
+        if isinstance(stream, io.TextIOWrapper) and not stream.encoding.lower().startswith("utf"):
+            stream.reconfigure(errors="replace")
     try:
         code = _guarded(_program)
     except KeyboardInterrupt:  # a second one, while the first was told
@@ -98,7 +103,3 @@ def _flushed(code: int) -> int:
                     print(f"stridor: cannot write the output: {error}", file=sys.stderr)
                 code = code or 1
     return code
-
-
-if __name__ == "__main__":
-    main()

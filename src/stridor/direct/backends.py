@@ -17,10 +17,10 @@ VARIABLE = "STRIDOR_SOLVER"
 PACKAGES = {
     "mumps": (
         ("mumps",),
-        'pip install "stridor[mumps]" (on Debian after apt install libmumps-seq-dev libopenblas-dev gfortran '
-        "pkg-config)",
+        'pip install "python-mumps>=0.0.4" (on Debian after apt install libmumps-seq-dev libopenblas-dev gfortran '
+        "pkg-config; with conda: conda install -c conda-forge python-mumps)",
     ),
-    "pardiso": (("pypardiso",), 'pip install "stridor[pardiso]"'),
+    "pardiso": (("pypardiso",), 'pip install "pypardiso>=0.4.6"'),
     "superlu": (("scipy",), "comes with SciPy"),
     "slepc": (("petsc4py", "mpi4py"), f'pip install "stridor[slepc]"; {SLEPC_BUILD}'),
 }

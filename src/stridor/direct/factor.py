@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import platform
+import sys
 import time
 from dataclasses import dataclass
 from functools import cache
@@ -257,7 +259,7 @@ def factorise(
             raise SingularMatrix("the matrix is singular: elimination meets a pivot of zero") from error
     if held.shape[0] >= TOLD:
         _log.info("%s: %d unknowns in %.1f s, %.0f MB", name, held.shape[0], factor.seconds, factor.memory_bytes / 1e6)
-    if name == "superlu" and time.process_time() - worked > SLOW and not installed("mumps"):
+    if name == "superlu" and time.process_time() - worked > SLOW and not (installed("mumps") or installed("pardiso")):
         _say_what_is_faster()
     if ratio < SINGULAR:
         factor.free()
@@ -268,8 +270,13 @@ def factorise(
 
 @cache
 def _say_what_is_faster() -> None:
-    """Once in a process: a block of 95 000 freedoms takes MUMPS 7.5 s where SuperLU takes 25 s (docs/validation.md)."""
-    _log.warning("SuperLU is slow on matrices as large as these; MUMPS takes about a third: %s", PACKAGES["mumps"][1])
+    """Once in a process: 98 000 freedoms of a block take PARDISO and MUMPS 10 s, SuperLU 35 s (docs/validation.md).
+    PARDISO has wheels for Linux and Windows on processors of one kind."""
+    wheels = sys.platform != "darwin" and platform.machine() in ("x86_64", "AMD64")
+    name, program = ("pardiso", "PARDISO") if wheels else ("mumps", "MUMPS")
+    words = "SuperLU is slow on matrices as large as these; %s takes about a third: %s"
+    _log.warning(words, program, PACKAGES[name][1])
+
 
 
 def _largest(matrix: Sparse) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import importlib
 import json
 import os
 import time
@@ -23,11 +24,16 @@ from .processes import Process, this_process
 
 try:
     import fcntl
-except ImportError:  # Windows
+except ImportError:
     fcntl = None
+try:
+    msvcrt: Any = importlib.import_module("msvcrt")  # Windows
+except ImportError:
+    msvcrt = None
 
 NAME = ".stridor-run"
 _TRIES = 20
+_BEYOND = 2**30  # Windows lets nobody read bytes that are locked: this one is beyond what is said of the holder
 _UNLOCKABLE = (errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)
 # Folders that this process has claimed already: `stridor run` and `st.run` within it ask for the same.
 _own: set[Path] = set()
@@ -59,6 +65,9 @@ def claimed(folder: Path, parts: Sequence[str] = (), *, where: str = "--out") ->
         with contextlib.suppress(OSError):
             (folder / NAME).unlink()
         os.close(handle)
+        if msvcrt is not None:  # Windows removes no file that is open, be it another's
+            with contextlib.suppress(OSError):
+                (folder / NAME).unlink()
         for each in reversed(made):
             # What was made for results that did not come goes again.
             with contextlib.suppress(OSError):
@@ -110,7 +119,8 @@ def _lock(folder: Path, where: str) -> int:
             )
             with contextlib.suppress(OSError):  # a full disk is told when results are written
                 os.ftruncate(handle, 0)
-                os.pwrite(handle, text.encode(), 0)
+                os.lseek(handle, 0, os.SEEK_SET)
+                os.write(handle, text.encode())
             return handle
         holder = _read(handle)
         os.close(handle)
@@ -137,6 +147,13 @@ def _taken(handle: int) -> bool:
                 return False
         else:
             return True
+    elif msvcrt is not None:
+        try:
+            os.lseek(handle, _BEYOND, os.SEEK_SET)
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
     holder = _read(handle)
     if holder is None:
         return True
@@ -164,8 +181,8 @@ def _printable(value: object) -> str:
 def _read(handle: int) -> dict[str, Any] | None:
     """What the holder wrote of itself, None before it has."""
     try:
-        text = os.pread(handle, 4096, 0)
-        found = json.loads(text)
+        os.lseek(handle, 0, os.SEEK_SET)
+        found = json.loads(os.read(handle, 4096))
     except (OSError, ValueError):
         return None
     return found if isinstance(found, dict) else None

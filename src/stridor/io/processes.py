@@ -23,8 +23,8 @@ class Process:
 
     @property
     def dead(self) -> bool:
-        """Whether it is known to have ended; never so of a process of another computer."""
-        if self.host != platform.node():
+        """Whether it is known to have ended; never so of a process of another computer, or on Windows."""
+        if self.host != platform.node() or not hasattr(os, "fork"):  # on Windows os.kill(…, 0) is Ctrl-C
             return False
         try:
             os.kill(self.number, 0)

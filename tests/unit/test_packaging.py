@@ -1,0 +1,42 @@
+"""What an installation promises is there: extras, the environment of conda, addresses."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stridor.direct.backends import PACKAGES
+
+ROOT = Path(__file__).parents[2]
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+MODULES = {"python-mumps": "mumps"}
+
+
+def bare(requirement: str) -> str:
+    return requirement.partition(";")[0].replace(" ", "")
+
+
+def test_extras_are_what_the_program_knows_how_to_use():
+    named = {re.split("[><=]", bare(r))[0] for extra in PROJECT["optional-dependencies"].values() for r in extra}
+    assert all(PROJECT["optional-dependencies"].values()), "an extra with nothing behind it"
+    known = {module for modules, _ in PACKAGES.values() for module in modules} | {"slepc4py"}
+    assert {MODULES.get(name, name) for name in named} <= known
+
+
+def test_conda_brings_what_pip_would():
+    text = (ROOT / "environment.yml").read_text(encoding="utf-8").replace("matplotlib-base", "matplotlib")
+    conda = set(re.findall(r"^  - (\S+)$", text, re.M))
+    needed = {bare(r) for r in (*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["mumps"])}
+    assert needed <= conda
+
+
+@pytest.mark.skipif(find_spec("pypardiso") is None, reason="pypardiso (stridor[fast]) is not installed")
+def test_pardiso_is_taken_where_it_is_installed():
+    from stridor import direct
+
+    assert "pardiso" in direct.available()
