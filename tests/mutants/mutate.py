@@ -263,7 +263,7 @@ def copy_tree() -> None:
     left_out = shutil.ignore_patterns("__pycache__", "*.out")
     for name in ("src", "tests", "docs", "benchmarks"):
         shutil.copytree(ROOT / name, TREE / name, ignore=left_out)
-    for name in ("pyproject.toml", "README.md", "CHANGELOG.md", "Makefile", "environment.yml"):
+    for name in ("pyproject.toml", "README.md", "CHANGELOG.md", "Makefile", "environment.yml", "hatch_build.py"):
         shutil.copy(ROOT / name, TREE / name)
     with open(TREE / "src/stridor/kernels/sources.py", "a", encoding="utf-8") as file:
         file.write(SAME_KERNELS.format(digest=sources_digest()))

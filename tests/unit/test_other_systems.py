@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -67,6 +68,13 @@ def test_a_folder_that_is_locked_is_refused_without_them(folder: Path):
     assert done.returncode == 2
     assert b"process 7 on here has been writing there since noon" in done.stderr
     assert b"Traceback" not in done.stderr
+
+
+def test_what_a_dead_process_said_of_itself_holds_no_folder(folder: Path):
+    out = folder / "left"
+    out.mkdir()
+    (out / ".stridor-run").write_text(json.dumps({"host": platform.node(), "process": 2**22 + 1, "since": "noon"}))
+    assert program("onsets", "two-beams.toml", "--out", "left", cwd=folder).returncode == 0
 
 
 def test_pipes_that_know_no_greek(folder: Path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import tomllib
 from importlib.util import find_spec
 from pathlib import Path
@@ -33,6 +34,18 @@ def test_conda_brings_what_pip_would():
     conda = set(re.findall(r"^  - (\S+)$", text, re.M))
     needed = {bare(r) for r in (*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["mumps"])}
     assert needed <= conda
+
+
+def test_the_readme_of_a_package_index_leads_nowhere_that_it_has_not():
+    hook = runpy.run_path(str(ROOT / "hatch_build.py"))
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = hook["for_an_index"](readme)
+    assert "](docs/" in readme
+    assert "](docs/" not in shown
+    assert "a brake pad on a disc;\neach finds" in shown
+    assert "![" not in shown
+    kept = "[words](https://example.org) ![picture](https://example.org/a.png)"
+    assert hook["for_an_index"](kept) == kept
 
 
 @pytest.mark.skipif(find_spec("pypardiso") is None, reason="pypardiso (stridor[fast]) is not installed")
