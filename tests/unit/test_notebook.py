@@ -183,3 +183,15 @@ def test_datasets_are_those_of_files() -> None:
     for thing in (MODES, ONSETS, agreement(), run()):
         assert thing.to_xarray().identical(st.to_dataset(thing))
         assert thing.to_xarray().attrs["format"] == "stridor results 1"
+
+
+def test_modes_of_reduced_models_and_of_bodies_are_tables():
+    case = st.loads(template_text("two-beams"))
+    modes = st.reduced_model(case, {"mu": (0.0, 0.3)}).modes({"mu": 0.1})
+    frame = modes.to_dataframe()
+    assert list(frame)[:3] == ["mu", "frequency_hz", "growth_1_s"]
+    assert frame["frequency_hz"].tolist() == modes.frequency_hz.tolist()
+    assert frame["unstable"].sum() == 1
+    assert set(frame["mu"]) == {0.1}
+    alone = st.body_modes(case)["beam2"]
+    assert alone.to_dataframe()["mode"].tolist() == list(alone.labels)

@@ -13,9 +13,10 @@ import scipy.sparse.linalg as spl
 from ..digits import hertz, readable
 from ..direct import factorise
 from ..fe.assembly import connected_components
-from ..notebook import Shown, counted, html_table
+from ..notebook import counted, html_table
 from ..system import System
 from ..system.model import Line, Solid
+from ..tabular import Rows, Tabular
 from ..typing import Array, Sparse
 from .workspace import Problem, Workspace
 
@@ -25,7 +26,7 @@ MOST = 40  # modes of a larger body
 
 
 @dataclass(frozen=True, repr=False)
-class BodyModes(Shown):
+class BodyModes(Tabular):
     """Undamped modes of one body alone, supports included: frequency_hz (k,) and what they are
     ("rigid", of beams "F1" bending, "T1" traction, "FT3" mixed, of others "E1"), by frequency."""
 
@@ -41,6 +42,10 @@ class BodyModes(Shown):
     def _repr_html_(self) -> str:
         rows = [(label, readable(f)) for label, f in zip(self.labels, self.frequency_hz, strict=True)]
         return html_table(counted(len(rows), "mode").capitalize(), ("mode", "frequency [Hz]"), rows)
+
+    def table(self) -> Rows:
+        """A row for each mode."""
+        return ("mode", "frequency_hz"), list(zip(self.labels, self.frequency_hz.tolist(), strict=True))
 
 
 def body_modes(problem: Problem, *, max_frequency_hz: float | None = None) -> Mapping[str, BodyModes]:

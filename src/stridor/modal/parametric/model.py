@@ -20,6 +20,7 @@ import numpy as np
 
 from ...digits import hertz, readable
 from ...notebook import Shown, counted, html_table
+from ...tabular import MODE, Rows, Tabular, mode_cells
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from ..tolerances import UNSTABLE_RELATIVE
@@ -31,7 +32,7 @@ REACH = 1.0 + 1e-9
 
 
 @dataclass(frozen=True, repr=False)
-class ReducedModes(Shown):
+class ReducedModes(Tabular):
     """Modes at one point of the box: λ (k,) [1/s], residual (k,) of the full problem (scaled, both sides' larger one),
     error (k,) estimated of λ, relative; passed (k,): whether that is below the bound asked for. point: the values of
     the parameters; inside: whether they lie in the box. right, left (r, k) are the vectors on the basis."""
@@ -59,6 +60,14 @@ class ReducedModes(Shown):
         ]
         outside = "" if self.inside else "outside the box of the model"
         return html_table(f"Reduced modes: {self._line}", heads, rows, (outside,))
+
+    def table(self) -> Rows:
+        """Heads and rows, as reduced.csv has them for each point."""
+        heads = (*self.point, *MODE, "error", "residual", "inside")
+        columns = (self.frequency_hz, self.growth_rate, self.unstable, self.error, self.residual)
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        cells = ((*mode_cells(f, g, unstable=u), error, residual, self.inside) for f, g, u, error, residual in rows)
+        return heads, [(*self.point.values(), *row) for row in cells]
 
     @property
     def frequency_hz(self) -> Array:
