@@ -37,6 +37,8 @@ def test_what_the_text_says(followed: tuple[Path, dict[str, str]]) -> None:
     assert "K − Kᵀ has rank 2" in printed["stridor matrices brake.toml"]
     growing = [line.split() for line in printed["stridor modes brake.toml"].splitlines() if "  unstable" in line]
     assert [words[1] for words in growing] == ["8667.05"]
+    # Without places of nodes there is no shape to draw.
+    assert "Next: stridor report brake.toml" in printed["stridor modes brake.toml"]
     whirling = printed["stridor modes rotor.toml --set parameters.Omega.value=100"]
     for frequency in (50 - 100 / (2 * np.pi), 50 + 100 / (2 * np.pi)):
         assert f"{frequency:.4f}" in whirling

@@ -29,9 +29,9 @@ def _is_are(count: int, of: str) -> str:
     return f"{count or 'none'} of {of} {'are' if count > 1 else 'is'} unstable"
 
 
-def of_modes(result: ComplexModes, mu: str | None) -> Conclusion:
-    """How many are unstable and which is the fastest; then its shape, or where growth begins. mu: as the
-    user gave it."""
+def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True) -> Conclusion:
+    """How many are unstable and which is the fastest; then its shape (the report, where the model has none to be
+    drawn), or where growth begins. mu: as the user gave it."""
     from ..modal.growing import doubt
 
     growing = result.unstable & result.in_band
@@ -55,6 +55,8 @@ def of_modes(result: ComplexModes, mu: str | None) -> Conclusion:
     b = int(rate[0].argmax())
     sentence += f"; the fastest {fastest(float(result.frequency_hz[0, b]), float(rate[0, b]))}"
     own = ("--mu", mu) if mu is not None else ()
+    if not drawn:
+        return Conclusion(sentence + caution, "report", own)
     return Conclusion(sentence + caution, "shapes", (*own, "--branch", str(result.branch[b])))
 
 

@@ -128,7 +128,8 @@ def modes(
         call.document(result.to_json(sort=order, unstable=unstable))
     else:
         show_modes(result, sort=order, unstable=unstable, say=call.say)
-        call.conclude(of_modes(result, mu))
+        system = work.system()
+        call.conclude(of_modes(result, mu, drawn=bool(system.solids or system.lines)))
     if result.interrupted:
         raise typer.Exit(INTERRUPTED)
 
