@@ -34,7 +34,7 @@ from .modes import samples
 from .passages import Passage, crossings, meetings
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import GUARD, Band, converge_at, projected
+from .refine import GUARD, Band, converge_over, projected
 from .shifted import real_columns
 
 FOLLOW = 1.1  # times the band: from where branches are followed
@@ -80,7 +80,7 @@ def krylov_onsets(
     top = searched(problem.pencil(high).condensed(), 2 * np.pi * max_frequency_hz)
     # Modes that start above the band may meet inside it.
     reduced = projected(problem, Band(1, top * follow), high, carried)
-    converge_at(reduced, numbered_at + samples(high - numbered_at, _count_of_samples(numbered_at, high)))
+    converge_over(reduced, numbered_at + samples(high - numbered_at, _count_of_samples(numbered_at, high)))
     if carried is not None:
         carried.take(reduced, GUARD)
     way = _way(reduced, (low, high), top, numbered_at)

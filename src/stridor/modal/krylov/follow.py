@@ -130,11 +130,10 @@ def _coincide(old: State, found: Eigenpairs) -> bool:
 def matched(old: State, found: Eigenpairs, named: int, *, surely: bool = True) -> IntArray | None:
     """Places (b,) among ``found`` of the branches of ``old``; None where that is not clear for the first ``named`` of
     them and ``surely`` is asked."""
-    step = found.mu - old.mu
-    moved = step * old.tangents
-    reach = 0.5 * np.maximum(np.abs(old.coordinate), 1e-3 * np.abs(old.coordinate).max(initial=0.0))
-    moved = np.where(np.isfinite(moved) & (np.abs(moved) < reach), moved, 0.0)
-    distance = np.abs((old.coordinate + moved)[:, None] - found.coordinate)
+    half = 0.5 * (found.mu - old.mu)
+    ahead = _moved(old.coordinate, half * old.tangents)
+    behind = _moved(found.coordinate, -half * found.tangents)
+    distance = np.abs(ahead[:, None] - behind)
     if distance.shape[1] < distance.shape[0]:
         return None if surely else np.argmin(distance, axis=1)
     # Of two real values at the same distance the one that grows.
@@ -154,6 +153,13 @@ def matched(old: State, found: Eigenpairs, named: int, *, surely: bool = True) -
         j, index[i], index[j] = pair
         clear[i] = clear[j] = True
     return index if len(np.unique(index)) == len(index) else None
+
+
+def _moved(coordinate: ComplexArray, by: ComplexArray) -> ComplexArray:
+    """Where eigenvalues (k,) are half a step on, as far as their tangents say anything of it. What half a step from
+    either end leaves is of third order, a whole one from one end of second."""
+    reach = 0.25 * np.maximum(np.abs(coordinate), 1e-3 * np.abs(coordinate).max(initial=0.0))
+    return np.where(np.isfinite(by) & (np.abs(by) < reach), coordinate + by, coordinate)
 
 
 def _named(old: State, new: State) -> State | None:

@@ -19,7 +19,7 @@ from ..tolerances import BELIEVED
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import MARGIN, Band, converge_at, left_vectors, projected
+from .refine import MARGIN, NAMES, Band, converge_at, converge_over, left_vectors, projected
 
 SAMPLES = 7
 
@@ -57,7 +57,7 @@ def krylov_modes(
     asked = None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz
     band = Band(count, None if asked is None else searched(problem.pencil(top).condensed(), asked))
     reduced = projected(problem, band, top)
-    converge_at(reduced, samples(top), left=vectors is True)
+    converge_over(reduced, samples(top), between=NAMES, left=vectors is True)
     values, planned = _converged(reduced, values, progress, left=vectors is True)
     found = _followed(reduced, values, band, damped=damped, vectors=vectors)
     planned = found.planned if planned is None else planned

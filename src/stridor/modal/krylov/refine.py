@@ -23,6 +23,8 @@ from .reduced import Reduced
 from .shifted import Shifted, frictionless_modes, modes_below, real_columns, shift_for
 
 TOLERANCE = 2e-11  # backward error at which an eigenpair counts as found: eigenvalues are right to 1e-9 then
+GROWTH = 1e-9  # and between the ends of a range, where growth must be known but onsets are solved for by themselves
+NAMES = 1e-7  # and where it is only which branch is which
 LARGEST_REST = 1e-4  # and what it may leave of the lumped inertia forces
 SWEEPS = 40
 IDLE = 4  # sweeps in a row that do not halve what is left: it is rounding
@@ -168,6 +170,19 @@ def converge_at(
         converge(reduced, [mu], tolerance=tolerance, left=left)
         if not left and reduced.count > GROWN * reduced.compressed:
             reduced.compress()
+
+
+def converge_over(reduced: Reduced, frictions: Array, *, between: float = GROWTH, left: bool = False) -> None:
+    """`converge_at` over a range: exact at its ends, up to a backward error ``between`` them; each μ in the middle of
+    those before, so that most find nothing left to do."""
+    values = np.unique(frictions)
+    converge_at(reduced, values[[-1, 0]], left=left)
+    parts = [(0, len(values) - 1)]
+    for low, high in parts:
+        if high - low > 1:
+            middle = (low + high) // 2
+            converge_at(reduced, [values[middle]], tolerance=between, left=left)
+            parts += [(low, middle), (middle, high)]
 
 
 def unbalanced(reduced: Reduced, mu: float, tolerance: float, *, left: bool = False) -> tuple[float, Array, Array]:
