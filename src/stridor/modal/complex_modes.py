@@ -32,6 +32,7 @@ def complex_modes(
     solver: str | None = None,
     source: str | None = None,
     progress: Progress | None = None,
+    numbered_at: float = 0.0,
 ) -> ComplexModes:
     """Modes at the friction coefficients ``mu``, branches followed from μ = 0.
 
@@ -41,6 +42,7 @@ def complex_modes(
     basis), "krylov" (sparse matrices that stand without friction), "reduced" (a model over μ, its modes solved in full)
     or "full" (any matrices); None takes what suits the system, and the next where that turns out not to.
     friction_damping (across the direction of sliding), prestress and the direct solver matter on sparse matrices only.
+    numbered_at: a μ up to the least of them from which the source "krylov" follows instead, where numbers do not matter.
     progress is called with the number of μ done and of all; on
     KeyboardInterrupt what is done is returned, ``planned`` tells of how many. Raises AnalysisError where contacts do
     not slide, have no equilibrium, branches cannot be told apart, or the source named does not take the system;
@@ -50,5 +52,8 @@ def complex_modes(
     if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)) or np.any(values < 0):
         raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
     options = Options(friction_damping, prestress, solver, source)
-    asked = Asked(max_frequency_hz, damped=damped, options=options, count=count, vectors=vectors, progress=progress)
+    asked = Asked(
+        max_frequency_hz, damped=damped, options=options, count=count, vectors=vectors, progress=progress,
+        numbered_at=numbered_at,
+    )  # fmt: skip
     return answered(system, asked, lambda source, a: source.modes(system, values, a), without_following=True)

@@ -38,6 +38,7 @@ from .quadratic.problem import times
 BELIEVED = 1e-7  # relative change of λ, or distance from the guess, above which it has gone elsewhere
 LEAST_SHIFT, MOST_SHIFT = 1e-10, 1e-6  # of |λ|: how far beside an eigenvalue P is factorised
 WIDENED = 30.0
+BESIDE = 3e-4  # of the distance to the nearest other eigenvalue: how far from a pole what is regular there is taken
 RELATIVE_STEP = 1e-3
 AFFINE = 1e-8  # second over first differences below which a matrix is affine in a number
 
@@ -190,15 +191,13 @@ def by_release(
         return np.zeros(0, dtype=complex)
     problem, n, scale = pencil.whole, pencil.size, pencil.unit
     nodes = np.unique(np.concatenate(groups))
-    beside = 0.3j * min(gap, 1e-2 * abs(mode.eigenvalue))
+    # Near enough that G does not change, far enough that its digits are left beside those of the pole.
+    side = 1j * BESIDE * min(gap, abs(mode.eigenvalue))
     unit = np.zeros((problem.size, len(nodes)), dtype=complex)
     unit[n + nodes, np.arange(len(nodes))] = scale
-    # On both sides of λ₀, so that what G changes between them cancels.
-    regular = np.zeros((len(nodes), len(nodes)), dtype=complex)
-    for side in (beside, -beside):
-        with factorise(problem.at(mode.eigenvalue + side), saddle=True, solver=solver) as factor:
-            answer = scale * factor.solve(unit)[n + nodes]
-        regular += 0.5 * (answer - np.outer(mode.right.force[nodes], mode.left.force[nodes]) / side)
+    with factorise(problem.at(mode.eigenvalue + side), saddle=True, solver=solver) as factor:
+        answer = scale * factor.solve(unit)[n + nodes]
+    regular = answer - np.outer(mode.right.force[nodes], mode.left.force[nodes]) / side
     found = np.zeros(len(groups), dtype=complex)
     for k, group in enumerate(groups):
         at = np.searchsorted(nodes, group)
@@ -207,14 +206,17 @@ def by_release(
     return found
 
 
-def rate_of(at: Callable[[float], Pencil], value: float, step: float | None = None) -> tuple[PencilChange, bool]:
+def rate_of(
+    at: Callable[[float], Pencil], value: float, step: float | None = None, *, base: Pencil | None = None
+) -> tuple[PencilChange, bool]:
     """Change of P per unit of a number about ``value``, and whether P is affine in it.
 
     Differences over ± step (a thousandth of the value), exact for what is affine; else of fourth order, exact up to
     the fourth power. Where the number cannot fall below its value (a damping of zero), forwards and of second order.
+    base: at(value), where it is known.
     """
     h = step if step is not None else RELATIVE_STEP * (abs(value) or 1.0)
-    base = at(value)
+    base = at(value) if base is None else base
     high = at(value + h)
     try:
         low = at(value - h)

@@ -39,6 +39,7 @@ def modes_of_band(
     own: float | None = None,
     options: Options | None = None,
     progress: Progress | None = None,
+    numbered_at: float = 0.0,
 ) -> ComplexModes:
     """Every mode of a band at the friction coefficients ``mu``, as `complex_modes` follows them and `checked_modes`
     completes them, each with the nodes that touch at its μ. Whatever says something about which modes grow takes this
@@ -49,7 +50,7 @@ def modes_of_band(
     def followed(held: System, at: Array, tell: Progress | None) -> ComplexModes:
         return complex_modes(
             held, at, max_frequency_hz=max_frequency_hz, damped=damped, vectors=vectors,
-            progress=tell, **asdict(options),
+            progress=tell, numbered_at=numbered_at, **asdict(options),
         )  # fmt: skip
 
     def checked(held: System, found: ComplexModes) -> ComplexModes:

@@ -23,9 +23,12 @@ def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequenc
     """The measure with its modes solved again, steady sliding too."""
     linear = ranking.linear
     band = max_frequency_hz or linear.case.modal.max_frequency_hz
-    modes = _solved(_changed(linear, measure), linear, band)
-    if max_frequency_hz is None:
-        modes = modes.lowest(linear.case.modal.modes if count is None else count)
+    lowest = None if max_frequency_hz is not None else linear.case.modal.modes if count is None else count
+    # Which modes are the lowest at μ = 0 matters where not all are looked at.
+    numbered = lowest is not None and lowest <= len(linear.modes.branch)
+    modes = _solved(_changed(linear, measure), linear, band, 0.0 if numbered else linear.mu)
+    if lowest is not None:
+        modes = modes.lowest(lowest)
     modes = modes.chosen(np.flatnonzero(modes.in_band[0]))
     actual: ComplexArray = modes.eigenvalues[0]
     unstable = modes.unstable[0]
@@ -47,14 +50,15 @@ def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequenc
     return replace(measure, verified=result)
 
 
-def _solved(system: System, linear: Linearised, band: float) -> ComplexModes:
+def _solved(system: System, linear: Linearised, band: float, numbered_at: float) -> ComplexModes:
     """The modes of the band of a changed system, and what was checked of them."""
     damped, options = linear.damped, linear.options
     if options.source is None and system.symmetric_definite:
         # Sparse matrices for small systems too: a mass at one node leaves their complete basis no proportional damping.
         with suppress(Unfit):
-            return modes_of_band(system, linear.mu, band, damped=damped, options=replace(options, source="krylov"))
-    return modes_of_band(system, linear.mu, band, damped=damped, options=options)
+            krylov = replace(options, source="krylov")
+            return modes_of_band(system, linear.mu, band, damped=damped, options=krylov, numbered_at=numbered_at)
+    return modes_of_band(system, linear.mu, band, damped=damped, options=options, numbered_at=numbered_at)
 
 
 def _changed(linear: Linearised, measure: Measure) -> System:

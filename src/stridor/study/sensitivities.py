@@ -213,7 +213,7 @@ class Linearised:
             return pencil_of(self.varied(path, value), self.mu, self.held, self.options)
 
         try:
-            return rate_of(at, self.value(path), step)[0]
+            return rate_of(at, self.value(path), step, base=self.pencil)[0]
         except CaseError as error:
             accepted = f"a number that can be varied a little ({error.problems[0].accepted})"
             raise CaseError(path, self.value(path), accepted) from error

@@ -35,8 +35,9 @@ def krylov_modes(
     vectors: bool | Literal["right"] = False,
     options: Options | None = None,
     progress: Progress | None = None,
+    numbered_at: float = 0.0,
 ) -> ComplexModes:
-    """Modes at the friction coefficients ``mu``, branches followed from μ = 0, as `complex_modes` gives them.
+    """Modes at the friction coefficients ``mu``, branches followed from ``numbered_at``, as `complex_modes` gives them.
 
     count: how many branches, lowest frequencies at μ = 0 first; max_frequency_hz instead takes all that start below it,
     and those that start a little above and come below it at one of these μ. vectors keeps left and right ones, "right"
@@ -57,9 +58,9 @@ def krylov_modes(
     asked = None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz
     band = Band(count, None if asked is None else searched(problem.pencil(top).condensed(), asked))
     reduced = projected(problem, band, top)
-    converge_over(reduced, samples(top), between=NAMES, left=vectors is True)
+    converge_over(reduced, numbered_at + samples(top - numbered_at), between=NAMES, left=vectors is True)
     values, planned = _converged(reduced, values, progress, left=vectors is True)
-    found = _followed(reduced, values, band, damped=damped, vectors=vectors)
+    found = _followed(reduced, values, band, damped=damped, vectors=vectors, start=numbered_at)
     planned = found.planned if planned is None else planned
     return replace(found, max_frequency_hz=max_frequency_hz, planned=planned)
 
@@ -83,18 +84,18 @@ def _converged(
 
 
 def _followed(
-    reduced: Reduced, values: Array, band: Band, *, damped: bool, vectors: bool | Literal["right"]
+    reduced: Reduced, values: Array, band: Band, *, damped: bool, vectors: bool | Literal["right"], start: float
 ) -> ComplexModes:
     """The branches of the band at all μ, judged in the sparse problem."""
     problem = reduced.problem
     longest = max(float(values.max()) / 10, 1e-3)
-    follower = Follower(reduced, longest=longest)
-    start = follower.state
+    follower = Follower(reduced, start=start, longest=longest)
+    first = follower.state
     if band.frequency is None:
-        branches = np.arange(min(band.count, len(start.index)))
+        branches = np.arange(min(band.count, len(first.index)))
     else:
         # What is exact there: modes of the band, and beside it those that may come into it.
-        branches = np.flatnonzero(start.values.imag <= MARGIN * band.frequency)
+        branches = np.flatnonzero(first.values.imag <= MARGIN * band.frequency)
     follower.named = len(branches)
     require_memory(len(values), len(branches), problem.size if vectors else 0)
     shape = (len(values), len(branches))
@@ -133,7 +134,7 @@ def _followed(
         return found
     top = band.frequency * (1 + 1e-12)
     ever: BoolArray = np.any(np.imag(eigenvalues) <= top, axis=0)
-    inside = (start.values.imag[branches] <= top) | ever
+    inside = (first.values.imag[branches] <= top) | ever
     return found.chosen(np.flatnonzero(inside))
 
 
