@@ -280,7 +280,7 @@ def test_map_has_no_slopes_where_nothing_is_damped():
 def test_paths_that_lead_to_no_number():
     model = loads(MINIMAL)
     for path in ("springs.x.between", "springs.z.stiffness", "title", "contacts.rub.friction.law"):
-        with pytest.raises(CaseError, match="number of the case|no such number"):
+        with pytest.raises(CaseError, match=r"number of the case|no such number"):
             sensitivities(model, [path], mu=0.5)
     assert number_at(model, "bodies.m.mass") == 1.0
     with pytest.raises(CaseError, match="branches from 1 to 2"):

@@ -42,7 +42,7 @@ def complex_modes(
     basis), "krylov" (sparse matrices that stand without friction), "reduced" (a model over μ, its modes solved in full)
     or "full" (any matrices); None takes what suits the system, and the next where that turns out not to.
     friction_damping (across the direction of sliding), prestress and the direct solver matter on sparse matrices only.
-    numbered_at: a μ up to the least of them from which the source "krylov" follows instead, where numbers do not matter.
+    numbered_at: a μ up to the least of them, from which "krylov" follows instead where numbers do not matter.
     progress is called with the number of μ done and of all; on
     KeyboardInterrupt what is done is returned, ``planned`` tells of how many. Raises AnalysisError where contacts do
     not slide, have no equilibrium, branches cannot be told apart, or the source named does not take the system;
