@@ -132,28 +132,21 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
     for _ in range(SWEEPS):
         if not pending:
             break
-            stage(f"modes at {len(pending)} friction coefficients, {reduced.count} unknowns")
         for mu in list(pending):
+            stage(f"modes at μ = {mu:.6g}, {reduced.count} unknowns")
             worst[mu], force, opening = unbalanced(reduced, mu, tolerance, left=left)
-            if not force.shape[1] and not opening.shape[1]:
-                pending.remove(mu)
-                found = reduced.eigenpairs(mu)
-                reduced.keep(found.right[:, wanted(reduced, found)])
-                continue
             idle[mu] = 0 if worst[mu] < 0.5 * least[mu] else idle[mu] + 1
             least[mu] = min(least[mu], worst[mu])
-            if idle[mu] >= IDLE and worst[mu] <= BELIEVED:  # rounding, which basis vectors are not made of
-                pending.remove(mu)
-                found = reduced.eigenpairs(mu)
-                reduced.keep(found.right[:, wanted(reduced, found)])
-                continue
-            force = principal(reduced.problem, force)
-            grown = reduced.enrich_left(force, opening) if left else reduced.enrich(force)
-            if not grown:  # what is left is rounding: there is nothing to take in
-                pending.remove(mu)
-                stuck.append(mu)
-                found = reduced.eigenpairs(mu)
-                reduced.keep(found.right[:, wanted(reduced, found)])
+            rounding = idle[mu] >= IDLE and worst[mu] <= BELIEVED  # which no basis vectors are made of
+            if (force.shape[1] or opening.shape[1]) and not rounding:
+                force = principal(reduced.problem, force)
+                grown = reduced.enrich_left(force, opening) if left else reduced.enrich(force)
+                if grown:
+                    continue
+                stuck.append(mu)  # there is nothing to take in
+            pending.remove(mu)
+            found = reduced.eigenpairs(mu)
+            reduced.keep(found.right[:, wanted(reduced, found)])
     stuck = [mu for mu in (*stuck, *pending) if worst[mu] > BELIEVED]
     if stuck:
         raise FollowingError(
