@@ -170,6 +170,23 @@ def test_formulas_and_integers_come_back(tmp_path):
         assert (back.problem.at([k]).stiffness != made.problem.at([k]).stiffness).nnz == 0
 
 
+@pytest.mark.parametrize("keep", ["all", "eigenvalues"])
+def test_states_of_overdamped_modes_come_back(tmp_path, keep):
+    n = 60
+    stiffness = sp.csr_array(sp.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(n, n)))
+    dampers = sp.csr_array(sp.diags_array(np.where(np.arange(n) % 9 == 4, 40.0, 0.0)))
+    terms = (
+        Term(sp.csr_array(sp.eye_array(n)), "mass", CONSTANT, symmetric=True),
+        Term(stiffness, "stiffness", Product((("k", 1.0),)), symmetric=True),
+        Term(dampers, "damping", CONSTANT, symmetric=True),
+    )
+    made = reduce(ParametricProblem(terms, (Parameter("k", 1.0, 2.0, 1.5),)), 0.1)
+    assert made.states is not None
+    back = st.open(st.save(made, tmp_path / "model.npz", keep=keep))
+    assert np.array_equal(back.states.right, made.states.right)
+    assert np.array_equal(back.modes([1.31]).values, made.modes([1.31]).values)
+
+
 def test_patterns_in_common_are_written_once(model, content):
     damping = [t.matrix for t in model.problem.terms if t.role == "damping"]
     assert len(damping) > 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from stridor.modal.parametric.basis import residual
 from stridor.modal.parametric.dense import _by_companion, dense_modes
 from stridor.modal.parametric.factors import Product
 from stridor.modal.parametric.full import verified
+from stridor.modal.parametric.states import States
 from stridor.study.reduced import parametric_problem, reduced_model
 from stridor.system import build_system
 
@@ -224,6 +226,57 @@ def test_strong_dashpots_far_from_the_band_bring_modes_into_it(first):
         for lam in reference.values[np.abs(reference.values) < 0.999 * top]:
             assert np.abs(found.values - lam).min(initial=np.inf) < 1e-7 * abs(lam), (seed, lam)
     assert cheap > 30
+
+
+def strongly_damped() -> ParametricProblem:
+    """The rotor with dampers far beyond critical at places of their own."""
+    problem = rotor()
+    rng = np.random.default_rng(5)
+    strength = np.zeros(problem.size)
+    strength[rng.choice(problem.size, 12, replace=False)] = 10 ** rng.uniform(1.0, 2.0, 12)
+    dampers = Term(sp.csr_array(sp.diags_array(strength)), "damping", lambda _: 1.0, symmetric=True)
+    return ParametricProblem((*problem.terms, dampers), problem.parameters)
+
+
+@pytest.fixture(scope="module")
+def damped():
+    return reduce(strongly_damped(), FREQUENCY_HZ, bound=1e-8)
+
+
+def test_overdamped_modes_are_found_among_states(damped):
+    problem = damped.problem
+    assert damped.whole
+    assert damped.states is not None
+    assert damped.states.count < 1.4 * damped.size
+    for point in [*problem.corners([2, 2]), *random_points(problem, 6, 4)]:
+        whole = eigenvalues(problem, point)
+        exact = whole[np.abs(whole) < 0.999 * damped.frequency]
+        found = damped.modes(point)
+        away = np.abs(exact[:, None] - found.values).min(axis=1) / np.abs(exact)
+        assert np.count_nonzero(exact.imag == 0) >= 5
+        assert away.max() < 1e-8
+        assert np.all(found.passed)
+        nearest = np.abs(found.values[:, None] - whole).min(axis=1) / np.abs(found.values)
+        assert np.all(nearest <= found.error + 1e-12)
+        assert np.unique(np.abs(found.values[:, None] - whole).argmin(axis=1)).size == len(found.values)
+        # in the order, and of the length, that the companion matrix gives them
+        reference = replace(damped, states=None).modes(point)
+        assert found.values == pytest.approx(reference.values, rel=1e-7)
+        for one, other in ((found.right, reference.right), (found.left, reference.left)):
+            assert np.abs(np.einsum("ij,ij->j", one.conj(), other)) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_outside_the_box_states_are_not_trusted(damped):
+    point = {"Omega": 6.0, "mu": 0.9}
+    found, reference = damped.modes(point), replace(damped, states=None).modes(point)
+    assert not found.inside
+    assert np.array_equal(found.values, reference.values)
+
+
+def test_states_that_are_none_give_way_to_the_companion_matrix(damped):
+    nothing = np.zeros_like(damped.states.right)
+    found = replace(damped, states=States(nothing, nothing)).modes({"Omega": 1.0})
+    assert np.array_equal(found.values, replace(damped, states=None).modes({"Omega": 1.0}).values)
 
 
 def test_left_residuals_are_those_of_the_transposed_problem():

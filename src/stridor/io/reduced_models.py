@@ -29,6 +29,7 @@ from ..modal.parametric.contacts import ContactsProblem
 from ..modal.parametric.contacts_rigid import Elimination
 from ..modal.parametric.factors import ParameterFactor, factor_from_json
 from ..modal.parametric.problem import POWERS
+from ..modal.parametric.states import States
 from ..reading import ZIP, bounded, irregular, size_words
 from ..study.provenance import versions
 from .archive_reader import ArchiveReader, check_unfolded, whole_count
@@ -46,7 +47,7 @@ QUICK = 1  # compression: half the time of the usual 6, a tenth larger
 _NUMBERS = ("frequency", "constant", "bound", "solves", "whole")
 _ARRAYS = ("vectors", "projected", "right_sketch", "left_sketch")
 _OF_CONTACTS = {"terms", "parameters", "elimination", "notes"}
-_NAMED = {"problem", "seconds", *_NUMBERS, *_ARRAYS}
+_NAMED = {"problem", "seconds", "states", *_NUMBERS, *_ARRAYS}
 
 
 def save_reduced(
@@ -142,6 +143,9 @@ def _header(
     for name in _ARRAYS:
         if name != "vectors" or keep != "eigenvalues":
             written.take(name, getattr(model, name))
+    if model.states is not None:
+        written.take("right_states", model.states.right)
+        written.take("left_states", model.states.left)
     problem = model.problem
     return {
         "format": FORMAT,
@@ -151,6 +155,7 @@ def _header(
         "freedoms": problem.size,
         "unknowns": model.size,
         "sketch": int(model.right_sketch.shape[1]),
+        "states": 0 if model.states is None else model.states.count,
         "parameters": [{"name": p.name, "low": p.low, "high": p.high, "value": p.value} for p in problem.parameters],
         "terms": [_term(k, t, written, matrices=keep == "all") for k, t in enumerate(problem.terms)],
         "contacts": _contacts(problem, written, vectors=keep != "eigenvalues"),
@@ -321,6 +326,10 @@ def _model(archive: zipfile.ZipFile, header: Mapping[str, Any]) -> ReducedModel:
     vectors: Any = LeftOut("its basis was", (n, r), n * r)
     if keep != "eigenvalues":
         vectors = reading.numbers("vectors", (n, r))
+    # Files of versions that knew no states say nothing of them.
+    count, states = whole_count(header.get("states", 0)), None
+    if count:
+        states = States(*(reading.numbers(f"{side}_states", (2 * r, count)) for side in ("right", "left")))
     numbers = header["model"]
     frequency, constant, bound = (float(numbers[name]) for name in ("frequency", "constant", "bound"))
     if not (0 < frequency < np.inf and constant > 0 and 0 < bound < np.inf):
@@ -337,6 +346,7 @@ def _model(archive: zipfile.ZipFile, header: Mapping[str, Any]) -> ReducedModel:
         seconds={str(part): float(value) for part, value in numbers["seconds"].items()},
         solves=int(numbers["solves"]),
         whole=bool(numbers["whole"]),
+        states=states,
     )
 
 

@@ -198,7 +198,7 @@ def without_damping(model: ReducedModel) -> ReducedModel:
     terms = tuple(model.problem.terms[k] for k in kept)
     return replace(
         model, problem=replace(model.problem, terms=terms), projected=model.projected[kept],
-        right_sketch=model.right_sketch[kept], left_sketch=model.left_sketch[kept],
+        right_sketch=model.right_sketch[kept], left_sketch=model.left_sketch[kept], states=None,
     )  # fmt: skip
 
 

@@ -23,7 +23,7 @@ JUMP = 0.1  # of the distance to the next mode: what an inverse iteration may mo
 @dataclass(frozen=True)
 class DenseModes:
     """λ (k,) with Im λ ≥ 0 ascending, right and left vectors (r, k) of unit length, yᵀP(λ) = 0. whole: whether it took
-    the whole companion matrix."""
+    the whole companion matrix, or would have without `states`."""
 
     values: ComplexArray
     right: ComplexArray

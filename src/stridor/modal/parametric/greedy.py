@@ -23,6 +23,7 @@ from .basis import Basis, real_and_imaginary
 from .dense import DenseModes, assembled, dense_modes
 from .model import ReducedModel, product_over_slope, sketched, sketched_rests
 from .problem import ParametricProblem
+from .states import spanned
 
 SEED = 20061
 MARGIN = 1.03  # modes up to this much above the band are made exact
@@ -36,8 +37,13 @@ WATCHED = 6  # points for each parameter whose estimates have to stay within the
 FINE = 3  # parameters up to which the grid has points between the corners
 ASKED = 3  # of the points whose estimates fail, the worst ones, that are asked themselves
 FIRST_CUT, LESS = 3e-4, 1.6  # of the largest singular value: what is cut away at first, and how it sinks
-TOGETHER = 64  # answers at most that join the basis at once
+FINE_CUT = 1e-6  # of it: what is cut away where the whole basis is dear
+TOGETHER, FEWER = 64, 40  # answers at most that join the basis at once; fewer where a large basis is dear
 ROUNDS = 25
+PAIR = 2  # of the points that fail, how many are asked together where each takes the whole companion matrix
+STATES = 10.0 ** -np.arange(7.0, 12.5, 0.5)  # of the strongest: states left out, tried in turn
+WORTH = 1.4  # states for each unknown, of which the whole companion matrix has two, up to which they pay
+SPARED = 0.8  # of the bound: what an estimate may be with them
 
 Point = Mapping[str, float]
 
@@ -77,26 +83,31 @@ class Greedy:
         return self.basis.problem
 
     @passing()
-    def enrich(self, points: list[Point]) -> None:
-        """Answers to what the modes at all points leave, together, until every mode at every point passes. Raises
-        AnalysisError where they do not settle."""
+    def enrich(self, points: list[Point], turn: Array | None = None) -> None:
+        """Answers to what the modes at all points leave, together, until every mode at every point passes. turn (r, s):
+        what of the basis they are first asked on. Raises AnalysisError where they do not settle."""
         pending = list(points)
         failing: list[tuple[Point, DenseModes, Array]] = []
         for _ in range(ROUNDS):
-            failing_before, failing = failing, []
+            failing_before, failing, waiting = failing, [], []
             for point in pending:
+                if self.whole and len(failing) == PAIR:
+                    waiting.append(point)
+                    continue
                 # Where damping was too strong, or two modes too close, for the cheap way, it still is.
                 known = next((f.whole for other, f, _ in failing_before if other is point), False)
-                found, error = self._asked(point, whole=known)
+                found, error = self._asked(point, turn, whole=known)
                 if np.any(error > PASSED * self.bound):
                     failing.append((point, found, error))
                 else:
                     self.passed.append((point, found))
-            stage(f"reduced model: {len(failing)} of {len(pending)} points to be answered, {self.basis.count} unknowns")
+            pending = [point for point, _, _ in failing] + waiting
+            open_points = f"{len(pending)} of {len(points)} points to be answered"
+            stage(f"reduced model: {open_points}, {self.basis.count} unknowns")
             if not failing:
                 return
             self._answer(failing)
-            pending = [point for point, _, _ in failing]
+            turn = None
         raise AnalysisError(
             "the reduced model does not settle over the box; ask for a smaller box, a lower frequency or a larger bound"
         )
@@ -129,13 +140,16 @@ class Greedy:
                     # Once: modes of those that fail join the others.
                     asked = True
                     self.work.lap("cut")
-                    self.enrich([watched[k] for k in np.argsort(errors)[-ASKED:] if errors[k] > WATCHFUL * self.bound])
+                    worst = [k for k in np.argsort(errors)[-ASKED:] if errors[k] > WATCHFUL * self.bound]
+                    self.enrich([watched[k] for k in worst], left[:, size > FINE_CUT * size[0]] if self.whole else None)
                     self.work.lap("enrichment")
                     left, size = self._span()
                     continue
             if turn.shape[1] == left.shape[1]:
                 break
             share /= LESS
+        if self.whole and constant is not None:
+            model, constant = self._among_states(replace(model, constant=constant), turn, measured, exact, watched)
         self.work.lap("cut")
         vectors = self.basis.vectors @ turn
         self.work.lap("vectors")
@@ -143,6 +157,27 @@ class Greedy:
             model, vectors=vectors, constant=constant or SAFETY, seconds=dict(self.work.seconds),
             solves=self.work.solves,
         )  # fmt: skip
+
+    def _among_states(
+        self, model: ReducedModel, turn: Array, measured: list[Point], exact: list[ComplexArray], watched: list[Point]
+    ) -> tuple[ReducedModel, float]:
+        """The model and its constant with the fewest states that do for the whole companion matrix, judged at the same
+        points; without any where too many are needed."""
+        problem = self.problem
+        found = [_on(modes, self.basis.count) for _, modes in self.passed]
+        cut = [replace(m, right=turn.T @ m.right, left=turn.T @ m.left) for m in found]
+        matrices = assembled(model.projected, problem.factors(problem.reference), problem.powers)
+        for share in STATES:
+            states = spanned(cut, matrices, self.frequency, share)
+            if states.count > WORTH * model.size:
+                break
+            tried = replace(model, states=states)
+            constant = _constant(tried, measured, exact)
+            if constant is not None:
+                tried = replace(tried, constant=constant)
+                if all(np.all(tried.modes(point).error <= SPARED * self.bound) for point in watched):
+                    return tried, constant
+        return model, model.constant
 
     @property
     def whole(self) -> bool:
@@ -162,10 +197,16 @@ class Greedy:
         self.tried, self.stiff = self.tried + 1, self.stiff + found.whole
         return found
 
-    def _asked(self, point: Point, *, whole: bool = False) -> tuple[DenseModes, Array]:
-        """The modes at a point and their errors (k,) by residuals, without a constant."""
-        matrices = self._matrices(point)
-        found = self._solved(matrices, whole=whole)
+    def _asked(self, point: Point, turn: Array | None, *, whole: bool = False) -> tuple[DenseModes, Array]:
+        """The modes at a point, of the basis or of what is turned out of it, and their errors (k,) by residuals,
+        without a constant."""
+        mass, damping, stiffness = matrices = self._matrices(point)
+        if turn is None:
+            found = self._solved(matrices, whole=whole)
+        else:
+            small = turn.T @ mass @ turn, turn.T @ damping @ turn, turn.T @ stiffness @ turn
+            found = self._solved(small, whole=whole)
+            found = replace(found, right=turn @ found.right, left=turn @ found.left)
         factors, powers = self.problem.factors(point), self.problem.powers
         sizes = [
             sketched(sketch, factors, powers, found.values, vectors)
@@ -193,7 +234,7 @@ class Greedy:
                     weights[index][1 - side].append(np.zeros((len(z), 2 * z.shape[1])))
         block = np.hstack(seen)
         squares, turn = sl.eigh(block @ block.T)
-        keep = np.flatnonzero(squares > max(WEAKEST**2 * squares[-1], 1e-300))[-TOGETHER:]
+        keep = np.flatnonzero(squares > max(WEAKEST**2 * squares[-1], 1e-300))[-(FEWER if self.whole else TOGETHER) :]
         mix = block.T @ (turn[:, keep] / squares[keep])
         right, left = ([np.hstack(sides[side]) @ mix for sides in weights] for side in (0, 1))
         force = self.basis.forces(right, left)

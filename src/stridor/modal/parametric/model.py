@@ -27,6 +27,7 @@ from ..tolerances import UNSTABLE_RELATIVE
 from .basis import expanded
 from .dense import DenseModes, assembled, dense_modes
 from .problem import ParametricProblem
+from .states import States
 
 REACH = 1.0 + 1e-9
 
@@ -90,7 +91,7 @@ class ReducedModel(Shown):
     """Basis V (n, r), projected terms (t, r, r), sketches (t, s, r) of the scaled A_jV and A_jᵀV; frequency [1/s]:
     modes up to it are promised. constant: of the error estimate; bound: the relative error promised in the box;
     seconds and solves that making it took, by part; whole: damping is so strong that points take the whole companion
-    matrix."""
+    matrix; states: what has their modes in its place, within the box."""
 
     problem: ParametricProblem
     vectors: Array
@@ -103,6 +104,7 @@ class ReducedModel(Shown):
     seconds: Mapping[str, float]
     solves: int
     whole: bool = False
+    states: States | None = None
 
     @property
     def _line(self) -> str:
@@ -125,11 +127,14 @@ class ReducedModel(Shown):
         point = self.problem.point(values)
         factors, powers = self.problem.factors(point), self.problem.powers
         matrices = assembled(self.projected, factors, powers)
-        found = dense_modes(*matrices, self.frequency, REACH, whole=self.whole)
+        inside = self.problem.inside(point)
+        # Outside the box nothing says that the states are those of its modes.
+        found = self.states.modes(matrices, self.frequency, REACH) if self.states is not None and inside else None
+        if found is None:
+            found = dense_modes(*matrices, self.frequency, REACH, whole=self.whole)
         residual, error = self._judged(matrices, factors, found)
         return ReducedModes(
-            point, found.values, residual, error, error <= self.bound, self.problem.inside(point), found.right,
-            found.left,
+            point, found.values, residual, error, error <= self.bound, inside, found.right, found.left
         )  # fmt: skip
 
     def expand(self, modes: ReducedModes, *, left: bool = False) -> ComplexArray:
