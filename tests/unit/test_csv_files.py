@@ -99,9 +99,11 @@ def test_numbers_are_those_of_the_documents(folder: Path, documents: dict[str, d
         assert [float(r["value"]) for r in tables[file]] == [o[value] for o in onsets]
         assert [float(r["frequency_hz"]) for r in tables[file]] == [o["frequency_hz"] for o in onsets]
     assert {r["parameter"] for r in tables["onsets.csv"]} == {"mu"}
+    kept = st.open(folder / "case.out" / "sensitivities.nc")
     (sensitive, *_), numbers = documents["sensitivities"]["modes"], tables["sensitivities.csv"]
     assert [r["parameter"] for r in numbers[:2]] == ["mu", DAMPINGS[0]]
     assert float(numbers[1]["growth_per_percent_1_s"]) == sensitive["parameters"][1]["growth_per_percent"]
+    assert kept["growth_per_percent"].values[1, 0] == sensitive["parameters"][1]["growth_per_percent"]
     measures = documents["countermeasures"]["measures"]
     assert [r["name"] for r in tables["countermeasures.csv"]] == [m["name"] for m in measures]
     assert float(tables["countermeasures.csv"][0]["verified_removed_1_s"]) == measures[0]["verified"]["removed"]

@@ -50,6 +50,20 @@ def test_onsets_file_holds_what_is_missing_as_nan(case: st.Case, tmp_path: Path)
     assert list(data["kind"].values) == [o.kind for o in found.onsets]
 
 
+@pytest.mark.parametrize("mu", [0.01, 0.2])  # without and with an unstable mode
+def test_sensitivities_round_trip(case: st.Case, tmp_path: Path, mu: float) -> None:
+    found = st.sensitivities(case, ["mu", "bodies.beam1.damping.mass"], mu=mu, band_hz=(100.0, 20e3))
+    assert (len(found.branch) > 0) == (mu == 0.2)
+    data = st.open(st.save(found, tmp_path / "sensitivities.nc"))
+    assert list(data["parameter"].values) == list(found.parameters)
+    assert np.array_equal(data["branch"].values, found.branch)
+    derivative = data["growth_derivative"].values + 1j * data["angular_frequency_derivative"].values
+    assert np.array_equal(derivative, found.derivative)
+    assert np.array_equal(data["growth_per_percent"].values, found.growth_per_percent, equal_nan=True)
+    assert (data.attrs["mu"], list(data.attrs["band_hz"])) == (mu, [100.0, 20e3])
+    assert st.loads(data.attrs["case"]) == case
+
+
 def test_no_onsets_is_a_file_too(case: st.Case, tmp_path: Path) -> None:
     found = st.onsets(case, (0.0, 1e-3), max_frequency_hz=5e3)
     assert found.onsets == ()
@@ -128,7 +142,7 @@ def test_what_cannot_be_saved_or_opened(case: st.Case, tmp_path: Path) -> None:
             st.save(modes, tmp_path / "modes.nc", **given)
         assert str(error.value) == told
     for thing in (case, None, st.to_dataset(modes)):
-        with pytest.raises(st.CaseError, match=r"^result: 'a \w+' – complex modes, onsets, a trajectory or an agreement"):
+        with pytest.raises(st.CaseError, match=r"^result: 'a \w+' – complex modes, onsets, sensitivities, a trajectory"):
             st.save(thing, tmp_path / "nothing.nc")
     assert not list(tmp_path.iterdir())
     (tmp_path / "empty.npz").touch()

@@ -43,6 +43,7 @@ def sensitivities(
 
     friction, chosen = call.one_friction(mu), band_of(band, work.modal.max_frequency_hz, branch)
     result = solve(work, parameter or ["mu"], mu=friction, modes=branch or "unstable", band_hz=chosen)
+    call.keep(result, "sensitivities.nc")
     call.tabulate(result, "sensitivities.csv")
     drawn = sensitivity_bars(result) if len(result.branch) else None
     _draw(call, drawn, "sensitivities.png")

@@ -68,6 +68,17 @@ _AGREEMENT = {
     "mac": _Rule(("mu",), low=-1e-12, high=1.0 + 1e-12, missing=True),
     "dominant_frequency": _Rule(("mu",), low=0.0, missing=True),
 }
+_BOTH = ("parameter", "branch")
+_SENSITIVITIES = {
+    "parameter": _Rule(("parameter",), "O"),
+    "branch": _Rule(("branch",), "i"),
+    "value": _Rule(("parameter",)),
+    **{name: _Rule(("branch",)) for name in ("growth_rate", "frequency")},
+    **{name: _Rule(_BOTH) for name in ("growth_derivative", "angular_frequency_derivative")},
+    **{name: _Rule(_BOTH, missing=True) for name in ("growth_per_percent", "frequency_per_percent")},
+    **{name: _Rule(_BOTH, missing=True) for name in ("exceptional_real", "exceptional_imag")},
+    **{name: _Rule(("branch",), low=0.0, missing=True) for name in ("condition", "nearest", "residual")},
+}
 _RECORDS = {
     **{name: _Rule(_BY_CONTACT) for name in ("normal_force", "tangential_force", "slip_speed", "gap")},
     **{name: _Rule(_BY_POINT) for name in ("displacement", "velocity", "acceleration")},
@@ -96,7 +107,9 @@ _NODES = {
     "node_status": _Rule(_BY_NODE, "i", 0, 2),
     **_NODE_RECORDS,
 }
-_RULES: dict[str, dict[str, _Rule]] = {"modes": _MODES, "onsets": _ONSETS, "compare": _AGREEMENT, "simulate": _RUN}
+_RULES: dict[str, dict[str, _Rule]] = {
+    "modes": _MODES, "onsets": _ONSETS, "sensitivities": _SENSITIVITIES, "compare": _AGREEMENT, "simulate": _RUN,
+}  # fmt: skip
 _COUNTS = ("record_every", "steps", "planned_steps", "most_sweeps", "unconverged_steps")
 _NUMBERS = ("step", "beta2", "step_limit", "wall_seconds")
 _PATHS = ("modal", "nodal", "assembled")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from ..digits import readable
 from ..notebook import counted, html_table
-from ..tabular import MODE, Cell, Rows, Tabular, mode_cells, with_band
+from ..tabular import MODE, Cell, Rows, Tabular, dataset, mode_cells, with_band
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .measures import growing
 
@@ -158,9 +159,8 @@ class Sensitivities(Tabular):
         return html_table(f"Sensitivities at μ = {self.mu:g}", heads, rows, self.warnings)
 
     def to_xarray(self) -> Any:
-        """xarray.Dataset with dimensions parameter and branch; complex numbers as real and imaginary part."""
-        import xarray as xr
-
+        """xarray.Dataset with dimensions parameter and branch, as `st.save` writes it; complex numbers as real and
+        imaginary part."""
         both, one = ("parameter", "branch"), ("branch",)
         table: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
             "value": (("parameter",), self.values, {"long_name": "value of the number"}),
@@ -176,11 +176,15 @@ class Sensitivities(Tabular):
             "exceptional_imag": (both, self.exceptional.imag, {"long_name": "exceptional point of the number"}),
             "residual": (one, self.residual, {"long_name": "componentwise backward error"}),
         }
-        return xr.Dataset(
-            {name: xr.Variable(dims, data, attrs) for name, (dims, data, attrs) in table.items()},
-            coords={"parameter": list(self.parameters), "branch": self.branch},
-            attrs={"analysis": "sensitivities", "mu": self.mu, "warnings": "\n".join(self.warnings)},
-        )
+        names = np.array(self.parameters, dtype=object)
+        coords = {"parameter": ("parameter", names), "branch": ("branch", self.branch)}
+        data = dataset("sensitivities", table, coords, self.provenance)
+        data.attrs |= {"mu": self.mu, "damped": int(self.damped), "warnings": "\n".join(self.warnings)}
+        if self.open_contacts:
+            data.attrs["open_contacts"] = json.dumps(self.open_contacts)
+        if self.band_hz is not None:
+            data.attrs["band_hz"] = list(self.band_hz)
+        return data
 
 
 def _finite(value: float) -> float | None:
