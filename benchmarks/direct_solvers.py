@@ -1,6 +1,8 @@
-"""Sparse direct solvers on the stiffness of an elastic block of eight-node hexahedra: each that is installed.
+"""Sparse direct solvers, each that is installed: the stiffness of an elastic block of eight-node hexahedra, and the pad
+on a disc at a real and at a complex shift.
 
-Factorising, then solving for one vector at a time and for 16 at once. --short: 12 000 instead of 100 000 freedoms.
+Factorising, then solving for one vector at a time and for 16 at once. --short: 12 000 instead of 100 000 freedoms, and
+a coarse pad.
 """
 
 from __future__ import annotations
@@ -11,8 +13,10 @@ import time
 import numpy as np
 import scipy.sparse as sp
 
-from _common import machine, options
+import stridor as st
+from _common import COARSE, machine, options
 from stridor import direct
+from stridor.case import template_text
 
 
 def element_stiffness(size: float, young_modulus: float, poisson_ratio: float) -> np.ndarray:
@@ -55,15 +59,14 @@ def block(cells: tuple[int, int, int], size: float = 1e-3) -> sp.csr_array:
     return sp.csr_array(whole[free][:, free])
 
 
-def main() -> None:
-    args = options(__doc__ or "")
-    stiffness = block((15, 15, 15) if args.short else (32, 32, 30))
-    n = stiffness.shape[0]
-    print(f"elastic block of hexahedra, {n} freedoms, {stiffness.nnz} entries ({machine()})")
-    right = np.random.default_rng(0).standard_normal((n, 16))
+def compare(title: str, matrix: sp.csr_array) -> None:
+    """Factors of a symmetric matrix by each solver, then solutions alone and together."""
+    n = matrix.shape[0]
+    print(f"{title}, {n} freedoms, {matrix.nnz} entries")
+    right = np.random.default_rng(0).standard_normal((n, 16)).astype(matrix.dtype)
     for solver in direct.available():
         started = time.perf_counter()
-        with direct.factorise(stiffness, symmetric=True, solver=solver) as factor:
+        with direct.factorise(matrix, symmetric=True, solver=solver) as factor:
             ready = time.perf_counter()
             for column in range(4):
                 factor.solve(right[:, column])
@@ -75,6 +78,24 @@ def main() -> None:
                 f"  {solver:8s} factorise {ready - started:7.2f} s (of it {factor.seconds:.2f} s the factors),"
                 f" solve {single:7.4f} s alone, {many:7.4f} s each of 16, {factor.memory_bytes / 1e6:6.0f} MB"
             )
+
+
+def compare_pad(short: bool) -> None:
+    """The shipped pad on a disc in contact without friction, at a shift in the middle of its band."""
+    case = st.loads(template_text("pad-on-disc"))
+    case = case.with_(COARSE) if short else case
+    mass, damping, stiffness = st.pencil(case, 0.0).matrices()
+    omega = np.pi * case.modal.max_frequency_hz
+    real = sp.csr_array(stiffness - omega**2 * mass)
+    compare("pad on disc, K − ω²M", real)
+    compare("pad on disc, K + iωC − ω²M", sp.csr_array(real + 1j * omega * damping))
+
+
+def main() -> None:
+    short = options(__doc__ or "").short
+    print(machine())
+    compare("elastic block of hexahedra", block((15, 15, 15) if short else (32, 32, 30)))
+    compare_pad(short)
 
 
 if __name__ == "__main__":
