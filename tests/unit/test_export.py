@@ -81,13 +81,17 @@ def test_rigid_contact_brings_its_force_as_an_unknown(tmp_path: Path) -> None:
 
 
 def test_contact_over_a_surface_and_its_tables(tmp_path: Path) -> None:
-    case = st.loads(rubbing_block("max_frequency_hz = 60e3")).with_({"loads": None})  # so that all nodes touch
+    case = st.loads(rubbing_block("max_frequency_hz = 60e3\nsweep_points = 7")).with_({"loads": None})  # so that all nodes touch
     system = st.build_system(case)
     written = st.export(case, tmp_path, format="npz")
     assert written.case is not None
     own = onsets(case)
     assert len(own)
     assert onsets(st.load(written.case)) == pytest.approx(own, rel=1e-10)
+    sought = ("friction_range", "max_frequency_hz", "modes", "sweep_points")
+    assert [getattr(st.load(written.case).modal, name) for name in sought] == [
+        getattr(case.modal, name) for name in sought
+    ]
     table = rows(tmp_path / "freedoms.csv")
     assert [f"{r['body']} node {r['node']} {r['direction']}" for r in table] == list(system.dof_names)
     block = next(s for s in system.solids if s.name == "block")

@@ -168,6 +168,19 @@ def test_a_page_of_matrices_that_no_time_loop_takes(tmp_path: Path, nothing_comp
         st.run(st.load(path), tmp_path / "case.out")
 
 
+def test_matrices_that_follow_friction_are_swept_once(tmp_path: Path) -> None:
+    """Each friction coefficient costs a search in the full problem: no second sweep without damping, no zooms."""
+    path, said = written(tmp_path, text=TEXT.replace("parameters.mu = { value = 0.3 }", "")), list[str]()
+    st.report(path, mu=0.3, log=said.append, skip=["sensitivities", "countermeasures"])
+    assert [line for line in said if line.startswith(("modes: ", "onsets: "))] == [
+        "modes: of the bodies alone",
+        "modes: in contact without friction",
+        "modes: 3 friction coefficients from 0 to 1, damped",
+        "onsets: damped",
+        "modes: at μ = 0.3",
+    ]
+
+
 def test_a_second_call_computes_nothing_and_says_the_same(tmp_path: Path, nothing_computed: pytest.MonkeyPatch) -> None:
     path = written(tmp_path)
     nothing_computed.undo()

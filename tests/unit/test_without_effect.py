@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -219,3 +220,9 @@ def test_check_tells_cubic_springs() -> None:
     case = st.loads(BELT).with_({"springs.k.cubic": 2e5, "springs.k.damping": 3.0})
     (line,) = [x for x in st.describe(case).lines if x.startswith("  spring k")]
     assert line == "  spring k: m to ground, 1 N/m and 200000 N/m³ times the cube, with a dashpot of 3 N s/m"
+
+
+def test_matrices_that_follow_friction_are_solved_by_the_solver_named(tmp_path: Path) -> None:
+    exported = st.export(beams().with_({"contacts.A.stiffness": 1e7}), tmp_path)
+    assert exported.case is not None
+    assert without_effect(st.load(exported.case), "modes", solver="superlu") == []

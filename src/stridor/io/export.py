@@ -194,7 +194,7 @@ def _case(work: Workspace, model: ExportedModel, form: Format) -> str:
     lines += ["", "[modal]", f"max_frequency_hz = {settings.max_frequency_hz!r}", f"modes = {settings.modes}"]
     if model.mu is None:
         low, high = settings.friction_range
-        lines.append(f"friction_range = [{low!r}, {high!r}]")
+        lines += [f"friction_range = [{low!r}, {high!r}]", f"sweep_points = {settings.sweep_points}"]
     if not settings.damped:
         lines.append("damped = false")
     lines += ["", "[matrices]", f"dimension = {model.dimension}", f"labels = {_quoted(LABELS)}", "terms = ["]

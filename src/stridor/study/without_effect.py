@@ -54,7 +54,7 @@ def _of_few_points(work: Workspace, case: Case) -> bool:
     # Contact over a surface never is, which the case tells without a model.
     if not case.imported and any(not is_point_on_line(case, contact) for contact in case.contacts.values()):
         return False
-    return by_receptance(work.system())
+    return not work.varies and by_receptance(work.system())
 
 
 def _given(case: Case, solver: str | None) -> bool:
