@@ -13,12 +13,15 @@ import sys
 import termios
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from program import stridor
 from stridor.app import tables
 from stridor.app.closing import command
+from stridor.app.conclusions import of_countermeasures
 from stridor.app.output import _filled, stdout
+from stridor.study.measures import Countermeasures, Measure, Verified
 
 COARSE = [
     "--set", "bodies.beam1.elements=6", "--set", "bodies.beam2.elements=18", "--set", "temporal.step=4e-7",
@@ -213,3 +216,25 @@ def on_terminal(words: list[str], cwd: Path, more: dict[str, str]) -> str:
     os.close(ours)
     assert process.returncode == 0
     return text.decode()
+
+
+def change(name: str, removed: float, again: float | None) -> Measure:
+    verified = None if again is None else Verified(1.0, 1e3, again, again, (1e3,))
+    return Measure("number", name, 1, 5.0, removed / 5, removed / 5, removed, np.zeros(1, complex), (), (), None, None, verified)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said", "set_to"),
+    [
+        # What was predicted to help most and makes things worse is neither called best nor gone on with.
+        ([change("a", 9.0, -4.0), change("b", 5.0, 2.0), change("c", 3.0, 6.0)], "best: raise c by 5 %, takes 6.000 1/s", "c=2.1"),
+        ([change("a", 9.0, -4.0), change("b", 5.0, None)],
+         "1 change solved again, and none takes growth away; best: raise b by 5 %, predicted to take 5.000 1/s away", "b=2.1"),
+        ([change("a", 9.0, -4.0)], "no change takes growth away", None),
+    ],
+)  # fmt: skip
+def test_the_best_change_is_one_that_helped_when_solved_again(changes: list[Measure], said: str, set_to: str | None) -> None:
+    result = Countermeasures(0.3, "sum", np.array([1]), np.array([1j]), tuple(changes), 0.01)
+    conclusion = of_countermeasures(result, lambda _: 2.0, None)
+    assert conclusion.sentence.startswith(said)
+    assert (conclusion.options[-1] if conclusion.options else None) == set_to

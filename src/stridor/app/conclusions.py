@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..digits import fixed, measured, readable
+from ..notebook import counted
 from .closing import Conclusion
 
 if TYPE_CHECKING:
@@ -113,19 +114,23 @@ def of_sensitivities(result: Sensitivities, mu: str | None) -> Conclusion:
 
 
 def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float], mu: str | None) -> Conclusion:
-    """The change that takes away most per cent for per cent, as it was solved again or is predicted; then the modes
-    with the best change of a number made. value_of: what a number of the case is."""
+    """The change that takes most growth away, as it was solved again or is predicted; then the modes with the best
+    change of a number made. value_of: what a number of the case is."""
     own = ("--mu", mu) if mu is not None else ()
     if not result.measures:
         return Conclusion("", "modes", own)  # the warnings say why
-    best = result.measures[0]
+    if not result.helpful:
+        return Conclusion("no change takes growth away", "modes", own)
+    best = result.helpful[0]
     if best.verified is None:
         said = f"best: {best.words}, predicted to take {readable(best.removed, 4)} 1/s away"
+        if again := sum(m.verified is not None for m in result.measures):
+            said = f"{counted(again, 'change')} solved again, and none takes growth away; {said}"
     else:
         left = len(best.verified.unstable_hz)
         rest = f"{left} unstable mode{'' if left == 1 else 's'} left" if left else "nothing grows then"
         said = f"best: {best.words}, takes {readable(best.verified.removed, 4)} 1/s away, solved again; {rest}"
-    number = next((m for m in result.measures if m.kind == "number"), None)
+    number = next((m for m in result.helpful if m.kind == "number"), None)
     if number is None:
         return Conclusion(said)
     new = value_of(number.name) * (1 + number.direction * number.percent / 100)

@@ -112,8 +112,15 @@ class Countermeasures(Tabular):
         return heads, rows
 
     @property
+    def helpful(self) -> tuple[Measure, ...]:
+        """Changes that take growth away, best first: those solved again by what they took, then those predicted to."""
+        again = [m for m in self.measures if m.verified is not None and m.verified.removed > 0]
+        again.sort(key=lambda m: -m.verified.removed if m.verified else 0.0)
+        return (*again, *(m for m in self.measures if m.verified is None and m.removed > 0))
+
+    @property
     def _line(self) -> str:
-        best = f"; best: {self.measures[0].words}" if self.measures else ""
+        best = f"; best: {self.helpful[0].words}" if self.helpful else ""
         return f"{counted(len(self.measures), 'change')} at μ = {self.mu:g}{best}"
 
     def _repr_html_(self) -> str:
