@@ -168,6 +168,13 @@ def test_a_page_of_matrices_that_no_time_loop_takes(tmp_path: Path, nothing_comp
         st.run(st.load(path), tmp_path / "case.out")
 
 
+@pytest.mark.parametrize("verb", ["shapes", "steady"])
+def test_what_has_no_places_is_refused_before_anything_is_computed(tmp_path: Path, verb: str, nothing_computed: Any) -> None:
+    done = stridor(verb, written(tmp_path).name, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.replace("\n", " ").startswith("stridor: bodies: no places of nodes, so there is nothing to draw; ")
+
+
 def test_matrices_that_follow_friction_are_swept_once(tmp_path: Path) -> None:
     """Each friction coefficient costs a search in the full problem: no second sweep without damping, no zooms."""
     path, said = written(tmp_path, text=TEXT.replace("parameters.mu = { value = 0.3 }", "")), list[str]()

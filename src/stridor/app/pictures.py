@@ -36,10 +36,11 @@ def write_shapes(
     with frequencies in a band, where one is given).
 
     Returns a document for each: branch, frequency, growth and the files. Raises CaseError for branches that are not
-    in the list of modes.
+    in the list of modes, and, before anything is computed, for matrices without a mesh.
     """
     work = Workspace.of(problem)
     system = work.system(mu)
+    _require_places(system)
     modes = analyses.modes(work, mu, max_frequency_hz=work.modal.max_frequency_hz, vectors="right")
     if band_hz is not None and branches is None:
         modes = modes.between(*band_hz)
@@ -48,6 +49,14 @@ def write_shapes(
     for column in chosen:
         documents.append(_write_one(system, modes, int(column), folder, work.options, gif=gif))
     return documents
+
+
+def _require_places(system: System) -> None:
+    if not system.solids and not system.lines:
+        raise CaseError(
+            "bodies", None, "no places of nodes, so there is nothing to draw; bodies.NAME.mesh gives them to matrices, "
+            "and `stridor modes` and `stridor report` need none"
+        )  # fmt: skip
 
 
 def _chosen(modes: ComplexModes, branches: Sequence[int] | None) -> IntArray:
@@ -133,6 +142,7 @@ def write_steady(problem: Problem, steady: SurfaceSliding, folder: Path) -> list
     from ..view.field_plots import contact_snapshot
 
     system = Workspace.of(problem).system()
+    _require_places(system)
     nodes = system.contact_nodes()
     history = NodeHistory(
         names=nodes.names,
