@@ -22,7 +22,8 @@ from stridor.view.words import _agreement_sentence, _onset_sentence, model_in_wo
 def report(**more: Any) -> Any:
     nothing = Onsets((), (0.0, 0.5), 20e3, True)
     fields = {"damped_onsets": nothing, "undamped_onsets": None, "damped_sweep": None, "modes": None}
-    return SimpleNamespace(**(fields | {"max_frequency_hz": 20e3, "agreement": None} | more))
+    values = fields | {"max_frequency_hz": 20e3, "agreement": None} | more
+    return SimpleNamespace(**values, onsets=values["damped_onsets"] or values["undamped_onsets"])
 
 
 def sweep(growth: float, frequency_hz: float) -> ComplexModes:
