@@ -23,7 +23,8 @@ def report(**more: Any) -> Any:
     nothing = Onsets((), (0.0, 0.5), 20e3, True)
     fields = {"damped_onsets": nothing, "undamped_onsets": None, "damped_sweep": None, "modes": None}
     values = fields | {"max_frequency_hz": 20e3, "agreement": None} | more
-    return SimpleNamespace(**values, onsets=values["damped_onsets"] or values["undamped_onsets"])
+    damped, undamped = values["damped_onsets"], values["undamped_onsets"]
+    return SimpleNamespace(**values, onsets=undamped if damped is None else damped)
 
 
 def sweep(growth: float, frequency_hz: float) -> ComplexModes:
