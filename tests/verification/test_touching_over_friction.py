@@ -15,6 +15,7 @@ import pytest
 
 import stridor as st
 from rubbing_block import rubbing_block
+from stridor.app.show_modes import by_stretch
 from stridor.modal import growing as growing_module
 from stridor.modal import krylov as krylov_module
 from stridor.modal import over_friction
@@ -406,6 +407,17 @@ def test_what_is_true_of_all_stretches_is_said_once() -> None:
     assert "(0 to 0.2) Checked at both ends: none" in told.completeness
     assert "(0.2 to 0.5) NOT COMPLETE" in told.completeness
     assert not told.complete
+
+
+def test_what_was_checked_is_printed_a_paragraph_for_each_stretch() -> None:
+    found = st.onsets(coarse(0.45, 0.3))
+    count = int(found.completeness.split()[0])
+    told = by_stretch(found.completeness)
+    assert len(told) > count
+    assert all(line.startswith("(") for line in told[1 : count + 1])
+    assert " ".join(told) == found.completeness
+    assert by_stretch("Checked (0.1 to 0.2) as all.") == ["Checked", "(0.1 to 0.2) as all."]
+    assert by_stretch("Checked at both ends.") == ["Checked at both ends."]
 
 
 def test_modes_are_matched_by_their_nearness_alone() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Literal
 
@@ -103,9 +104,14 @@ def show_onsets(result: Onsets) -> None:
         stdout.print(
             f"{result.outside} more at frequencies outside of {result.frequencies.removeprefix('from ')}"
         )
-    for line in (result.completeness, *result.notes):
+    for line in (*by_stretch(result.completeness), *result.notes):
         if line:
             stdout.print(line)
+
+
+def by_stretch(completeness: str) -> list[str]:
+    """What was checked, a paragraph for each stretch of μ that has words of its own."""
+    return re.split(r" (?=\([0-9.e+-]+ to [0-9.e+-]+\) )| (?=In each of them: )", completeness)
 
 
 def _onset(onset: Onset) -> list[str]:
