@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from solid_cases import case, slider
 from stridor.case import Case, loads, template_text
 from stridor.errors import CaseError
 from stridor.study.contact_edges import edge_rows
-from stridor.study.countermeasures import Countermeasures, Measure, rank_countermeasures
+from stridor.study.countermeasures import Countermeasures, Measure, Verified, rank_countermeasures
 from stridor.study.damping_map import DampingMap, damping_map
 from stridor.study.sensitivities import sensitivities
 from stridor.system import build_system
@@ -136,6 +137,21 @@ def test_documents_tables_and_figures(beams, ranked):
     assert len(sensitivity_table(found).rows) == 2 * len(found.branch)
     for figure in (sensitivity_plots.sensitivity_bars(found), sensitivity_plots.countermeasure_bars(ranked)):
         assert figure.axes[0].patches
+
+
+@pytest.mark.parametrize("removed", [5.0, -5.0])
+def test_a_change_that_did_harm_when_solved_again_is_crossed(ranked, removed: float) -> None:
+    solved = Verified(10.0, 3e3, removed, removed, (3e3,))
+    measures = (replace(ranked.measures[0], verified=solved), *(replace(m, verified=None) for m in ranked.measures[1:]))
+    axes = sensitivity_plots.countermeasure_bars(replace(ranked, measures=measures)).axes[0]
+    words = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert ("solved again" in words) == (removed > 0)
+    assert ("made it worse" in words) == (removed < 0)
+    (mark,) = [line for line in axes.lines if line.get_marker() in ("D", "X")]
+    assert mark.get_marker() == ("D" if removed > 0 else "X")
+    if removed > 0:
+        low, high = axes.get_xlim()
+        assert low < mark.get_xdata()[0] < high
 
 
 def test_the_figure_of_a_map_hatches_where_damping_harms():

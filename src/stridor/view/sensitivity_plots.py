@@ -44,7 +44,8 @@ def sensitivity_bars(result: Sensitivities, *, ax: Axes | None = None) -> Figure
 
 @styled
 def countermeasure_bars(result: Countermeasures, *, ax: Axes | None = None) -> Figure:
-    """Growth rate removed per per cent of change, best first; the verified ones with what solving again gave."""
+    """Growth rate removed per per cent of change, best first; the verified ones with what solving again gave: a
+    diamond, or a cross at zero where growth became more, not less."""
     measures = result.measures[:MOST_BARS]
     figure, ax = panel(ax, 1.2 + 0.34 * max(1, len(measures)))
     at = np.arange(len(measures))
@@ -52,8 +53,12 @@ def countermeasure_bars(result: Countermeasures, *, ax: Axes | None = None) -> F
     colours = [ORANGE if bad else BLUE for bad in worse]
     ax.barh(at, [m.removed_per_percent for m in measures], 0.7, color=colours)
     checked = [(k, m.verified.removed / m.percent) for k, m in enumerate(measures) if m.verified is not None]
-    if checked:
-        ax.plot([v for _, v in checked], [k for k, _ in checked], "D", color=INK, ms=5)
+    less = [(k, v) for k, v in checked if v > 0]
+    more = [k for k, v in checked if v <= 0]
+    if less:
+        ax.plot([v for _, v in less], [k for k, _ in less], "D", color=INK, ms=5)
+    if more:
+        ax.plot(np.full(len(more), 0.02), more, "X", color=INK, mec="white", ms=9, transform=ax.get_yaxis_transform())
     _names(ax, [m.words for m in measures])
     if measures:
         # Changes of a damping differ by decades from those of a mass.
@@ -69,8 +74,12 @@ def countermeasure_bars(result: Countermeasures, *, ax: Axes | None = None) -> F
     handles = [Line2D([], [], color=BLUE, linewidth=6, label="first order")]
     if any(worse):
         handles.append(Line2D([], [], color=ORANGE, linewidth=6, label="may make another mode unstable"))
-    if checked:
+    if less:
         handles.append(Line2D([], [], color=INK, marker="D", ms=5, linestyle="none", label="solved again"))
+    if more:
+        handles.append(
+            Line2D([], [], color=INK, marker="X", ms=7, linestyle="none", label="made it worse")
+        )
     legend_above(ax, handles, columns=2)
     return figure
 
