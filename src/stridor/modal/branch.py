@@ -11,10 +11,11 @@ from ..digits import hertz, readable
 from ..notebook import html_table
 from ..tabular import MODE, Rows, Tabular, mode_cells
 from ..typing import Array, BoolArray, ComplexArray
+from .rates import Rates
 
 
 @dataclass(frozen=True, repr=False)
-class Branch(Tabular):
+class Branch(Rates, Tabular):
     """A mode over μ (k,), an item of `ComplexModes`: its number, λ (k,) [1/s], NaN where it is not known, backward
     error (k,), whether it grows (k,), and where asked for its right and left unit vectors (k, n)."""
 
@@ -25,22 +26,6 @@ class Branch(Tabular):
     unstable: BoolArray
     right: ComplexArray | None = None
     left: ComplexArray | None = None
-
-    @property
-    def frequency_hz(self) -> Array:
-        """Im λ / 2π (k,)."""
-        return self.eigenvalues.imag / (2 * np.pi)
-
-    @property
-    def growth_rate(self) -> Array:
-        """Re λ (k,) [1/s], positive when unstable."""
-        return self.eigenvalues.real
-
-    @property
-    def damping_ratio(self) -> Array:
-        """−Re λ/|λ| (k,)."""
-        size = np.abs(self.eigenvalues)
-        return -np.divide(self.eigenvalues.real, size, out=np.zeros_like(size), where=size > 0)
 
     def table(self) -> Rows:
         """Heads and rows, those of the modes' CSV file: a row for each μ."""

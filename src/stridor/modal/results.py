@@ -14,6 +14,7 @@ from ..notebook import counted, html_table
 from ..tabular import Rows, Tabular
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .branch import Branch
+from .rates import Rates
 from .tables import modes_dataset, modes_rows
 from .tolerances import UNSTABLE_RELATIVE
 
@@ -25,7 +26,7 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, repr=False)
-class ComplexModes(Tabular):
+class ComplexModes(Rates, Tabular):
     """Modes over μ (k,), one column per branch (b,): a sequence of `Branch`, and of a slice of it modes again.
 
     eigenvalues λ (k, b) [1/s]: growth rate + j angular frequency. branch (b,) numbers the modes from
@@ -60,22 +61,6 @@ class ComplexModes(Tabular):
     source: str = ""
     band_hz: tuple[float, float] | None = None
     unstable_outside: IntArray | None = None
-
-    @property
-    def frequency_hz(self) -> Array:
-        """Im λ / 2π (k, b)."""
-        return self.eigenvalues.imag / (2 * np.pi)
-
-    @property
-    def growth_rate(self) -> Array:
-        """Re λ (k, b) [1/s], positive when unstable."""
-        return self.eigenvalues.real
-
-    @property
-    def damping_ratio(self) -> Array:
-        """−Re λ/|λ| (k, b)."""
-        size = np.abs(self.eigenvalues)
-        return -np.divide(self.eigenvalues.real, size, out=np.zeros_like(size), where=size > 0)
 
     @property
     def unstable(self) -> BoolArray:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..digits import readable
+from ..modal.rates import Rates
 from ..notebook import counted, html_table
 from ..tabular import MODE, Cell, Rows, Tabular, dataset, mode_cells, with_band
 from ..typing import Array, BoolArray, ComplexArray, IntArray
@@ -16,7 +17,7 @@ from .measures import growing
 
 
 @dataclass(frozen=True, repr=False)
-class Sensitivities(Tabular):
+class Sensitivities(Rates, Tabular):
     """dλ/dp of b modes at one μ over k numbers of the case.
 
     parameters (k,) paths, values (k,) at the case. branch (b,) as `complex_modes` numbers them; eigenvalues (b,) [1/s];
@@ -43,16 +44,6 @@ class Sensitivities(Tabular):
     open_contacts: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
     band_hz: tuple[float, float] | None = None
-
-    @property
-    def frequency_hz(self) -> Array:
-        """Im λ / 2π (b,)."""
-        return self.eigenvalues.imag / (2 * np.pi)
-
-    @property
-    def growth_rate(self) -> Array:
-        """Re λ (b,) [1/s], positive when unstable."""
-        return self.eigenvalues.real
 
     @property
     def unstable(self) -> BoolArray:
