@@ -21,8 +21,10 @@ from stridor.modal import krylov as krylov_module
 from stridor.modal import over_friction
 from stridor.modal import source as source_module
 from stridor.modal.from_above import with_origins
+from stridor.modal.full import search as searching
 from stridor.modal.full.counted import Counted, Passing
 from stridor.modal.full.search import Answer
+from stridor.modal.full.words import _lacking
 from stridor.modal.growing import growing_modes
 from stridor.modal.joined import ALIKE, TouchingChange, joined_onsets, jumps, matched
 from stridor.modal.krylov import Carried
@@ -382,7 +384,9 @@ def test_growth_that_ends_above_the_band_is_not_taken_for_what_comes_into_it_lat
     assert "do not settle" not in found.completeness
 
 
-def test_counted_growth_from_above_the_band_without_its_onset_is_not_complete() -> None:
+def test_counted_growth_from_above_the_band_without_its_onset_is_not_complete(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     into, out = Passing(0.5, 1 + 6e4j, 2), Passing(0.3, 1 + 6e4j, -2)
     begins = Onset(0.2, 9575.0, "flutter", True, False, (0, 0), 0.0, None, None, enters_at=0.5)
 
@@ -393,6 +397,13 @@ def test_counted_growth_from_above_the_band_without_its_onset_is_not_complete() 
     assert unplaced((begins,), (into,)) == 0
     assert unplaced((), (out, into)) == 0
     assert unplaced((begins,), (into, into)) == 1
+    # Counted at both ends it agrees; what is said and what is exported must not.
+    monkeypatch.setattr(searching, "_ends_agree", lambda *_: True)
+    seen = Counted(((0.0, 0), (1.0, 2)), (), (into,))
+    for onsets, whole in (((), False), ((begins,), True)):
+        answer = searching._counted_answer(None, Answer(onsets, False), seen, None, 5e4, "")
+        assert answer.complete is whole
+        assert ("0.5 was not found" in _lacking(answer, "μ", float)) is not whole
 
 
 def test_what_is_true_of_all_stretches_is_said_once() -> None:

@@ -8,7 +8,7 @@ the growing roots are counted on a grid and the onsets enclosed between its valu
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,7 +31,8 @@ ON_EDGE = 1e-6  # of the highest frequency: modes so near it may count on one si
 
 @dataclass(frozen=True)
 class Answer:
-    """Onsets in ascending order; complete: whether as many roots grow wherever that was looked at as they say.
+    """Onsets in ascending order; complete: whether as many roots grow wherever that was looked at as they say, and
+    one of them begins whatever comes into the band.
 
     way: the branches, where following them led to all. seen: what was counted instead; lacks: where that and the
     onsets differ. why: what kept branches from being followed, if anything did. walked: at how many ω the imaginary
@@ -197,7 +198,8 @@ def _counted_answer(
     lacks = seen.lacking(onsets)
     agree = _ends_agree(family, seen, ends, top)
     every = tuple(sorted((*onsets, *entering), key=_order))
-    return Answer(every, not lacks and agree, way, seen, tuple(lacks), why)
+    answer = Answer(every, not lacks and agree, way, seen, tuple(lacks), why)
+    return replace(answer, complete=answer.complete and not answer.unplaced)
 
 
 def _same(one: Onset, other: Onset, width: float, top: float) -> bool:

@@ -33,12 +33,6 @@ def sentence(
         return f"Not complete: {numbers}, but {_lacking(answer, name, value)}.{passing}"
     if answer.way is None:
         assert answer.seen is not None, "what else would have led to it"
-        if answer.unplaced:
-            at = ", ".join(f"{value(p.mu):.4g}" for p in answer.unplaced[:MOST])
-            return (
-                f"Not complete: {numbers}, as the onsets say, but where growth begins that comes into the band at "
-                f"{name} ≈ {at} was not found, above {top / (2 * np.pi):g} Hz.{passing}"
-            )
         how = f"As many roots grow at each of {len(answer.seen.grid)} values of {name} as the onsets say"
         why = f": {answer.why}" if answer.why else ""
         if answer.walked:
@@ -89,6 +83,9 @@ def _followed(answer: Answer, name: str, value: Callable[[float], float], where:
 
 def _lacking(answer: Answer, name: str, value: Callable[[float], float]) -> str:
     """Where what is counted is not what the onsets say."""
+    unplaced = ", ".join(f"{value(p.mu):.4g}" for p in answer.unplaced[:MOST])
+    if not answer.lacks and unplaced:
+        return f"where growth begins, above the band, that comes into it at {name} ≈ {unplaced} was not found"
     if not answer.lacks:
         return "what was counted there is not the same"
     differences = [
