@@ -8,6 +8,8 @@ import json
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
+from scipy.io import mmwrite
 
 import stridor as st
 from program import stridor
@@ -249,3 +251,38 @@ def test_the_command_prints_a_table_and_writes_one(block, tmp_path):
     assert len(rows) == 4
     assert f"{float(rows[0]['mu']):.6f}" == lines[4].split()[1]
     assert float(rows[0]["mu_error"]) < 1e-7
+
+
+def test_a_map_of_matrices_with_friction_in_a_factor_has_the_onsets_of_each_point(tmp_path):
+    """Two modes that meet by a follower force: without μ in its own place no point would have an onset."""
+    matrices = {
+        "m": np.eye(2),
+        "k": np.array([[2.0, -0.5], [-0.5, 1.5]]),
+        "f": np.array([[0.0, 1.0], [0.0, 0.0]]),
+        "c": np.diag([1.0, 2.0]),
+    }
+    for name, matrix in matrices.items():
+        mmwrite(tmp_path / f"{name}.mtx", sp.coo_array(matrix))
+    terms = [("m", "mass", "1.0"), ("k", "stiffness", "1.0"), ("f", "stiffness", '"mu"'), ("c", "damping", "0.01")]
+    lines = ",\n".join(f'  {{ file = "{n}.mtx", role = "{role}", factor = {value} }}' for n, role, value in terms)
+    text = f'title = "Two modes"\n[bodies.two]\ntype = "matrices"\nterms = [\n{lines}\n]\n'
+    path = tmp_path / "two.toml"
+    path.write_text(f"{text}[modal]\nfriction_range = [0.0, 2.0]\nmax_frequency_hz = 1.0\n", encoding="utf-8")
+    two = st.load(path)
+    damping, mass = "bodies.two.terms.3.factor", "bodies.two.terms.0.factor"
+    found = st.damping_map(two, damping, mass, x_range=(0.005, 0.02), y_range=(1.0, 1.2), grid=(2, 2))
+
+    def onset(x: float, y: float) -> float:
+        first = st.onsets(two.with_({damping: x, mass: y})).first
+        assert first is not None
+        return first.mu
+
+    for i, x in enumerate(found.x_values):
+        for j, y in enumerate(found.y_values):
+            assert found.onset_mu[i, j] == pytest.approx(onset(x, y), abs=1e-12)
+            by_x = (onset(x * 1.001, y) - onset(x * 0.999, y)) / (0.002 * x)
+            by_y = (onset(x, y * 1.001) - onset(x, y * 0.999)) / (0.002 * y)
+            assert found.slope_x[i, j] == pytest.approx(by_x, rel=1e-5)
+            assert found.slope_y[i, j] == pytest.approx(by_y, rel=1e-5)
+    # Without damping K has the eigenvalues 7/4 ± √(1/16 + (½ − μ)/2), which meet at μ = 5/8.
+    assert found.undamped_mu == pytest.approx(0.625, abs=1e-12)

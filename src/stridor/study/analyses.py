@@ -214,23 +214,36 @@ def onsets(
     limit = max_frequency_hz or work.modal.max_frequency_hz
     require_band(band_hz, limit)
     damped = work.modal.damped if damped is None else damped
+    result = found_onsets(work, between, limit, damped=damped, check=check)
+    made = provenance(work, "onsets", time.perf_counter() - started)
+    result = replace(result, provenance=made)
+    return result if band_hz is None else result.between(*band_hz)
+
+
+def found_onsets(
+    work: Workspace, between: tuple[float, float], max_frequency_hz: float, *, damped: bool, check: bool
+) -> Onsets:
+    """Onsets in a range of μ, by whatever way the case takes: with matrices that depend on μ, they are those at each.
+
+    What every analysis asks that wants the onsets of a case with other numbers. Raises as `onsets` does.
+    """
     options = work.options
     if work.varies:
         require_full(options.source)
         own = work.own_friction if work.has_contacts else None
         result = full_onsets(
-            work.system, between, max_frequency_hz=limit, damped=damped, options=options, own=own
+            work.system, between, max_frequency_hz=max_frequency_hz, damped=damped, options=options, own=own
         )
         notes = _held_by_factors(work, own)
     elif check:
-        result = onsets_of_band(work.system(), between, limit, damped=damped, options=options)
+        result = onsets_of_band(work.system(), between, max_frequency_hz, damped=damped, options=options)
         notes = (*taken_as_closed(work.system()), *decided_by_meshes(work.system(), solver=options.solver))
     else:
-        result = solve_onsets(work.system(), between, max_frequency_hz=limit, damped=damped, **asdict(options))
+        result = solve_onsets(
+            work.system(), between, max_frequency_hz=max_frequency_hz, damped=damped, **asdict(options)
+        )
         notes = taken_as_closed(work.system())
-    made = provenance(work, "onsets", time.perf_counter() - started)
-    result = replace(result, notes=(*result.notes, *notes), provenance=made)
-    return result if band_hz is None else result.between(*band_hz)
+    return replace(result, notes=(*result.notes, *notes))
 
 
 def simulate(

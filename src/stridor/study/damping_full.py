@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..case import Case
 from ..errors import AnalysisError
-from ..modal.derivatives import HeldContacts, Mode, by_friction, pencil_of, rate_of, solve_mode
+from ..modal.derivatives import HeldContacts, Mode, PencilChange, by_friction, pencil_of, rate_of, solve_mode
 from ..modal.krylov.steady import touching_nodes
-from ..modal.onsets import Onset, onsets
-from ..modal.options import Options
+from ..modal.onsets import Onset
 from ..modal.pencil import Pencil
-from ..system import System, build_system
-from .options import options_of
+from .analyses import found_onsets
 from .sensitivities import number_at
+from .workspace import Workspace
 
 NOWHERE = (float("nan"), float("nan"))
 
@@ -45,45 +44,38 @@ class FullSearch:
 
     def lowest(self, x: float, y: float) -> tuple[LowestOnset | None, tuple[str, ...]]:
         """The lowest onset at values of the two numbers, and what there is to be said. Raises AnalysisError."""
-        varied = self.case.with_(dict(zip(self.paths, (x, y), strict=True)))
-        system = build_system(varied)
-        first = lowest_onset(varied, system, self.mu_range, self.max_frequency_hz)
+        varied = Workspace(self.case.with_(dict(zip(self.paths, (x, y), strict=True))))
+        first = lowest_onset(varied, self.mu_range, self.max_frequency_hz)
         if first is None:
             return None, ()
         found = LowestOnset(first.mu, first.frequency_hz, residual=first.residual)
         if first.growth_slope is None:
             return found, ()  # undamped: the onset is an exceptional point
         try:
-            slopes = onset_slopes(varied, system, first, self.paths)
+            slopes = onset_slopes(varied, first, self.paths, self.mu_range)
         except AnalysisError as error:
             return found, (f"no slopes: {error}",)
         return LowestOnset(first.mu, first.frequency_hz, (slopes[0], slopes[1]), first.residual), ()
 
     def undamped(self) -> LowestOnset | None:
         """The lowest onset without structural damping. Raises AnalysisError."""
-        first = lowest_onset(self.case, build_system(self.case), self.mu_range, self.max_frequency_hz, damped=False)
+        first = lowest_onset(Workspace(self.case), self.mu_range, self.max_frequency_hz, damped=False)
         return None if first is None else LowestOnset(first.mu, first.frequency_hz, residual=first.residual)
 
 
 def lowest_onset(
-    case: Case, system: System, mu_range: tuple[float, float], max_frequency_hz: float, *, damped: bool = True
+    work: Workspace, mu_range: tuple[float, float], max_frequency_hz: float, *, damped: bool = True
 ) -> Onset | None:
     """The onset of least μ from which on something grows."""
-    options = options_of(case)
-    return onsets(
-        system,
-        mu_range,
-        max_frequency_hz=max_frequency_hz,
-        damped=damped,
-        **asdict(options),
-    ).first
+    return found_onsets(work, mu_range, max_frequency_hz, damped=damped, check=False).first
 
 
-def onset_slopes(case: Case, system: System, onset: Onset, paths: Sequence[str]) -> list[float]:
+def onset_slopes(
+    work: Workspace, onset: Onset, paths: Sequence[str], mu_range: tuple[float, float]
+) -> list[float]:
     """dμ_c/dp of an onset with damping for numbers of the case. Raises AnalysisError where it has no derivative."""
-    options = options_of(case)
-    mu = onset.mu
-    held = _held(system, options)
+    options, mu = work.options, onset.mu
+    system, held = work.system(mu), _held(work, mu_range[0])
     pencil = pencil_of(system, mu, held, options)
     lam = 2j * np.pi * onset.frequency_hz
     if not abs(lam):
@@ -92,22 +84,34 @@ def onset_slopes(case: Case, system: System, onset: Onset, paths: Sequence[str])
     point, kappa = onset.exceptional_mu, onset.square_root_coefficient
     gap = 2 * kappa * abs(mu - point) ** 0.5 if point is not None and kappa is not None else 1e-3 * abs(lam)
     mode = solve_mode(pencil, lam, min(gap, abs(lam)), solver=options.solver)
-    by_mu = mode.derivative(by_friction(system, mu, held, options)).real
+    by_mu = mode.derivative(_by_friction(work, mu, held, pencil)).real
     if by_mu == 0.0:
         raise AnalysisError("growth does not change with friction there")
-    return [-_derivative(case, mode, path, mu, held, options).real / by_mu for path in paths]
+    return [-_derivative(work, mode, path, mu, held).real / by_mu for path in paths]
 
 
-def _held(system: System, options: Options) -> HeldContacts:
+def _held(work: Workspace, lowest: float) -> HeldContacts:
     """The nodes that touch where the search for onsets has them touch: in steady sliding with the laws' own friction,
-    not with that of the onset, which other nodes may do."""
+    not with that of the onset, which other nodes may do. lowest: the low end of the range of μ."""
+    at = work.own_friction if work.varies else None
+    at = lowest if work.varies and at is None else at
+    system = work.system(at)
     nodes = system.contact_nodes()
-    steady = touching_nodes(system, nodes, None, options.solver)
+    steady = touching_nodes(system, nodes, at, work.options.solver)
     return HeldContacts(np.flatnonzero(steady.active), steady.sense, steady.stuck, system.size, nodes.count)
 
 
-def _derivative(case: Case, mode: Mode, path: str, mu: float, held: HeldContacts, options: Options) -> complex:
+def _by_friction(work: Workspace, mu: float, held: HeldContacts, pencil: Pencil) -> PencilChange:
+    """What friction does to P, in contacts and in factors of imported matrices."""
+    if not work.varies:
+        return by_friction(work.system(), mu, held, work.options)
+    return rate_of(lambda value: pencil_of(work.system(value), value, held, work.options), mu, base=pencil)[0]
+
+
+def _derivative(work: Workspace, mode: Mode, path: str, mu: float, held: HeldContacts) -> complex:
+    case = work.case("a slope")
+
     def at(value: float) -> Pencil:
-        return pencil_of(build_system(case.with_({path: value})), mu, held, options)
+        return pencil_of(Workspace(case.with_({path: value})).system(mu), mu, held, work.options)
 
     return mode.derivative(rate_of(at, number_at(case, path))[0])

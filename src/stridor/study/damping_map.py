@@ -17,7 +17,6 @@ import numpy as np
 
 from ..errors import AnalysisError, CaseError
 from ..modal.source import by_receptance
-from ..system import build_system
 from ..typing import Array
 from .damping_full import FullSearch, LowestOnset
 from .damping_reduced import ReducedSearch
@@ -77,7 +76,7 @@ def damping_map(
     for path in (x, y):
         number_at(case, path)
     full = FullSearch(case, (x, y), (low, high), top)
-    search, notes = _search(full, xs, ys, method, bound)
+    search, notes = _search(work, full, xs, ys, method, bound)
     table = _Table(search, xs, ys, (x, y))
     table.fill(progress)
     if isinstance(search, ReducedSearch):
@@ -96,12 +95,14 @@ def damping_map(
 
 
 def _search(
-    full: FullSearch, xs: Array, ys: Array, method: Method, bound: float
+    work: Workspace, full: FullSearch, xs: Array, ys: Array, method: Method, bound: float
 ) -> tuple[FullSearch | ReducedSearch, tuple[str, ...]]:
     """How onsets are searched for, and what is to be said about it."""
     if method == "auto":
-        system = build_system(full.case)
-        if system.size < LARGE or len(xs) * len(ys) < MANY or by_receptance(system):
+        system = work.system()
+        # Matrices that depend on μ may be symmetric at one; no receptance is theirs at every other.
+        closed = not work.varies and by_receptance(system)
+        if system.size < LARGE or len(xs) * len(ys) < MANY or closed:
             method = "full"
     if method == "full":
         return full, (FOLLOWED,)
