@@ -11,6 +11,7 @@ import struct
 import subprocess
 import sys
 import termios
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,10 @@ import pytest
 
 from program import stridor
 from stridor.app import tables
+from stridor.app.arguments import Call
 from stridor.app.closing import command
 from stridor.app.conclusions import of_countermeasures
+from stridor.app.explore import show_countermeasures
 from stridor.app.output import _filled, stdout
 from stridor.study.measures import Countermeasures, Measure, Verified
 
@@ -238,3 +241,26 @@ def test_the_best_change_is_one_that_helped_when_solved_again(changes: list[Meas
     conclusion = of_countermeasures(result, lambda _: 2.0, None)
     assert conclusion.sentence.startswith(said)
     assert (conclusion.options[-1] if conclusion.options else None) == set_to
+
+
+def test_counter_measures_take_one_screen(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    harm = Verified(9.0, 6490.0, -9.0, -9.0, tuple(np.linspace(2e3, 9e3, 30)))
+    many = [replace(change(f"materials.lining.young_modulus_{k}", 40.0 - k, None), makes_unstable=tuple(range(20))) for k in range(25)]
+    many[:3] = [replace(m, verified=harm) for m in many[:3]]
+    result = Countermeasures(0.3, "sum", np.array([1]), np.array([1j]), tuple(many), 0.01)
+    show_countermeasures(Call(tmp_path / "case.toml", None, None, None, json=False, quiet=False), result)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 34  # with result, hints and notes no more than 40
+    assert "  18 more of 25, predicted to take less per % away, in countermeasures.csv" in lines
+    assert max(map(len, lines)) <= 80
+    printed = " ".join(" ".join(lines).split())
+    assert "young_modulus_6" in printed
+    assert "young_modulus_7" not in printed
+    assert "and 17 more" in printed
+    assert "and 27 more" in printed
+    # What was solved again is shown however many there are.
+    verified = replace(result, measures=tuple(replace(m, verified=harm) for m in many[:12]))
+    show_countermeasures(Call(tmp_path / "case.toml", None, None, None, json=False, quiet=False), verified)
+    shown = capsys.readouterr().out
+    assert "young_modulus_11" in shown
+    assert "more of" not in shown

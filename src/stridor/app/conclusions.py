@@ -124,7 +124,7 @@ def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float]
     best = result.helpful[0]
     if best.verified is None:
         said = f"best: {best.words}, predicted to take {readable(best.removed, 4)} 1/s away"
-        if again := sum(m.verified is not None for m in result.measures):
+        if again := result.solved_again:
             said = f"{counted(again, 'change')} solved again, and none takes growth away; {said}"
     else:
         left = len(best.verified.unstable_hz)

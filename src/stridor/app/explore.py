@@ -15,8 +15,10 @@ from .reduce import reduce
 from .values import band_of
 
 if TYPE_CHECKING:
+    from ..study.measures import Countermeasures
     from ..view.tables import Table
 
+ONE_SCREEN = 7  # changes, of up to five lines each
 
 
 @verb()
@@ -72,7 +74,6 @@ def countermeasures(
     from ..study.countermeasures import rank_countermeasures
     from ..study.sensitivities import number_at
     from ..view.sensitivity_plots import countermeasure_bars
-    from ..view.sensitivity_tables import countermeasure_table
     from .conclusions import of_countermeasures
 
     target: Any = branch[0] if branch else "sum"
@@ -80,13 +81,21 @@ def countermeasures(
     call.tabulate(result, "countermeasures.csv")
     drawn = countermeasure_bars(result) if result.measures else None
     _draw(call, drawn, "countermeasures.png")
-    _show(call, result, countermeasure_table(result), ["of all, per % [1/s]", "removed, predicted [1/s]"])
+    show_countermeasures(call, result)
     if not call.json:
         case = work.case(call.verb)
         call.conclude(of_countermeasures(result, partial(number_at, case), mu))
 
 
-def _show(call: Call, result: Any, shown: Table, drop: list[str]) -> None:
+def show_countermeasures(call: Call, result: Countermeasures) -> None:
+    """The table of those solved again and of the best of the others, no more than fit on a screen."""
+    from ..view.sensitivity_tables import countermeasure_table
+
+    less = ["of all, per % [1/s]", "removed, predicted [1/s]"]
+    _show(call, result, countermeasure_table(result), less, most=max(ONE_SCREEN, result.solved_again))
+
+
+def _show(call: Call, result: Any, shown: Table, drop: list[str], most: int | None = None) -> None:
     from .output import stdout
     from .tables import table
 
@@ -95,9 +104,11 @@ def _show(call: Call, result: Any, shown: Table, drop: list[str]) -> None:
         return
     if shown.rows:
         words = [shown.heads[k] for k in shown.words]
-        cells, bad = [row.cells for row in shown.rows], [k for k, row in enumerate(shown.rows) if row.kind == "bad"]
-        name = f"{shown.name}.csv"
+        rows, name = shown.rows[:most], f"{shown.name}.csv"
+        cells, bad = [row.cells for row in rows], [k for k, row in enumerate(rows) if row.kind == "bad"]
         table(shown.title, shown.heads, cells, drop=drop, words=words, marked=bad, kept_in=name)
+        if left := len(shown.rows) - len(rows):
+            stdout.print(f"  {left} more of {len(shown.rows)}, predicted to take less per % away, in {name}")
     for warning in result.warnings:
         stdout.print(warning)
 

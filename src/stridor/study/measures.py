@@ -119,6 +119,11 @@ class Countermeasures(Tabular):
         return (*again, *(m for m in self.measures if m.verified is None and m.removed > 0))
 
     @property
+    def solved_again(self) -> int:
+        """How many of the changes, the first ones, were solved again with the change made."""
+        return sum(m.verified is not None for m in self.measures)
+
+    @property
     def _line(self) -> str:
         best = f"; best: {self.helpful[0].words}" if self.helpful else ""
         return f"{counted(len(self.measures), 'change')} at μ = {self.mu:g}{best}"

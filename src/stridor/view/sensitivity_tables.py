@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from ..digits import readable
+from collections.abc import Sequence
+
 from ..study.countermeasures import Countermeasures, Measure
 from ..study.sensitivities import Sensitivities
 from .tables import Row, Table, drop_empty, quantity, significant
 
 BADLY_CONDITIONED = 10.0
+SOME = 3  # modes that a cell of a table names
 
 
 def sensitivity_table(result: Sensitivities) -> Table:
@@ -92,14 +94,23 @@ def countermeasure_table(result: Countermeasures) -> Table:
 def _consequences(measure: Measure) -> str:
     parts: list[str] = []
     if measure.makes_unstable:
-        parts.append(f"makes unstable: mode {', '.join(str(b) for b in measure.makes_unstable)}")
+        parts.append(f"makes unstable: mode {_some([str(b) for b in measure.makes_unstable])}")
     if measure.brings_close:
-        parts.append(f"brings close: mode {', '.join(str(b) for b in measure.brings_close)}")
-    if measure.verified is not None and not measure.verified.unstable_hz:
+        parts.append(f"brings close: mode {_some([str(b) for b in measure.brings_close])}")
+    again = measure.verified
+    if again is not None and not again.unstable_hz:
         parts.append("solved again: nothing grows")
-    elif measure.verified is not None:
-        where = ", ".join(f"{readable(f)} Hz" if f else "0 Hz (diverges)" for f in measure.verified.unstable_hz)
-        parts.append(f"solved again: grows at {where}")
-    if measure.verified is not None and measure.verified.doubt:
-        parts.append(measure.verified.doubt)
+    elif again is not None:
+        where = _some([significant(f) for f in again.unstable_hz if f])
+        diverges = "" if all(again.unstable_hz) else "diverges at 0 Hz"
+        grows = f"grows at {where} Hz" if where else ""
+        parts.append(f"solved again: {', '.join(filter(None, (diverges, grows)))}")
+    if again is not None and again.doubt:
+        parts.append(again.doubt)
     return "; ".join(parts)
+
+
+def _some(words: Sequence[str]) -> str:
+    """The first of a list, and how many more there are: the document of the result has them all."""
+    more = len(words) - SOME
+    return ", ".join(words[:SOME]) + (f" and {more} more" if more > 0 else "")
