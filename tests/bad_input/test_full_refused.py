@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import stridor as st
-from matrix_cases import matrix_case
+from matrix_cases import matrix_case, rubbing
 from program import stridor
 from stridor.study.workspace import Workspace
 
@@ -17,7 +19,8 @@ pytestmark = pytest.mark.bad_input
 
 ONE, SPRINGS = np.eye(2), np.array([[2.0, 1.0], [1.0, 2.0]])
 BELT = np.array([[0.0, -4 / 3], [0.0, 0.0]])
-WORKS = "what works for these is `stridor report`, `stridor modes`, `stridor onsets` and `stridor steady`"
+WORKS = "what works for these is `stridor report`, `stridor modes` and `stridor onsets`"
+ALONG = f"{WORKS[:-1]} --along NAME`"
 
 
 def model(folder: Path, *more: tuple, factor: str = "mu", extra: str = "") -> st.Case:
@@ -44,7 +47,10 @@ def test_a_run_needs_friction_and_a_comparison_contacts(tmp_path: Path):
     """Circulatory forces alone: modes and time answer, a run has no onset to look for."""
     case = model(tmp_path, factor="0.5", extra="[[phases]]\nname = 'free'\nduration = 1.0\n")
     refused = message(Workspace(case).structured, "run")
-    assert refused.startswith("run: there are no contacts and no factor of a matrix")
+    assert refused == (
+        "run: there are no contacts and no factor of a matrix has mu in it, so there is no onset to solve for; what works "
+        "for these is `stridor report`, `stridor modes`, `stridor simulate` and `stridor onsets --along NAME`"
+    )
     assert message(st.compare, case) == "a perturbation of steady sliding needs contacts that slide"
     assert st.simulate(case).steps > 0
 
@@ -86,9 +92,19 @@ def test_time_loops_take_constant_matrices(tmp_path: Path, call):
 def test_masses_that_the_time_loop_does_not_take(tmp_path: Path, call, mass, expected: str):
     case = matrix_case(tmp_path, [(mass, "mass", ""), (SPRINGS + BELT, "stiffness", "")], 1.0)
     given = (tmp_path / "out",) if call is st.run else ()
-    assert message(call, case, *given) == f"{call.__name__}: {expected}; {WORKS}"
+    assert message(call, case, *given) == f"{call.__name__}: {expected}; {ALONG}"
     words = " ".join(st.describe(case).lines)
     assert f"time loops do not: {expected}" in words
+
+
+def test_the_last_lines_of_matrices_without_friction_name_what_takes_them(tmp_path: Path):
+    model(tmp_path, factor="0.5")
+    assert "Next: stridor report case.toml" in stridor("modes", "case.toml", cwd=tmp_path).stdout
+
+
+def test_steady_sliding_is_recommended_where_it_can_be_drawn(tmp_path: Path):
+    case = rubbing(tmp_path, 1e3)
+    assert message(st.compare, case).endswith("`stridor onsets` and `stridor steady`")
 
 
 @pytest.mark.slow
@@ -115,6 +131,12 @@ def test_the_verbs_say_it_in_one_line(tmp_path: Path):
     assert done.returncode == 1
     assert done.stderr.startswith("stridor: simulate: factors of imported matrices depend on mu")
     assert done.stderr.count("\n") == 1
+    # What is recommended works, and the commands that verbs end with too.
+    for verb in re.findall("`stridor ([a-z]+)`", done.stderr):
+        recommended = stridor(verb, "case.toml", cwd=tmp_path)
+        assert recommended.returncode == 0, recommended.stderr
+        _, _, following = recommended.stdout.partition("Next: stridor ")
+        assert stridor(*shlex.split(following), cwd=tmp_path).returncode == 0, following
     done = stridor("onsets", "case.toml", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["onsets"][0]["mu"] == pytest.approx(0.75, rel=1e-12)

@@ -389,8 +389,9 @@ def test_what_no_memory_holds_is_refused_with_numbers(folder: Path, item: str) -
     assert done.returncode == 2
     *warned, refused = done.stderr.splitlines()
     assert "GB of records" in refused
-    assert len(warned) <= 1
-    assert all(line.startswith("warning: ") and "unusual" in line for line in warned)
+    told = " ".join(warned)
+    assert told.count("warning: ") <= 1
+    assert not told or (told.startswith("warning: ") and "unusual" in told)
 
 
 def test_reduce_solves_anywhere_in_the_box_and_confirms_onsets(folder: Path) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from program import stridor
-from stridor.app import tables
+from stridor.app import output, tables
 from stridor.app.arguments import Call
 from stridor.app.closing import command
 from stridor.app.conclusions import of_countermeasures
@@ -188,6 +188,42 @@ def test_columns_go_by_importance_and_are_named(
         assert ("not shown, for want of room: residual; in a.csv" in " ".join(" ".join(lines).split())) == bool(gone)
 
 
+def test_a_bar_is_there_while_something_is_under_way(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is refused before it begins draws none, and what comes after it is told of without it."""
+    monkeypatch.setattr(output, "stderr", output._Screen(stderr=True, force_terminal=True, soft_wrap=True))
+    with output.progress_bar("simulate", quiet=False) as progress:
+        assert capsys.readouterr().err == ""
+        progress(3, 10)
+        output.stderr.print("below it")
+        assert "simulate" in capsys.readouterr().err
+        progress(10, 10)
+        capsys.readouterr()
+        output.stderr.print("compare")
+        assert capsys.readouterr().err == "compare\n"
+    assert capsys.readouterr().err == ""
+
+
+def test_warnings_and_notes_fit_the_page_and_errors_that_of_a_terminal(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    words = ["modes", "two-beams.toml", "--mu", "0.2,40", "--out", "deep"]
+    told = stridor(*words, cwd=folder).stderr
+    assert "warning: --mu: 40 is unusual" in told
+    assert "\n  " in told
+    assert max(map(len, told.splitlines())) <= 60
+    # A problem is a line, for other programs to read; on a terminal it breaks between words.
+    wrong = ["modes", "two-beams.toml", "--set", "bodies.beam1.elements=many"]
+    line = stridor(*wrong, cwd=folder).stderr
+    assert line.count("\n") == 1
+    shown = on_terminal(wrong, folder, {}, 2).replace("\r\n", "\n")
+    assert len(line) > 81
+    assert max(map(len, shown.splitlines())) <= 80
+    assert " ".join(shown.split()) == line.strip()
+
+
 @pytest.mark.parametrize("colours", [True, False])
 def test_a_terminal_has_unstable_modes_in_red_unless_no_color_is_set(folder: Path, *, colours: bool) -> None:
     shown = on_terminal(["modes", "two-beams.toml"], folder, {} if colours else {"NO_COLOR": "1"})
@@ -199,7 +235,7 @@ def test_a_terminal_has_unstable_modes_in_red_unless_no_color_is_set(folder: Pat
     assert stdout.page == 80  # of a pipe, as here
 
 
-def on_terminal(words: list[str], cwd: Path, more: dict[str, str]) -> str:
+def on_terminal(words: list[str], cwd: Path, more: dict[str, str], code: int = 0) -> str:
     """What stands on a terminal of 80 columns."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
@@ -217,7 +253,7 @@ def on_terminal(words: list[str], cwd: Path, more: dict[str, str]) -> str:
                 break
             text += part
     os.close(ours)
-    assert process.returncode == 0
+    assert process.returncode == code
     return text.decode()
 
 

@@ -72,7 +72,7 @@ def _guarded(call: Callable[[], int | None]) -> int:
         code = call()
         interrupts.check()
     except StridorError as error:
-        print(f"stridor: {error}" if "\n" not in str(error) else f"stridor:\n{error}", file=sys.stderr)
+        _refuse(f"stridor: {error}" if "\n" not in str(error) else f"stridor:\n{error}")
         return 2 if isinstance(error, CaseError) else 1
     except KeyboardInterrupt:
         interrupts.heard()
@@ -88,6 +88,16 @@ def _guarded(call: Callable[[], int | None]) -> int:
         print(f"stridor: a number of the case is out of range for this computation ({error})", file=sys.stderr)
         return 1
     return code or 0
+
+
+def _refuse(text: str) -> None:
+    """Say what is wrong: a problem is a line, for other programs to read; on a terminal lines no longer than that."""
+    if not sys.stderr.isatty():
+        print(text, file=sys.stderr)
+        return
+    from .output import stderr
+
+    stderr.print(text)
 
 
 def _flushed(code: int) -> int:

@@ -30,9 +30,9 @@ def _is_are(count: int, of: str) -> str:
     return f"{count or 'none'} of {of} {'are' if count > 1 else 'is'} unstable"
 
 
-def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True) -> Conclusion:
+def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True, onsets: bool = True) -> Conclusion:
     """How many are unstable and which is the fastest; then its shape (the report, where the model has none to be
-    drawn), or where growth begins. mu: as the user gave it."""
+    drawn), or where growth begins (the report, where nothing depends on friction). mu: as the user gave it."""
     from ..modal.growing import doubt
 
     growing = result.unstable & result.in_band
@@ -47,12 +47,12 @@ def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True) -> Con
             first = float(result.mu[int(np.argmax(some))])
             top = fastest(float(result.frequency_hz[row, b]), float(rate[row, b]))
             sentence += f", the lowest {first:g}; the fastest at μ = {result.mu[row]:g}: {top}"
-        return Conclusion(sentence + caution, "onsets")
+        return Conclusion(sentence + caution, "onsets" if onsets else "report")
     band = "" if result.max_frequency_hz is None else f" up to {result.max_frequency_hz:g} Hz"
     band = " from {:g} to {:g} Hz".format(*result.band_hz) if result.band_hz is not None else band
     sentence = f"{_is_are(int(growing.sum()), f'{result.total[0]} modes{band}')} at μ = {result.mu[0]:g}"
     if not growing.any():
-        return Conclusion(sentence + caution, "onsets")
+        return Conclusion(sentence + caution, "onsets" if onsets else "report")
     b = int(rate[0].argmax())
     sentence += f"; the fastest {fastest(float(result.frequency_hz[0, b]), float(rate[0, b]))}"
     own = ("--mu", mu) if mu is not None else ()

@@ -128,8 +128,7 @@ def modes(
         call.document(result.to_json(sort=order, unstable=unstable))
     else:
         show_modes(result, sort=order, unstable=unstable, say=call.say)
-        system = work.system()
-        call.conclude(of_modes(result, mu, drawn=bool(system.solids or system.lines)))
+        call.conclude(of_modes(result, mu, drawn=work.has_places, onsets=work.rubs))
     if result.interrupted:
         raise typer.Exit(INTERRUPTED)
 

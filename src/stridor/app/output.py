@@ -10,7 +10,7 @@ import re
 import textwrap
 import time
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from rich.console import Console
@@ -25,15 +25,13 @@ PAGE = 80  # columns of a line where no terminal says how many
 
 class _Screen(Console):
     """A console that takes back the line that says what is being computed before it prints, and prints sentences in
-    lines no longer than the page, no word broken: a path stays whole, however long. On stderr, a log where it is no
-    terminal, a sentence is a line."""
+    lines no longer than the page, no word broken: a path stays whole, however long."""
 
     def print(self, *objects: Any, **options: Any) -> None:
         hush()
         if all(isinstance(thing, str) for thing in objects):
             options.setdefault("markup", False)
-            text = " ".join(objects)
-            objects = (text if self.stderr and not self.is_terminal else _filled(text, self.page),)
+            objects = (_filled(" ".join(objects), self.page),)
         super().print(*objects, **options)
 
     @property
@@ -106,27 +104,39 @@ class Log(logging.Handler):
 
 @contextmanager
 def progress_bar(text: str, *, quiet: bool) -> Generator[Any, None, None]:
-    """Yields progress(done, planned) drawn on stderr with the time left."""
+    """Yields progress(done, planned) drawn on stderr with the time left, while it is under way."""
     if quiet or not stderr.is_terminal:
         # A bar in a log file is noise.
         yield None
         return
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TextColumn("time left"),
-        TimeRemainingColumn(),
-        console=stderr,
-        transient=True,
-    )
-    with silent(), bar:
-        task = bar.add_task(text, total=None)
+    with ExitStack() as drawn:
+        yield _Bar(text, drawn)
 
-        def advance(done: int, planned: int) -> None:
-            bar.update(task, total=planned, completed=done)
 
-        yield advance
+class _Bar:
+    """A bar that is there from the first word of progress to the last: what is refused before has drawn none, and what
+    comes after is told of in its turn."""
+
+    def __init__(self, text: str, drawn: ExitStack) -> None:
+        self.text, self.drawn = text, drawn
+        self.bar: Progress | None = None
+
+    def __call__(self, done: int, planned: int) -> None:
+        if done >= planned:
+            self.drawn.close()
+            self.bar = None
+            return
+        if self.bar is None:
+            self.bar = self._begun(planned)
+        self.bar.update(self.bar.task_ids[0], total=planned, completed=done)
+
+    def _begun(self, planned: int) -> Progress:
+        what, left = TextColumn("{task.description}"), TextColumn("time left")
+        columns = what, BarColumn(), TaskProgressColumn(), left, TimeRemainingColumn()
+        self.drawn.enter_context(silent())
+        bar = self.drawn.enter_context(Progress(*columns, console=stderr, transient=True))
+        bar.add_task(self.text, total=planned)
+        return bar
 
 
 @contextmanager

@@ -225,7 +225,7 @@ def run(
         outcome = run_all(
             work, call.folder, progress=progress, log=call.say, only=only, skip=skip, fresh=fresh, kept=kept
         )
-    _told(call, outcome)
+    _told(call, outcome, work)
 
 
 @verb(parts=("figures", "parts"))
@@ -245,10 +245,10 @@ def report(
     from .pipeline import report as write
 
     kept, friction = _kept(call, work, fresh=fresh), call.one_friction(mu)
-    _told(call, write(work, call.folder, mu=friction, log=call.say, skip=skip, fresh=fresh, kept=kept))
+    _told(call, write(work, call.folder, mu=friction, log=call.say, skip=skip, fresh=fresh, kept=kept), work)
 
 
-def _told(call: Call, outcome: Outcome) -> None:
+def _told(call: Call, outcome: Outcome, work: Workspace) -> None:
     """The verdict and where the page is, or the document of all of it."""
     from .output import stdout
 
@@ -264,7 +264,7 @@ def _told(call: Call, outcome: Outcome) -> None:
             stdout.print(f"report: {outcome.report}")
         stdout.print(outcome.verdict)
         if not outcome.interrupted:
-            call.suggest("shapes")
+            call.suggest("shapes" if work.has_places else "countermeasures")
     if outcome.interrupted:
         raise typer.Exit(130)
 

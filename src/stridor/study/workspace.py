@@ -33,7 +33,6 @@ from .options import options_of
 
 SYSTEMS = 16  # kept at the same time, of a case whose matrices depend on μ
 ACCEPTED = "a case, the path of its file, a system or a workspace"
-WORKS = "what works for these is `stridor report`, `stridor modes`, `stridor onsets` and `stridor steady`"
 
 
 class _Settings(Table):
@@ -136,6 +135,17 @@ class Workspace(Shown):
         """Whether anything is in contact."""
         return bool(self.system().contact_nodes().count if self._case is None else self._case.contacts)
 
+    @property
+    def rubs(self) -> bool:
+        """Whether anything depends on the friction coefficient: contacts, or factors of matrices."""
+        return self.has_contacts or self.varies
+
+    @property
+    def has_places(self) -> bool:
+        """Whether nodes have places, so that shapes and pressures can be drawn."""
+        system = self.system()
+        return bool(system.solids or system.lines)
+
     @cached_property
     def own_friction(self) -> float | None:
         """The coefficient of all contacts at their slip speeds in steady sliding; None where they differ.
@@ -183,17 +193,24 @@ class Workspace(Shown):
                 why = f", and beyond mu = 0 {beyond}" if beyond else ""
                 raise AnalysisError(
                     f"{what}: factors of imported matrices depend on mu{why}; the time loop takes constant matrices "
-                    f"only; {WORKS}"
+                    f"only; {self._works()}"
                 )
         system = self.system(mu)
         if why := unfit_in_time(system):
-            raise AnalysisError(f"{what}: {why}; {WORKS}")
+            raise AnalysisError(f"{what}: {why}; {self._works()}")
         if not system.symmetric_definite and what == "run" and not self.has_contacts:
             raise AnalysisError(
                 "run: there are no contacts and no factor of a matrix has mu in it, so there is no onset to solve for; "
-                "what works here is `stridor modes`, `stridor simulate` and `stridor onsets --along NAME`"
+                + self._works("simulate")
             )
         return system
+
+    def _works(self, *more: str) -> str:
+        """What to do in place of what the time loop does not take: verbs that take the problem."""
+        verbs = ["report", "modes", *more, "onsets" if self.rubs else "onsets --along NAME"]
+        verbs += ["steady"] if self.has_places else []
+        *first, last = (f"`stridor {verb}`" for verb in verbs)
+        return f"what works for these is {', '.join(first)} and {last}"
 
 
 Problem = Case | System | Workspace | str | PathLike[str]
