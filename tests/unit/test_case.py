@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -219,8 +220,15 @@ def test_copies_take_numpy_numbers_and_tables(bench: Case):
 
 
 def test_cases_are_frozen(bench: Case):
-    with pytest.raises(ValueError, match="frozen"):
-        bench.title = "other"  # pyright: ignore[reportAttributeAccessIssue]
+    table: Any = bench
+    told = 'a case is frozen; vary it by copy: case.with_({"title": …})'
+    for refused in (lambda: setattr(table, "title", "other"), lambda: delattr(table, "title")):
+        with pytest.raises(ValueError, match=f"^{re.escape(told)}$"):
+            refused()
+    told = 'a case is frozen; vary it by copy: case.with_({"contacts.A.friction.coefficient": 0.3})'
+    with pytest.raises(TypeError, match=f"^{re.escape(told)}$"):
+        table.contacts["A"].stiffness = 2.0
+    assert bench.with_({"title": "other"}).title == "other"
 
 
 @pytest.mark.parametrize("name", templates())

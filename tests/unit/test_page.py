@@ -224,6 +224,17 @@ def test_warnings_and_notes_fit_the_page_and_errors_that_of_a_terminal(
     assert " ".join(shown.split()) == line.strip()
 
 
+@pytest.mark.parametrize(
+    "words", ["compare two-beams.toml --only growth COARSE", "modes two-beams.toml", "report two-beams.toml --skip modes,onsets"]
+)
+def test_warnings_stand_before_the_result(folder: Path, words: str) -> None:
+    shown = on_terminal([*words_of(words), "--solver", "superlu", "--out", "warned"], folder, {})
+    body, following, after = shown.partition(NEXT)
+    assert "warning: --solver has no effect" in body
+    assert following
+    assert "warning" not in after + body.splitlines()[-1]
+
+
 @pytest.mark.parametrize("colours", [True, False])
 def test_a_terminal_has_unstable_modes_in_red_unless_no_color_is_set(folder: Path, *, colours: bool) -> None:
     shown = on_terminal(["modes", "two-beams.toml"], folder, {} if colours else {"NO_COLOR": "1"})

@@ -176,6 +176,7 @@ class Call:
         """The last lines on stdout: the result in a sentence and, unless quiet, the command that comes next."""
         from .output import stdout
 
+        self.warn(self.idle)
         if found.sentence:
             stdout.print(found.sentence)
         if found.verb:

@@ -45,6 +45,7 @@ def steady(call: Call, mu: Mu = None) -> None:
         return
     from .show import show_steady
 
+    call.warn(call.idle)
     show_steady(document)
     call.suggest("modes", *(() if mu is None else ("--mu", mu)))
 

@@ -24,6 +24,7 @@ Count = Annotated[int, Field(strict=True, ge=1, le=100_000)]
 Counts = Annotated[tuple[Count, ...], Field(min_length=1, max_length=3)]
 Direction = Literal["x", "y", "z", "rotation"]
 
+EXAMPLE = '"contacts.A.friction.coefficient": 0.3'  # of a change
 POINT = 'a point, "body.point" or "body@distance"'
 PLACE = 'a point, "body.point" or "body@distance", or a boundary, "body.boundary"'
 
@@ -33,11 +34,18 @@ def is_zero(vector: tuple[float, ...]) -> bool:
     return max(map(abs, vector)) < 1.0 / MOST
 
 
+class FrozenError(TypeError, ValueError):
+    """A case is not changed but varied by copy: what frozen tables and dictionaries raise, of both their kinds."""
+
+    def __init__(self, change: str = EXAMPLE) -> None:
+        super().__init__(f"a case is frozen; vary it by copy: case.with_({{{change}}})")
+
+
 class FrozenTable(dict[str, Any]):
     """A table by names that does not change: a dict that refuses, pickled and copied as one."""
 
     def _refused(self, *_: object, **__: object) -> NoReturn:
-        raise TypeError('a case is frozen; vary it by copy: case.with_({"contacts.A.friction.coefficient": 0.3})')
+        raise FrozenError
 
     __setitem__ = __delitem__ = __ior__ = clear = pop = popitem = setdefault = update = _refused  # pyright: ignore
 
@@ -54,3 +62,17 @@ class Table(BaseModel):
         """Freeze tables by names, of which defaults pass no validator."""
         values = vars(self)
         values.update({name: FrozenTable(value) for name, value in values.items() if isinstance(value, dict)})
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not name.startswith("_"):
+            raise FrozenError(self._with(name))
+        super().__setattr__(name, value)
+
+    def __delattr__(self, name: str) -> None:
+        if not name.startswith("_"):
+            raise FrozenError(self._with(name))
+        super().__delattr__(name)
+
+    def _with(self, name: str) -> str:
+        """How a change of a key is written, of a table by an example: it does not know where in a case it stands."""
+        return EXAMPLE

@@ -90,6 +90,9 @@ class Case(Shown, Table):
             between = [problem for problem in problems_between(_sound(data, error)) if problem.where not in told]
             raise CaseError.many(_in_file_order([*found, *between])) from None
 
+    def _with(self, name: str) -> str:
+        return f'"{name}": …'
+
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> Case:
         """The case that data, as read from TOML, describe. Raises CaseError with every problem found."""
