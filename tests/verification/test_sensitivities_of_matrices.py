@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import stridor as st
 from matrix_cases import TURN, matrix_case
@@ -106,7 +107,10 @@ def test_the_bench_as_matrices_answers_as_the_bench(tmp_path: Path) -> None:
 
 def test_countermeasures_of_matrices_are_solved_again(tmp_path: Path) -> None:
     for make, mu in ((friction, 1.0), (turning, 1.0), (symmetric, None)):
-        found = st.rank_countermeasures(make(tmp_path), mu=mu, percent=0.1, verify=3)
+        case = make(tmp_path)
+        factors = [f"bodies.matrices.terms.{k}.factor" for k, term in enumerate(case.imported["matrices"].terms) if term.factor == 1.0]
+        numbers = [*factors, *(["parameters.Omega.value"] if make is turning else [])]
+        found = st.rank_countermeasures(case, mu=mu, percent=0.1, verify=3, numbers=numbers)
         assert found.measures, found.warnings
         for measure in found.measures[:3]:
             assert measure.verified is not None
@@ -132,6 +136,31 @@ def test_the_program_on_imported_matrices(tmp_path: Path) -> None:
     assert done.returncode == 0
 
 
+def test_whole_matrices_are_no_change_that_can_be_built(tmp_path: Path) -> None:
+    """Dampings, springs and parameters are tried; the mass and stiffness of everything where they are asked for."""
+    case = friction(tmp_path)
+    spring = {"file": str(tmp_path / "spring.npz"), "role": "stiffness", "factor": 0.1}
+    sp.save_npz(tmp_path / "spring.npz", sp.csr_array(np.diag([1.0, 0.0])))
+    terms = [*[term.model_dump() for term in case.imported["matrices"].terms], spring]
+    sprung = case.with_({"bodies.matrices.terms": terms})
+    path = "bodies.matrices.terms.{}.factor".format
+    found = st.rank_countermeasures(sprung, mu=1.0, verify=0)
+    assert {measure.name for measure in found.measures} <= {path(1), path(4)}
+    assert found.measures
+    assert found.warnings[-1] == (
+        f"not tried, for nobody can build it: all of a mass or stiffness matrix ({path(0)}, {path(2)}); --parameter PATH or "
+        "numbers= asks for one"
+    )
+    done = stridor("countermeasures", "case.toml", "--mu", "1", "--parameter", path(2), "--json", "--quiet", cwd=tmp_path)
+    document = json.loads(done.stdout)
+    assert [measure["name"] for measure in document["measures"]] == [path(2)]
+    assert not document["warnings"]
+    # A report's sensitivities are of the same numbers.
+    notes = st.report(sprung, tmp_path / "out", mu=1.0, skip=["modes", "onsets", "countermeasures"]).everything
+    assert notes.sensitivities is not None
+    assert notes.sensitivities.parameters == ("mu", path(1), path(4))
+
+
 def test_where_nothing_can_be_changed(tmp_path: Path) -> None:
     case = friction(tmp_path)
     fixed = {f"bodies.matrices.terms.{k}.factor": "1" for k in range(3)}
@@ -139,3 +168,9 @@ def test_where_nothing_can_be_changed(tmp_path: Path) -> None:
     assert not found.measures
     expected = "there is nothing to change: factors of imported matrices that are numbers, or parameters in them, would be"
     assert found.warnings[-1] == expected
+    found = st.rank_countermeasures(case.with_({"bodies.matrices.terms.1.factor": "1"}), mu=1.0)
+    assert not found.measures
+    assert found.warnings[-2] == (
+        "there is nothing to change but whole matrices: no damping, spring, added mass or parameter of the case"
+    )
+    assert found.warnings[-1].startswith("not tried, for nobody can build it: ")

@@ -10,7 +10,7 @@ import typer
 from ..errors import CaseError
 from .arguments import Call, verb
 from .damping import damping_map
-from .option_table import Band, Branch, MaxFrequency, Mu, Source, Undamped
+from .option_table import Band, Branch, MaxFrequency, Mu, Parameter, Source, Undamped
 from .reduce import reduce
 from .values import band_of
 
@@ -24,10 +24,7 @@ ONE_SCREEN = 7  # changes, of up to five lines each
 @verb()
 def sensitivities(
     call: Call,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option("--parameter", metavar="PATH", help="A number of the case, or mu. Repeatable [default: mu]."),
-    ] = None,
+    parameter: Parameter = None,
     mu: Mu = None,
     branch: Branch = None,
     band: Band = None,
@@ -59,6 +56,7 @@ def countermeasures(
     call: Call,
     mu: Mu = None,
     branch: Branch = None,
+    parameter: Parameter = None,
     percent: Annotated[float, typer.Option("--percent", help="Size of the change that is predicted.")] = 5.0,
     verify: Annotated[int, typer.Option("--verify", help="How many of the best are solved again.")] = 3,
     max_frequency: MaxFrequency = None,
@@ -77,7 +75,10 @@ def countermeasures(
     from .conclusions import of_countermeasures
 
     target: Any = branch[0] if branch else "sum"
-    result = rank_countermeasures(work, mu=call.one_friction(mu), target=target, percent=percent, verify=verify)
+    friction = call.one_friction(mu)
+    result = rank_countermeasures(
+        work, mu=friction, target=target, numbers=parameter, percent=percent, verify=verify
+    )
     call.tabulate(result, "countermeasures.csv")
     drawn = countermeasure_bars(result) if result.measures else None
     _draw(call, drawn, "countermeasures.png")

@@ -158,6 +158,17 @@ At = Annotated[
         "sensitivities=--set countermeasures=--set damping-map=--set",
     ),
 ]
+Parameter = Annotated[
+    list[str] | None,
+    _option(
+        "--parameter",
+        "A number of the case, or mu. Repeatable [default: mu; of countermeasures what can be built].",
+        metavar="PATH",
+        on="sensitivities countermeasures",
+        lacks="steady=--set shapes=--set modes=--set onsets=--along simulate=--set compare=--set run=--set report=page "
+        "damping-map=--x reduce=--box",
+    ),
+]
 Force = Annotated[bool, _option("--force", "Replace files that are there already.", on="new export")]
 Set = Annotated[
     list[str] | None,

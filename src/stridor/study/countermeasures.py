@@ -13,6 +13,7 @@ from ..case.bodies import BeamBody, SolidBody
 from ..case.matrix_checks import MU
 from ..errors import CaseError
 from ..modal.krylov.steady import refuse_stick
+from ..system.imported import Share, load_terms
 from .asked import require_frequency
 from .measure_ranking import Ranking
 from .measure_verification import verified
@@ -20,6 +21,8 @@ from .measures import Countermeasures, Measure, Target, Verified
 from .provenance import provenance
 from .sensitivities import Linearised
 from .workspace import Problem, Workspace
+
+WHOLE = 0.5  # of all freedoms: a matrix that reaches over more is that of the whole model
 
 __all__ = ["Countermeasures", "Measure", "Verified", "rank_countermeasures"]
 
@@ -43,12 +46,12 @@ def rank_countermeasures(
     """Rank changes of a case by the growth rate that they take away per per cent of change.
 
     target: the number of an unstable branch, or "sum" of all unstable ones. numbers: paths to try (default: moduli and
-    densities of all materials, the damping that bodies have, contact stiffnesses, of imported matrices their factors
-    and the parameters in them). added_mass: a point mass at the best node of each body. chamfers: how many rows of
-    contact nodes are taken away at most, at the leading edge (which meets the other body's material first) and at the
-    trailing one. percent: change that consequences are predicted for; margin: damping ratio. The best ``verify`` are
-    solved again with that change made. watch: "unstable" does not look after the stable modes, which saves a
-    factorisation for each.
+    densities of all materials, the damping that bodies have, contact stiffnesses, of imported matrices their factors,
+    but for whole masses and stiffnesses, and the parameters in them). added_mass: a point mass at the best node of each
+    body. chamfers: how many rows of contact nodes are taken away at most, at the leading edge (which meets the other
+    body's material first) and at the trailing one. percent: change that consequences are predicted for; margin: damping
+    ratio. The best ``verify`` are solved again with that change made. watch: "unstable" does not look after the stable
+    modes, which saves a factorisation for each.
 
     Predictions are of first order; a pair of modes near its exceptional point is predicted by its mean and squared
     half difference, which go through it smoothly. Touching nodes are held in predictions, solved for anew in
@@ -72,13 +75,15 @@ def rank_countermeasures(
         raise CaseError("target", target, accepted)
     band = linear.columns("all") if watch == "all" else unstable
     ranking = Ranking(linear, [b for b in band if linear.mode(b) is not None], target, percent, margin)
-    found = ranking.numbers(default_numbers(case) if numbers is None else list(numbers))
+    left = whole_matrices(case, linear.mu) if numbers is None else []
+    found = ranking.numbers(default_numbers(case, left) if numbers is None else list(numbers))
     if added_mass:
         found += ranking.masses()
     if chamfers > 0:
         found += ranking.chamfers(chamfers)
     helping = sorted((m for m in found if m.removed_per_percent > 0), key=lambda m: -m.removed_per_percent)
-    told = [] if helping else [_none_helps(case, len(found))]
+    told = [] if helping else [_none_helps(case, len(found), left)]
+    told += [_left_out(left)] if left else []
     checked = [verified(ranking, m, count, max_frequency_hz) for m in helping[:verify]]
     return Countermeasures(
         linear.mu,
@@ -92,23 +97,61 @@ def rank_countermeasures(
     )
 
 
-def default_numbers(case: Case) -> list[str]:
-    """Paths of the numbers that changes are tried on: of materials, damping, factors, contact stiffnesses."""
+def default_numbers(case: Case, left: Sequence[str]) -> list[str]:
+    """Paths of the numbers that changes are tried on: of materials, damping, factors but for those left out, contact
+    stiffnesses."""
     used = dict.fromkeys(getattr(body, "material", None) for body in case.bodies.values())
     paths = [f"materials.{m}.{n}" for m in used if m in case.materials for n in ("young_modulus", "density")]
     for name, body in case.bodies.items():
         if isinstance(body, BeamBody | SolidBody):
             paths += [f"bodies.{name}.damping.{n}" for n in ("mass", "stiffness") if getattr(body.damping, n) > 0]
-    for name, body in case.imported.items():
-        factors = enumerate(term.factor for term in body.terms)
-        paths += [f"bodies.{name}.terms.{k}.factor" for k, factor in factors if not isinstance(factor, str)]
+    paths += [path for path in _factors(case) if path not in left]
     # Friction is what makes it squeal, and no change of the structure.
     paths += [f"parameters.{name}.value" for name in case.parameters if name in case.factor_names and name != MU]
     return paths + [f"contacts.{name}.stiffness" for name, c in case.contacts.items() if c.stiffness != "rigid"]
 
 
-def _none_helps(case: Case, tried: int) -> str:
+def whole_matrices(case: Case, mu: float | None = None) -> list[str]:
+    """Paths of factors of imported masses and stiffnesses that reach over most freedoms: nobody builds a brake with all
+    its stiffness or mass raised, while dampings, springs and added masses are changed. mu: where factors have it."""
+    found: list[str] = []
+    for name, body in case.imported.items():
+        shares = load_terms(case, name, body, mu).shares
+        found += [
+            f"bodies.{name}.terms.{k}.factor"
+            for k, share in enumerate(shares)
+            if share.role != "damping" and _reach(share) > WHOLE
+        ]
+    return [path for path in _factors(case) if path in found]
+
+
+def _factors(case: Case) -> list[str]:
+    """Paths of the factors of imported matrices that are numbers."""
+    return [
+        f"bodies.{name}.terms.{k}.factor"
+        for name, body in case.imported.items()
+        for k, term in enumerate(body.terms)
+        if not isinstance(term.factor, str)
+    ]
+
+
+def _reach(share: Share) -> float:
+    """The fraction of all rows that hold anything."""
+    rows = share.matrix.tocoo()
+    return len(np.unique(rows.row[rows.data != 0])) / max(share.matrix.shape[0], 1)
+
+
+def _left_out(paths: Sequence[str]) -> str:
+    return (
+        f"not tried, for nobody can build it: all of a mass or stiffness matrix ({', '.join(paths)}); --parameter PATH "
+        "or numbers= asks for one"
+    )
+
+
+def _none_helps(case: Case, tried: int, left: Sequence[str]) -> str:
     """What is said where something grows and no change takes any of it away."""
+    if left and not tried:
+        return "there is nothing to change but whole matrices: no damping, spring, added mass or parameter of the case"
     if tried:
         return f"none of {tried} changes tried takes growth away"
     why = ": factors of imported matrices that are numbers, or parameters in them, would be" if case.imported else ""

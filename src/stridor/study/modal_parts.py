@@ -19,7 +19,7 @@ from ..typing import Array, ComplexArray
 from . import analyses
 from .body_modes import BodyModes
 from .clock import Clock
-from .countermeasures import default_numbers, rank_countermeasures
+from .countermeasures import default_numbers, rank_countermeasures, whole_matrices
 from .measures import Countermeasures
 from .parts import Parts
 from .sensitivities import Sensitivities, sensitivities
@@ -138,7 +138,7 @@ class ModalParts:
         if case is None or not self._asked("sensitivities"):
             return None
         friction = ["mu"] if self.rubs else []
-        numbers = [*friction, *default_numbers(case)]
+        numbers = [*friction, *default_numbers(case, whole_matrices(case, self.mu))]
         if not numbers:
             return self._note("there is no number to change")
         return self._changes("sensitivities", lambda: sensitivities(self.work, numbers, mu=self.mu))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..digits import readable
 from ..study.countermeasures import Countermeasures, Measure
 from ..study.sensitivities import Sensitivities
 from .tables import Row, Table, drop_empty, quantity, significant
@@ -101,7 +102,7 @@ def _consequences(measure: Measure) -> str:
     if again is not None and not again.unstable_hz:
         parts.append("solved again: nothing grows")
     elif again is not None:
-        where = _some([significant(f) for f in again.unstable_hz if f])
+        where = _some([readable(f, 4, decimals=0) for f in again.unstable_hz if f])
         diverges = "" if all(again.unstable_hz) else "diverges at 0 Hz"
         grows = f"grows at {where} Hz" if where else ""
         parts.append(f"solved again: {', '.join(filter(None, (diverges, grows)))}")
