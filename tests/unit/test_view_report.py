@@ -24,6 +24,7 @@ from test_view_plots import (
 )
 
 from benches import paper_case
+from stridor.stages import heard
 from stridor.temporal.signals import spectrogram
 from stridor.view import BodyModes, FrictionCurve, NamedShape, ReportInputs, write_report
 from stridor.view import report as report_module
@@ -268,3 +269,14 @@ def test_a_model_without_units_keeps_its_digits() -> None:
     assert quantity(-0.0) == "0.0"
     assert quantity(3199.75) == "3199.8"
     assert quantity(-2.5e-7) == "−2.50e−07"
+
+
+def test_what_is_drawn_is_told(tmp_path):
+    """Figures take seconds, in which nothing else would be said."""
+    told: list[str] = []
+    with heard(lambda now: told.append("" if now is None else now.what)):
+        write_report(full_inputs(), tmp_path)
+    assert told[0] == "tables and figures of the page"
+    assert told[-1] == ""
+    drawn = {path.stem for path in (tmp_path / "figures").glob("*.svg")}
+    assert set(told[1:-1]) == {f"figure {name}, as SVG and PNG" for name in drawn}

@@ -172,3 +172,18 @@ def test_exported_matrices_are_those_of_the_case():
     assert abs(friction - friction.T).max() > 0.1 * abs(friction).max()
     assert np.linalg.matrix_rank(friction.toarray() / abs(friction).max(), tol=1e-9) == 1
     assert mass.shape == (361, 361)
+
+
+def test_a_sweep_of_large_matrices_takes_few_friction_coefficients(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is a search of its own there; the case says otherwise where it says how many."""
+    case = matrix_case(tmp_path, [(np.eye(2), "mass", ""), (np.eye(2), "stiffness", "1 + mu")], 1.0)
+
+    def swept(case: st.Case) -> int:
+        written = st.report(case, tmp_path / "out", mu=0.5, skip=["onsets", "sensitivities", "countermeasures"], fresh=True)
+        assert written.everything.sweep_damped is not None
+        return len(written.everything.sweep_damped.mu)
+
+    assert swept(case) == 201
+    monkeypatch.setattr("stridor.study.modal_parts.SMALL", 1)
+    assert swept(case.with_({"title": "large"})) == 21
+    assert swept(case.with_({"modal.sweep_points": 5})) == 5

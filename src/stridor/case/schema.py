@@ -348,8 +348,10 @@ class Modal(Table):
     modes: Annotated[int, Field(strict=True, ge=1)] = Field(
         default=20, description="a whole number >= 1, how many branches are listed"
     )
-    sweep_points: Annotated[int, Field(strict=True, ge=2)] = Field(
-        default=201, description="a whole number >= 2, how many friction coefficients a sweep takes"
+    sweep_points: Annotated[int, Field(strict=True, ge=2)] | None = Field(
+        default=None,
+        description="a whole number >= 2, how many friction coefficients a sweep takes (left out: 201, or 21 of large "
+        "matrices with mu in a factor)",
     )
     damped: Truth = Field(default=True, description="true or false, with or without damping")
     friction_damping: Truth = Field(

@@ -194,7 +194,8 @@ def _case(work: Workspace, model: ExportedModel, form: Format) -> str:
     lines += ["", "[modal]", f"max_frequency_hz = {settings.max_frequency_hz!r}", f"modes = {settings.modes}"]
     if model.mu is None:
         low, high = settings.friction_range
-        lines += [f"friction_range = [{low!r}, {high!r}]", f"sweep_points = {settings.sweep_points}"]
+        lines += [f"friction_range = [{low!r}, {high!r}]"]
+        lines += [f"sweep_points = {settings.sweep_points}"] if settings.sweep_points is not None else []
     if not settings.damped:
         lines.append("damped = false")
     lines += ["", "[matrices]", f"dimension = {model.dimension}", f"labels = {_quoted(LABELS)}", "terms = ["]

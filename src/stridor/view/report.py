@@ -15,6 +15,7 @@ from pathlib import Path
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.figure import Figure
 
+from ..stages import passing, stage
 from .body_words import bodies_table
 from .change_parts import change_figures, change_tables, change_words, mechanism_table
 from .figures import ReportFigure, agreement_figures, modal_figures, model_figures, temporal_figures
@@ -54,6 +55,7 @@ class Section:
         return not (self.paragraphs or self.lines or self.parts)
 
 
+@passing()
 def write_report(inputs: ReportInputs, folder: Path) -> Path:
     """Write folder/report.html and folder/figures/NAME.png and .svg; the path of the page.
 
@@ -62,10 +64,12 @@ def write_report(inputs: ReportInputs, folder: Path) -> Path:
     folder = Path(folder)
     figures = folder / "figures"
     figures.mkdir(parents=True, exist_ok=True)
+    stage("tables and figures of the page")
     chapters = sections(inputs)
     drawings: dict[str, str] = {}
     for part in (p for chapter in chapters for p in chapter.parts):
         if isinstance(part, ReportFigure):
+            stage(f"figure {part.name}, as SVG and PNG", logged=False)
             lay_out(part.figure)
             vector = _rendered(part.figure, "svg")
             _write(figures / f"{part.name}.svg", vector)
