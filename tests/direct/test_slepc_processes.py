@@ -38,6 +38,7 @@ needs_slepc = pytest.mark.skipif(
 )
 ENVIRONMENT = {
     **{name: value for name, value in os.environ.items() if name != "STRIDOR_SOLVER"},
+    "COLUMNS": "1000",  # a sentence is a line
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     # More processes than cores, or others that use them, are no fault.
