@@ -22,26 +22,26 @@ def case_key(case: Case) -> str:
     sources of this program, since another version may give other numbers."""
     data = case.model_dump(mode="json", exclude_none=True)
     kept = {name: value for name, value in data.items() if name not in ELSEWHERE}
-    files = {path: contents(Path(path)) for path in sorted(set(_files(kept)))}
-    text = json.dumps({"case": kept, "files": files, "sources": _sources()}, sort_keys=True)
+    files = {path: contents(Path(path)) for path in sorted(set(files_of(kept)))}
+    text = json.dumps({"case": kept, "files": files, "sources": sources_key()}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _files(value: Any) -> Iterator[str]:
+def files_of(value: Any) -> Iterator[str]:
     """Paths of files named anywhere in the tables of a case."""
     if isinstance(value, Mapping):
         for name, item in cast("Mapping[str, Any]", value).items():
             if name in FILES and isinstance(item, str):
                 yield item
             else:
-                yield from _files(item)
+                yield from files_of(item)
     elif isinstance(value, list):
         for item in cast("list[Any]", value):
-            yield from _files(item)
+            yield from files_of(item)
 
 
 @cache
-def _sources() -> str:
+def sources_key() -> str:
     """SHA-256 of the modules of this package."""
     digest = hashlib.sha256()
     package = Path(__file__).parent.parent

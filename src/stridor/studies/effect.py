@@ -1,0 +1,77 @@
+"""Which parameters of a study change nothing of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any, cast
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..case import Case
+from ..errors import StridorError
+from ..system import System, build_system
+from ..typing import Array
+from .checks import FRICTION
+from .schema import Study
+
+SETTINGS = ("modal", "temporal", "comparison", "phases", "steady")  # change what is computed, not the model
+IN_TIME = ("simulate", "compare")
+_SKIPPED = {"answers", "of_matrices", "stress_stiffness", "line_rows"}
+
+
+def without_effect(study: Study, case: Case, samples: Array) -> list[str]:
+    """Sentences about parameters that leave mass, damping, stiffness, contacts, loads and motions as they are, and so
+    every row. None where a model cannot be built: its rows say so."""
+    told: list[str] = []
+    for k, path in enumerate(study.parameters):
+        table = path.split(".", 1)[0]
+        values = np.unique(samples[:, k])
+        if len(values) == 1:
+            told.append(f"{path} has the one value {values[0]:g} in all samples")
+            continue
+        if path == FRICTION or (table in SETTINGS and not _idle(table, study)):
+            continue
+        if table in SETTINGS or _same_model(case, path, float(values[0]), float(values[-1])):
+            told.append(f"{path} has no effect on {study.compute}: it changes nothing of the model")
+    return told
+
+
+def _idle(table: str, study: Study) -> bool:
+    """Whether a table of settings has no part in what is computed."""
+    in_time = study.compute in IN_TIME
+    return (table in ("temporal", "phases") and not in_time) or (table == "comparison" and study.compute != "compare")
+
+
+def _same_model(case: Case, path: str, low: float, high: float) -> bool:
+    try:
+        one, other = (build_system(case.with_({path: value})) for value in (low, high))
+    except StridorError:
+        return False
+    return same(one, other)
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two descriptions hold the same numbers; what cannot be told apart counts as different."""
+    if type(one) is not type(other):
+        return False
+    if one is other:
+        return True
+    if sp.issparse(one):
+        return one.shape == other.shape and (one != other).nnz == 0
+    if isinstance(one, np.ndarray):
+        return one.shape == other.shape and bool(np.array_equal(one, other, equal_nan=one.dtype.kind in "fc"))
+    if isinstance(one, Mapping):
+        mine, theirs = cast("Mapping[Any, Any]", one), cast("Mapping[Any, Any]", other)
+        return mine.keys() == theirs.keys() and all(same(mine[k], theirs[k]) for k in mine)
+    if isinstance(one, list | tuple):
+        first, second = cast("tuple[Any, ...]", one), cast("tuple[Any, ...]", other)
+        return len(first) == len(second) and all(same(a, b) for a, b in zip(first, second, strict=True))
+    if is_dataclass(one):
+        names = [f.name for f in fields(one) if not (isinstance(one, System) and f.name in _SKIPPED)]
+        return all(same(getattr(one, name), getattr(other, name)) for name in names)
+    try:
+        return bool(one == other)
+    except ValueError:
+        return False

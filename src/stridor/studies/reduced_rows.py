@@ -1,0 +1,159 @@
+"""Rows answered by one certified reduced model over all parameters of a study.
+
+The model's own estimate says how far its eigenvalues may be off. Every row near the boundary of stability, every row
+whose estimate is above the bound and a random share of all are solved in the full problem as well, which then counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..case import Case
+from ..errors import AnalysisError, CaseError
+from ..io.reduced_models import load_reduced, save_reduced
+from ..modal.full import onsets_along
+from ..modal.parametric import ReducedModel
+from ..modal.tolerances import UNSTABLE_RELATIVE
+from ..study.reduced import reduced_model
+from ..typing import Array
+from .checks import FRICTION
+from .rows import Row, modes_row, onsets_row
+from .schema import Compute, Keep, Study
+
+SAFE = 100.0  # how many times its estimated error a growth rate must be to have a sign
+NEAR = 1e-6  # growth, of |λ|, below which stability is decided in full however small the error
+SAME = 10.0  # how many times the estimated error the full problem may be away
+ROUNDING = 1e-9  # relative difference of eigenvalues that is none
+WORTH = 50  # rows from which on a model is worth making
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """A model and what is asked of it."""
+
+    model: ReducedModel
+    compute: Compute
+    names: Mapping[str, str]  # of parameters of the study: those of the model
+
+    @staticmethod
+    def read(path: str, case: Case) -> Reduced:
+        """A model that `made` wrote. Raises CaseError where it is damaged."""
+        model = load_reduced(path)
+        compute: Compute = "onsets" if Path(path).stem.endswith("onsets") else "modes"
+        return Reduced(model, compute, {p.name: p.name for p in model.problem.parameters} | _named(case))
+
+    def row(self, values: Mapping[str, float], keep: Keep) -> Row | None:
+        """A row of the model, None where a value lies outside its box."""
+        point = {self.names.get(path, path): value for path, value in values.items()}
+        return self._modes(point, keep) if self.compute == "modes" else self._onsets(point, keep)
+
+    def _modes(self, point: Mapping[str, float], keep: Keep) -> Row | None:
+        found = self.model.modes(point)
+        if not found.inside:
+            return None
+        upper = found.values.imag >= 0
+        lam, error = found.values[upper], found.error[upper]
+        row = modes_row(lam, np.zeros(len(lam), dtype=int), keep.modes)
+        near = np.abs(lam.real) <= np.maximum(SAFE * error, NEAR) * np.abs(lam)
+        # Without damping what is stable lies on the axis, but for rounding.
+        near &= (np.abs(lam.real) > UNSTABLE_RELATIVE * np.abs(lam)) | (error > UNSTABLE_RELATIVE / SAFE)
+        return row | {
+            "status": 1, "source": "reduced", "estimated_error": float(error.max(initial=0.0)),
+            "_doubtful": bool(near.any() or np.any(error > self.model.bound)),
+        }  # fmt: skip
+
+    def _onsets(self, point: Mapping[str, float], keep: Keep) -> Row | None:
+        if not self.model.problem.inside(self.model.problem.point(point)):
+            return None
+        found = onsets_along(self.model, FRICTION, point, confirm=False)
+        low = next(p.low for p in self.model.problem.parameters if p.name == FRICTION)
+        modes = self.model.modes({**point, FRICTION: low})
+        growing = int(np.count_nonzero(modes.unstable & (modes.values.imag >= 0)))
+        row = onsets_row(found, keep.onsets, complete=found.complete, growing_at_start=growing)
+        error = float(modes.error.max(initial=0.0))
+        return row | {"status": 1, "source": "reduced", "estimated_error": error, "_doubtful": not found.complete}
+
+    @staticmethod
+    def doubtful(row: Row) -> bool:
+        """Whether the full problem is to decide; said once."""
+        return bool(row.pop("_doubtful", False))
+
+    def confirmed(self, row: Row, full: Row) -> Row:
+        """The row of the full problem, with what the model's was away from it."""
+        if full["status"] != 1:
+            return full
+        off = difference(row, full, self.compute)
+        allowed = max(SAME * float(row["estimated_error"]), ROUNDING)
+        if self.compute == "onsets":
+            allowed = max(allowed, 1e-6)  # μ is further off than λ where growth begins slowly
+        agrees = off <= allowed and _same_counts(row, full, self.compute)
+        told = {"estimated_error": row["estimated_error"], "difference": off, "confirmed": 1 if agrees else 2}
+        return full | told
+
+
+def difference(row: Row, full: Row, compute: Compute) -> float:
+    """Largest relative difference of eigenvalues, or of onsets, of two answers; infinite where their number differs."""
+    if compute == "onsets":
+        one, other = row["onset_mu"], full["onset_mu"]
+        if len(one) != len(other):
+            return float("inf")
+        return float((np.abs(one - other) / np.maximum(np.abs(other), 1e-3)).max(initial=0.0))
+    ours, theirs = (r["growth_rate"] + 2j * np.pi * r["frequency_hz"] for r in (row, full))
+    if not len(ours) or not len(theirs):
+        return 0.0 if len(ours) == len(theirs) else float("inf")
+    apart: Array = np.abs(theirs[:, None] - ours[None, :]).min(axis=1) / np.maximum(np.abs(theirs), 1e-300)
+    return float(apart.max())
+
+
+def _same_counts(row: Row, full: Row, compute: Compute) -> bool:
+    names = ("onsets",) if compute == "onsets" else ("modes_of_band",)
+    return all(row[name] == full[name] for name in names)
+
+
+def _named(case: Case) -> dict[str, str]:
+    """Paths of values of [parameters], which models call by their names."""
+    return {f"parameters.{name}.value": name for name in case.parameters}
+
+
+def box_of(study: Study, case: Case, samples: Array) -> dict[str, tuple[float, float]]:
+    """Ranges (low, high) that hold all samples, by the names that a model gives them; a value that is the same
+    everywhere is no range."""
+    named = _named(case)
+    box: dict[str, tuple[float, float]] = {}
+    for k, path in enumerate(study.parameters):
+        low, high = float(samples[:, k].min()), float(samples[:, k].max())
+        if low < high:
+            box[named.get(path, path)] = (low, high)
+    if study.compute == "onsets":
+        box[FRICTION] = case.modal.friction_range
+    return box
+
+
+def unfit(study: Study, case: Case, rows: int) -> str:
+    """Why no reduced model is tried, "" where one is."""
+    if study.answers.source == "full":
+        return "the study asks for full solves"
+    if study.compute not in ("modes", "onsets"):
+        return f"{study.compute} has no reduced model"
+    if not case.modal.damped:
+        return "modal.damped = false: a reduced model keeps the damping"
+    if study.answers.source == "auto" and rows < WORTH:
+        return f"{rows} rows are fewer than a model is worth"
+    return ""
+
+
+def made(study: Study, case: Case, samples: Array, path: Path) -> Reduced:
+    """The model over all samples, kept in a file. Raises CaseError and AnalysisError where there is none."""
+    box = box_of(study, case, samples)
+    constant = [p for k, p in enumerate(study.parameters) if samples[:, k].min() == samples[:, k].max()]
+    if constant:
+        raise CaseError("parameters", constant[0], "has one value only; set it by a table [set]")
+    model = reduced_model(case, box, bound=study.answers.bound)
+    if model.whole:
+        raise AnalysisError("damping is so strong that the reduced model is no faster")
+    save_reduced(model, path, case=case)
+    return Reduced(model, study.compute, {p.name: p.name for p in model.problem.parameters} | _named(case))

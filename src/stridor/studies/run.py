@@ -1,0 +1,317 @@
+"""From a study to its store: samples, who answers them, rows written as they come."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..case import Case
+from ..errors import AnalysisError, CaseError
+from ..interrupts import held
+from ..io.claims import claimed
+from ..stages import stage
+from ..study.case_key import files_of
+from ..study.fingerprint import contents
+from ..study.provenance import provenance
+from ..typing import Array, IntArray
+from . import reduced_rows
+from .effect import without_effect
+from .parts import Part
+from .result import StudyResult, opened
+from .rows import Row, lengths, variables
+from .sampling import samples
+from .schema import Study
+from .store import DONE, FAILED, PENDING, Head, Store
+from .task import Batch, Task, program
+from .uncertainty import Probability, missing_samples, probability
+from .workers import LocalWorkers
+
+NAME = "study.zarr"
+SECONDS = 1.0  # of work in a batch, and between two writings
+LARGEST = 1000  # rows of a batch
+TRIAL = 4  # rows on which a reduced model is proved before it answers
+
+Progress = Callable[[int, int], None]
+
+
+class Workers(Protocol):
+    """Who answers batches of rows: `LocalWorkers`, `ClusterWorkers`. A context."""
+
+    count: int
+    lost: int
+
+    @property
+    def words(self) -> str: ...
+    def __enter__(self) -> Workers: ...
+    def __exit__(self, *_: object) -> None: ...
+    def answers(self, batches: Iterator[Batch]) -> Iterator[dict[int, Row]]: ...
+
+
+def run_study(
+    study: Study,
+    folder: str | Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    part: Part | None = None,
+    go_on: bool = False,
+    progress: Progress | None = None,
+    say: Callable[[str], None] | None = None,
+) -> StudyResult:
+    """Compute what is missing of a study in a folder, in which ``study.zarr`` has a row for each sample.
+
+    workers: processes of this computer (default: one for each core); scheduler: the address of a Dask scheduler
+    ("tcp://host:port") instead. part: only these samples, in a folder of their own. go_on: also with a store that
+    another version of stridor has begun. progress is called with rows done and of all, say with what is to be known.
+
+    Ctrl-C ends it with what is done (`StudyResult.interrupted`); the same call goes on from there, as it does after the
+    process was killed. Raises CaseError for the store of another study and where another process is at it,
+    AnalysisError where the store cannot be written, a scheduler does not answer or a worker has another stridor.
+    """
+    place = Path(folder) if part is None else Path(folder) / part.folder
+    with claimed(place):
+        return _Run(study, place, part, go_on, progress, say or (lambda _: None)).all(workers, scheduler)
+
+
+@dataclass
+class _Run:
+    study: Study
+    folder: Path
+    part: Part | None
+    go_on: bool
+    progress: Progress | None
+    say: Callable[[str], None]
+    rows: dict[int, Row] = field(default_factory=dict[int, Row])
+    rate: float = 0.0  # seconds of a row
+    interrupted: bool = False
+
+    def all(self, workers: int | None, scheduler: str | None) -> StudyResult:
+        """Open or make the store, answer what is missing, and more where the goal asks for it."""
+        started = time.perf_counter()
+        stage("samples of the study")
+        case = self.study.base()
+        store = self._store(case)
+        for line in store.told("without_effect") or ():
+            self.say(f"warning: {line}")
+        status = store.status
+        if not self._open_rows(status).size:
+            self.say("all rows are there")
+        task = self._task(case, store) if self._open_rows(status).size else None
+        while task is not None:
+            with _workers(task, workers, scheduler) as who:
+                self.say(f"{who.words}")
+                self._answer(store, who)
+            store.note(lost_workers=(store.told("lost_workers") or 0) + who.lost)
+            if self.interrupted or not self._more(store):
+                break
+        store.note(seconds=(store.told("seconds") or 0.0) + time.perf_counter() - started)
+        return opened(store.path, interrupted=self.interrupted)
+
+    # -- the store ---------------------------------------------------------------------------------------------------
+    def _store(self, case: Case) -> Store:
+        path = self.folder / NAME
+        columns = variables(self.study.compute)
+        digest = digest_of(self.study, case, self.part)
+        if path.exists():
+            store = Store.opened(path, columns)
+            self._check(store, digest)
+            return store
+        values = samples(self.study)
+        numbers = np.arange(len(values))
+        if self.part is not None:
+            numbers = self.part.numbers(len(values))
+            values = values[numbers]
+        made = provenance(case, "study", 0.0) | {"programs": [program()]}
+        head = Head(self.study.document(), digest, made, "" if self.part is None else str(self.part))
+        parameters = {name: unit_of(name) for name in self.study.parameters}
+        store = Store.made(
+            path, head, values, parameters, columns, lengths(self.study.compute, self.study.keep), numbers=numbers
+        )
+        store.note(without_effect=without_effect(self.study, case, values))
+        return store
+
+    def _check(self, store: Store, digest: str) -> None:
+        """Raises CaseError where the store is not one of this study and this program."""
+        head = store.head
+        if head.digest != digest:
+            raise CaseError(str(store.path), None, f"is of another study: {_differences(head.study, self.study)}")
+        programs = store.told("programs") or head.provenance.get("programs", [])
+        if program() not in programs:
+            if not self.go_on:
+                raise CaseError(
+                    str(store.path), None,
+                    f"was begun by another stridor ({', '.join(programs)}; this is {program()}), which may give other "
+                    "numbers: remove the store, name another folder (--out), or go on all the same (--go-on)",
+                )  # fmt: skip
+            store.note(programs=[*programs, program()])
+
+    def _open_rows(self, status: IntArray) -> IntArray:
+        """Places of the rows that are to be computed."""
+        return np.flatnonzero((status == PENDING) | ((status == FAILED) & self.study.restart_failed))
+
+    # -- who answers -------------------------------------------------------------------------------------------------
+    def _task(self, case: Case, store: Store) -> Task:
+        """The full problem, or a reduced model where there is one that agrees with it."""
+        plain = Task(case.to_toml(), self.study.compute, tuple(self.study.parameters), self.study.keep, "", program())
+        path = (self.folder / f"reduced-{self.study.compute}.npz").resolve()
+        answers = store.told("answers")
+        if answers is None:
+            why = self._reduced(case, store.samples, path)
+            answers = {"source": "full" if why else "reduced", "why": why}
+            store.note(answers=answers)
+        if answers["source"] == "full":
+            self.say(f"every sample is solved in full: {answers['why']}")
+            return plain
+        if not path.exists():
+            reduced_rows.made(self.study, case, store.samples, path)
+        self.say("samples are answered by one reduced model; a share of them is solved in full as well")
+        return Task(plain.case, plain.compute, plain.names, plain.keep, str(path), plain.program)
+
+    def _reduced(self, case: Case, values: Array, path: Path) -> str:
+        """Make a reduced model and prove it on some samples; why there is none, "" where there is."""
+        if why := reduced_rows.unfit(self.study, case, len(values)):
+            return why
+        asked = self.study.answers.source == "reduced"
+        stage("reduced model over all samples")
+        try:
+            model = reduced_rows.made(self.study, case, values, path)
+            why = self._proved(case, values, model)
+        except (CaseError, AnalysisError) as error:
+            if asked:
+                raise
+            return f"there is no reduced model: {error}"
+        if why and asked:
+            raise AnalysisError(why)
+        return why
+
+    def _proved(self, case: Case, values: Array, model: reduced_rows.Reduced) -> str:
+        """What speaks against a model on a few samples solved in full, "" where they agree."""
+        from .rows import full_row
+
+        chosen = np.random.default_rng(self.study.sampling.seed).permutation(len(values))[:TRIAL]
+        for done, k in enumerate(chosen.tolist()):
+            stage(f"reduced model against the full problem, sample {done + 1} of {len(chosen)}")
+            point = dict(zip(self.study.parameters, values[k].tolist(), strict=True))
+            row = model.row(point, self.study.keep)
+            full = full_row(case, self.study.compute, point, self.study.keep)
+            if row is None or full["status"] != DONE:
+                continue
+            model.doubtful(row)
+            found = model.confirmed(row, full)
+            if found["confirmed"] != 1:
+                return f"the reduced model and the full problem differ by {found['difference']:.1e} at a sample"
+        return ""
+
+    # -- the work ----------------------------------------------------------------------------------------------------
+    def _answer(self, store: Store, who: Workers) -> None:
+        """Have every open row answered and written."""
+        status = store.status
+        places = self._open_rows(status)
+        total, done = len(status), len(status) - len(places)
+        if self.progress is not None:
+            self.progress(done, total)
+        written = time.monotonic()
+        with held() as signals:
+            try:
+                for rows in who.answers(self._batches(store, places, who.count)):
+                    self.rows |= rows
+                    done += len(rows)
+                    self._learned(rows)
+                    if time.monotonic() - written > SECONDS:
+                        self._write(store)
+                        written = time.monotonic()
+                    if self.progress is not None:
+                        self.progress(done, total)
+                    if signals.asked:
+                        signals.met = self.interrupted = True
+                        break
+            finally:
+                self._write(store)
+
+    def _write(self, store: Store) -> None:
+        rows, self.rows = self.rows, {}
+        store.write(rows)
+
+    def _learned(self, rows: Mapping[int, Row]) -> None:
+        seconds = [float(row["seconds"]) for row in rows.values() if "seconds" in row]
+        if seconds:
+            mean = float(np.mean(seconds))
+            self.rate = mean if not self.rate else 0.7 * self.rate + 0.3 * mean
+
+    def _batches(self, store: Store, places: IntArray, workers: int) -> Iterator[Batch]:
+        """Open rows in batches of about a second, smaller towards the end so that all workers end together."""
+        values = store.samples
+        chosen = np.random.default_rng(self.study.sampling.seed + 1).random(len(values)) < self.study.answers.confirm
+        at = 0
+        while at < len(places):
+            size = 1 if not self.rate else int(np.clip(SECONDS / max(self.rate, 1e-6), 1, LARGEST))
+            size = max(1, min(size, (len(places) - at) // (2 * workers) or 1))
+            part = places[at : at + size]
+            at += size
+            yield Batch(
+                tuple(part.tolist()), tuple(map(tuple, values[part].tolist())), tuple(chosen[part].tolist())
+            )
+
+    def _more(self, store: Store) -> bool:
+        """Add samples where the probability of instability is not known as well as asked for."""
+        goal = self.study.goal
+        if goal is None or self.part is not None:
+            return False
+        found = opened(store.path)
+        known: Probability = probability(found.unstable, goal.confidence)
+        have = len(found.unstable)
+        wanted = min(missing_samples(known, goal.half_width), goal.most)
+        if known.half_width <= goal.half_width or wanted <= have:
+            return False
+        if self.study.sampling.method == "sobol":
+            wanted = min(1 << (wanted - 1).bit_length(), goal.most)
+        self.say(f"{known.words}; {wanted - have} samples more")
+        store.extend(samples(self.study, wanted))
+        return True
+
+
+def digest_of(study: Study, case: Case, part: Part | None = None) -> str:
+    """SHA-256 of what the rows follow from: samples, case, the files that it names; not of who computes them."""
+    document = study.document()
+    for name in ("title", "restart_failed", "goal"):
+        document.pop(name, None)
+    data = case.model_dump(mode="json", exclude_none=True)
+    files = {path: contents(Path(path)) for path in sorted(set(files_of(data)))}
+    text = json.dumps([document, files, "" if part is None else str(part)], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _differences(before: Mapping[str, Any], study: Study) -> str:
+    """What of a study differs from that in the store, in a few words."""
+    now = study.document()
+    names = [n for n in dict.fromkeys([*before, *now]) if n not in ("title", "goal") and before.get(n) != now.get(n)]
+    what = ", ".join(names) or "a file that the case names"
+    return f"{what} differ{'s' if len(names) < 2 else ''}; remove it, or name another folder (--out)"
+
+
+def unit_of(path: str) -> str:
+    """The unit of a parameter, "" where its name tells none."""
+    return "1" if path == "mu" else ""
+
+
+def _workers(task: Task, count: int | None, scheduler: str | None) -> Workers:
+    if scheduler is None:
+        return LocalWorkers(task, count or available())
+    from .cluster import ClusterWorkers
+
+    return ClusterWorkers(task, scheduler)
+
+
+def available() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
