@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from .case import Case, load, loads
     from .io.datasets import open, save, to_dataset
     from .io.export import export
+    from .studies.plots import study_figures
+    from .studies.result import open_study
+    from .studies.run import run_study
+    from .studies.schema import Study
     from .study.analyses import (
         body_modes,
         compare,
@@ -48,6 +52,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Case": ".case",
+    "Study": ".studies.schema",
     "System": ".system",
     "Workspace": ".study.workspace",
     "body_modes": ".study.analyses",
@@ -62,6 +67,7 @@ _HOMES = {
     "modes": ".study.analyses",
     "onsets": ".study.analyses",
     "open": ".io.datasets",
+    "open_study": ".studies.result",
     "pencil": ".study.pencil",
     "perturbed_copies": ".study.copies",
     "plot": ".view",
@@ -69,10 +75,12 @@ _HOMES = {
     "reduced_model": ".study.reduced",
     "report": ".app.pipeline",
     "run": ".app.pipeline",
+    "run_study": ".studies.run",
     "save": ".io.datasets",
     "sensitivities": ".study.sensitivities",
     "simulate": ".study.analyses",
     "steady_sliding": ".study.analyses",
+    "study_figures": ".studies.plots",
     "summarise": ".study.analyses",
     "to_dataset": ".io.datasets",
 }
@@ -84,6 +92,7 @@ __all__ = [
     "Case",
     "CaseError",
     "StridorError",
+    "Study",
     "System",
     "Workspace",
     "body_modes",
@@ -98,6 +107,7 @@ __all__ = [
     "modes",
     "onsets",
     "open",
+    "open_study",
     "pencil",
     "perturbed_copies",
     "plot",
@@ -105,10 +115,12 @@ __all__ = [
     "reduced_model",
     "report",
     "run",
+    "run_study",
     "save",
     "sensitivities",
     "simulate",
     "steady_sliding",
+    "study_figures",
     "summarise",
     "to_dataset",
 ]

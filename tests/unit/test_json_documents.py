@@ -12,7 +12,7 @@ import pytest
 
 import stridor as st
 from program import stridor
-from stridor.app.option_table import ABOUT, COMPUTING
+from stridor.app.option_table import EVERY
 from stridor.case import template_text
 
 FEW = [
@@ -43,7 +43,15 @@ WORDS = {
     "compare": ["case.toml"],
     "run": ["case.toml", "--skip", "compare,report"],
     "report": ["case.toml", "--skip", "countermeasures,sensitivities"],
+    "study": ["study.toml"],
+    "plot": ["study.out"],
 }
+STUDY = """
+case = "case.toml"
+parameters.mu.range = [0.0, 0.2]
+parameters."bodies.beam1.damping.mass".range = [1.0, 10.0]
+sampling = { method = "sobol", samples = 4 }
+"""
 # Tables whose keys are names of the case or of the result, not words of the document.
 NAMED = {"contacts", "bodies", "first_regime", "settled", "matrices", "copies", "seconds", "point", "parameters"}
 
@@ -78,12 +86,14 @@ def names(value: Any) -> Iterator[str]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("json")
     (made / "case.toml").write_text(st.loads(template_text("two-beams"), FEW).text, encoding="utf-8")
+    (made / "study.toml").write_text(STUDY, encoding="utf-8")
+    assert stridor("study", "study.toml", "--quiet", cwd=made).returncode == 0
     assert stridor("export", "case.toml", "--quiet", cwd=made).returncode == 0
     return made
 
 
 def test_every_verb_is_told_of() -> None:
-    assert set(told()[1]) == {name.split()[0] for name in WORDS} == {*ABOUT, *COMPUTING}
+    assert set(told()[1]) == {name.split()[0] for name in WORDS} == set(EVERY)
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] if n == "compare" else []) for n in WORDS])

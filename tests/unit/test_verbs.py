@@ -49,8 +49,8 @@ OF_A_CASE = {  # of what is in a case file beside the matrices
     "damping_map", "describe", "rank_countermeasures", "reduced_model", "report", "run", "sensitivities",
 }  # fmt: skip
 OTHERS = {  # what takes no problem
-    "AnalysisError", "Case", "CaseError", "StridorError", "System", "build_system", "load", "loads", "open", "plot", "save",
-    "to_dataset",
+    "AnalysisError", "Case", "CaseError", "StridorError", "Study", "System", "build_system", "load", "loads", "open",
+    "open_study", "plot", "run_study", "save", "study_figures", "to_dataset",
 }  # fmt: skip
 
 

@@ -17,6 +17,8 @@ COMPUTING = (
     "damping-map", "reduce",
 )  # fmt: skip
 ABOUT = ("new", "check", "matrices", "export")  # verbs about the case itself
+STUDIES = ("study", "plot")  # of many samples of a case
+EVERY = (*ABOUT, *COMPUTING, *STUDIES)
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,7 @@ Set = Annotated[
         "--set",
         "Change a value of the case, e.g. contacts.A.friction.coefficient=0.3. Repeatable.",
         metavar="KEY=VALUE",
-        on=" ".join((*ABOUT, *COMPUTING)),
+        on=" ".join(EVERY),
     ),
 ]
 Solver = Annotated[
@@ -185,7 +187,7 @@ Solver = Annotated[
         "--solver",
         "Sparse direct solver: mumps, pardiso, superlu; slepc for all processes of mpiexec [default: the case's].",
         metavar="NAME",
-        on=" ".join((*ABOUT[1:], *COMPUTING)),
+        on=" ".join(EVERY[1:]),
     ),
 ]
 Out = Annotated[
@@ -194,23 +196,23 @@ Out = Annotated[
         "--out",
         "Folder for what is written [default: CASE.out; of new here].",
         metavar="DIR",
-        on=" ".join((*ABOUT, *COMPUTING)),
+        on=" ".join(EVERY),
     ),
 ]
 Json = Annotated[
     bool,
-    _option("--json", "Print one JSON document on stdout and nothing else there.", on=" ".join((*ABOUT, *COMPUTING))),
+    _option("--json", "Print one JSON document on stdout and nothing else there.", on=" ".join(EVERY)),
 ]
 Quiet = Annotated[
     bool,
-    _option("--quiet", "No log, no progress, no hint at what comes next.", on=" ".join((*ABOUT, *COMPUTING))),
+    _option("--quiet", "No log, no progress, no hint at what comes next.", on=" ".join(EVERY)),
 ]
 Verbose = Annotated[
     bool,
     _option(
         "--verbose",
         "Say on stderr which methods are chosen and why, and every stage.",
-        on=" ".join((*ABOUT[1:], *COMPUTING)),
+        on=" ".join(EVERY[1:]),
     ),
 ]
 
@@ -218,7 +220,7 @@ Verbose = Annotated[
 def rows() -> list[str]:
     """The table as lines of Markdown, as docs/commands.md has it."""
     lines = ["| option | what it says | on | not on, and why |", "|---|---|---|---|"]
-    everywhere: dict[tuple[str, ...], str] = {(*ABOUT, *COMPUTING): "all", (*ABOUT[1:], *COMPUTING): "all but `new`"}
+    everywhere: dict[tuple[str, ...], str] = {EVERY: "all", EVERY[1:]: "all but `new`"}
     for option in TABLE.values():
         flag = option.name if option.metavar is None else f"{option.name} {option.metavar}".replace("|", "\\|")
         on = everywhere.get(option.on) or ", ".join(f"`{verb}`" for verb in option.on)

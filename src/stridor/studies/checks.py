@@ -97,7 +97,7 @@ def _of_sampling(study: Study, path: str, varied: Varied) -> Iterator[Problem]:
     method = study.sampling.method
     if method == "grid":
         if varied.distribution is not None:
-            accepted = 'values or range and points with sampling.method = "grid"; or take another method, such as "sobol"'
+            accepted = 'values, or range and points, with sampling.method = "grid"; or another method, such as "sobol"'
             yield problem(path, "distribution", varied.distribution, accepted)
         elif varied.range is not None and varied.points is None:
             yield problem(path, "points", None, "missing – how many points of the grid the range has")
@@ -129,7 +129,7 @@ def _of_samples(study: Study) -> Iterator[Problem]:
             accepted = 'goes with the methods "random" and "sobol", to which samples can be added'
             yield Problem("goal", method, accepted)
         if study.compute != "modes":
-            yield Problem("goal", study.compute, 'goes with compute = "modes": it is about the probability of instability')
+            yield Problem("goal", study.compute, 'goes with compute = "modes": how likely a mode grows is its subject')
 
 
 def _of_correlation(study: Study) -> Iterator[Problem]:

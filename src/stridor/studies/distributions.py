@@ -59,7 +59,8 @@ def _shape(varied: Varied) -> Any:
     """The distribution without its limits; mean and deviation are those of the number itself."""
     from scipy import stats
 
-    assert varied.mean is not None and varied.deviation is not None, "the study was checked"
+    assert varied.mean is not None, "the study was checked"
+    assert varied.deviation is not None, "the study was checked"
     if varied.distribution == "normal":
         return stats.norm(varied.mean, varied.deviation)
     spread = np.sqrt(np.log1p((varied.deviation / varied.mean) ** 2))

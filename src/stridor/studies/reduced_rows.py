@@ -59,8 +59,9 @@ class Reduced:
         lam, error = found.values[upper], found.error[upper]
         row = modes_row(lam, np.zeros(len(lam), dtype=int), keep.modes)
         near = np.abs(lam.real) <= np.maximum(SAFE * error, NEAR) * np.abs(lam)
-        # Without damping what is stable lies on the axis, but for rounding.
-        near &= (np.abs(lam.real) > UNSTABLE_RELATIVE * np.abs(lam)) | (error > UNSTABLE_RELATIVE / SAFE)
+        if not np.any(self.model.problem.powers == 1):
+            # Without damping what is stable lies on the axis, but for rounding.
+            near &= (np.abs(lam.real) > UNSTABLE_RELATIVE * np.abs(lam)) | (error > UNSTABLE_RELATIVE / SAFE)
         return row | {
             "status": 1, "source": "reduced", "estimated_error": float(error.max(initial=0.0)),
             "_doubtful": bool(near.any() or np.any(error > self.model.bound)),

@@ -17,9 +17,20 @@ from ..tabular import Cell, Rows, Tabular
 from ..typing import Array, BoolArray, IntArray
 from .schema import Study
 from .store import DONE, FAILED, PENDING, dataset
-from .uncertainty import Indices, Probability, in_bands, probability, sobol_indices
+from .uncertainty import Indices, Probability, grows, in_bands, probability, sobol_indices
 
 BANDS = 8  # of frequency, where nobody says which
+
+
+@dataclass(frozen=True)
+class BranchSpread:
+    """How a branch scatters: its number, frequency [Hz] and growth rate [1/s] at the 5th, 50th and 95th percentile, and
+    the share of samples in which it grows."""
+
+    number: int
+    frequency_hz: tuple[float, float, float]
+    growth_rate: tuple[float, float, float]
+    grows: float
 
 
 @dataclass(frozen=True, repr=False)
@@ -70,8 +81,8 @@ class StudyResult(Tabular, Shown):
 
     @property
     def unstable(self) -> BoolArray:
-        """Whether something grows, of the rows that have results: a mode at the row's friction, or an onset in the range
-        of friction."""
+        """Whether something grows, of the rows that have results: a mode at the row's friction, or from an onset in the
+        range of friction on."""
         if self.compute == "modes":
             return np.asarray(self.data["unstable_modes"].values[self.done] > 0)
         if self.compute == "onsets":
@@ -94,13 +105,43 @@ class StudyResult(Tabular, Shown):
         if self.compute != "modes":
             raise AnalysisError("bands of frequency are those of modes; compute modes")
         frequency, growth = (self.data[name].values[self.done] for name in ("frequency_hz", "growth_rate"))
-        if edges is None:
-            growing = frequency[(growth > 0) & np.isfinite(frequency)]
-            low, high = (growing.min(), growing.max()) if growing.size else (0.0, 1.0)
-            edges = np.linspace(0.999 * low, 1.001 * high, BANDS + 1).tolist()
-        happened = in_bands(frequency, growth, edges)
+        growing = frequency[grows(frequency, growth)]
+        low, high = (growing.min(), growing.max()) if growing.size else (0.0, 1.0)
+        ends: list[float] = np.linspace(0.999 * low, 1.001 * high, BANDS + 1).tolist() if edges is None else [*edges]
+        happened = in_bands(frequency, growth, ends)
         shares = [probability(happened[:, k], confidence) for k in range(happened.shape[1])]
-        return [(edges[k], edges[k + 1], share) for k, share in enumerate(shares)]
+        return [(ends[k], ends[k + 1], share) for k, share in enumerate(shares)]
+
+    @cached_property
+    def _followed(self) -> bool:
+        """Whether every mode kept has the number of its branch."""
+        data = self.data
+        known = np.isfinite(data["frequency_hz"].values[self.done])
+        return bool(np.all(data["branch"].values[self.done][known] > 0))
+
+    @property
+    def branch_words(self) -> str:
+        """By what `branches` tells modes apart."""
+        return "by branch from μ = 0" if self._followed else "by place in frequency"
+
+    def branches(self) -> list[BranchSpread]:
+        """Spread of the modes that all samples have: by the number of their branch, which is followed from μ = 0 in the
+        full problem; rows of a reduced model are told apart by their place in frequency, where modes may change places.
+        None of those of which some rows have kept no mode."""
+        data = self.data
+        frequency, growth, branch = (data[n].values[self.done] for n in ("frequency_hz", "growth_rate", "branch"))
+        if not self._followed:
+            if np.any(data["modes_of_band"].values[self.done] > frequency.shape[1]):
+                return []
+            branch = np.where(np.isfinite(frequency), np.arange(1, frequency.shape[1] + 1), 0)
+        found: list[BranchSpread] = []
+        for number in np.unique(branch[branch > 0]).tolist():
+            inside = (branch == number) & np.isfinite(frequency)
+            if np.count_nonzero(inside) < len(frequency):
+                continue
+            spread = [tuple(np.quantile(v[inside], (0.05, 0.5, 0.95)).tolist()) for v in (frequency, growth)]
+            found.append(BranchSpread(int(number), *spread, float(np.mean(grows(frequency[inside], growth[inside])))))  # type: ignore[arg-type]
+        return found
 
     def indices(self, of: str | None = None) -> Indices:
         """Sobol indices of a result of one number a row (default: the largest growth rate, or the critical μ). Raises
@@ -202,7 +243,7 @@ def _cell(value: Any) -> Cell:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def opened(path: str | Path, *, interrupted: bool = False) -> StudyResult:
+def open_study(path: str | Path, *, interrupted: bool = False) -> StudyResult:
     """The store of a study, or the folder that it lies in. Raises CaseError where there is none or it is damaged."""
     place = Path(path)
     if place.is_dir() and (place / "study.zarr").is_dir():

@@ -18,7 +18,7 @@ from ..modal.onset import Onsets
 from ..modal.tolerances import UNSTABLE_RELATIVE
 from ..study.analyses import compare, modes, onsets, simulate, steady_sliding, summarise
 from ..study.workspace import Workspace
-from ..typing import Array, ComplexArray
+from ..typing import ComplexArray, IntArray
 from .checks import FRICTION
 from .schema import Compute, Keep
 
@@ -27,7 +27,7 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Variable:
-    """A column of the store: dtype "f8", "i8", "i1" or "str", an inner dimension ("" for one number), unit and words."""
+    """A column of the store: dtype "f8", "i8", "i1" or "str"; inner dimension, "" for one number a row; unit, words."""
 
     name: str
     dtype: str
@@ -69,10 +69,10 @@ def _printable(text: str) -> str:
     return re.sub(r"\s+", " ", "".join(c if c.isprintable() else " " for c in text)).strip()[:500]
 
 
-# -- modes ---------------------------------------------------------------------------------------------------------------
+# -- modes -------------------------------------------------------------------------------------------------------------
 
 
-def modes_row(eigenvalues: ComplexArray, branches: Array, keep: int, *, rounding: float = UNSTABLE_RELATIVE) -> Row:
+def modes_row(eigenvalues: ComplexArray, branches: IntArray, keep: int, *, rounding: float = UNSTABLE_RELATIVE) -> Row:
     """The modes λ (k,) [1/s] of a row: unstable ones first, then the lowest, in the order of frequency."""
     growing = eigenvalues.real > rounding * np.abs(eigenvalues)
     order = np.lexsort((eigenvalues.imag, -eigenvalues.real * growing, ~growing))[:keep]
@@ -100,7 +100,7 @@ def _modes(work: Workspace, mu: float | None, keep: Keep) -> Row:
     return row | {"note": _printable(" ".join(map(doubt, found.completeness)))}
 
 
-# -- onsets --------------------------------------------------------------------------------------------------------------
+# -- onsets ------------------------------------------------------------------------------------------------------------
 
 
 def onsets_row(found: Onsets | ParametricOnsets, keep: int, *, complete: bool, growing_at_start: int) -> Row:
@@ -128,7 +128,7 @@ def _onsets(work: Workspace, mu: float | None, keep: Keep) -> Row:
     return row | {"note": _printable(doubt(found.completeness))}
 
 
-# -- the others ----------------------------------------------------------------------------------------------------------
+# -- the others --------------------------------------------------------------------------------------------------------
 
 
 def _steady(work: Workspace, mu: float | None, keep: Keep) -> Row:

@@ -8,6 +8,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -25,7 +26,7 @@ from ..typing import Array, IntArray
 from . import reduced_rows
 from .effect import without_effect
 from .parts import Part
-from .result import StudyResult, opened
+from .result import StudyResult, open_study
 from .rows import Row, lengths, variables
 from .sampling import samples
 from .schema import Study
@@ -56,8 +57,8 @@ class Workers(Protocol):
 
 
 def run_study(
-    study: Study,
-    folder: str | Path,
+    study: Study | str | PathLike[str],
+    folder: str | Path | None = None,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -66,7 +67,8 @@ def run_study(
     progress: Progress | None = None,
     say: Callable[[str], None] | None = None,
 ) -> StudyResult:
-    """Compute what is missing of a study in a folder, in which ``study.zarr`` has a row for each sample.
+    """Compute what is missing of a study, or of the one in a file, in a folder (default: FILE.out), in which
+    ``study.zarr`` has a row for each sample.
 
     workers: processes of this computer (default: one for each core); scheduler: the address of a Dask scheduler
     ("tcp://host:port") instead. part: only these samples, in a folder of their own. go_on: also with a store that
@@ -76,6 +78,11 @@ def run_study(
     process was killed. Raises CaseError for the store of another study and where another process is at it,
     AnalysisError where the store cannot be written, a scheduler does not answer or a worker has another stridor.
     """
+    if not isinstance(study, Study):
+        folder = Path(study).with_suffix(".out") if folder is None else folder
+        study = Study.load(study)
+    if folder is None:
+        raise CaseError("folder", None, "missing – give the folder that the study's store is to lie in")
     place = Path(folder) if part is None else Path(folder) / part.folder
     with claimed(place):
         return _Run(study, place, part, go_on, progress, say or (lambda _: None)).all(workers, scheduler)
@@ -113,7 +120,7 @@ class _Run:
             if self.interrupted or not self._more(store):
                 break
         store.note(seconds=(store.told("seconds") or 0.0) + time.perf_counter() - started)
-        return opened(store.path, interrupted=self.interrupted)
+        return open_study(store.path, interrupted=self.interrupted)
 
     # -- the store ---------------------------------------------------------------------------------------------------
     def _store(self, case: Case) -> Store:
@@ -265,7 +272,7 @@ class _Run:
         goal = self.study.goal
         if goal is None or self.part is not None:
             return False
-        found = opened(store.path)
+        found = open_study(store.path)
         known: Probability = probability(found.unstable, goal.confidence)
         have = len(found.unstable)
         wanted = min(missing_samples(known, goal.half_width), goal.most)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,6 +14,7 @@ from pydantic import Field, ValidationError
 from ..case import Case, load, loads
 from ..case.fields import Number, Positive, Table, Truth
 from ..case.messages import problems_of
+from ..case.overrides import override
 from ..errors import CaseError, Problem
 from ..reading import irregular
 
@@ -72,7 +73,7 @@ class Correlation(Table):
 class Keep(Table):
     """How much of a row is kept."""
 
-    modes: Few = Field(default=12, description="how many modes of a row are kept: unstable ones first, then the lowest")
+    modes: Few = Field(default=40, description="how many modes of a row are kept: unstable ones first, then the lowest")
     onsets: Few = Field(default=8, description="how many onsets of a row are kept, the lowest")
 
 
@@ -84,7 +85,7 @@ class Answers(Table):
         description='"full" (each sample a model of its own), "reduced" (one certified model for all) or "auto"',
     )
     bound: Positive = Field(default=1e-8, description="relative error of eigenvalues of the reduced model, > 0")
-    confirm: Share = Field(default=0.01, description="share of rows, at random, that are solved in full as well, 0 to 1")
+    confirm: Share = Field(default=0.01, description="share of rows, at random, solved in full as well, 0 to 1")
 
 
 class Goal(Table):
@@ -132,23 +133,27 @@ class Study(Table):
             raise CaseError.many(problems)
 
     @staticmethod
-    def load(path: str | PathLike[str]) -> Study:
-        """The study in a TOML file; its case is sought beside it. Raises CaseError."""
+    def load(path: str | PathLike[str], overrides: Sequence[str] = ()) -> Study:
+        """The study in a TOML file, with overrides such as "sampling.samples=100" applied; its case is sought beside
+        it. Raises CaseError."""
         source = os.fspath(path)
-        if reason := irregular(Path(path), LARGEST):
-            raise CaseError(source, None, reason)
         try:
+            if reason := irregular(Path(path), LARGEST):
+                raise CaseError(source, None, reason)
             text = Path(path).read_bytes().decode("utf-8-sig")
         except FileNotFoundError:
             raise CaseError(source, None, "no such file") from None
         except UnicodeDecodeError as error:
             raise CaseError(source, None, f"not UTF-8 text (byte {error.start}); save the file as UTF-8") from None
-        except OSError as error:
-            raise CaseError(source, None, f"cannot be read: {error.strerror or error}") from None
-        return Study.loads(text, folder=Path(path).resolve().parent, source=source)
+        except (OSError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            raise CaseError(source, None, f"cannot be read: {reason}") from None
+        return Study.loads(text, overrides, folder=Path(path).resolve().parent, source=source)
 
     @staticmethod
-    def loads(text: str, *, folder: Path | None = None, source: str = "<text>") -> Study:
+    def loads(
+        text: str, overrides: Sequence[str] = (), *, folder: Path | None = None, source: str = "<text>"
+    ) -> Study:
         """The study in a TOML text; its case is sought from ``folder``. Raises CaseError."""
         try:
             data = tomllib.loads(text)
@@ -158,6 +163,8 @@ class Study(Table):
             raise CaseError(source, None, 'empty; a study needs case = "…" and a table [parameters."PATH"]')
         if "bodies" in data:
             raise CaseError(source, None, 'is a case file, not a study; a study names it: case = "FILE.toml"')
+        if problems := override(data, overrides):
+            raise CaseError.many(problems)
         if isinstance(data.get("case"), str) and folder is not None:
             data["case"] = str(folder / data["case"])
         return Study(**data)

@@ -1,16 +1,17 @@
 """The store of a study: a Zarr group with a row for each sample, opened by xarray without stridor.
 
-Every chunk is written beside its place and renamed. Of a block of rows the results go first and ``status`` last, so that
-a row counts as computed only when all of it is there: a study that is killed at any moment goes on where it was. Each
-chunk carries a checksum.
+Every chunk is written beside its place and renamed. Of a block of rows the results go first and ``status`` last, so
+that a row counts as computed only when all of it is there: a study that is killed at any moment goes on where it was.
+Each chunk carries a checksum.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -106,10 +107,16 @@ class Store:
             return
         places = np.array(sorted(rows))
         ordered = sorted(self.variables, key=lambda v: v.name == "status")
-        try:
+        with self._disk_told():
             for chosen in _by_chunk(places, self._group["status"].chunks[0]):
                 for variable in ordered:
                     self._put(variable, chosen, rows)
+
+    @contextlib.contextmanager
+    def _disk_told(self) -> Generator[None]:
+        """Raises AnalysisError where something within cannot be written."""
+        try:
+            yield
         except OSError as error:
             raise AnalysisError(
                 f"cannot write {self.path}: {error.strerror or error}; rows that were written before are kept, and the "
@@ -145,18 +152,20 @@ class Store:
         if len(samples) <= have:
             return
         parameters = json.loads(self._group.attrs["parameters"])
-        # The longest first: a store that was cut off here has a `status` no longer than its parameters.
-        for name in sorted(self._group.array_keys(), key=lambda name: name == "status"):
-            array = self._group[name]
-            array.resize((len(samples), *array.shape[1:]))
-            if name in parameters:
-                array[have:] = samples[have:, list(parameters).index(name)]
-            elif name == "number":
-                array[have:] = np.arange(have, len(samples))
+        # The status last: a store that was cut off here has a `status` no longer than its parameters.
+        with self._disk_told():
+            for name in sorted(self._group.array_keys(), key=lambda name: name == "status"):
+                array = self._group[name]
+                array.resize((len(samples), *array.shape[1:]))
+                if name in parameters:
+                    array[have:] = samples[have:, list(parameters).index(name)]
+                elif name == "number":
+                    array[have:] = np.arange(have, len(samples))
 
     def note(self, **attributes: Any) -> None:
         """Keep what is to be known of the store as a whole."""
-        self._group.attrs.update({name: json.dumps(value) for name, value in attributes.items()})
+        with self._disk_told():
+            self._group.attrs.update({name: json.dumps(value) for name, value in attributes.items()})
 
     def told(self, name: str) -> Any:
         """What was kept by `note`, None where there is nothing."""

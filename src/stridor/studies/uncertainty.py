@@ -6,11 +6,13 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ..errors import AnalysisError
+from ..modal.tolerances import UNSTABLE_RELATIVE
 from ..typing import Array, BoolArray
 from .sampling import salib
 
@@ -19,8 +21,8 @@ RESAMPLES = 200  # of the intervals of Sobol indices
 
 @dataclass(frozen=True)
 class Probability:
-    """A share of samples with its interval (Wilson's): independent samples are in it ``confidence`` of the time; those of
-    a low-discrepancy sequence lie closer together, so that for them it is wide."""
+    """A share of samples with its interval (Wilson's), which of independent samples holds the truth ``confidence`` of
+    the time; shares of a low-discrepancy sequence lie closer to it, so that for them it is wide."""
 
     value: float
     low: float
@@ -105,7 +107,8 @@ class Indices:
 
 def sobol_indices(of: str, names: Sequence[str], values: Array, *, note: str = "") -> Indices:
     """Indices of a result (n,) over the samples of the method "saltelli", in their order (SALib; Saltelli et al.,
-    Comput. Phys. Commun. 181 (2010) 259–270). Raises AnalysisError for rows without a result and where nothing varies."""
+    Comput. Phys. Commun. 181 (2010) 259–270). Raises AnalysisError for rows without a result, and where nothing
+    varies."""
     if not np.all(np.isfinite(values)):
         missing = int(np.count_nonzero(~np.isfinite(values)))
         raise AnalysisError(f"{of}: {missing} of {len(values)} rows have no result; Sobol indices need every one")
@@ -115,20 +118,20 @@ def sobol_indices(of: str, names: Sequence[str], values: Array, *, note: str = "
     problem: Mapping[str, Any] = {"num_vars": len(names), "names": list(names), "bounds": [[0, 1]] * len(names)}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = analyse(
-            problem, np.asarray(values), calc_second_order=False, num_resamples=RESAMPLES, seed=1, print_to_console=False
-        )
+        found = analyse(problem, np.asarray(values), calc_second_order=False, num_resamples=RESAMPLES, seed=1)
     parts = (np.asarray(found[key], dtype=float) for key in ("S1", "ST", "S1_conf", "ST_conf"))
     return Indices(of, tuple(names), *parts, note=note)
 
 
+def grows(frequency: Array, growth: Array) -> BoolArray:
+    """Which modes, of frequencies [Hz] and growth rates [1/s], grow beyond rounding; none where there is NaN."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(growth > UNSTABLE_RELATIVE * np.hypot(2 * np.pi * frequency, growth))
+
+
 def in_bands(frequency: Array, growth: Array, edges: Sequence[float]) -> BoolArray:
     """Whether a mode grows in each band (n, b) of frequencies ``edges`` (b + 1,) [Hz]; frequency, growth (n, k)."""
-    growing = (growth > 0) & np.isfinite(frequency)
+    growing = grows(frequency, growth)
     return np.stack(
-        [np.any(growing & (frequency >= low) & (frequency < high), axis=1) for low, high in _pairs(edges)], axis=1
+        [np.any(growing & (frequency >= low) & (frequency < high), axis=1) for low, high in pairwise(edges)], axis=1
     )
-
-
-def _pairs(edges: Sequence[float]) -> list[tuple[float, float]]:
-    return list(zip(edges[:-1], edges[1:], strict=True))

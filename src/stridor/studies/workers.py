@@ -14,9 +14,9 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from typing import Any
 
 from ..errors import AnalysisError
@@ -29,10 +29,13 @@ PATIENCE = 5.0  # seconds that a worker has to end
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
+Answer = Callable[[Task, Batch], Iterator[tuple[int, Row]]]
+
+
 @dataclass
 class _Worker:
     process: Any
-    pipe: Connection
+    pipe: Any  # a Connection, or on Windows a PipeConnection
     batch: Batch | None = None
     done: dict[int, Row] = field(default_factory=dict[int, Row])
 
@@ -40,8 +43,8 @@ class _Worker:
 class LocalWorkers:
     """Processes that answer batches. Use as a context; they end with it, and with the process that has them."""
 
-    def __init__(self, task: Task, count: int) -> None:
-        self.task, self.count = task, count
+    def __init__(self, task: Task, count: int, answer: Answer = answered) -> None:
+        self.task, self.count, self.answer = task, count, answer
         self.lost = 0
         self._workers: list[_Worker] = []
         self._context = multiprocessing.get_context("spawn")
@@ -127,7 +130,8 @@ class LocalWorkers:
 
     def _started(self) -> _Worker:
         ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=_work, args=(theirs, self.task), daemon=True, name="stridor study")
+        given = theirs, self.task, self.answer
+        process = self._context.Process(target=_work, args=given, daemon=True, name="stridor study")
         with _one_thread_each():
             process.start()
         theirs.close()
@@ -151,7 +155,7 @@ def _one_thread_each() -> Generator[None]:
                 os.environ[name] = value
 
 
-def _work(pipe: Connection, task: Task) -> None:
+def _work(pipe: Any, task: Task, answer: Answer) -> None:
     """What a worker does until its pipe ends, as it does with the process that has it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that has the workers
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -161,7 +165,7 @@ def _work(pipe: Connection, task: Task) -> None:
             rows: dict[int, Row] = {}
             last = time.monotonic()
             try:
-                for place, row in answered(task, batch):
+                for place, row in answer(task, batch):
                     rows[place] = row
                     if time.monotonic() - last > EVERY:
                         pipe.send(("rows", rows))

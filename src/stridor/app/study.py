@@ -1,0 +1,199 @@
+"""`stridor study`: a case with many values of its numbers; `stridor plot`: the figures of its store."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import CaseError
+from ..interrupts import INTERRUPTED, heard
+from .arguments import Call, verb
+from .closing import Conclusion
+
+if TYPE_CHECKING:
+    from ..studies.parts import Part
+    from ..studies.result import StudyResult
+
+StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)]
+StoreFolder = Annotated[
+    Path, typer.Argument(metavar="STORE", help="Store of a study (study.zarr), or its folder.", show_default=False)
+]
+FAILED_ROWS = 3  # exit code, as of a list that is not complete
+
+
+@verb(StudyFile)
+def study(
+    call: Call,
+    workers: Annotated[
+        int | None, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes [default: all cores].")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler, tcp://host:port, in place of these."),
+    ] = None,
+    part: Annotated[
+        str | None, typer.Option("--part", metavar="K/N", help="Only the K-th of N parts, for arrays of jobs.")
+    ] = None,
+    merge: Annotated[bool, typer.Option("--merge", help="Put the parts together that --part wrote.")] = False,
+    go_on: Annotated[
+        bool, typer.Option("--go-on", help="Go on with a store that another version of stridor has begun.")
+    ] = False,
+) -> None:
+    """Many samples of one case: maps, probability of squeal, what decides it. Goes on where it was."""
+    from ..studies.parts import Part
+    from ..studies.schema import Study
+
+    given = [name for name, on in (("--part", part), ("--scheduler", scheduler), ("--workers", workers)) if on]
+    if merge and given:
+        raise CaseError("--merge", None, f"goes without {given[0]}")
+    if scheduler is not None and workers is not None:
+        raise CaseError("--workers", workers, "goes without --scheduler, which has workers of its own")
+    one = None if part is None else Part.read(part)
+    loaded = Study.load(call.path, call.set_ or [])
+    call.warn(loaded.base().warnings)
+    if merge:
+        result = _merged(call)
+    else:
+        if one is None:
+            call.claim()
+        result = _run(call, loaded, one, workers, scheduler, go_on=go_on)
+    _finish(call, result, draw=one is None and not result.interrupted)
+
+
+def _run(
+    call: Call, loaded: Any, part: Part | None, workers: int | None, scheduler: str | None, *, go_on: bool
+) -> StudyResult:
+    from ..studies.run import run_study
+    from .output import counting
+
+    with counting("study", quiet=call.quiet) as progress:
+        return run_study(
+            loaded, call.folder, workers=workers, scheduler=scheduler, part=part, go_on=go_on, progress=progress,
+            say=call.say,
+        )  # fmt: skip
+
+
+def _merged(call: Call) -> StudyResult:
+    from ..studies.merge import merged
+    from ..studies.result import open_study
+    from ..studies.run import NAME
+
+    call.claim()
+    call.warn(merged(call.folder, call.folder / NAME))
+    return open_study(call.folder / NAME)
+
+
+def _finish(call: Call, result: StudyResult, *, draw: bool) -> None:
+    """Write the table, the figures and the page; say what came out."""
+    from ..io.csv_files import write_csv
+
+    files = [result.path]
+    if draw:
+        files.append(write_csv(result, call.folder / "study.csv"))
+        files += _drawn(call, result)
+    for path in files:
+        call.say(f"written: {path}")
+    _show(call, result, files)
+    if result.interrupted:
+        heard()
+        call.say("interrupted; the same command goes on from there")
+        raise typer.Exit(INTERRUPTED)
+    if len(result.failed) or result.pending:
+        raise typer.Exit(FAILED_ROWS)
+
+
+def _drawn(call: Call, result: StudyResult) -> list[Path]:
+    """Figures and the page, beside the store."""
+    from ..io.atomic import replacing
+    from ..studies.page import write_page
+    from ..studies.plots import study_figures
+    from ..view.style import lay_out
+
+    drawn = study_figures(result)
+    files: list[Path] = []
+    for name, figure in drawn.items():
+        lay_out(figure)
+        path = call.folder / f"{name}.png"
+        with replacing(path) as temporary:
+            figure.savefig(temporary, dpi=150)
+        files.append(path)
+    files.append(write_page(result, drawn, call.folder / "study.html"))
+    return files
+
+
+def _show(call: Call, result: StudyResult, files: list[Path]) -> None:
+    from ..studies.summary import answer, failures, tables
+    from .output import stdout
+    from .tables import table
+
+    if call.json:
+        call.document(document(result) | {"files": [str(f) for f in files]})
+        return
+    for title, heads, rows in tables(result):
+        if rows:
+            table(title, list(heads), [list(row) for row in rows], drop=["samples", "5 %", "95 %"], kept_in="study.csv")
+        else:
+            stdout.print(title)
+    for text, number in failures(result):
+        stdout.print(f"failed, {number} of {len(result.status)} rows: {text}")
+    for note in result.notes:
+        stdout.print(note)
+    call.conclude(Conclusion(answer(result)))
+
+
+def document(result: StudyResult) -> dict[str, Any]:
+    """The document of --json."""
+    from ..errors import AnalysisError
+    from ..studies.summary import answer, failures
+
+    found: dict[str, Any] = {
+        "store": str(result.path),
+        "compute": result.compute,
+        "sampling": result.method,
+        "parameters": list(result.parameters),
+        "rows": len(result.status),
+        "computed": int(result.done.sum()),
+        "failed": len(result.failed),
+        "pending": result.pending,
+        "interrupted": result.interrupted,
+        "answer": answer(result),
+        "notes": list(result.notes),
+        "errors": [{"error": text, "rows": int(number)} for text, number in failures(result)],
+        "probability": None,
+        "bands": [],
+        "sobol": None,
+    }
+    if result.compute in ("modes", "onsets") and result.method not in ("grid", "saltelli"):
+        found["probability"] = result.probability().to_json()
+        if result.compute == "modes" and result.done.any():
+            bands = result.probability_in_bands()
+            found["bands"] = [{"low_hz": low, "high_hz": high, **p.to_json()} for low, high, p in bands]
+    if result.method == "saltelli":
+        try:
+            found["sobol"] = result.indices().to_json()
+        except AnalysisError as error:
+            found["sobol"] = {"error": str(error)}
+    return found
+
+
+@verb(StoreFolder)
+def plot(call: Call) -> None:
+    """The figures of a study again, from its store alone."""
+    from ..studies.result import open_study
+
+    result = open_study(call.path)
+    call.claim()
+    files = _drawn(call, result)
+    for path in files:
+        call.say(f"written: {path}")
+    if call.json:
+        call.document({"files": [str(f) for f in files]})
+    else:
+        from ..studies.summary import answer
+
+        call.conclude(Conclusion(answer(result)))
+
+
+VERBS = {"study": study, "plot": plot}

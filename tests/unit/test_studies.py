@@ -1,0 +1,382 @@
+"""Studies end to end: the same rows whoever computes them, nothing lost and nothing done twice whoever is killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import stridor as st
+from program import stridor
+from stridor.case import template_text
+from stridor.studies import reduced_rows
+from stridor.studies.parts import Part
+from stridor.studies.rows import Row, full_row
+from stridor.studies.schema import Keep
+from stridor.studies.task import Batch, Task
+from stridor.studies.workers import LocalWorkers
+
+FEW = ["bodies.beam1.elements=3", "bodies.beam2.elements=6", "modal.max_frequency_hz=3e3"]
+MASS = "bodies.beam1.damping.mass"
+GRID = {"mu": {"range": (0.0, 0.6), "points": 5}, MASS: {"values": (1.0, 20.0)}}
+EXACT = ["frequency_hz", "growth_rate", "branch", "unstable_modes", "status", "number", "mu", MASS]
+
+
+@pytest.fixture(scope="module")
+def case() -> st.Case:
+    return st.loads(template_text("two-beams"), FEW)
+
+
+@pytest.fixture(scope="module")
+def grid(case: st.Case) -> st.Study:
+    return st.Study(case=case, parameters=GRID, answers={"source": "full"})
+
+
+@pytest.fixture(scope="module")
+def whole(grid: st.Study, tmp_path_factory: pytest.TempPathFactory) -> st.studies.result.StudyResult:  # type: ignore[name-defined]
+    return st.run_study(grid, tmp_path_factory.mktemp("whole"), workers=2)
+
+
+def same(one: xr.Dataset, other: xr.Dataset) -> bool:
+    return all(np.array_equal(one[n].values, other[n].values, equal_nan=one[n].dtype.kind == "f") for n in EXACT)
+
+
+def test_rows_are_what_modes_says(case: st.Case, whole) -> None:
+    assert whole.done.all()
+    for k in (0, 3, 9):
+        mu, mass = float(whole.data["mu"][k]), float(whole.data[MASS][k])
+        modes = st.modes(case.with_({MASS: mass}), mu, max_frequency_hz=3e3)
+        row = whole.data.isel(row=k)
+        held = np.isfinite(row["frequency_hz"].values)
+        assert row["frequency_hz"].values[held] == pytest.approx(np.sort(modes.frequency_hz[0]), rel=1e-12)
+        assert int(row["unstable_modes"]) == int(modes.unstable.sum())
+
+
+def test_xarray_opens_a_store_without_stridor(whole) -> None:
+    code = (
+        "import sys, warnings; warnings.simplefilter('error')\n"
+        f"import xarray as xr; d = xr.open_zarr({str(whole.path)!r}, consolidated=False)\n"
+        "print(d.sizes['row'], d['growth_rate'].attrs['units'], sorted(d.coords), float(d['mu'].max()), 'stridor' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert done.stdout == f"10 1/s ['{MASS}', 'mu', 'number'] 0.6 False\n"
+
+
+def test_parts_put_together_are_the_whole(grid: st.Study, whole, tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text("", encoding="utf-8")
+    for number in (1, 3):
+        st.run_study(grid, tmp_path, workers=1, part=Part(number, 3))
+    from stridor.studies.merge import merged
+
+    told = merged(tmp_path, tmp_path / "study.zarr")
+    assert told == ["parts missing: 2 of 3; their rows are not computed"]
+    assert st.open_study(tmp_path).pending == 3
+    st.run_study(grid, tmp_path, workers=1, part=Part(2, 3))
+    assert merged(tmp_path, tmp_path / "study.zarr") == []
+    assert same(st.open_study(tmp_path).data, whole.data)
+    # Nothing is left to do for the study itself.
+    again = st.run_study(grid, tmp_path, workers=1, progress=lambda *_: pytest.fail("something was computed"))
+    assert again.done.all()
+
+
+def test_rows_that_fail_say_why_and_stop_no_others(case: st.Case, tmp_path: Path) -> None:
+    study = st.Study(case=case, parameters={"materials.steel.poisson_ratio": {"values": (0.2, 0.3, 0.7)}})
+    found = st.run_study(study, tmp_path, workers=1)
+    assert found.status.tolist() == [1, 1, 2]
+    assert "materials.steel.poisson_ratio" in str(found.data["error"].values[2])
+    assert any(note.startswith("1 row failed, the first:") for note in found.notes)
+
+
+def test_parameters_without_effect_are_told(case: st.Case, tmp_path: Path) -> None:
+    parameters = {"materials.steel.poisson_ratio": {"values": (0.2, 0.3)}, "mu": {"values": (0.1,)}, "temporal.perturbation": {"values": (1e-9, 1e-8)}}
+    lines: list[str] = []
+    st.run_study(st.Study(case=case, parameters=parameters), tmp_path, workers=1, say=lines.append)
+    told = [line for line in lines if line.startswith("warning:")]
+    assert told == [
+        "warning: materials.steel.poisson_ratio has no effect on modes: it changes nothing of the model",
+        "warning: mu has the one value 0.1 in all samples",
+        "warning: temporal.perturbation has no effect on modes: it changes nothing of the model",
+    ]
+
+
+# -- who is killed -----------------------------------------------------------------------------------------------------
+RUN = """
+import sys, stridor as st
+from stridor.studies.schema import Study
+if __name__ == "__main__":
+    st.run_study(Study.load(sys.argv[1]), sys.argv[2], workers=2)
+"""
+KILLED = f"""
+case = "case.toml"
+answers.source = "full"
+parameters.mu = {{ range = [0.0, 0.6], points = 40 }}
+parameters."{MASS}".values = [1.0, 20.0]
+"""
+
+
+def _survives(case: st.Case, folder: Path, moments: Iterator[float]) -> None:
+    """Kill a study again and again: rows that were done stay, to the bit and to their time, and are not done twice."""
+    (folder / "case.toml").write_text(case.text, encoding="utf-8")
+    (folder / "study.toml").write_text(KILLED, encoding="utf-8")
+    before: xr.Dataset | None = None
+    for wait in moments:
+        words = [sys.executable, "-c", RUN, "study.toml", "out"]
+        with subprocess.Popen(words, cwd=folder, stderr=subprocess.DEVNULL) as process:
+            until = time.monotonic() + 60
+            while before is None and not (folder / "out/study.zarr/status/c").exists() and time.monotonic() < until:
+                time.sleep(0.05)
+            time.sleep(wait)
+            process.kill()
+        if not (folder / "out" / "study.zarr").exists():
+            continue
+        now = st.open_study(folder / "out").data
+        if before is not None:
+            done = before["status"].values == 1
+            for name in ("growth_rate", "seconds", "frequency_hz"):
+                assert np.array_equal(before[name].values[done], now[name].values[done], equal_nan=True)
+            assert np.all(now["status"].values[done] == 1)
+        before = now
+    assert before is not None
+    study = st.Study.load(folder / "study.toml")
+    last = st.run_study(study, folder / "out", workers=2)
+    done = before["status"].values == 1
+    assert np.array_equal(before["seconds"].values[done], last.data["seconds"].values[done])
+    assert same(last.data, st.run_study(study, folder / "other", workers=2).data)
+    assert not list((folder / "out").rglob("*.partial"))
+
+
+def test_a_study_that_is_killed_goes_on(case: st.Case, tmp_path: Path) -> None:
+    _survives(case, tmp_path, iter((0.3, 2.2, 4.0)))
+
+
+@pytest.mark.slow
+def test_a_study_that_is_killed_thirty_times_goes_on(case: st.Case, tmp_path: Path) -> None:
+    rng = np.random.default_rng(int(time.time()))
+    _survives(case, tmp_path, iter(rng.uniform(0.0, 5.0, 32).tolist()))
+
+
+def _deadly(task: Task, batch: Batch) -> Iterator[tuple[int, Row]]:
+    """Row 3 kills whoever computes it; row 5 only the first time."""
+    for place in batch.places:
+        mark = Path(task.model) / f"{place}"
+        if place == 3 or (place == 5 and not mark.exists()):
+            mark.write_text("", encoding="utf-8")
+            os.kill(os.getpid(), signal.SIGKILL)
+        yield place, {"status": 1, "seconds": 0.1}
+
+
+def test_a_row_that_kills_its_workers_fails_and_others_do_not(tmp_path: Path) -> None:
+    batches = [Batch(tuple(range(k, k + 4)), ((0.0,),) * 4, (False,) * 4) for k in (0, 4, 8)]
+    rows: dict[int, Row] = {}
+    with LocalWorkers(Task("", "modes", ("mu",), Keep(), str(tmp_path)), 2, _deadly) as workers:
+        for found in workers.answers(iter(batches)):
+            assert not rows.keys() & found.keys()
+            rows |= found
+    assert sorted(rows) == list(range(12))
+    assert [k for k, row in sorted(rows.items()) if row["status"] != 1] == [3]
+    assert rows[3]["error"] == "the worker process died 3 times at this row: out of memory, or killed"
+    assert workers.lost == 4
+
+
+def test_workers_end_with_the_process_that_has_them(case: st.Case, tmp_path: Path) -> None:
+    (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
+    (tmp_path / "study.toml").write_text(KILLED.replace("points = 40", "points = 4000"), encoding="utf-8")
+    words = [sys.executable, "-c", RUN, "study.toml", "out"]
+    with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.DEVNULL) as process:
+        until = time.monotonic() + 60
+        while not (children := _children(process.pid)) and time.monotonic() < until:
+            time.sleep(0.1)
+        time.sleep(1.5)
+        children |= _children(process.pid)
+        process.kill()
+    assert children
+    until = time.monotonic() + 20
+    while any(map(_runs, children)) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not any(map(_runs, children))
+
+
+def _children(number: int) -> set[int]:
+    found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(number)], capture_output=True, text=True, check=False)
+    return {int(word) for word in found.stdout.split()}
+
+
+def _runs(number: int) -> bool:
+    try:
+        return Path(f"/proc/{number}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_a_full_disk_loses_nothing_that_was_written(case: st.Case, tmp_path: Path) -> None:
+    """Files may have no more than so many bytes, which the chunk of growth rates passes as rows are added."""
+    (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
+    (tmp_path / "study.toml").write_text(KILLED, encoding="utf-8")
+    limited = (
+        "import resource, stridor as st\n"
+        "if __name__ == '__main__':\n"
+        "    from stridor.studies.store import Store\n"
+        "    made = Store.made\n"
+        "    def then_full(*a, **k):\n"
+        "        found = made(*a, **k)\n"
+        "        resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000))\n"
+        "        return found\n"
+        "    Store.made = staticmethod(then_full)\n"
+        "    try:\n"
+        "        st.run_study('study.toml', 'out', workers=1)\n"
+        "    except st.AnalysisError as error:\n"
+        "        print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", limited], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "cannot write" in done.stdout, done.stderr
+    assert "the same command goes on from there" in done.stdout
+    kept = st.open_study(tmp_path / "out")
+    assert kept.pending > 0
+    last = st.run_study(tmp_path / "study.toml", tmp_path / "out", workers=2)
+    assert last.done.all()
+    assert np.array_equal(kept.data["seconds"].values[kept.done], last.data["seconds"].values[kept.done])
+
+
+def test_ctrl_c_keeps_what_is_done(case: st.Case, tmp_path: Path) -> None:
+    (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
+    (tmp_path / "study.toml").write_text(KILLED, encoding="utf-8")
+    words = [sys.executable, "-m", "stridor", "study", "study.toml"]
+    with subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        until = time.monotonic() + 60
+        while not (tmp_path / "study.out/study.zarr/status/c").exists() and time.monotonic() < until:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, (out, err)
+    assert "interrupted; the same command goes on from there" in err
+    assert "Traceback" not in err
+    assert 0 < int(st.open_study(tmp_path / "study.out").done.sum()) < 80
+
+
+# -- the reduced model -------------------------------------------------------------------------------------------------
+SCATTER = {"mu": {"range": (0.0, 0.6)}, MASS: {"range": (1.0, 20.0)}, "materials.steel.density": {"range": (7700.0, 7900.0)}}
+
+
+@pytest.fixture(scope="module")
+def scatter(case: st.Case, tmp_path_factory: pytest.TempPathFactory):
+    study = st.Study(case=case, parameters=SCATTER, sampling={"method": "sobol", "samples": 128}, answers={"confirm": 0.1})
+    return st.run_study(study, tmp_path_factory.mktemp("scatter"), workers=2)
+
+
+def test_reduced_rows_are_those_of_the_full_problem(case: st.Case, scatter) -> None:
+    data = scatter.data
+    assert set(data["source"].values) == {"reduced", "full"}
+    assert np.count_nonzero(data["confirmed"].values == 1) >= 5
+    assert not np.any(data["confirmed"].values == 2)
+    for k in np.flatnonzero(data["source"].values == "reduced")[:6].tolist():
+        values = {name: float(data[name][k]) for name in scatter.parameters}
+        full = full_row(case, "modes", values, Keep())
+        held = np.isfinite(data["frequency_hz"].values[k])
+        here = data["growth_rate"].values[k, held] + 2j * np.pi * data["frequency_hz"].values[k, held]
+        there = full["growth_rate"] + 2j * np.pi * full["frequency_hz"]
+        allowed = max(10 * float(data["estimated_error"][k]), 1e-11)
+        assert np.abs(here - there).max() <= allowed * np.abs(there).max()
+        assert int(data["unstable_modes"][k]) == full["unstable_modes"]
+
+
+def test_rows_near_the_boundary_are_solved_in_full() -> None:
+    case = st.loads(template_text("two-beams"), ["modal.max_frequency_hz=12e3", f"{MASS}=10.0"])
+    first = st.onsets(case, (0.0, 1.0)).first
+    assert first is not None
+    study = st.Study(case=case, parameters=SCATTER, sampling={"method": "sobol", "samples": 64})
+    model = reduced_rows.Reduced(
+        st.reduced_model(case, {"mu": (0.0, 1.0), MASS: (1.0, 20.0)}), "modes", {"mu": "mu", MASS: MASS}
+    )
+    at = {"mu": first.mu, MASS: 10.0}
+    for mu, near in ((first.mu * (1 + 1e-9), True), (first.mu * (1 - 1e-9), True), (first.mu * 0.9, False)):
+        row = model.row(at | {"mu": mu}, study.keep)
+        assert row is not None
+        assert model.doubtful(row) is near
+
+
+def test_a_model_that_is_wrong_is_found_out(case: st.Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = reduced_rows.Reduced.row
+    scale = 1 + 1e-6
+
+    def shifted(self, values, keep):
+        row = real(self, values, keep)
+        return row if row is None else row | {"frequency_hz": row["frequency_hz"] * scale}
+
+    monkeypatch.setattr(reduced_rows.Reduced, "row", shifted)
+    lines: list[str] = []
+    study = st.Study(case=case, parameters=SCATTER, sampling={"method": "sobol", "samples": 64})
+    st.run_study(study, tmp_path, workers=1, say=lines.append)
+    assert any("differ by 1.0e-06 at a sample" in line for line in lines)
+    assert set(st.open_study(tmp_path).data["source"].values) == {"full"}
+
+
+def test_a_goal_adds_samples_until_the_interval_is_narrow(case: st.Case, tmp_path: Path) -> None:
+    study = st.Study(
+        case=case, parameters=SCATTER, sampling={"method": "sobol", "samples": 32}, goal={"half_width": 0.05, "most": 2000}
+    )
+    found = st.run_study(study, tmp_path, workers=2)
+    known = found.probability()
+    assert 32 < known.of <= 2000
+    assert known.half_width <= 0.05
+    assert found.pending == 0
+
+
+# -- the program -------------------------------------------------------------------------------------------------------
+def test_the_program_prints_the_answer_and_draws(tmp_path: Path) -> None:
+    case = st.loads(template_text("two-beams"), ["modal.max_frequency_hz=12e3"])
+    (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
+    text = 'title = "A <b> study"\ncase = "case.toml"\nsampling = { method = "sobol", samples = 64 }\n'
+    text += f'parameters.mu.range = [0.0, 0.6]\nparameters."{MASS}".range = [1.0, 20.0]\n'
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    done = stridor("study", "study.toml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[-2].startswith("a mode grows with a probability of ") or lines[-1].startswith("a mode grows")
+    assert max(map(len, lines)) <= 80
+    folder = tmp_path / "study.out"
+    drawn = {path.name for path in folder.glob("*.png")}
+    assert {"stability-map.png", "root-locus.png", "over-mu.png", "bands.png"} <= drawn
+    page = (folder / "study.html").read_text(encoding="utf-8")
+    assert "A &lt;b&gt; study" in page
+    assert page.count("<img ") == len(drawn)
+    heads = (folder / "study.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
+    assert heads[:3] == ["number", "mu", MASS]
+    for path in folder.glob("*.png"):
+        path.unlink()
+    (tmp_path / "case.toml").unlink()  # the store is enough
+    assert stridor("plot", "study.out", cwd=tmp_path).returncode == 0
+    assert {path.name for path in (tmp_path / "study.out.out").glob("*.png")} | {
+        path.name for path in folder.glob("*.png")
+    } >= drawn
+
+
+def test_the_document_holds_no_more_than_plain_values(case: st.Case, tmp_path: Path) -> None:
+    (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
+    text = 'case = "case.toml"\ncompute = "onsets"\nsampling = { method = "saltelli", samples = 4 }\nset = { "modal.friction_range" = [0.0, 2.0] }\n'
+    text += f'parameters."{MASS}".range = [1.0, 20.0]\nparameters."bodies.beam2.damping.mass".range = [1.0, 20.0]\n'
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    done = stridor("study", "study.toml", "--json", "--quiet", "--workers", "2", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert (told["rows"], told["computed"], told["failed"]) == (16, 16, 0)
+    assert [item["parameter"] for item in told["sobol"]["indices"]] == [MASS, "bodies.beam2.damping.mass"]
+
+
+@pytest.mark.parametrize("compute", ["steady", "simulate", "compare"])
+def test_other_analyses_have_rows_too(case: st.Case, tmp_path: Path, compute: str) -> None:
+    short = case.with_({"phases": [{"name": "go", "duration": 2e-4}], "comparison.critical": False, "temporal.record_every": 1})
+    study = st.Study(case=short, compute=compute, parameters={"mu": {"values": (0.1, 0.3)}})
+    found = st.run_study(study, tmp_path, workers=2)
+    assert found.done.all(), found.data["error"].values
+    column = {"steady": "normal_force", "simulate": "steps", "compare": "modal_frequency_hz"}[compute]
+    assert np.all(found.data[column].values > 0)
