@@ -47,17 +47,17 @@ class ClusterWorkers:
         threads = sum(self._client.nthreads().values())
         if not threads:
             raise AnalysisError(f"the scheduler {self.address} has no workers: start some (dask worker {self.address})")
-        try:
-            found = self._client.run(program)
-        except Exception as error:
-            raise AnalysisError(
-                f"a worker of {self.address} cannot import stridor ({_first_line(error)}); install this version "
-                f"({program()}) on all"
-            ) from None
-        for worker, other in found.items():
-            if other != program():
+        own = program()
+        for worker, other in self._client.run(_program, on_error="return").items():
+            if isinstance(other, OSError):
+                continue  # it has just died; whoever comes in its place is asked with its first batch
+            if isinstance(other, BaseException):
                 raise AnalysisError(
-                    f"worker {worker} has another stridor ({other}) than this study ({program()}); install the same "
+                    f"worker {worker} cannot import stridor ({_first_line(other)}); install this version ({own}) on all"
+                )
+            if other != own:
+                raise AnalysisError(
+                    f"worker {worker} has another stridor ({other}) than this study ({own}); install the same "
                     "on all"
                 )
         return threads
@@ -110,6 +110,11 @@ class ClusterWorkers:
                 return died(batch)
             again.extend(batch.alone())
             return {}
+
+
+def _program() -> str:
+    """That of a worker."""
+    return program()
 
 
 def _answered(task: Task, batch: Batch) -> dict[int, Row]:

@@ -1,0 +1,74 @@
+"""A study on a Dask cluster of this computer: a scheduler and two workers in processes of their own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stridor as st
+from stridor.case import template_text
+
+pytest.importorskip("distributed", reason="the extra cluster is not installed")
+FEW = ["bodies.beam1.elements=3", "bodies.beam2.elements=6", "modal.max_frequency_hz=3e3"]
+MASS = "bodies.beam1.damping.mass"
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Address and workers."""
+    file = tmp_path / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path, "start_new_session": True}
+    dask = Path(sys.executable).with_name("dask")
+    running = [subprocess.Popen([dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file], **quiet)]  # type: ignore[call-overload]
+    workers = [
+        subprocess.Popen([dask, "worker", "--scheduler-file", file, "--nthreads", "1", "--no-dashboard"], **quiet)  # type: ignore[call-overload]
+        for _ in range(2)
+    ]
+    from distributed import Client
+
+    try:
+        until = time.monotonic() + 60
+        while not file.exists() and time.monotonic() < until:
+            time.sleep(0.1)
+        with Client(scheduler_file=str(file), set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=60)
+            address = client.scheduler.address
+        yield address, workers
+    finally:
+        for process in (*workers, *running):
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def test_rows_are_those_of_local_workers_and_a_lost_worker_loses_none(scheduler, tmp_path: Path) -> None:
+    address, workers = scheduler
+    case = st.loads(template_text("two-beams"), FEW)
+    parameters = {"mu": {"range": (0.0, 0.6), "points": 30}, MASS: {"values": (1.0, 5.0, 20.0)}}
+    study = st.Study(case=case, parameters=parameters, answers={"source": "full"})
+    killer = threading.Timer(3.0, lambda: os.killpg(workers[0].pid, signal.SIGKILL))
+    killer.start()
+    found = st.run_study(study, tmp_path / "cluster", scheduler=address)
+    killer.join()
+    here = st.run_study(study, tmp_path / "local", workers=2)
+    assert found.done.all()
+    for name in ("growth_rate", "frequency_hz", "unstable_modes"):
+        assert np.array_equal(found.data[name].values, here.data[name].values, equal_nan=True)
+
+
+def test_workers_with_another_stridor_are_refused(scheduler, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from stridor.studies import cluster, task
+
+    monkeypatch.setattr(cluster, "program", lambda: "9.9.9 of-the-future")
+    case = st.loads(template_text("two-beams"), FEW)
+    study = st.Study(case=case, parameters={"mu": {"values": (0.1,)}}, answers={"source": "full"})
+    with pytest.raises(st.AnalysisError, match=rf"has another stridor \({task.program()}\) than this study \(9\.9\.9 of-the-future\)"):
+        st.run_study(study, tmp_path / "refused", scheduler=scheduler[0])
