@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from .study.copies import perturbed_copies
     from .study.countermeasures import rank_countermeasures
     from .study.damping_map import damping_map
+    from .study.ensemble import ensemble
     from .study.pencil import pencil
     from .study.reduced import reduced_model
     from .study.sensitivities import sensitivities
@@ -60,6 +61,7 @@ _HOMES = {
     "compare": ".study.analyses",
     "damping_map": ".study.damping_map",
     "describe": ".study.analyses",
+    "ensemble": ".study.ensemble",
     "export": ".io.export",
     "friction_curve": ".study.analyses",
     "load": ".case",
@@ -100,6 +102,7 @@ __all__ = [
     "compare",
     "damping_map",
     "describe",
+    "ensemble",
     "export",
     "friction_curve",
     "load",

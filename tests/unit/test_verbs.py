@@ -16,7 +16,7 @@ from stridor.notebook import MOST_LETTERS
 
 COARSE = {
     "bodies.beam1.elements": 3, "bodies.beam2.elements": 6, "modal.max_frequency_hz": 12e3,
-    "phases": [{"name": "go", "duration": 2e-5}], "temporal.record_every": 1, "temporal.step": None,
+    "phases": [{"name": "go", "duration": 3e-4}], "temporal.record_every": 1, "temporal.step": None,
     "comparison": {"mu": [0.3], "critical": False},
 }  # fmt: skip
 MASS = ("bodies.beam1.damping.mass", "bodies.beam2.damping.mass")
@@ -29,6 +29,7 @@ VERBS: dict[str, Callable[[Any, Path], object]] = {
         p, *MASS, x_range=(1, 20), y_range=(1, 20), grid=(2, 2), mu_range=(0, 0.2)
     ),
     "describe": lambda p, _: st.describe(p),
+    "ensemble": lambda p, _: st.ensemble(p, mu=[0.1, 0.3]),
     "export": lambda p, out: st.export(p, out),
     "friction_curve": lambda p, _: st.friction_curve(p, [5000.0, 6000.0]),
     "modes": lambda p, _: st.modes(p, 0.1),

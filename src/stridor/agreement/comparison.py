@@ -24,7 +24,7 @@ from ..temporal.signals import Components, Growth, growth, low_passed, spectrum
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..threads import one_thread
-from ..typing import IntArray
+from ..typing import Array, IntArray
 from .critical import compare_critical
 from .kept import Plain, Store, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
 from .perturbation import modes_as_in_time, perturb
@@ -354,11 +354,19 @@ def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float |
         signal = run.slip_speed[part, 0]
     else:
         return None, None
-    filtered = low_passed(signal, run.sampling, max_frequency_hz)
-    spec = spectrum(filtered[len(filtered) // 2 :], run.sampling)
+    return dominant_line(signal, run.sampling, max_frequency_hz)
+
+
+def dominant_line(
+    signal: Array, sampling: float, max_frequency_hz: float, share: float = 0.5
+) -> tuple[float | None, Growth | None]:
+    """Frequency [Hz] of the largest line in the last share of a signal (k,) sampled every ``sampling`` [s], and the
+    growth of that line over all of it, as `dominant_response` has them; None for what there is not."""
+    filtered = low_passed(signal, sampling, max_frequency_hz)
+    spec = spectrum(filtered[int(len(filtered) * (1.0 - share)) :], sampling)
     frequency, amplitude = spec.peak(above_hz=2 * spec.bandwidth_hz)
     if amplitude == 0.0:
         return None, None
-    fitted = growth(filtered, run.sampling, frequency)
+    fitted = growth(filtered, sampling, frequency)
     # A rate from part of a period is the start of the motion, not its growth.
     return frequency, fitted if (fitted.end - fitted.start) * frequency >= LEAST_PERIODS else None

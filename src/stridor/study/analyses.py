@@ -276,7 +276,7 @@ def simulate(
         marks["fingerprint"] = fingerprint(work.given, mu)
     system, phases, settings = work.structured("simulate", mu), phases_of(work), settings_of(work)
     require_pressed_in_time(work, system, "simulate")
-    _check_extent(work, system)
+    check_extent(work, system)
 
     def told(run: Trajectory) -> Trajectory:
         made = provenance(work, "simulate", time.perf_counter() - started, mu=mu)
@@ -307,7 +307,7 @@ def same_records(settings: Settings, restart: Trajectory) -> bool:
     return settings.record_every == restart.record_every and settings.watch == restart.watch_names
 
 
-def _check_extent(work: Workspace, system: System) -> None:
+def check_extent(work: Workspace, system: System) -> None:
     """Refuse runs that start inside one another or that no memory holds."""
     problems = [
         Wrong(

@@ -311,6 +311,34 @@ def contact_stage(
 
 
 @njit(cache=True, inline="always")
+def _count(c: int, later: float, state: LoopState) -> None:  # pragma: no cover - compiled
+    """Statistics of one contact; later: its slip speed [m/s] over the step."""
+    row = state.statistics[c]
+    status = state.status[c]
+    if status == _STICK:
+        row[STICK_STEPS] += 1.0
+        if row[FIRST_STICK] < 0.0:
+            row[FIRST_STICK] = state.counters[0]
+    elif status == _SLIP:
+        row[SLIP_STEPS] += 1.0
+        row[MAX_SPEED] = max(row[MAX_SPEED], abs(later))
+    else:
+        row[OPEN_STEPS] += 1.0
+        if row[FIRST_OPEN] < 0.0:
+            row[FIRST_OPEN] = state.counters[0]
+    row[MAX_NORMAL] = max(row[MAX_NORMAL], abs(state.normal[c]))
+    row[MAX_TANGENTIAL] = max(row[MAX_TANGENTIAL], abs(state.tangential[c]))
+
+
+@njit(cache=True, inline="always")
+def count_contacts(contacts: ContactArrays, state: LoopState, scratch: Scratch) -> None:
+    # pragma: no cover - compiled
+    """The statistics of `accumulate` alone, of contacts that slide little."""
+    for c in range(contacts.kind.shape[0]):
+        _count(c, scratch.moved[contacts.base[c] + 1], state)
+
+
+@njit(cache=True, inline="always")
 def accumulate(
     k: int,
     contacts: ContactArrays,
@@ -340,21 +368,7 @@ def accumulate(
             now += w * (state.rate[base + a] + two_b * scratch.moved[base + a]) / s
             later += w * scratch.moved[base + a]
         friction += state.tangential[c] * now
-        row = state.statistics[c]
-        status = state.status[c]
-        if status == _STICK:
-            row[STICK_STEPS] += 1.0
-            if row[FIRST_STICK] < 0.0:
-                row[FIRST_STICK] = state.counters[0]
-        elif status == _SLIP:
-            row[SLIP_STEPS] += 1.0
-            row[MAX_SPEED] = max(row[MAX_SPEED], abs(later))
-        else:
-            row[OPEN_STEPS] += 1.0
-            if row[FIRST_OPEN] < 0.0:
-                row[FIRST_OPEN] = state.counters[0]
-        row[MAX_NORMAL] = max(row[MAX_NORMAL], abs(state.normal[c]))
-        row[MAX_TANGENTIAL] = max(row[MAX_TANGENTIAL], abs(state.tangential[c]))
+        _count(c, later, state)
     works[FRICTION] -= friction * dt
     works[NORMAL] -= (total - friction) * dt
     for j in range(loads):

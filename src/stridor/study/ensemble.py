@@ -1,0 +1,254 @@
+"""Temporal ensembles: one case over friction, loads, speeds and starts, and which unstable mode responds where."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import CaseError
+from ..sliding import full_motion
+from ..system import System
+from ..temporal.ensembles import Outcome, march_all
+from ..temporal.legs import Member
+from ..temporal.settings import Settings, choose_step
+from ..temporal.simulate import Progress
+from ..temporal.simulate import plan as step_limits
+from ..temporal.trajectory import Trajectory
+from ..typing import Array, IntArray
+from .analyses import check_extent
+from .ensemble_modes import Found, unstable_modes
+from .ensemble_numbers import LEAST_RECORDS, Numbers, Observable, last_phase, numbers_of, observable_of
+from .ensemble_result import AXES, Ensemble
+from .pressed import require_pressed_in_time
+from .provenance import provenance
+from .settings import phases_of, settings_of
+from .workspace import Problem, Workspace
+
+Values = float | Sequence[float] | Array | None
+Sweep = Literal["up", "down", "both"]
+
+
+def ensemble(
+    problem: Problem,
+    *,
+    mu: Values = None,
+    load: Values = None,
+    speed: Values = None,
+    perturbation: Values = None,
+    initial: Literal["rest", "steady-sliding"] | None = None,
+    grid: bool = True,
+    sweep: Sweep | None = None,
+    along: Literal["mu", "load", "speed"] = "mu",
+    observable: str | None = None,
+    window: float = 0.5,
+    modes: bool = True,
+    records: bool = False,
+    cores: int | None = None,
+    separately: bool = False,
+    progress: Progress | None = None,
+) -> Ensemble:
+    """Runs in time of one case, side by side: every combination of the values given, or with ``grid`` False the first
+    of each, the second of each and so on.
+
+    mu scales every contact's friction law at the case's own speed; load and speed are factors on all loads and on all
+    prescribed velocities (None: 1); perturbation [m/s] of the slip speed at the start, where runs begin in steady
+    sliding (initial; None: as [temporal] says). sweep: members that differ in the number ``along`` follow one another,
+    each from where the one before ended, for the duration of the last phase, with rising values ("up"), falling ones
+    ("down") or both; loads and speeds change by a ramp over its first tenth, friction at once. observable: what
+    amplitudes are of ("beam1.tip.velocity", "A.normal_force"; default the velocity of the first watched point); window:
+    the share of the last phase that is looked at. modes False leaves out the modal map. records keeps the members' runs
+    from the start of the last phase on. cores: threads (None: all). separately: one run after the other in any case.
+
+    Members go side by side on the modal path with contacts that slide little; others take separate runs, and a note
+    says so. A member that fails is a row with its error. progress is called with steps done and planned of all. Ctrl-C
+    returns what is finished. Raises CaseError for values that are none, and what `simulate` raises for all members.
+    """
+    started = time.perf_counter()
+    work = Workspace.of(problem)
+    values = _values(work, mu, load, speed, perturbation, initial)
+    plan = _Plan.of(values, grid=grid, sweep=sweep, along=along)
+    system = work.structured("simulate")
+    require_pressed_in_time(work, system, "ensemble")
+    check_extent(work, system)
+    settings = settings_of(work)
+    if initial is not None:
+        settings = replace(settings, initial=initial)
+    if speed is not None and not np.any(system.motion.full):
+        raise CaseError("speed", None, "no support of the case moves with a prescribed velocity, so none can be scaled")
+    _check_window(work, system, settings, window)
+    looked_at = observable_of(observable, system, settings)
+    watch = settings.watch if records else (looked_at.owner,) if looked_at.of_point else ()
+    seen = _Seen(looked_at, work.modal.max_frequency_hz, plan, records)
+    outcome = march_all(
+        system, phases_of(work), replace(settings, watch=watch), plan.tracks, seen.see, window=window, cores=cores,
+        progress=progress, separately=separately,
+    )  # fmt: skip
+    found = _modes(work, plan) if modes else Found(None, (), ())
+    made = provenance(work, "ensemble", time.perf_counter() - started, **_asked(values, grid, sweep, along, window))
+    return _result(work, system, plan, seen, outcome, found, window, made)
+
+
+def _check_window(work: Workspace, system: System, settings: Settings, window: float) -> None:
+    """Refuse a window of too few records for a spectrum."""
+    step = choose_step(step_limits(system, settings)[2], settings)
+    count = int(window * work.phases[-1].duration / step / settings.record_every)
+    if 0.0 < window <= 1.0 and count < LEAST_RECORDS:
+        raise CaseError(
+            "window", window,
+            f"a share of the last phase with {LEAST_RECORDS} records at least, here it has {count}: let that phase "
+            "last longer, or record more often (temporal.record_every)",
+        )  # fmt: skip
+
+
+def _values(
+    work: Workspace, mu: Values, load: Values, speed: Values, perturbation: Values, initial: str | None
+) -> dict[str, Array]:
+    """What members differ in, by name, checked; NaN for friction that is the laws' own."""
+    starts = initial or work.temporal.initial
+    if perturbation is not None and starts != "steady-sliding":
+        raise CaseError(
+            "perturbation", None, 'goes with initial = "steady-sliding"; from rest runs are disturbed anyway'
+        )
+    own = work.own_friction
+    default = {
+        "mu": np.nan if own is None else own, "load": 1.0, "speed": 1.0, "perturbation": work.temporal.perturbation
+    }  # fmt: skip
+    given = {"mu": mu, "load": load, "speed": speed, "perturbation": perturbation}
+    made: dict[str, Array] = {}
+    for name, values in given.items():
+        array = np.atleast_1d(np.asarray(default[name] if values is None else values, dtype=float))
+        factor = name in ("load", "speed")
+        low = array <= 0.0 if factor else array < 0.0
+        if values is not None and (array.ndim != 1 or not len(array) or not np.isfinite(array).all() or low.any()):
+            raise CaseError(name, values, f"finite numbers {'above 0' if factor else '≥ 0'}, at least one")
+        made[name] = array
+    return made
+
+
+def _asked(values: dict[str, Array], grid: bool, sweep: str | None, along: str, window: float) -> dict[str, Any]:
+    asked = {name: [None if np.isnan(v) else float(v) for v in array] for name, array in values.items()}
+    return asked | {"grid": grid, "sweep": sweep, "along": along if sweep else None, "window": window}
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Members (k, 4) in the order of the result, their branch, tracks of members and where each of these belongs."""
+
+    axes: tuple[tuple[str, Array], ...]
+    rows: Array
+    sweep: tuple[str, ...]
+    tracks: tuple[tuple[Member, ...], ...]
+    place: dict[tuple[int, int], int]
+
+    @classmethod
+    def of(cls, values: dict[str, Array], *, grid: bool, sweep: str | None, along: str) -> _Plan:
+        """Raises CaseError for lists of several lengths, and a sweep of what has one value."""
+        if sweep not in (None, "up", "down", "both") or along not in AXES[:3]:
+            name, given = ("along", along) if along not in AXES[:3] else ("sweep", sweep)
+            raise CaseError(name, given, "mu, load or speed" if name == "along" else "up, down or both")
+        if not grid:
+            return cls._listed(values, sweep)
+        values = {name: np.unique(array) if sweep and name == along else array for name, array in values.items()}
+        if sweep and len(values[along]) < 2:
+            raise CaseError("sweep", sweep, f"goes along {along}, of which two or more values are needed")
+        branches = {None: ("",), "up": ("up",), "down": ("down",), "both": ("up", "down")}[sweep]
+        combined = np.array(list(product(*(values[name] for name in AXES))))
+        rows, marks = np.tile(combined, (len(branches), 1)), tuple(b for b in branches for _ in combined)
+        numbers = np.arange(len(rows)).reshape(len(branches), *(len(values[name]) for name in AXES))
+        if sweep:
+            moved = np.moveaxis(numbers, 1 + AXES.index(along), 1)
+            moved = moved.reshape(len(branches), len(values[along]), -1)
+            chains = [moved[k][::-1] if branch == "down" else moved[k] for k, branch in enumerate(branches)]
+            order = np.concatenate(chains).T
+        else:
+            order = numbers.reshape(-1, 1)
+        return cls(tuple(values.items()), rows, marks, *_tracks(rows, order))
+
+    @classmethod
+    def _listed(cls, values: dict[str, Array], sweep: str | None) -> _Plan:
+        if sweep:
+            raise CaseError("sweep", sweep, "goes over all combinations of values: grid=True")
+        count = max(len(array) for array in values.values())
+        for name, array in values.items():
+            if len(array) not in (1, count):
+                raise CaseError(name, f"{len(array)} values", f"one value or {count}, as many as others have")
+        rows = np.stack([np.broadcast_to(values[name], count) for name in AXES], axis=1)
+        return cls((), rows, ("",) * count, *_tracks(rows, np.arange(count)[:, None]))
+
+
+def _tracks(rows: Array, order: IntArray) -> tuple[tuple[tuple[Member, ...], ...], dict[tuple[int, int], int]]:
+    """Members of each track, and the row of each by track and number in it."""
+    tracks = tuple(tuple(_member(rows[int(k)]) for k in line) for line in order)
+    return tracks, {(t, leg): int(k) for t, line in enumerate(order) for leg, k in enumerate(line)}
+
+
+def _member(row: Array) -> Member:
+    mu, load, speed, perturbation = (float(v) for v in row)
+    return Member(None if np.isnan(mu) else mu, load, speed, perturbation)
+
+
+class _Seen:
+    """Takes runs as they are finished, from any thread, and keeps their numbers."""
+
+    def __init__(self, observable: Observable, max_frequency_hz: float, plan: _Plan, records: bool) -> None:
+        self.observable, self.max_frequency_hz, self.plan, self.records = observable, max_frequency_hz, plan, records
+        self.numbers: dict[int, Numbers] = {}
+        self.errors: dict[int, str] = {}
+        self.runs: dict[int, Trajectory] = {}
+
+    def see(self, track: int, leg: int, run: Trajectory | str) -> None:
+        """One member."""
+        row = self.plan.place[track, leg]
+        if isinstance(run, str):
+            self.errors[row] = run
+            return
+        self.numbers[row] = numbers_of(run, self.observable, self.max_frequency_hz)
+        if self.records:
+            self.runs[row] = last_phase(run)
+
+
+def _modes(work: Workspace, plan: _Plan) -> Found:
+    if np.isnan(plan.rows[:, 0]).any():
+        return Found(None, (), ("no modal map: contacts have different friction coefficients; name mu",))
+    return unstable_modes(work, [float(v) for v in plan.rows[:, 0]], [float(v) for v in plan.rows[:, 2]])
+
+
+def _result(
+    work: Workspace, system: System, plan: _Plan, seen: _Seen, outcome: Outcome, found: Found, window: float,
+    made: dict[str, Any],
+) -> Ensemble:  # fmt: skip
+    """All rows."""
+    count = len(plan.rows)
+    names = next((tuple(n.contacts) for n in seen.numbers.values()), ())
+    one = {name: np.full(count, np.nan) for name in ("rms", "peak", "frequency_hz", "growth_rate")}
+    shares = {name: np.full((count, len(names)), np.nan) for name in ("stick", "slip", "separation")}
+    mode, mode_hz, deviation = np.zeros(count, dtype=np.int64), np.full(count, np.nan), np.full(count, np.nan)
+    regime = ["failed" if k in seen.errors else "interrupted" for k in range(count)]
+    for k, numbers in seen.numbers.items():
+        regime[k] = numbers.regime
+        for name, values in one.items():
+            values[k] = getattr(numbers, name)
+        for name, values in shares.items():
+            values[k] = [getattr(c, f"{name}_fraction") for c in numbers.contacts.values()]
+        growing = found.at(float(plan.rows[k, 0]), float(plan.rows[k, 2]))
+        if growing is not None and numbers.regime in ("saturated", "transient", "grows"):
+            mode[k], mode_hz[k], deviation[k] = growing.nearest(numbers.frequency_hz)
+    separate = () if outcome.side_by_side else (f"separate runs, not side by side: {outcome.reason}",)
+    nodes = system.contact_nodes()
+    sliding = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1).max(initial=0.0)
+    end = sum(p.duration for p in work.phases)
+    return Ensemble(
+        mu=plan.rows[:, 0], load=plan.rows[:, 1], speed=plan.rows[:, 2], perturbation=plan.rows[:, 3],
+        sweep=plan.sweep, slip_speed=plan.rows[:, 2] * float(sliding), observable=seen.observable.name,
+        unit=seen.observable.unit, **one, **shares, contact_names=names, regime=tuple(regime), mode=mode,
+        mode_hz=mode_hz, mode_deviation=deviation, error=tuple(seen.errors.get(k, "") for k in range(count)),
+        window=(end - window * work.phases[-1].duration, end), step=outcome.step,
+        method="side by side" if outcome.side_by_side else "separate runs", axes=plan.axes, modal=found.map,
+        runs=tuple(seen.runs.get(k) for k in range(count)) if seen.records else (), notes=(*separate, *found.notes),
+        interrupted=outcome.interrupted, provenance=made,
+    )  # fmt: skip

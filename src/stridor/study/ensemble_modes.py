@@ -1,0 +1,105 @@
+"""The modal map beside an ensemble, and which of the modes that may grow is the one that a member shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..agreement.comparison import NEAR
+from ..errors import StridorError
+from ..modal.results import ComplexModes
+from ..sliding import slip_speeds
+from ..system import System
+from ..typing import Array, IntArray
+from .analyses import modes
+from .ensemble_result import ModalMap
+from .workspace import Workspace
+
+SAME = 1e-12  # relative: coefficients of contacts that are one
+
+
+@dataclass(frozen=True)
+class Growing:
+    """Unstable modes at one μ and speed: numbers, frequencies [Hz] and growth rates [1/s], all (b,)."""
+
+    mode: IntArray
+    frequency_hz: Array
+    growth_rate: Array
+
+    def nearest(self, frequency_hz: float) -> tuple[int, float, float]:
+        """Number of the mode within 5 % of a frequency, 0 for none; the nearest one's frequency [Hz] and f/f_mode − 1,
+        NaN where nothing grows."""
+        if not len(self.mode) or not np.isfinite(frequency_hz):
+            return 0, np.nan, np.nan
+        deviation = frequency_hz / self.frequency_hz - 1.0
+        k = int(np.argmin(np.abs(deviation)))
+        number = int(self.mode[k]) if abs(deviation[k]) < NEAR else 0
+        return number, float(self.frequency_hz[k]), float(deviation[k])
+
+
+@dataclass(frozen=True)
+class Found:
+    """Unstable modes by μ and speed: a map, those at each of its points in the same order, and what is to be said."""
+
+    map: ModalMap | None
+    growing: tuple[tuple[Growing, ...], ...]
+    notes: tuple[str, ...]
+
+    def at(self, mu: float, speed: float) -> Growing | None:
+        """Those of a member; None where it is not known."""
+        if self.map is None:
+            return None
+        i = int(np.argmin(np.abs(self.map.mu - mu)))
+        j = int(np.argmin(np.abs(self.map.speed - speed)))
+        return self.growing[i][j]
+
+
+def unstable_modes(work: Workspace, mus: Sequence[float], speeds: Sequence[float]) -> Found:
+    """What grows at each μ, and at each speed where friction depends on it. Where that cannot be told, why not."""
+    system = work.system()
+    constant = all(c.law.constant for c in system.contacts) and all(s.law.constant for s in system.surfaces)
+    values, own = np.unique(mus), np.unique([1.0]) if constant else np.unique(speeds)
+    columns: list[list[Growing]] = []
+    try:
+        for speed in own:
+            there, friction = _at_speed(work, system, values, float(speed))
+            found = modes(there, mu=friction)
+            columns.append([_growing(found, i) for i in range(len(values))])
+    except StridorError as error:
+        return Found(None, (), (f"no modal map: {error}",))
+    growing = tuple(tuple(column[i] for column in columns) for i in range(len(values)))
+    count = np.array([[len(g.mode) for g in row] for row in growing], dtype=np.int64)
+    fastest = np.array([[_fastest(g) for g in row] for row in growing])
+    return Found(ModalMap(values, own, count, fastest[..., 0], fastest[..., 1]), growing, ())
+
+
+def _at_speed(work: Workspace, system: System, mus: Array, speed: float) -> tuple[Workspace, Array]:
+    """The case with its supports at another speed, and the friction coefficients that its laws have there."""
+    if speed == 1.0:
+        return work, mus
+    case = work.case("the modal map of friction that depends on speed")
+    changes = {
+        f"supports.{name}.velocity.{direction}": speed * value
+        for name, support in case.supports.items()
+        for direction, value in support.velocity.items()
+    }
+    full = np.abs(slip_speeds(system, system.motion.full))
+    laws = [(c.law, float(v)) for c, v in zip(system.contacts, full, strict=True)]
+    there = np.array([[law.scaled(float(mu), v).sliding(speed * v) for law, v in laws] for mu in mus])
+    if not laws or np.ptp(there, axis=1).max() > SAME * np.abs(there).max():
+        raise StridorError("friction depends on speed, and contacts that slide at several speeds have no common one")
+    return Workspace(case.with_(changes)), there[:, 0]
+
+
+def _growing(found: ComplexModes, i: int) -> Growing:
+    which = np.flatnonzero(found.unstable[i] & (found.frequency_hz[i] > 0.0))
+    return Growing(found.branch[which], found.frequency_hz[i][which], found.growth_rate[i][which])
+
+
+def _fastest(growing: Growing) -> tuple[float, float]:
+    if not len(growing.mode):
+        return np.nan, np.nan
+    k = int(np.argmax(growing.growth_rate))
+    return float(growing.frequency_hz[k]), float(growing.growth_rate[k])

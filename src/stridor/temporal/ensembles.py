@@ -1,0 +1,179 @@
+"""Many runs of one system: side by side where the modal stepper takes them, else one after the other.
+
+What comes out is a `Trajectory` for each member, the same in both cases but that side by side neither energies nor the
+state for a restart are kept. Members that fail do not stop others.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from threading import Event
+
+from ..errors import StridorError
+from ..interrupts import at_once, held
+from ..stages import passing, stage
+from ..system import System
+from ..threads import one_thread
+from .inputs import check_inputs
+from .legs import Legs, leg_phases, legs_of
+from .march import Progress
+from .schedule import PhaseSpec
+from .settings import Settings, choose_step
+from .side_by_side import Block, Seen, Track
+from .simulate import plan, simulate
+from .steppers.modal import ModalStepper, modal_stepper
+from .steppers.modal.vectors import LANES
+from .trajectory import Trajectory
+
+TOLD_SECONDS = 0.1
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How an ensemble was run: side by side or, for a reason in words, one after the other; whether it was cut short;
+    step Δt [s]."""
+
+    side_by_side: bool
+    reason: str
+    interrupted: bool
+    step: float
+
+
+@passing()
+@one_thread
+def march_all(
+    system: System,
+    phases: Sequence[PhaseSpec],
+    settings: Settings,
+    tracks: Sequence[Track],
+    seen: Seen,
+    *,
+    window: float,
+    cores: int | None = None,
+    progress: Progress | None = None,
+    separately: bool = False,
+) -> Outcome:
+    """March every track: its first member from the initial state, each further one from where the one before ended.
+
+    Tracks are of one length. seen is called, from any thread, with each member's run or why there is none; the last
+    phase of a run is the window, the last share of the case's last phase. cores: threads (None: all). separately: one
+    run after the other in any case. Ctrl-C, or KeyboardInterrupt from progress, ends it; what was seen until then
+    stays. Raises CaseError and AnalysisError for what holds of all members.
+    """
+    taken = settings.system(system)
+    check_inputs(
+        taken, phases, step=settings.step, beta2=settings.beta2, record_every=settings.record_every,
+        watch=settings.watch,
+    )  # fmt: skip
+    stepper, reason = (None, "asked for") if separately else _shared(taken, settings)
+    step = stepper.scheme.step if stepper is not None else choose_step(plan(system, settings)[2], settings)
+    legs = legs_of(phases, taken, step, len(tracks[0]), window, steady=settings.initial == "steady-sliding")
+    if stepper is None:
+        cut = _one_by_one(system, replace(settings, step=step), tracks, seen, legs, progress)
+        return Outcome(False, reason, cut, step)
+    stage("time loop of an ensemble; the first one of a version is compiled for up to a minute")
+    blocks = [
+        Block(stepper, settings, legs, tracks[a:b], range(a, b), seen)
+        for a, b in pairwise(_cuts(len(tracks), cores or _all_cores()))
+    ]
+    return Outcome(True, "", _at_the_same_time(blocks, legs, progress, cores or _all_cores()), step)
+
+
+def _shared(system: System, settings: Settings) -> tuple[ModalStepper | None, str]:
+    """The stepper whose operators all members share, else None and why not."""
+    path, why, _ = plan(system, settings)
+    if path != "modal":
+        return None, why
+    finite = [c.name for c in system.contacts if c.sliding != "small"]
+    if finite:
+        return None, f'sliding = "finite" at {", ".join(finite)}'
+    return modal_stepper(system, settings, None), ""
+
+
+def _all_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _cuts(count: int, cores: int) -> list[int]:
+    """Where to cut tracks into blocks: no more than the lanes in each, all about as long, as many as keep all cores."""
+    blocks = -(-count // LANES)
+    blocks = min(count, -(-blocks // cores) * cores)
+    return [round(k * count / blocks) for k in range(blocks + 1)]
+
+
+def _at_the_same_time(blocks: Sequence[Block], legs: Legs, progress: Progress | None, cores: int) -> bool:
+    """All blocks on some threads; whether that was cut short."""
+    planned = legs.steps * sum(len(block.tracks) for block in blocks)
+    done = [0] * len(blocks)
+    end = Event()
+    with at_once():  # compiles the loop or loads it, before anybody waits for its end
+        blocks[0].warm()
+
+    def work(number: int) -> None:
+        def count(steps: int) -> None:
+            done[number] += steps
+
+        blocks[number].run(end.is_set, count)
+
+    with held() as block, ThreadPoolExecutor(min(cores, len(blocks))) as pool:
+        running = [pool.submit(work, number) for number in range(len(blocks))]
+        try:
+            while running:
+                finished, left = wait(running, TOLD_SECONDS)
+                running = list(left)
+                for future in finished:
+                    future.result()
+                if progress is not None:
+                    progress(sum(done), planned)
+                if block.asked:
+                    end.set()
+        except KeyboardInterrupt:
+            end.set()
+        except BaseException:
+            end.set()
+            raise
+        block.met = True
+    return end.is_set()
+
+
+def _one_by_one(
+    system: System, settings: Settings, tracks: Sequence[Track], seen: Seen, legs: Legs, progress: Progress | None
+) -> bool:
+    """Every member by a run of its own; whether that was cut short."""
+    planned = legs.steps * len(tracks)
+    for number, track in enumerate(tracks):
+        before: Trajectory | None = None
+        failed = ""
+        for leg, member in enumerate(track):
+            if failed:
+                seen(number, leg, f"not reached: {failed}")
+                continue
+            base = number * legs.steps
+
+            def told(done: int, _: int, base: int = base) -> None:
+                if progress is not None:
+                    progress(base + done, planned)
+
+            phases = [p for k in range(leg + 1) for p in leg_phases(legs, k, track[k], system)]
+            try:
+                run = simulate(
+                    system, phases, member.settings(settings), mu=member.mu, progress=told, restart=before, join=False,
+                    changed=before is not None,
+                )  # fmt: skip
+            except StridorError as error:
+                failed = str(error)
+                seen(number, leg, failed)
+                continue
+            if run.interrupted:
+                return True
+            seen(number, leg, run)
+            gone = () if before is None else before.phases
+            before = replace(run, phases=(*gone, *run.phases))  # a restart wants all that was before
+    return False

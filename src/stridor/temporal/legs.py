@@ -1,0 +1,177 @@
+"""Members of an ensemble: what differs between them, and the phases that they go through."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import CaseError
+from ..sliding import slip_speeds
+from ..system import System
+from ..typing import Array
+from .schedule import PhaseSpec, Schedule, Stretch, lay_out
+from .settings import Settings
+
+WINDOW = "window"  # the name of the part of the last phase that is looked at
+RISE = 0.1  # of a further leg: how long loads and speeds take to their next value
+
+
+@dataclass(frozen=True)
+class Member:
+    """One run: mu of every contact at its full speed (None: the laws' own), factors on all loads and on all prescribed
+    velocities; perturbation [m/s] of the slip speed at the start (None: the settings')."""
+
+    mu: float | None = None
+    load: float = 1.0
+    speed: float = 1.0
+    perturbation: float | None = None
+
+    def settings(self, settings: Settings) -> Settings:
+        """The settings with its own perturbation."""
+        return settings if self.perturbation is None else replace(settings, perturbation=self.perturbation)
+
+    def system(self, system: System) -> System:
+        """The system with its friction."""
+        if self.mu is None:
+            return system
+        return system.with_friction(self.mu, np.abs(slip_speeds(system, system.motion.full)))
+
+    def phases(self, phases: Sequence[PhaseSpec], system: System) -> list[PhaseSpec]:
+        """The phases with its factors."""
+        made: list[PhaseSpec] = []
+        for number, phase in enumerate(phases):
+            # What the first phase does not name is one.
+            loads = {**dict.fromkeys(system.loads, 1.0), **phase.loads} if number == 0 else phase.loads
+            named = dict.fromkeys(system.motion.names, 1.0) if number == 0 else {}
+            velocities = {**named, **phase.velocities}
+            made.append(
+                replace(
+                    phase,
+                    loads={name: self.load * value for name, value in loads.items()},
+                    velocities={name: self.speed * value for name, value in velocities.items()},
+                )
+            )
+        return made
+
+
+@dataclass(frozen=True)
+class Legs:
+    """The phases of one run or, where members follow one another, of one after the other: those of the case, then for
+    each further member its last phase again, with a ramp to the new loads and speeds. The end of each leg is a phase of
+    its own, the window. Factors are those of the case; members scale them."""
+
+    phases: tuple[tuple[PhaseSpec, ...], ...]
+    schedules: tuple[Schedule, ...]
+    rises: tuple[Schedule | None, ...]
+
+    @property
+    def steps(self) -> int:
+        """Steps of all legs."""
+        return self.schedules[-1].steps
+
+    def first(self, leg: int) -> int:
+        """First step of a leg."""
+        return self.schedules[leg].stretches[0].first
+
+    def forcing(
+        self, first: int, count: int, members: Sequence[Sequence[Member]], distance: Array
+    ) -> tuple[Array, Array]:
+        """Loads (count, k, l) and increments of the supports (count, k, p) of k tracks of members from a step on;
+        distance (p,): 1 for motions that are distances, which nobody scales."""
+        loads: list[Array] = []
+        increments: list[Array] = []
+        while count > 0:
+            leg = next((k for k, s in enumerate(self.schedules) if first < s.steps), len(self.schedules) - 1)
+            last = leg == len(self.schedules) - 1
+            size = count if last else min(count, self.schedules[leg].steps - first)
+            present = [track[leg] for track in members]
+            before = [track[max(leg - 1, 0)] for track in members] if self.rises[leg] is not None else present
+            made = [s.load_factors(first, size) for s in self._tables(leg)]
+            moved = [s.motion_increments(first, size) for s in self._tables(leg)]
+            load = np.array([[m.load for m in before], [m.load for m in present]])
+            speed = np.array([[m.speed for m in before], [m.speed for m in present]])
+            loads.append(_combined(made, load, np.zeros(made[0].shape[1])))
+            increments.append(_combined(moved, speed, distance))
+            first, count = first + size, count - size
+        return np.concatenate(loads), np.concatenate(increments)
+
+    def _tables(self, leg: int) -> list[Schedule]:
+        rise = self.rises[leg]
+        return [self.schedules[leg]] if rise is None else [self.schedules[leg], rise]
+
+
+def _combined(tables: Sequence[Array], factors: Array, unscaled: Array) -> Array:
+    """Tables (c, q) with the factors before (k,), and of the second what these rise by: (c, k, q)."""
+    before = np.where(unscaled > 0, 1.0, factors[0][:, None])
+    out = tables[0][:, None, :] * before
+    if len(tables) > 1:
+        out = out + tables[1][:, None, :] * (factors[1] - factors[0])[:, None]
+    return out
+
+
+def legs_of(
+    phases: Sequence[PhaseSpec], system: System, step: float, count: int, window: float, *, steady: bool
+) -> Legs:
+    """The legs of ``count`` members one after the other; window: share of the last phase, in (0, 1]. Raises CaseError
+    for a window that begins before the ramp of that phase ends."""
+    if not 0.0 < window <= 1.0:
+        raise CaseError("window", window, "the share of the last phase that is looked at, above 0 and at most 1")
+    last, names = phases[-1], list(system.motion.names)
+    kept = last.duration * (1.0 - window)
+    if last.ramp > kept or (count > 1 and last.duration * RISE > kept):
+        least = max(last.ramp / last.duration, RISE if count > 1 else 0.0)
+        raise CaseError("window", window, f"at most {1.0 - least:g}: before it loads and speeds still change by a ramp")
+    legs = [tuple(phases[:-1]) + _split(last, window)]
+    for k in range(1, count):
+        name = f"{last.name} {k + 1}"
+        legs.append(_split(PhaseSpec(name, last.duration, {}, {}), window))
+    whole = lay_out([p for leg in legs for p in leg], step, list(system.loads), names, system.motion.full_distance)
+    if steady:
+        whole = whole.from_steady()
+    schedules: list[Schedule] = []
+    rises: list[Schedule | None] = []
+    at = 0
+    for k, leg in enumerate(legs):
+        stretches = whole.stretches[at : at + len(leg)]
+        schedules.append(Schedule(step, stretches))
+        rises.append(_rise(step, stretches, RISE * last.duration) if k else None)
+        at += len(leg)
+    return Legs(tuple(legs), tuple(schedules), tuple(rises))
+
+
+def _split(phase: PhaseSpec, window: float) -> tuple[PhaseSpec, ...]:
+    """A phase in two, the second of which is the window."""
+    if window == 1.0:
+        return (replace(phase, name=WINDOW),)
+    first = replace(phase, duration=phase.duration * (1.0 - window))
+    return first, PhaseSpec(WINDOW, phase.duration * window, {}, {})
+
+
+def _rise(step: float, stretches: Sequence[Stretch], ramp: float) -> Schedule:
+    """From nothing to what the stretches have, by a ramp [s] that begins with them."""
+    first, zero = stretches[0], np.zeros(len(stretches[0].distances_after))
+    rising = replace(
+        first,
+        last=stretches[-1].last,
+        ramp_steps=ramp / step,
+        loads_before=np.zeros(len(first.loads_after)),
+        velocities_before=np.zeros(len(first.velocities_after)),
+        distances_before=zero,
+        distances_after=zero,
+    )
+    return Schedule(step, (rising,))
+
+
+def leg_phases(legs: Legs, leg: int, member: Member, system: System) -> list[PhaseSpec]:
+    """The phases of a leg as a single run takes them, with the factors of a member."""
+    if leg == 0:
+        return member.phases(legs.phases[0], system)
+    full = legs.schedules[leg].stretches[0]
+    first, *rest = legs.phases[leg]
+    whole = sum(p.duration for p in legs.phases[leg])
+    loads = {name: member.load * float(f) for name, f in zip(system.loads, full.loads_after, strict=True)}
+    speeds = zip(system.motion.names, full.velocities_after, strict=True)
+    velocities = {name: member.speed * float(f) for name, f in speeds}
+    return [replace(first, loads=loads, velocities=velocities, ramp=RISE * whole), *rest]

@@ -1,0 +1,170 @@
+"""Members that march side by side: one block of them from its start to its end, on one core."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import StridorError
+from ..system import System
+from ..system.uncoupled import UncoupledModes
+from ..typing import Array
+from .legs import Legs, Member, leg_phases
+from .phase_results import PhaseResults, fresh_statistics
+from .schedule import lay_out
+from .settings import Settings, not_finite
+from .steppers.modal import ModalStepper
+from .steppers.modal.batch import Batch, friction_of, member_machine
+from .steppers.modal.batch_kernel import BatchRecord
+from .steppers.modal.machine import Machine, modal_machine
+from .trajectory import Trajectory
+
+CHUNK = 10_000  # steps between looks at whether to go on
+# Called with the number of a track, of a member in it, and its run or why there is none.
+Seen = Callable[[int, int, Trajectory | str], None]
+Track = Sequence[Member]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Tracks by their numbers that are marched together; all of one system, whose operators are those of stepper."""
+
+    stepper: ModalStepper
+    settings: Settings
+    legs: Legs
+    tracks: Sequence[Track]
+    numbers: Sequence[int]
+    seen: Seen
+
+    @property
+    def system(self) -> System:
+        """The system without the members' friction."""
+        return self.stepper.system
+
+    def run(self, asked: Callable[[], bool], count: Callable[[int], None]) -> None:
+        """To the end, or to where an end is asked for; count is told the steps of all members done. Members that cannot
+        begin are seen at once, with why."""
+        machines: list[Machine] = []
+        present: list[int] = []
+        for k, track in enumerate(self.tracks):
+            try:
+                machines.append(self._begun(track[0]))
+                present.append(k)
+            except StridorError as error:
+                self._failed(k, 0, str(error))
+                count(self.legs.steps)
+        if machines:
+            self._march(Batch(machines, _modes(self.stepper), self.settings.watch), present, asked, count)
+
+    def warm(self) -> None:
+        """Compile the loop, or load it."""
+        member = self.tracks[0][0]
+        machine = modal_machine(self.system, self.stepper.scheme, _modes(self.stepper))
+        machine.repack()
+        batch = Batch([machine], _modes(self.stepper), self.settings.watch)
+        forcing = self.legs.forcing(0, 1, [[member]], self.system.motion.full_distance)
+        batch.advance(0, *forcing, batch.room(0, self.settings.record_every))
+
+    def _begun(self, member: Member) -> Machine:
+        stepper, system = self.stepper, self.system
+        phases, motion = leg_phases(self.legs, 0, member, system), system.motion
+        schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
+        settings = member.settings(self.settings)
+        if settings.initial == "steady-sliding":
+            schedule = schedule.from_steady()
+        return member_machine(member.system(system), stepper.scheme, _modes(stepper), schedule, settings)
+
+    def _march(
+        self, batch: Batch, present: Sequence[int], asked: Callable[[], bool], count: Callable[[int], None]
+    ) -> None:
+        """Leg by leg; what is finished is seen at the end of each."""
+        tracks = [self.tracks[k] for k in present]
+        told: set[int] = set()
+        for leg, schedule in enumerate(self.legs.schedules):
+            if leg:
+                batch.friction = friction_of([track[leg].system(self.system) for track in tracks])
+            first, every = batch.done, self.settings.record_every
+            records = -(-schedule.steps // every) - -(-first // every)
+            record = batch.room(records, every)
+            results = [self._results(batch, lane, leg) for lane in range(len(tracks))]
+            while batch.done < schedule.steps:
+                if asked():
+                    return
+                for one in results:
+                    one.begin(batch.done)
+                size = min(CHUNK, schedule.stretch_at(batch.done).last - batch.done)
+                forcing = self.legs.forcing(batch.done, size + 1, tracks, self.system.motion.full_distance)
+                batch.advance(size, *forcing, record)
+                count(size * len(tracks))
+            for lane, k in enumerate(present):
+                if lane in told:
+                    continue
+                if batch.lost[lane] >= 0:
+                    told.add(lane)
+                    self._failed(k, leg, self._lost(int(batch.lost[lane]), leg))
+                    continue
+                run = self._trajectory(batch, record, lane, leg, results[lane])
+                self.seen(self.numbers[k], leg, run)
+
+    def _results(self, batch: Batch, lane: int, leg: int) -> PhaseResults:
+        """Statistics of one member, cleared where a leg begins."""
+        statistics: Array = batch.states.statistics[lane]
+        statistics[:] = fresh_statistics(*statistics.shape)
+        stepper = self.stepper
+        return PhaseResults(self.legs.schedules[leg], stepper.contact_names, statistics, stepper.closed)
+
+    def _failed(self, track: int, leg: int, why: str) -> None:
+        """See a member that has failed, and all that would have followed it."""
+        self.seen(self.numbers[track], leg, why)
+        for later in range(leg + 1, len(self.legs.schedules)):
+            self.seen(self.numbers[track], later, f"not reached: {why}")
+
+    def _lost(self, step: int, leg: int) -> str:
+        dt = self.stepper.scheme.step
+        return not_finite(step * dt, self.legs.schedules[leg].stretch_at(step).name, dt)
+
+    def _trajectory(self, batch: Batch, record: BatchRecord, lane: int, leg: int, results: PhaseResults) -> Trajectory:
+        """The run of one member through one leg, without energies and without a state to go on from."""
+        stepper, settings, scheme = self.stepper, self.settings, self.stepper.scheme
+        kept, every = int(record.kept[0]), settings.record_every
+        start = -(-self.legs.first(leg) // every)
+        contacts, watched = record.contacts[:kept, lane], record.watch[:kept, lane]
+        watched = watched.reshape(kept, len(settings.watch), self.system.dimension, 3)
+        counters, unknown = batch.states.counters[lane], np.full(kept, np.nan)
+        return Trajectory(
+            time=(start + np.arange(kept)) * every * scheme.step,
+            contact_names=stepper.contact_names,
+            normal_force=contacts[:, :, 0].copy(),
+            tangential_force=contacts[:, :, 1].copy(),
+            slip_speed=contacts[:, :, 2].copy(),
+            gap=contacts[:, :, 3].copy(),
+            status=contacts[:, :, 4].astype(np.int64),
+            watch_names=settings.watch,
+            displacement=watched[..., 0].copy(),
+            velocity=watched[..., 1].copy(),
+            acceleration=watched[..., 2].copy(),
+            kinetic=unknown,
+            elastic=unknown,
+            works={},
+            phases=results.all(batch.done),
+            step=scheme.step,
+            beta2=scheme.beta2,
+            record_every=every,
+            steps=batch.done,
+            planned_steps=self.legs.schedules[leg].steps,
+            path=stepper.path,
+            path_reason=stepper.reason,
+            step_limit=stepper.limit.step,
+            limiting_body=stepper.limit.body,
+            most_sweeps=int(counters[1]),
+            unconverged_steps=int(counters[2]),
+            interrupted=False,
+            wall_seconds=0.0,
+        )
+
+
+def _modes(stepper: ModalStepper) -> UncoupledModes:
+    assert stepper.modes is not None  # who makes a block has looked
+    return stepper.modes

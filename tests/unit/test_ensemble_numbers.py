@@ -1,0 +1,127 @@
+"""What an ensemble says of one member: regimes by the halves of the window, observables by their names."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stridor as st
+from benches import paper_case
+from stridor.study.ensemble_numbers import numbers_of, observable_of
+from stridor.study.settings import settings_of
+from stridor.system import build_system
+from stridor.temporal.trajectory import ContactStatistics, PhaseResult, Trajectory
+
+SLIPS = ContactStatistics(0.0, 1.0, 0.0, 1.0, 1.0, 1.0, None, None)
+STICKS = ContactStatistics(1.0, 0.0, 0.0, 1.0, 1.0, 1.0, None, None)
+CHANGES = ContactStatistics(0.3, 0.6, 0.1, 1.0, 1.0, 1.0, None, None)
+STEP, COUNT, LINE = 1e-5, 4000, 500.0
+
+
+def member(velocity: np.ndarray, contact: ContactStatistics) -> Trajectory:
+    """A run of a phase and a window, whose one point moves along x."""
+    time = STEP * np.arange(COUNT)
+    nothing, moved = np.zeros((COUNT, 1)), np.zeros((COUNT, 1, 2))
+    moved[:, 0, 0] = velocity
+    half, end = STEP * COUNT / 2, STEP * COUNT
+    phases = tuple(PhaseResult(n, a, b, {"A": contact}) for n, a, b in (("slide", 0.0, half), ("window", half, end)))
+    return Trajectory(
+        time=time, contact_names=("A",), normal_force=nothing, tangential_force=nothing, slip_speed=nothing, gap=nothing,
+        status=nothing.astype(int), watch_names=("P",), displacement=moved, velocity=moved, acceleration=moved,
+        kinetic=time, elastic=time, works={}, phases=phases, step=STEP, beta2=0.5, record_every=1, steps=COUNT,
+        planned_steps=COUNT, path="modal", path_reason="", step_limit=STEP, limiting_body="", most_sweeps=1,
+        unconverged_steps=0, interrupted=False, wall_seconds=0.0,
+    )  # fmt: skip
+
+
+def observed(velocity: np.ndarray, contact: ContactStatistics):
+    case = paper_case()
+    found = observable_of("beam1.tip.velocity", build_system(case), settings_of(case))
+    from dataclasses import replace
+
+    return numbers_of(member(velocity, contact), replace(found, owner="P"), 5000.0)
+
+
+@pytest.mark.parametrize(
+    ("rate", "contact", "regime"),
+    [
+        (0.0, CHANGES, "saturated"), (30.0, CHANGES, "transient"), (-30.0, CHANGES, "transient"),
+        (0.0, SLIPS, "linear"), (30.0, SLIPS, "grows"), (-30.0, SLIPS, "decays"), (0.0, STICKS, "sticks"),
+        (30.0, STICKS, "sticks"), (None, SLIPS, "still"),
+    ],
+)  # fmt: skip
+def test_regimes(rate, contact, regime):
+    time = STEP * np.arange(COUNT)
+    signal = np.zeros(COUNT) if rate is None else 2.0 * np.exp(rate * (time - time[-1])) * np.sin(2 * np.pi * LINE * time)
+    found = observed(signal + 0.7, contact)
+    assert found.regime == regime
+    if rate is not None:
+        assert found.growth_rate == pytest.approx(rate, abs=0.5)
+        assert found.frequency_hz == pytest.approx(LINE, rel=3e-3)  # an eighth of a bin
+
+
+def test_amplitudes_are_of_the_window_about_its_mean():
+    time = STEP * np.arange(COUNT)
+    signal = np.where(time < STEP * COUNT / 2, 50.0, 3.0 * np.sin(2 * np.pi * LINE * time) + 1.0)
+    found = observed(signal, CHANGES)
+    assert found.rms == pytest.approx(3.0 / np.sqrt(2.0), rel=1e-3)
+    assert found.peak == pytest.approx(3.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "columns"),
+    [
+        (None, "m/s", 2), ("beam1.tip.velocity", "m/s", 2), ("beam1.tip.acceleration_y", "m/s2", 1),
+        ("beam2.end.displacement_x", "m", 1), ("A.normal_force", "N", 1), ("A.slip_speed", "m/s", 1),
+    ],
+)  # fmt: skip
+def test_observables_by_name(name, unit, columns):
+    case = paper_case().with_({"phases.press.duration": 1e-5, "phases.slide.duration": 1e-5})
+    found = observable_of(name, build_system(case), settings_of(case))
+    assert found.unit == unit
+    run = st.simulate(case.with_({"temporal.watch": ["beam1.tip", "beam2.end"]}))
+    assert found.signals(run).shape == (len(run.time), columns)
+
+
+ACCEPTED = "observable: {!r} – POINT.QUANTITY with a point among"
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("name", ["tip", "beam1.velocity", "A.velocity", "beam1.tip.slip_speed", "beam1.tip.velocity_z", "A.", "A.normal_force_x"])
+def test_observables_that_are_none_say_what_is_accepted(name):
+    case = paper_case()
+    with pytest.raises(st.CaseError) as raised:
+        observable_of(name, build_system(case), settings_of(case))
+    assert str(raised.value).startswith(ACCEPTED.format(name))
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"mu": [0.1, -0.2]}, "mu: [0.1, -0.2] – finite numbers ≥ 0, at least one"),
+        ({"mu": []}, "mu: [] – finite numbers ≥ 0, at least one"),
+        ({"load": 0.0}, "load: 0.0 – finite numbers above 0, at least one"),
+        ({"speed": [1.0, float("nan")]}, "speed: [1.0, nan] – finite numbers above 0, at least one"),
+        ({"perturbation": 1e-6}, 'perturbation: goes with initial = "steady-sliding"; from rest runs are disturbed anyway'),
+        ({"mu": [0.1, 0.2], "load": [1.0, 2.0, 3.0], "grid": False}, "mu: '2 values' – one value or 3, as many as others have"),
+        ({"mu": 0.1, "sweep": "up"}, "sweep: 'up' – goes along mu, of which two or more values are needed"),
+        ({"mu": [0.1, 0.2], "sweep": "sideways"}, "sweep: 'sideways' – up, down or both"),
+        ({"mu": [0.1, 0.2], "sweep": "up", "along": "time"}, "along: 'time' – mu, load or speed"),
+        ({"mu": [0.1, 0.2], "sweep": "up", "grid": False}, "sweep: 'up' – goes over all combinations of values: grid=True"),
+        ({"window": 0.0}, "window: 0.0 – the share of the last phase that is looked at, above 0 and at most 1"),
+        ({"mu": [0.1, 0.2], "sweep": "up", "window": 0.95}, "window: 0.95 – at most 0.9: before it loads and speeds still change by a ramp"),
+        ({"window": 1e-5}, "window: 1e-05 – a share of the last phase with 64 records at least, here it has 0: let that phase last longer, or record more often (temporal.record_every)"),
+    ],
+)  # fmt: skip
+def test_values_that_are_none_are_refused(given, said):
+    with pytest.raises(st.CaseError) as raised:
+        st.ensemble(paper_case(), **given)
+    assert str(raised.value) == said
+
+
+@pytest.mark.bad_input
+def test_a_case_in_which_nothing_moves_has_no_speed_to_scale():
+    case = paper_case().with_({"supports.clamp.velocity": {}, "phases.slide.velocities": {}, "phases.press.velocities": {}})
+    with pytest.raises(st.CaseError, match="no support of the case moves with a prescribed velocity"):
+        st.ensemble(case, speed=2.0)
