@@ -295,7 +295,7 @@ def test_rows_near_the_boundary_are_solved_in_full() -> None:
     assert first is not None
     study = st.Study(case=case, parameters=SCATTER, sampling={"method": "sobol", "samples": 64})
     model = reduced_rows.Reduced(
-        st.reduced_model(case, {"mu": (0.0, 1.0), MASS: (1.0, 20.0)}), "modes", {"mu": "mu", MASS: MASS}
+        (st.reduced_model(case, {"mu": (0.0, 1.0), MASS: (1.0, 20.0)}),), "modes", {}
     )
     at = {"mu": first.mu, MASS: 10.0}
     for mu, near in ((first.mu * (1 + 1e-9), True), (first.mu * (1 - 1e-9), True), (first.mu * 0.9, False)):

@@ -164,7 +164,7 @@ class _Lines:
 
     def __call__(self, done: int, planned: int) -> None:
         now = time.monotonic()
-        if now - self.last < BETWEEN_LINES or done >= planned:
+        if now - self.last < BETWEEN_LINES or not 0 < done < planned:
             return
         self.last = now
         left = (now - self.started) / done * (planned - done)

@@ -1,4 +1,5 @@
-"""Rows answered by one certified reduced model over all parameters of a study.
+"""Rows answered by one certified reduced model over all parameters of a study, or one for each stretch of friction in
+which the same nodes touch.
 
 The model's own estimate says how far its eigenvalues may be off. Every row near the boundary of stability, every row
 whose estimate is above the bound and a random share of all are solved in the full problem as well, which then counts.
@@ -18,7 +19,10 @@ from ..io.reduced_models import load_reduced, save_reduced
 from ..modal.full import onsets_along
 from ..modal.parametric import ReducedModel
 from ..modal.tolerances import UNSTABLE_RELATIVE
+from ..sliding.stretches import stretches
+from ..study.options import options_of
 from ..study.reduced import reduced_model
+from ..system import build_system
 from ..typing import Array
 from .checks import FRICTION
 from .rows import Row, modes_row, onsets_row
@@ -29,50 +33,52 @@ NEAR = 1e-6  # growth, of |λ|, below which stability is decided in full however
 SAME = 10.0  # how many times the estimated error the full problem may be away
 ROUNDING = 1e-9  # relative difference of eigenvalues that is none
 WORTH = 50  # rows from which on a model is worth making
+MOST_STRETCHES = 4  # of friction, each with a model of its own
+EXTREMES, SOME = 12, 4  # samples on which models are proved
 
 
 @dataclass(frozen=True)
 class Reduced:
-    """A model and what is asked of it."""
+    """Models, each over a stretch of friction (one over all of it where friction is no parameter), and what is asked of
+    them. names: of parameters of the study, those of the models."""
 
-    model: ReducedModel
+    models: tuple[ReducedModel, ...]
     compute: Compute
-    names: Mapping[str, str]  # of parameters of the study: those of the model
+    names: Mapping[str, str]
 
     @staticmethod
     def read(path: str, case: Case) -> Reduced:
-        """A model that `made` wrote. Raises CaseError where it is damaged."""
-        model = load_reduced(path)
-        compute: Compute = "onsets" if Path(path).stem.endswith("onsets") else "modes"
-        return Reduced(model, compute, {p.name: p.name for p in model.problem.parameters} | _named(case))
+        """Models that `made` wrote into a folder. Raises CaseError where one is damaged."""
+        folder = Path(path)
+        compute: Compute = "onsets" if folder.name.endswith("onsets") else "modes"
+        return Reduced(tuple(map(load_reduced, sorted(folder.glob("*.npz")))), compute, _named(case))
 
     def row(self, values: Mapping[str, float], keep: Keep) -> Row | None:
-        """A row of the model, None where a value lies outside its box."""
+        """A row of the model that holds these values, None where none does."""
         point = {self.names.get(path, path): value for path, value in values.items()}
-        return self._modes(point, keep) if self.compute == "modes" else self._onsets(point, keep)
+        for model in self.models:
+            if model.problem.inside(model.problem.point(point)):
+                return self._modes(model, point, keep) if self.compute == "modes" else self._onsets(model, point, keep)
+        return None
 
-    def _modes(self, point: Mapping[str, float], keep: Keep) -> Row | None:
-        found = self.model.modes(point)
-        if not found.inside:
-            return None
+    def _modes(self, model: ReducedModel, point: Mapping[str, float], keep: Keep) -> Row:
+        found = model.modes(point)
         upper = found.values.imag >= 0
         lam, error = found.values[upper], found.error[upper]
         row = modes_row(lam, np.zeros(len(lam), dtype=int), keep.modes)
         near = np.abs(lam.real) <= np.maximum(SAFE * error, NEAR) * np.abs(lam)
-        if not np.any(self.model.problem.powers == 1):
+        if not np.any(model.problem.powers == 1):
             # Without damping what is stable lies on the axis, but for rounding.
             near &= (np.abs(lam.real) > UNSTABLE_RELATIVE * np.abs(lam)) | (error > UNSTABLE_RELATIVE / SAFE)
         return row | {
             "status": 1, "source": "reduced", "estimated_error": float(error.max(initial=0.0)),
-            "_doubtful": bool(near.any() or np.any(error > self.model.bound)),
+            "_doubtful": bool(near.any() or np.any(error > model.bound)),
         }  # fmt: skip
 
-    def _onsets(self, point: Mapping[str, float], keep: Keep) -> Row | None:
-        if not self.model.problem.inside(self.model.problem.point(point)):
-            return None
-        found = onsets_along(self.model, FRICTION, point, confirm=False)
-        low = next(p.low for p in self.model.problem.parameters if p.name == FRICTION)
-        modes = self.model.modes({**point, FRICTION: low})
+    def _onsets(self, model: ReducedModel, point: Mapping[str, float], keep: Keep) -> Row:
+        found = onsets_along(model, FRICTION, point, confirm=False)
+        low = next(p.low for p in model.problem.parameters if p.name == FRICTION)
+        modes = model.modes({**point, FRICTION: low})
         growing = int(np.count_nonzero(modes.unstable & (modes.values.imag >= 0)))
         row = onsets_row(found, keep.onsets, complete=found.complete, growing_at_start=growing)
         error = float(modes.error.max(initial=0.0))
@@ -148,13 +154,45 @@ def unfit(study: Study, case: Case, rows: int) -> str:
 
 
 def made(study: Study, case: Case, samples: Array, path: Path) -> Reduced:
-    """The model over all samples, kept in a file. Raises CaseError and AnalysisError where there is none."""
+    """The models over all samples, kept in a folder. Raises CaseError and AnalysisError where there is none."""
     box = box_of(study, case, samples)
     constant = [p for k, p in enumerate(study.parameters) if samples[:, k].min() == samples[:, k].max()]
     if constant:
         raise CaseError("parameters", constant[0], "has one value only; set it by a table [set]")
-    model = reduced_model(case, box, bound=study.answers.bound)
-    if model.whole:
-        raise AnalysisError("damping is so strong that the reduced model is no faster")
-    save_reduced(model, path, case=case)
-    return Reduced(model, study.compute, {p.name: p.name for p in model.problem.parameters} | _named(case))
+    models: list[ReducedModel] = []
+    path.mkdir(parents=True, exist_ok=True)
+    for number, (own, low, high) in enumerate(_by_touching(study, case, box.get(FRICTION))):
+        part = box if FRICTION not in box else {**box, FRICTION: (low, high)}
+        model = reduced_model(own, part, bound=study.answers.bound)
+        if model.whole and model.states is None:
+            raise AnalysisError("damping is so strong that the reduced model is no faster")
+        save_reduced(model, path / f"{number:02}.npz", case=own)
+        models.append(model)
+    return Reduced(tuple(models), study.compute, _named(case))
+
+
+def _by_touching(study: Study, case: Case, friction: tuple[float, float] | None) -> list[tuple[Case, float, float]]:
+    """Ranges of friction, each with a case in whose steady sliding the nodes touch that do so all over it. Raises
+    AnalysisError where there are too many, and where no case has them."""
+    if friction is None:
+        return [(case, 0.0, 0.0)]
+    found = stretches(build_system(case), *friction, solver=options_of(case).solver)
+    if len(found) > MOST_STRETCHES or (len(found) > 1 and study.compute == "onsets"):
+        raise AnalysisError(f"other nodes touch as friction grows, {len(found) - 1} times in its range")
+    if any(s.reason or s.others for s in found):
+        raise AnalysisError("somewhere in the range of friction nothing slides steadily, or nodes change all along it")
+    if len(found) > 1 and any(c.friction.law != "coulomb" for c in case.contacts.values()):
+        raise AnalysisError("other nodes touch as friction grows, and friction is not constant")
+    parts: list[tuple[Case, float, float]] = []
+    for stretch in found:
+        changes = {f"contacts.{name}.friction.coefficient": stretch.at for name in case.contacts}
+        parts.append((case if stretch.at is None else case.with_(changes), stretch.low, stretch.high))
+    return parts
+
+
+def proofs(samples: Array, seed: int) -> list[int]:
+    """Places of samples (n, p) on which models are proved before they answer: where each number is least and largest,
+    which is where other nodes touch if they do anywhere, and some at random."""
+    extreme = [int(place(samples[:, k])) for k in range(samples.shape[1]) for place in (np.argmin, np.argmax)]
+    some = np.random.default_rng(seed).permutation(len(samples))[:SOME].tolist()
+    return list(dict.fromkeys([*extreme[:EXTREMES], *some]))

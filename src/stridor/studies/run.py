@@ -38,7 +38,6 @@ from .workers import LocalWorkers
 NAME = "study.zarr"
 SECONDS = 1.0  # of work in a batch, and between two writings
 LARGEST = 1000  # rows of a batch
-TRIAL = 4  # rows on which a reduced model is proved before it answers
 
 Progress = Callable[[int, int], None]
 
@@ -168,16 +167,17 @@ class _Run:
     def _task(self, case: Case, store: Store) -> Task:
         """The full problem, or a reduced model where there is one that agrees with it."""
         plain = Task(case.to_toml(), self.study.compute, tuple(self.study.parameters), self.study.keep, "", program())
-        path = (self.folder / f"reduced-{self.study.compute}.npz").resolve()
+        path = (self.folder / f"reduced-{self.study.compute}").resolve()
         answers = store.told("answers")
         if answers is None:
             why = self._reduced(case, store.samples, path)
-            answers = {"source": "full" if why else "reduced", "why": why}
+            models = 0 if why else len(list(path.glob("*.npz")))
+            answers = {"source": "full" if why else "reduced", "why": why, "models": models}
             store.note(answers=answers)
         if answers["source"] == "full":
             self.say(f"every sample is solved in full: {answers['why']}")
             return plain
-        if not path.exists():
+        if len(list(path.glob("*.npz"))) != answers["models"]:
             reduced_rows.made(self.study, case, store.samples, path)
         self.say("samples are answered by one reduced model; a share of them is solved in full as well")
         return Task(plain.case, plain.compute, plain.names, plain.keep, str(path), plain.program)
@@ -203,8 +203,8 @@ class _Run:
         """What speaks against a model on a few samples solved in full, "" where they agree."""
         from .rows import full_row
 
-        chosen = np.random.default_rng(self.study.sampling.seed).permutation(len(values))[:TRIAL]
-        for done, k in enumerate(chosen.tolist()):
+        chosen = reduced_rows.proofs(values, self.study.sampling.seed)
+        for done, k in enumerate(chosen):
             stage(f"reduced model against the full problem, sample {done + 1} of {len(chosen)}")
             point = dict(zip(self.study.parameters, values[k].tolist(), strict=True))
             row = model.row(point, self.study.keep)

@@ -19,7 +19,7 @@ from .schema import Compute, Keep
 
 @dataclass(frozen=True)
 class Task:
-    """A case as TOML, what is computed of each sample, and the file of a reduced model ("" none). program: of the
+    """A case as TOML, what is computed of each sample, and the folder of reduced models ("" none). program: of the
     stridor that asks."""
 
     case: str
