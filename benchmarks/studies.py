@@ -19,7 +19,9 @@ import numpy as np
 import stridor as st
 from _common import machine
 from stridor.case import template_text
+from stridor.studies.rows import variables
 from stridor.studies.schema import Study
+from stridor.studies.store import Head, Store
 from stridor.studies.task import Batch
 
 SCATTER = {
@@ -69,6 +71,22 @@ def scheduling(address: str) -> None:
             print(f"  a task of {rows:>3} rows without work: {1e3 * each:.2f} ms, {1e6 * each / rows:.0f} µs a row")
 
 
+def writing(rows: int) -> None:
+    """What the one process that writes the store takes for rows of modes."""
+    study = scatter(rows, "reduced")
+    columns = variables("modes")
+    row = {v.name: np.zeros(40) if v.inner else "" if v.dtype == "str" else 1 for v in columns}
+    with tempfile.TemporaryDirectory() as folder:
+        head = Head(study.document(), "", {})
+        values = np.random.default_rng(1).random((rows, 3))
+        store = Store.made(Path(folder) / "x.zarr", head, values, dict.fromkeys(SCATTER, ""), columns, {"mode": 40})
+        started = time.perf_counter()
+        for first in range(0, rows, 1000):
+            store.write({k: row for k in range(first, min(first + 1000, rows))})
+        each = (time.perf_counter() - started) / rows
+    print(f"  writing a row of 40 modes: {1e6 * each:.0f} µs, {1 / each:.0f} rows/s at most")
+
+
 def cluster(study: Study) -> None:
     dask = Path(sys.executable).with_name("dask")
     with tempfile.TemporaryDirectory() as folder:
@@ -103,6 +121,7 @@ def main() -> None:
     full = scatter(few, "full")
     one = line("full, 1 worker", 1, timed(full, 1))
     print(f"  ratio of 2 workers to 1: {line('full, 2 workers', 2, timed(full, 2)) / one:.2f}")
+    writing(many)
     reduced = scatter(many, "reduced")
     first = line("reduced, 1 worker", 1, timed(reduced, 1))
     print(f"  ratio of reduced to full, 1 worker: {first / one:.0f}")

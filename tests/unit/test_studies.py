@@ -112,9 +112,7 @@ def test_parameters_without_effect_are_told(case: st.Case, tmp_path: Path) -> No
 # -- who is killed -----------------------------------------------------------------------------------------------------
 RUN = """
 import sys, stridor as st
-from stridor.studies.schema import Study
-if __name__ == "__main__":
-    st.run_study(Study.load(sys.argv[1]), sys.argv[2], workers=2)
+st.run_study(sys.argv[1], sys.argv[2], workers=2)
 """
 KILLED = f"""
 case = "case.toml"
@@ -247,6 +245,16 @@ def test_a_full_disk_loses_nothing_that_was_written(case: st.Case, tmp_path: Pat
     assert np.array_equal(kept.data["seconds"].values[kept.done], last.data["seconds"].values[kept.done])
 
 
+def test_a_script_needs_no_guard(case: st.Case, tmp_path: Path) -> None:
+    """Workers do not import the script that starts them."""
+    (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
+    (tmp_path / "study.toml").write_text(KILLED.replace("points = 40", "points = 4"), encoding="utf-8")
+    (tmp_path / "script.py").write_text("import stridor as st\nprint(st.run_study('study.toml', workers=2))\n", encoding="utf-8")
+    done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("modes of 8 samples") == 1
+
+
 def test_ctrl_c_keeps_what_is_done(case: st.Case, tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
     (tmp_path / "study.toml").write_text(KILLED, encoding="utf-8")
@@ -346,7 +354,7 @@ def test_the_program_prints_the_answer_and_draws(tmp_path: Path) -> None:
     folder = tmp_path / "study.out"
     drawn = {path.name for path in folder.glob("*.png")}
     assert {"stability-map.png", "root-locus.png", "over-mu.png", "bands.png"} <= drawn
-    page = (folder / "study.html").read_text(encoding="utf-8")
+    page = (folder / "report.html").read_text(encoding="utf-8")
     assert "A &lt;b&gt; study" in page
     assert page.count("<img ") == len(drawn)
     heads = (folder / "study.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
@@ -355,9 +363,9 @@ def test_the_program_prints_the_answer_and_draws(tmp_path: Path) -> None:
         path.unlink()
     (tmp_path / "case.toml").unlink()  # the store is enough
     assert stridor("plot", "study.out", cwd=tmp_path).returncode == 0
-    assert {path.name for path in (tmp_path / "study.out.out").glob("*.png")} | {
-        path.name for path in folder.glob("*.png")
-    } >= drawn
+    assert {path.name for path in folder.glob("*.png")} == drawn
+    assert stridor("plot", "study.out/study.zarr", "--out", "elsewhere", cwd=tmp_path).returncode == 0
+    assert {path.name for path in (tmp_path / "elsewhere").glob("*.png")} == drawn
 
 
 def test_the_document_holds_no_more_than_plain_values(case: st.Case, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -119,7 +120,7 @@ def _drawn(call: Call, result: StudyResult) -> list[Path]:
         with replacing(path) as temporary:
             figure.savefig(temporary, dpi=150)
         files.append(path)
-    files.append(write_page(result, drawn, call.folder / "study.html"))
+    files.append(write_page(result, drawn, call.folder / "report.html"))
     return files
 
 
@@ -184,6 +185,8 @@ def plot(call: Call) -> None:
     from ..studies.result import open_study
 
     result = open_study(call.path)
+    if call.out is None:
+        call = replace(call, out=result.path.parent)
     call.claim()
     files = _drawn(call, result)
     for path in files:

@@ -82,7 +82,10 @@ class Reduced:
         growing = int(np.count_nonzero(modes.unstable & (modes.values.imag >= 0)))
         row = onsets_row(found, keep.onsets, complete=found.complete, growing_at_start=growing)
         error = float(modes.error.max(initial=0.0))
-        return row | {"status": 1, "source": "reduced", "estimated_error": error, "_doubtful": not found.complete}
+        # Where growth begins at an end of the range, or has a hair's breadth before it, the full problem says so.
+        ends = np.abs(row["onset_mu"][:, None] - np.array(found.between)).min(initial=np.inf)
+        doubtful = not found.complete or ends <= NEAR * (found.between[1] - found.between[0])
+        return row | {"status": 1, "source": "reduced", "estimated_error": error, "_doubtful": bool(doubtful)}
 
     @staticmethod
     def doubtful(row: Row) -> bool:

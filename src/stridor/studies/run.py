@@ -37,7 +37,8 @@ from .workers import LocalWorkers
 
 NAME = "study.zarr"
 SECONDS = 1.0  # of work in a batch, and between two writings
-LARGEST = 1000  # rows of a batch
+MANY = 100  # workers, from which on batches grow with their number
+LARGEST = 10_000  # rows of a batch
 
 Progress = Callable[[int, int], None]
 
@@ -259,7 +260,9 @@ class _Run:
         chosen = np.random.default_rng(self.study.sampling.seed + 1).random(len(values)) < self.study.answers.confirm
         at = 0
         while at < len(places):
-            size = 1 if not self.rate else int(np.clip(SECONDS / max(self.rate, 1e-6), 1, LARGEST))
+            # A scheduler hands out some hundred tasks a second: with more workers they are longer.
+            seconds = SECONDS * max(1.0, workers / MANY)
+            size = 1 if not self.rate else int(np.clip(seconds / max(self.rate, 1e-6), 1, LARGEST))
             size = max(1, min(size, (len(places) - at) // (2 * workers) or 1))
             part = places[at : at + size]
             at += size

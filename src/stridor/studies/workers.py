@@ -11,6 +11,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections import deque
@@ -132,7 +133,7 @@ class LocalWorkers:
         ours, theirs = self._context.Pipe()
         given = theirs, self.task, self.answer
         process = self._context.Process(target=_work, args=given, daemon=True, name="stridor study")
-        with _one_thread_each():
+        with _one_thread_each(), _main_left_out():
             process.start()
         theirs.close()
         worker = _Worker(process, ours)
@@ -153,6 +154,20 @@ def _one_thread_each() -> Generator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+@contextlib.contextmanager
+def _main_left_out() -> Generator[None]:
+    """Processes that start here do not import the script that starts them, which would start a study again where it
+    lacks ``if __name__ == "__main__"``; nothing of it is needed."""
+    main = sys.modules["__main__"].__dict__
+    before = {name: main[name] for name in ("__file__", "__spec__") if name in main}
+    main.pop("__file__", None)
+    main["__spec__"] = None
+    try:
+        yield
+    finally:
+        main.update(before)
 
 
 def _work(pipe: Any, task: Task, answer: Answer) -> None:
