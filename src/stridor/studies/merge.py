@@ -8,7 +8,7 @@ from pathlib import Path
 from ..errors import CaseError
 from .parts import FOLDERS, Part
 from .rows import lengths, variables
-from .run import digest_of, unit_of
+from .run import unit_of
 from .sampling import samples
 from .schema import Study
 from .store import DONE, Head, Store, dataset, head_of
@@ -22,7 +22,7 @@ def merged(folder: Path, path: Path) -> list[str]:
         raise CaseError(str(folder), None, f"no parts there: folders {FOLDERS} that --part wrote")
     heads = [head_of(place) for place in places]
     for place, head in zip(places, heads, strict=True):
-        if head.study != heads[0].study:
+        if head.digest != heads[0].digest:
             raise CaseError(str(place), None, f"is of another study than {places[0]}")
     study = Study.from_document(heads[0].study)
     count = Part.read(heads[0].part).count
@@ -33,8 +33,7 @@ def merged(folder: Path, path: Path) -> list[str]:
     if missing := [str(k) for k in range(1, count + 1) if k not in there]:
         listed = ", ".join(missing[:20]) + (" …" if len(missing) > 20 else "")
         told.append(f"parts missing: {listed} of {count}; their rows are not computed")
-    case = study.base()
-    head = Head(heads[0].study, digest_of(study, case), heads[0].provenance)
+    head = Head(heads[0].study, heads[0].digest, heads[0].provenance)
     values = samples(study)
     columns, inner = variables(study.compute), lengths(study.compute, study.keep)
     if path.exists():

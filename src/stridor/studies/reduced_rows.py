@@ -65,7 +65,7 @@ class Reduced:
         found = model.modes(point)
         upper = found.values.imag >= 0
         lam, error = found.values[upper], found.error[upper]
-        row = modes_row(lam, np.zeros(len(lam), dtype=int), keep.modes)
+        row = modes_row(lam, np.zeros(len(lam), dtype=int), keep.modes, model.frequency)
         near = np.abs(lam.real) <= np.maximum(SAFE * error, NEAR) * np.abs(lam)
         if not np.any(model.problem.powers == 1):
             # Without damping what is stable lies on the axis, but for rounding.

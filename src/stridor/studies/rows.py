@@ -15,7 +15,7 @@ from ..errors import StridorError
 from ..modal.full import ParametricOnsets
 from ..modal.growing import doubt
 from ..modal.onset import Onsets
-from ..modal.tolerances import UNSTABLE_RELATIVE
+from ..modal.results import grows
 from ..study.analyses import compare, modes, onsets, simulate, steady_sliding, summarise
 from ..study.workspace import Workspace
 from ..typing import ComplexArray, IntArray
@@ -72,9 +72,10 @@ def _printable(text: str) -> str:
 # -- modes -------------------------------------------------------------------------------------------------------------
 
 
-def modes_row(eigenvalues: ComplexArray, branches: IntArray, keep: int, *, rounding: float = UNSTABLE_RELATIVE) -> Row:
-    """The modes λ (k,) [1/s] of a row: unstable ones first, then the lowest, in the order of frequency."""
-    growing = eigenvalues.real > rounding * np.abs(eigenvalues)
+def modes_row(eigenvalues: ComplexArray, branches: IntArray, keep: int, top: float) -> Row:
+    """The modes λ (k,) [1/s] of a row: unstable ones first, then the lowest, in the order of frequency; top [1/s] is
+    the end of the band."""
+    growing = grows(eigenvalues, top)
     order = np.lexsort((eigenvalues.imag, -eigenvalues.real * growing, ~growing))[:keep]
     order = order[np.argsort(eigenvalues.imag[order], kind="stable")]
     chosen = eigenvalues[order]
@@ -95,8 +96,8 @@ def modes_row(eigenvalues: ComplexArray, branches: IntArray, keep: int, *, round
 def _modes(work: Workspace, mu: float | None, keep: Keep) -> Row:
     found = modes(work, mu, max_frequency_hz=work.modal.max_frequency_hz)
     inside = found.in_band[0]
-    row = modes_row(found.eigenvalues[0, inside], found.branch[inside], keep.modes)
-    row["unstable_modes"] = int(np.count_nonzero(found.unstable[0, inside]))
+    top = 2 * np.pi * work.modal.max_frequency_hz
+    row = modes_row(found.eigenvalues[0, inside], found.branch[inside], keep.modes, top)
     return row | {"note": _printable(" ".join(map(doubt, found.completeness)))}
 
 

@@ -126,7 +126,7 @@ class _Run:
     def _store(self, case: Case) -> Store:
         path = self.folder / NAME
         columns = variables(self.study.compute)
-        digest = digest_of(self.study, case, self.part)
+        digest = digest_of(self.study, case)
         if path.exists():
             store = Store.opened(path, columns)
             self._check(store, digest)
@@ -148,6 +148,8 @@ class _Run:
     def _check(self, store: Store, digest: str) -> None:
         """Raises CaseError where the store is not one of this study and this program."""
         head = store.head
+        if head.part != ("" if self.part is None else str(self.part)):
+            raise CaseError(str(store.path), None, f"holds part {head.part or 'all'} of the study; name another folder")
         if head.digest != digest:
             raise CaseError(str(store.path), None, f"is of another study: {_differences(head.study, self.study)}")
         programs = store.told("programs") or head.provenance.get("programs", [])
@@ -288,14 +290,14 @@ class _Run:
         return True
 
 
-def digest_of(study: Study, case: Case, part: Part | None = None) -> str:
+def digest_of(study: Study, case: Case) -> str:
     """SHA-256 of what the rows follow from: samples, case, the files that it names; not of who computes them."""
     document = study.document()
     for name in ("title", "restart_failed", "goal"):
         document.pop(name, None)
     data = case.model_dump(mode="json", exclude_none=True)
     files = {path: contents(Path(path)) for path in sorted(set(files_of(data)))}
-    text = json.dumps([document, files, "" if part is None else str(part)], sort_keys=True)
+    text = json.dumps([document, files], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

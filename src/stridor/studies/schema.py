@@ -16,6 +16,7 @@ from ..case.fields import Number, Positive, Table, Truth
 from ..case.messages import problems_of
 from ..case.overrides import override
 from ..errors import CaseError, Problem
+from ..notebook import Shown, counted
 from ..reading import irregular
 
 LARGEST = 2**22  # bytes of a study file
@@ -96,7 +97,7 @@ class Goal(Table):
     most: Samples = Field(default=100_000, description="how many samples there may be at most")
 
 
-class Study(Table):
+class Study(Shown, Table):
     """A case, the numbers of it that vary, and what is computed of each sample.
 
     st.Study(case="two-beams.toml", compute="modes", parameters={"mu": {"range": (0.0, 0.5), "points": 21}}), or
@@ -123,6 +124,8 @@ class Study(Table):
     )
 
     def __init__(self, /, **tables: Any) -> None:
+        if isinstance(tables.get("case"), PathLike):
+            tables["case"] = os.fspath(tables["case"])
         try:
             super().__init__(**tables)
         except ValidationError as error:
@@ -131,6 +134,15 @@ class Study(Table):
 
         if problems := problems_within(self):
             raise CaseError.many(problems)
+
+    @property
+    def _line(self) -> str:
+        title = f"{self.title}, " if self.title else ""
+        varied = counted(len(self.parameters), "parameter")
+        return f"{title}{self.compute} over {varied} ({', '.join(self.parameters)}), {self.sampling.method}"
+
+    def __str__(self) -> str:
+        return repr(self)
 
     @staticmethod
     def load(path: str | PathLike[str], overrides: Sequence[str] = ()) -> Study:
