@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         steady_sliding,
         summarise,
     )
+    from .study.boundary import stability_boundary
     from .study.copies import perturbed_copies
     from .study.countermeasures import rank_countermeasures
     from .study.damping_map import damping_map
@@ -81,6 +82,7 @@ _HOMES = {
     "save": ".io.datasets",
     "sensitivities": ".study.sensitivities",
     "simulate": ".study.analyses",
+    "stability_boundary": ".study.boundary",
     "steady_sliding": ".study.analyses",
     "study_figures": ".studies.plots",
     "summarise": ".study.analyses",
@@ -122,6 +124,7 @@ __all__ = [
     "save",
     "sensitivities",
     "simulate",
+    "stability_boundary",
     "steady_sliding",
     "study_figures",
     "summarise",

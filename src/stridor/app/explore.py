@@ -1,4 +1,4 @@
-"""Verbs that ask what a change would do: sensitivities, counter-measures, damping maps, reduced models."""
+"""Verbs that ask what a change would do: sensitivities, counter-measures, damping maps, boundaries, reduced models."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import typer
 
 from ..errors import CaseError
 from .arguments import Call, verb
+from .boundary import boundary
 from .damping import damping_map
 from .option_table import Band, Branch, MaxFrequency, Mu, Parameter, Source, Undamped
 from .reduce import reduce
@@ -128,5 +129,6 @@ VERBS = {
     "sensitivities": sensitivities,
     "countermeasures": countermeasures,
     "damping-map": damping_map,
+    "boundary": boundary,
     "reduce": reduce,
 }

@@ -14,7 +14,7 @@ import typer
 
 COMPUTING = (
     "steady", "shapes", "modes", "onsets", "simulate", "compare", "run", "report", "sensitivities", "countermeasures",
-    "damping-map", "reduce",
+    "damping-map", "boundary", "reduce",
 )  # fmt: skip
 ABOUT = ("new", "check", "matrices", "export")  # verbs about the case itself
 STUDIES = ("study", "plot")  # of many samples of a case
@@ -54,7 +54,7 @@ Mu = Annotated[
         "case's own, of compare comparison.mu].",
         metavar="MU",
         on="steady shapes modes simulate compare report sensitivities countermeasures export",
-        lacks="onsets=sought run=--range damping-map=sought reduce=--at",
+        lacks="onsets=sought run=--range damping-map=sought boundary=--set reduce=--at",
     ),
 ]
 Range = Annotated[
@@ -64,7 +64,8 @@ Range = Annotated[
         "Range of μ in which onsets are sought [default: modal.friction_range].",
         metavar="LOW:HIGH",
         on="onsets compare run report damping-map",
-        lacks="steady=--mu shapes=--mu modes=--mu simulate=--mu sensitivities=--mu countermeasures=--mu reduce=--box",
+        lacks="steady=--mu shapes=--mu modes=--mu simulate=--mu sensitivities=--mu countermeasures=--mu "
+        "boundary=--y-range reduce=--box",
     ),
 ]
 MaxFrequency = Annotated[
@@ -84,7 +85,7 @@ Band = Annotated[
         metavar="LOW:HIGH",
         on="modes shapes onsets sensitivities",
         lacks="steady=static simulate=time compare=pairs run=page report=page countermeasures=sum damping-map=lowest "
-        "reduce=unnumbered",
+        "boundary=curves reduce=unnumbered",
     ),
 ]
 Branch = Annotated[
@@ -95,7 +96,7 @@ Branch = Annotated[
         metavar="NUMBER",
         on="shapes sensitivities countermeasures",
         lacks="steady=static modes=--band onsets=--band simulate=time compare=fastest run=fastest report=fastest "
-        "damping-map=lowest reduce=unnumbered",
+        "damping-map=lowest boundary=curves reduce=unnumbered",
     ),
 ]
 Unstable = Annotated[
@@ -105,7 +106,7 @@ Unstable = Annotated[
         "List unstable modes alone.",
         on="modes",
         lacks="steady=static shapes=default onsets=all simulate=time compare=fastest run=page report=page "
-        "sensitivities=default countermeasures=default damping-map=lowest reduce=unnumbered",
+        "sensitivities=default countermeasures=default damping-map=lowest boundary=curves reduce=unnumbered",
     ),
 ]
 Sort = Annotated[
@@ -116,7 +117,7 @@ Sort = Annotated[
         metavar="frequency|growth",
         on="modes",
         lacks="steady=static shapes=growth onsets=μ simulate=time compare=μ run=page report=page sensitivities=growth "
-        "countermeasures=effect damping-map=grid reduce=frequency",
+        "countermeasures=effect damping-map=grid boundary=curves reduce=frequency",
     ),
 ]
 Source = Annotated[
@@ -125,7 +126,7 @@ Source = Annotated[
         "--source",
         "Where eigenpairs come from: receptance, krylov, reduced, full [default: modal.source, what suits].",
         metavar="NAME",
-        lacks="steady=static simulate=time reduce=reduced",
+        lacks="steady=static simulate=time boundary=--method reduce=reduced",
     ),
 ]
 Undamped = Annotated[
@@ -134,7 +135,8 @@ Undamped = Annotated[
         "--undamped",
         "Leave structural damping out.",
         on="modes shapes onsets sensitivities countermeasures",
-        lacks="steady=static simulate=time compare=time run=both report=both damping-map=damping reduce=kept",
+        lacks="steady=static simulate=time compare=time run=both report=both damping-map=damping boundary=kept "
+        "reduce=kept",
     ),
 ]
 Box = Annotated[
@@ -146,7 +148,7 @@ Box = Annotated[
         metavar="NAME=LOW:HIGH",
         on="reduce",
         lacks="steady=--mu shapes=--mu modes=--mu onsets=--between simulate=--mu compare=--range run=--range "
-        "report=--mu sensitivities=--mu countermeasures=--mu damping-map=--x-range",
+        "report=--mu sensitivities=--mu countermeasures=--mu damping-map=--x-range boundary=--x-range",
     ),
 ]
 At = Annotated[
@@ -157,7 +159,7 @@ At = Annotated[
         metavar="NAME=VALUES",
         on="reduce",
         lacks="steady=--set shapes=--set modes=--set onsets=--set simulate=--set compare=--set run=--set report=--set "
-        "sensitivities=--set countermeasures=--set damping-map=--set",
+        "sensitivities=--set countermeasures=--set damping-map=--set boundary=--set",
     ),
 ]
 Parameter = Annotated[
@@ -168,7 +170,7 @@ Parameter = Annotated[
         metavar="PATH",
         on="sensitivities countermeasures",
         lacks="steady=--set shapes=--set modes=--set onsets=--along simulate=--set compare=--set run=--set report=page "
-        "damping-map=--x reduce=--box",
+        "damping-map=--x boundary=--x reduce=--box",
     ),
 ]
 Force = Annotated[bool, _option("--force", "Replace files that are there already.", on="new export")]

@@ -41,7 +41,7 @@ class Root:
     """A solved onset: μ, λ on the axis, its vector x (n,), how growth opens there, and backward error.
 
     slope: dRe λ/dμ of a simple eigenvalue. square: κ² of λ ≈ λ_c ± κ √(μ − μ_c) of a double one, negative where the
-    growth ends.
+    growth ends. left (n,): yᵀP(λ) = 0.
     """
 
     mu: float
@@ -50,6 +50,7 @@ class Root:
     slope: float | None
     square: float | None
     residual: float
+    left: ComplexArray
 
 
 class BorderedFactor(Protocol):
@@ -107,7 +108,7 @@ class NewtonProblem(Protocol):
 
 @dataclass(frozen=True)
 class Point:
-    """g and its derivatives at (λ, μ), and the vector x (n,) that P all but takes to zero."""
+    """g and its derivatives at (λ, μ), and the vectors x and y (n,) that P all but takes to zero from both sides."""
 
     g: complex
     by_lam: complex
@@ -115,6 +116,7 @@ class Point:
     by_lam_lam: complex
     by_lam_mu: complex
     x: ComplexArray
+    y: ComplexArray
 
 
 @dataclass
@@ -170,7 +172,8 @@ class Border:
         twice = 2 * times(here.mass, x) + 2 * here.slope(lam, x_lam)
         mixed = change.slope(lam, x) + here.slope(lam, x_mu) + change.applied(lam, x_lam)
         return Point(
-            g, complex(both[n, 0]), complex(both[n, 1]), complex(-(y @ twice) / scale), complex(-(y @ mixed) / scale), x
+            g, complex(both[n, 0]), complex(both[n, 1]), complex(-(y @ twice) / scale), complex(-(y @ mixed) / scale),
+            x, y,
         )  # fmt: skip
 
 
@@ -207,7 +210,7 @@ def crossing(
         return None
     omega, mu, here = steps.kept
     slope = float((-here.by_mu / here.by_lam).real)
-    return _judged(problem, mu, 1j * omega, here.x, slope, None)
+    return _judged(problem, mu, 1j * omega, here, slope, None)
 
 
 def meeting(
@@ -239,7 +242,7 @@ def meeting(
     square = complex(-2 * here.by_mu / here.by_lam_lam)
     if not np.isfinite(square) or abs(square.imag) > 1e-3 * abs(square):
         return None
-    return _judged(problem, mu, 1j * omega, here.x, None, float(square.real))
+    return _judged(problem, mu, 1j * omega, here, None, float(square.real))
 
 
 def exceptional(
@@ -303,15 +306,15 @@ def standstill(
         return None
     _, mu, here = steps.kept
     if problem.reversible:
-        return _judged(problem, mu, 0j, here.x, None, float((-2 * here.by_mu / here.by_lam_lam).real))
+        return _judged(problem, mu, 0j, here, None, float((-2 * here.by_mu / here.by_lam_lam).real))
     if here.by_lam == 0:
         return None
-    return _judged(problem, mu, 0j, here.x, float((-here.by_mu / here.by_lam).real), None)
+    return _judged(problem, mu, 0j, here, float((-here.by_mu / here.by_lam).real), None)
 
 
 def _judged(
-    problem: NewtonProblem, mu: float, lam: complex, x: ComplexArray, slope: float | None, square: float | None
+    problem: NewtonProblem, mu: float, lam: complex, here: Point, slope: float | None, square: float | None
 ) -> Root | None:
     """The root with its backward error in the matrices as the system gives them there; None where that is too large."""
-    residual = problem.backward_error(mu, lam, x)
-    return Root(mu, lam, x, slope, square, residual) if residual <= CONFIRMED else None
+    residual = problem.backward_error(mu, lam, here.x)
+    return Root(mu, lam, here.x, slope, square, residual, here.y) if residual <= CONFIRMED else None

@@ -52,7 +52,7 @@ class ReducedSearch:
         AnalysisError where it does not settle."""
         case = full.case
         _dampings_only(case, full.paths, ends)
-        names = tuple(_box_name(case, path) for path in full.paths)
+        names = tuple(box_name(case, path) for path in full.paths)
         box = {FRICTION: full.mu_range, **dict(zip(names, ends, strict=True))}
         model = reduced_model(case, box, max_frequency_hz=full.max_frequency_hz, bound=bound)
         return cls(case, model, (names[0], names[1]), full)
@@ -210,7 +210,7 @@ def _between(model: ReducedModel, low: float, high: float) -> ReducedModel:
     return replace(model, problem=replace(model.problem, parameters=parameters))
 
 
-def _box_name(case: Case, path: str) -> str:
+def box_name(case: Case, path: str) -> str:
     """What a box calls the number at a path."""
     steps = split_path(path)
     return steps[1] if len(steps) == 3 and steps[0] == "parameters" and steps[1] in case.parameters else path

@@ -1,7 +1,7 @@
 """Settings that a case gives and that change nothing on the path its analyses take: told, one line each.
 
 - modal.solver, --solver: beams in point contacts, whose modes are dense unless modal.source says otherwise
-- modal.source: `steady`, `reduce`, `simulate`
+- modal.source: `steady`, `boundary`, `reduce`, `simulate`
 - modal.friction_damping: but for contact over nodes in space; `compare`, which has it as the time loop has
 - modal.prestress: but for assembled matrices with meshed solids; `compare`, `simulate`
 - modal.damped = false: `simulate`, `compare`
@@ -26,8 +26,8 @@ from .workspace import Workspace
 
 IN_TIME = ("simulate", "compare", "run")
 MODAL = (
-    "steady", "modes", "shapes", "onsets", "run", "sensitivities", "countermeasures", "damping_map", "reduce",
-    "report",
+    "steady", "modes", "shapes", "onsets", "run", "sensitivities", "countermeasures", "damping_map", "boundary",
+    "reduce", "report",
 )
 
 
@@ -97,7 +97,7 @@ def _of_modes(case: Case, verb: str, solver: str | None, *, few: bool) -> Iterat
     if dense and (solver is not None or case.modal.solver != "auto"):
         what = "modal.solver" if solver is None else "--solver"
         yield f"{what} has no effect: beams in point contacts are solved by dense methods"
-    if case.modal.source != "auto" and verb in ("steady", "reduce", "simulate"):
+    if case.modal.source != "auto" and verb in ("steady", "boundary", "reduce", "simulate"):
         yield f"modal.source has no effect on {verb}: it acts on modes and onsets"
     if case.modal.friction_damping and verb != "simulate":
         if few or case.dimension < 3:

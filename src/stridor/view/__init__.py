@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from . import plots
+    from .boundary_plots import stability_boundary
     from .inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
     from .plots import (
         Animation,
@@ -79,6 +80,7 @@ __all__ = [
     "spectrogram_plot",
     "spectrum_map",
     "spectrum_plot",
+    "stability_boundary",
     "write_report",
 ]
 
@@ -90,6 +92,7 @@ _HOME = {
     "countermeasure_bars": "sensitivity_plots",
     "damping_map": "sensitivity_plots",
     "sensitivity_bars": "sensitivity_plots",
+    "stability_boundary": "boundary_plots",
     "write_report": "report",
 }
 

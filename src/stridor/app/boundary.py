@@ -1,0 +1,113 @@
+"""`stridor boundary`: the curves over two numbers on which modes begin to grow, as a table, a picture and a file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .arguments import INCOMPLETE, Call, verb
+from .closing import Conclusion
+from .option_table import MaxFrequency
+from .values import pair
+
+if TYPE_CHECKING:
+    from ..study.boundary_result import Boundary, BoundaryCurve
+
+
+@verb()
+def boundary(
+    call: Call,
+    x: Annotated[str, typer.Option("--x", metavar="PATH", help="A number of the case.")],
+    x_range: Annotated[str, typer.Option("--x-range", metavar="LOW:HIGH", help="Its range.")],
+    y_range: Annotated[str, typer.Option("--y-range", metavar="LOW:HIGH", help="The other's range.")],
+    y: Annotated[str, typer.Option("--y", metavar="PATH", help="Another one.")] = "mu",
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="auto|full|reduced",
+            help="full: the whole matrices, up to 400 freedoms; reduced: one reduced model for all, a few points "
+            "solved again in the full problem; auto: full up to 60 freedoms.",
+        ),
+    ] = "auto",
+    lines: Annotated[int, typer.Option("--lines", help="Values of each number at which onsets are sought.")] = 5,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", help="How far curves may be off between their points, of the ranges.")
+    ] = 1e-3,
+    max_frequency: MaxFrequency = None,
+) -> None:
+    """Where modes begin to grow over two numbers, traced without a grid."""
+    loaded = call.workspace(max_frequency=max_frequency)
+
+    from ..io.atomic import replacing
+    from ..study.boundary import stability_boundary as solve
+    from ..view.boundary_plots import stability_boundary as draw
+    from .output import progress_bar, stdout
+
+    ranges = pair(x_range, "--x-range"), pair(y_range, "--y-range")
+    chosen: Any = method
+    with progress_bar("boundary", quiet=call.quiet) as progress:
+        result = solve(
+            loaded, x, y, x_range=ranges[0], y_range=ranges[1], method=chosen, lines=lines, tolerance=tolerance,
+            progress=progress,
+        )  # fmt: skip
+    files = [call.tabulate(result, "boundary.csv"), call.folder / "boundary.png"]
+    with replacing(files[1]) as temporary:
+        draw(result).savefig(temporary, dpi=150)
+    call.say(f"written: {files[1]}")
+    call.warn(result.warnings)
+    if call.json:
+        call.document(result.to_json() | {"files": [str(f) for f in files]})
+    else:
+        _show(result)
+        for line in (result.sentence, *result.notes):
+            stdout.print(line)
+        call.conclude(_conclusion(result))
+    if not result.agree:
+        raise typer.Exit(INCOMPLETE)
+
+
+def _conclusion(result: Boundary) -> Conclusion:
+    """How many curves bound what nothing grows in; then the modes at the lowest point of these."""
+    import numpy as np
+
+    outer = [curve for curve in result.curves if curve.outer.any()]
+    if not result.curves:
+        counts = {c.unstable_modes for c in result.counted}
+        growing = f"; {counts.pop() or 'no'} modes grow wherever that was counted" if len(counts) == 1 else ""
+        return Conclusion(f"no curve in the rectangle up to {result.max_frequency_hz:g} Hz{growing}", "modes")
+    if not outer:
+        return Conclusion(f"{len(result.curves)} curves; something grows on both sides of each of them", "modes")
+    lowest = [np.where(curve.outer, curve.y, np.inf) for curve in outer]
+    k = int(np.argmin([float(y.min()) for y in lowest]))
+    j = int(np.argmin(lowest[k]))
+    at = f"{result.x} = {outer[k].x[j]:.6g}, {result.y} = {outer[k].y[j]:.6g} ({outer[k].frequency_hz[j]:.6g} Hz)"
+    number = f"{len(outer)} of {len(result.curves)} curves {'bound' if len(outer) > 1 else 'bounds'}"
+    said = f"{number} where nothing grows, down to {at}"
+    options = tuple(
+        word
+        for path, value in ((result.x, outer[k].x[j]), (result.y, outer[k].y[j]))
+        for word in (("--mu", f"{value:.6g}") if path == "mu" else ("--set", f"{path}={value:.6g}"))
+        if path != "contact_stiffness"
+    )
+    return Conclusion(said, "modes", options)
+
+
+def _show(result: Boundary) -> None:
+    """A row for each curve."""
+    from .tables import table
+
+    if not result.curves:
+        return
+    heads = ["curve", "kind", "frequency [Hz]", "x", "y", "from", "to", "outer", "points"]
+    rows = [_row(k, curve) for k, curve in enumerate(result.curves, start=1)]
+    title = f"Where modes begin to grow\n  x: {result.x}\n  y: {result.y}"
+    table(title, heads, rows, drop=["points", "outer", "kind"], kept_in="boundary.csv")
+
+
+def _row(number: int, curve: BoundaryCurve) -> list[str]:
+    ends = ("closed", "") if curve.closed else curve.ends
+    share = f"{100 * float(curve.outer.mean()):.0f} %"
+    spans = [f"{v.min():.5g} … {v.max():.5g}" for v in (curve.frequency_hz, curve.x, curve.y)]
+    return [f"{number}", curve.kind, *spans, *ends, share, f"{len(curve.x)}"]

@@ -1,0 +1,266 @@
+"""The way along a curve of critical values: predict along tangent and bend, correct at a right angle to that.
+
+Steps are halved until Newton's method settles close to where it was predicted, tangents turn little, and the eigenpair
+is the one of the step before, by its vector and by ω. Then points in the middle of every two are solved as well: where
+one is off the cubic between its neighbours by more than the tolerance, both halves are looked at again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from ...typing import Array
+from .curve import Curve, hermite
+from .plane import Plane
+from .spot import Spot, settled
+
+LONGEST, SHORTEST = 0.15, 1e-6  # steps, in shares of the ranges
+FIRST = 0.02
+TURN = 0.45  # [rad] a step may turn the tangent by
+AIMED = 0.3  # and is meant to
+HIT = 0.2  # of a step: how far from the prediction the point may lie
+ALIKE = 0.6  # |xᴴx'| of vectors of unit length from one point to the next
+OMEGA = 0.05  # of ω: how far from its prediction
+STILL = 1e-4  # of the highest frequency: ω below which flutter has come to rest
+MOST = 3000  # points
+LEVELS = 6  # halvings in the middle of two points
+BESIDE = 0.5  # of a step: how far a point is looked for
+INSIDE = 1e-12
+CUSP = 1e-4  # how far from one another curves may end that end in one cusp
+
+
+def traced(plane: Plane, seed: Spot, tolerance: float) -> Curve:
+    """The curve through a point, both ways until it leaves the rectangle or the band, or comes back."""
+    forward, end, closed = _march(plane, seed, 1)
+    backward: list[Spot] = []
+    start = end
+    if not closed:
+        backward, start, _ = _march(plane, seed, -1)
+    spots = [*reversed(backward), seed, *forward]
+    return refined(plane, Curve(tuple(spots), closed, (start, end)), tolerance)
+
+
+def joined(curves: Sequence[Curve]) -> list[Curve]:
+    """The same curves; where two of meeting modes were lost at one place and frequency they end in a cusp there: three
+    modes meet."""
+    lost = [(k, e) for k, c in enumerate(curves) for e in (0, 1) if c.ends[e] == "lost" and c.kind == "meeting"]
+    ends = [list(c.ends) for c in curves]
+    for (k, e), (j, f) in combinations(lost, 2):
+        one, other = curves[k].spots[-e], curves[j].spots[-f]
+        near = float(np.hypot(*(one.p - other.p))) <= CUSP
+        if near and abs(one.omega - other.omega) <= OMEGA * one.omega:
+            ends[k][e] = ends[j][f] = "cusp"
+    return [replace(c, ends=(e[0], e[1])) for c, e in zip(curves, ends, strict=True)]
+
+
+@dataclass
+class _Way:
+    """Where a march is: the last point, the direction (2,) in which it goes on, its bend [rad per length], the step."""
+
+    spot: Spot
+    heading: Array
+    bend: float
+    step: float
+
+
+def _march(plane: Plane, seed: Spot, sense: int) -> tuple[list[Spot], str, bool]:
+    """Points after the first one, how it ends, and whether it came back."""
+    way = _Way(seed, sense * seed.tangent, 0.0, FIRST)
+    start, gone, found = way.heading, 0.0, list[Spot]()
+    while len(found) < MOST:
+        if _leaving(way):
+            return found, "edge", False
+        new = _next(plane, way)
+        if new is None:
+            slow = way.spot.kind != "standstill" and way.spot.omega <= 100 * STILL * plane.top
+            return found, "zero frequency" if slow else "lost", False
+        if gone and _back(way, new, seed, start):
+            return [*found, seed], "closed", True
+        if new.omega > plane.top:
+            return [*found, _at_top(plane, way, new)], "band", False
+        gone += float(np.hypot(*(new.p - way.spot.p)))
+        found.append(new)
+        way = _on(way, new)
+    return found, "lost", False
+
+
+def _at_top(plane: Plane, way: _Way, beyond: Spot) -> Spot:
+    """The point between the last one and one beyond the band at which ω is the highest frequency."""
+    old, top = way.spot, plane.top
+    best, first, last = beyond, (0.0, old.omega), (float(np.hypot(*(beyond.p - old.p))), beyond.omega)
+    for _ in range(8):
+        step = first[0] + (top - first[1]) / (last[1] - first[1]) * (last[0] - first[0])
+        new = _tried(plane, _Way(old, way.heading, way.bend, step))
+        if new is None or abs(new.omega - top) >= abs(best.omega - top):
+            break
+        best = new
+        if abs(new.omega - top) <= 1e-9 * top:
+            break
+        first, last = (first, (step, new.omega)) if new.omega > top else ((step, new.omega), last)
+    return best
+
+
+def _on(way: _Way, new: Spot) -> _Way:
+    """The way from the new point on, its next step as long as the bend allows."""
+    heading = new.tangent if new.tangent @ way.heading >= 0 else -new.tangent
+    length = float(np.hypot(*(new.p - way.spot.p)))
+    turn = _angle(way.heading, heading)
+    factor = AIMED / max(abs(turn), AIMED / 2)
+    step = float(np.clip(length * factor, SHORTEST, LONGEST))
+    return _Way(new, heading, turn / length if length else 0.0, step)
+
+
+def _next(plane: Plane, way: _Way) -> Spot | None:
+    """The next point; None where no step, however short, leads to one."""
+    while way.step >= SHORTEST:
+        new = _tried(plane, way)
+        if new is not None and _follows(plane, way, new):
+            return new
+        way.step *= 0.5
+    return None
+
+
+def _tried(plane: Plane, way: _Way) -> Spot | None:
+    """A step's point, on the edge of the rectangle where the step leads across that; None where there is none."""
+    ahead = _turned(way.heading, 0.5 * way.bend * way.step)
+    target = way.spot.p + way.step * ahead
+    if not _inside(target):
+        return _at_edge(plane, way, target)
+    normal = _turned(way.heading, way.bend * way.step + 0.5 * np.pi)
+    new = _corrected(plane, way, target, normal, BESIDE * way.step)
+    return _at_edge(plane, way, new.p) if new is not None and not _inside(new.p) else new
+
+
+def _at_edge(plane: Plane, way: _Way, target: Array) -> Spot | None:
+    """The point on the edge that the straight line from the last one to a target crosses, solved along the edge."""
+    last, step = way.spot.p, target - way.spot.p
+    shares = [
+        (float((edge - last[axis]) / step[axis]), axis, edge)
+        for axis in (0, 1) for edge in (0.0, 1.0)
+        if step[axis] and (target[axis] - edge) * (edge - 0.5) > 0
+    ]  # fmt: skip
+    share, axis, edge = min(shares)
+    guess = last + share * step
+    guess[axis] = edge
+    along = np.eye(2)[1 - axis]
+    new = _corrected(plane, way, guess, along, max(BESIDE * share * way.step, 10 * SHORTEST))
+    if new is None or not -INSIDE <= new.p[1 - axis] <= 1 + INSIDE:
+        return None
+    return new
+
+
+def _corrected(plane: Plane, way: _Way, target: Array, direction: Array, reach: float) -> Spot | None:
+    chord = plane.chord(target, direction, (-reach, reach))
+    spot = way.spot
+    omega = spot.omega + float(spot.turn @ (target - spot.p))
+    if spot.kind != "standstill" and omega <= STILL * plane.top:
+        return None
+    return settled(plane, spot.kind, chord, omega, spot.right, spot.left)
+
+
+def _follows(plane: Plane, way: _Way, new: Spot) -> bool:
+    """Whether a point is the next one of the same eigenpair's curve."""
+    old, step = way.spot, new.p - way.spot.p
+    length = float(np.hypot(*step))
+    if length < 0.1 * SHORTEST:
+        return False
+    ahead = way.heading
+    if old.kind == "crossing" and (new.tangent @ ahead) * (old.tangent @ ahead) < 0:
+        return False  # growth would be on the other side: another branch, beyond a saddle
+    heading = new.tangent if new.tangent @ ahead >= 0 else -new.tangent
+    turn = _angle(ahead, heading)
+    chord = _angle(ahead, step)
+    if abs(turn) > TURN or abs(chord) > TURN or abs(chord - 0.5 * turn) > HIT:
+        return False
+    if old.kind == "standstill":
+        return _like(plane, old, new)
+    if new.omega <= STILL * plane.top:
+        return False
+    omega = old.omega + float(old.turn @ step)
+    return abs(new.omega - omega) <= OMEGA * max(old.omega, new.omega) and _like(plane, old, new)
+
+
+def _like(plane: Plane, one: Spot, other: Spot) -> bool:
+    """Whether both have the same vectors, every unknown weighed by what its stiffness makes of it."""
+    for a, b in ((one.right, other.right), (one.left, other.left)):
+        a, b = plane.sizes * a, plane.sizes * b
+        if abs(np.vdot(a, b)) < ALIKE * np.linalg.norm(a) * np.linalg.norm(b):
+            return False
+    return True
+
+
+def _back(way: _Way, new: Spot, seed: Spot, start: Array) -> bool:
+    """Whether the step from the last point to the new one passes the first again, in its direction and as its mode."""
+    old, step = way.spot, new.p - way.spot.p
+    length = float(np.hypot(*step))
+    ahead = new.tangent if new.tangent @ way.heading >= 0 else -new.tangent
+    if (seed.p - old.p) @ step <= 0 or (seed.p - new.p) @ step > 0 or ahead @ start < np.cos(TURN):
+        return False
+    share = float((seed.p - old.p) @ step) / length**2
+    (near,) = hermite(old.p, way.heading, new.p, ahead, np.array([share]))
+    omega = (1 - share) * old.omega + share * new.omega
+    same = abs(omega - seed.omega) <= 0.5 * OMEGA * max(abs(seed.omega), 1e-300) or seed.kind == "standstill"
+    return same and float(np.hypot(*(seed.p - near))) <= 0.02 * length
+
+
+def refined(plane: Plane, curve: Curve, tolerance: float) -> Curve:
+    """The curve with points in the middle of every two, and more where a middle was not where it was expected."""
+    spots, headings = curve.spots, curve.headings
+    result, worst, unchecked = [spots[0]], 0.0, 0
+    for k in range(len(spots) - 1):
+        ends = [(spots[j], headings[j]) for j in (k, k + 1)]
+        more, off, missing = _between(plane, ends[0], ends[1], tolerance, LEVELS)
+        result += [*more, spots[k + 1]]
+        worst, unchecked = max(worst, off), unchecked + missing
+    return Curve(tuple(result), curve.closed, curve.ends, worst, unchecked)
+
+
+def _between(
+    plane: Plane, one: tuple[Spot, Array], other: tuple[Spot, Array], tolerance: float, levels: int
+) -> tuple[list[Spot], float, int]:
+    """Points between two, how far at most the last middle was off, and in how many pieces none was found."""
+    (old, heading), (new, heading_to) = one, other
+    length = float(np.hypot(*(new.p - old.p)))
+    if length <= 0.1 * tolerance:
+        return [], 0.0, 0
+    # At a standstill growth changes sides where flutter ends on it, which is to be known as well as the curve.
+    flips = (old.tangent @ heading) * (new.tangent @ heading_to) < 0
+    (middle,) = hermite(old.p, heading, new.p, heading_to, np.array([0.5]))
+    across = _turned(new.p - old.p, 0.5 * np.pi) / length
+    chord = plane.chord(middle, across, (-0.3 * length, 0.3 * length))
+    spot = settled(plane, old.kind, chord, 0.5 * (old.omega + new.omega), old.right, old.left)
+    if spot is None or not _like(plane, old, spot):
+        return [], 0.0, int(length > tolerance)
+    off = float(np.hypot(*(spot.p - middle)))
+    if (off <= tolerance and not flips) or levels <= (-LEVELS if flips else 0):
+        return [spot], off, int(off > tolerance)
+    ahead = spot.tangent if spot.tangent @ (new.p - old.p) >= 0 else -spot.tangent
+    first, one_off, lost = _between(plane, one, (spot, ahead), tolerance, levels - 1)
+    last, other_off, lost_too = _between(plane, (spot, ahead), other, tolerance, levels - 1)
+    return [*first, spot, *last], max(one_off, other_off), lost + lost_too
+
+
+def _leaving(way: _Way) -> bool:
+    """Whether the last point is on the edge and the way leads out."""
+    p, ahead = way.spot.p, way.heading
+    return any(
+        (p[axis] <= INSIDE and ahead[axis] < 0) or (p[axis] >= 1 - INSIDE and ahead[axis] > 0) for axis in (0, 1)
+    )
+
+
+def _inside(p: Array) -> bool:
+    return bool(np.all(p >= -INSIDE) and np.all(p <= 1 + INSIDE))
+
+
+def _turned(vector: Array, angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
+
+
+def _angle(one: Array, other: Array) -> float:
+    """From one direction to the other [rad]."""
+    return float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other))

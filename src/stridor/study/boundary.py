@@ -1,0 +1,126 @@
+"""Stability boundaries over two numbers of a case without a grid: what is traced is μ_c(p), not λ(p).
+
+From onsets on a few lines the curves Re λ(x, y) = 0 are followed by continuation, each by its own eigenpair
+(E. L. Allgower, K. Georg, Introduction to Numerical Continuation Methods, SIAM 2003; W. Govaerts, Numerical Methods for
+Bifurcations of Dynamical Equilibria, SIAM 2000), where nothing dissipates the exceptional points at which two modes
+meet.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..errors import CaseError
+from ..modal.boundary import Curve, Found, boundaries
+from ..modal.parametric import ReducedModel
+from ..typing import IntArray
+from .boundary_again import position_error, solved_again
+from .boundary_problem import Asked, Method, plane_of, solved_problem
+from .boundary_result import Boundary, BoundaryCurve, CountedAt
+from .boundary_words import sentence, told
+from .options import options_of
+from .provenance import provenance
+from .workspace import Problem, Workspace
+
+BESIDE = 1e-4  # of the ranges: how far beside a curve the others are counted
+
+
+def stability_boundary(
+    problem: Problem,
+    x: str,
+    y: str,
+    *,
+    x_range: tuple[float, float] | Sequence[float],
+    y_range: tuple[float, float] | Sequence[float],
+    max_frequency_hz: float | None = None,
+    method: Method = "auto",
+    bound: float = 1e-8,
+    tolerance: float = 1e-3,
+    lines: int = 5,
+    progress: Callable[[int, int], None] | None = None,
+) -> Boundary:
+    """Where modes begin to grow over two numbers of a case: curves with frequency, and how many modes grow beside them.
+
+    x, y: paths of numbers as in an override, names of [parameters], "contact_stiffness", or "mu"; where neither is, μ
+    is the case's own. tolerance: how far the cubic pieces between the points of a curve may be off, in shares of the
+    ranges. lines: on how many values of x and of y onsets are sought; closed curves between them may be missed, as the
+    result says. method: "reduced" takes a reduced model over x and y, whose eigenvalues are within ``bound`` of the
+    full ones by its own estimate, and solves some points again in the full problem; "full" takes the whole matrices,
+    up to 400 freedoms; "auto" the latter for up to 60. The nodes that touch are those of the case as it is.
+
+    progress: called with lines done and planned. Raises CaseError for what is no number or no range, AnalysisError
+    where matrices depend on the numbers in no simple way or friction jams.
+    """
+    started = time.perf_counter()
+    work = Workspace.of(problem)
+    case = work.case("a stability boundary")
+    ends = _range(x_range, "x_range"), _range(y_range, "y_range")
+    asked = Asked((x, y), ends, method, bound, tolerance, lines)
+    asked.check(case)
+    top = case.modal.max_frequency_hz if max_frequency_hz is None else float(max_frequency_hz)
+    if not (np.isfinite(top) and top > 0):
+        raise CaseError("max_frequency_hz", top, "a highest frequency is a finite number > 0 [Hz]")
+    solved = solved_problem(case, asked, top)
+    plane, notes = plane_of(solved, ends)
+    found = boundaries(plane, tolerance, lines, progress)
+    again, failed = solved_again(found, solved.problem, solved.vectors, options_of(case).solver)
+    curves = tuple(_curve(found, curve, solved.model) for curve in found.curves)
+    result_notes, warnings = told(found, asked.paths, solved, again, failed, tolerance)
+    return Boundary(
+        x, y, *ends, top, curves, *_lines(found), _counted(found), found.agree, sentence(found, asked.paths),
+        "full" if solved.model is None else "reduced", len(plane.sizes), plane.solves, plane.steps,
+        0 if solved.model is None else solved.model.solves, again, (*solved.notes, *notes, *result_notes), warnings,
+        provenance(work, "boundary", time.perf_counter() - started, method=method, bound=bound, tolerance=tolerance),
+    )  # fmt: skip
+
+
+def _curve(found: Found, curve: Curve, model: ReducedModel | None) -> BoundaryCurve:
+    """A curve in the units of x and y, with how many modes grow on both sides of each point."""
+    plane = found.plane
+    width = plane.high - plane.low
+    x, y = (plane.low + width * curve.points).T
+    tangent = curve.headings * width
+    error = np.array([np.nan if model is None else position_error(model, plane, s) for s in curve.spots])
+    return BoundaryCurve(
+        x, y, curve.omega / (2 * np.pi), tangent[:, 0], tangent[:, 1], curve.sides, _beside(found, curve),
+        "divergence" if curve.kind == "standstill" else "flutter", curve.closed, curve.ends,
+        np.array([s.residual for s in curve.spots]), error, curve.deviation, curve.unchecked,
+    )  # fmt: skip
+
+
+def _beside(found: Found, curve: Curve) -> IntArray:
+    """How many modes grow on the calmer side of each point (k,)."""
+    numbers = np.zeros(len(curve.spots), dtype=np.int64)
+    if not found.looked:
+        return numbers
+    for k, spot in enumerate(curve.spots):
+        calm = spot.p - BESIDE * spot.gradient / np.hypot(*spot.gradient)
+        numbers[k] = max(found.said(calm)[0], 0)
+    return numbers
+
+
+def _lines(found: Found) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Values of x and of y on whose lines onsets were sought."""
+    plane = found.plane
+    values = [
+        sorted(float(plane.low[axis] + line.value * (plane.high - plane.low)[axis])
+               for line in found.lines if line.axis == axis)
+        for axis in (0, 1)
+    ]  # fmt: skip
+    return tuple(values[0]), tuple(values[1])
+
+
+def _counted(found: Found) -> tuple[CountedAt, ...]:
+    plane = found.plane
+    places = [(plane.low + (plane.high - plane.low) * at.p, at.count.modes) for at in found.looked]
+    return tuple(CountedAt(float(p[0]), float(p[1]), modes) for p, modes in places)
+
+
+def _range(given: tuple[float, float] | Sequence[float], name: str) -> tuple[float, float]:
+    values = np.asarray(given, dtype=float)
+    if values.shape != (2,) or not np.all(np.isfinite(values)) or not values[0] < values[1]:
+        raise CaseError(name, given, "two finite numbers low < high")
+    return float(values[0]), float(values[1])

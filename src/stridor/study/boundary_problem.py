@@ -1,0 +1,110 @@
+"""What is solved for a stability boundary: a reduced model over both numbers, or the whole matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from ..case import Case
+from ..errors import AnalysisError, CaseError
+from ..modal.boundary import Plane
+from ..modal.parametric import ParametricProblem, ReducedModel
+from ..typing import Array
+from .damping_reduced import FRICTION, box_name
+from .reduced import parametric_problem, reduced_model
+from .sensitivities import number_at
+
+Method = Literal["auto", "reduced", "full"]
+SMALL = 60  # unknowns up to which a reduced model saves nothing
+MOST = 400  # and up to which all eigenvalues of the full problem are solved for hundreds of times
+BESIDE = 1e-4  # of a range: how far from an end without any damping curves begin
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What was asked for."""
+
+    paths: tuple[str, str]
+    ends: tuple[tuple[float, float], tuple[float, float]]
+    method: Method
+    bound: float
+    tolerance: float
+    lines: int
+
+    def check(self, case: Case) -> None:
+        """Raises CaseError for what does not hold together."""
+        if self.method not in get_args(Method):
+            raise CaseError("method", self.method, f"one of {', '.join(get_args(Method))}")
+        if not 1e-6 <= self.tolerance <= 0.05:
+            raise CaseError("tolerance", self.tolerance, "a share of the ranges from 1e-6 to 0.05")
+        if not 2 <= self.lines <= 100:
+            raise CaseError("lines", self.lines, "from 2 to 100 values of each number")
+        if self.paths[0] == self.paths[1]:
+            raise CaseError("y", self.paths[1], "the same number as x; give another one")
+        for path in self.paths:
+            if path not in (FRICTION, "contact_stiffness") and path not in case.parameters:
+                number_at(case, path)
+
+
+@dataclass(frozen=True)
+class Solved:
+    """The problem over x and y (names as a box calls them), its dense terms (t, r, r), and the basis (n, r) and model
+    that they are of; None: all freedoms."""
+
+    problem: ParametricProblem
+    names: tuple[str, str]
+    terms: Array
+    vectors: Array | None
+    model: ReducedModel | None
+    top: float
+    notes: tuple[str, ...]
+
+
+def solved_problem(case: Case, asked: Asked, top: float) -> Solved:
+    """What is solved up to top [Hz]. Raises CaseError and AnalysisError where neither a reduced model nor the full
+    problem serves."""
+    names = box_name(case, asked.paths[0]), box_name(case, asked.paths[1])
+    box = dict(zip(names, asked.ends, strict=True))
+    whole = parametric_problem(case, box)
+    method = asked.method
+    if method == "auto":
+        method = "full" if whole.size <= SMALL else "reduced"
+    if method == "full" and whole.size > MOST:
+        raise CaseError("method", "full", f"for up to {MOST} freedoms, and the case has {whole.size}; take reduced")
+    why = ""
+    if method == "reduced":
+        try:
+            model = reduced_model(case, box, max_frequency_hz=top, bound=asked.bound)
+            notes = tuple(getattr(model.problem, "notes", ()))
+            return Solved(model.problem, names, model.projected, model.vectors, model, model.frequency, notes)
+        except AnalysisError as error:
+            if asked.method == "reduced" or whole.size > MOST:
+                raise
+            why = f"all is solved in the full problem, there is no reduced model: {error}"
+    terms = np.array([term.matrix.toarray() for term in whole.terms])
+    notes = (*whole.notes, *([why] if why else ()))
+    return Solved(whole, names, terms, None, None, 2 * np.pi * top, notes)
+
+
+def plane_of(solved: Solved, ends: tuple[tuple[float, float], tuple[float, float]]) -> tuple[Plane, tuple[str, ...]]:
+    """The rectangle, without ends at which nothing is damped while it is elsewhere, and what is to be said of that."""
+    low, high = np.array(ends, dtype=float).T
+    whole = Plane(solved.problem, solved.terms, solved.names, solved.problem.reference, solved.top, low, high)
+    if whole.reversible:
+        return whole, ()
+    notes: list[str] = []
+    own_low, own_high = low.copy(), high.copy()
+    for axis in (0, 1):
+        for value, end, moved, sign in ((0.0, low, own_low, 1), (1.0, high, own_high, -1)):
+            if whole.line(axis, value).reversible:
+                moved[axis] = end[axis] + sign * BESIDE * (high - low)[axis]
+                notes.append(
+                    f"nothing is damped at {solved.names[axis]} = {end[axis]:g}, where onsets are not the limit of "
+                    f"little damping: curves are traced up to {moved[axis]:.6g}"
+                )
+    if not notes:
+        return whole, ()
+    point = solved.problem.reference
+    return Plane(solved.problem, solved.terms, solved.names, point, solved.top, own_low, own_high), tuple(notes)
