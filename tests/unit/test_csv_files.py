@@ -18,6 +18,7 @@ from stridor.io import atomic
 FEW = ["bodies.beam1.elements=6", "bodies.beam2.elements=18", "modal.sweep_points=3"]
 DAMPINGS = ("bodies.beam1.damping.mass", "bodies.beam2.damping.mass")
 MAP = ["--x", DAMPINGS[0], "--y", DAMPINGS[1], "--x-range", "10:50", "--y-range", "10:50", "--points", "2"]
+BOUNDARY = ["--x", DAMPINGS[0], "--x-range", "10:50", "--y-range", "0:0.2", "--lines", "2"]
 REDUCE = ["--box", "mu=0:0.3", "--at", "mu=0.1,0.2", "--onsets", "mu"]
 ALONG = ["--along", "bodies.beam1.thickness", "--between", "0.0014:0.0015"]
 # Verbs with words of their own, and the files that they write.
@@ -28,6 +29,7 @@ VERBS = {
     "sensitivities": (["--mu", "0.2", "--parameter", "mu", "--parameter", DAMPINGS[0]], ["sensitivities.csv"]),
     "countermeasures": (["--mu", "0.2", "--verify", "1"], ["countermeasures.csv"]),
     "damping-map": (MAP, ["damping_map.csv"]),
+    "boundary": (BOUNDARY, ["boundary.csv"]),
     "reduce": (REDUCE, ["reduced.csv", "reduced-onsets.csv"]),
 }
 
@@ -73,7 +75,7 @@ def documents(folder: Path) -> dict[str, dict]:
 @pytest.mark.parametrize("verb", VERBS)
 def test_columns_are_those_of_the_documentation(verb: str, folder: Path, documents: dict[str, dict]) -> None:
     assert documents[verb]
-    own = {"damping_map.csv": list(DAMPINGS), "reduced.csv": ["mu"]}
+    own = {"damping_map.csv": list(DAMPINGS), "boundary.csv": [DAMPINGS[0], "mu"], "reduced.csv": ["mu"]}
     for file in VERBS[verb][1]:
         rows = read(folder / "case.out" / file)
         assert rows

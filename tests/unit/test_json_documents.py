@@ -25,6 +25,7 @@ FEW = [
     "phases.slide.duration=4e-3",
 ]
 DAMPINGS = "--x bodies.beam1.damping.mass --y bodies.beam2.damping.mass --x-range 10:50 --y-range 10:50 --points 2"
+BOUNDARY = "--x bodies.beam1.damping.mass --x-range 10:50 --y-range 0:0.2 --lines 2"
 WORDS = {
     "new": ["two-beams"],
     "check": ["case.toml"],
@@ -36,6 +37,7 @@ WORDS = {
     "sensitivities": ["case.toml", "--mu", "0.2", "--band", "1000:9000"],
     "countermeasures": ["case.toml", "--mu", "0.2", "--verify", "1"],
     "damping-map": ["case.toml", *DAMPINGS.split()],
+    "boundary": ["case.toml", *BOUNDARY.split()],
     "reduce": ["case.toml", "--box", "mu=0:0.3", "--at", "mu=0.1", "--onsets", "mu"],
     "steady": ["case.toml"],
     "shapes": ["case.toml", "--mu", "0.2"],

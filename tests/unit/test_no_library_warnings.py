@@ -50,6 +50,7 @@ VERBS = {
     "compare": ["--mu", "0.4"],
     "damping-map": ["--x", "bodies.beam1.damping.mass", "--y", "bodies.beam2.damping.mass", "--x-range", "0:5",
                     "--y-range", "0:5", "--points", "2"],
+    "boundary": ["--x", "bodies.beam1.damping.mass", "--x-range", "0:5", "--y-range", "0:0.5", "--lines", "2"],
     "run": [],
 }
 # One process for several verbs: what counts is that nothing is said, also as it ends.
@@ -69,7 +70,7 @@ for verb in sys.argv[2].split(";"):
     ("template", "changes", "left_out"),
     [
         ("two-beams", BEAMS, ()),
-        pytest.param("pad-on-disc", PAD, ("compare", "run", "damping-map"), marks=pytest.mark.slow),
+        pytest.param("pad-on-disc", PAD, ("compare", "run", "damping-map", "boundary"), marks=pytest.mark.slow),
     ],
 )
 def test_every_verb_is_silent(tmp_path: Path, template: str, changes: list[str], left_out: tuple[str, ...]) -> None:

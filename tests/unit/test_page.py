@@ -88,6 +88,10 @@ ENDS = {
         "over the two dampings the lowest onset goes from μ = 0.076493 to 0.077144",
         f"onsets two-beams.toml --set {DAMPING[0]}=1e-09 --set {DAMPING[1]}=5e-08",
     ),
+    f"boundary two-beams.toml --x {DAMPING[0]} --x-range 1e-9:5e-8 --y-range 0:0.2 --lines 3": (
+        "1 of 3 curves bounds where nothing grows, down to ",
+        f"modes two-beams.toml --set {DAMPING[0]}=",
+    ),
     "simulate two-beams.toml COARSE": ("last phase: 5970.1 Hz dominates, ", "compare two-beams.toml COARSE"),
     "compare two-beams.toml --no-critical COARSE": (
         "agree: μ = 0.1: both unstable at 8651.1 Hz, growth 642.2 against 641.6 1/s (0.1 %)",

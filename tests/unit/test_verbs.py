@@ -42,12 +42,16 @@ VERBS: dict[str, Callable[[Any, Path], object]] = {
     "run": lambda p, out: st.run(p, out, only=["onsets"]),
     "sensitivities": lambda p, _: st.sensitivities(p, mu=0.1, modes="all"),
     "simulate": lambda p, _: st.simulate(p),
+    "stability_boundary": lambda p, _: st.stability_boundary(
+        p, MASS[0], "mu", x_range=(1, 20), y_range=(0, 0.2), lines=2
+    ),
     "steady_sliding": lambda p, _: st.steady_sliding(p),
     "summarise": lambda p, _: st.summarise(p, st.simulate(p)),
     "Workspace": lambda p, _: p if isinstance(p, st.Workspace) else st.Workspace(p),
 }  # fmt: skip
 OF_A_CASE = {  # of what is in a case file beside the matrices
     "damping_map", "describe", "rank_countermeasures", "reduced_model", "report", "run", "sensitivities",
+    "stability_boundary",
 }  # fmt: skip
 OTHERS = {  # what takes no problem
     "AnalysisError", "Case", "CaseError", "StridorError", "Study", "System", "build_system", "load", "loads", "open",

@@ -11,6 +11,7 @@ from ..case import Case
 from ..errors import AnalysisError, CaseError
 from ..modal.boundary import Plane
 from ..modal.parametric import ParametricProblem, ReducedModel
+from ..system import build_system
 from ..typing import Array
 from .damping_reduced import FRICTION, box_name
 from .reduced import parametric_problem, reduced_model
@@ -67,25 +68,24 @@ def solved_problem(case: Case, asked: Asked, top: float) -> Solved:
     problem serves."""
     names = box_name(case, asked.paths[0]), box_name(case, asked.paths[1])
     box = dict(zip(names, asked.ends, strict=True))
-    whole = parametric_problem(case, box)
-    method = asked.method
+    freedoms, method = build_system(case).size, asked.method
     if method == "auto":
-        method = "full" if whole.size <= SMALL else "reduced"
-    if method == "full" and whole.size > MOST:
-        raise CaseError("method", "full", f"for up to {MOST} freedoms, and the case has {whole.size}; take reduced")
-    why = ""
+        method = "full" if freedoms <= SMALL else "reduced"
+    if method == "full" and freedoms > MOST:
+        raise CaseError("method", "full", f"for up to {MOST} freedoms, and the case has {freedoms}; take reduced")
+    why: tuple[str, ...] = ()
     if method == "reduced":
         try:
             model = reduced_model(case, box, max_frequency_hz=top, bound=asked.bound)
             notes = tuple(getattr(model.problem, "notes", ()))
             return Solved(model.problem, names, model.projected, model.vectors, model, model.frequency, notes)
         except AnalysisError as error:
-            if asked.method == "reduced" or whole.size > MOST:
+            if asked.method == "reduced" or freedoms > MOST:
                 raise
-            why = f"all is solved in the full problem, there is no reduced model: {error}"
+            why = (f"all is solved in the full problem, there is no reduced model: {error}",)
+    whole = parametric_problem(case, box)
     terms = np.array([term.matrix.toarray() for term in whole.terms])
-    notes = (*whole.notes, *([why] if why else ()))
-    return Solved(whole, names, terms, None, None, 2 * np.pi * top, notes)
+    return Solved(whole, names, terms, None, None, 2 * np.pi * top, (*whole.notes, *why))
 
 
 def plane_of(solved: Solved, ends: tuple[tuple[float, float], tuple[float, float]]) -> tuple[Plane, tuple[str, ...]]:

@@ -14,6 +14,7 @@ from ..notebook import Shown, counted, html_table
 from ..tabular import Cell, Rows, Tabular
 from ..typing import Array, BoolArray, IntArray
 
+BESIDE = 1e-9  # of the ranges: how far inside the rectangle a point on its edge counts as
 HEADS = (
     "curve", "kind", "frequency_hz", "tangent_x", "tangent_y", "growth_side", "modes_beside", "boundary_error",
     "residual",
@@ -150,7 +151,7 @@ class Boundary(Tabular):
 
         Two diverging modes that meet and flutter count as two still, where no counted point is near.
         """
-        p = (np.array([x, y]) - self._low) / self._width
+        p = self._share(x, y)
         places = (np.array([[c.x, c.y] for c in self.counted]) - self._low) / self._width
         nearest = int(np.argmin(np.hypot(*(places - p).T)))
         passed = crossings(self._drawn, places[nearest], p)
@@ -160,13 +161,17 @@ class Boundary(Tabular):
         """The same on a grid: (nx, ny) at values xs (nx,) and ys (ny,), rising, at the cost of a line for each x."""
         table = np.zeros((len(xs), len(ys)), dtype=np.int64)
         for i, x in enumerate(np.asarray(xs, dtype=float).tolist()):
-            start, end = ((np.array([x, y]) - self._low) / self._width for y in (ys[0], ys[-1]))
-            places = np.linspace(0.0, 1.0, len(ys)) if len(ys) > 1 else np.zeros(1)
-            places = (np.asarray(ys) - ys[0]) / (ys[-1] - ys[0]) if len(ys) > 1 else places
+            start, end = (self._share(x, float(y)) for y in (ys[0], ys[-1]))
+            places = (np.asarray(ys) - ys[0]) / max(float(ys[-1] - ys[0]), 1e-300)
             table[i] = self.unstable_modes(x, float(ys[0]))
             for passed in crossings(self._drawn, start, end):
                 table[i, places > passed.at] += int(np.sign(passed.roots))
         return table
+
+    def _share(self, x: float, y: float) -> Array:
+        """A point in shares of the ranges, off the edges, on which curves end."""
+        inside: Array = np.clip((np.array([x, y]) - self._low) / self._width, BESIDE, 1 - BESIDE)
+        return inside
 
     @cached_property
     def _low(self) -> Array:

@@ -78,6 +78,11 @@ def told(
         )
     if failed:
         warnings.append(f"{counted(failed, 'point')} of the curves not found again in the full problem")
+    if found.passing:
+        notes.append(
+            "growing modes pass the highest frequency: between curves their number is that of the nearest counted "
+            "point, and may change where no curve is"
+        )
     if plane.reversible and found.curves:
         notes.append(
             f"nothing is damped: flutter begins where two modes meet, and little damping of any kind may move "

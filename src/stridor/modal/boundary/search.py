@@ -31,6 +31,7 @@ FORETOLD = 3  # counts at places where modes are expected on the axis, around on
 EVEN = 8  # places along a line at which it is counted, beside those between curves
 ALIKE = 0.02  # of ω: onset and crossing that are one
 HALVINGS = 9  # until a difference between counts and curves is placed
+ASIDE = 1e-4  # how far beside a curve others are counted
 EDGE = 1e-3  # of a line: crossings so near its ends may lie beyond them
 
 
@@ -67,13 +68,15 @@ class Looked:
 @dataclass
 class Found:
     """Curves, the lines that they were found on, and points at which was counted. wrong: where these do not fit
-    together, in words that hold ``x`` and ``y`` of places."""
+    together, in words that end before a place. passing: whether growing modes pass the highest frequency somewhere, so
+    that their number changes where no curve is."""
 
     plane: Plane
     curves: list[Curve] = field(default_factory=list[Curve])
     lines: list[Line] = field(default_factory=list[Line])
     looked: list[Looked] = field(default_factory=list[Looked])
     wrong: list[tuple[str, Array]] = field(default_factory=list[tuple[str, Array]])
+    passing: bool = False
 
     @property
     def drawn(self) -> list[Drawn]:
@@ -140,6 +143,8 @@ class _Search:
         self.found.curves = joined(self.found.curves)
         self.found.lines = [self._borne_out(line) for line in self.found.lines]
         self.found.wrong = [*self._contradicted(), *self._unmatched()]
+        if self.found.passing or any("band" in curve.ends for curve in self.found.curves):
+            self._look_beside()
         return self.found
 
     # -- lines and the curves that cut them ---------------------------------------------------------------------------
@@ -234,11 +239,22 @@ class _Search:
                 one = middle
             else:
                 other = middle
-        passes = not (one.count.judged and other.count.judged)
-        return None if passes else 0.5 * (one.p + other.p)
+        if one.count.judged and other.count.judged:
+            return 0.5 * (one.p + other.p)
+        self.found.passing = True
+        return None
 
     def _fit(self, one: Looked, other: Looked) -> bool:
         return self.found.said(other.p, one)[1] == other.count.roots
+
+    def _look_beside(self) -> None:
+        """Count beside the points of all curves: where growing modes leave the band numbers from far away are none."""
+        self.found.passing = True
+        for curve in self.found.curves:
+            for spot in curve.spots[::2]:
+                calm = spot.p - ASIDE * spot.gradient / np.hypot(*spot.gradient)
+                if np.all((calm > 0) & (calm < 1)):
+                    self._look(calm)
 
     def _contradicted(self) -> list[tuple[str, Array]]:
         """Points at which the curves say otherwise than what was counted, from one of them to the next."""

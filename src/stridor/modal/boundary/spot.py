@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...errors import AnalysisError
+from ...errors import AnalysisError, CaseError
 from ...typing import Array, ComplexArray
 from ..full.passages import quiet
 from ..newton import Root, crossing, meeting, standstill
@@ -56,7 +56,7 @@ def settled(
             if root is None or not between[0] <= root.mu <= between[1]:
                 return None
             return _spot(plane, kind, chord, root)
-    except (AnalysisError, ValueError, np.linalg.LinAlgError):
+    except (AnalysisError, CaseError, ValueError, np.linalg.LinAlgError):  # a formula may end outside the rectangle
         return None
 
 
