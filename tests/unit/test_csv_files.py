@@ -18,7 +18,7 @@ from stridor.io import atomic
 FEW = ["bodies.beam1.elements=6", "bodies.beam2.elements=18", "modal.sweep_points=3"]
 DAMPINGS = ("bodies.beam1.damping.mass", "bodies.beam2.damping.mass")
 MAP = ["--x", DAMPINGS[0], "--y", DAMPINGS[1], "--x-range", "10:50", "--y-range", "10:50", "--points", "2"]
-BOUNDARY = ["--x", DAMPINGS[0], "--x-range", "10:50", "--y-range", "0:0.2", "--lines", "2"]
+BOUNDARY = ["--x", DAMPINGS[0], "--x-range", "10:50", "--y", "mu", "--y-range", "0:0.2", "--lines", "2"]
 REDUCE = ["--box", "mu=0:0.3", "--at", "mu=0.1,0.2", "--onsets", "mu"]
 ALONG = ["--along", "bodies.beam1.thickness", "--between", "0.0014:0.0015"]
 # Verbs with words of their own, and the files that they write.

@@ -25,7 +25,7 @@ FEW = [
     "phases.slide.duration=4e-3",
 ]
 DAMPINGS = "--x bodies.beam1.damping.mass --y bodies.beam2.damping.mass --x-range 10:50 --y-range 10:50 --points 2"
-BOUNDARY = "--x bodies.beam1.damping.mass --x-range 10:50 --y-range 0:0.2 --lines 2"
+BOUNDARY = "--x bodies.beam1.damping.mass --x-range 10:50 --y mu --y-range 0:0.2 --lines 2"
 WORDS = {
     "new": ["two-beams"],
     "check": ["case.toml"],

@@ -50,7 +50,7 @@ VERBS = {
     "compare": ["--mu", "0.4"],
     "damping-map": ["--x", "bodies.beam1.damping.mass", "--y", "bodies.beam2.damping.mass", "--x-range", "0:5",
                     "--y-range", "0:5", "--points", "2"],
-    "boundary": ["--x", "bodies.beam1.damping.mass", "--x-range", "0:5", "--y-range", "0:0.5", "--lines", "2"],
+    "boundary": ["--x", "bodies.beam1.damping.mass", "--x-range", "0:5", "--y", "mu", "--y-range", "0:0.5", "--lines", "2"],
     "run": [],
 }
 # One process for several verbs: what counts is that nothing is said, also as it ends.

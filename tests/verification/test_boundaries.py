@@ -15,7 +15,6 @@ from matrix_cases import matrix_case
 from program import stridor
 from random_boundaries import disagreement, distance, eigenvalues, growing, off_the_curves, random_plane
 from stridor.modal.boundary import Found, Plane, boundaries, march, search
-from stridor.study import boundary as study
 from stridor.study.boundary_problem import Asked, plane_of, solved_problem
 from stridor.study.boundary_result import Boundary
 
@@ -292,9 +291,6 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
         lay = search._Search._lay
         patch.setattr(search._Search, "_lay", lambda self, axis, value: None if value > 0.3 else lay(self, axis, value))
         assert boundary().agree  # the curve is found on other lines
-    with monkeypatch.context() as patch:
-        patch.setattr(study, "boundaries", lambda plane, *_: Found(plane))
-        assert not boundary().curves
 
 
 @pytest.mark.parametrize(
@@ -322,7 +318,7 @@ def test_what_is_refused(words: dict, said: str) -> None:
 
 def test_the_verb(tmp_path: Path) -> None:
     flutter(tmp_path)
-    words = ("boundary", "case.toml", "--x", "x", "--x-range", "-1:2", "--y-range", "0:3")
+    words = ("boundary", "case.toml", "--x", "x", "--x-range", "-1:2", "--y", "mu", "--y-range", "0:3")
     done = stridor(*words, "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)

@@ -9,6 +9,7 @@ import typer
 from .arguments import INCOMPLETE, Call, verb
 from .closing import Conclusion
 from .option_table import MaxFrequency
+from .two_numbers import Method, X, XRange, Y, YRange
 from .values import pair
 
 if TYPE_CHECKING:
@@ -18,19 +19,11 @@ if TYPE_CHECKING:
 @verb()
 def boundary(
     call: Call,
-    x: Annotated[str, typer.Option("--x", metavar="PATH", help="A number of the case.")],
-    x_range: Annotated[str, typer.Option("--x-range", metavar="LOW:HIGH", help="Its range.")],
-    y_range: Annotated[str, typer.Option("--y-range", metavar="LOW:HIGH", help="The other's range.")],
-    y: Annotated[str, typer.Option("--y", metavar="PATH", help="Another one.")] = "mu",
-    method: Annotated[
-        str,
-        typer.Option(
-            "--method",
-            metavar="auto|full|reduced",
-            help="full: the whole matrices, up to 400 freedoms; reduced: one reduced model for all, a few points "
-            "solved again in the full problem; auto: full up to 60 freedoms.",
-        ),
-    ] = "auto",
+    x: X,
+    y: Y,
+    x_range: XRange,
+    y_range: YRange,
+    method: Method = "auto",
     lines: Annotated[int, typer.Option("--lines", help="Values of each number at which onsets are sought.")] = 5,
     tolerance: Annotated[
         float, typer.Option("--tolerance", help="How far curves may be off between their points, of the ranges.")

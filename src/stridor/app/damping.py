@@ -11,6 +11,7 @@ from ..digits import measured
 from .arguments import Call, verb
 from .closing import Conclusion
 from .option_table import MaxFrequency, Range, Source
+from .two_numbers import Method, X, XRange, Y, YRange
 from .values import pair
 
 if TYPE_CHECKING:
@@ -22,20 +23,12 @@ WIDEST = 13  # columns that are still read on a screen
 @verb()
 def damping_map(
     call: Call,
-    x: Annotated[str, typer.Option("--x", metavar="PATH", help="A damping of the case.")],
-    y: Annotated[str, typer.Option("--y", metavar="PATH", help="Another one.")],
-    x_range: Annotated[str, typer.Option("--x-range", metavar="LOW:HIGH", help="Its range.")],
-    y_range: Annotated[str, typer.Option("--y-range", metavar="LOW:HIGH", help="The other's range.")],
+    x: X,
+    y: Y,
+    x_range: XRange,
+    y_range: YRange,
     points: Annotated[int, typer.Option("--points", help="Points along each.")] = 9,
-    method: Annotated[
-        str,
-        typer.Option(
-            "--method",
-            metavar="auto|full|reduced",
-            help="full: a search in the full problem at every point; reduced: one reduced model for all, a few points "
-            "solved again in the full problem; auto: reduced where that is faster and possible.",
-        ),
-    ] = "auto",
+    method: Method = "auto",
     friction_range: Range = None,
     max_frequency: MaxFrequency = None,
     source: Source = None,
