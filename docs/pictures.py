@@ -77,8 +77,18 @@ def listing() -> None:
         terminal("terminal", " ".join(["stridor", *words]), done.stdout)
 
 
+def ensemble() -> None:
+    """Which mode responds over friction and speed, from steady sliding on."""
+    steady = {
+        "temporal.initial": "steady-sliding", "temporal.perturbation": 1e-4, "phases.press.velocities": {"clamp": 1.0},
+        "phases.press.duration": 1e-3, "phases.slide.duration": 0.03,
+    }  # fmt: skip
+    found = st.ensemble(case.with_(steady), mu=np.linspace(0.05, 0.3, 6), speed=np.linspace(0.5, 2.0, 4))
+    save(st.plot.ensemble_map(found), "ensemble", (8.4, 7.6))
+
+
 if __name__ == "__main__":
     save(st.plot.model(case), "two-beams", (8, 3.4))
     save(st.plot.model(pad), "pad-on-disc", (7, 4.4))
-    for draw in (imported_branches, steady_pressure, factors, listing):
+    for draw in (imported_branches, steady_pressure, factors, listing, ensemble):
         draw()

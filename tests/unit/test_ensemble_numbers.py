@@ -45,7 +45,7 @@ def observed(velocity: np.ndarray, contact: ContactStatistics):
 @pytest.mark.parametrize(
     ("rate", "contact", "regime"),
     [
-        (0.0, CHANGES, "saturated"), (30.0, CHANGES, "transient"), (-30.0, CHANGES, "transient"),
+        (0.0, CHANGES, "steady"), (30.0, CHANGES, "transient"), (-30.0, CHANGES, "transient"),
         (0.0, SLIPS, "linear"), (30.0, SLIPS, "grows"), (-30.0, SLIPS, "decays"), (0.0, STICKS, "sticks"),
         (30.0, STICKS, "sticks"), (None, SLIPS, "still"),
     ],
@@ -83,6 +83,59 @@ def test_observables_by_name(name, unit, columns):
     assert found.signals(run).shape == (len(run.time), columns)
 
 
+COARSE = {
+    "bodies.beam1.elements": 5, "bodies.beam2.elements": 12, "temporal.step": None, "temporal.record_every": 5,
+    "phases.press.duration": 2e-4, "phases.slide.duration": 2e-3,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("given", "panels", "marks"),
+    [
+        ({"mu": [0.3, 0.05]}, 6, 0), ({"mu": [0.05, 0.3], "sweep": "both"}, 6, 0),
+        ({"mu": [0.05, 0.3], "speed": [2.0, 1.0]}, 6, 4), ({"mu": [0.05, 0.3], "load": [1.0, 2.0], "sweep": "both"}, 10, 8),
+        ({"mu": [0.05, 0.3], "load": [1.0, 8e307], "modes": False}, 4, 4), ({"mu": [0.05, 0.3], "grid": False}, 6, 0),
+    ],
+)  # fmt: skip
+def test_the_map_shows_every_member_where_it_is(given, panels, marks):
+    found = st.ensemble(paper_case().with_(COARSE), **given)
+    figure = st.plot.ensemble_map(found)
+    axes = [ax for ax in figure.axes if ax.get_label() != "<colorbar>"]
+    assert len(axes) == panels
+    meshes = [c for ax in axes for c in ax.collections if type(c).__name__ == "QuadMesh"]
+    if marks:
+        shown = [m.get_array() for m in meshes[:: 4]]
+        assert sum(m.size for m in shown) == len(found) == marks
+        first = dict(found.axes)
+        across, down = np.argsort(first["mu"]), np.argsort(first["speed" if "speed" in given else "load"])
+        expected = found.rms.reshape(-1, len(across), len(down))[0][np.ix_(across, down)].T
+        np.testing.assert_array_equal(np.ma.filled(shown[0], np.nan), expected)
+    else:
+        first = found.rms[: len(found) // max(1, len(set(found.sweep)))]
+        drawn = axes[0].lines[0].get_ydata()
+        order = np.argsort(found.mu[: len(first)]) if found.axes else np.arange(len(first))
+        assert drawn.tolist() == first[order].tolist()
+    rings = [line for ax in axes for line in ax.lines if line.get_markerfacecolor() == "none"]
+    assert len(rings) == found.regimes.get("steady", 0)
+
+
+def test_a_file_of_an_ensemble_is_its_dataset(tmp_path):
+    found = st.ensemble(paper_case().with_(COARSE), mu=[0.05, 0.3], load=[1.0, 8e307])
+    data = st.open(st.save(found, tmp_path / "ensemble.nc"))
+    assert data.attrs["analysis"] == "ensemble"
+    np.testing.assert_array_equal(data.rms.values.ravel(), found.rms)
+    assert data.rms.attrs["units"] == "m/s"
+    assert data.regime.values.ravel().tolist() == list(found.regime)
+    assert "no longer finite" in data.error.sel(mu=0.3, load=8e307).item()
+    listed = st.ensemble(paper_case().with_(COARSE), mu=[0.05, 0.3], grid=False)
+    held = st.open(st.save(listed, tmp_path / "listed.nc"))
+    assert held.mu.values.tolist() == [0.05, 0.3]
+    assert held.mode.values.tolist() == listed.mode.tolist()
+    frame = found.to_dataframe()
+    assert frame["A.stick"].tolist()[0] == found.stick[0, 0]
+    assert frame["regime"].tolist()[1::2] == ["failed", "failed"]
+
+
 ACCEPTED = "observable: {!r} – POINT.QUANTITY with a point among"
 
 
@@ -105,9 +158,9 @@ def test_observables_that_are_none_say_what_is_accepted(name):
         ({"speed": [1.0, float("nan")]}, "speed: [1.0, nan] – finite numbers above 0, at least one"),
         ({"perturbation": 1e-6}, 'perturbation: goes with initial = "steady-sliding"; from rest runs are disturbed anyway'),
         ({"mu": [0.1, 0.2], "load": [1.0, 2.0, 3.0], "grid": False}, "mu: '2 values' – one value or 3, as many as others have"),
-        ({"mu": 0.1, "sweep": "up"}, "sweep: 'up' – goes along mu, of which two or more values are needed"),
+        ({"mu": 0.1, "sweep": "up"}, "sweep: 'up' – goes over mu, of which two or more values are needed"),
         ({"mu": [0.1, 0.2], "sweep": "sideways"}, "sweep: 'sideways' – up, down or both"),
-        ({"mu": [0.1, 0.2], "sweep": "up", "along": "time"}, "along: 'time' – mu, load or speed"),
+        ({"mu": [0.1, 0.2], "sweep": "up", "swept": "time"}, "swept: 'time' – mu, load or speed"),
         ({"mu": [0.1, 0.2], "sweep": "up", "grid": False}, "sweep: 'up' – goes over all combinations of values: grid=True"),
         ({"window": 0.0}, "window: 0.0 – the share of the last phase that is looked at, above 0 and at most 1"),
         ({"mu": [0.1, 0.2], "sweep": "up", "window": 0.95}, "window: 0.95 – at most 0.9: before it loads and speeds still change by a ramp"),

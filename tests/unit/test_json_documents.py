@@ -47,6 +47,7 @@ WORDS = {
     "report": ["case.toml", "--skip", "countermeasures,sensitivities"],
     "study": ["study.toml"],
     "plot": ["study.out"],
+    "ensemble": ["case.toml", "--mu", "0.05,0.2", "--speed", "1,2"],
 }
 STUDY = """
 case = "case.toml"

@@ -92,6 +92,9 @@ ENDS = {
         "1 of 3 curves bounds where nothing grows, down to ",
         f"modes two-beams.toml --set {DAMPING[0]}=",
     ),
+    "ensemble two-beams.toml --mu 0.3 --load 0.5,0.5 COARSE": (
+        "2 members: ", "simulate two-beams.toml --mu 0.3 COARSE"
+    ),
     "simulate two-beams.toml COARSE": ("last phase: 5970.1 Hz dominates, ", "compare two-beams.toml COARSE"),
     "compare two-beams.toml --no-critical COARSE": (
         "agree: μ = 0.1: both unstable at 8651.1 Hz, growth 642.2 against 641.6 1/s (0.1 %)",

@@ -88,3 +88,15 @@ def test_lines_are_as_wide_as_the_window_makes_them(window: str) -> None:
     half = int(np.argmax(size < 0.5 * size[0]))
     at = half - 1 + (size[half - 1] - 0.5 * size[0]) / (size[half - 1] - size[half])
     assert signals._WIDTH[window] == pytest.approx(2 * at / padding, rel=0.01)
+
+
+def test_a_peak_beside_the_edge_of_what_is_looked_at_stays_between_its_bins() -> None:
+    # A strong line just below the edge: its slope is the largest value above, and no peak of a parabola.
+    frequency = np.arange(10.0)
+    amplitude = np.array([0.0, 1.0, 50.0, 49.0, 45.0, 1.0, 0.5, 0.2, 0.1, 0.1])
+    found = signals.Spectrum(frequency, amplitude, "hann", 1.0, 2.0)
+    assert found.peak(above_hz=2.5)[0] == pytest.approx(2.5)
+    lone = np.exp(-((frequency - 6.3) ** 2))
+    assert signals.Spectrum(frequency, lone, "hann", 1.0, 2.0).peak()[0] == pytest.approx(6.3)
+
+

@@ -292,7 +292,7 @@ def test_a_sweep_goes_up_and_down_through_each_column(along):
     case = paper_case().with_(COARSE).with_({"phases.press.duration": 2e-4, "phases.slide.duration": 2e-3})
     other = "speed" if along == "mu" else "mu"
     given = {along: [0.3, 0.1], other: [0.5, 0.4]}
-    found = st.ensemble(case, sweep="both", along=along, modes=False, **given)
+    found = st.ensemble(case, sweep="both", swept=along, modes=False, **given)
     data = found.to_xarray()
     assert data.sweep.values.tolist() == ["up", "down"]
     up, down = data.rms.sel(sweep="up").squeeze(), data.rms.sel(sweep="down").squeeze()
@@ -301,9 +301,9 @@ def test_a_sweep_goes_up_and_down_through_each_column(along):
     assert up.sel({along: 0.1}).values.tolist() == starts.rms.tolist()
     assert np.all(up.sel({along: 0.3}) != st.ensemble(case, modes=False, **(given | {along: 0.3})).rms)
     assert np.all(up != down)
-    upwards = st.ensemble(case, sweep="up", along=along, modes=False, **given)
+    upwards = st.ensemble(case, sweep="up", swept=along, modes=False, **given)
     assert upwards.rms.tolist() == found.rms[: len(upwards)].tolist()
-    falling = st.ensemble(case, sweep="down", along=along, modes=False, **given).to_xarray().rms.squeeze()
+    falling = st.ensemble(case, sweep="down", swept=along, modes=False, **given).to_xarray().rms.squeeze()
     starts = st.ensemble(case, modes=False, **(given | {along: 0.3}))
     assert falling.sel({along: 0.3}).values.tolist() == starts.rms.tolist()
 

@@ -17,7 +17,7 @@ COMPUTING = (
     "damping-map", "boundary", "reduce",
 )  # fmt: skip
 ABOUT = ("new", "check", "matrices", "export")  # verbs about the case itself
-STUDIES = ("study", "plot")  # of many samples of a case
+STUDIES = ("study", "plot", "ensemble")  # of many samples of a case
 EVERY = (*ABOUT, *COMPUTING, *STUDIES)
 
 
@@ -50,10 +50,10 @@ Mu = Annotated[
     str | None,
     _option(
         "--mu",
-        "Friction coefficient of every contact; modes and compare take several: a,b or start:stop:count [default: the "
-        "case's own, of compare comparison.mu].",
+        "Friction coefficient of every contact; modes, compare and ensemble take several: a,b or start:stop:count "
+        "[default: the case's own, of compare comparison.mu].",
         metavar="MU",
-        on="steady shapes modes simulate compare report sensitivities countermeasures export",
+        on="steady shapes modes simulate compare report sensitivities countermeasures export ensemble",
         lacks="onsets=sought run=--range damping-map=sought boundary=--set reduce=--at",
     ),
 ]

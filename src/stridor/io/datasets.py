@@ -14,6 +14,7 @@ from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
 from ..modal.parametric import ReducedModel
 from ..reading import is_reduced_file, starts_with
+from ..study.ensemble_result import Ensemble
 from ..study.sensitivity_result import Sensitivities
 from ..temporal.node_history import NODE_FIELDS, NodeHistory
 from ..temporal.trajectory import HISTORIES, ContactStatistics, PhaseResult, Trajectory
@@ -24,7 +25,7 @@ from .result_files import HDF5, damage_told, open_results
 from .seals import seal
 from .streams import NotedErrors
 
-Result = ComplexModes | Onsets | Sensitivities | Trajectory | Agreement
+Result = ComplexModes | Onsets | Sensitivities | Trajectory | Agreement | Ensemble
 
 
 def to_dataset(result: Result) -> Any:
@@ -33,8 +34,8 @@ def to_dataset(result: Result) -> Any:
     if isinstance(result, Result):  # pyright: ignore[reportUnnecessaryIsInstance]
         return result.to_xarray()
     accepted = (
-        "complex modes, onsets, sensitivities, a trajectory or an agreement; reduced models are no datasets, but can "
-        "be saved"
+        "complex modes, onsets, sensitivities, a trajectory, an ensemble or an agreement; reduced models are no "
+        "datasets, but can be saved"
     )
     raise CaseError("result", f"a {type(result).__name__}", accepted)
 

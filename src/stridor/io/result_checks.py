@@ -107,8 +107,26 @@ _NODES = {
     "node_status": _Rule(_BY_NODE, "i", 0, 2),
     **_NODE_RECORDS,
 }
+_GRID = ("sweep", "mu", "load", "speed", "perturbation")
+
+
+def _ensemble(dims: tuple[str, ...]) -> dict[str, _Rule]:
+    """Rules of an ensemble over a grid, or over members one by one."""
+    share = _Rule((*dims, "contact"), low=0.0, high=1.0, missing=True)
+    positive = _Rule(dims, low=0.0, missing=True)
+    return {
+        "contact": _Rule(("contact",), "O"),
+        **dict.fromkeys(("stick", "slip", "separation"), share),
+        **dict.fromkeys(("rms", "peak", "frequency_hz", "slip_speed", "mode_hz"), positive),
+        **{name: _Rule(dims, missing=True) for name in ("growth_rate", "mode_deviation")},
+        "mode": _Rule(dims, "i", 0),
+        **{name: _Rule(dims, "O") for name in ("regime", "error")},
+    }
+
+
 _RULES: dict[str, dict[str, _Rule]] = {
     "modes": _MODES, "onsets": _ONSETS, "sensitivities": _SENSITIVITIES, "compare": _AGREEMENT, "simulate": _RUN,
+    "ensemble": _ensemble(_GRID),
 }  # fmt: skip
 _COUNTS = ("record_every", "steps", "planned_steps", "most_sweeps", "unconverged_steps")
 _NUMBERS = ("step", "beta2", "step_limit", "wall_seconds")
@@ -125,6 +143,8 @@ def check_results(dataset: Any) -> None:
         raise ValueError("its provenance is no table")
     if analysis == "simulate":
         _check_run(dataset)
+    elif analysis == "ensemble" and "member" in dataset.dims:
+        _check_rules(dataset, _ensemble(("member",)), {})
     else:
         _check_rules(dataset, _RULES[analysis], {})
 

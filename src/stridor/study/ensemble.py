@@ -43,7 +43,7 @@ def ensemble(
     initial: Literal["rest", "steady-sliding"] | None = None,
     grid: bool = True,
     sweep: Sweep | None = None,
-    along: Literal["mu", "load", "speed"] = "mu",
+    swept: Literal["mu", "load", "speed"] = "mu",
     observable: str | None = None,
     window: float = 0.5,
     modes: bool = True,
@@ -57,7 +57,7 @@ def ensemble(
 
     mu scales every contact's friction law at the case's own speed; load and speed are factors on all loads and on all
     prescribed velocities (None: 1); perturbation [m/s] of the slip speed at the start, where runs begin in steady
-    sliding (initial; None: as [temporal] says). sweep: members that differ in the number ``along`` follow one another,
+    sliding (initial; None: as [temporal] says). sweep: members that differ in the number ``swept`` follow one another,
     each from where the one before ended, for the duration of the last phase, with rising values ("up"), falling ones
     ("down") or both; loads and speeds change by a ramp over its first tenth, friction at once. observable: what
     amplitudes are of ("beam1.tip.velocity", "A.normal_force"; default the velocity of the first watched point); window:
@@ -71,7 +71,7 @@ def ensemble(
     started = time.perf_counter()
     work = Workspace.of(problem)
     values = _values(work, mu, load, speed, perturbation, initial)
-    plan = _Plan.of(values, grid=grid, sweep=sweep, along=along)
+    plan = _Plan.of(values, grid=grid, sweep=sweep, swept=swept)
     system = work.structured("simulate")
     require_pressed_in_time(work, system, "ensemble")
     check_extent(work, system)
@@ -89,7 +89,7 @@ def ensemble(
         progress=progress, separately=separately,
     )  # fmt: skip
     found = _modes(work, plan) if modes else Found(None, (), ())
-    made = provenance(work, "ensemble", time.perf_counter() - started, **_asked(values, grid, sweep, along, window))
+    made = provenance(work, "ensemble", time.perf_counter() - started, **_asked(values, grid, sweep, swept, window))
     return _result(work, system, plan, seen, outcome, found, window, made)
 
 
@@ -130,9 +130,9 @@ def _values(
     return made
 
 
-def _asked(values: dict[str, Array], grid: bool, sweep: str | None, along: str, window: float) -> dict[str, Any]:
+def _asked(values: dict[str, Array], grid: bool, sweep: str | None, swept: str, window: float) -> dict[str, Any]:
     asked = {name: [None if np.isnan(v) else float(v) for v in array] for name, array in values.items()}
-    return asked | {"grid": grid, "sweep": sweep, "along": along if sweep else None, "window": window}
+    return asked | {"grid": grid, "sweep": sweep, "swept": swept if sweep else None, "window": window}
 
 
 @dataclass(frozen=True)
@@ -146,23 +146,23 @@ class _Plan:
     place: dict[tuple[int, int], int]
 
     @classmethod
-    def of(cls, values: dict[str, Array], *, grid: bool, sweep: str | None, along: str) -> _Plan:
+    def of(cls, values: dict[str, Array], *, grid: bool, sweep: str | None, swept: str) -> _Plan:
         """Raises CaseError for lists of several lengths, and a sweep of what has one value."""
-        if sweep not in (None, "up", "down", "both") or along not in AXES[:3]:
-            name, given = ("along", along) if along not in AXES[:3] else ("sweep", sweep)
-            raise CaseError(name, given, "mu, load or speed" if name == "along" else "up, down or both")
+        if sweep not in (None, "up", "down", "both") or swept not in AXES[:3]:
+            name, given = ("swept", swept) if swept not in AXES[:3] else ("sweep", sweep)
+            raise CaseError(name, given, "mu, load or speed" if name == "swept" else "up, down or both")
         if not grid:
             return cls._listed(values, sweep)
-        values = {name: np.unique(array) if sweep and name == along else array for name, array in values.items()}
-        if sweep and len(values[along]) < 2:
-            raise CaseError("sweep", sweep, f"goes along {along}, of which two or more values are needed")
+        values = {name: np.unique(array) if sweep and name == swept else array for name, array in values.items()}
+        if sweep and len(values[swept]) < 2:
+            raise CaseError("sweep", sweep, f"goes over {swept}, of which two or more values are needed")
         branches = {None: ("",), "up": ("up",), "down": ("down",), "both": ("up", "down")}[sweep]
         combined = np.array(list(product(*(values[name] for name in AXES))))
         rows, marks = np.tile(combined, (len(branches), 1)), tuple(b for b in branches for _ in combined)
         numbers = np.arange(len(rows)).reshape(len(branches), *(len(values[name]) for name in AXES))
         if sweep:
-            moved = np.moveaxis(numbers, 1 + AXES.index(along), 1)
-            moved = moved.reshape(len(branches), len(values[along]), -1)
+            moved = np.moveaxis(numbers, 1 + AXES.index(swept), 1)
+            moved = moved.reshape(len(branches), len(values[swept]), -1)
             chains = [moved[k][::-1] if branch == "down" else moved[k] for k, branch in enumerate(branches)]
             order = np.concatenate(chains).T
         else:
@@ -236,7 +236,7 @@ def _result(
         for name, values in shares.items():
             values[k] = [getattr(c, f"{name}_fraction") for c in numbers.contacts.values()]
         growing = found.at(float(plan.rows[k, 0]), float(plan.rows[k, 2]))
-        if growing is not None and numbers.regime in ("saturated", "transient", "grows"):
+        if growing is not None and numbers.regime in ("steady", "transient", "grows"):
             mode[k], mode_hz[k], deviation[k] = growing.nearest(numbers.frequency_hz)
     separate = () if outcome.side_by_side else (f"separate runs, not side by side: {outcome.reason}",)
     nodes = system.contact_nodes()

@@ -17,7 +17,7 @@ from ..typing import Array
 
 OF_POINT = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
 OF_CONTACT = {"slip_speed": "m/s", "normal_force": "N", "tangential_force": "N", "gap": "m"}
-STEADY = 1.1  # by how much the amplitudes of both halves of the window may differ where it is saturated
+STEADY = 1.1  # by how much the amplitudes of both halves of the window may differ where it is steady
 LEAST_RECORDS = 64  # of a window
 ROUNDING = 1e-12  # of the largest value: what no longer vibrates
 
@@ -115,7 +115,7 @@ def _regime(before: float, after: float, contacts: Collection[ContactStatistics]
     """What the amplitudes of both halves of a window, and what its contacts did, say of it (see `Ensemble`)."""
     steady = max(before, after) <= STEADY * min(before, after)
     if not all(_one_state(c) for c in contacts):
-        return "saturated" if steady else "transient"
+        return "steady" if steady else "transient"
     if contacts and not any(c.slip_fraction > 0.0 for c in contacts):
         return "sticks"
     return "linear" if steady else "grows" if after > before else "decays"

@@ -15,7 +15,12 @@ from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
 
 AXES = ("mu", "load", "speed", "perturbation")
-REGIMES = ("saturated", "transient", "grows", "decays", "linear", "sticks", "still", "failed", "interrupted")
+SHARES = ("stick", "slip", "separation")
+HEADS = (
+    *AXES, "sweep", "slip_speed_m_s", "regime", "rms", "peak", "frequency_hz", "growth_1_s", "mode", "mode_hz",
+    "mode_deviation", "error",
+)  # fmt: skip
+REGIMES = ("steady", "transient", "grows", "decays", "linear", "sticks", "still", "failed", "interrupted")
 UNITS = {"slip_speed": "m/s", "frequency_hz": "Hz", "growth_rate": "1/s", "mode_hz": "Hz", "perturbation": "m/s"}
 
 
@@ -52,14 +57,14 @@ class Ensemble(Tabular):
 
     Over the window, the last share of the last phase: rms and peak (k,) of the ``observable`` about its mean [unit];
     frequency_hz (k,) of its largest line; stick, slip, separation (k, m): shares of time, of every step; growth_rate
-    (k,) [1/s] of the rms from one half of it to the other. regime (k,), by these halves: "saturated" where contacts
+    (k,) [1/s] of the rms from one half of it to the other. regime (k,), by these halves: "steady" where contacts
     change between stick, slip and separation and the rms of both is the same within 10 %, "transient" where it is not.
     Without such changes contacts that slip leave the motion linear: it "grows" or "decays" by more than that, or is
     "linear"; "sticks" where none slips, "still" where nothing vibrates; "failed" (error says why) or "interrupted".
 
     mode (k,): number, as in `modes`, of the unstable mode that responds, the nearest one to the frequency if it is
     within 5 % of it, else 0; mode_hz, mode_deviation (k,): frequency of the nearest and how far off the run is,
-    f/f_mode − 1; only of members that are saturated or transient or grow. NaN is what does not exist.
+    f/f_mode − 1; only of members that are steady or transient or grow. NaN is what does not exist.
 
     axes: the values along each of mu, load, speed, perturbation, if members are all combinations of these, in that
     order, up before down; else (). modal: the modal map, None where it was not asked for or cannot be told. runs: the
@@ -110,13 +115,25 @@ class Ensemble(Tabular):
     def to_json(self) -> dict[str, Any]:
         """The document that `stridor ensemble --json` prints; None stands for what does not exist."""
         heads, rows = self.table()
+        fixed = len(HEADS)
+        shares = zip(self.stick, self.slip, self.separation, strict=True)
+        contacts = [
+            {
+                name: dict(zip(SHARES, (_plain(one[c]) for one in of_member), strict=True))
+                for c, name in enumerate(self.contact_names)
+            }
+            for of_member in shares
+        ]
         return {
             "observable": self.observable,
             "unit": self.unit,
             "window": list(self.window),
             "step": self.step,
             "method": self.method,
-            "members": [dict(zip(heads, row, strict=True)) for row in rows],
+            "members": [
+                dict(zip(heads[:fixed], row[:fixed], strict=True)) | {"contacts": own}
+                for row, own in zip(rows, contacts, strict=True)
+            ],
             "modal": None if self.modal is None else self.modal.to_json(),
             "interrupted": self.interrupted,
             "notes": list(self.notes),
@@ -124,11 +141,8 @@ class Ensemble(Tabular):
 
     def table(self) -> Rows:
         """Heads and rows, as its CSV file has them: a row for each member."""
-        shares = [f"{name}.{what}" for name in self.contact_names for what in ("stick", "slip", "separation")]
-        heads = (
-            *AXES, "sweep", "slip_speed_m_s", "regime", "rms", "peak", "frequency_hz", "growth_1_s", *shares, "mode",
-            "mode_hz", "mode_deviation", "error",
-        )  # fmt: skip
+        shares = [f"{name}.{what}" for name in self.contact_names for what in SHARES]
+        heads = (*HEADS, *shares)
         rows: list[tuple[Cell, ...]] = []
         for k in range(len(self)):
             numbers = [self.rms, self.peak, self.frequency_hz, self.growth_rate]
@@ -141,11 +155,11 @@ class Ensemble(Tabular):
                     _plain(self.slip_speed[k]),
                     self.regime[k],
                     *(_plain(v[k]) for v in numbers),
-                    *(_plain(v) for v in fractions),
                     int(self.mode[k]) or None,
                     _plain(self.mode_hz[k]),
                     _plain(self.mode_deviation[k]),
                     self.error[k],
+                    *(_plain(v) for v in fractions),
                 )
             )
         return heads, rows

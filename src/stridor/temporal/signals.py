@@ -54,7 +54,8 @@ def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:
         return float(frequency[k])
     a, b, c = np.log(amplitude[k - 1 : k + 2])
     bend = a - 2 * b + c
-    shift = 0.5 * (a - c) / bend if bend < 0 else 0.0
+    # Beside the edge of what is looked at a neighbour may be larger: the vertex then lies anywhere.
+    shift = min(max(0.5 * (a - c) / bend, -0.5), 0.5) if bend < 0 else 0.0
     return float(frequency[k] + shift * (frequency[1] - frequency[0]))
 
 

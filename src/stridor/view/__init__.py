@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from . import plots
     from .boundary_plots import stability_boundary
+    from .ensemble_plots import ensemble_map
     from .inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
     from .plots import (
         Animation,
@@ -60,6 +61,7 @@ __all__ = [
     "damping_branches",
     "damping_map",
     "energy_plot",
+    "ensemble_map",
     "frequency_branches",
     "friction_curve",
     "growth_branches",
@@ -91,6 +93,7 @@ _HOME = {
     "ReportInputs": "inputs",
     "countermeasure_bars": "sensitivity_plots",
     "damping_map": "sensitivity_plots",
+    "ensemble_map": "ensemble_plots",
     "sensitivity_bars": "sensitivity_plots",
     "stability_boundary": "boundary_plots",
     "write_report": "report",
