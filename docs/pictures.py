@@ -87,8 +87,16 @@ def ensemble() -> None:
     save(st.plot.ensemble_map(found), "ensemble", (8.4, 7.6))
 
 
+def boundary() -> None:
+    """Where modes of the two beams begin to grow over friction and a damping."""
+    found = st.stability_boundary(
+        case, "bodies.beam2.damping.mass", "mu", x_range=(0.0, 2000.0), y_range=(0.0, 0.5)
+    )
+    save(st.plot.stability_boundary(found), "boundary", (7, 4.2))
+
+
 if __name__ == "__main__":
     save(st.plot.model(case), "two-beams", (8, 3.4))
     save(st.plot.model(pad), "pad-on-disc", (7, 4.4))
-    for draw in (imported_branches, steady_pressure, factors, listing, ensemble):
+    for draw in (imported_branches, steady_pressure, factors, listing, ensemble, boundary):
         draw()

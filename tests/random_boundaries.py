@@ -109,26 +109,30 @@ def disagreement(problem: Plane, found: Found, mesh: float) -> str:
 
 
 def off_the_curves(problem: Plane, found: Found, beside: float) -> list[np.ndarray]:
-    """Points of the curves on whose two sides, so far away in shares of the ranges, the number of growing roots is not
-    that which the curves say."""
-    wrong, places = list[np.ndarray](), list[tuple[np.ndarray, np.ndarray]]()
+    """Points of the curves on whose two sides, so far away in shares of the ranges and half as far again, the number of
+    growing roots is not that which the curves say. Where another curve is as near they are not told apart."""
+    wrong: list[np.ndarray] = []
     for curve in found.curves:
-        points = curve.drawn.points
-        ways = np.diff(points, axis=0)
-        normal = np.stack([-ways[:, 1], ways[:, 0]], axis=1) / np.maximum(np.hypot(*ways.T), 1e-300)[:, None]
-        middle = 0.5 * (points[1:] + points[:-1])
-        # Where another one is as near they are not told apart.
+        points, ways = curve.drawn.points, np.diff(curve.drawn.points, axis=0)
         others = replace(found, curves=[other for other in found.curves if other is not curve])
-        alone = np.array([distance(others, m) > 2 * beside for m in middle], dtype=bool)
-        normal, middle = normal[alone], middle[alone]
-        places += [(m - beside * n, m + beside * n) for m, n in zip(middle, normal, strict=True)]
-    inside = [(a, b) for a, b in places if min(*a, *b) >= 0 and max(*a, *b) <= 1]
-    sides = [growing(eigenvalues(problem, np.array(side)), problem.top) for side in zip(*inside, strict=True)]
-    for (a, b), before, after in zip(inside, *sides, strict=True):
-        passed = crossings(found.drawn, a, b)
-        ends = [c for c in passed if c.omega > 0.999 * problem.top]
-        if not ends and after - before != sum(c.roots for c in passed):
-            wrong.append(0.5 * (a + b))
+        middle = 0.5 * (points[1:] + points[:-1])
+        normal = np.stack([-ways[:, 1], ways[:, 0]], axis=1) / np.maximum(np.hypot(*ways.T), 1e-300)[:, None]
+        sides = [(m - 1.5 * beside * n, m + 1.5 * beside * n) for m, n in zip(middle, normal, strict=True)]
+        judged = [
+            k for k, (a, b) in enumerate(sides)
+            if min(*a, *b) >= 0 and max(*a, *b) <= 1 and distance(others, middle[k]) > 2 * beside
+        ]  # fmt: skip
+        if not judged:
+            continue
+        off = np.ones(len(judged), dtype=bool)
+        for share in (beside, 1.5 * beside):
+            ends = [middle[judged] + sign * share * normal[judged] for sign in (-1, 1)]
+            before, after = (growing(eigenvalues(problem, end), problem.top) for end in ends)
+            for j, (a, b) in enumerate(zip(*ends, strict=True)):
+                passed = crossings(found.drawn, a, b)
+                at_end = any(c.omega > 0.999 * problem.top for c in passed)
+                off[j] &= not at_end and after[j] - before[j] != sum(c.roots for c in passed)
+        wrong += [middle[judged[j]] for j in np.flatnonzero(off)]
     return wrong
 
 

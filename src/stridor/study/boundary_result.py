@@ -30,7 +30,7 @@ class BoundaryCurve(Shown):
     growth_side (k,): 1 where the mode grows on the left of that direction, −1 on the right. modes_beside (k,): how many
     other modes grow on both sides; 0 is the outer boundary. closed: whether it came back to its first point, which is
     its last as well. ends: "edge" of the rectangle, "band" (the highest frequency), "zero frequency" (flutter comes to
-    rest at a divergence), "cusp" (three undamped modes meet, and another curve ends), "lost" (it could not be followed
+    rest at a divergence), "cusp" (another curve ends there as well, both at a tip), "lost" (it could not be followed
     further) or "closed".
 
     residual (k,): backward error in the matrices that were solved, those of the reduced model or the full ones. error

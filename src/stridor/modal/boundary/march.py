@@ -45,13 +45,13 @@ def traced(plane: Plane, seed: Spot, tolerance: float) -> Curve:
 
 
 def joined(curves: Sequence[Curve]) -> list[Curve]:
-    """The same curves; where two of meeting modes were lost at one place and frequency they end in a cusp there: three
-    modes meet."""
-    lost = [(k, e) for k, c in enumerate(curves) for e in (0, 1) if c.ends[e] == "lost" and c.kind == "meeting"]
+    """The same curves; where two of one kind were lost at one place and frequency they end in a cusp there: three
+    undamped modes meet, or little damping has rounded that off by less than the shortest step."""
+    lost = [(k, e) for k, c in enumerate(curves) for e in (0, 1) if c.ends[e] == "lost"]
     ends = [list(c.ends) for c in curves]
     for (k, e), (j, f) in combinations(lost, 2):
         one, other = curves[k].spots[-e], curves[j].spots[-f]
-        near = float(np.hypot(*(one.p - other.p))) <= CUSP
+        near = one.kind == other.kind and float(np.hypot(*(one.p - other.p))) <= CUSP
         if near and abs(one.omega - other.omega) <= OMEGA * one.omega:
             ends[k][e] = ends[j][f] = "cusp"
     return [replace(c, ends=(e[0], e[1])) for c, e in zip(curves, ends, strict=True)]
