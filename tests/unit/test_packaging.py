@@ -25,14 +25,14 @@ def bare(requirement: str) -> str:
 def test_extras_are_what_the_program_knows_how_to_use():
     named = {re.split("[><=]", bare(r))[0] for extra in PROJECT["optional-dependencies"].values() for r in extra}
     assert all(PROJECT["optional-dependencies"].values()), "an extra with nothing behind it"
-    known = {module for modules, _ in PACKAGES.values() for module in modules} | {"slepc4py"}
+    known = {module for modules, _ in PACKAGES.values() for module in modules} | {"slepc4py", "distributed"}
     assert {MODULES.get(name, name) for name in named} <= known
 
 
 def test_conda_brings_what_pip_would():
     text = (ROOT / "environment.yml").read_text(encoding="utf-8").replace("matplotlib-base", "matplotlib")
     conda = set(re.findall(r"^  - (\S+)$", text, re.M))
-    needed = {bare(r) for r in (*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["mumps"])}
+    needed = {bare(r).lower() for r in (*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["mumps"])}
     assert needed <= conda
 
 

@@ -21,7 +21,7 @@ from stridor.case import template_text
 from stridor.studies import reduced_rows
 from stridor.studies.parts import Part
 from stridor.studies.rows import Row, full_row
-from stridor.studies.schema import Keep
+from stridor.studies.tables import Keep
 from stridor.studies.task import Batch, Task
 from stridor.studies.workers import LocalWorkers
 

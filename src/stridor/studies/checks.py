@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..case import Case
 from ..errors import CaseError, Problem
 from ..study.sensitivities import number_at
-from .schema import MOST_SAMPLES, Study, Varied, problem
+from .distributions import inside
+from .tables import MOST_SAMPLES, Varied, problem
+
+if TYPE_CHECKING:
+    from .schema import Study
 
 FRICTION = "mu"
 _NORMAL = ("mean", "deviation")
@@ -85,8 +90,6 @@ def _of_distribution(path: str, varied: Varied) -> Iterator[Problem]:
         yield problem(path, "high", varied.high, f"above low = {varied.low:g}")
         return
     if varied.mean is not None and varied.deviation is not None:
-        from .distributions import inside
-
         share = inside(varied)
         if not share > 1e-6:
             accepted = f"limits that leave something of the distribution: between them lie {share:.1g} of it"

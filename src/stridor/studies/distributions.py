@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array
-from .schema import Varied
+from .tables import Varied
 
 LEAST = 1e-15  # of a share: normal scores of 0 and 1 are infinite
 

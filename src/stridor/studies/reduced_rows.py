@@ -26,7 +26,8 @@ from ..system import build_system
 from ..typing import Array
 from .checks import FRICTION
 from .rows import Row, modes_row, onsets_row
-from .schema import Compute, Keep, Study
+from .schema import Study
+from .tables import Compute, Keep
 
 SAFE = 100.0  # how many times its estimated error a growth rate must be to have a sign
 NEAR = 1e-6  # growth, of |λ|, below which stability is decided in full however small the error

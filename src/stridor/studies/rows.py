@@ -20,7 +20,7 @@ from ..study.analyses import compare, modes, onsets, simulate, steady_sliding, s
 from ..study.workspace import Workspace
 from ..typing import ComplexArray, IntArray
 from .checks import FRICTION
-from .schema import Compute, Keep
+from .tables import Compute, Keep
 
 Row = dict[str, Any]
 

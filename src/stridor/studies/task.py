@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from .. import __version__
 from ..case import Case, loads
 from ..errors import AnalysisError
 from ..study.case_key import sources_key
+from ..study.provenance import versions
 from ..threads import one_thread
 from .reduced_rows import Reduced
 from .rows import Row, failed, full_row
-from .schema import Compute, Keep
+from .tables import Compute, Keep
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Batch:
 
 def program() -> str:
     """Version and sources of the stridor that runs."""
-    return f"{__version__} {sources_key()[:12]}"
+    return f"{versions()['stridor']} {sources_key()[:12]}"
 
 
 def answered(task: Task, batch: Batch) -> Iterator[tuple[int, Row]]:
