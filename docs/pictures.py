@@ -88,10 +88,8 @@ def ensemble() -> None:
 
 
 def boundary() -> None:
-    """Where modes of the two beams begin to grow over friction and a damping."""
-    found = st.stability_boundary(
-        case, "bodies.beam2.damping.mass", "mu", x_range=(0.0, 2000.0), y_range=(0.0, 0.5)
-    )
+    """Where modes of the two beams begin to grow over friction and a thickness."""
+    found = st.stability_boundary(case, "bodies.beam1.thickness", "mu", x_range=(0.001, 0.002), y_range=(0.0, 0.5))
     save(st.plot.stability_boundary(found), "boundary", (7, 4.2))
 
 

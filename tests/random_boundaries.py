@@ -109,8 +109,9 @@ def disagreement(problem: Plane, found: Found, mesh: float) -> str:
 
 
 def off_the_curves(problem: Plane, found: Found, beside: float) -> list[np.ndarray]:
-    """Points of the curves on whose two sides, so far away in shares of the ranges and half as far again, the number of
-    growing roots is not that which the curves say. Where another curve is as near they are not told apart."""
+    """Points of the curves between whose two sides, so far away in shares of the ranges and half as far again, no root of
+    the curve's frequency begins to grow, nor as many in all as the curves say. Where another curve is as near they are not
+    told apart."""
     wrong: list[np.ndarray] = []
     for curve in found.curves:
         points, ways = curve.drawn.points, np.diff(curve.drawn.points, axis=0)
@@ -124,14 +125,16 @@ def off_the_curves(problem: Plane, found: Found, beside: float) -> list[np.ndarr
         ]  # fmt: skip
         if not judged:
             continue
+        omega = curve.drawn.omega[:-1][judged, None]
         off = np.ones(len(judged), dtype=bool)
         for share in (beside, 1.5 * beside):
             ends = [middle[judged] + sign * share * normal[judged] for sign in (-1, 1)]
-            before, after = (growing(eigenvalues(problem, end), problem.top) for end in ends)
+            values = [eigenvalues(problem, end) for end in ends]
+            before, after = (growing(v, problem.top) for v in values)
+            own = [np.take_along_axis(v, np.abs(v - 1j * omega).argmin(axis=1)[:, None], axis=1)[:, 0] for v in values]
+            passes = own[0].real * own[1].real < 0
             for j, (a, b) in enumerate(zip(*ends, strict=True)):
-                passed = crossings(found.drawn, a, b)
-                at_end = any(c.omega > 0.999 * problem.top for c in passed)
-                off[j] &= not at_end and after[j] - before[j] != sum(c.roots for c in passed)
+                off[j] &= not passes[j] and after[j] - before[j] != sum(c.roots for c in crossings(found.drawn, a, b))
         wrong += [middle[judged[j]] for j in np.flatnonzero(off)]
     return wrong
 

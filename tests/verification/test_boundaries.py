@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -150,6 +151,18 @@ def test_an_island(tmp_path: Path, centre: tuple[float, float], axes: tuple[floa
     against_a_grid(*traced(case, "x", (0.0, 1.0), 1.0))
 
 
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+def test_pieces_between_points_are_as_near_as_asked_for(tmp_path: Path, tolerance: float) -> None:
+    case = damped_by(tmp_path, "0.1*(((x - 0.46)/0.2)**2 + ((mu - 0.55)/0.15)**2 - 1)")
+    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0), tolerance=tolerance)
+    (curve,), ((x, y, _),) = found.curves, found.polylines()
+    assert found.agree
+    assert curve.deviation <= tolerance
+    # Relative to the ellipse, whose half axes are 0.15 and 0.2; straight pieces of the drawing add some 1e-5.
+    assert np.abs(np.hypot((x - 0.46) / 0.2, (y - 0.55) / 0.15) - 1).max() <= tolerance / 0.15
+    assert len(curve.x) > (50 if tolerance < 1e-4 else 30)
+
+
 def test_an_island_that_cuts_no_line_and_is_nowhere_counted_is_not_excluded(tmp_path: Path) -> None:
     """The growth falls off so steeply that nothing betrays it from outside: missed, and the result says that it may."""
     case = damped_by(tmp_path, "0.1 - exp(-((x - 0.55)/0.01)**2 - ((mu - 0.55)/0.01)**2)")
@@ -210,6 +223,27 @@ def test_two_beams_against_onsets_of_the_full_problem() -> None:
         assert [f for _, f in at] == pytest.approx([o.frequency_hz for o in onsets], rel=1e-3)
 
 
+def test_tongues_of_two_beams_against_onsets_of_the_full_problem() -> None:
+    """Thirteen curves over a thickness that fold, cross and end in a tip, on columns at which all onsets are sought anew."""
+    case, path, ends = paper_case(), "bodies.beam1.thickness", (0.001, 0.002)
+    found = st.stability_boundary(case, path, "mu", x_range=ends, y_range=(0.0, 0.5))
+    assert found.agree
+    assert found.solves + found.steps <= 0.02 * FINE**2
+    for value in (0.00111, 0.001475, 0.00183):
+        at = sorted(
+            (float(y[k] + (value - x[k]) / (x[k + 1] - x[k]) * (y[k + 1] - y[k])), float(f[k]))
+            for x, y, f in found.polylines() for k in np.flatnonzero(np.diff(x > value)).tolist()
+        )  # fmt: skip
+        onsets = [o for o in st.onsets(case.with_({path: value}), (0.0, 0.5)).onsets if o.frequency_hz <= 40e3]
+        assert len(onsets) >= 3
+        assert [mu for mu, _ in at] == pytest.approx([o.mu for o in onsets], abs=1e-3 * 0.5)
+        assert [f for _, f in at] == pytest.approx([o.frequency_hz for o in onsets], rel=1e-3)
+        grows = [o.mu for o in onsets if not o.stabilising], [o.mu for o in onsets if o.stabilising]
+        for mu in (0.05, 0.1501, 0.3001, 0.4801):
+            said = sum(m < mu for m in grows[0]) - sum(m < mu for m in grows[1])
+            assert found.unstable_modes(value, mu) == said
+
+
 def ascending(line: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[np.ndarray, ...]:
     order = np.argsort(line[0], kind="stable")
     return tuple(v[order] for v in line)
@@ -255,7 +289,7 @@ def wrong(seed: int) -> tuple[bool, str]:
     return True, f"seed {seed}: no boundary at {off[0].round(4)}" if off else ""
 
 
-@pytest.mark.parametrize("seeds", [range(5), (7, 10), (13, 100)], ids=str)
+@pytest.mark.parametrize("seeds", [range(5), (7, 10), (13, 100), (140, 278)], ids=str)
 def test_random_problems(seeds) -> None:
     assert [wrong(seed) for seed in seeds] == [(True, "")] * len(seeds)
 
@@ -328,8 +362,10 @@ def test_the_verb(tmp_path: Path) -> None:
     assert [float(r["mu"]) for r in rows] == curve["y"]
     assert {r["curve"] for r in rows} == {"1"}
     assert (tmp_path / "case.out" / "boundary.png").stat().st_size > 10_000
-    said = " ".join(stridor(*words, cwd=tmp_path).stdout.split())
-    assert "1 of 1 curves bounds where nothing grows, down to x = " in said
+    said = stridor(*words, cwd=tmp_path).stdout
+    assert "one curve bounds where nothing grows, down to x = " in " ".join(said.split())
+    following = shlex.split(said.partition("Next: stridor ")[2].replace("\\\n", " "))
+    assert stridor(*following, cwd=tmp_path).returncode == 0
     called = st.stability_boundary(st.load(tmp_path / "case.toml"), "x", "mu", x_range=(-1, 2), y_range=(0, 3))
     assert called.to_json() == {k: v for k, v in document.items() if k != "files"}
     data = called.to_xarray()

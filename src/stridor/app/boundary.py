@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..notebook import counted
 from .arguments import INCOMPLETE, Call, verb
 from .closing import Conclusion
 from .option_table import MaxFrequency
@@ -13,6 +14,7 @@ from .two_numbers import Method, X, XRange, Y, YRange
 from .values import pair
 
 if TYPE_CHECKING:
+    from ..case import Case
     from ..study.boundary_result import Boundary, BoundaryCurve
 
 
@@ -56,19 +58,19 @@ def boundary(
         _show(result)
         for line in (result.sentence, *result.notes):
             stdout.print(line)
-        call.conclude(_conclusion(result))
+        call.conclude(_conclusion(result, loaded.case(call.verb)))
     if not result.agree:
         raise typer.Exit(INCOMPLETE)
 
 
-def _conclusion(result: Boundary) -> Conclusion:
+def _conclusion(result: Boundary, case: Case) -> Conclusion:
     """How many curves bound what nothing grows in; then the modes at the lowest point of these."""
     import numpy as np
 
     outer = [curve for curve in result.curves if curve.outer.any()]
     if not result.curves:
         counts = {c.unstable_modes for c in result.counted}
-        growing = f"; {counts.pop() or 'no'} modes grow wherever that was counted" if len(counts) == 1 else ""
+        growing = f"; {counted(counts.pop(), 'mode')} grow wherever that was counted" if len(counts) == 1 else ""
         return Conclusion(f"no curve in the rectangle up to {result.max_frequency_hz:g} Hz{growing}", "modes")
     if not outer:
         return Conclusion(f"{len(result.curves)} curves; something grows on both sides of each of them", "modes")
@@ -76,15 +78,15 @@ def _conclusion(result: Boundary) -> Conclusion:
     k = int(np.argmin([float(y.min()) for y in lowest]))
     j = int(np.argmin(lowest[k]))
     at = f"{result.x} = {outer[k].x[j]:.6g}, {result.y} = {outer[k].y[j]:.6g} ({outer[k].frequency_hz[j]:.6g} Hz)"
-    number = f"{len(outer)} of {len(result.curves)} curves {'bound' if len(outer) > 1 else 'bounds'}"
-    said = f"{number} where nothing grows, down to {at}"
-    options = tuple(
-        word
-        for path, value in ((result.x, outer[k].x[j]), (result.y, outer[k].y[j]))
-        for word in (("--mu", f"{value:.6g}") if path == "mu" else ("--set", f"{path}={value:.6g}"))
-        if path != "contact_stiffness"
-    )
-    return Conclusion(said, "modes", options)
+    count = f"{len(outer)} of {len(result.curves)} curves" if len(result.curves) > 1 else "one curve"
+    said = f"{count} {'bound' if len(outer) > 1 else 'bounds'} where nothing grows, down to {at}"
+    options: list[str] = []
+    for path, value in ((result.x, outer[k].x[j]), (result.y, outer[k].y[j])):
+        if path == "contact_stiffness" and path not in case.parameters:
+            return Conclusion(said)  # no verb but `reduce` takes it
+        own = f"parameters.{path}.value" if path in case.parameters else path
+        options += ["--mu", f"{value:.6g}"] if own == "mu" else ["--set", f"{own}={value:.6g}"]
+    return Conclusion(said, "modes", tuple(options))
 
 
 def _show(result: Boundary) -> None:

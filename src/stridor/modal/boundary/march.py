@@ -27,6 +27,8 @@ ALIKE = 0.6  # |xᴴx'| of vectors of unit length from one point to the next
 OMEGA = 0.05  # of ω: how far from its prediction
 STILL = 1e-4  # of the highest frequency: ω below which flutter has come to rest
 MOST = 3000  # points
+LONG = 0.05  # pieces longer than that are halved in any case
+EVENLY = 0.02  # of its change: how far off ω may be in the middle of two points
 LEVELS = 6  # halvings in the middle of two points
 BESIDE = 0.5  # of a step: how far a point is looked for
 INSIDE = 1e-12
@@ -236,12 +238,25 @@ def _between(
     if spot is None or not _like(plane, old, spot):
         return [], 0.0, int(length > tolerance)
     off = float(np.hypot(*(spot.p - middle)))
-    if (off <= tolerance and not flips) or levels <= (-LEVELS if flips else 0):
+    smooth = off <= tolerance and length <= LONG and _even(old, spot, new, heading, heading_to)
+    if (smooth and not flips) or levels <= (-LEVELS if flips else 0):
         return [spot], off, int(off > tolerance)
     ahead = spot.tangent if spot.tangent @ (new.p - old.p) >= 0 else -spot.tangent
     first, one_off, lost = _between(plane, one, (spot, ahead), tolerance, levels - 1)
     last, other_off, lost_too = _between(plane, (spot, ahead), other, tolerance, levels - 1)
     return [*first, spot, *last], max(one_off, other_off), lost + lost_too
+
+
+def _even(old: Spot, middle: Spot, new: Spot, heading: Array, heading_to: Array) -> bool:
+    """Whether ω, too, is in the middle where the cubic through both ends has it: near places where two modes all but
+    meet it changes within less than a step, and the curve turns there and back."""
+    if old.kind != "crossing":
+        return True
+    length = float(np.hypot(*(new.p - old.p)))
+    first, last = (float(spot.turn @ way) for spot, way in ((old, heading), (new, heading_to)))
+    expected = 0.5 * (old.omega + new.omega) + length / 8 * (first - last)
+    size = length * max(abs(first), abs(last)) + abs(new.omega - old.omega)
+    return abs(middle.omega - expected) <= EVENLY * size + 1e-6 * middle.omega
 
 
 def _leaving(way: _Way) -> bool:
