@@ -17,6 +17,7 @@ from stridor.study.boundary_result import Boundary
 FINE = 1001
 BENCHES: dict[str, tuple[Case, str, tuple[float, float], tuple[float, float]]] = {
     "two beams, damping of one": (bench(), "bodies.beam2.damping.mass", (0.0, 2000.0), (0.0, 0.5)),
+    "two beams, thickness of one": (bench(), "bodies.beam1.thickness", (0.001, 0.002), (0.0, 0.5)),
     "two beams, density": (bench(), "materials.steel.density", (6000.0, 9000.0), (0.0, 0.5)),
     "two beams, contact stiffness": (bench(), "contact_stiffness", (0.01, 1.0), (0.0, 1.0)),
     "pad on disc, coarse, damping": (
