@@ -322,6 +322,14 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
         assert not found.curves
         assert "growth begins or ends where no curve is" in found.sentence
     with monkeypatch.context() as patch:
+
+        def refused(*_: object) -> None:
+            raise st.AnalysisError("not today")
+
+        patch.setattr(Plane, "onsets", refused)
+        with pytest.raises(st.AnalysisError, match="not today"):
+            boundary()
+    with monkeypatch.context() as patch:
         lay = search._Search._lay
         patch.setattr(search._Search, "_lay", lambda self, axis, value: None if value > 0.3 else lay(self, axis, value))
         assert boundary().agree  # the curve is found on other lines

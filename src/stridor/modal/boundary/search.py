@@ -118,6 +118,7 @@ class _Search:
     ) -> None:
         self.plane, self.tolerance, self.number = plane, tolerance, lines
         self.found, self._progress, self._done = Found(plane), progress, 0
+        self._failed: list[AnalysisError] = []
 
     def all(self) -> Found:
         """Lines, curves and counts, again where they differ."""
@@ -125,6 +126,8 @@ class _Search:
         for axis in (0, 1):
             for value in places.tolist():
                 self._lay(axis, value)
+        if len(self._failed) == len(self.found.lines):
+            raise self._failed[0]
         middles = 0.5 * (places[1:] + places[:-1])
         # Next to one another along lines, so that a difference lies on one that can be searched.
         cells = [(x, y) for k, x in enumerate(middles.tolist()) for y in middles.tolist()[:: -1 if k % 2 else 1]]
@@ -157,6 +160,7 @@ class _Search:
             answer = self.plane.onsets(axis, value)
         except AnalysisError as error:
             self.found.lines.append(Line(axis, value, (), complete=False, why=str(error)))
+            self._failed.append(error)
             return
         inside = [o for o in answer.onsets if 2 * np.pi * o.frequency_hz <= self.plane.top]
         onsets = tuple((o.mu, 2 * np.pi * o.frequency_hz, o.roots) for o in inside)
