@@ -15,6 +15,7 @@ STRIDOR = str(Path(sys.executable).parent / "stridor")
 IMAGES = Path(__file__).parent / "images"
 case = st.loads(st.case.template_text("two-beams"))
 pad = st.loads(st.case.template_text("pad-on-disc"))
+WRITTEN = 12_000  # rows a second, docs/scaling.md
 coarse = {"disc": [4, 48, 1], "lining": [6, 12, 2], "plate": [6, 12, 1]}
 pad = pad.with_({f"bodies.{name}.mesh.divisions": value for name, value in coarse.items()})
 
@@ -87,6 +88,30 @@ def ensemble() -> None:
     save(st.plot.ensemble_map(found), "ensemble", (8.4, 7.6))
 
 
+def study() -> None:
+    """Samples over friction and damping, as `stridor study` draws them."""
+    normal = {"distribution": "normal", "mean": 5.0, "deviation": 1.0, "low": 0.0}
+    parameters = {"mu": {"range": (0.0, 0.3)}, "bodies.beam1.damping.mass": normal}
+    made = st.Study(case=case, parameters=parameters, sampling={"method": "sobol", "samples": 512, "seed": 1})
+    with tempfile.TemporaryDirectory() as folder:
+        save(st.study_figures(st.run_study(made, folder))["stability-map"], "study", (7.6, 4.4))
+
+
+def study_cost() -> None:
+    """Rows a second over workers by the figures of the page: seconds of a row, rows a second that one store takes."""
+    workers = np.geomspace(1, 1e4, 60)
+    figure, ax = plt.subplots(layout="constrained")
+    for seconds, label in ((0.144, "full problem"), (0.0019, "reduced model")):
+        (line,) = ax.loglog(workers, workers / seconds, "--", linewidth=1)
+        ax.loglog(workers, np.minimum(workers / seconds, WRITTEN), color=line.get_color(), label=label)
+    ax.axhline(WRITTEN, color="0.4", linewidth=0.8)
+    ax.text(1.2, 1.15 * WRITTEN, "one process writes the store; parts have one each", color="0.3")
+    ax.set(xlabel="workers", ylabel="rows a second", xlim=(1, 1e4))
+    ax.grid(visible=True, color="0.9")
+    ax.legend(frameon=False, loc="lower right")
+    save(figure, "study-cost", (7, 3.6))
+
+
 def boundary() -> None:
     """Where modes of the two beams begin to grow over friction and a thickness."""
     found = st.stability_boundary(case, "bodies.beam1.thickness", "mu", x_range=(0.001, 0.002), y_range=(0.0, 0.5))
@@ -96,5 +121,5 @@ def boundary() -> None:
 if __name__ == "__main__":
     save(st.plot.model(case), "two-beams", (8, 3.4))
     save(st.plot.model(pad), "pad-on-disc", (7, 4.4))
-    for draw in (imported_branches, steady_pressure, factors, listing, ensemble, boundary):
+    for draw in (imported_branches, steady_pressure, factors, listing, ensemble, study, study_cost, boundary):
         draw()

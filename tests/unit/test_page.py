@@ -90,7 +90,7 @@ ENDS = {
     ),
     f"boundary two-beams.toml --x {DAMPING[0]} --x-range 1e-9:5e-8 --y mu --y-range 0:0.2 --lines 3": (
         "1 of 3 curves bounds where nothing grows, down to ",
-        f"modes two-beams.toml --set {DAMPING[0]}=",
+        f"modes two-beams.toml --set {DAMPING[0]}=1e-09 --mu 0.0766642",
     ),
     "ensemble two-beams.toml --mu 0.3 --load 0.5,0.5 COARSE": (
         "2 members: ", "simulate two-beams.toml --mu 0.3 COARSE"

@@ -45,7 +45,10 @@ class Spectrum:
         if not inside.any() or not np.any(self.amplitude[inside] > 0):
             return 0.0, 0.0
         k = int(np.argmax(np.where(inside, self.amplitude, -1.0)))
-        return _interpolated(self.frequency_hz, self.amplitude, k), float(self.amplitude[k])
+        # Beside the edge of what is looked at a neighbour may be larger: the vertex then lies anywhere.
+        half, here = 0.5 * float(np.ptp(self.frequency_hz[:2])), float(self.frequency_hz[k])
+        found = min(max(_interpolated(self.frequency_hz, self.amplitude, k), here - half), here + half)
+        return found, float(self.amplitude[k])
 
 
 def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:
@@ -54,8 +57,7 @@ def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:
         return float(frequency[k])
     a, b, c = np.log(amplitude[k - 1 : k + 2])
     bend = a - 2 * b + c
-    # Beside the edge of what is looked at a neighbour may be larger: the vertex then lies anywhere.
-    shift = min(max(0.5 * (a - c) / bend, -0.5), 0.5) if bend < 0 else 0.0
+    shift = 0.5 * (a - c) / bend if bend < 0 else 0.0
     return float(frequency[k] + shift * (frequency[1] - frequency[0]))
 
 
