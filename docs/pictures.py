@@ -105,7 +105,7 @@ def study_cost() -> None:
         (line,) = ax.loglog(workers, workers / seconds, "--", linewidth=1)
         ax.loglog(workers, np.minimum(workers / seconds, WRITTEN), color=line.get_color(), label=label)
     ax.axhline(WRITTEN, color="0.4", linewidth=0.8)
-    ax.text(1.2, 1.15 * WRITTEN, "one process writes the store; parts have one each", color="0.3")
+    ax.text(1.2, 1.3 * WRITTEN, "what one store takes", color="0.3")
     ax.set(xlabel="workers", ylabel="rows a second", xlim=(1, 1e4))
     ax.grid(visible=True, color="0.9")
     ax.legend(frameon=False, loc="lower right")
