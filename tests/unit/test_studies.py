@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -259,7 +260,10 @@ def test_ctrl_c_keeps_what_is_done(case: st.Case, tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
     (tmp_path / "study.toml").write_text(KILLED.replace("points = 40", "points = 4000"), encoding="utf-8")
     words = [sys.executable, "-m", "stridor", "study", "study.toml"]
-    with subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # tests in the background of a shell inherit none
+    with subprocess.Popen(
+        words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed
+    ) as process:
         until = time.monotonic() + 60
         while not (tmp_path / "study.out/study.zarr/status/c").exists() and time.monotonic() < until:
             time.sleep(0.05)
