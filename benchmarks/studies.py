@@ -1,6 +1,7 @@
 """What a row of a study costs, alone and beside others: two-beam bench, scatter of friction, damping and density.
 
-python benchmarks/studies.py [--short] [--cluster] (--short: few rows; --cluster: also over TCP, needs distributed)
+python benchmarks/studies.py [--short] [--cluster] [--pad]
+(--short: few rows; --cluster: also over TCP, needs distributed; --pad: also the pad on the disc, a minute)
 
 Overhead: what a study takes beyond the rows themselves, of the workers' time; rows are timed where they are computed.
 """
@@ -111,10 +112,25 @@ def cluster(study: Study) -> None:
                 process.wait()
 
 
+def pad() -> None:
+    """Rows of the pad on the disc on its coarsest mesh, over friction, damping and Young's modulus of the lining."""
+    meshes = {"disc": [4, 44, 1], "lining": [4, 9, 2], "plate": [4, 9, 1]}
+    case = st.loads(template_text("pad-on-disc"))
+    case = case.with_({f"bodies.{name}.mesh.divisions": value for name, value in meshes.items()})
+    parameters = {
+        "mu": {"range": (0.0, 0.3)},
+        "bodies.disc.damping.stiffness": {"range": (1e-8, 2e-7)},
+        "materials.lining.young_modulus": {"distribution": "normal", "mean": 1e9, "deviation": 5e7},
+    }
+    study = Study(case=case, parameters=parameters, sampling={"method": "sobol", "samples": 128})
+    line("pad, reduced, 1 worker", 1, timed(study, 1))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--short", action="store_true")
     parser.add_argument("--cluster", action="store_true")
+    parser.add_argument("--pad", action="store_true")
     args = parser.parse_args()
     few, many = (60, 200) if args.short else (300, 10_000)
     print(f"studies of the two-beam bench ({machine()})")
@@ -126,6 +142,8 @@ def main() -> None:
     first = line("reduced, 1 worker", 1, timed(reduced, 1))
     print(f"  ratio of reduced to full, 1 worker: {first / one:.0f}")
     print(f"  ratio of 2 workers to 1: {line('reduced, 2 workers', 2, timed(reduced, 2)) / first:.2f}")
+    if args.pad:
+        pad()
     if args.cluster:
         cluster(reduced)
 

@@ -21,7 +21,7 @@ from program import stridor
 from stridor.case import template_text
 from stridor.studies import reduced_rows
 from stridor.studies.parts import Part
-from stridor.studies.rows import Row, full_row
+from stridor.studies.rows import Row, failed, full_row
 from stridor.studies.tables import Keep
 from stridor.studies.task import Batch, Task
 from stridor.studies.workers import LocalWorkers
@@ -341,6 +341,39 @@ def test_a_goal_adds_samples_until_the_interval_is_narrow(case: st.Case, tmp_pat
     assert 32 < known.of <= 2000
     assert known.half_width <= 0.05
     assert found.pending == 0
+
+
+def test_a_goal_that_is_narrower_on_a_restart_adds_samples(case: st.Case, tmp_path: Path) -> None:
+    parts = {"case": case, "parameters": SCATTER, "sampling": {"method": "sobol", "samples": 64}, "answers": {"source": "full"}}
+    first = st.run_study(st.Study(**parts, goal={"half_width": 0.5}), tmp_path, workers=2)
+    assert len(first.status) == 64
+    again = st.run_study(st.Study(**parts, goal={"half_width": 0.02, "most": 128}), tmp_path, workers=2)
+    assert (len(again.status), again.pending) == (128, 0)
+    assert np.array_equal(again.data["seconds"].values[:64], first.data["seconds"].values)
+
+
+def test_a_goal_ends_where_rows_fail(case: st.Case, tmp_path: Path) -> None:
+    """Half of the samples are no material: the goal is out of reach of the samples allowed."""
+    parameters = {"mu": {"range": (0.0, 0.6)}, "materials.steel.poisson_ratio": {"range": (0.1, 0.9)}}
+    study = st.Study(
+        case=case, parameters=parameters, sampling={"method": "random", "samples": 16}, answers={"source": "full"},
+        goal={"half_width": 0.02, "most": 48},
+    )  # fmt: skip
+    found = st.run_study(study, tmp_path, workers=2)
+    assert (len(found.status), found.pending) == (48, 0)
+    assert 10 < len(found.failed) < 40
+    assert found.probability().of == 48 - len(found.failed)
+
+
+def test_a_model_does_not_answer_what_the_full_problem_cannot(
+    case: st.Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stridor.studies.run.full_row", lambda *_: failed("nothing slides there"))
+    lines: list[str] = []
+    study = st.Study(case=case, parameters=SCATTER, sampling={"method": "sobol", "samples": 64})
+    st.run_study(study, tmp_path, workers=2, say=lines.append)
+    assert any(line.endswith("there is no answer: nothing slides there") for line in lines)
+    assert set(st.open_study(tmp_path).data["source"].values) == {"full"}
 
 
 # -- the program -------------------------------------------------------------------------------------------------------

@@ -25,6 +25,8 @@ from .option_table import TABLE, Json, Out, Quiet, Set, Solver, Verbose
 from .values import INFINITY, numbers, pair
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..case import Case
     from ..io.datasets import Result
     from ..study.workspace import Workspace
@@ -202,6 +204,16 @@ class Call:
         from ..io.csv_files import write_csv
 
         path = write_csv(result, self.folder / name)
+        self.say(f"written: {path}")
+        return path
+
+    def draw(self, figure: Figure, name: str) -> Path:
+        """Save a figure in the folder, and say so."""
+        from ..io.atomic import replacing
+
+        path = self.folder / name
+        with replacing(path) as temporary:
+            figure.savefig(temporary, dpi=150)
         self.say(f"written: {path}")
         return path
 

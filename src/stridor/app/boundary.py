@@ -35,7 +35,6 @@ def boundary(
     """Where modes begin to grow over two numbers, traced without a grid."""
     loaded = call.workspace(max_frequency=max_frequency)
 
-    from ..io.atomic import replacing
     from ..study.boundary import stability_boundary as solve
     from ..view.boundary_plots import stability_boundary as draw
     from .output import progress_bar, stdout
@@ -47,10 +46,7 @@ def boundary(
             loaded, x, y, x_range=ranges[0], y_range=ranges[1], method=chosen, lines=lines, tolerance=tolerance,
             progress=progress,
         )  # fmt: skip
-    files = [call.tabulate(result, "boundary.csv"), call.folder / "boundary.png"]
-    with replacing(files[1]) as temporary:
-        draw(result).savefig(temporary, dpi=150)
-    call.say(f"written: {files[1]}")
+    files = [call.tabulate(result, "boundary.csv"), call.draw(draw(result), "boundary.png")]
     call.warn(result.warnings)
     if call.json:
         call.document(result.to_json() | {"files": [str(f) for f in files]})

@@ -36,7 +36,6 @@ def damping_map(
     """The lowest onset over two dampings, and where more damping lowers it."""
     loaded = call.case(source=source, max_frequency=max_frequency, friction_range=friction_range)
 
-    from ..io.atomic import replacing
     from ..study.damping_map import damping_map as solve
     from ..view.sensitivity_plots import damping_map as draw
     from .output import progress_bar, stdout
@@ -47,10 +46,7 @@ def damping_map(
         result = solve(
             loaded, x, y, x_range=ranges[0], y_range=ranges[1], grid=(points, points), method=chosen, progress=progress
         )
-    files = [call.tabulate(result, "damping_map.csv"), call.folder / "damping_map.png"]
-    with replacing(files[1]) as temporary:
-        draw(result).savefig(temporary, dpi=150)
-    call.say(f"written: {files[1]}")
+    files = [call.tabulate(result, "damping_map.csv"), call.draw(draw(result), "damping_map.png")]
     call.warn(result.warnings)
     if call.json:
         call.document(result.to_json() | {"files": [str(f) for f in files]})

@@ -65,7 +65,6 @@ def ensemble(
     work = call.workspace()
     call.check_friction(values["mu"])
 
-    from ..io.atomic import replacing
     from ..study.ensemble import ensemble as solve
     from ..view.ensemble_plots import ensemble_map
     from .output import progress_bar
@@ -74,10 +73,8 @@ def ensemble(
     with progress_bar("ensemble", quiet=call.quiet) as progress:
         result = solve(work, **given, observable=observable, window=window, cores=cores, progress=progress)
     call.keep(result, "ensemble.nc")
-    files = [call.folder / "ensemble.nc", call.tabulate(result, "ensemble.csv"), call.folder / "ensemble.png"]
-    with replacing(files[2]) as temporary:
-        ensemble_map(result).savefig(temporary, dpi=150)
-    call.say(f"written: {files[2]}")
+    files = [call.folder / "ensemble.nc", call.tabulate(result, "ensemble.csv")]
+    files.append(call.draw(ensemble_map(result), "ensemble.png"))
     if call.json:
         call.document(result.to_json() | {"files": [str(f) for f in files]})
     else:

@@ -45,8 +45,8 @@ def sensitivities(
     result = solve(work, parameter or ["mu"], mu=friction, modes=branch or "unstable", band_hz=chosen)
     call.keep(result, "sensitivities.nc")
     call.tabulate(result, "sensitivities.csv")
-    drawn = sensitivity_bars(result) if len(result.branch) else None
-    _draw(call, drawn, "sensitivities.png")
+    if len(result.branch):
+        call.draw(sensitivity_bars(result), "sensitivities.png")
     _show(call, result, sensitivity_table(result), ["condition", "frequency per % [Hz]", "growth rate [1/s]"])
     if not call.json:
         call.conclude(of_sensitivities(result, mu))
@@ -81,8 +81,8 @@ def countermeasures(
         work, mu=friction, target=target, numbers=parameter, percent=percent, verify=verify
     )
     call.tabulate(result, "countermeasures.csv")
-    drawn = countermeasure_bars(result) if result.measures else None
-    _draw(call, drawn, "countermeasures.png")
+    if result.measures:
+        call.draw(countermeasure_bars(result), "countermeasures.png")
     show_countermeasures(call, result)
     if not call.json:
         case = work.case(call.verb)
@@ -113,16 +113,6 @@ def _show(call: Call, result: Any, shown: Table, drop: list[str], most: int | No
             stdout.print(f"  {left} more of {len(shown.rows)}, predicted to take less per % away, in {name}")
     for warning in result.warnings:
         stdout.print(warning)
-
-
-def _draw(call: Call, figure: Any, name: str) -> None:
-    from ..io.atomic import replacing
-
-    if figure is not None:
-        path = call.folder / name
-        with replacing(path) as temporary:
-            figure.savefig(temporary, dpi=150)
-        call.say(f"written: {path}")
 
 
 VERBS = {

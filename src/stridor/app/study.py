@@ -10,7 +10,7 @@ import typer
 
 from ..errors import CaseError
 from ..interrupts import INTERRUPTED, heard
-from .arguments import Call, verb
+from .arguments import INCOMPLETE, Call, verb
 from .closing import Conclusion
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TO
 StoreFolder = Annotated[
     Path, typer.Argument(metavar="STORE", help="Store of a study (study.zarr), or its folder.", show_default=False)
 ]
-FAILED_ROWS = 3  # exit code, as of a list that is not complete
 
 
 @verb(StudyFile)
@@ -88,26 +87,21 @@ def _merged(call: Call) -> StudyResult:
 
 def _finish(call: Call, result: StudyResult, *, draw: bool) -> None:
     """Write the table, the figures and the page; say what came out."""
-    from ..io.csv_files import write_csv
-
     files = [result.path]
+    call.say(f"written: {result.path}")
     if draw:
-        files.append(write_csv(result, call.folder / "study.csv"))
-        files += _drawn(call, result)
-    for path in files:
-        call.say(f"written: {path}")
+        files += [call.tabulate(result, "study.csv"), *_drawn(call, result)]
     _show(call, result, files)
     if result.interrupted:
         heard()
         call.say("interrupted; the same command goes on from there")
         raise typer.Exit(INTERRUPTED)
     if len(result.failed) or result.pending:
-        raise typer.Exit(FAILED_ROWS)
+        raise typer.Exit(INCOMPLETE)
 
 
 def _drawn(call: Call, result: StudyResult) -> list[Path]:
     """Figures and the page, beside the store."""
-    from ..io.atomic import replacing
     from ..studies.page import write_page
     from ..studies.plots import study_figures
     from ..view.style import lay_out
@@ -116,11 +110,9 @@ def _drawn(call: Call, result: StudyResult) -> list[Path]:
     files: list[Path] = []
     for name, figure in drawn.items():
         lay_out(figure)
-        path = call.folder / f"{name}.png"
-        with replacing(path) as temporary:
-            figure.savefig(temporary, dpi=150)
-        files.append(path)
+        files.append(call.draw(figure, f"{name}.png"))
     files.append(write_page(result, drawn, call.folder / "report.html"))
+    call.say(f"written: {files[-1]}")
     return files
 
 
@@ -189,8 +181,6 @@ def plot(call: Call) -> None:
         call = replace(call, out=result.path.parent)
     call.claim()
     files = _drawn(call, result)
-    for path in files:
-        call.say(f"written: {path}")
     if call.json:
         call.document({"files": [str(f) for f in files]})
     else:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from ..errors import AnalysisError
 from ..io.atomic import write_text
 from .result import StudyResult
 from .summary import Line, answer, failures, tables
@@ -45,10 +44,7 @@ def write_page(result: StudyResult, figures: Mapping[str, Figure], path: Path) -
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{html.escape(title)}</title><style>{style}\n{own}</style></head>\n<body>\n{body}\n</body></html>\n"
     )
-    try:
-        write_text(path, text)
-    except OSError as error:
-        raise AnalysisError(f"cannot write {path}: {error.strerror or error}") from error
+    write_text(path, text)
     return path
 
 

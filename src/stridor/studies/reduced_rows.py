@@ -27,12 +27,10 @@ from ..typing import Array
 from .checks import FRICTION
 from .rows import Row, modes_row, onsets_row
 from .schema import Study
-from .tables import Compute, Keep
+from .tables import OF_ONSETS, ROUNDING, SAME, Compute, Keep
 
 SAFE = 100.0  # how many times its estimated error a growth rate must be to have a sign
 NEAR = 1e-6  # growth, of |λ|, below which stability is decided in full however small the error
-SAME = 10.0  # how many times the estimated error the full problem may be away
-ROUNDING = 1e-9  # relative difference of eigenvalues that is none
 WORTH = 50  # rows from which on a model is worth making
 MOST_STRETCHES = 4  # of friction, each with a model of its own
 EXTREMES, SOME = 12, 4  # samples on which models are proved
@@ -100,7 +98,7 @@ class Reduced:
         off = difference(row, full, self.compute)
         allowed = max(SAME * float(row["estimated_error"]), ROUNDING)
         if self.compute == "onsets":
-            allowed = max(allowed, 1e-6)  # μ is further off than λ where growth begins slowly
+            allowed = max(allowed, OF_ONSETS)
         agrees = off <= allowed and _same_counts(row, full, self.compute)
         told = {"estimated_error": row["estimated_error"], "difference": off, "confirmed": 1 if agrees else 2}
         return full | told

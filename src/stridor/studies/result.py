@@ -17,6 +17,7 @@ from ..tabular import Cell, Rows, Tabular
 from ..typing import Array, BoolArray, IntArray
 from .schema import Study
 from .store import DONE, FAILED, PENDING, dataset
+from .tables import OF_ONSETS, ROUNDING, SAME
 from .uncertainty import Indices, Probability, grows, in_bands, probability, sobol_indices
 
 BANDS = 8  # of frequency, where nobody says which
@@ -195,7 +196,7 @@ class StudyResult(Tabular, Shown):
         off = np.asarray(self.data["difference"].values)[self.done]
         error = np.asarray(self.data["estimated_error"].values)[self.done]
         worst = f"estimated error {np.nanmax(error):.1e} at most" if np.isfinite(error).any() else ""
-        lines = [f"{answered} rows by the reduced model alone, {worst}; {both} solved in full as well"]
+        lines = [f"{answered} rows by a reduced model alone, {worst}; {both} solved in full as well"]
         wrong = int(np.count_nonzero(confirmed == 2))
         if wrong:
             lines.append(
@@ -203,8 +204,14 @@ class StudyResult(Tabular, Shown):
                 'solved in full are not to be trusted; ask for answers.source = "full"'
             )
         elif both:
-            lines[0] += f", all within what was estimated (off by {np.nanmax(off):.1e} at most)"
+            lines[0] += f", off by {np.nanmax(off):.1e} at most, none by more than {self._allowed}"
         return lines
+
+    @property
+    def _allowed(self) -> str:
+        """What counts as confirmed."""
+        least = OF_ONSETS if self.compute == "onsets" else ROUNDING
+        return f"{SAME:g} times the estimate or {least:g}"
 
     def _told(self, name: str) -> Any:
         text = self.data.attrs.get(name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -27,7 +28,7 @@ from . import reduced_rows
 from .effect import without_effect
 from .parts import Part
 from .result import StudyResult, open_study
-from .rows import Row, lengths, variables
+from .rows import Row, full_row, lengths, variables
 from .sampling import samples
 from .schema import Study
 from .store import DONE, FAILED, PENDING, Head, Store
@@ -108,10 +109,9 @@ class _Run:
         store = self._store(case)
         for line in store.told("without_effect") or ():
             self.say(f"warning: {line}")
-        status = store.status
-        if not self._open_rows(status).size:
+        if not self._open_rows(store.status).size and not self._more(store):
             self.say("all rows are there")
-        task = self._task(case, store) if self._open_rows(status).size else None
+        task = self._task(case, store) if self._open_rows(store.status).size else None
         while task is not None:
             with _workers(task, workers, scheduler) as who:
                 self.say(f"{who.words}")
@@ -182,7 +182,7 @@ class _Run:
             return plain
         if len(list(path.glob("*.npz"))) != answers["models"]:
             reduced_rows.made(self.study, case, store.samples, path)
-        self.say("samples are answered by one reduced model; a share of them is solved in full as well")
+        self.say("samples are answered by a reduced model; a share of them is solved in full as well")
         return Task(plain.case, plain.compute, plain.names, plain.keep, str(path), plain.program)
 
     def _reduced(self, case: Case, values: Array, path: Path) -> str:
@@ -204,21 +204,22 @@ class _Run:
 
     def _proved(self, case: Case, values: Array, model: reduced_rows.Reduced) -> str:
         """What speaks against a model on a few samples solved in full, "" where they agree."""
-        from .rows import full_row
-
-        chosen = reduced_rows.proofs(values, self.study.sampling.seed)
+        chosen, compared = reduced_rows.proofs(values, self.study.sampling.seed), 0
         for done, k in enumerate(chosen):
             stage(f"reduced model against the full problem, sample {done + 1} of {len(chosen)}")
             point = dict(zip(self.study.parameters, values[k].tolist(), strict=True))
             row = model.row(point, self.study.keep)
             full = full_row(case, self.study.compute, point, self.study.keep)
-            if row is None or full["status"] != DONE:
-                continue
+            if row is None:
+                continue  # outside of the model: such rows are solved in full
+            if full["status"] != DONE:
+                return f"at a sample that a reduced model would answer there is no answer: {full['error']}"
+            compared += 1
             model.doubtful(row)
             found = model.confirmed(row, full)
             if found["confirmed"] != 1:
                 return f"the reduced model and the full problem differ by {found['difference']:.1e} at a sample"
-        return ""
+        return "" if compared else "the reduced model holds none of the samples that it is proved on"
 
     # -- the work ----------------------------------------------------------------------------------------------------
     def _answer(self, store: Store, who: Workers) -> None:
@@ -279,12 +280,15 @@ class _Run:
             return False
         found = open_study(store.path)
         known: Probability = probability(found.unstable, goal.confidence)
-        have = len(found.unstable)
-        wanted = min(missing_samples(known, goal.half_width), goal.most)
-        if known.half_width <= goal.half_width or wanted <= have:
+        have = len(found.status)
+        if not known.of or known.half_width <= goal.half_width:
             return False
+        # Rows that fail are expected to go on failing as often.
+        wanted = min(math.ceil(missing_samples(known, goal.half_width) * have / known.of), goal.most)
         if self.study.sampling.method == "sobol":
             wanted = min(1 << (wanted - 1).bit_length(), goal.most)
+        if wanted <= have:
+            return False
         self.say(f"{known.words}; {wanted - have} samples more")
         store.extend(samples(self.study, wanted))
         return True

@@ -9,6 +9,9 @@ from pydantic import Field
 from ..case.fields import Number, Positive, Table
 from ..errors import Problem
 
+# When the full problem confirms a row of a reduced model: eigenvalues no further off than so many times the estimate,
+# or this relative difference; onsets no further than that, as μ is further off than λ where growth begins slowly.
+SAME, ROUNDING, OF_ONSETS = 10.0, 1e-9, 1e-6
 MOST_SAMPLES = 10_000_000
 
 Compute = Literal["modes", "onsets", "steady", "simulate", "compare"]
