@@ -10,6 +10,7 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 from scipy.io import mmwrite
+from scipy.optimize import linear_sum_assignment
 
 from benches import paper_case
 from solid_cases import bench_as_solids, case
@@ -226,6 +227,46 @@ def test_strong_dashpots_far_from_the_band_bring_modes_into_it(first):
         for lam in reference.values[np.abs(reference.values) < 0.999 * top]:
             assert np.abs(found.values - lam).min(initial=np.inf) < 1e-7 * abs(lam), (seed, lam)
     assert cheap > 30
+
+
+def close_pairs(seed: int) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
+    """M, D, K and a band: modes that nearly coincide, some joined by friction before or beyond their meeting, with
+    dashpots, proportional damping and now and then gyroscopic forces that couple all."""
+    random = np.random.default_rng(seed)
+    r = int(random.integers(10, 60))
+    omega = np.sort(random.uniform(0.2, 1.0, r) * np.geomspace(1, 10 ** random.uniform(0.5, 2.5), r))
+    for j in random.choice(r - 1, int(random.integers(0, 6))):
+        omega[j + 1] = omega[j] * (1 + 10 ** random.uniform(-7, -2))
+    shapes = np.linalg.qr(random.standard_normal((r, r)))[0]
+    stiffness = np.diag(omega**2)
+    for j in random.integers(0, r - 1, int(random.integers(0, 4))):
+        coupling = random.uniform(0, 1.5) * abs(omega[j + 1] ** 2 - omega[j] ** 2) / 2
+        stiffness[j, j + 1] += coupling
+        stiffness[j + 1, j] -= coupling
+    dashpots = random.standard_normal((r, int(random.integers(1, 4))))
+    damping = np.diag(10 ** random.uniform(-7, -2) * omega * (random.uniform(0, 1, r) if seed % 3 == 1 else 1.0))
+    damping += dashpots @ dashpots.T * omega.mean() * 10 ** random.uniform(-8, -1)
+    if seed % 5 == 0:
+        turn = random.standard_normal((r, r))
+        damping += (turn - turn.T) * 10 ** random.uniform(-6, -2) * omega[0]
+    matrices = np.eye(r), shapes @ damping @ shapes.T, shapes @ stiffness @ shapes.T
+    return matrices, float(np.quantile(omega, random.uniform(0.2, 0.8)))
+
+
+@pytest.mark.parametrize("seeds", [[*range(150), 2600], pytest.param(range(5000), marks=pytest.mark.slow)])
+def test_modes_that_damping_mixes_are_all_there_and_none_is_there_twice(seeds):
+    cheap = 0
+    for seed in seeds:
+        matrices, top = close_pairs(seed)
+        found, reference = dense_modes(*matrices, top, 1.0), dense_modes(*matrices, top, 1.0, whole=True)
+        cheap += not found.whole
+        mine, theirs = (m.values[np.abs(m.values) < 0.999 * top] for m in (found, reference))
+        assert len(mine) == len(theirs), seed
+        away = np.abs(mine[:, None] - theirs) / np.abs(theirs)
+        one_to_one = linear_sum_assignment(away)
+        # Of two that all but coincide the companion matrix has no more digits.
+        assert away[one_to_one].max(initial=0.0) < 1e-6, seed
+    assert cheap > 0.7 * len(seeds)
 
 
 def strongly_damped() -> ParametricProblem:
