@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -299,6 +300,19 @@ def test_reduced_rows_are_those_of_the_full_problem(case: st.Case, scatter) -> N
         allowed = max(10 * float(data["estimated_error"][k]), 1e-11)
         assert np.abs(here - there).max() <= allowed * np.abs(there).max()
         assert int(data["unstable_modes"][k]) == full["unstable_modes"]
+        numbers = data["branch"].values[k, held]
+        assert np.count_nonzero(numbers) >= len(numbers) - 1
+        assert np.all((numbers == full["branch"]) | (numbers == 0))
+
+
+def test_branches_scatter_by_their_numbers_from_the_reduced_model_too(scatter) -> None:
+    assert scatter.branch_words == "by branch from μ = 0"
+    spread = scatter.branches()
+    assert [b.number for b in spread] == sorted({b.number for b in spread})
+    assert len(spread) >= 4
+    assert all(b.samples >= 0.95 * 128 for b in spread)
+    places = replace(scatter, data=scatter.data.assign(branch=0 * scatter.data["branch"]))
+    assert places.branch_words == "by place in frequency"
 
 
 def test_rows_near_the_boundary_are_solved_in_full() -> None:

@@ -25,6 +25,7 @@ from ..study.reduced import reduced_model
 from ..system import build_system
 from ..typing import Array
 from .checks import FRICTION
+from .followed import Anchor, anchors_noted, anchors_read, numbered
 from .rows import Row, modes_row, onsets_row
 from .schema import Study
 from .tables import OF_ONSETS, ROUNDING, SAME, Compute, Keep
@@ -39,32 +40,40 @@ EXTREMES, SOME = 12, 4  # samples on which models are proved
 @dataclass(frozen=True)
 class Reduced:
     """Models, each over a stretch of friction (one over all of it where friction is no parameter), and what is asked of
-    them. names: of parameters of the study, those of the models."""
+    them. names: of parameters of the study, those of the models. anchors: of each model, where numbers are known."""
 
     models: tuple[ReducedModel, ...]
     compute: Compute
     names: Mapping[str, str]
+    anchors: tuple[tuple[Anchor, ...], ...] = ()
 
     @staticmethod
     def read(path: str, case: Case) -> Reduced:
         """Models that `made` wrote into a folder. Raises CaseError where one is damaged."""
         folder = Path(path)
         compute: Compute = "onsets" if folder.name.endswith("onsets") else "modes"
-        return Reduced(tuple(map(load_reduced, sorted(folder.glob("*.npz")))), compute, _named(case))
+        files = sorted(folder.glob("*.npz"))
+        models = tuple(map(load_reduced, files))
+        anchors = tuple(anchors_read(m, _numbers(f)) for m, f in zip(models, files, strict=True))
+        return Reduced(models, compute, _named(case), anchors)
 
     def row(self, values: Mapping[str, float], keep: Keep) -> Row | None:
         """A row of the model that holds these values, None where none does."""
         point = {self.names.get(path, path): value for path, value in values.items()}
-        for model in self.models:
+        for k, model in enumerate(self.models):
             if model.problem.inside(model.problem.point(point)):
-                return self._modes(model, point, keep) if self.compute == "modes" else self._onsets(model, point, keep)
+                if self.compute == "onsets":
+                    return self._onsets(model, point, keep)
+                return self._modes(model, self.anchors[k] if self.anchors else (), point, keep)
         return None
 
-    def _modes(self, model: ReducedModel, point: Mapping[str, float], keep: Keep) -> Row:
+    def _modes(
+        self, model: ReducedModel, anchors: tuple[Anchor, ...], point: Mapping[str, float], keep: Keep
+    ) -> Row:
         found = model.modes(point)
         upper = found.values.imag >= 0
         lam, error = found.values[upper], found.error[upper]
-        row = modes_row(lam, np.zeros(len(lam), dtype=int), keep.modes, model.frequency)
+        row = modes_row(lam, numbered(model, anchors, found)[upper], keep.modes, model.frequency)
         near = np.abs(lam.real) <= np.maximum(SAFE * error, NEAR) * np.abs(lam)
         if not np.any(model.problem.powers == 1):
             # Without damping what is stable lies on the axis, but for rounding.
@@ -161,16 +170,23 @@ def made(study: Study, case: Case, samples: Array, path: Path) -> Reduced:
     constant = [p for k, p in enumerate(study.parameters) if samples[:, k].min() == samples[:, k].max()]
     if constant:
         raise CaseError("parameters", constant[0], "has one value only; set it by a table [set]")
-    models: list[ReducedModel] = []
+    named = _named(case)
     path.mkdir(parents=True, exist_ok=True)
     for number, (own, low, high) in enumerate(_by_touching(study, case, box.get(FRICTION))):
         part = box if FRICTION not in box else {**box, FRICTION: (low, high)}
         model = reduced_model(own, part, bound=study.answers.bound)
         if model.whole and model.states is None:
             raise AnalysisError("damping is so strong that the reduced model is no faster")
-        save_reduced(model, path / f"{number:02}.npz", case=own)
-        models.append(model)
-    return Reduced(tuple(models), study.compute, _named(case))
+        place = path / f"{number:02}.npz"
+        save_reduced(model, place, case=own)
+        if study.compute == "modes":
+            anchors_noted(model, case, {name: named.get(name, name) for name in study.parameters}, _numbers(place))
+    return Reduced.read(str(path), case)
+
+
+def _numbers(model: Path) -> Path:
+    """Where the numbers of the branches of a model lie."""
+    return model.with_name(f"{model.stem}-branches.json")
 
 
 def _by_touching(study: Study, case: Case, friction: tuple[float, float] | None) -> list[tuple[Case, float, float]]:

@@ -21,17 +21,19 @@ from .tables import OF_ONSETS, ROUNDING, SAME
 from .uncertainty import Indices, Probability, grows, in_bands, probability, sobol_indices
 
 BANDS = 8  # of frequency, where nobody says which
+MOSTLY = 0.95  # of the modes or samples: a share from which on what the others lack is left aside
 
 
 @dataclass(frozen=True)
 class BranchSpread:
     """How a branch scatters: its number, frequency [Hz] and growth rate [1/s] at the 5th, 50th and 95th percentile, and
-    the share of samples in which it grows."""
+    the share of samples in which it grows; ``samples`` has it, of which a few may lack a number."""
 
     number: int
     frequency_hz: tuple[float, float, float]
     growth_rate: tuple[float, float, float]
     grows: float
+    samples: int
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,10 +117,10 @@ class StudyResult(Tabular, Shown):
 
     @cached_property
     def _followed(self) -> bool:
-        """Whether every mode kept has the number of its branch."""
+        """Whether all but a few of the modes kept have the number of their branch."""
         data = self.data
         known = np.isfinite(data["frequency_hz"].values[self.done])
-        return bool(np.all(data["branch"].values[self.done][known] > 0))
+        return bool(np.count_nonzero(data["branch"].values[self.done][known] > 0) >= MOSTLY * np.count_nonzero(known))
 
     @property
     def branch_words(self) -> str:
@@ -126,9 +128,9 @@ class StudyResult(Tabular, Shown):
         return "by branch from μ = 0" if self._followed else "by place in frequency"
 
     def branches(self) -> list[BranchSpread]:
-        """Spread of the modes that all samples have: by the number of their branch, which is followed from μ = 0 in the
-        full problem; rows of a reduced model are told apart by their place in frequency, where modes may change places.
-        None of those of which some rows have kept no mode."""
+        """Spread of the modes that all samples have, or all but 5 %: by the number of their branch, as `modes` counts
+        them from μ = 0. Where those are not known, by their place in frequency, where modes may change places; none of
+        those of which some rows have kept no mode."""
         data = self.data
         frequency, growth, branch = (data[n].values[self.done] for n in ("frequency_hz", "growth_rate", "branch"))
         if not self._followed:
@@ -138,10 +140,12 @@ class StudyResult(Tabular, Shown):
         found: list[BranchSpread] = []
         for number in np.unique(branch[branch > 0]).tolist():
             inside = (branch == number) & np.isfinite(frequency)
-            if np.count_nonzero(inside) < len(frequency):
+            samples = int(np.count_nonzero(inside))
+            if samples < (MOSTLY if self._followed else 1.0) * len(frequency):
                 continue
-            spread = [tuple(np.quantile(v[inside], (0.05, 0.5, 0.95)).tolist()) for v in (frequency, growth)]
-            found.append(BranchSpread(int(number), *spread, float(np.mean(grows(frequency[inside], growth[inside])))))  # type: ignore[arg-type]
+            f, g = (tuple(np.quantile(v[inside], (0.05, 0.5, 0.95)).tolist()) for v in (frequency, growth))
+            share = float(np.mean(grows(frequency[inside], growth[inside])))
+            found.append(BranchSpread(int(number), f, g, share, samples))  # type: ignore[arg-type]
         return found
 
     def indices(self, of: str | None = None) -> Indices:
