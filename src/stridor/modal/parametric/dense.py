@@ -12,7 +12,7 @@ from ...errors import AnalysisError
 from ...typing import Array, BoolArray, ComplexArray
 from .basis import expanded
 
-NEAR = (1.6, 4.0)  # modes up to this much above the band are solved for together: first try, second try
+NEAR = (1.2, 4.0)  # modes up to this much above the band are solved for together: first try, second try
 SMALL = 1e-13
 HIDDEN = 0.3  # share of their stiffness that damping of modes far away may reach at the end of the band
 ANSWERS = 6
