@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from .study.sensitivities import sensitivities
     from .study.workspace import Workspace
     from .system import System, build_system
+    from .view.sound import sound
 
 _HOMES = {
     "Case": ".case",
@@ -82,6 +83,7 @@ _HOMES = {
     "save": ".io.datasets",
     "sensitivities": ".study.sensitivities",
     "simulate": ".study.analyses",
+    "sound": ".view.sound",
     "stability_boundary": ".study.boundary",
     "steady_sliding": ".study.analyses",
     "study_figures": ".studies.plots",
@@ -124,6 +126,7 @@ __all__ = [
     "save",
     "sensitivities",
     "simulate",
+    "sound",
     "stability_boundary",
     "steady_sliding",
     "study_figures",

@@ -48,6 +48,7 @@ WORDS = {
     "study": ["study.toml"],
     "plot": ["study.out"],
     "ensemble": ["case.toml", "--mu", "0.05,0.2", "--speed", "1,2"],
+    "sound": ["run.out"],
 }
 STUDY = """
 case = "case.toml"
@@ -92,6 +93,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (made / "study.toml").write_text(STUDY, encoding="utf-8")
     assert stridor("study", "study.toml", "--quiet", cwd=made).returncode == 0
     assert stridor("export", "case.toml", "--quiet", cwd=made).returncode == 0
+    assert stridor("simulate", "case.toml", "--out", "run.out", "--quiet", cwd=made).returncode == 0
     return made
 
 

@@ -55,7 +55,7 @@ OF_A_CASE = {  # of what is in a case file beside the matrices
 }  # fmt: skip
 OTHERS = {  # what takes no problem
     "AnalysisError", "Case", "CaseError", "StridorError", "Study", "System", "build_system", "load", "loads", "open",
-    "open_study", "plot", "run_study", "save", "study_figures", "to_dataset",
+    "open_study", "plot", "run_study", "save", "sound", "study_figures", "to_dataset",
 }  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import typer
 
 from .. import interrupts
 from ..errors import CaseError, StridorError
-from . import about, ensemble, explore, launch, modal, study, temporal
+from . import about, ensemble, explore, launch, modal, sound, study, temporal
 
 app = typer.Typer(
     name="stridor",
@@ -25,7 +25,7 @@ app = typer.Typer(
 )
 
 
-for verbs in (about.VERBS, modal.VERBS, temporal.VERBS, explore.VERBS, study.VERBS, ensemble.VERBS):
+for verbs in (about.VERBS, modal.VERBS, temporal.VERBS, explore.VERBS, study.VERBS, ensemble.VERBS, sound.VERBS):
     for name, call in verbs.items():
         app.command(name=name)(call)
 

@@ -11,7 +11,7 @@ from ..interrupts import INTERRUPTED, heard
 from ..notebook import counted
 from .arguments import Call, verb
 from .closing import Conclusion
-from .option_table import Mu
+from .option_table import Mu, Observable
 from .values import numbers, one_of
 
 if TYPE_CHECKING:
@@ -43,12 +43,7 @@ def ensemble(
     swept: Annotated[
         str, typer.Option("--swept", metavar="mu|load|speed", help="What rises or falls in a sweep.")
     ] = "mu",
-    observable: Annotated[
-        str | None,
-        typer.Option(
-            "--observable", metavar="NAME", help="What amplitudes are of, as beam1.tip.velocity or A.normal_force."
-        ),
-    ] = None,
+    observable: Observable = None,
     window: Annotated[
         float, typer.Option("--window", metavar="SHARE", help="The end of the last phase that is looked at.")
     ] = 0.5,

@@ -18,7 +18,8 @@ COMPUTING = (
 )  # fmt: skip
 ABOUT = ("new", "check", "matrices", "export")  # verbs about the case itself
 STUDIES = ("study", "plot", "ensemble")  # of many samples of a case
-EVERY = (*ABOUT, *COMPUTING, *STUDIES)
+SHOWING = ("sound",)  # what was computed before
+EVERY = (*ABOUT, *COMPUTING, *STUDIES, *SHOWING)
 
 
 @dataclass(frozen=True)
@@ -236,3 +237,10 @@ def rows() -> list[str]:
 
 def _code(why: str) -> str:
     return f"`{why}`" if why.startswith("--") else why
+# Of verbs that look at one history of a run; what they take unless told differs, and their pages say what.
+Observable = Annotated[
+    str | None,
+    typer.Option(
+        "--observable", metavar="NAME", help="The history that is taken, as beam1.tip.velocity or A.normal_force."
+    ),
+]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,14 +58,19 @@ def observable_of(name: str | None, system: System, settings: Settings) -> Obser
             name = f"{contacts[-1]}.slip_speed"
         else:
             raise CaseError("observable", None, "a point or a contact to look at: give temporal.watch")
+    return named_observable(name, list(system.points), contacts, "xyz"[: system.dimension])
+
+
+def named_observable(name: str, points: Sequence[str], contacts: Sequence[str], directions: str) -> Observable:
+    """The observable of a name among these points and contacts. Raises CaseError for another."""
     owner, _, what = name.rpartition(".")
     quantity, _, direction = what.partition("_") if what.split("_")[0] in OF_POINT else (what, "", "")
-    if quantity in OF_POINT and owner in system.points and direction in ("", *"xyz"[: system.dimension]):
+    if quantity in OF_POINT and owner in points and direction in ("", *directions):
         return Observable(name, owner, quantity, direction, OF_POINT[quantity])
     if quantity in OF_CONTACT and owner in contacts:
         return Observable(name, owner, quantity, "", OF_CONTACT[quantity])
     accepted = (
-        f"POINT.QUANTITY with a point among {', '.join(system.points) or 'none'} and {', '.join(OF_POINT)} (_x, _y for "
+        f"POINT.QUANTITY with a point among {', '.join(points) or 'none'} and {', '.join(OF_POINT)} (_x, _y for "
         f"one direction), or CONTACT.QUANTITY with a contact among {', '.join(contacts) or 'none'} and "
         f"{', '.join(OF_CONTACT)}"
     )
