@@ -220,6 +220,15 @@ Verbose = Annotated[
 ]
 
 
+# Of verbs that look at one history of a run; what they take unless told differs, and their pages say what.
+Observable = Annotated[
+    str | None,
+    typer.Option(
+        "--observable", metavar="NAME", help="The history that is taken, as beam1.tip.velocity or A.normal_force."
+    ),
+]
+
+
 def rows() -> list[str]:
     """The table as lines of Markdown, as docs/commands.md has it."""
     lines = ["| option | what it says | on | not on, and why |", "|---|---|---|---|"]
@@ -237,10 +246,3 @@ def rows() -> list[str]:
 
 def _code(why: str) -> str:
     return f"`{why}`" if why.startswith("--") else why
-# Of verbs that look at one history of a run; what they take unless told differs, and their pages say what.
-Observable = Annotated[
-    str | None,
-    typer.Option(
-        "--observable", metavar="NAME", help="The history that is taken, as beam1.tip.velocity or A.normal_force."
-    ),
-]
