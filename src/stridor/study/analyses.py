@@ -252,16 +252,17 @@ def simulate(
     *,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
+    checkpoint_seconds: float = 20.0,
     restart: Trajectory | None = None,
     changed: bool = False,
 ) -> Trajectory:
     """The temporal approach through the load phases; mu scales every contact's friction law.
 
-    checkpoint is called with the trajectory so far about every 20 seconds. restart goes on from an earlier run of the
-    same case, μ and files; durations of phases that are not over may differ, and what is recorded, which then gives
-    the new part alone. Raises CaseError for each thing that differs otherwise; with ``changed`` it goes on all the
-    same, and `provenance` tells in "restarts" what was changed when. A system alone goes through the phases of its
-    workspace, and without one for 0.01 s under all its loads.
+    checkpoint is called with the trajectory so far at most every ``checkpoint_seconds``. restart goes on from an
+    earlier run of the same case, μ and files; durations of phases that are not over may differ, and what is recorded,
+    which then gives the new part alone. Raises CaseError for each thing that differs otherwise; with ``changed`` it
+    goes on all the same, and `provenance` tells in "restarts" what was changed when. A system alone goes through the
+    phases of its workspace, and without one for 0.01 s under all its loads.
     """
     started = time.perf_counter()
     require_friction(mu)
@@ -290,6 +291,7 @@ def simulate(
             mu=mu,
             progress=progress,
             checkpoint=None if checkpoint is None else lambda part: checkpoint(told(part)),
+            checkpoint_seconds=checkpoint_seconds,
             restart=restart,
             join=restart is None or same_records(settings, restart),
             changed=changed,
