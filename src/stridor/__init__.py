@@ -22,6 +22,7 @@ from .errors import AnalysisError, CaseError, StridorError
 
 if TYPE_CHECKING:
     from . import view as plot
+    from .app.page import app
     from .app.pipeline import report, run
     from .case import Case, load, loads
     from .io.datasets import open, save, to_dataset
@@ -58,6 +59,7 @@ _HOMES = {
     "Study": ".studies.schema",
     "System": ".system",
     "Workspace": ".study.workspace",
+    "app": ".app",
     "body_modes": ".study.analyses",
     "build_system": ".system",
     "compare": ".study.analyses",
@@ -101,6 +103,7 @@ __all__ = [
     "Study",
     "System",
     "Workspace",
+    "app",
     "body_modes",
     "build_system",
     "compare",
@@ -140,7 +143,7 @@ def __getattr__(name: str) -> Any:
     if home is None:
         raise AttributeError(f"module 'stridor' has no attribute {name!r}")
     module = import_module(home, __name__)
-    return module if name == "plot" else getattr(module, name)
+    return module if name in ("plot", "app") else getattr(module, name)
 
 
 def __dir__() -> list[str]:

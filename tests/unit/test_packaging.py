@@ -25,7 +25,7 @@ def bare(requirement: str) -> str:
 def test_extras_are_what_the_program_knows_how_to_use():
     named = {re.split("[><=]", bare(r))[0] for extra in PROJECT["optional-dependencies"].values() for r in extra}
     assert all(PROJECT["optional-dependencies"].values()), "an extra with nothing behind it"
-    known = {module for modules, _ in PACKAGES.values() for module in modules} | {"slepc4py", "distributed"}
+    known = {module for modules, _ in PACKAGES.values() for module in modules} | {"slepc4py", "distributed", "nicegui"}
     assert {MODULES.get(name, name) for name in named} <= known
 
 

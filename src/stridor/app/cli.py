@@ -13,7 +13,7 @@ import typer
 
 from .. import interrupts
 from ..errors import CaseError, StridorError
-from . import about, ensemble, explore, launch, modal, sound, study, temporal
+from . import about, ensemble, explore, launch, modal, page_command, sound, study, temporal
 
 app = typer.Typer(
     name="stridor",
@@ -25,7 +25,8 @@ app = typer.Typer(
 )
 
 
-for verbs in (about.VERBS, modal.VERBS, temporal.VERBS, explore.VERBS, study.VERBS, ensemble.VERBS, sound.VERBS):
+TOPICS = (about, modal, temporal, explore, study, ensemble, sound, page_command)
+for verbs in (topic.VERBS for topic in TOPICS):
     for name, call in verbs.items():
         app.command(name=name)(call)
 

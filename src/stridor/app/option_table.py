@@ -19,7 +19,8 @@ COMPUTING = (
 ABOUT = ("new", "check", "matrices", "export")  # verbs about the case itself
 STUDIES = ("study", "plot", "ensemble")  # of many samples of a case
 SHOWING = ("sound",)  # what was computed before
-EVERY = (*ABOUT, *COMPUTING, *STUDIES, *SHOWING)
+EVERY = (*ABOUT, *COMPUTING, *STUDIES, *SHOWING)  # that print or write what they find
+PAGES = ("app",)  # in a browser
 
 
 @dataclass(frozen=True)
@@ -181,7 +182,7 @@ Set = Annotated[
         "--set",
         "Change a value of the case, e.g. contacts.A.friction.coefficient=0.3. Repeatable.",
         metavar="KEY=VALUE",
-        on=" ".join(EVERY),
+        on=" ".join((*EVERY, *PAGES)),
     ),
 ]
 Solver = Annotated[
@@ -208,7 +209,7 @@ Json = Annotated[
 ]
 Quiet = Annotated[
     bool,
-    _option("--quiet", "No log, no progress, no hint at what comes next.", on=" ".join(EVERY)),
+    _option("--quiet", "No log, no progress, no hint at what comes next.", on=" ".join((*EVERY, *PAGES))),
 ]
 Verbose = Annotated[
     bool,
@@ -232,7 +233,9 @@ Observable = Annotated[
 def rows() -> list[str]:
     """The table as lines of Markdown, as docs/commands.md has it."""
     lines = ["| option | what it says | on | not on, and why |", "|---|---|---|---|"]
-    everywhere: dict[tuple[str, ...], str] = {EVERY: "all", EVERY[1:]: "all but `new`"}
+    everywhere: dict[tuple[str, ...], str] = {
+        (*EVERY, *PAGES): "all", EVERY: "all but `app`", EVERY[1:]: "all but `new` and `app`",
+    }  # fmt: skip
     for option in TABLE.values():
         flag = option.name if option.metavar is None else f"{option.name} {option.metavar}".replace("|", "\\|")
         on = everywhere.get(option.on) or ", ".join(f"`{verb}`" for verb in option.on)

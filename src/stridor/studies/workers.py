@@ -133,7 +133,7 @@ class LocalWorkers:
         ours, theirs = self._context.Pipe()
         given = theirs, self.task, self.answer
         process = self._context.Process(target=_work, args=given, daemon=True, name="stridor study")
-        with _one_thread_each(), _main_left_out():
+        with one_thread_each(), main_left_out():
             process.start()
         theirs.close()
         worker = _Worker(process, ours)
@@ -142,7 +142,7 @@ class LocalWorkers:
 
 
 @contextlib.contextmanager
-def _one_thread_each() -> Generator[None]:
+def one_thread_each() -> Generator[None]:
     """Processes that start here compute with one thread: there are as many as cores."""
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))
@@ -157,7 +157,7 @@ def _one_thread_each() -> Generator[None]:
 
 
 @contextlib.contextmanager
-def _main_left_out() -> Generator[None]:
+def main_left_out() -> Generator[None]:
     """Processes that start here do not import the script that starts them, which would start a study again where it
     lacks ``if __name__ == "__main__"``; nothing of it is needed."""
     main = sys.modules["__main__"].__dict__

@@ -50,18 +50,31 @@ def animation_html(
     """
     skin = skin_of(system, vector)
     heading = title or f"Mode at {mode_title(frequency_hz, None)}"
-    ramp = [_hex(row) for row in _ramp()[:: (RAMP - 1) // 9]]
     moving = "three-dimensional view, turned by dragging or the arrow keys" if skin.dimension == 3 else "plane view"
-    page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    return page.from_string(_asset("mode.html.j2")).render(
+    return _page(
         title=heading,
         growth=growth_in_words(growth_rate),
         kind="unstable" if growth_rate > 0 else "stable",
         note=(f"{mode_title(frequency_hz, None)}, " if title else "") + "slowed down, drawn with constant amplitude",
         description=f"{heading}: {', '.join(skin.names)} in motion, {moving}",
-        ramp=", ".join(ramp),
         data=page_data(skin, scale=scale),
-        script=Markup(_asset("mode.js")),
+        framed=False,
+    )
+
+
+def animation_shell() -> str:
+    """The page of `animation_html` without a mode, for a frame: the page around it posts the data of `page_data` to it,
+    {geometry} all of them or {motion} those of another mode, with {title, growth, unstable} and {dark}."""
+    return _page(
+        title="", growth="", kind="stable", note="slowed down", description="A mode in motion", data=None, framed=True
+    )
+
+
+def _page(**content: Any) -> str:
+    page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    ramp = [_hex(row) for row in _ramp()[:: (RAMP - 1) // 9]]
+    return page.from_string(_asset("mode.html.j2")).render(
+        ramp=", ".join(ramp), script=Markup(_asset("mode.js")), **content
     )
 
 

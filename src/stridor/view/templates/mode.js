@@ -1,33 +1,51 @@
 "use strict";
 // A mode in motion: Re(û e^{jφ}) on the outer facets, turned by dragging. A depth buffer decides what hides what;
 // everything is drawn on a plain canvas, nothing is fetched.
-const data = JSON.parse(document.getElementById("data").textContent);
+let data, points, real, imag, facets, edges, body, segments, segmentBody, count, space, reach, ramp, bodies;
+let moved, seen, size; // in the model; right and down in pixels, towards the eye; |u| of the largest amplitude
 
 function decoded(text, Kind) {
   const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   return new Kind(bytes.buffer);
 }
-const Index = data.wide ? Uint32Array : Uint16Array;
-const points = decoded(data.points, Float32Array);
-const real = decoded(data.real, Int16Array);
-const imag = decoded(data.imag, Int16Array);
-const facets = decoded(data.facets, Index);
-const edges = decoded(data.edges, Index);
-const body = decoded(data.body, Uint8Array);
-const segments = decoded(data.segments, Index);
-const segmentBody = decoded(data.segment_body, Uint8Array);
-const count = points.length / 3;
-const space = data.dimension === 3;
+
+// Everything about a model, its mode included.
+function load(given) {
+  data = given;
+  const Index = data.wide ? Uint32Array : Uint16Array;
+  points = decoded(data.points, Float32Array);
+  facets = decoded(data.facets, Index);
+  edges = decoded(data.edges, Index);
+  body = decoded(data.body, Uint8Array);
+  segments = decoded(data.segments, Index);
+  segmentBody = decoded(data.segment_body, Uint8Array);
+  count = points.length / 3;
+  space = data.dimension === 3;
+  moved = new Float32Array(3 * count);
+  seen = new Float32Array(3 * count);
+  size = new Float32Array(count);
+  // The box around the model fits the window as it is first seen; turning does not change the size of things.
+  reach = directions(data.elevation, data.azimuth)
+    .map((d) => Math.max(1e-12, d.reduce((sum, v, i) => sum + Math.abs(v) * data.half[i], 0)));
+  ramp = shades(data.ramp);
+  bodies = shades(data.pale);
+  change(data);
+}
+
+// Another mode of the same model.
+function change(motion) {
+  Object.assign(data, motion);
+  real = decoded(data.real, Int16Array);
+  imag = decoded(data.imag, Int16Array);
+}
 
 const canvas = document.getElementById("view");
 const context = canvas.getContext("2d");
 const control = (name) => document.getElementById(name);
-const start = { elevation: data.elevation, azimuth: data.azimuth, zoom: 1, x: 0, y: 0 };
+const start = { elevation: 0, azimuth: 0, zoom: 1, x: 0, y: 0 };
 const state = { ...start, phase: 0, playing: !matchMedia("(prefers-reduced-motion: reduce)").matches };
 
-const moved = new Float32Array(3 * count); // in the model
-const seen = new Float32Array(3 * count); // right and down in pixels, towards the eye
-const size = new Float32Array(count); // |u| of the instant, of the largest amplitude
+let paper = 0xffffffff; // behind it all
 let image, pixels, depth, inked, width = 0, height = 0;
 
 function resize() {
@@ -62,10 +80,6 @@ function directions(elevation, azimuth) {
   const ce = Math.cos(rise), se = Math.sin(rise), ca = Math.cos(turn), sa = Math.sin(turn);
   return [[-sa, ca, 0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]];
 }
-// The box around the model fits the window as it is first seen; turning does not change the size of things.
-const reach = directions(start.elevation, start.azimuth)
-  .map((d) => Math.max(1e-12, d.reduce((sum, v, i) => sum + Math.abs(v) * data.half[i], 0)));
-
 function project() {
   const [right, up, toward] = directions(state.elevation, state.azimuth);
   const fit = Math.min(width / (2 * reach[0]), height / (2 * reach[1]));
@@ -92,7 +106,6 @@ function shades(colours) {
   });
   return made;
 }
-const ramp = shades(data.ramp), bodies = shades(data.pale);
 
 // Seen coordinates point down, so the lamp at the upper left does too.
 const lamp = [-0.35, -0.45, 0.82].map((v) => v / Math.hypot(0.35, 0.45, 0.82));
@@ -176,7 +189,7 @@ function draw() {
   const byBody = control("colours").value === "body";
   move(Number(control("amplitude").value));
   project();
-  pixels.fill(0xffffffff);
+  pixels.fill(paper);
   depth.fill(-Infinity);
   for (let f = 0; f < body.length; f++) {
     const a = 3 * facets[4 * f], b = 3 * facets[4 * f + 1], c = 3 * facets[4 * f + 2], d = 3 * facets[4 * f + 3];
@@ -290,8 +303,45 @@ canvas.addEventListener("keydown", (event) => {
   else return;
   event.preventDefault();
 });
-window.addEventListener("resize", () => { resize(); later(); });
+window.addEventListener("resize", () => { if (data) { resize(); later(); } });
 
-resize();
-legend();
-play(state.playing);
+function begin() {
+  Object.assign(start, { elevation: data.elevation, azimuth: data.azimuth });
+  Object.assign(state, start);
+  resize();
+  legend();
+  play(state.playing);
+}
+
+// A page that has this one in a frame tells it what to play: all of a model, or another mode of the one that it has.
+window.addEventListener("message", (event) => {
+  if (event.source !== window.parent || window.parent === window || !event.data) return;
+  const { geometry, motion, title, growth, unstable, dark } = event.data;
+  if (dark !== undefined) {
+    document.documentElement.classList.toggle("dark", dark);
+    paper = dark ? 0xff221d1b : 0xffffffff;
+    if (data) later();
+  }
+  if (title !== undefined) {
+    document.querySelector("h1").textContent = title;
+    control("growth").textContent = growth;
+    control("growth").className = unstable ? "unstable" : "stable";
+    canvas.setAttribute("aria-label", `${title}, in motion; ${growth}`);
+  }
+  if (geometry) {
+    const first = !data || data.dimension !== geometry.dimension;
+    load(geometry);
+    if (first) begin();
+    else legend();
+  } else if (motion && data) change(motion);
+  if (data) {
+    legend();
+    later();
+  }
+});
+
+const given = JSON.parse(document.getElementById("data").textContent);
+if (given) {
+  load(given);
+  begin();
+} else window.parent.postMessage("stridor-mode-ready", "*");

@@ -1,0 +1,202 @@
+"""One open page: its state with what came before, what was computed for it, and who wants to know."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ...case import Case
+from ...errors import CaseError
+from .levers import Lever, levers
+from .state import History, Source, State, checked, file_text, first_state, from_link, to_link
+from .worker import BENCH, Program, Worker
+
+Loop = Callable[..., object]  # calls a function in the thread of the page: loop.call_soon_threadsafe
+
+
+@dataclass
+class Picture:
+    """What was computed last, piece by piece, as plain data (`bench.Bench` says which pieces there are).
+
+    number: of the newest question, done: of the newest that is answered in full. problem: why the newest state has no
+    picture; the pieces are then of the last that had one.
+    """
+
+    parts: dict[str, Any] = field(default_factory=dict[str, Any])
+    number: int = 0
+    done: int = 0
+    problem: str = ""
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being computed."""
+        return self.done < self.number
+
+
+class Session:
+    """A page that somebody has open. All calls are made in the thread of the page; heard are they there as well.
+
+    own: the sources that links may name, `source`: what the page opens with. folder: a temporary folder that is this
+    page's alone and goes with it. Raises CaseError for a source that is no case.
+    """
+
+    def __init__(self, source: Source, own: Mapping[str, Source], call: Loop, *, program: Program = BENCH) -> None:
+        self._own, self._call = own, call
+        self._history = History(first_state(source))
+        self._listeners: list[Callable[[], None]] = []
+        self._viewers: list[Callable[[str, Any], None]] = []
+        self._closers: list[Callable[[], None]] = []
+        self._moving: object = None
+        self.picture = Picture()
+        self.folder = Path(tempfile.mkdtemp(prefix="stridor-page-"))
+        self._worker = Worker(self._answered, program)
+        self.closed = False
+
+    # -- what a panel reads ---------------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> State:
+        """What the page is at."""
+        return self._history.now
+
+    def case(self) -> Case:
+        """The case with its changes. Raises CaseError where these do not go together."""
+        return self.state.case()
+
+    def levers(self) -> list[Lever]:
+        """What can be moved, with the values and ranges of the case as it was opened."""
+        return levers(checked(self.state.source))
+
+    @property
+    def history(self) -> History:
+        """What undo and redo walk along."""
+        return self._history
+
+    def file_text(self) -> str:
+        """The case file with the changes in it. Raises CaseError."""
+        return file_text(self.state)
+
+    def link(self) -> str:
+        """The state as letters for the address, "" where it is too large for one."""
+        return to_link(self.state, self._own)
+
+    # -- who wants to know ----------------------------------------------------------------------------------------
+
+    def on_change(self, callback: Callable[[], None]) -> None:
+        """Call back after every change of the state."""
+        self._listeners.append(callback)
+
+    def on_picture(self, callback: Callable[[str, Any], None]) -> None:
+        """Call back with every piece of the picture: its name and its content."""
+        self._viewers.append(callback)
+
+    def on_close(self, callback: Callable[[], None]) -> None:
+        """Call back when the page is gone."""
+        self._closers.append(callback)
+
+    # -- what a control does --------------------------------------------------------------------------------------
+
+    def go(self, state: State, *, moving: object = None) -> None:
+        """To another state. moving: what is being moved, of which all moves in a row are one step for undo."""
+        together = moving is not None and moving == self._moving
+        self._moving = moving
+        self._history.go(state, together=together)
+        self._changed()
+
+    def move(self, path: str, value: float) -> None:
+        """A lever to a value; "mu" is the friction coefficient of the page."""
+        if path == "mu":
+            self.go(replace(self.state, mu=max(float(value), 0.0)), moving="mu")
+        else:
+            self.go(self.state.with_change(path, value), moving=path)
+
+    def choose(self, branch: int | None) -> None:
+        """A mode by its number, None for none."""
+        self.go(replace(self.state, branch=branch))
+
+    def look(self, tab: str) -> None:
+        """At another tab; nothing is computed for that."""
+        self._history.go(replace(self.state, tab=tab), together=True)
+        for listener in list(self._listeners):
+            listener()
+
+    def reset(self) -> None:
+        """All numbers as the case was opened."""
+        self.go(replace(first_state(self.state.source), tab=self.state.tab))
+
+    def open(self, source: Source) -> None:
+        """Another case in place of this one. Raises CaseError, and the page stays as it is."""
+        self.go(replace(first_state(source), tab=self.state.tab))
+
+    def restore(self, link: str) -> None:
+        """The state of a link. Raises CaseError, and the page stays as it is."""
+        state = from_link(link, self._own)
+        state.case()
+        self.go(state)
+
+    def undo(self) -> None:
+        """One step back."""
+        self._moving = None
+        if self._history.undo():
+            self._changed()
+
+    def redo(self) -> None:
+        """One step forth."""
+        self._moving = None
+        if self._history.redo():
+            self._changed()
+
+    def compute(self) -> None:
+        """Ask for the picture of the state."""
+        self.picture.number = self._worker.ask(self.state)
+
+    def close(self) -> None:
+        """The page is gone: its process ends, its folder is removed."""
+        if self.closed:
+            return
+        self.closed = True
+        self._worker.close()
+        for callback in self._closers:
+            callback()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    # -- inside ---------------------------------------------------------------------------------------------------
+
+    def _changed(self) -> None:
+        self.compute()
+        for listener in list(self._listeners):
+            listener()
+
+    def _answered(self, number: int, part: str, content: Any) -> None:
+        """A piece of an answer, in the thread that listens."""
+        self._call(self._heard, number, part, content)
+
+    def _heard(self, number: int, part: str, content: Any) -> None:
+        if self.closed:
+            return
+        picture = self.picture
+        if part == "done":
+            picture.done = max(picture.done, number)
+        elif part in ("refused", "unanswered", "failed"):
+            picture.problem = str(content)
+            picture.done = max(picture.done, number)
+        else:
+            picture.parts[part] = content
+        if part == "locus":
+            picture.problem = ""
+            picture.parts.pop("onsets", None)
+        for viewer in list(self._viewers):
+            viewer(part, content)
+
+
+def refused(call: Callable[[], None]) -> str:
+    """What is wrong with what was asked, in the words of the command line; "" where nothing is."""
+    try:
+        call()
+    except CaseError as error:
+        return str(error)
+    return ""
