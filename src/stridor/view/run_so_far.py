@@ -99,10 +99,9 @@ def run_so_far(run: Trajectory, *, point: str | None = None, max_frequency_hz: f
         acceleration = band(f"{name} {axis}", "m/s²", history)
         portrait = _portrait(f"{name} {axis}", displacement, velocity, run.sampling)
         sonogram = _sonogram(history, float(run.time[0]), run.sampling, max_frequency_hz)
-    forces = [
-        [band(name, "N", values[:, c]) for c, name in enumerate(run.contact_names)] if count else []
-        for values in (run.normal_force, run.tangential_force)
-    ]
+    def forces(values: Array) -> list[Band]:
+        return [band(name, "N", values[:, c]) for c, name in enumerate(run.contact_names)] if count else []
+
     status = {
         name: [_plain(np.add.reduceat((run.status[:, c] == kind).astype(float), starts) / sizes) for kind in range(3)]
         for c, name in enumerate(run.contact_names)
@@ -111,8 +110,9 @@ def run_so_far(run: Trajectory, *, point: str | None = None, max_frequency_hz: f
     phases = [(p.name, p.start, p.end) for p in run.phases]
     end, middles = float(run.time[-1]) if count else 0.0, _plain(time)
     return RunSoFar(
-        run.steps, run.planned_steps, end, count, middles, phases, acceleration, *forces, status, portrait, sonogram
-    )
+        run.steps, run.planned_steps, end, count, middles, phases, acceleration, forces(run.normal_force),
+        forces(run.tangential_force), status, portrait, sonogram,
+    )  # fmt: skip
 
 
 def _plain(values: Array) -> list[float]:

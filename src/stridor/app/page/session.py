@@ -84,6 +84,10 @@ class Session:
         """The state as letters for the address, "" where it is too large for one."""
         return to_link(self.state, self._own)
 
+    def later(self, function: Callable[..., object], *given: Any) -> None:
+        """Call a function in the thread of the page, unless the page is gone by then."""
+        self._call(lambda: None if self.closed else function(*given))
+
     # -- who wants to know ----------------------------------------------------------------------------------------
 
     def on_change(self, callback: Callable[[], None]) -> None:
