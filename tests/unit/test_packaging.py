@@ -15,7 +15,7 @@ from stridor.direct.backends import PACKAGES
 
 ROOT = Path(__file__).parents[2]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-MODULES = {"python-mumps": "mumps"}
+MODULES = {"python-mumps": "mumps", "numba-cuda": "numba_cuda"}
 
 
 def bare(requirement: str) -> str:
@@ -23,9 +23,10 @@ def bare(requirement: str) -> str:
 
 
 def test_extras_are_what_the_program_knows_how_to_use():
-    named = {re.split("[><=]", bare(r))[0] for extra in PROJECT["optional-dependencies"].values() for r in extra}
+    named = {re.split(r"[><=\[]", bare(r))[0] for extra in PROJECT["optional-dependencies"].values() for r in extra}
     assert all(PROJECT["optional-dependencies"].values()), "an extra with nothing behind it"
-    known = {module for modules, _ in PACKAGES.values() for module in modules} | {"slepc4py", "distributed", "nicegui"}
+    known = {module for modules, _ in PACKAGES.values() for module in modules}
+    known |= {"slepc4py", "distributed", "nicegui", "numba_cuda"}
     assert {MODULES.get(name, name) for name in named} <= known
 
 

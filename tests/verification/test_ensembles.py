@@ -19,13 +19,13 @@ from stridor.errors import AnalysisError
 from stridor.laws import Hyperbolic, StaticKinetic, Tabulated, Weakening
 from stridor.sliding import steady_sliding
 from stridor.system import System, build_system
-from stridor.temporal import ensembles, side_by_side
+from stridor.temporal import ensembles
 from stridor.temporal.ensembles import march_all
 from stridor.temporal.legs import Member
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.settings import Settings
 from stridor.temporal.simulate import simulate
-from stridor.temporal.steppers.modal import start
+from stridor.temporal.steppers.modal import batch, start
 from stridor.temporal.trajectory import Trajectory
 
 pytestmark = pytest.mark.verification
@@ -149,7 +149,7 @@ def test_it_does_not_matter_in_which_chunks_members_march(monkeypatch):
     system, settings = coarse(), Settings(record_every=7, watch=("beam1.tip",))
     tracks = [[Member(0.1), Member(0.3)], [Member(0.2), Member(0.4, 0.5)]]
     whole = all_of(system, PHASES, settings, tracks)
-    monkeypatch.setattr(side_by_side, "CHUNK", 101)
+    monkeypatch.setattr(batch, "CHUNK", 101)
     cut = all_of(system, PHASES, settings, tracks)
     for key, run in whole.items():
         assert run.velocity.tobytes() == cut[key].velocity.tobytes()
@@ -243,7 +243,7 @@ def test_numbers_are_those_of_the_summary_of_a_run():
 def test_ctrl_c_keeps_what_is_finished(monkeypatch):
     case = paper_case().with_(COARSE).with_({"phases.press.duration": 2e-4, "phases.slide.duration": 3e-3})
     monkeypatch.setattr(ensembles, "TOLD_SECONDS", 0.001)
-    monkeypatch.setattr(side_by_side, "CHUNK", 50)
+    monkeypatch.setattr(batch, "CHUNK", 50)
     monkeypatch.setattr(ensembles, "LANES", 2)
     whole = st.ensemble(case, mu=[0.1, 0.1, 0.2, 0.2, 0.3, 0.3], grid=False, modes=False, cores=1)
 

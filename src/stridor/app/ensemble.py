@@ -48,6 +48,12 @@ def ensemble(
         float, typer.Option("--window", metavar="SHARE", help="The end of the last phase that is looked at.")
     ] = 0.5,
     cores: Annotated[int | None, typer.Option("--cores", metavar="N", min=1, help="Threads [default: all]")] = None,
+    device: Annotated[
+        str,
+        typer.Option(
+            "--device", metavar="auto|cpu|gpu", help="Where: auto takes a GPU, if there is one, for 64 runs or more."
+        ),
+    ] = "auto",
 ) -> None:
     """Many runs in time side by side: where it vibrates, how strongly and at which frequency."""
     values = {
@@ -57,6 +63,7 @@ def ensemble(
     if sweep is not None:
         one_of(sweep, "--sweep", ("up", "down", "both"))
     one_of(swept, "--swept", ("mu", "load", "speed"))
+    one_of(device, "--device", ("auto", "cpu", "gpu"))
     work = call.workspace()
     call.check_friction(values["mu"])
 
@@ -64,7 +71,7 @@ def ensemble(
     from ..view.ensemble_plots import ensemble_map
     from .output import progress_bar
 
-    given: dict[str, Any] = {**values, "sweep": sweep, "swept": swept}
+    given: dict[str, Any] = {**values, "sweep": sweep, "swept": swept, "device": device}
     with progress_bar("ensemble", quiet=call.quiet) as progress:
         result = solve(work, **given, observable=observable, window=window, cores=cores, progress=progress)
     call.keep(result, "ensemble.nc")
@@ -109,7 +116,7 @@ def _show(result: Ensemble) -> None:
                 str(result.mode[k]) if result.mode[k] else "–",
             ]
         )
-    title = f"{result.observable} from {result.window[0]:.4g} to {result.window[1]:.4g} s, {result.method}"
+    title = f"{result.observable} from {result.window[0]:.4g} to {result.window[1]:.4g} s, {result.how}"
     words = ["regime", *(["sweep"] if swept else [])]
     table(title, heads, rows, drop=["slip", "stick", "separation"], words=words, kept_in="ensemble.csv")
     if len(result) > MOST_ROWS:

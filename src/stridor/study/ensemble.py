@@ -50,6 +50,7 @@ def ensemble(
     records: bool = False,
     cores: int | None = None,
     separately: bool = False,
+    device: Literal["auto", "cpu", "gpu"] = "auto",
     progress: Progress | None = None,
 ) -> Ensemble:
     """Runs in time of one case, side by side: every combination of the values given, or with ``grid`` False the first
@@ -63,10 +64,12 @@ def ensemble(
     amplitudes are of ("beam1.tip.velocity", "A.normal_force"; default the velocity of the first watched point); window:
     the share of the last phase that is looked at. modes False leaves out the modal map. records keeps the members' runs
     from the start of the last phase on. cores: threads (None: all). separately: one run after the other in any case.
+    device: "gpu" (`stridor[gpu]`), "cpu", or "auto", a GPU where there is one and members are many.
 
     Members go side by side on the modal path with contacts that slide little; others take separate runs, and a note
     says so. A member that fails is a row with its error. progress is called with steps done and planned of all. Ctrl-C
-    returns what is finished. Raises CaseError for values that are none, and what `simulate` raises for all members.
+    returns what is finished. Raises CaseError for values that are none, AnalysisError where a GPU is asked for and
+    cannot be had, and what `simulate` raises for all members.
     """
     started = time.perf_counter()
     work = Workspace.of(problem)
@@ -86,7 +89,7 @@ def ensemble(
     seen = _Seen(looked_at, work.modal.max_frequency_hz, plan, records)
     outcome = march_all(
         system, phases_of(work), replace(settings, watch=watch), plan.tracks, seen.see, window=window, cores=cores,
-        progress=progress, separately=separately,
+        progress=progress, separately=separately, device=device,
     )  # fmt: skip
     found = _modes(work, plan) if modes else Found(None, (), ())
     made = provenance(work, "ensemble", time.perf_counter() - started, **_asked(values, grid, sweep, swept, window))
@@ -239,6 +242,7 @@ def _result(
         if growing is not None and numbers.regime in ("steady", "transient", "grows"):
             mode[k], mode_hz[k], deviation[k] = growing.nearest(numbers.frequency_hz)
     separate = () if outcome.side_by_side else (f"separate runs, not side by side: {outcome.reason}",)
+    separate += (outcome.said,) if outcome.said else ()
     nodes = system.contact_nodes()
     sliding = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1).max(initial=0.0)
     end = sum(p.duration for p in work.phases)
@@ -250,5 +254,5 @@ def _result(
         window=(end - window * work.phases[-1].duration, end), step=outcome.step,
         method="side by side" if outcome.side_by_side else "separate runs", axes=plan.axes, modal=found.map,
         runs=tuple(seen.runs.get(k) for k in range(count)) if seen.records else (), notes=(*separate, *found.notes),
-        interrupted=outcome.interrupted, provenance=made,
+        interrupted=outcome.interrupted, device=outcome.device, provenance=made,
     )  # fmt: skip

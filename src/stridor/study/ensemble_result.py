@@ -69,6 +69,7 @@ class Ensemble(Tabular):
     axes: the values along each of mu, load, speed, perturbation, if members are all combinations of these, in that
     order, up before down; else (). modal: the modal map, None where it was not asked for or cannot be told. runs: the
     members' `Trajectory`, each with the part from the start of its last phase on, where records were asked for.
+    device: "cpu", or the name of the GPU on which they ran.
     """
 
     mu: Array
@@ -100,6 +101,7 @@ class Ensemble(Tabular):
     runs: tuple[Trajectory | None, ...] = ()
     notes: tuple[str, ...] = ()
     interrupted: bool = False
+    device: str = "cpu"
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -130,6 +132,7 @@ class Ensemble(Tabular):
             "window": list(self.window),
             "step": self.step,
             "method": self.method,
+            "device": self.device,
             "members": [
                 dict(zip(heads[:fixed], row[:fixed], strict=True)) | {"contacts": own}
                 for row, own in zip(rows, contacts, strict=True)
@@ -171,9 +174,14 @@ class Ensemble(Tabular):
         return {name: found[name] for name in REGIMES if found[name]}
 
     @property
+    def how(self) -> str:
+        """In words how they ran, and where if that was a GPU."""
+        return self.method if self.device == "cpu" else f"{self.method} on {self.device}"
+
+    @property
     def _line(self) -> str:
         told = ", ".join(f"{count} {name}" for name, count in self.regimes.items())
-        return f"{counted(len(self), 'member')}, {self.method}: {told}"
+        return f"{counted(len(self), 'member')}, {self.how}: {told}"
 
     def _repr_html_(self) -> str:
         heads = ("μ", "load", "speed", "sweep", "regime", f"rms [{self.unit}]", "frequency [Hz]", "mode")
@@ -217,7 +225,8 @@ class Ensemble(Tabular):
                 values = getattr(self.modal, name)
                 variables[f"modal_{name}"] = (("modal_mu", "modal_speed"), values, {"units": unit})
         data = dataset("ensemble", variables, coords, self.provenance)
-        return data.assign_attrs(observable=self.observable, unit=self.unit, method=self.method, step=self.step)
+        told = {"observable": self.observable, "unit": self.unit, "method": self.method, "device": self.device}
+        return data.assign_attrs(**told, step=self.step)
 
 
 def _plain(value: Any) -> float | None:

@@ -1,4 +1,4 @@
-"""Many runs of one system: side by side where the modal stepper takes them, else one after the other.
+"""Many runs of one system: side by side where the modal stepper takes them, on cores or a GPU, else separate runs.
 
 What comes out is a `Trajectory` for each member, the same in both cases but that side by side neither energies nor the
 state for a restart are kept. Members that fail do not stop others.
@@ -10,14 +10,14 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from threading import Event
 
-from ..errors import StridorError
+from ..errors import AnalysisError, CaseError, StridorError
 from ..interrupts import at_once, held
 from ..stages import passing, stage
 from ..system import System
 from ..threads import one_thread
+from .devices import Gpu, first_line, place
 from .inputs import check_inputs
 from .legs import Legs, leg_phases, legs_of
 from .march import Progress
@@ -35,12 +35,14 @@ TOLD_SECONDS = 0.1
 @dataclass(frozen=True)
 class Outcome:
     """How an ensemble was run: side by side or, for a reason in words, one after the other; whether it was cut short;
-    step Δt [s]."""
+    step Δt [s]; on "cpu" or the GPU of that name, and what is to say about that."""
 
     side_by_side: bool
     reason: str
     interrupted: bool
     step: float
+    device: str = "cpu"
+    said: str = ""
 
 
 @passing()
@@ -56,31 +58,62 @@ def march_all(
     cores: int | None = None,
     progress: Progress | None = None,
     separately: bool = False,
+    device: str = "cpu",
 ) -> Outcome:
     """March every track: its first member from the initial state, each further one from where the one before ended.
 
     Tracks are of one length. seen is called, from any thread, with each member's run or why there is none; the last
     phase of a run is the window, the last share of the case's last phase. cores: threads (None: all). separately: one
-    run after the other in any case. Ctrl-C, or KeyboardInterrupt from progress, ends it; what was seen until then
-    stays. Raises CaseError and AnalysisError for what holds of all members.
+    run after the other in any case. device: see `devices.place`. Ctrl-C, or KeyboardInterrupt from progress, ends it;
+    what was seen until then stays. Raises CaseError and AnalysisError for what holds of all members.
     """
     taken = settings.system(system)
     check_inputs(
         taken, phases, step=settings.step, beta2=settings.beta2, record_every=settings.record_every,
         watch=settings.watch,
     )  # fmt: skip
+    gpu, said = place(device, len(tracks))
     stepper, reason = (None, "asked for") if separately else _shared(taken, settings)
+    if stepper is None and device == "gpu":
+        raise CaseError("device", device, f"cpu: what is run separately ({reason}) runs on no GPU")
     step = stepper.scheme.step if stepper is not None else choose_step(plan(system, settings)[2], settings)
     legs = legs_of(phases, taken, step, len(tracks[0]), window, steady=settings.initial == "steady-sliding")
     if stepper is None:
         cut = _one_by_one(system, replace(settings, step=step), tracks, seen, legs, progress)
         return Outcome(False, reason, cut, step)
+    common = Block(stepper, settings, legs, tracks, range(len(tracks)), seen)
+    if gpu is not None:
+        blocks, failed = _on(gpu, common)
+        if not failed:
+            return Outcome(True, "", _at_the_same_time(blocks, legs, progress, 1), step, gpu.name)
+        said = f"{gpu.name} cannot run the time loop: {failed}"
+        if device == "gpu":
+            raise AnalysisError(f"{said}; device cpu runs it")
+        said = f"on the CPU: {said}"
     stage("time loop of an ensemble; the first one of a version is compiled for up to a minute")
-    blocks = [
-        Block(stepper, settings, legs, tracks[a:b], range(a, b), seen)
-        for a, b in pairwise(_cuts(len(tracks), cores or _all_cores()))
-    ]
-    return Outcome(True, "", _at_the_same_time(blocks, legs, progress, cores or _all_cores()), step)
+    blocks = common.cut(_cuts(len(tracks), cores or _all_cores()))
+    with at_once():  # compiles the loop or loads it, before anybody waits for its end
+        blocks[0].warm()
+    return Outcome(True, "", _at_the_same_time(blocks, legs, progress, cores or _all_cores()), step, said=said)
+
+
+def _on(gpu: Gpu, common: Block) -> tuple[list[Block], str]:
+    """Blocks for a GPU, of as many members as its memory and that for records hold, and why it cannot run them."""
+    from .steppers.modal.device import DeviceBatch, most_members
+
+    stage(f"time loop of an ensemble, compiled for {gpu.name}")
+    stepper, settings, legs = common.stepper, common.settings, common.legs
+    records = max(s.steps - legs.first(k) for k, s in enumerate(legs.schedules)) / settings.record_every
+    size = most_members(stepper.system, len(settings.watch), records, gpu.free)
+    blocks = replace(common, batch=DeviceBatch).cut([*range(0, len(common.tracks), size), len(common.tracks)])
+    try:
+        with at_once():
+            blocks[0].warm()
+    except StridorError:
+        raise
+    except Exception as error:  # of many kinds: compiler, linker, driver, memory
+        return [], first_line(error)
+    return blocks, ""
 
 
 def _shared(system: System, settings: Settings) -> tuple[ModalStepper | None, str]:
@@ -113,8 +146,6 @@ def _at_the_same_time(blocks: Sequence[Block], legs: Legs, progress: Progress | 
     planned = legs.steps * sum(len(block.tracks) for block in blocks)
     done = [0] * len(blocks)
     end = Event()
-    with at_once():  # compiles the loop or loads it, before anybody waits for its end
-        blocks[0].warm()
 
     def work(number: int) -> None:
         def count(steps: int) -> None:

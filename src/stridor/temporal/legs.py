@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -56,6 +57,27 @@ class Member:
         return made
 
 
+class Acting(NamedTuple):
+    """Loads and increments of the supports over c steps: sums of t tables (c, t, q), each times factors (k, t, q) of
+    the members, as whole tables of many members would be large."""
+
+    loads: Array
+    load_factors: Array
+    increments: Array
+    increment_factors: Array
+
+    def spread(self) -> tuple[Array, Array]:
+        """Loads (c, k, l) and increments (c, k, p) of every member."""
+        return _sum(self.loads, self.load_factors), _sum(self.increments, self.increment_factors)
+
+
+def _sum(tables: Array, factors: Array) -> Array:
+    out = tables[:, None, 0] * factors[:, 0]
+    for t in range(1, tables.shape[1]):
+        out = out + tables[:, None, t] * factors[:, t]
+    return out
+
+
 @dataclass(frozen=True)
 class Legs:
     """The phases of one run or, where members follow one another, of one after the other: those of the case, then for
@@ -75,39 +97,52 @@ class Legs:
         """First step of a leg."""
         return self.schedules[leg].stretches[0].first
 
-    def forcing(
-        self, first: int, count: int, members: Sequence[Sequence[Member]], distance: Array
-    ) -> tuple[Array, Array]:
-        """Loads (count, k, l) and increments of the supports (count, k, p) of k tracks of members from a step on;
-        distance (p,): 1 for motions that are distances, which nobody scales."""
-        loads: list[Array] = []
-        increments: list[Array] = []
+    def forcing(self, first: int, count: int, members: Sequence[Sequence[Member]], distance: Array) -> Acting:
+        """What acts on k tracks of members over ``count`` steps from a step on; distance (p,): 1 for motions that are
+        distances, which nobody scales."""
+        load_tables: list[list[Array]] = []
+        motion_tables: list[list[Array]] = []
+        load_factors: list[Array] = []
+        motion_factors: list[Array] = []
         while count > 0:
             leg = next((k for k, s in enumerate(self.schedules) if first < s.steps), len(self.schedules) - 1)
             last = leg == len(self.schedules) - 1
             size = count if last else min(count, self.schedules[leg].steps - first)
             present = [track[leg] for track in members]
-            before = [track[max(leg - 1, 0)] for track in members] if self.rises[leg] is not None else present
-            made = [s.load_factors(first, size) for s in self._tables(leg)]
-            moved = [s.motion_increments(first, size) for s in self._tables(leg)]
+            before = [track[leg - 1] for track in members] if self.rises[leg] is not None else present
+            tables = self._tables(leg)
+            load_tables.append([s.load_factors(first, size) for s in tables])
+            motion_tables.append([s.motion_increments(first, size) for s in tables])
             load = np.array([[m.load for m in before], [m.load for m in present]])
             speed = np.array([[m.speed for m in before], [m.speed for m in present]])
-            loads.append(_combined(made, load, np.zeros(made[0].shape[1])))
-            increments.append(_combined(moved, speed, distance))
+            load_factors += _factors(load, np.zeros(load_tables[-1][0].shape[1]))[: len(tables)]
+            motion_factors += _factors(speed, distance)[: len(tables)]
             first, count = first + size, count - size
-        return np.concatenate(loads), np.concatenate(increments)
+        return Acting(
+            _side_by_side(load_tables), np.stack(load_factors, axis=1),
+            _side_by_side(motion_tables), np.stack(motion_factors, axis=1),
+        )  # fmt: skip
 
     def _tables(self, leg: int) -> list[Schedule]:
         rise = self.rises[leg]
         return [self.schedules[leg]] if rise is None else [self.schedules[leg], rise]
 
 
-def _combined(tables: Sequence[Array], factors: Array, unscaled: Array) -> Array:
-    """Tables (c, q) with the factors before (k,), and of the second what these rise by: (c, k, q)."""
+def _factors(factors: Array, unscaled: Array) -> list[Array]:
+    """Of the values before, and of what they rise by from there, each (k, q)."""
     before = np.where(unscaled > 0, 1.0, factors[0][:, None])
-    out = tables[0][:, None, :] * before
-    if len(tables) > 1:
-        out = out + tables[1][:, None, :] * (factors[1] - factors[0])[:, None]
+    return [before, np.broadcast_to((factors[1] - factors[0])[:, None], before.shape)]
+
+
+def _side_by_side(pieces: Sequence[Sequence[Array]]) -> Array:
+    """Tables (c, q) of pieces that follow one another as (Σc, t, q): each is zero outside of its own piece."""
+    out = np.zeros((sum(len(p[0]) for p in pieces), sum(map(len, pieces)), pieces[0][0].shape[1]))
+    row = column = 0
+    for piece in pieces:
+        for table in piece:
+            out[row : row + len(table), column] = table
+            column += 1
+        row += len(piece[0])
     return out
 
 

@@ -1,9 +1,10 @@
-"""Members that march side by side: one block of them from its start to its end, on one core."""
+"""Members that march side by side: one block of them from its start to its end, on one core or one device."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from .steppers.modal.batch_kernel import BatchRecord
 from .steppers.modal.machine import Machine, modal_machine
 from .trajectory import Trajectory
 
-CHUNK = 10_000  # steps between looks at whether to go on
 # Called with the number of a track, of a member in it, and its run or why there is none.
 Seen = Callable[[int, int, Trajectory | str], None]
 Track = Sequence[Member]
@@ -29,7 +29,9 @@ Track = Sequence[Member]
 
 @dataclass(frozen=True)
 class Block:
-    """Tracks by their numbers that are marched together; all of one system, whose operators are those of stepper."""
+    """Tracks by their numbers that are marched together; all of one system, whose operators are those of stepper.
+
+    batch: what steps them."""
 
     stepper: ModalStepper
     settings: Settings
@@ -37,11 +39,16 @@ class Block:
     tracks: Sequence[Track]
     numbers: Sequence[int]
     seen: Seen
+    batch: type[Batch] = Batch
 
     @property
     def system(self) -> System:
         """The system without the members' friction."""
         return self.stepper.system
+
+    def cut(self, at: Sequence[int]) -> list[Block]:
+        """The same in parts that end at these of its tracks; at begins with 0."""
+        return [replace(self, tracks=self.tracks[a:b], numbers=self.numbers[a:b]) for a, b in pairwise(at)]
 
     def run(self, asked: Callable[[], bool], count: Callable[[int], None]) -> None:
         """To the end, or to where an end is asked for; count is told the steps of all members done. Members that cannot
@@ -56,16 +63,16 @@ class Block:
                 self._failed(k, 0, str(error))
                 count(self.legs.steps)
         if machines:
-            self._march(Batch(machines, _modes(self.stepper), self.settings.watch), present, asked, count)
+            self._march(self.batch(machines, _modes(self.stepper), self.settings.watch), present, asked, count)
 
     def warm(self) -> None:
         """Compile the loop, or load it."""
         member = self.tracks[0][0]
         machine = modal_machine(self.system, self.stepper.scheme, _modes(self.stepper))
         machine.repack()
-        batch = Batch([machine], _modes(self.stepper), self.settings.watch)
-        forcing = self.legs.forcing(0, 1, [[member]], self.system.motion.full_distance)
-        batch.advance(0, *forcing, batch.room(0, self.settings.record_every))
+        batch = self.batch([machine], _modes(self.stepper), self.settings.watch)
+        acting = self.legs.forcing(0, 1, [[member]], self.system.motion.full_distance)
+        batch.advance(0, acting, batch.room(0, self.settings.record_every))
 
     def _begun(self, member: Member) -> Machine:
         stepper, system = self.stepper, self.system
@@ -94,9 +101,9 @@ class Block:
                     return
                 for one in results:
                     one.begin(batch.done)
-                size = min(CHUNK, schedule.stretch_at(batch.done).last - batch.done)
-                forcing = self.legs.forcing(batch.done, size + 1, tracks, self.system.motion.full_distance)
-                batch.advance(size, *forcing, record)
+                size = min(batch.longest(every), schedule.stretch_at(batch.done).last - batch.done)
+                acting = self.legs.forcing(batch.done, size + 1, tracks, self.system.motion.full_distance)
+                batch.advance(size, acting, record)
                 count(size * len(tracks))
             for lane, k in enumerate(present):
                 if lane in told:

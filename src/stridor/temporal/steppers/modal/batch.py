@@ -13,6 +13,7 @@ from ....system.uncoupled import UncoupledModes
 from ....typing import Array, IntArray
 from ...beta2 import Scheme
 from ...columns import CONTACT_RECORD
+from ...legs import Acting
 from ...schedule import Schedule
 from ...settings import Settings
 from .batch_kernel import BatchForcing, BatchRecord, run_batch
@@ -21,6 +22,8 @@ from .machine import Machine, modal_machine
 from .stage import LoopState
 from .start import initial_state
 from .vectors import LANES
+
+CHUNK = 10_000  # steps between looks at whether to go on
 
 
 def member_machine(
@@ -40,7 +43,7 @@ def friction_of(systems: Sequence[System]) -> Array:
 
 
 class Batch:
-    """Up to ``LANES`` members, stepped together.
+    """Members that are stepped together: up to ``LANES`` of them, any number on a device (`device`).
 
     states: of `LoopState`, with the members (k, …) in front. lost (k,): the step at which a member was no longer
     finite, −1 while it is. friction (k, m, …) may be replaced between steps.
@@ -65,6 +68,10 @@ class Batch:
         self._own = np.zeros((0, 0))
         self._lift = np.ascontiguousarray(np.vstack([first.table.lift[:rows], np.zeros((1, first.table.motions))]))
 
+    def longest(self, every: int) -> int:
+        """How many steps one call of `advance` may take with a record each ``every`` steps."""
+        return CHUNK
+
     def room(self, records: int, every: int) -> BatchRecord:
         """Room for so many records."""
         watched = self.modal.watch.shape[0]
@@ -73,13 +80,13 @@ class Batch:
             contacts=np.zeros((records, self.members, len(self.system.contacts), CONTACT_RECORD)),
             watch=np.zeros((records, self.members, watched, 3)),
             kept=np.zeros(1, dtype=np.int64),
-            sums=np.zeros((3 * watched, LANES)),
+            sums=np.zeros((3 * watched, self.fields.ud.shape[1])),
             before=np.zeros((self.members, 2, self.table.motions)),
             watch_lift=self._watch_lift,
         )
 
-    def advance(self, steps: int, loads: Array, increments: Array, record: BatchRecord) -> None:
-        """So many steps under loads (steps + 1, k, l) and increments of the supports (steps + 1, k, p)."""
+    def advance(self, steps: int, acting: Acting, record: BatchRecord) -> None:
+        """So many steps under what acts over steps + 1."""
         run_batch(
             steps,
             self.done,
@@ -87,7 +94,7 @@ class Batch:
             self.table.contacts,
             self.friction,
             self.scheme,
-            self._forcing(loads, increments),
+            self._forcing(*acting.spread()),
             self.compliance,
             self.fields,
             self.states,
@@ -130,13 +137,14 @@ def _rows(name: str, machine: Machine, rows: int) -> Any:
 def _fields(machines: Sequence[Machine], rows: int) -> BatchFields:
     """The modes of all members in their lanes; lanes without a member stay at zero."""
     size, auxiliary = len(machines[0].fields.u), len(machines[0].fields.coefficients)
+    lanes = -(-len(machines) // LANES) * LANES
     fields = BatchFields(
-        ud=np.zeros((2 * size, LANES)),
-        q=np.zeros((size, LANES)),
-        constant=np.zeros((size, LANES)),
-        push=np.zeros((rows + 1, LANES)),
-        pull=np.zeros((rows + 1, LANES)),
-        coefficients=np.zeros((auxiliary, LANES)),
+        ud=np.zeros((2 * size, lanes)),
+        q=np.zeros((size, lanes)),
+        constant=np.zeros((size, lanes)),
+        push=np.zeros((rows + 1, lanes)),
+        pull=np.zeros((rows + 1, lanes)),
+        coefficients=np.zeros((auxiliary, lanes)),
     )
     for lane, machine in enumerate(machines):
         fields.ud[0::2, lane], fields.ud[1::2, lane] = machine.fields.u, machine.fields.d

@@ -6,9 +6,8 @@ how. Works and energies are not accumulated.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
-
-import numpy as np
 
 from ....kernels import njit
 from ....typing import Array, IntArray
@@ -98,7 +97,7 @@ def _lent_modal(m: BatchModal) -> BatchModal:  # pragma: no cover - compiled
 
 
 @njit(cache=True, inline="always")
-def _keep_contacts(
+def keep_contacts(
     at: int, lane: int, contacts: ContactArrays, scheme: Scheme, state: LoopState, scratch: Scratch, record: BatchRecord
 ) -> None:  # pragma: no cover - compiled
     """A member's contacts at t_n."""
@@ -110,7 +109,24 @@ def _keep_contacts(
         row[REC_SLIP] = (state.rate[base + 1] + two_b * scratch.moved[base + 1]) / scheme.s
         row[REC_GAP] = contacts.gap[c] + scratch.displacement[base]
         row[REC_STATUS] = state.status[c]
-    record.before[lane] = state.motion
+    for p in range(state.motion.shape[1]):
+        record.before[lane, 0, p], record.before[lane, 1, p] = state.motion[0, p], state.motion[1, p]
+
+
+@njit(cache=True, inline="always")
+def keep_point(
+    at: int, lane: int, w: int, su: float, sq: float, sd: float, increments: Array, scheme: Scheme, record: BatchRecord
+) -> None:  # pragma: no cover - compiled
+    """A watched row of a member at t_n, from its sums over modes of u, q and d and the increments (p,) of supports."""
+    dt, s = scheme.step, scheme.s
+    for p in range(increments.shape[0]):
+        lift = record.watch_lift[w, p]
+        su += lift * record.before[lane, 0, p]
+        sq += lift * record.before[lane, 1, p]
+        sd += lift * increments[p]
+    record.watch[at, lane, w, 0] = su
+    record.watch[at, lane, w, 1] = (sq + 2.0 * scheme.beta2 * sd / dt) / s
+    record.watch[at, lane, w, 2] = 2.0 * (sd / dt - sq) / (dt * s)
 
 
 @njit(cache=True)
@@ -118,19 +134,11 @@ def _keep_watched(
     k: int, at: int, modal: BatchModal, fields: BatchFields, scheme: Scheme, forcing: BatchForcing, record: BatchRecord
 ) -> None:  # pragma: no cover - compiled
     """The watched points of all members at t_n."""
-    dt, s, two_b = scheme.step, scheme.s, 2.0 * scheme.beta2
     batch_watch(modal, fields, record.sums)
     for lane in range(record.contacts.shape[1]):
         for w in range(modal.watch.shape[0]):
             su, sq, sd = record.sums[3 * w, lane], record.sums[3 * w + 1, lane], record.sums[3 * w + 2, lane]
-            for p in range(forcing.increments.shape[2]):
-                lift = record.watch_lift[w, p]
-                su += lift * record.before[lane, 0, p]
-                sq += lift * record.before[lane, 1, p]
-                sd += lift * forcing.increments[k, lane, p]
-            record.watch[at, lane, w, 0] = su
-            record.watch[at, lane, w, 1] = (sq + two_b * sd / dt) / s
-            record.watch[at, lane, w, 2] = 2.0 * (sd / dt - sq) / (dt * s)
+            keep_point(at, lane, w, su, sq, sd, forcing.increments[k, lane], scheme, record)
 
 
 @njit(cache=True)
@@ -146,11 +154,12 @@ def _give_up(lane: int, fields: BatchFields, state: LoopState) -> None:  # pragm
 
 
 @njit(cache=True, inline="always")
-def _finite(state: LoopState) -> bool:  # pragma: no cover - compiled
+def finite_rows(state: LoopState) -> bool:  # pragma: no cover - compiled
+    """Whether the rows of a member are."""
     total = 0.0
     for r in range(state.value.shape[0] - 1):
         total += state.value[r]
-    return bool(np.isfinite(total))
+    return math.isfinite(total)
 
 
 @njit(cache=True, nogil=True)
@@ -202,12 +211,12 @@ def run_batch(
                 state.predicted[r] = fields.pull[r, lane]
             contact_stage(k, own, scheme, acting, compliance, state, scratch)
             if recorded:
-                if not _finite(state):
+                if not finite_rows(state):
                     lost[lane] = done + k
                     _give_up(lane, fields, state)
                     changed = True
                     continue
-                _keep_contacts(at, lane, own, scheme, state, scratch, record)
+                keep_contacts(at, lane, own, scheme, state, scratch, record)
             count_contacts(own, state, scratch)
             advance_rows(k, scheme, acting, state, scratch)
             state.counters[0] += 1
