@@ -1,0 +1,45 @@
+"""What processes of pages run in tests, in place of the bench."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+
+def counting() -> Callable[[Any, Callable[[str, Any], None]], None]:
+    """Answers a number of seconds after as long, which a newer question may interrupt; "die" ends the process."""
+
+    def answer(question: Any, send: Callable[[str, Any], None]) -> None:
+        if question == "die":
+            os._exit(1)
+        send("begun", question)
+        until = time.monotonic() + float(question)
+        while time.monotonic() < until:
+            time.sleep(0.001)
+        send("answer", question)
+
+    return answer
+
+
+def careful() -> Callable[[Any, Callable[[str, Any], None]], None]:
+    """Sends much at once for as long as it is let, so that it is interrupted while it sends."""
+
+    def answer(question: Any, send: Callable[[str, Any], None]) -> None:
+        if question == "last":
+            send("answer", "last")
+            return
+        for _ in range(2000):
+            send("block", b"x" * 300_000)
+
+    return answer
+
+
+def threads() -> Callable[[Any, Callable[[str, Any], None]], None]:
+    """Answers what the environment says about threads."""
+
+    def answer(question: Any, send: Callable[[str, Any], None]) -> None:
+        send("answer", (os.environ.get("OPENBLAS_NUM_THREADS"), os.getpid()))
+
+    return answer

@@ -1,0 +1,125 @@
+"""What a page's process answers is what the calls of the package give."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stridor as st
+from stridor.app.page.bench import Bench
+from stridor.app.page.drawing import drawing
+from stridor.app.page.state import Source, State, first_state
+from stridor.system import build_system
+
+BEAMS = Source.template("two-beams")
+
+
+def answered(bench: Bench, state: State) -> dict[str, Any]:
+    """The newest content of every part, as the browser has it: through JSON."""
+    found: dict[str, Any] = {}
+    bench(state, lambda part, content: found.__setitem__(part, json.loads(json.dumps(content, allow_nan=False))))
+    return found
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return Bench()
+
+
+@pytest.fixture(scope="module")
+def state() -> State:
+    return replace(first_state(BEAMS).with_change("bodies.beam1.angle_deg", 83.0), mu=0.3)
+
+
+@pytest.fixture(scope="module")
+def unstable(state: State) -> Any:
+    modes = st.modes(state.case(), mu=0.3, max_frequency_hz=40e3, vectors="right")
+    return modes, int(modes.branch[np.argmax(modes.growth_rate[0])])
+
+
+@pytest.fixture(scope="module")
+def found(bench: Bench, state: State, unstable: Any) -> dict[str, Any]:
+    return answered(bench, replace(state, branch=unstable[1]))
+
+
+def test_onsets_are_those_of_the_package_to_all_digits(found: dict[str, Any], state: State):
+    wanted = st.onsets(state.case())
+    assert found["onsets"]["onsets"] == [json.loads(json.dumps(o.to_json())) for o in wanted]
+    assert found["onsets"]["complete"] is wanted.complete is True
+    assert found["onsets"]["first"] == {"mu": wanted.first.mu, "frequency_hz": wanted.first.frequency_hz}
+
+
+def test_modes_at_the_friction_of_the_page_are_checked_ones(found: dict[str, Any], unstable: Any):
+    modes, _ = unstable
+    assert found["at"]["checked"]
+    assert [m["frequency_hz"] for m in found["at"]["modes"]] == pytest.approx([modes.frequency_hz[0, b] for b in modes.order(0)], rel=1e-9)
+    assert [m["unstable"] for m in found["at"]["modes"]] == [bool(modes.unstable[0, b]) for b in modes.order(0)]
+    assert "Checked" in found["at"]["completeness"]
+
+
+def test_branches_over_friction_are_those_of_a_sweep(found: dict[str, Any], state: State):
+    modes = st.modes(state.case(), found["locus"]["mu"], max_frequency_hz=40e3, check=False)
+    assert 0.3 in found["locus"]["mu"]
+    for column, branch in enumerate(found["locus"]["branches"]):
+        assert branch["branch"] == modes.branch[column]
+        assert branch["growth_rate"] == pytest.approx(modes.growth_rate[:, column], rel=1e-6)
+        assert branch["unstable"] == modes.unstable[:, column].tolist()
+
+
+def test_the_energy_of_a_mode_is_balanced(found: dict[str, Any], unstable: Any):
+    modes, branch = unstable
+    shape = found["shape"]
+    assert shape["branch"] == branch
+    assert sum(b["share"] for b in shape["bodies"]) == pytest.approx(1.0)
+    fed = sum(c["per_cycle"] for c in shape["contacts"]["each"]) + shape["contacts"]["damping"]
+    assert fed == pytest.approx(2 * shape["growth_rate"] / shape["frequency_hz"], rel=1e-3)
+    assert shape["contacts"]["each"][0]["per_cycle"] > 0 > shape["contacts"]["damping"]
+
+
+def test_the_tornado_is_that_of_sensitivities(found: dict[str, Any], state: State, unstable: Any):
+    _, branch = unstable
+    wanted = st.sensitivities(state.case(), ["mu", "materials.steel.density"], mu=0.3, modes=[branch], max_frequency_hz=40e3)
+    bars = {bar["path"]: bar for bar in found["tornado"]["bars"]}
+    assert bars["mu"]["growth"] == pytest.approx(float(wanted.growth_per_percent[0, 0]))
+    assert bars["materials.steel.density"]["frequency_hz"] == pytest.approx(float(wanted.frequency_per_percent_hz[1, 0]))
+    sizes = [abs(bar["growth"]) for bar in found["tornado"]["bars"]]
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_the_geometry_is_sent_once(bench: Bench, state: State, unstable: Any, found: dict[str, Any]):
+    assert "geometry" in found["shape"]
+    again = answered(bench, replace(state, mu=0.31, branch=unstable[1]))
+    assert "geometry" not in again["shape"]
+    assert set(again["shape"]["motion"]) == {"real", "imag", "scale", "bent"}
+    assert "locus" not in again  # nothing of it has changed
+    moved = answered(bench, replace(state, branch=unstable[1]).with_change("bodies.beam1.angle_deg", 82.0))
+    assert "geometry" in moved["shape"]
+
+
+def test_what_the_case_refuses_is_said_and_the_next_is_answered():
+    bench = Bench()
+    state = first_state(BEAMS)
+    refused = answered(bench, state.with_change("bodies.beam1.length", 0.04))
+    with pytest.raises(st.CaseError) as caught:
+        st.onsets(state.with_change("bodies.beam1.length", 0.04).case())
+    assert refused["refused"] == str(caught.value)
+    assert "onsets" in answered(bench, state)
+
+
+def test_where_there_is_no_steady_sliding_that_is_said():
+    state = first_state(BEAMS).with_change("loads.press.force.1", 20.0)
+    found = answered(Bench(), state)
+    with pytest.raises(st.AnalysisError) as caught:
+        st.modes(state.case(), check=False)
+    assert found["unanswered"] == str(caught.value)
+
+
+def test_the_drawing_names_what_it_shows():
+    case = first_state(BEAMS).case()
+    svg = drawing(case, build_system(case))
+    for words in ("beam1", "beam2", "20 N", "0.02 m/s", "holds x, y, φ", "50 mm", 'role="img"', "contact A: beam1.tip on beam2"):
+        assert words in svg
