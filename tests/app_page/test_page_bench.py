@@ -66,12 +66,12 @@ def test_branches_over_friction_are_those_of_a_sweep(found: dict[str, Any], stat
     assert 0.3 in found["locus"]["mu"]
     for column, branch in enumerate(found["locus"]["branches"]):
         assert branch["branch"] == modes.branch[column]
-        assert branch["growth_rate"] == pytest.approx(modes.growth_rate[:, column], rel=1e-6)
+        assert branch["growth_rate"] == pytest.approx(modes.growth_rate[:, column], rel=1e-5)
         assert branch["unstable"] == modes.unstable[:, column].tolist()
 
 
 def test_the_energy_of_a_mode_is_balanced(found: dict[str, Any], unstable: Any):
-    modes, branch = unstable
+    _, branch = unstable
     shape = found["shape"]
     assert shape["branch"] == branch
     assert sum(b["share"] for b in shape["bodies"]) == pytest.approx(1.0)

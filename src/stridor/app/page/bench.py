@@ -7,14 +7,14 @@ a case is kept in its workspace as long as the case is the one on the page.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ... import stages
-from ...errors import AnalysisError, CaseError, StridorError
+from ...errors import CaseError, StridorError
 from ...modal.complex_modes import ComplexModes
 from ...modal.onsets import Onset, Onsets
 from ...study.analyses import modes, onsets
@@ -23,10 +23,11 @@ from .drawing import drawing
 from .levers import friction_range
 from .mode_data import energy_of, participation, shape_of, tornado
 from .state import State
+from .worker import IDLE
 
 POINTS = 41  # of the curves
 LARGE = 2000  # freedoms, beyond which an answer takes longer than a slider waits
-DIGITS = 7  # of numbers that are drawn only
+DIGITS = 6  # of numbers that are drawn only
 
 Send = Callable[[str, Any], None]
 
@@ -37,6 +38,7 @@ class _Model:
 
     key: Any
     work: Workspace
+    idle: Workspace | None = None  # of its own, for what may be given up halfway
     locus: ComplexModes | None = None
     onsets: Onsets | None = None
     geometry: str = ""
@@ -45,28 +47,36 @@ class _Model:
 class Bench:
     """Answers states (`State`) piece by piece: send(part, content) with plain data.
 
-    Parts: "model" (drawing, freedoms), "refused" (what is wrong with the case), "stage" (what is under way), "locus"
+    Parts: "model" (drawing, freedoms), "refused" (what is wrong with the case), "progress" (of large models), "locus"
     (branches over μ), "at" (modes at the μ of the page), "unanswered" (why there are no modes), "onsets", "shape" (the
     mode chosen), "tornado" (its sensitivities).
     """
 
     def __init__(self) -> None:
         self._model: _Model | None = None
+        self._leisure = False
 
     def __call__(self, state: State, send: Send) -> None:
         """Answer a state."""
+        self._leisure = False
         try:
             model = self._of(state, send)
-            with stages.heard(lambda stage: send("stage", None if stage is None else stage.what)):
-                self._answer(state, model, send)
+            self._answer(state, model, send)
         except BaseException as error:
             if isinstance(error, CaseError):
                 send("refused", str(error))
             elif isinstance(error, StridorError | ArithmeticError | MemoryError | np.linalg.LinAlgError):
                 send("unanswered", str(error) or type(error).__name__)
             else:
-                self._model = None  # given up halfway: what is half made is not gone on with
+                self._given_up()
                 raise
+
+    def _given_up(self) -> None:
+        """What is half made is not gone on with."""
+        if self._model is not None and self._leisure:
+            self._model.idle = None
+        else:
+            self._model = None
 
     def _of(self, state: State, send: Send) -> _Model:
         """The model of a state, built where it is another one than before."""
@@ -74,12 +84,8 @@ class Bench:
             self._model = None
             case = state.case()
             model = _Model(state.model, Workspace(case))
-            system = model.work.system()
-            send("model", {
-                "title": case.title, "freedoms": system.size, "svg": drawing(case, system),
-                "friction_range": friction_range(case), "max_frequency_hz": case.modal.max_frequency_hz,
-                "warnings": case.warnings, "large": system.size > LARGE,
-            })  # fmt: skip
+            if model.work.system().size > LARGE:
+                send("model", _described(model.work))  # what follows takes a while
             self._model = model
         return self._model
 
@@ -91,21 +97,25 @@ class Bench:
             send("locus", locus_of(model.locus))
             if state.mu in model.locus.mu:
                 send("at", modes_at(model.locus, state.mu, checked=False))
+            send("model", _described(work))
         else:
             here = self._modes_here(work, state.mu)
             send("at", modes_at(here, state.mu, checked=False))
         if state.branch is not None:
             here = here or self._modes_here(work, state.mu)
             self._shape(model, here, state.branch, send)
+        self._leisure = True
+        send(IDLE, None)
+        model.idle = model.idle or Workspace(work.case("the page"))
+        self._at_leisure(state, model, model.idle, send)
+
+    def _at_leisure(self, state: State, model: _Model, work: Workspace, send: Send) -> None:
+        """What takes longer than a slider waits."""
         if model.onsets is None:
-            send("stage", "the onsets are being solved")
             model.onsets = onsets(work)
         send("onsets", onsets_of(model.onsets))
-        if not model.locus.completeness:
-            send("stage", f"the modes at μ = {state.mu:g} are sought in the full problem")
-            send("at", modes_at(modes(work, state.mu, max_frequency_hz=_band(work)), state.mu, checked=True))
+        send("at", modes_at(modes(work, state.mu, max_frequency_hz=_band(work)), state.mu, checked=True))
         if state.branch is not None:
-            send("stage", "what changes the chosen mode")
             send("tornado", tornado(work, state.mu, state.branch))
 
     def _swept(self, model: _Model, mu: float, send: Send) -> ComplexModes:
@@ -141,8 +151,20 @@ class Bench:
 
 
 def bench() -> Bench:
-    """A bench, as the process of a page has it."""
+    """A bench, as the process of a page has it: what is loaded by now is no garbage, and is not looked through for it
+    while a slider moves."""
+    gc.collect()
+    gc.freeze()
     return Bench()
+
+
+def _described(work: Workspace) -> dict[str, Any]:
+    """The model to scale, and what is to be known of it."""
+    case, system = work.case("the page"), work.system()
+    return {
+        "title": case.title, "freedoms": system.size, "svg": drawing(case, system), "warnings": case.warnings,
+        "large": system.size > LARGE,
+    }  # fmt: skip
 
 
 def _band(work: Workspace) -> float:
@@ -196,6 +218,3 @@ def onsets_of(found: Onsets) -> dict[str, Any]:
 
 def _first(first: Onset | None) -> dict[str, Any] | None:
     return None if first is None else {"mu": first.mu, "frequency_hz": first.frequency_hz}
-
-
-__all__ = ["AnalysisError", "Bench", "bench", "locus_of", "modes_at", "onsets_of"]

@@ -8,7 +8,7 @@ from nicegui import events, ui
 
 from .session import Session
 
-CHARTS = (("frequency", 240), ("growth", 160))  # and their heights in pixels
+CHARTS = (("frequency", 240), ("growth", 170))  # and their heights in pixels
 
 
 def build(container: ui.element, session: Session) -> dict[str, int]:

@@ -1,8 +1,8 @@
 """A process of its own that answers what a page asks, the newest question only.
 
-While it computes, at most one question waits: the newest. What takes longer than `PATIENCE` is given up for a newer
-one, so that two hundred moves of a slider are a handful of answers and never a queue. The process ends with its pipe,
-and so with the page and with the server, however these end.
+While it computes, at most one question waits: the newest. What takes longer than `PATIENCE`, or comes after the part
+`IDLE`, is given up for a newer one, so that two hundred moves of a slider are a handful of answers and never a queue.
+The process ends with its pipe, and so with the page and with the server, however these end.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any
 from ...studies.workers import main_left_out, one_thread_each
 
 PATIENCE = 0.5  # seconds that an answer may take before a newer question stops it
+IDLE = "idle"  # the part that says: what comes now is for when nobody asks
 END = 3.0  # seconds that a process has to end
 
 Send = Callable[[str, Any], None]
@@ -148,6 +149,7 @@ class _Questions:
         self._newest: tuple[int, Any] | None = None
         self._began: float | None = None
         self._sending = False
+        self._patience = PATIENCE
         threading.Thread(target=self._reading, daemon=True).start()
         threading.Thread(target=self._watching, daemon=True).start()
 
@@ -158,7 +160,7 @@ class _Questions:
             while self._newest is None:
                 self._wake.wait(0.5)
             newest, self._newest = self._newest, None
-            self._began = time.monotonic()
+            self._began, self._patience = time.monotonic(), PATIENCE
             return newest
 
     def send(self, message: tuple[int, str, Any]) -> None:
@@ -173,8 +175,14 @@ class _Questions:
     def waiting(self) -> bool:
         """Whether a newer question is there, and what is under way has had its time."""
         began = self._began
-        late = began is not None and time.monotonic() - began > PATIENCE
+        late = began is not None and time.monotonic() - began >= self._patience
         return late and self._newest is not None and not self._sending
+
+    def idle(self) -> None:
+        """What is under way from here on is for when nobody asks."""
+        self._patience = 0.0
+        if self.waiting:
+            interrupt_main(signal.SIGINT)
 
     def given_up(self) -> None:
         """What is under way is: it is not interrupted again."""
@@ -189,6 +197,8 @@ class _Questions:
             with self._wake:
                 self._newest = newest
                 self._wake.notify()
+            if self.waiting:
+                interrupt_main(signal.SIGINT)
 
     def _watching(self) -> None:
         while True:
@@ -222,7 +232,10 @@ def _answer_next(questions: _Questions, answer: Answer) -> None:
     number, question = questions.next()
 
     def send(part: str, content: Any) -> None:
-        questions.send((number, part, content))
+        if part == IDLE:
+            questions.idle()
+        else:
+            questions.send((number, part, content))
 
     answer(question, send)
     send("done", None)

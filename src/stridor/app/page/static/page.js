@@ -4,7 +4,7 @@ const stridor = (() => {
   const $ = (id) => document.getElementById(id);
   const state = {
     charts: {}, colours: {}, levers: [], values: {}, low: 0, high: 1, branch: null, locus: null, at: null, onsets: null,
-    shape: null, geometry: null, link: "", waiting: {}, timer: null,
+    shape: null, geometry: null, link: "", waiting: {}, timer: null, drawn: {},
   };
   const dark = () => document.body.classList.contains("body--dark");
   const paint = () => ({ text: dark() ? "#d8d8d8" : "#222", line: dark() ? "#5a5e66" : "#999", grid: dark() ? "#33373e" : "#e4e4e4",
@@ -110,7 +110,7 @@ const stridor = (() => {
 
   // -- curves ------------------------------------------------------------------------------------------------------
   const chartOf = (name) => getElement(state.charts[name])?.chart;
-  const KINDS = { frequency: ["frequency_hz", "frequency [Hz]"], growth: ["growth_rate", "growth rate Re λ [1/s]"] };
+  const KINDS = { frequency: ["frequency_hz", "frequency [Hz]"], growth: ["growth_rate", "growth rate [1/s]"] };
 
   function curves(key, wanted) {
     const drawn = [];
@@ -145,16 +145,16 @@ const stridor = (() => {
         line("chosen mode", curves(key, chosen), p.ink, 3.2, 4),
         { id: "onsets", name: "onset, solved", type: "scatter", symbol: "diamond", symbolSize: 9, silent: true, animation: false, z: 6,
           itemStyle: { color: p.ink }, labelLayout: { hideOverlap: true },
-          label: { show: name === "frequency", position: "right", distance: 6, color: p.text, fontSize: 11, lineHeight: 13, formatter: (d) => d.data.words,
+          label: { show: name === "frequency", position: "right", distance: 6, offset: [0, -15], color: p.text, fontSize: 11, lineHeight: 13, formatter: (d) => d.data.words,
             backgroundColor: dark() ? "rgba(27,29,34,.85)" : "rgba(255,255,255,.85)", padding: 2 },
           data: onsetPoints(name) },
       ];
       chart.setOption({
         animation: false, backgroundColor: "transparent",
-        grid: { left: 64, right: 16, top: 10, bottom: 36, outerBoundsMode: "none" },
+        grid: { left: 72, right: 16, top: 10, bottom: 36, outerBoundsMode: "none" },
         xAxis: { type: "value", min: state.low, max: state.high, name: "friction coefficient μ", nameLocation: "middle", nameGap: 22, nameTextStyle: { color: p.text },
           axisLabel: { color: p.text }, axisLine: { lineStyle: { color: p.line } }, splitLine: { lineStyle: { color: p.grid } } },
-        yAxis: { type: "value", name: axis, nameLocation: "middle", nameGap: 48, min: name === "frequency" ? 0 : null, nameTextStyle: { color: p.text },
+        yAxis: { type: "value", name: axis, nameLocation: "middle", nameGap: 52, min: name === "frequency" ? 0 : null, nameTextStyle: { color: p.text },
           axisLabel: { color: p.text, formatter: (v) => shown(v) }, axisLine: { show: true, lineStyle: { color: p.line } }, splitLine: { lineStyle: { color: p.grid } } },
         series,
       });
@@ -294,7 +294,7 @@ const stridor = (() => {
     box.replaceChildren();
     if (s.missing) return;
     const lines = [`damping ratio ${shown(100 * s.damping_ratio)} %`];
-    for (const b of s.bodies) lines.push(`${b.body}: ${(100 * b.share).toFixed(1)} % of the kinetic energy, phase ${b.phase_deg === null ? "–" : `${Math.round(b.phase_deg)}°`}`);
+    for (const b of s.bodies) lines.push(`${b.body}: ${(100 * b.share).toFixed(1)} % of the kinetic energy, phase ${b.phase_deg === null ? "–" : `${shown(Math.round(b.phase_deg))}°`}`);
     for (const c of s.contacts.each) lines.push(`friction at ${c.contact}: ${shown(100 * c.per_cycle, 3)} % of the mode's energy per cycle ${c.per_cycle > 0 ? "fed in" : "taken out"}`);
     if (s.contacts.damping !== undefined) lines.push(`damping: ${shown(100 * s.contacts.damping, 3)} % per cycle`);
     if (s.contacts.why) lines.push(`energy of friction: ${s.contacts.why}`);
@@ -338,15 +338,15 @@ const stridor = (() => {
       $("st-model").innerHTML = c.svg || "<p class='st-note'>Matrices without places: there is nothing to draw.</p>";
       $("st-title").textContent = c.title;
     },
-    locus(c) { state.locus = c; state.onsets = null; problem(""); draw(); stamp(); },
-    at(c) { state.at = c; list(); problem(""); stamp(); },
+    locus(c) { state.locus = c; state.onsets = null; problem(""); draw(); stamp("locus"); },
+    at(c) { state.at = c; list(); problem(""); stamp("at"); },
     onsets(c) { state.onsets = c; draw(); },
     shape(c) { state.shape = c; shape(); },
     tornado,
     refused: problem, unanswered: problem, failed: problem,
   };
-  // When the last picture was drawn, for measurements.
-  const stamp = () => { state.drawn = performance.now(); state.pictures = (state.pictures ?? 0) + 1; };
+  // How often each part was drawn, for measurements: counted when it is on the screen.
+  const stamp = (part) => requestAnimationFrame(() => { state.drawn[part] = (state.drawn[part] ?? 0) + 1; });
   function show(part, content, busy) {
     parts[part]?.(content);
     said(busy);

@@ -1,0 +1,75 @@
+"""From a slider to the picture, in a real browser: how long until the branches of the moved case are on the screen.
+
+python benchmarks/page.py [--short] [CASE.toml]
+Needs the extra app, playwright, and Chromium at /usr/bin/chromium; without them it says so and leaves.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import subprocess
+import sys
+import time
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+CHROMIUM = Path("/usr/bin/chromium")
+MOVE = """([path, share]) => new Promise((done) => {
+  const slider = document.querySelector(`[data-path="${path}"]`), part = path === "mu" ? "at" : "locus";
+  const before = stridor.state.drawn[part] ?? 0, began = performance.now();
+  slider.value = Math.round(share * slider.max);
+  slider.dispatchEvent(new Event("input", { bubbles: true }));
+  const drawn = () => (stridor.state.drawn[part] ?? 0) > before;
+  const look = () => (drawn() ? done(performance.now() - began) : requestAnimationFrame(look));
+  look();
+})"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--short", action="store_true", help="fewer moves")
+    parser.add_argument("case", nargs="*", help="a case file (default: the two beams)")
+    args = parser.parse_args()
+    if find_spec("nicegui") is None or find_spec("playwright") is None or not CHROMIUM.exists():
+        print("no measurement: needs nicegui, playwright and /usr/bin/chromium")
+        return
+    command = [sys.executable, "-m", "stridor", "app", "--no-browser", "--quiet", *args.case]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert server.stdout is not None
+    try:
+        measure(server.stdout.readline().strip(), 12 if args.short else 60)
+    finally:
+        server.terminate()
+        server.wait(20)
+        server.stdout.close()
+
+
+def measure(address: str, moves: int) -> None:
+    """Moves of three sliders, one after the other."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1280, "height": 720})
+        page.goto(address)
+        page.wait_for_function("typeof stridor !== 'undefined' && stridor.state.onsets !== null", timeout=600_000)
+        paths: list[str] = page.evaluate("stridor.state.levers.map((lever) => lever.path)")
+        for path in paths[:4]:
+            each = [moved(page, path, k / moves) for k in range(1, moves)]
+            ordered = sorted(each)
+            p95 = ordered[min(len(ordered) - 1, int(0.95 * len(ordered)))]
+            middle = statistics.median(each)
+            print(f"{path}: slider to picture, median {middle:.0f} ms, p95 {p95:.0f} ms ({len(each)} moves)")
+        browser.close()
+
+
+def moved(page: Any, path: str, turn: float) -> float:
+    """Milliseconds of one move to somewhere near where the lever stood, with a rest before it as a hand has it."""
+    time.sleep(0.1)
+    return float(page.evaluate(MOVE, [path, 0.4 + 0.2 * turn]))
+
+
+if __name__ == "__main__":
+    main()

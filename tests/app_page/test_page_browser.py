@@ -1,0 +1,304 @@
+"""The page in a real browser: Debian's Chromium through Playwright.
+
+Screenshots of every step lie in the folder that STRIDOR_SCREENSHOTS names (build/screenshots): look at them.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import stridor as st
+from stridor.case import template_text
+
+pytest.importorskip("nicegui", reason="the extra app is not installed")
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+CHROMIUM = Path(os.environ.get("STRIDOR_CHROMIUM", "/usr/bin/chromium"))
+pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no browser at {CHROMIUM} (Debian: apt install chromium)")
+ROOT = Path(__file__).parents[2]
+SHOTS = Path(os.environ.get("STRIDOR_SCREENSHOTS", ROOT / "build" / "screenshots"))
+PATIENT = 60_000  # ms
+SOLVED = "typeof stridor !== 'undefined' && stridor.state.onsets !== null"
+
+
+@contextmanager
+def serving(*words: str) -> Generator[tuple[subprocess.Popen[str], str]]:
+    """The program with its page, and the address."""
+    command = [sys.executable, "-m", "stridor", "app", "--no-browser", "--quiet", *words]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stderr is not None
+    try:
+        address = process.stdout.readline().strip()
+        assert address.startswith("http://127.0.0.1:"), process.stderr.read()
+        yield process, address
+    finally:
+        process.kill()
+        process.wait(20)
+        process.stdout.close()
+        process.stderr.close()
+
+
+@pytest.fixture(scope="module")
+def address() -> Generator[str]:
+    with serving() as (_, found):
+        yield found
+
+
+@pytest.fixture(scope="module")
+def browser() -> Generator[Any]:
+    with sync_api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@contextmanager
+def page_at(browser: Any, address: str, *, width: int = 1280, height: int = 720, **more: Any) -> Generator[Any]:
+    """A page that has drawn its case; nothing may be asked of another computer, and the script may not fail."""
+    context = browser.new_context(viewport={"width": width, "height": height}, **more)
+    page = context.new_page()
+    failed: list[str] = []
+    page.on("pageerror", lambda error: failed.append(str(error)))
+    page.on("request", lambda asked: failed.append(asked.url) if "127.0.0.1" not in asked.url and not asked.url.startswith(("data:", "blob:", "about:")) else None)
+    page.goto(address)
+    page.wait_for_function(SOLVED, timeout=PATIENT)
+    try:
+        yield page
+    finally:
+        context.close()
+    assert not failed
+
+
+@pytest.fixture
+def page(browser: Any, address: str) -> Generator[Any]:
+    with page_at(browser, address) as opened:
+        yield opened
+
+
+def shot(page: Any, name: str, **more: Any) -> None:
+    SHOTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=SHOTS / f"{name}.png", **more)
+
+
+def slide(page: Any, path: str, value: float) -> None:
+    """A number field to a value, as it is typed."""
+    field = page.locator(f'[data-number="{path}"]')
+    field.fill(f"{value:g}")
+    field.press("Enter")
+
+
+def wait(page: Any, condition: str) -> None:
+    page.wait_for_function(condition, timeout=PATIENT)
+
+
+def test_a_slider_moves_the_onset_to_what_the_package_gives(page: Any):
+    case = st.loads(template_text("two-beams"))
+    assert page.evaluate("stridor.state.onsets.first.mu") == st.onsets(case).first.mu
+    slider = page.locator('input[type=range][data-path="bodies.beam1.angle_deg"]')
+    slider.focus()
+    before = page.evaluate("stridor.state.onsets.first.mu")
+    for _ in range(4):
+        slider.press("ArrowLeft")
+    wait(page, f"{SOLVED} && stridor.state.onsets.first.mu !== {before}")
+    angle = float(page.locator('[data-number="bodies.beam1.angle_deg"]').input_value())
+    assert angle == pytest.approx(85.0 - 4 * 60 / 200)
+    wanted = st.onsets(case.with_({"bodies.beam1.angle_deg": angle}))
+    assert page.evaluate("stridor.state.onsets.onsets.map((o) => [o.mu, o.frequency_hz])") == [[o.mu, o.frequency_hz] for o in wanted]
+    drawn = page.evaluate("getElement(stridor.state.charts.frequency).chart.getOption().series.find((s) => s.id === 'onsets').data.map((d) => d.value)")
+    assert drawn == [[o.mu, o.frequency_hz] for o in wanted if o.mu <= 1]
+    assert f"μ = {wanted.first.mu:.5g}"[:10] in page.locator("#st-said").inner_text()
+    shot(page, "bench")
+
+
+def test_the_line_of_friction_is_dragged_and_moved_by_keys(page: Any):
+    line = page.locator('[data-line="frequency"]')
+    box = line.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 200, box["y"] + 60, steps=4)
+    page.mouse.up()
+    mu = page.evaluate("stridor.state.values.mu")
+    assert mu > 0.2
+    wait(page, f"stridor.state.at.mu === {mu} && stridor.state.at.checked")
+    assert float(page.locator('[data-number="mu"]').input_value()) == mu
+    line.focus()
+    line.press("ArrowRight")
+    wait(page, f"stridor.state.at.mu > {mu}")
+    assert line.get_attribute("aria-valuetext") == f"μ = {page.evaluate('stridor.state.values.mu'):.7g}"
+
+
+def test_a_mode_is_chosen_by_keyboard_and_played(page: Any):
+    page.locator(".st-grows button").first.focus()
+    page.keyboard.press("Enter")
+    wait(page, "document.querySelector('#st-tornado table') !== null")
+    frame = page.frame_locator("#st-mode-frame")
+    degrees = frame.locator("#degrees")
+    first = degrees.inner_text()
+    for _ in range(100):
+        if degrees.inner_text() != first:
+            break
+        time.sleep(0.05)
+    else:
+        pytest.fail("it does not move")
+    modes = st.modes(st.loads(template_text("two-beams")))
+    grown = modes[int(modes.growth_rate[0].argmax())]
+    assert page.locator("#st-mode-title").inner_text() == f"Mode {grown.number} at μ = 0.1"
+    assert "unstable: growth rate" in frame.locator("#growth").inner_text()
+    assert "fed in" in page.locator("#st-mode-facts").inner_text()
+    shot(page, "mode", full_page=True)
+
+
+def test_a_click_on_a_branch_chooses_its_mode(page: Any):
+    place = page.evaluate("""() => {
+      const chart = getElement(stridor.state.charts.frequency).chart, b = stridor.state.locus.branches[11], k = 20;
+      const [x, y] = chart.convertToPixel({xAxisIndex: 0, yAxisIndex: 0}, [stridor.state.locus.mu[k], b.frequency_hz[k]]);
+      const box = chart.getDom().getBoundingClientRect();
+      return [box.left + x, box.top + y, b.branch];
+    }""")
+    page.mouse.click(place[0], place[1])
+    wait(page, f"stridor.state.branch === {place[2]} && stridor.state.shape?.branch === {place[2]}")
+
+
+def test_a_broken_file_is_refused_as_on_the_command_line(page: Any, tmp_path: Path):
+    path = tmp_path / "broken.toml"
+    path.write_text(template_text("two-beams").replace("length = 0.05", "length = -1.0"), encoding="utf-8")
+    with pytest.raises(st.CaseError) as refused:
+        st.load(path)
+    page.set_input_files("input[type=file]", path)
+    problem = page.locator("#st-problem")
+    problem.wait_for(state="visible", timeout=PATIENT)
+    assert problem.inner_text().strip() == str(refused.value)
+    shot(page, "refused")
+    slide(page, "mu", 0.2)  # the page goes on with the last good state
+    wait(page, "stridor.state.at.mu === 0.2")
+    mended = tmp_path / "mended.toml"
+    mended.write_text(template_text("two-beams").replace("angle_deg = 85.0", "angle_deg = 84.0"), encoding="utf-8")
+    page.set_input_files("input[type=file]", mended)
+    wait(page, "document.querySelector('[data-number=\"bodies.beam1.angle_deg\"]').value === '84'")
+    assert problem.is_hidden()
+
+
+def test_a_number_that_is_refused_is_said_and_taken_back(page: Any):
+    slide(page, "loads.press.force.1", 20.0)
+    page.locator("#st-problem").wait_for(state="visible", timeout=PATIENT)
+    assert "pull" in page.locator("#st-problem").inner_text()
+    page.get_by_role("button", name="Undo").click()
+    wait(page, "document.querySelector('[data-number=\"loads.press.force.1\"]').value === '-20'")
+    page.locator("#st-problem").wait_for(state="hidden", timeout=PATIENT)
+
+
+def test_a_link_restores_the_state_and_the_file_has_it(page: Any, browser: Any):
+    slide(page, "bodies.beam1.angle_deg", 82.0)
+    slide(page, "mu", 0.25)
+    wait(page, "stridor.state.at?.mu === 0.25 && location.hash.length > 20")
+    with page_at(browser, page.url) as other:
+        assert other.locator('[data-number="bodies.beam1.angle_deg"]').input_value() == "82"
+        wait(other, "stridor.state.at.mu === 0.25")
+        assert other.evaluate("stridor.state.onsets.first.mu") == st.onsets(st.loads(template_text("two-beams")).with_({"bodies.beam1.angle_deg": 82.0})).first.mu
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Save file").click()
+    case = st.load(saved.value.path())
+    assert case.bodies["beam1"].angle_deg == 82.0
+    assert case.contacts["A"].friction.coefficient == 0.25
+
+
+def test_two_pages_at_once_do_not_know_of_each_other(page: Any, browser: Any, address: str):
+    with page_at(browser, address) as other:
+        slide(page, "mu", 0.3)
+        slide(other, "mu", 0.4)
+        wait(page, "stridor.state.at.mu === 0.3")
+        wait(other, "stridor.state.at.mu === 0.4")
+        assert page.locator('[data-number="mu"]').input_value() == "0.3"
+
+
+def test_two_hundred_moves_in_a_row_make_no_queue(page: Any):
+    page.evaluate("""async () => {
+      const slider = document.querySelector('[data-path="bodies.beam1.angle_deg"]');
+      for (let k = 0; k < 200; k++) {
+        slider.value = 60 + (k % 80);
+        slider.dispatchEvent(new Event("input", { bubbles: true }));
+        await new Promise((done) => setTimeout(done, 10));
+      }
+    }""")
+    began = time.monotonic()
+    last = page.locator('[data-number="bodies.beam1.angle_deg"]').input_value()
+    wanted = st.onsets(st.loads(template_text("two-beams")).with_({"bodies.beam1.angle_deg": float(last)})).first.mu
+    wait(page, f"stridor.state.onsets?.first?.mu === {wanted!r}")
+    assert time.monotonic() - began < 8.0  # one answer, and not what is left of two hundred
+    assert page.evaluate("stridor.state.drawn.locus") < 150
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_a_phone_and_a_small_screen(browser: Any, address: str, scheme: str):
+    with page_at(browser, address, color_scheme=scheme) as page:
+        page.locator(".st-grows button").first.click()
+        wait(page, "document.querySelector('#st-tornado table') !== null")
+        assert page.evaluate("document.body.classList.contains('body--dark')") is (scheme == "dark")
+        page.evaluate("scrollTo(0, 0)")
+        for name, width, height in (("screen", 1280, 720), ("phone", 390, 844)):
+            page.set_viewport_size({"width": width, "height": height})
+            page.wait_for_timeout(500)
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            wider = page.evaluate("""() => [...document.querySelectorAll('.st-bench *')].filter((e) => e.getClientRects().length
+              && !e.closest('.st-scroll, .st-mu, svg') && e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0 && getComputedStyle(e).display !== 'inline')
+              .map((e) => `${e.tagName}.${e.className}#${e.id} ${e.scrollWidth}>${e.clientWidth} ${e.textContent.slice(0, 20)}`)""")
+            assert not wider, wider
+            shot(page, f"{name}-{scheme}", full_page=name == "phone")
+
+
+def test_controls_have_names_and_charts_have_words(page: Any):
+    nameless = page.evaluate("""() => [...document.querySelectorAll('button, input, [role=slider], [role=tab], iframe')]
+      .filter((e) => !e.closest('.st-upload') && e.getClientRects().length)
+      .filter((e) => !(e.getAttribute('aria-label') || e.title || e.textContent.trim() || (e.id && document.querySelector(`label[for="${CSS.escape(e.id)}"]`))))
+      .map((e) => e.outerHTML.slice(0, 120))""")
+    assert nameless == []
+    said = page.evaluate("[...document.querySelectorAll('.st-chart')].map((c) => [c.getAttribute('role'), c.getAttribute('aria-label')])")
+    assert [role for role, _ in said] == ["img", "img"]
+    assert all("μ = 0.076725" in words for _, words in said)
+
+
+def test_who_has_not_the_token_is_refused(address: str):
+    base = address.rsplit("/", 2)[0]
+    for path in ("/", "/wrong/", "/_nicegui/", "/docs", "/openapi.json"):
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(base + path)
+        assert refused.value.code == 403
+        assert "lacks the token" in refused.value.read().decode()
+    assert urllib.request.urlopen(address).status == 200
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_ctrl_c_ends_it_with_its_processes_and_without_a_word(browser: Any):
+    with serving() as (process, address):
+        context = browser.new_context()
+        page = context.new_page()
+        page.goto(address)
+        page.wait_for_function(SOLVED, timeout=PATIENT)
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        own = [int(p) for task in children.parents[1].iterdir() for p in (task / "children").read_text().split()]
+        assert own
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+        assert (process.returncode, out, err) == (0, "", "")
+        until = time.monotonic() + 5.0
+        while time.monotonic() < until and any(Path(f"/proc/{pid}").exists() for pid in own):
+            time.sleep(0.1)
+        assert not any(Path(f"/proc/{pid}").exists() for pid in own)
+        context.close()
+
+
+def test_a_case_that_is_none_is_refused_before_anything_is_served(tmp_path: Path):
+    done = subprocess.run([sys.executable, "-m", "stridor", "app", "none.toml"], capture_output=True, text=True, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, "stridor: none.toml: no such file\n")
