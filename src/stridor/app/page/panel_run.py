@@ -12,7 +12,8 @@ from nicegui import context, events, ui
 
 from ...errors import CaseError
 from ...view.style import BLUE, STATUS_COLOURS, VERMILION
-from .runs import ENDS, Run, Wish, sound_of_file
+from .running import sound_of_file
+from .runs import ENDS, Run, Wish
 from .session import Session
 from .state import State
 
@@ -50,8 +51,8 @@ class _Panel:
         self.of: State | None = None
         self.file: str | None = None
         self.picture: Any = None
-        ui.add_css(_asset("run.css"))
-        ui.add_body_html(f"<script>{_asset('run.js')}</script>")
+        ui.add_css(asset("run.css"))
+        ui.add_body_html(f"<script>{asset('run.js')}</script>")
         charts: dict[str, int] = {}
         with container:
             ui.html(_PARTS, sanitize=False)
@@ -131,5 +132,6 @@ class _Panel:
             self.run.close()
 
 
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """A file of the page."""
     return (resources.files("stridor.app.page") / "static" / name).read_text(encoding="utf-8")

@@ -1,7 +1,8 @@
-"""Runs in time, each in a process of its own: at most a few at once, the others wait for their turn.
+"""What takes long, each in a process of its own: runs in time, comparisons, reports. At most a few at once, the others
+wait for their turn.
 
-A process tells what it has computed a few times a second, in so few numbers that each telling is the whole picture: a
-page that was reloaded, or looked away, has missed nothing. It ends with its pipe, and so with the page and the server.
+A run tells what it has computed a few times a second, in so few numbers that each telling is the whole picture. A
+process (`running`) ends with its pipe, and so with the page and the server.
 """
 
 from __future__ import annotations
@@ -9,32 +10,32 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
-import signal
 import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from ...studies.workers import main_left_out, one_thread_each
+from .running import serve
 
 AT_ONCE = max(1, (os.cpu_count() or 2) - 1)  # runs; one core is left to the pages
-TOLD_SECONDS = 0.4
 END = 3.0  # seconds that a process has to end
-FILE = "simulate.nc"
 
+ENDS = ("done", "stopped", "refused", "failed")
 Heard = Callable[[str, Any], None]
+What = Literal["run", "compare", "report"]
 
 
 @dataclass(frozen=True)
 class Wish:
-    """A run: the case as TOML, friction coefficient (None: the case's own), where its file goes, the point to be shown
-    (None: the first) and the highest frequency [Hz] of the spectra."""
+    """What is wanted, of which case (TOML) at which friction coefficient (None: the case's own), and where its files
+    go; of a run the point to be shown (None: the first) and the highest frequency [Hz] of the spectra."""
 
     case: str
     mu: float | None
     folder: str
+    what: What = "run"
     point: str | None = None
     max_frequency_hz: float = 40e3
 
@@ -83,9 +84,9 @@ class Run:
     """A run from its wish to its end.
 
     heard(part, content) is called, in a thread of its own, with "waiting" (the place in the queue), "begun",
-    "progress" (steps done and planned), "picture" (of `run_so_far`), "sound" (a WAV file's bytes and what it is) or
-    "silent" (why there is none), and at last with one of "done" and "stopped" (sentence, and the file), "refused" (the
-    words of the command line) and "failed".
+    "progress" (steps done and planned), "log" (what is being done), "picture" (of `run_so_far`), "sound" (a WAV file's
+    bytes and what it is) or "silent" (why there is none), and at last with one of "done" and "stopped" (sentence, file,
+    and the tables of a comparison), "refused" (the words of the command line) and "failed".
     """
 
     def __init__(self, wish: Wish, heard: Heard, queue: Queue | None = None) -> None:
@@ -111,7 +112,7 @@ class Run:
         """Its turn has come."""
         context = multiprocessing.get_context("spawn")
         own, its = context.Pipe()
-        process = context.Process(target=_serve, args=(its, self.wish), name="stridor run", daemon=True)
+        process = context.Process(target=serve, args=(its, self.wish), name="stridor run", daemon=True)
         with one_thread_each(), main_left_out():
             process.start()
         its.close()  # so that the pipe ends with the process
@@ -166,105 +167,8 @@ class Run:
         self._queue.drop(self)
 
 
-ENDS = ("done", "stopped", "refused", "failed")
-
-
 def _killed(process: Any) -> None:
     process.join(0.2)
     if process.is_alive():
         process.kill()
     process.join(END)
-
-
-# -- inside of the process ---------------------------------------------------------------------------------------------
-
-
-class _Wishes:
-    """What the page wants of a run under way; the process ends where nobody is at the other end."""
-
-    def __init__(self, pipe: Any) -> None:
-        self._pipe = pipe
-        self.stop = threading.Event()
-        self.slow: float | None = None
-        threading.Thread(target=self._reading, daemon=True).start()
-
-    def _reading(self) -> None:
-        while True:
-            try:
-                name, value = self._pipe.recv()
-            except (EOFError, OSError):
-                os._exit(0)  # nobody listens any more
-            if name == "stop":
-                self.stop.set()
-            elif name == "listen":
-                self.slow = float(value)
-
-
-def _serve(pipe: Any, wish: Wish) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all processes of a terminal; the pipe will end
-    from ...errors import StridorError
-
-    wishes = _Wishes(pipe)
-    try:
-        _marched(pipe, wish, wishes)
-    except StridorError as error:
-        pipe.send(("refused", str(error)))
-    except MemoryError:
-        pipe.send(("failed", "there is not enough memory for this run; record less often (temporal.record_every)"))
-
-
-def _marched(pipe: Any, wish: Wish, wishes: _Wishes) -> None:
-    from ...case import loads
-    from ...io.datasets import save
-    from ...study.analyses import simulate, summarise
-    from ...study.workspace import Workspace
-    from ...temporal.trajectory import Trajectory
-    from ...view.run_so_far import run_so_far
-    from ..conclusions import of_run
-
-    work = Workspace(loads(wish.case))
-
-    def progress(done: int, planned: int) -> None:
-        pipe.send(("progress", (done, planned)))
-        if wishes.stop.is_set():
-            raise KeyboardInterrupt
-
-    def shown(part: Trajectory) -> None:
-        drawn = run_so_far(part, point=wish.point, max_frequency_hz=wish.max_frequency_hz)
-        pipe.send(("picture", drawn.to_json()))
-        if wishes.slow is not None:
-            slow, wishes.slow = wishes.slow, None
-            pipe.send(sounded(part, slow))
-
-    run = simulate(work, wish.mu, progress=progress, checkpoint=shown, checkpoint_seconds=TOLD_SECONDS)
-    shown(run)
-    target = save(run, Path(wish.folder) / FILE)
-    if run.interrupted:
-        sentence = f"stopped after {run.steps} of {run.planned_steps} steps"
-    else:
-        sentence = of_run(summarise(work, run).to_json()).sentence
-    pipe.send(("stopped" if run.interrupted else "done", {"sentence": sentence, "file": str(target)}))
-
-
-def sounded(run: Any, slow: float) -> tuple[str, Any]:
-    """A run's sound, as a page is told of it: "sound", or "silent" and why."""
-    from ...errors import StridorError
-    from ...view.sound import sound
-
-    try:
-        found = sound(run, slow=slow)
-    except StridorError as error:
-        return "silent", str(error)
-    return "sound", {"wav": found.wav(), "sentence": found.sentence, "seconds": found.seconds}
-
-
-def sound_of_file(path: str, slow: float) -> tuple[str, Any]:
-    """The same of a run that has ended."""
-    from ...errors import StridorError
-    from ...io.datasets import load_trajectory
-
-    try:
-        run = load_trajectory(path)
-    except StridorError as error:
-        return "silent", str(error)
-    return sounded(run, slow)

@@ -180,7 +180,7 @@ const stridorRun = (() => {
     Object.assign(page, { charts, colours });
     document.querySelectorAll(".st-run-chart").forEach((e) => { e.hidden = !page.picture; });
     new MutationObserver(() => { page.sonogramAt = 0; draw(); }).observe(document.body, { attributes: true, attributeFilter: ["class"] });
-    $("st-run-go").addEventListener("click", () => emitEvent("stridor-run", {}));
+    $("st-run-go").addEventListener("click", () => { running(true); emitEvent("stridor-run", {}); });
     $("st-run-stop").addEventListener("click", () => emitEvent("stridor-run-stop", {}));
     $("st-run-listen").addEventListener("click", () => (page.sound ? silence() : emitEvent("stridor-run-listen", { slow: Number($("st-run-slow").value) })));
   }

@@ -1,0 +1,157 @@
+"""Inside of the process of a run in time, a comparison or a report: what it computes and what it tells."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ...study.workspace import Workspace
+    from ...temporal.trajectory import Trajectory
+    from ...view.tables import Table
+    from .runs import Wish
+
+TOLD_SECONDS = 0.4
+FILE = "simulate.nc"
+STOPPED: Mapping[str, Any] = {"sentence": "stopped", "file": None}
+
+
+class _Page:
+    """The other end of the pipe: what the page is told and what it wants. The process ends where nobody is there."""
+
+    def __init__(self, pipe: Any) -> None:
+        self._pipe, self._whole = pipe, threading.Lock()
+        self.stop = threading.Event()
+        self.gives_up = True  # whether to stop is to leave everything as it is
+        self.slow: float | None = None
+        threading.Thread(target=self._reading, daemon=True).start()
+
+    def tell(self, part: str, content: Any) -> None:
+        """Tell it, whole: what is half written into a pipe spoils it."""
+        with self._whole:
+            self._pipe.send((part, content))
+
+    def _reading(self) -> None:
+        while True:
+            try:
+                name, value = self._pipe.recv()
+            except (EOFError, OSError):
+                os._exit(0)  # nobody listens any more
+            if name == "listen":
+                self.slow = float(value)
+            elif self.gives_up:
+                self.tell("stopped", STOPPED)
+                os._exit(0)
+            else:
+                self.stop.set()
+
+
+def serve(pipe: Any, wish: Wish) -> None:
+    """Do what is wished for and tell of it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all processes of a terminal; the pipe will end
+    page = _Page(pipe)
+    from ...case import loads
+    from ...errors import StridorError
+    from ...study.workspace import Workspace
+
+    kinds: dict[str, Callable[[_Page, Wish, Workspace], None]] = {
+        "run": _run, "compare": _compare, "report": _report
+    }  # fmt: skip
+    try:
+        kinds[wish.what](page, wish, Workspace(loads(wish.case)))
+    except StridorError as error:
+        page.tell("refused", str(error))
+    except MemoryError:
+        page.tell("failed", "there is not enough memory; record less often (temporal.record_every)")
+
+
+def _run(page: _Page, wish: Wish, work: Workspace) -> None:
+    from ...io.datasets import save
+    from ...study.analyses import simulate, summarise
+    from ...view.run_so_far import run_so_far
+    from ..conclusions import of_run
+
+    page.gives_up = False  # what was computed is kept
+
+    def progress(done: int, planned: int) -> None:
+        page.tell("progress", (done, planned))
+        if page.stop.is_set():
+            raise KeyboardInterrupt
+
+    def shown(part: Trajectory) -> None:
+        page.tell("picture", run_so_far(part, point=wish.point, max_frequency_hz=wish.max_frequency_hz).to_json())
+        if page.slow is not None:
+            slow, page.slow = page.slow, None
+            page.tell(*sounded(part, slow))
+
+    run = simulate(work, wish.mu, progress=progress, checkpoint=shown, checkpoint_seconds=TOLD_SECONDS)
+    shown(run)
+    target = save(run, Path(wish.folder) / FILE)
+    if run.interrupted:
+        sentence = f"stopped after {run.steps} of {run.planned_steps} steps"
+    else:
+        sentence = of_run(summarise(work, run).to_json()).sentence
+    page.tell("stopped" if run.interrupted else "done", {"sentence": sentence, "file": str(target)})
+
+
+def _compare(page: _Page, wish: Wish, work: Workspace) -> None:
+    from ...io.kept_parts import NAME, KeptParts
+    from ...study.analyses import compare
+    from ...view.tables import Table
+    from ...view.temporal_tables import agreement_table, critical_row
+
+    kept = KeptParts(Path(wish.folder) / NAME, work.key)
+    found = compare(
+        work, None if wish.mu is None else [wish.mu], progress=lambda words: page.tell("log", words), kept=kept
+    )
+    tables = [_plain(agreement_table(c)) for c in found.comparisons]
+    critical = critical_row(found)
+    if critical is not None:
+        heads = ("", "modal", "temporal", "difference", "")
+        tables.append(_plain(Table("critical", "Where growth begins", heads, (critical,), frozenset({0, 4}))))
+    sentences = [c.verdict for c in found.comparisons]
+    page.tell("done", {"sentence": " ".join(sentences) or "nothing was compared", "file": None, "tables": tables})
+
+
+def _plain(table: Table) -> dict[str, Any]:
+    rows = [{"cells": list(row.cells), "kind": row.kind} for row in table.rows]
+    return {"title": table.title, "heads": list(table.heads), "rows": rows, "words": sorted(table.words)}
+
+
+def _report(page: _Page, wish: Wish, work: Workspace) -> None:
+    from ..pipeline import run
+
+    outcome = run(work, wish.folder, log=lambda words: page.tell("log", words))
+    target = Path(wish.folder) / "report.html"
+    if not target.exists():
+        page.tell("failed", " ".join(outcome.everything.notes) or "no report was written")
+        return
+    page.tell("done", {"sentence": "the report is written", "file": str(target)})
+
+
+def sounded(run: Any, slow: float) -> tuple[str, Any]:
+    """A run's sound, as a page is told of it: "sound", or "silent" and why."""
+    from ...errors import StridorError
+    from ...view.sound import sound
+
+    try:
+        found = sound(run, slow=slow)
+    except StridorError as error:
+        return "silent", str(error)
+    return "sound", {"wav": found.wav(), "sentence": found.sentence, "seconds": found.seconds}
+
+
+def sound_of_file(path: str, slow: float) -> tuple[str, Any]:
+    """The same of a run that has ended."""
+    from ...errors import StridorError
+    from ...io.datasets import load_trajectory
+
+    try:
+        run = load_trajectory(path)
+    except StridorError as error:
+        return "silent", str(error)
+    return sounded(run, slow)
