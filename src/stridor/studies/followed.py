@@ -27,6 +27,7 @@ from .checks import FRICTION
 
 STEP = 0.05  # of μ, from one anchor to the next
 MOST = 21
+ASIDE = 0.02  # of the range
 NEAR = 1e-5  # of |λ|: how near the model's modes are to those of the full problem
 
 
@@ -48,7 +49,9 @@ def anchors_noted(model: ReducedModel, case: Case, names: Mapping[str, str], pat
     there = {path: point[own] for path, own in names.items() if own in point and path != FRICTION}
     own = None
     if low is not None and high is not None:
-        own = np.linspace(low, high, min(MOST, 2 + int((high - low) / STEP)))
+        # Not at the ends themselves, where other nodes may be about to touch.
+        shares = np.linspace(ASIDE, 1 - ASIDE, min(MOST, 2 + int((high - low) / STEP)))
+        own = low + (high - low) * shares
     stage("numbers of the branches, followed in the full problem")
     try:
         found = modes(case.with_(there), own, max_frequency_hz=case.modal.max_frequency_hz, check=False)
