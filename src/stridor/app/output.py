@@ -159,15 +159,19 @@ class _Lines:
     """Progress as lines of a log."""
 
     def __init__(self, text: str) -> None:
-        self.text, self.started = text, time.monotonic()
-        self.last = self.started
+        self.text, self.last = text, time.monotonic()
+        self.before: tuple[float, int] | None = None
 
     def __call__(self, done: int, planned: int) -> None:
         now = time.monotonic()
-        if now - self.last < BETWEEN_LINES or not 0 < done < planned:
+        if self.before is None:
+            # What came before the first word, a model or factors, is no measure of what comes now.
+            self.before = now, done
+        started, first = self.before
+        if now - self.last < BETWEEN_LINES or not first < done < planned:
             return
         self.last = now
-        left = (now - self.started) / done * (planned - done)
+        left = (now - started) / (done - first) * (planned - done)
         stderr.print(f"{self.text}: {done} of {planned}, about {duration(left)} left")
 
 

@@ -180,7 +180,7 @@ def made(study: Study, case: Case, samples: Array, path: Path) -> Reduced:
         place = path / f"{number:02}.npz"
         save_reduced(model, place, case=own)
         if study.compute == "modes":
-            anchors_noted(model, case, {name: named.get(name, name) for name in study.parameters}, _numbers(place))
+            anchors_noted(model, own, {name: named.get(name, name) for name in study.parameters}, _numbers(place))
     return Reduced.read(str(path), case)
 
 
