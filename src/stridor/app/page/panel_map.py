@@ -1,13 +1,165 @@
-"""The tab with the map of stability over two numbers."""
+"""The tab with the map of stability over two numbers, refined while one looks; a click goes there."""
 
 from __future__ import annotations
 
-from nicegui import ui
+import json
+import math
+from typing import Any
 
+from nicegui import context, events, ui
+
+from ...errors import CaseError
+from ...view.style import VERMILION
+from .levers import Lever, friction_range
+from .panel_run import asset
+from .runs import ENDS, Run, Wish
 from .session import Session
+from .state import State, checked, friction_changes
+
+FRICTION = "mu"
+WIDE = (0.3, 3.0)  # times a number that spans decades: the range that is offered
+
+_PARTS = """
+<form id="st-map-form" class="st-run-tools" onsubmit="return false">
+  <fieldset><legend>across</legend><label for="st-map-x">number</label><select id="st-map-x"></select>
+    <label for="st-map-x-low">from</label><input id="st-map-x-low" inputmode="decimal">
+    <label for="st-map-x-high">to</label><input id="st-map-x-high" inputmode="decimal"><span id="st-map-x-unit"></span>
+  </fieldset>
+  <fieldset><legend>up</legend><label for="st-map-y">number</label><select id="st-map-y"></select>
+    <label for="st-map-y-low">from</label><input id="st-map-y-low" inputmode="decimal">
+    <label for="st-map-y-high">to</label><input id="st-map-y-high" inputmode="decimal"><span id="st-map-y-unit"></span>
+  </fieldset>
+  <button type="button" id="st-map-go">Draw map</button>
+  <button type="button" id="st-map-stop" disabled>Stop</button>
+</form>
+<p id="st-map-said" class="st-note" role="status">Where modes begin to grow over two numbers: curves are traced, coarse
+first and then finer. A click on the map, or Enter on a point of it, moves the bench there.</p>
+"""
 
 
 def build(container: ui.element, session: Session) -> None:
     """Fill the container of a page."""
-    with container:
-        ui.label("Stability map: not on this page yet; `stridor boundary` draws it.").classes("st-note")
+    _Panel(container, session)
+
+
+class _Panel:
+    """What of it is Python; static/map.js draws."""
+
+    def __init__(self, container: ui.element, session: Session) -> None:
+        self.session, self.client = session, context.client
+        self.run: Run | None = None
+        self.of: State | None = None
+        self.axes: tuple[str, str] = ("", "")
+        self.picture: Any = None
+        ui.add_body_html(f"<script>{asset('map.js')}</script>")
+        with container:
+            ui.html(_PARTS, sanitize=False)
+            self.chart = ui.echart({"series": []}).classes("st-chart st-map-chart").style("height: 520px")
+        ui.on("stridor-map-hello", self._hello)
+        ui.on("stridor-map", self._go)
+        ui.on("stridor-map-stop", lambda: None if self.run is None else self.run.stop())
+        ui.on("stridor-map-to", self._to)
+        session.on_change(self._follow)
+        session.on_close(lambda: None if self.run is None else self.run.close())
+
+    def _script(self, name: str, *given: Any) -> None:
+        self.client.run_javascript(f"stridorMap.{name}({', '.join(json.dumps(g) for g in given)})")
+
+    def _hello(self) -> None:
+        self._script("start", self.chart.id, VERMILION)
+        self._offer()
+        if self.picture is not None:
+            self._script("show", "map", self.picture)
+
+    def _offer(self) -> None:
+        """The numbers that there are, of the case that is open."""
+        low, high = friction_range(checked(self.session.state.source))
+        numbers = [{"path": FRICTION, "words": "friction μ", "unit": "", "low": low, "high": high}]
+        for lever in self.session.levers():
+            if lever.path != FRICTION:
+                ends = _range(lever)
+                numbers.append(
+                    {"path": lever.path, "words": lever.label, "unit": lever.unit, "low": ends[0], "high": ends[1]}
+                )
+        self._script("offer", numbers)
+
+    # -- what is asked --------------------------------------------------------------------------------------------
+
+    def _go(self, event: events.GenericEventArguments) -> None:
+        if self.run is not None and not self.run.over:
+            return
+        state = self.session.state
+        try:
+            options = _options(event.args)
+            changes = friction_changes(state) if FRICTION not in (options["x"], options["y"]) else {}
+            wish = Wish(state.case().with_(changes).to_toml(), None, str(self.session.folder), "map", options=options)
+        except CaseError as error:
+            self._script("show", "refused", str(error))
+            return
+        self.of, self.axes = state, (options["x"], options["y"])
+        self._script("begin")
+        self.run = Run(wish, lambda part, content: self.session.later(self._heard, part, content))
+
+    def _heard(self, part: str, content: Any) -> None:
+        if part == "map":
+            self.picture = content
+        if part in ENDS or part in ("waiting", "begun", "log", "map"):
+            self._script("show", part, content)
+        if part == "map":
+            self._follow()
+
+    def _to(self, event: events.GenericEventArguments) -> None:
+        """To a point of the map."""
+        given = event.args if isinstance(event.args, dict) else {}
+        values = [given.get("x"), given.get("y")]
+        if not all(self.axes) or not all(isinstance(v, int | float) and math.isfinite(v) for v in values):
+            return
+        for path, value in zip(self.axes, values, strict=True):
+            self.session.move(path, float(value))  # type: ignore[arg-type]
+
+    def _follow(self) -> None:
+        """Where the page is on the map, and whether the map is of another case by now."""
+        of, now = self.of, self.session.state
+        if now.source != getattr(of, "source", now.source):
+            self.of, self.axes, self.picture = None, ("", ""), None
+            self._offer()
+            self._script("clear")
+            return
+        if of is None:
+            return
+        at = [now.mu if path == FRICTION else now.changes.get(path) for path in self.axes]
+        known = {lever.path: lever.value for lever in self.session.levers()}
+        at = [known.get(path) if value is None else value for path, value in zip(self.axes, at, strict=True)]
+        self._script("here", at, _others(of, self.axes) != _others(now, self.axes))
+
+
+def _others(state: State, axes: tuple[str, str]) -> Any:
+    """What of a state is neither of the two numbers."""
+    mu = None if FRICTION in axes else state.mu
+    return mu, {path: value for path, value in state.changes.items() if path not in axes}
+
+
+def _range(lever: Lever) -> tuple[float, float]:
+    if lever.scale == "log" and lever.value > 0:
+        return WIDE[0] * lever.value, WIDE[1] * lever.value
+    return lever.low, lever.high
+
+
+def _options(given: Any) -> dict[str, Any]:
+    """What is to be mapped, as the page asks for it. Raises CaseError."""
+    given = given if isinstance(given, dict) else {}
+    x, y = str(given.get("x", ""))[:200], str(given.get("y", ""))[:200]
+    if x == y:
+        raise CaseError("the map", x, "two different numbers")
+    ranges: dict[str, tuple[float, float]] = {}
+    for name in ("x_range", "y_range"):
+        ends = given.get(name)
+        if not (
+            isinstance(ends, list)
+            and len(ends) == 2
+            and all(isinstance(v, int | float) and math.isfinite(v) for v in ends)
+            and ends[0] < ends[1]
+        ):
+            raise CaseError(f"the range of {x if name == 'x_range' else y}", ends, "two numbers, the smaller one first")
+        ranges[name] = (float(ends[0]), float(ends[1]))
+    return {"x": x, "y": y, **ranges}

@@ -59,7 +59,7 @@ def serve(pipe: Any, wish: Wish) -> None:
     from ...study.workspace import Workspace
 
     kinds: dict[str, Callable[[_Page, Wish, Workspace], None]] = {
-        "run": _run, "compare": _compare, "report": _report
+        "run": _run, "compare": _compare, "report": _report, "map": _map
     }  # fmt: skip
     try:
         kinds[wish.what](page, wish, Workspace(loads(wish.case)))
@@ -131,6 +131,12 @@ def _report(page: _Page, wish: Wish, work: Workspace) -> None:
         page.tell("failed", " ".join(outcome.everything.notes) or "no report was written")
         return
     page.tell("done", {"sentence": "the report is written", "file": str(target)})
+
+
+def _map(page: _Page, wish: Wish, work: Workspace) -> None:
+    from .mapping import mapped
+
+    page.tell("done", {"sentence": mapped(page.tell, work, wish.options), "file": None})
 
 
 def sounded(run: Any, slow: float) -> tuple[str, Any]:

@@ -1,5 +1,5 @@
-"""What takes long, each in a process of its own: runs in time, comparisons, reports. At most a few at once, the others
-wait for their turn.
+"""What takes long, each in a process of its own: runs in time, comparisons, reports, maps. At most a few at once, the
+others wait for their turn.
 
 A run tells what it has computed a few times a second, in so few numbers that each telling is the whole picture. A
 process (`running`) ends with its pipe, and so with the page and the server.
@@ -12,8 +12,8 @@ import multiprocessing
 import os
 import threading
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from ...studies.workers import main_left_out, one_thread_each
@@ -24,7 +24,7 @@ END = 3.0  # seconds that a process has to end
 
 ENDS = ("done", "stopped", "refused", "failed")
 Heard = Callable[[str, Any], None]
-What = Literal["run", "compare", "report"]
+What = Literal["run", "compare", "report", "map"]
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class Wish:
     what: What = "run"
     point: str | None = None
     max_frequency_hz: float = 40e3
+    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  # of a map
 
 
 class Queue:
