@@ -19,14 +19,17 @@ from ...modal.complex_modes import ComplexModes
 from ...modal.onsets import Onset, Onsets
 from ...study.analyses import modes, onsets
 from ...study.workspace import Workspace
+from ...system import System
 from .drawing import drawing
 from .levers import friction_range
 from .mode_data import energy_of, participation, shape_of, tornado
+from .model_reduced import Reduced
 from .state import State
 from .worker import IDLE
 
 POINTS = 41  # of the curves
-LARGE = 2000  # freedoms, beyond which an answer takes longer than a slider waits
+FEW_POINTS = 13  # of a large model that has no reduced one
+LARGE = 600  # freedoms, beyond which an answer takes longer than a slider waits
 DIGITS = 6  # of numbers that are drawn only
 
 Send = Callable[[str, Any], None]
@@ -34,13 +37,16 @@ Send = Callable[[str, Any], None]
 
 @dataclass
 class _Model:
-    """The workspace of the case on the page and what was told of it."""
+    """The workspace of the case on the page and what was told of it. reduced: of a large one, where it has one; why:
+    why it has none."""
 
     key: Any
     work: Workspace
+    reduced: Reduced | None = None
+    why: str = ""
     idle: Workspace | None = None  # of its own, for what may be given up halfway
     locus: ComplexModes | None = None
-    onsets: Onsets | None = None
+    onsets: dict[str, Any] | None = None
     geometry: str = ""
 
 
@@ -54,6 +60,7 @@ class Bench:
 
     def __init__(self) -> None:
         self._model: _Model | None = None
+        self._reduced: Reduced | None = None
         self._leisure = False
 
     def __call__(self, state: State, send: Send) -> None:
@@ -84,26 +91,45 @@ class Bench:
             self._model = None
             case = state.case()
             model = _Model(state.model, Workspace(case))
-            if model.work.system().size > LARGE:
-                send("model", _described(model.work))  # what follows takes a while
+            if self._reduced is not None and self._reduced.holds(state):
+                model.reduced = self._reduced
+            elif model.work.system().size > LARGE:
+                send("model", _described(model))  # what follows takes a while
+                self._reduce(model, state, send)
             self._model = model
         return self._model
 
+    def _reduce(self, model: _Model, state: State, send: Send) -> None:
+        """A reduced model for a large one, or why there is none."""
+        self._reduced = None
+        try:
+            made = Reduced.made(state, lambda what: send("progress", {"what": what}))
+            if made.holds(state):
+                model.reduced = self._reduced = made
+            else:
+                model.why = f"μ = {state.mu:g} is outside of the range of a reduced model"
+        except StridorError as error:
+            model.why = f"No reduced model ({error}): every answer takes its time."
+        send("progress", {"what": ""})
+
     def _answer(self, state: State, model: _Model, send: Send) -> None:
+        if model.reduced is not None and model.reduced.holds(state):
+            self._answer_reduced(state, model, model.reduced, send)
+            return
         work = model.work
         here = None
         if model.locus is None:
-            model.locus = self._swept(model, state.mu, send)
+            model.locus = self._swept(work, state.mu, send)
             send("locus", locus_of(model.locus))
             if state.mu in model.locus.mu:
                 send("at", modes_at(model.locus, state.mu, checked=False))
-            send("model", _described(work))
+            send("model", _described(model))
         else:
-            here = self._modes_here(work, state.mu)
+            here = _modes_here(work, state.mu)
             send("at", modes_at(here, state.mu, checked=False))
         if state.branch is not None:
-            here = here or self._modes_here(work, state.mu)
-            self._shape(model, here, state.branch, send)
+            here = here or _modes_here(work, state.mu)
+            self._shape(model, work.system(state.mu), here, state.branch, send, energy=True)
         self._leisure = True
         send(IDLE, None)
         model.idle = model.idle or Workspace(work.case("the page"))
@@ -111,42 +137,58 @@ class Bench:
 
     def _at_leisure(self, state: State, model: _Model, work: Workspace, send: Send) -> None:
         """What takes longer than a slider waits."""
-        if model.onsets is None:
-            model.onsets = onsets(work)
-        send("onsets", onsets_of(model.onsets))
+        model.onsets = model.onsets or onsets_of(onsets(work))
+        send("onsets", model.onsets)
         send("at", modes_at(modes(work, state.mu, max_frequency_hz=_band(work)), state.mu, checked=True))
         if state.branch is not None:
             send("tornado", tornado(work, state.mu, state.branch))
 
-    def _swept(self, model: _Model, mu: float, send: Send) -> ComplexModes:
+    def _answer_reduced(self, state: State, model: _Model, reduced: Reduced, send: Send) -> None:
+        """On a reduced model: first the modes at the μ of the page, then the curves."""
+        here, error = reduced.here(state, vectors=state.branch is not None)
+        send("at", {**modes_at(here, state.mu, checked=False), "said": _certified(reduced, error)})
+        if state.branch is not None:
+            self._shape(model, reduced.work.system(), here, state.branch, send, energy=False)
+        self._leisure = True
+        send(IDLE, None)
+        if model.locus is None:
+            model.locus, error = reduced.sweep(state)
+            send("locus", {**locus_of(model.locus), "said": _certified(reduced, error)})
+            send("model", _described(model))
+            here, error = reduced.here(state, vectors=state.branch is not None)
+            send("at", {**modes_at(here, state.mu, checked=False), "said": _certified(reduced, error)})
+        model.onsets = model.onsets or reduced.onsets(state)
+        send("onsets", model.onsets)
+        if state.branch is not None:
+            model.idle = model.idle or Workspace(model.work.case("the page"))
+            self._shape(model, model.idle.system(), here, state.branch, send, energy=True)
+
+    def _swept(self, work: Workspace, mu: float, send: Send) -> ComplexModes:
         """Branches over the range of μ and at the μ of the page."""
-        work = model.work
         low, high = friction_range(work.case("the page"))
-        points = POINTS if work.system().size <= LARGE else 13
+        large = work.system().size > LARGE
         inside = [mu] if low <= mu <= high else []
-        mus = np.unique(np.append(np.linspace(low, high, points), inside))
+        mus = np.unique(np.append(np.linspace(low, high, FEW_POINTS if large else POINTS), inside))
 
         def told(done: int, planned: int) -> None:
-            if work.system().size > LARGE:
-                send("progress", {"done": done, "planned": planned})
+            if large:
+                send("progress", {"what": f"modes at {done} of {planned} friction coefficients"})
 
         return modes(work, mus, max_frequency_hz=_band(work), check=False, progress=told)
 
-    def _modes_here(self, work: Workspace, mu: float) -> ComplexModes:
-        return modes(work, mu, max_frequency_hz=_band(work), vectors="right", check=False)
-
-    def _shape(self, model: _Model, here: ComplexModes, branch: int, send: Send) -> None:
+    def _shape(
+        self, model: _Model, system: System, here: ComplexModes, branch: int, send: Send, *, energy: bool
+    ) -> None:
         """The chosen mode, if it is one of those at this μ; its geometry only where the page has another one."""
         where = np.flatnonzero(here.branch == branch)
         if not len(where) or not np.isfinite(here.eigenvalues[0, where[0]]):
             send("shape", {"branch": branch, "missing": f"mode {branch} is not in the band at μ = {here.mu[0]:g}"})
             return
-        work, column = model.work, int(where[0])
-        shape, key = shape_of(work.system(float(here.mu[0])), here, column, known=model.geometry)
-        model.geometry = key
+        column = int(where[0])
+        shape, model.geometry = shape_of(system, here, column, known=model.geometry)
+        fed = energy_of(system, model.work.options, here, column) if energy else {"each": [], "why": "being computed"}
         send("shape", {
-            "branch": branch, **shape, "bodies": participation(work.system(float(here.mu[0])), here, column),
-            "contacts": energy_of(work, here, column),
+            "branch": branch, **shape, "bodies": participation(system, here, column), "contacts": fed,
         })  # fmt: skip
 
 
@@ -158,12 +200,21 @@ def bench() -> Bench:
     return Bench()
 
 
-def _described(work: Workspace) -> dict[str, Any]:
+def _modes_here(work: Workspace, mu: float) -> ComplexModes:
+    return modes(work, mu, max_frequency_hz=_band(work), vectors="right", check=False)
+
+
+def _certified(reduced: Reduced, error: float) -> str:
+    return f"{reduced.words}; estimated error of λ ≤ {error:.0e}, relative."
+
+
+def _described(model: _Model) -> dict[str, Any]:
     """The model to scale, and what is to be known of it."""
-    case, system = work.case("the page"), work.system()
+    work = model.work if model.reduced is None else model.reduced.work
+    case, system = model.work.case("the page"), work.system()
     return {
         "title": case.title, "freedoms": system.size, "svg": drawing(case, system), "warnings": case.warnings,
-        "large": system.size > LARGE,
+        "large": system.size > LARGE, "why": model.why,
     }  # fmt: skip
 
 

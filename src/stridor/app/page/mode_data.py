@@ -10,6 +10,7 @@ import numpy as np
 from ...errors import CaseError, StridorError
 from ...modal.complex_modes import ComplexModes
 from ...modal.krylov import friction_energy
+from ...modal.options import Options
 from ...study.countermeasures import default_numbers, whole_matrices
 from ...study.sensitivities import sensitivities
 from ...study.workspace import Workspace
@@ -65,15 +66,14 @@ def participation(system: System, modes: ComplexModes, column: int) -> list[dict
     ]  # fmt: skip
 
 
-def energy_of(work: Workspace, modes: ComplexModes, column: int) -> dict[str, Any]:
+def energy_of(system: System, options: Options, modes: ComplexModes, column: int) -> dict[str, Any]:
     """Energy that friction feeds in at each contact during one period, over the energy of the mode, or why there is
     none."""
-    system = work.system(float(modes.mu[0]))
     nodes = system.contact_nodes()
     if not nodes.count or modes.eigenvalues[0, column].imag == 0.0:
         return {"each": [], "why": "no contact, or a mode that does not vibrate"}
     try:
-        found = friction_energy(system, modes, 0, column, options=work.options)
+        found = friction_energy(system, modes, 0, column, options=options)
     except StridorError as error:
         return {"each": [], "why": str(error)}
     each = found.per_cycle

@@ -243,7 +243,8 @@ const stridor = (() => {
   function said(busy, stage) {
     const on = state.onsets;
     let text = "";
-    if (!on) text = state.locus ? "The onsets are being solved." : "The modes are being computed.";
+    if (state.progress) text = `${state.progress[0].toUpperCase()}${state.progress.slice(1)}.`;
+    else if (!on) text = state.locus ? "The onsets are being solved." : "The modes are being computed.";
     else if (on.first) text = `Growth begins at μ = ${on.first.mu.toPrecision(5)}, ${on.first.frequency_hz.toFixed(1)} Hz (${on.onsets.length} onset${on.onsets.length === 1 ? "" : "s"} solved).`;
     else text = on.growing_at_start.length ? `Something grows already at μ = ${on.friction_range[0]}.` : `Nothing grows up to μ = ${on.friction_range[1]}.`;
     if (on && !on.complete) text += ` ${on.completeness}`;
@@ -258,7 +259,8 @@ const stridor = (() => {
     $("st-modes-title").textContent = `Modes at μ = ${written(at.mu)}`;
     const box_ = $("st-modes-said");
     box_.replaceChildren(`${at.modes.length} modes, ${growing || "none"} growing. `);
-    if (!at.checked) box_.append("Followed from μ = 0, not checked yet.");
+    if (at.said) box_.append(at.said);
+    else if (!at.checked) box_.append("Followed from μ = 0, not checked yet.");
     else if (at.completeness) box_.append(element("details", {}, element("summary", {}, at.completeness.split(/[.:]/)[0]), at.completeness));
     const scroll = box.scrollTop, held = document.activeElement?.dataset?.branch;
     const rows = at.modes.map((m) => {
@@ -337,12 +339,14 @@ const stridor = (() => {
     model(c) {
       $("st-model").innerHTML = c.svg || "<p class='st-note'>Matrices without places: there is nothing to draw.</p>";
       $("st-title").textContent = c.title;
+      if (c.why) problem(c.why);
     },
-    locus(c) { state.locus = c; state.onsets = null; problem(""); draw(); stamp("locus"); },
+    locus(c) { state.locus = c; state.onsets = null; state.progress = ""; problem(""); draw(); stamp("locus"); },
     at(c) { state.at = c; list(); problem(""); stamp("at"); },
     onsets(c) { state.onsets = c; draw(); },
     shape(c) { state.shape = c; shape(); },
     tornado,
+    progress(c) { state.progress = c.what; },
     refused: problem, unanswered: problem, failed: problem,
   };
   // How often each part was drawn, for measurements: counted when it is on the screen.

@@ -1,0 +1,186 @@
+"""Large models: sliders work on a certified reduced model, made once; its estimated error is told with every answer."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ...case import Case
+from ...digits import fixed, measured
+from ...modal.complex_modes import ComplexModes
+from ...modal.full import ParametricOnset, ParametricOnsets, onsets_along
+from ...modal.parametric import ReducedModel
+from ...modal.parametric.contacts import ContactsProblem
+from ...modal.parametric.line import numbers_at
+from ...modal.parametric.model import ReducedModes
+from ...stages import heard
+from ...study.reduced import reduced_model
+from ...study.workspace import Workspace
+from ...typing import IntArray
+from .levers import friction_range
+from .state import State, checked
+
+FRICTION, STIFFNESS = "mu", "contact_stiffness"
+REACH = (0.1, 10.0)  # times the contact stiffness of the case
+POINTS = 21  # of the curves
+
+Tell = Callable[[str], None]
+
+
+@dataclass
+class Reduced:
+    """A reduced model over μ, and over contact stiffness where one contact has a number for it, with the workspace of
+    the case that it is of. words: what the page says of it."""
+
+    model: ReducedModel
+    work: Workspace
+    stiffness_path: str
+    words: str
+    base: Any
+    _numbered: list[tuple[ReducedModes, IntArray]] = field(default_factory=list[tuple[ReducedModes, IntArray]])
+
+    @staticmethod
+    def made(state: State, tell: Tell) -> Reduced:
+        """The model of a state's case, as it stands but for what the model is over. tell: what is under way. Raises
+        AnalysisError where there is none."""
+        began = time.perf_counter()
+        work = Workspace(base_of(state).case())
+        case = work.case("a reduced model")
+        box = {FRICTION: (0.0, friction_range(case)[1])}
+        path = stiffness_path(case)
+        if path:
+            box[STIFFNESS] = REACH
+        with heard(lambda stage: tell("" if stage is None else stage.what)):
+            tell("a reduced model is made, once for this case")
+            model = reduced_model(work, box)
+        took = time.perf_counter() - began
+        over = "μ and contact stiffness" if path else "μ"
+        words = f"Reduced model over {over}: {model.size} of {work.system().size} freedoms, made in {took:.0f} s"
+        return Reduced(model, work, path, words, base_of(state).model)
+
+    def holds(self, state: State) -> bool:
+        """Whether a state differs in nothing but what the model is over, and lies in the ranges of that."""
+        return base_of(state).model == self.base and self.model.problem.inside(self._point(state))
+
+    def here(self, state: State, *, vectors: bool = False) -> tuple[ComplexModes, float]:
+        """Modes at the μ of a state, and the largest estimated error of their λ, relative. Their numbers are those of
+        the nearest point where they are known, until `sweep` has followed them from μ = 0."""
+        found = self.model.modes(self._point(state))
+        return self._modes([found], [self._numbers(found, state)], vectors=vectors), float(found.error.max(initial=0.0))
+
+    def sweep(self, state: State) -> tuple[ComplexModes, float]:
+        """Branches over the range of μ and at the μ of a state, and the largest estimated error."""
+        low, high = friction_range(self.work.case("the page"))
+        mus = np.unique(np.append(np.linspace(low, high, POINTS), [state.mu] if low <= state.mu <= high else []))
+        rows: list[ReducedModes] = []
+        numbers: list[IntArray] = []
+        self._numbered = []
+        for mu in np.unique(np.append(0.0, mus)):
+            found = self.model.modes(self._point(replace(state, mu=float(mu))))
+            number = self._numbers(found, state)
+            self._numbered.append((found, number))
+            if mu in mus:
+                rows.append(found)
+                numbers.append(number)
+        return self._modes(rows, numbers), max(float(r.error.max(initial=0.0)) for r in rows)
+
+    def onsets(self, state: State) -> dict[str, Any]:
+        """Onsets found on the model, each solved in the full problem, as `bench.onsets_of` has them."""
+        point = self._point(state)
+        found = onsets_along(self.model, FRICTION, {k: v for k, v in point.items() if k != FRICTION})
+        low, high = friction_range(self.work.case("the page"))
+        start = self.model.modes({**point, FRICTION: low})
+        growing = [
+            {"frequency_hz": float(f), "growth_rate": float(g)}
+            for f, g, u in zip(start.frequency_hz, start.growth_rate, start.unstable, strict=True)
+            if u and f >= 0
+        ]
+        return onsets_on_page(found, (low, high), growing)
+
+    def _point(self, state: State) -> dict[str, float]:
+        point = {FRICTION: state.mu}
+        if self.stiffness_path:
+            own = float(_stiffness(self.work.case("the page"), self.stiffness_path))
+            point[STIFFNESS] = state.changes.get(self.stiffness_path, own) / own
+        return point
+
+    def _numbers(self, found: ReducedModes, state: State) -> IntArray:
+        """Numbers (k,) by frequency at μ = 0, followed to a point; 0 where that is not known."""
+        at = found.point[FRICTION]
+        if at == 0.0:
+            upper = np.flatnonzero(found.values.imag >= 0)
+            numbers = np.zeros(len(found.values), dtype=np.int64)
+            numbers[upper[np.argsort(found.values[upper].imag, kind="stable")]] = np.arange(1, len(upper) + 1)
+            return numbers
+        if not self._numbered:
+            start = self.model.modes(self._point(replace(state, mu=0.0)))
+            self._numbered = [(start, self._numbers(start, state))]
+        nearest, numbers = min(self._numbered, key=lambda k: self._apart(k[0].point, found.point))
+        return numbers_at(self.model, nearest, numbers, found)
+
+    def _apart(self, one: Mapping[str, float], other: Mapping[str, float]) -> float:
+        """How far two points are from each other, of the ranges; friction counts most, as branches meet over it."""
+        spans = {p.name: p.high - p.low for p in self.model.problem.parameters}
+        return sum((1.0 if k == FRICTION else 0.1) * abs(one[k] - other[k]) / span for k, span in spans.items())
+
+    def _modes(self, rows: list[ReducedModes], numbers: list[IntArray], *, vectors: bool = False) -> ComplexModes:
+        """Rows as modes over μ, a column for each number; those whose number is not known have one above all others."""
+        top = max((int(n.max(initial=0)) for n in numbers), default=0)
+        extra = max(int(np.sum((n == 0) & (r.values.imag >= 0))) for r, n in zip(rows, numbers, strict=True))
+        values = np.full((len(rows), top + extra), complex(np.nan, np.nan))
+        size = self.work.system().size
+        right = np.zeros((len(rows), top + extra, size), dtype=complex) if vectors else None
+        for k, (row, number) in enumerate(zip(rows, numbers, strict=True)):
+            upper = np.flatnonzero(row.values.imag >= 0)
+            unknown = iter(range(top, top + extra))
+            column = [int(number[j]) - 1 if number[j] else next(unknown) for j in upper]
+            values[k, column] = row.values[upper]
+            if right is not None:
+                problem, shapes = self.model.problem, self.model.expand(row)
+                moved = problem.displacements(shapes) if isinstance(problem, ContactsProblem) else shapes
+                right[k, column] = np.asarray(moved).T[upper]
+        kept = np.flatnonzero(np.isfinite(values).any(axis=0))
+        return ComplexModes(
+            mu=np.array([r.point[FRICTION] for r in rows]), eigenvalues=values[:, kept],
+            branch=np.arange(1, top + extra + 1)[kept], residual=np.full((len(rows), len(kept)), np.nan), damped=True,
+            right=None if right is None else right[:, kept], source="reduced",
+            max_frequency_hz=self.work.modal.max_frequency_hz, notes=tuple(getattr(self.model.problem, "notes", ())),
+        )  # fmt: skip
+
+
+def base_of(state: State) -> State:
+    """The state without what a reduced model is over."""
+    path = stiffness_path(checked(state.source))
+    return replace(state, changes={k: v for k, v in state.changes.items() if k != path})
+
+
+def stiffness_path(case: Case) -> str:
+    """The path of the contact stiffness where a case has one contact with a number for it, else ""."""
+    soft = [name for name, c in case.contacts.items() if c.stiffness != "rigid"]
+    return f"contacts.{soft[0]}.stiffness" if len(soft) == 1 else ""
+
+
+def _stiffness(case: Case, path: str) -> Any:
+    return case.contacts[path.split(".")[1]].stiffness
+
+
+def onsets_on_page(
+    found: ParametricOnsets, between: tuple[float, float], growing: list[dict[str, float]]
+) -> dict[str, Any]:
+    """Onsets along μ as the page takes those of `st.onsets`."""
+    each = [{**o.to_json(), "mu": o.value, "branches": [0, 0]} for o in found]
+    first = next(({"mu": o.value, "frequency_hz": o.frequency_hz} for o in found if not o.stabilising), None)
+    return {
+        "onsets": each, "words": [_words(o) for o in found], "first": first, "complete": found.complete,
+        "completeness": found.sentence, "growing_at_start": growing, "friction_range": list(between),
+        "source": "reduced",
+    }  # fmt: skip
+
+
+def _words(onset: ParametricOnset) -> str:
+    ends = ", where growth ends" if onset.stabilising else ""
+    return f"μ = {fixed(onset.value, 6)}, {measured(onset.frequency_hz, 1)} Hz, {onset.kind}{ends}"
