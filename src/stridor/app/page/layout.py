@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 TOO_LARGE = f"a case file of at most {LARGEST_TEXT / 1e6:g} MB"
 SECTIONS = (("left", "Model and numbers"), ("middle", "Modes over friction"), ("right", "Run in time and comparison"))
+TABS = (("bench", "Bench"), ("map", "Stability map"))
 COLOURS = {"stable": BLUE, "unstable": VERMILION, "ink": INK, "speed": GREEN}
 
 
@@ -52,14 +53,16 @@ class Layout:
         self._head()
         self.problem = ui.html('<div id="st-problem" class="st-problem" role="alert" hidden></div>', sanitize=False)
         with ui.tabs(on_change=lambda event: self._tab(str(event.value))).classes("st-tabs") as tabs:
-            first = ui.tab("bench", label="Bench")
-            ui.tab("map", label="Stability map")
+            for name, words in TABS:
+                ui.tab(name, label=words)
         self.tabs = tabs
-        with ui.tab_panels(tabs, value=first, animated=False, keep_alive=True).classes("st-panels"):
-            with ui.tab_panel("bench").classes("st-bench"):
-                charts = self._bench()
-            with ui.tab_panel("map"):
-                panel_map.build(ui.column().classes("st-map"), session)
+        tabs.set_value("bench")
+        # Both are always there, one of them unseen: what is told of a picture finds its place whichever tab is open.
+        self.panels = {name: _panel(words) for name, words in TABS}
+        with self.panels["bench"].classes("st-bench"):
+            charts = self._bench()
+        panel_map.build(self.panels["map"].classes("st-map"), session)
+        self.panels["map"].set_visibility(False)
         ui.on("stridor-hello", lambda event: self._hello(event, charts))
         session.on_change(self._follow)
         session.on_picture(self._show)
@@ -125,6 +128,8 @@ class Layout:
         self.redo.set_enabled(session.history.can_redo)
         if self.tabs.value != state.tab:
             self.tabs.set_value(state.tab)
+        for name, panel in self.panels.items():
+            panel.set_visibility(name == state.tab)
 
     def _show(self, part: str, content: Any) -> None:
         self._script("show", part, content, self.session.picture.busy)
@@ -169,6 +174,10 @@ class Layout:
 
 def _button(words: str, call: Callable[[], object] | None = None) -> ui.button:
     return ui.button(words, on_click=call).props("flat dense no-caps")
+
+
+def _panel(words: str) -> ui.element:
+    return ui.element("div").classes("st-panel").props(f'role=tabpanel aria-label="{words}"')
 
 
 def _section(name: str, words: str) -> ui.element:

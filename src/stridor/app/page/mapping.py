@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ...study.boundary_result import Boundary
 
 LINES = (2, 3, 5, 9)  # on which onsets are sought, more each time
-CELLS = 60  # of the shading beside the curves, along each number
+CELLS = 150  # of the shading beside the curves, along each number
 GRIDS = (5, 9, 17, 33)  # values of each number where curves cannot be traced
 FRICTION = "mu"
 
