@@ -12,95 +12,18 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Generator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from browsing import PATIENT, SOLVED, WITH_BROWSER, page_at, serving, shot, slide, wait
 
 import stridor as st
 from stridor.case import template_text
 
 pytest.importorskip("nicegui", reason="the extra app is not installed")
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-CHROMIUM = Path(os.environ.get("STRIDOR_CHROMIUM", "/usr/bin/chromium"))
-pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no browser at {CHROMIUM} (Debian: apt install chromium)")
-ROOT = Path(__file__).parents[2]
-SHOTS = Path(os.environ.get("STRIDOR_SCREENSHOTS", ROOT / "build" / "screenshots"))
-PATIENT = 60_000  # ms
-SOLVED = "typeof stridor !== 'undefined' && stridor.state.onsets !== null"
-
-
-@contextmanager
-def serving(*words: str) -> Generator[tuple[subprocess.Popen[str], str]]:
-    """The program with its page, and the address."""
-    command = [sys.executable, "-m", "stridor", "app", "--no-browser", "--quiet", *words]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    assert process.stderr is not None
-    try:
-        address = process.stdout.readline().strip()
-        assert address.startswith("http://127.0.0.1:"), process.stderr.read()
-        yield process, address
-    finally:
-        process.kill()
-        process.wait(20)
-        process.stdout.close()
-        process.stderr.close()
-
-
-@pytest.fixture(scope="module")
-def address() -> Generator[str]:
-    with serving() as (_, found):
-        yield found
-
-
-@pytest.fixture(scope="module")
-def browser() -> Generator[Any]:
-    with sync_api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
-        yield opened
-        opened.close()
-
-
-@contextmanager
-def page_at(browser: Any, address: str, *, width: int = 1280, height: int = 720, **more: Any) -> Generator[Any]:
-    """A page that has drawn its case; nothing may be asked of another computer, and the script may not fail."""
-    context = browser.new_context(viewport={"width": width, "height": height}, **more)
-    page = context.new_page()
-    failed: list[str] = []
-    page.on("pageerror", lambda error: failed.append(str(error)))
-    page.on("request", lambda asked: failed.append(asked.url) if "127.0.0.1" not in asked.url and not asked.url.startswith(("data:", "blob:", "about:")) else None)
-    page.goto(address)
-    page.wait_for_function(SOLVED, timeout=PATIENT)
-    try:
-        yield page
-    finally:
-        context.close()
-    assert not failed
-
-
-@pytest.fixture
-def page(browser: Any, address: str) -> Generator[Any]:
-    with page_at(browser, address) as opened:
-        yield opened
-
-
-def shot(page: Any, name: str, **more: Any) -> None:
-    SHOTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=SHOTS / f"{name}.png", **more)
-
-
-def slide(page: Any, path: str, value: float) -> None:
-    """A number field to a value, as it is typed."""
-    field = page.locator(f'[data-number="{path}"]')
-    field.fill(f"{value:g}")
-    field.press("Enter")
-
-
-def wait(page: Any, condition: str) -> None:
-    page.wait_for_function(condition, timeout=PATIENT)
+pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+pytestmark = WITH_BROWSER
 
 
 def test_a_slider_moves_the_onset_to_what_the_package_gives(page: Any):

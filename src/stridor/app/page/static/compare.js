@@ -56,8 +56,9 @@ const stridorBoth = (() => {
     $("st-both-title").textContent = is ? "Do both approaches agree? The numbers have changed since" : "Do both approaches agree?";
   }
   const ready = () => {
-    if (typeof emitEvent !== "function" || !$("st-both-go")) { setTimeout(ready, 30); return; }
+    if (typeof emitEvent !== "function" || !window.socket?.connected || !$("st-both-go")) { setTimeout(ready, 30); return; }
     for (const [id, name] of [["go", "stridor-compare"], ["report", "stridor-report"], ["stop", "stridor-compare-stop"]]) $(`st-both-${id}`).addEventListener("click", () => { running(true); emitEvent(name, {}); });
+    page.ready = true;
   };
   setTimeout(ready, 0);
   return { page, show, begin, stale };

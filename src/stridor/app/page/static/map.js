@@ -122,17 +122,19 @@ const stridorMap = (() => {
       event.preventDefault();
       go(page.here.map((v, k) => v + (step[k] * (page.asked[k ? "y_range" : "x_range"][1] - page.asked[k ? "y_range" : "x_range"][0])) / 100));
     });
-    for (const axis of ["x", "y"]) $(`st-map-${axis}`).addEventListener("change", () => chosen(axis));
-    $("st-map-go").addEventListener("click", ask);
-    $("st-map-stop").addEventListener("click", () => emitEvent("stridor-map-stop", {}));
   }
   function go(at) {
     const within = (v, [low, high]) => Math.min(Math.max(Number(v.toPrecision(5)), low), high);
     emitEvent("stridor-map-to", { x: within(at[0], page.asked.x_range), y: within(at[1], page.asked.y_range) });
   }
   const hello = () => {
-    if (typeof emitEvent === "function" && window.socket?.connected && $("st-map-go")) emitEvent("stridor-map-hello", {});
-    else setTimeout(hello, 60);
+    if (typeof emitEvent === "function" && window.socket?.connected && $("st-map-go")) {
+      emitEvent("stridor-map-hello", {});
+      page.ready = true;
+      for (const axis of ["x", "y"]) $(`st-map-${axis}`).addEventListener("change", () => chosen(axis));
+      $("st-map-go").addEventListener("click", ask);
+      $("st-map-stop").addEventListener("click", () => emitEvent("stridor-map-stop", {}));
+    } else setTimeout(hello, 60);
   };
   setTimeout(hello, 0);
   return { page, start, offer, show, begin, here, clear };

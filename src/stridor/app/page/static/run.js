@@ -180,13 +180,15 @@ const stridorRun = (() => {
     Object.assign(page, { charts, colours });
     document.querySelectorAll(".st-run-chart").forEach((e) => { e.hidden = !page.picture; });
     new MutationObserver(() => { page.sonogramAt = 0; draw(); }).observe(document.body, { attributes: true, attributeFilter: ["class"] });
-    $("st-run-go").addEventListener("click", () => { running(true); emitEvent("stridor-run", {}); });
-    $("st-run-stop").addEventListener("click", () => emitEvent("stridor-run-stop", {}));
-    $("st-run-listen").addEventListener("click", () => (page.sound ? silence() : emitEvent("stridor-run-listen", { slow: Number($("st-run-slow").value) })));
   }
   const hello = () => {
-    if (typeof emitEvent === "function" && window.socket?.connected && $("st-run-go")) emitEvent("stridor-run-hello", {});
-    else setTimeout(hello, 30);
+    if (typeof emitEvent === "function" && window.socket?.connected && $("st-run-go")) {
+      emitEvent("stridor-run-hello", {});
+      page.ready = true;
+      $("st-run-go").addEventListener("click", () => { running(true); emitEvent("stridor-run", {}); });
+      $("st-run-stop").addEventListener("click", () => emitEvent("stridor-run-stop", {}));
+      $("st-run-listen").addEventListener("click", () => (page.sound ? silence() : emitEvent("stridor-run-listen", { slow: Number($("st-run-slow").value) })));
+    } else setTimeout(hello, 30);
   };
   setTimeout(hello, 0);
   return { page, start, show, begin, stale };

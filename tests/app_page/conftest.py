@@ -1,0 +1,30 @@
+"""One browser and one server for all tests of the page in a browser."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Any
+
+import pytest
+from browsing import CHROMIUM, page_at, serving
+
+
+@pytest.fixture(scope="session")
+def address() -> Generator[str]:
+    with serving() as (_, found):
+        yield found
+
+
+@pytest.fixture(scope="session")
+def browser() -> Generator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with sync_api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def page(browser: Any, address: str) -> Generator[Any]:
+    with page_at(browser, address) as opened:
+        yield opened

@@ -1,0 +1,164 @@
+"""What takes long on the page, in a real browser: runs that are watched, heard, stopped and reloaded, maps, comparisons."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browsing import PATIENT, WITH_BROWSER, page_at, serving, shot, wait
+
+import stridor as st
+from benches import paper_case
+
+pytest.importorskip("nicegui", reason="the extra app is not installed")
+pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+pytestmark = WITH_BROWSER
+
+SHORT = {
+    "bodies.beam1.elements": 6, "bodies.beam2.elements": 12, "temporal.step": 2e-7, "temporal.record_every": 5,
+    "phases.press.duration": 1e-3, "phases.slide.duration": 1e-2, "contacts.A.friction.coefficient": 0.3,
+}  # fmt: skip
+LONG = SHORT | {"phases.slide.duration": 300.0, "temporal.record_every": 2000}
+
+
+def served(folder: Path, changes: dict[str, Any]) -> Any:
+    path = folder / "bench.toml"
+    path.write_text(paper_case().with_(changes).to_toml(), encoding="utf-8")
+    return serving(str(path))
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Generator[str]:
+    with served(tmp_path_factory.mktemp("short"), SHORT) as (_, found):
+        yield found
+
+
+@pytest.fixture(scope="module")
+def endless(tmp_path_factory: pytest.TempPathFactory) -> Generator[tuple[Any, str]]:
+    with served(tmp_path_factory.mktemp("long"), LONG) as found:
+        yield found
+
+
+def said(page: Any, part: str = "run") -> str:
+    return str(page.locator(f"#st-{part}-said").inner_text())
+
+
+def runs_of(server: Any) -> int:
+    """How many processes of runs the server has: each with its own pipe, beside the one of the page."""
+    children = 0
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            words = status.read_text().rpartition(")")[2].split()
+            command = (status.parent / "cmdline").read_bytes()
+        except OSError:
+            continue
+        children += int(words[1]) == server.pid and words[0] != "Z" and b"spawn_main" in command
+    return children
+
+
+def test_a_run_is_drawn_and_heard(browser: Any, short: str) -> None:
+    with page_at(browser, short) as page:
+        page.click("#st-run-go")
+        wait(page, "document.querySelector('#st-run-said').textContent.startsWith('At μ = 0.3: last phase')")
+        run = st.simulate(paper_case().with_(SHORT))
+        seen = page.evaluate("stridorRun.page.picture")
+        assert seen["done"] == seen["planned"] == run.steps
+        assert max(seen["normal_force"][0]["high"]) == run.normal_force.max()
+        drawn = page.evaluate("[...document.querySelectorAll('.st-run-chart')].map((c) => c.getAttribute('aria-label'))")
+        assert all(words for words in drawn)
+        assert "Modes that grow:" in drawn[3]
+        heard = st.sound(run)
+        page.click("#st-run-listen")
+        wait(page, "stridorRun.page.sound !== null")
+        assert page.evaluate("stridorRun.page.sound.seconds") == pytest.approx(heard.seconds, rel=0.01)
+        assert heard.sentence in said(page)
+        assert page.inner_text("#st-run-listen") == "Silence"
+        page.click("#st-run-listen")
+        assert page.evaluate("stridorRun.page.sound") is None
+        page.fill('[data-number="mu"]', "0.35")
+        page.press('[data-number="mu"]', "Enter")
+        wait(page, "document.querySelector('#st-run-title').textContent === 'Run in time at μ = 0.3: the numbers have changed since'")
+        shot(page, "run", full_page=True)
+
+
+def test_a_run_grows_is_stopped_and_waits_for_its_turn(browser: Any, endless: tuple[Any, str]) -> None:
+    _, address = endless
+    with page_at(browser, address) as page, page_at(browser, address) as other:
+        page.click("#st-run-go")
+        wait(page, "stridorRun.page.picture !== null")
+        end = page.evaluate("stridorRun.page.picture.end")
+        wait(page, f"stridorRun.page.picture.end > {end}")
+        other.click("#st-run-go")
+        if page.evaluate("navigator.hardwareConcurrency") <= 2:
+            wait(other, "document.querySelector('#st-run-said').textContent === 'Waiting for its turn: number 1 in the queue.'")
+        page.click("#st-run-listen")  # of what there is by now
+        wait(page, "stridorRun.page.sound !== null || document.querySelector('#st-run-said').textContent.startsWith('No sound')")
+        page.click("#st-run-stop")
+        wait(page, "document.querySelector('#st-run-said').textContent.includes('stopped after')")
+        wait(other, "stridorRun.page.picture !== null")
+        assert page.is_enabled("#st-run-go")
+
+
+def test_a_reload_in_the_middle_of_a_run_ends_it_and_the_page_goes_on(browser: Any, endless: tuple[Any, str]) -> None:
+    server, address = endless
+    with page_at(browser, address) as page:
+        page.click("#st-run-go")
+        wait(page, "stridorRun.page.picture !== null")
+        page.reload()
+        wait(page, "typeof stridor !== 'undefined' && stridor.state.onsets !== null")
+        until = time.monotonic() + 20
+        while runs_of(server) > 1 and time.monotonic() < until:
+            time.sleep(0.1)
+        assert runs_of(server) <= 1
+        page.click("#st-run-go")
+        wait(page, "stridorRun.page.picture !== null")
+    until = time.monotonic() + 20
+    while runs_of(server) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert runs_of(server) == 0
+
+
+def test_both_approaches_and_the_report(browser: Any, short: str, tmp_path: Path) -> None:
+    with page_at(browser, short) as page:
+        page.click("#st-both-go")
+        wait(page, "document.querySelectorAll('#st-both-tables table').length === 2")
+        found = st.compare(paper_case().with_(SHORT))
+        assert said(page, "both") == found.comparisons[0].verdict
+        cells = page.locator("#st-both-tables").inner_text()
+        assert f"{found.comparisons[0].modal_eigenvalue.real:.1f}" in cells
+        with page.expect_download(timeout=2 * PATIENT) as got:
+            page.click("#st-both-report")
+        assert got.value.suggested_filename == "bench-report.html"
+        got.value.save_as(tmp_path / "report.html")
+        text = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert "Do both approaches agree?" in text
+        assert "http://" not in text.split("<body")[0]
+        shot(page, "compare", full_page=True)
+
+
+def test_a_click_on_the_map_goes_there(browser: Any, short: str) -> None:
+    with page_at(browser, short) as page:
+        page.get_by_role("tab", name="Stability map").click()
+        page.fill("#st-map-x-high", "0.6")
+        page.fill("#st-map-y-low", "5e9")
+        page.click("#st-map-go")
+        wait(page, "stridorMap.page.map !== null && !document.querySelector('#st-map-go').disabled")
+        chart = "getElement(stridorMap.page.chart).chart"
+        x, y = page.evaluate(f"{chart}.convertToPixel({{gridIndex: 0}}, [0.25, 1.5e10])")
+        page.locator(".st-map-chart").click(position={"x": x, "y": y})
+        wait(page, "Math.abs(stridor.state.values.mu - 0.25) < 0.005")
+        shot(page, "map", full_page=True)
+        page.get_by_role("tab", name="Bench").click()
+        stiffness = float(page.locator('[data-number="contacts.A.stiffness"]').input_value())
+        assert stiffness == pytest.approx(1.5e10, rel=0.02)
+        mu = page.evaluate("stridor.state.values.mu")
+        wait(page, f"stridor.state.at.mu === {mu}")
+        # Nonsense in a field is refused in words, and the page goes on.
+        page.get_by_role("tab", name="Stability map").click()
+        page.fill("#st-map-x-high", "much")
+        page.click("#st-map-go")
+        wait(page, "document.querySelector('#st-map-said').textContent.includes('two numbers, the smaller one first')")
+        assert page.is_enabled("#st-map-go")
