@@ -173,7 +173,7 @@ class Layout:
 
 
 def _button(words: str, call: Callable[[], object] | None = None) -> ui.button:
-    return ui.button(words, on_click=call).props("flat dense no-caps")
+    return ui.button(words, on_click=call, color=None).props("flat dense no-caps")
 
 
 def _panel(words: str) -> ui.element:

@@ -103,6 +103,8 @@ class Server:
         self.port = self._socket.getsockname()[1]
         outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         page(self)
+        # No bar over the page while something is fetched: it has no name, and the page says itself what it does.
+        nicegui.app.config.quasar_config["loadingBar"] = {"skipHijack": True}
         nicegui.ui.run_with(
             outer, title="stridor", dark=None, mount_path=f"/{self.token}", show_welcome_message=False,
             reconnect_timeout=PATIENCE, tailwind=False, binding_refresh_interval=None, favicon="〰️",
