@@ -12,7 +12,9 @@ from .option_table import Quiet, Set
 
 CaseFile = Annotated[
     Path | None,
-    typer.Argument(metavar="CASE", help="Case file (TOML) [default: the two beams].", show_default=False),
+    typer.Argument(
+        metavar="CASE", help="Case file (TOML), or store of a study [default: the two beams].", show_default=False
+    ),
 ]
 
 
@@ -33,9 +35,16 @@ def app(
     from .page import source_of
     from .page.server import Server, needed, show
     from .page.state import Source
+    from .page.study_rows import is_study, study_at
 
     needed()
-    source = source_of(case)
+    study = None
+    if case is not None and is_study(case):
+        if set_:
+            raise CaseError("--set", ", ".join(set_), "goes with a case file; a study has its own numbers")
+        source, study = study_at(case)
+    else:
+        source = source_of(case)
     if set_:  # changed values cannot keep the comments that speak of the old ones
         changed = load(case, set_) if case else loads(template_text("two-beams"), set_, "two-beams")
         source = Source(source.name, changed.text, source.folder)
@@ -46,7 +55,7 @@ def app(
         if browser:
             show(address)
 
-    Server({"case": source}, port).run(ready=ready)
+    Server({"case": source}, port, study=study).run(ready=ready)
 
 
 VERBS = {"app": app}

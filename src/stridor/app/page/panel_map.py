@@ -59,6 +59,7 @@ class _Panel:
         ui.on("stridor-map", self._go)
         ui.on("stridor-map-stop", lambda: None if self.run is None else self.run.stop())
         ui.on("stridor-map-to", self._to)
+        ui.on("stridor-map-sample", self._sample)
         session.on_change(self._follow)
         session.on_close(lambda: None if self.run is None else self.run.close())
 
@@ -68,6 +69,9 @@ class _Panel:
     def _hello(self) -> None:
         self._script("start", self.chart.id, VERMILION)
         self._offer()
+        if self.session.study is not None:
+            self._script("samples", self.session.study)
+            self.session.look("map")
         if self.picture is not None:
             self._script("show", "map", self.picture)
 
@@ -116,6 +120,14 @@ class _Panel:
             return
         for path, value in zip(self.axes, values, strict=True):
             self.session.move(path, float(value))  # type: ignore[arg-type]
+
+    def _sample(self, event: events.GenericEventArguments) -> None:
+        """To a sample of the study: all of its numbers."""
+        study, row = self.session.study, event.args.get("row") if isinstance(event.args, dict) else None
+        if study is None or not isinstance(row, int) or not 0 <= row < len(study["grows"]):
+            return
+        for path, values in study["numbers"].items():
+            self.session.move(path, values[row])
 
     def _follow(self) -> None:
         """Where the page is on the map, and whether the map is of another case by now."""

@@ -9,7 +9,7 @@ import os
 import socket
 import threading
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,12 +26,14 @@ START = 30.0  # seconds
 
 @dataclass(eq=False)
 class Server:
-    """A server of pages: the cases they open with by key, the port (0: any that is free), the token of its address."""
+    """A server of pages: the cases they open with by key, the port (0: any that is free), the token of its address;
+    study: samples that the maps show (`study_rows`)."""
 
     opened: dict[str, Source]
     port: int
     token: str = field(default_factory=new_token)
     framed: bool = False
+    study: Mapping[str, Any] | None = None
     sessions: set[Session] = field(default_factory=set[Session])
     _server: Any = None
     _socket: socket.socket | None = None
@@ -89,6 +91,7 @@ class Server:
                 loop.call_soon_threadsafe(function, *given)
 
         session = Session(self.source_of(key), {**template_sources(), **self.opened}, call)
+        session.study = self.study
         self.sessions.add(session)
         session.on_close(lambda: self.sessions.discard(session))
         return session

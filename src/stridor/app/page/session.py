@@ -55,6 +55,7 @@ class Session:
         self.folder = Path(tempfile.mkdtemp(prefix="stridor-page-"))
         self._worker = Worker(self._answered, program)
         self.closed = False
+        self.study: Mapping[str, Any] | None = None  # samples of a study, for the map
 
     # -- what a panel reads ---------------------------------------------------------------------------------------
 
