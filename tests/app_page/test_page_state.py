@@ -156,3 +156,12 @@ def test_every_lever_moves_its_case():
 def test_the_pad_on_the_disc_has_its_levers():
     found = {lever.path for lever in levers(checked(Source.template("pad-on-disc")))}
     assert {"contacts.face.stiffness", "loads.piston.pressure"} <= found
+
+
+def test_a_link_to_a_file_of_the_server_is_to_its_text_not_its_name():
+    mine, other = (Source("case.toml", template_text(name), "/somewhere") for name in ("two-beams", "pad-on-disc"))
+    link = to_link(first_state(mine), {mine.key: mine})
+    assert len(link) < 200
+    assert from_link(link, {mine.key: mine, other.key: other}).source == mine
+    with pytest.raises(st.CaseError, match="holds no state of this page"):
+        from_link(link, {other.key: other})

@@ -162,6 +162,8 @@ class Bench:
         if state.branch is not None:
             model.idle = model.idle or Workspace(model.work.case("the page"))
             self._shape(model, model.idle.system(), here, state.branch, send, energy=True)
+            why = f"Not computed on this page for a model of this size: stridor sensitivities --branch {state.branch}"
+            send("tornado", {"branch": state.branch, "bars": [], "warnings": [why]})
 
     def _swept(self, work: Workspace, mu: float, send: Send) -> ComplexModes:
         """Branches over the range of μ and at the μ of the page."""

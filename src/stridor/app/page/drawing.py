@@ -30,6 +30,7 @@ class _Sheet:
     high: Array
     parts: list[str] = field(default_factory=list[str])
     words: list[str] = field(default_factory=list[str])
+    named: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
 
     @property
     def scale(self) -> float:
@@ -52,6 +53,13 @@ class _Sheet:
         """A text about a place of the sheet."""
         x, y = min(max(x, 4.0), WIDTH - 4.0), min(max(y, 10.0), self.height - 3.0)
         self.parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" class="{kind}">{escape(words)}</text>')
+
+    def name(self, x: float, y: float, words: str) -> None:
+        """A name at a place, or below those that stand there."""
+        while any(abs(x - x0) < 40 and abs(y - y0) < 11 for x0, y0 in self.named):
+            y += 11
+        self.named.append((x, y))
+        self.text(x, y, words, kind="name")
 
     def arrow(self, tail: tuple[float, float], tip: tuple[float, float], colour: str) -> None:
         """An arrow."""
@@ -83,7 +91,7 @@ def drawing(case: Case, system: System) -> str:
             _draw_beam(sheet, name, body, COLOURS[index % len(COLOURS)])
         elif skin.dimension == 2 or len(names) > 1:
             middle = seen[skin.point_body == index].mean(axis=0)
-            sheet.text(*sheet.at(middle), name, kind="name")
+            sheet.name(*sheet.at(middle), name)
     _draw_supports(sheet, case)
     _draw_loads(sheet, case)
     _draw_contacts(sheet, case, system)

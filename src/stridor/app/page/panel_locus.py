@@ -15,7 +15,8 @@ def build(container: ui.element, session: Session) -> dict[str, int]:
     """Fill the container of a page; returns the numbers of its charts by name, for the page's script."""
     made: dict[str, int] = {}
     with container:
-        ui.html('<p id="st-said" class="st-said" role="status" aria-live="polite"></p>', sanitize=False)
+        said = ui.html('<p id="st-said" class="st-said" role="status" aria-live="polite"></p>', sanitize=False)
+        said.classes("st-said-box")
         for name, height in CHARTS:
             chart = ui.echart({"series": []}).classes(f"st-chart st-{name}").style(f"height: {height}px")
             made[name] = chart.id

@@ -90,7 +90,8 @@ class Server:
             with contextlib.suppress(RuntimeError):  # the loop has ended: so has the page
                 loop.call_soon_threadsafe(function, *given)
 
-        session = Session(self.source_of(key), {**template_sources(), **self.opened}, call)
+        own = {**template_sources(), **{source.key: source for source in self.opened.values()}}
+        session = Session(self.source_of(key), own, call)
         session.study = self.study
         self.sessions.add(session)
         session.on_close(lambda: self.sessions.discard(session))

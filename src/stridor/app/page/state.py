@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import hashlib
 import json
 import math
 import tomllib
@@ -38,6 +39,12 @@ class Source:
     name: str
     text: str
     folder: str | None = None
+
+    @property
+    def key(self) -> str:
+        """What links call it where the server has it: a name that another text does not have."""
+        told = "\n".join((self.folder or "", self.text)).encode()
+        return f"file:{hashlib.sha256(told).hexdigest()[:16]}"
 
     @staticmethod
     def template(name: str) -> Source:

@@ -146,7 +146,7 @@ const stridor = (() => {
         line("chosen mode", curves(key, chosen), p.ink, 3.2, 4),
         { id: "onsets", name: "onset, solved", type: "scatter", symbol: "diamond", symbolSize: 9, silent: true, animation: false, z: 6,
           itemStyle: { color: p.ink }, labelLayout: { hideOverlap: true },
-          label: { show: name === "frequency", position: "right", distance: 6, offset: [0, -15], color: p.text, fontSize: 11, lineHeight: 13, formatter: (d) => d.data.words,
+          label: { show: name === "frequency", position: "right", distance: 6, offset: [-4, -19], color: p.text, fontSize: 11, lineHeight: 13, formatter: (d) => d.data.words,
             backgroundColor: dark() ? "rgba(27,29,34,.85)" : "rgba(255,255,255,.85)", padding: 2 },
           data: onsetPoints(name) },
       ];
@@ -345,7 +345,11 @@ const stridor = (() => {
     locus(c) { state.locus = c; state.onsets = null; state.progress = ""; problem(""); draw(); stamp("locus"); },
     at(c) { state.at = c; list(); problem(""); stamp("at"); },
     onsets(c) { state.onsets = c; draw(); },
-    shape(c) { state.shape = c; shape(); },
+    shape(c) {
+      if (state.shape?.branch !== c.branch) $("st-tornado").replaceChildren(element("p", { class: "st-note" }, "Being computed."));
+      state.shape = c;
+      shape();
+    },
     tornado,
     progress(c) { state.progress = c.what; },
     refused: problem, unanswered: problem, failed: problem,
