@@ -30,7 +30,7 @@ COLOURS = {"stable": BLUE, "unstable": VERMILION, "ink": INK, "speed": GREEN}
 def page(server: Server) -> None:
     """Register the page with NiceGUI: every time it is opened it has a session of its own."""
 
-    @ui.page("/", reconnect_timeout=3.0)
+    @ui.page("/")
     async def _bench(client: Client, case: str = "") -> None:
         try:
             session = server.session(case)

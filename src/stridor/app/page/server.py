@@ -20,7 +20,7 @@ from .session import Session
 from .state import Source, template_sources
 
 HOST = "127.0.0.1"
-PATIENCE = 3.0  # seconds that a page may be away, as when it is loaded again
+PATIENCE = 10.0  # seconds that a page may be away, as behind a busy browser, before it counts as closed
 START = 30.0  # seconds
 
 

@@ -58,6 +58,8 @@ class Worker:
         self._heard, self._program = heard, program
         self._number = 0
         self._newest: tuple[int, Any] | None = None
+        self._last: tuple[int, Any] | None = None
+        self._retried = 0
         self._wake = threading.Condition()
         self._closed = False
         self._process: Any = None
@@ -69,7 +71,7 @@ class Worker:
         """Put a question in place of any that was not sent yet; its number."""
         with self._wake:
             self._number += 1
-            self._newest = (self._number, question)
+            self._newest = self._last = (self._number, question)
             self._wake.notify()
             return self._number
 
@@ -125,10 +127,14 @@ class Worker:
             self._heard(number, part, content)
         with self._wake:
             died = not self._closed and pipe is self._pipe
+            number, again = self._number, False
             if died:
                 self._pipe = None  # the next question starts another one
-            number = self._number
-        if died:
+                again = self._retried != number
+            if again:  # the newest question is not lost with a process that died of one before
+                self._retried, self._newest = number, self._last
+                self._wake.notify()
+        if died and not again:
             self._heard(number, "failed", "the process that computes for this page has died; the next change starts "
                                           "another one")  # fmt: skip
 
