@@ -43,3 +43,16 @@ def threads() -> Callable[[Any, Callable[[str, Any], None]], None]:
         send("answer", (os.environ.get("OPENBLAS_NUM_THREADS"), os.getpid()))
 
     return answer
+
+
+def importing() -> Callable[[Any, Callable[[str, Any], None]], None]:
+    """Imports a module that takes a while, as engines do when they are first needed; "again" says what it has."""
+
+    def answer(question: Any, send: Callable[[str, Any], None]) -> None:
+        send("idle", None)
+        send("begun", None)
+        import page_slow_module
+
+        send("answer", page_slow_module.WHOLE)
+
+    return answer

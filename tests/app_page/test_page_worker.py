@@ -135,3 +135,12 @@ def test_ctrl_c_is_none_of_its_business():
         until(heard, "begun", number)
         os.kill(worker.process.pid, signal.SIGINT)
         assert until(heard, "done", number)
+
+
+def test_an_import_is_not_left_halfway():
+    with working("importing") as (worker, heard):
+        first = worker.ask(None)
+        until(heard, "begun", first)
+        time.sleep(0.2)
+        second = worker.ask(None)
+        assert until(heard, "answer", second)[-1][2] == 1  # begun once, and not again

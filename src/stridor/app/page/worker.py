@@ -16,6 +16,7 @@ import time
 from _thread import interrupt_main
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import FrameType
 from typing import Any
 
 from ...studies.workers import main_left_out, one_thread_each
@@ -216,9 +217,9 @@ class _Questions:
 def _serve(pipe: Any, program: Program) -> None:
     questions: _Questions | None = None
 
-    def interrupted(*_: object) -> None:
+    def interrupted(_: int, frame: FrameType | None) -> None:
         # Ctrl-C goes to all processes of a terminal: here it means nothing, the pipe will end.
-        if questions is not None and questions.waiting:
+        if questions is not None and questions.waiting and _may_stop(frame):
             questions.given_up()
             raise Superseded
 
@@ -232,6 +233,17 @@ def _serve(pipe: Any, program: Program) -> None:
             continue
         except OSError:
             return
+
+
+def _may_stop(frame: FrameType | None) -> bool:
+    """Whether what is under way can be left where it is: a module half imported, or a kernel half compiled, stays so
+    for all answers to come."""
+    while frame is not None:
+        name = frame.f_code.co_filename
+        if name.startswith("<frozen importlib") or f"{os.sep}numba{os.sep}" in name:
+            return False
+        frame = frame.f_back
+    return True
 
 
 def _answer_next(questions: _Questions, answer: Answer) -> None:
