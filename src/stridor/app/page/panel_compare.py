@@ -58,7 +58,7 @@ class _Panel:
             return
         state = self.session.state
         try:
-            wish = Wish(_text(state), None, str(_folder(self.session)), what)
+            wish = Wish(_text(state), state.mu, str(_folder(self.session)), what)
         except CaseError as error:
             self._script("show", "refused", str(error))
             return
@@ -91,10 +91,12 @@ class _Panel:
 
 
 def _text(state: State) -> str:
-    """The case as it is, the μ of the page in it: the report tells of a case, not of a page. Raises CaseError."""
+    """The case as it is, the μ of the page in it and compared at that one alone: the report tells of a case, not of a
+    page. Raises CaseError."""
     from ...case import loads
 
-    return loads(file_text(state), folder=Path(state.source.folder or ".")).to_toml()
+    case = loads(file_text(state), folder=Path(state.source.folder or "."))
+    return case.with_({"comparison.mu": [state.mu]}).to_toml()
 
 
 def _folder(session: Session) -> Path:
