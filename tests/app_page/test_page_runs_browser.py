@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import PATIENT, WITH_BROWSER, page_at, serving, shot, wait
+from browsing import PATIENT, READY, SOLVED, WITH_BROWSER, page_at, serving, shot, wait
 
 import stridor as st
 from benches import paper_case
@@ -108,7 +108,7 @@ def test_a_reload_in_the_middle_of_a_run_ends_it_and_the_page_goes_on(browser: A
         page.click("#st-run-go")
         wait(page, "stridorRun.page.picture !== null")
         page.reload()
-        wait(page, "typeof stridor !== 'undefined' && stridor.state.onsets !== null")
+        wait(page, f"{SOLVED} && {READY}")
         until = time.monotonic() + 20
         while runs_of(server) > 1 and time.monotonic() < until:
             time.sleep(0.1)
@@ -165,3 +165,46 @@ def test_a_click_on_the_map_goes_there(browser: Any, short: str) -> None:
         page.click("#st-map-go")
         wait(page, "document.querySelector('#st-map-said').textContent.includes('two numbers, the smaller one first')")
         assert page.is_enabled("#st-map-go")
+
+
+def test_another_case_has_nothing_of_the_one_before(browser: Any, short: str) -> None:
+    with page_at(browser, short) as page:
+        page.get_by_role("tab", name="Stability map").click()
+        page.click("#st-map-go")
+        wait(page, "stridorMap.page.map !== null")
+        page.evaluate("window.seen = []")
+        # What is told of the first moment under the other name.
+        page.evaluate("""const told = stridor.forget; document.querySelector('#st-title') && new MutationObserver(() =>
+            window.seen.push([document.querySelector('#st-said').textContent, document.querySelectorAll('#st-modes-list tr').length])
+        ).observe(document.querySelector('#st-title'), { childList: true })""")
+        page.get_by_role("button", name="Examples").click()
+        page.get_by_text("two-beams", exact=True).click()
+        wait(page, "stridor.state.onsets !== null && document.querySelector('#st-map-said').textContent === 'Another case is open.'")
+        first_words, first_rows = page.evaluate("window.seen[0]")
+        assert "solved" not in first_words
+        assert first_rows == 0
+        page.wait_for_timeout(3000)  # the map of the case before, were it still made
+        assert page.evaluate("stridorMap.page.map") is None
+        assert page.is_enabled("#st-map-go")
+
+
+def test_a_run_may_follow_at_once(browser: Any, short: str) -> None:
+    with page_at(browser, short) as page:
+        for mu in ("0.3", "0.2"):
+            page.fill('[data-number="mu"]', mu)
+            page.press('[data-number="mu"]', "Enter")
+            wait(page, f"stridor.state.values.mu === {mu} && !document.querySelector('#st-run-go').disabled")
+            page.click("#st-run-go")
+            wait(page, f"document.querySelector('#st-run-said').textContent.startsWith('At μ = {mu}: ')")
+            assert page.inner_text("#st-run-title") == "Run in time"
+
+
+def test_words_about_a_file_stay_to_be_read(browser: Any, short: str, tmp_path: Path) -> None:
+    with page_at(browser, short) as page:
+        broken = tmp_path / "broken.toml"
+        broken.write_text("title = 1\n", encoding="utf-8")
+        page.set_input_files("input[type=file]", broken)
+        page.locator("#st-problem").wait_for(state="visible")
+        words = page.inner_text("#st-problem")
+        page.evaluate("stridor.show('at', stridor.state.at, false)")  # an answer that was under way
+        assert page.inner_text("#st-problem") == words

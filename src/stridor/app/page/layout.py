@@ -107,7 +107,7 @@ class Layout:
     def _hello(self, event: events.GenericEventArguments, charts: dict[str, int]) -> None:
         """The script is there: it has the link of its address, if there is one."""
         self._script("start", charts, COLOURS)
-        link = str((event.args or {}).get("link") or "")
+        link = str(event.args.get("link") or "") if isinstance(event.args, dict) else ""
         if not link or not self._try(lambda: self.session.restore(link)):
             self._follow()
             self.session.compute()
@@ -117,6 +117,8 @@ class Layout:
         session = self.session
         state = session.state
         if state.source != self._source:
+            if self._source is not None:
+                self._script("forget")
             self._source = state.source
             self._script("levers", panel_model.lever_data(session))
         low, high = friction_range(checked(state.source))

@@ -12,7 +12,7 @@ from nicegui import context, ui
 from ...errors import CaseError
 from .panel_run import asset
 from .runs import ENDS, Run, What, Wish
-from .session import Session
+from .session import Session, started
 from .state import State, file_text
 
 _PARTS = """
@@ -41,6 +41,7 @@ class _Panel:
         self.run: Run | None = None
         self.of: State | None = None
         self.what: What = "compare"
+        self.reported = ""
         ui.add_body_html(f"<script>{asset('compare.js')}</script>")
         with container:
             ui.html(_PARTS, sanitize=False)
@@ -55,6 +56,7 @@ class _Panel:
 
     def _go(self, what: What) -> None:
         if self.run is not None and not self.run.over:
+            self._script("show", "refused", "what is under way has not ended yet")
             return
         state = self.session.state
         try:
@@ -64,9 +66,11 @@ class _Panel:
             return
         self.what = what
         self._script("begin", state.mu, what)
+        if what == "report":
+            self.reported = state.source.name
         if what == "compare":
             self.of = state
-        self.run = Run(wish, lambda part, content: self.session.later(self._heard, part, content))
+        self.run = started(wish, self.session, self._heard, lambda: self.run)
 
     def _stop(self) -> None:
         if self.run is not None:
@@ -75,7 +79,7 @@ class _Panel:
     def _heard(self, part: str, content: Any) -> None:
         if part == "done" and self.what == "report":
             with self.client:
-                name = f"{self.session.state.source.name.removesuffix('.toml')}-report.html"
+                name = f"{self.reported.removesuffix('.toml')}-report.html"
                 ui.download(Path(content["file"]).read_bytes(), name, "text/html")
         if part in ENDS or part in ("waiting", "begun", "log"):
             self._script("show", part, content)

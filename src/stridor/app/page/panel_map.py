@@ -13,7 +13,7 @@ from ...view.style import VERMILION
 from .levers import Lever, friction_range
 from .panel_run import asset
 from .runs import ENDS, Run, Wish
-from .session import Session
+from .session import Session, started
 from .state import State, checked, friction_changes
 
 FRICTION = "mu"
@@ -50,6 +50,7 @@ class _Panel:
         self.run: Run | None = None
         self.of: State | None = None
         self.axes: tuple[str, str] = ("", "")
+        self.source = session.state.source
         self.picture: Any = None
         ui.add_body_html(f"<script>{asset('map.js')}</script>")
         with container:
@@ -91,6 +92,7 @@ class _Panel:
 
     def _go(self, event: events.GenericEventArguments) -> None:
         if self.run is not None and not self.run.over:
+            self._script("show", "refused", "what is under way has not ended yet")
             return
         state = self.session.state
         try:
@@ -102,7 +104,7 @@ class _Panel:
             return
         self.of, self.axes = state, (options["x"], options["y"])
         self._script("begin")
-        self.run = Run(wish, lambda part, content: self.session.later(self._heard, part, content))
+        self.run = started(wish, self.session, self._heard, lambda: self.run)
 
     def _heard(self, part: str, content: Any) -> None:
         if part == "map":
@@ -118,8 +120,10 @@ class _Panel:
         values = [given.get("x"), given.get("y")]
         if not all(self.axes) or not all(isinstance(v, int | float) and math.isfinite(v) for v in values):
             return
+        known = {FRICTION, *(lever.path for lever in self.session.levers())}
         for path, value in zip(self.axes, values, strict=True):
-            self.session.move(path, float(value))  # type: ignore[arg-type]
+            if path in known:
+                self.session.move(path, float(value))  # type: ignore[arg-type]
 
     def _sample(self, event: events.GenericEventArguments) -> None:
         """To a sample of the study: all of its numbers."""
@@ -132,8 +136,12 @@ class _Panel:
     def _follow(self) -> None:
         """Where the page is on the map, and whether the map is of another case by now."""
         of, now = self.of, self.session.state
-        if now.source != getattr(of, "source", now.source):
+        if now.source != self.source:
+            self.source = now.source
             self.of, self.axes, self.picture = None, ("", ""), None
+            if self.run is not None:
+                self.run.close()
+                self.run = None
             self._offer()
             self._script("clear")
             return

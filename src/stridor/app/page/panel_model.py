@@ -19,9 +19,11 @@ def build(container: ui.element, session: Session) -> None:
 
     def moved(event: events.GenericEventArguments) -> None:
         given: Any = event.args
+        if not isinstance(given, dict) or not {"path", "value"} <= set(given):
+            return
         path, value = str(given["path"]), given["value"]
         known = {lever.path for lever in session.levers()} | {"mu"}
-        if path in known and isinstance(value, int | float) and math.isfinite(value):
+        if path in known and isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
             session.move(path, float(value))
 
     ui.on("stridor-move", moved)

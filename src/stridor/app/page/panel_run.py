@@ -14,7 +14,7 @@ from ...errors import CaseError
 from ...view.style import BLUE, STATUS_COLOURS, VERMILION
 from .running import sound_of_file
 from .runs import ENDS, Run, Wish
-from .session import Session
+from .session import Session, started
 from .state import State
 
 CHARTS = (("acceleration", 150), ("force", 150), ("status", 80), ("sonogram", 170), ("portrait", 190))
@@ -78,6 +78,7 @@ class _Panel:
 
     def _go(self) -> None:
         if self.run is not None and not self.run.over:
+            self._script("show", "refused", "what is under way has not ended yet")
             return
         try:
             case = self.session.case()
@@ -90,11 +91,13 @@ class _Panel:
             return
         self.of, self.file, self.picture = self.session.state, None, None
         self._script("begin", self.session.state.mu, self._growing())
-        self.run = Run(wish, lambda part, content: self.session.later(self._heard, part, content))
+        self.run = started(wish, self.session, self._heard, lambda: self.run)
 
     def _growing(self) -> list[float]:
         """Frequencies [Hz] of the modes that grow at the μ of the page, as far as they are known."""
         at = self.session.picture.parts.get("at") or {}
+        if self.session.picture.busy and at.get("mu") != self.session.state.mu:
+            return []
         return [m["frequency_hz"] for m in at.get("modes", ()) if m.get("unstable")]
 
     def _stop(self) -> None:

@@ -117,7 +117,11 @@ class Run:
         with one_thread_each(), main_left_out():
             process.start()
         its.close()  # so that the pipe ends with the process
-        self._process, self._pipe = process, own
+        with self._lock:
+            self._process, self._pipe = process, own
+        if self.over:  # closed or stopped while it began
+            self.close()
+            return
         threading.Thread(target=self._listening, args=(own,), name="stridor-run-listener", daemon=True).start()
         self.told("begun")
 
@@ -159,6 +163,8 @@ class Run:
             except (EOFError, OSError, TypeError):  # TypeError: closed while it was being read
                 break
             self.told(last, content)
+            if last in ENDS:
+                self._ended()  # the next may begin: what is left of the process is its own end
         if last not in ENDS:
             self.told("failed", "the process of this run has died: out of memory, or killed")
         self._ended()

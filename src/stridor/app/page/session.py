@@ -12,9 +12,11 @@ from typing import Any
 from ...case import Case
 from ...errors import CaseError
 from .levers import Lever, levers
+from .runs import Run, Wish
 from .state import History, Source, State, checked, file_text, first_state, from_link, to_link
 from .worker import BENCH, Program, Worker
 
+LARGEST_MU = 10.0  # friction coefficient of the page: what is beyond takes minutes, and is none
 Loop = Callable[..., object]  # calls a function in the thread of the page: loop.call_soon_threadsafe
 
 
@@ -108,14 +110,18 @@ class Session:
     def go(self, state: State, *, moving: object = None) -> None:
         """To another state. moving: what is being moved, of which all moves in a row are one step for undo."""
         together = moving is not None and moving == self._moving
+        if state == self.state:
+            return
         self._moving = moving
+        if state.source != self.state.source:
+            self.picture.parts.clear()
         self._history.go(state, together=together)
         self._changed()
 
     def move(self, path: str, value: float) -> None:
         """A lever to a value; "mu" is the friction coefficient of the page."""
         if path == "mu":
-            self.go(replace(self.state, mu=max(float(value), 0.0)), moving="mu")
+            self.go(replace(self.state, mu=min(max(float(value), 0.0), LARGEST_MU)), moving="mu")
         else:
             self.go(self.state.with_change(path, value), moving=path)
 
@@ -125,7 +131,7 @@ class Session:
 
     def look(self, tab: str) -> None:
         """At another tab; nothing is computed for that."""
-        self._history.go(replace(self.state, tab=tab), together=True)
+        self._history.now = replace(self.state, tab=tab)
         for listener in list(self._listeners):
             listener()
 
@@ -205,3 +211,15 @@ def refused(call: Callable[[], None]) -> str:
     except CaseError as error:
         return str(error)
     return ""
+
+
+def started(wish: Wish, session: Session, heard: Callable[[str, Any], None], newest: Callable[[], Run | None]) -> Run:
+    """A run whose parts are heard in the thread of the page as long as it is the ``newest`` of its panel."""
+    made: list[Run] = []
+
+    def told(part: str, content: Any) -> None:
+        if not made or newest() is made[0]:
+            heard(part, content)
+
+    made.append(Run(wish, lambda part, content: session.later(told, part, content)))
+    return made[0]

@@ -250,7 +250,8 @@ def file_text(state: State) -> str:
 def friction_changes(state: State) -> dict[str, float]:
     """What the μ of the page changes in the case: every contact's law scaled, as all analyses do with a μ."""
     case = state.case()
-    if math.isclose(state.mu, own_friction(case), rel_tol=1e-12):
+    same = "mu" in case.parameters or len({c.friction.coefficient for c in case.contacts.values()}) <= 1
+    if same and math.isclose(state.mu, own_friction(case), rel_tol=1e-12):
         return {}
     if "mu" in case.parameters:
         return {"parameters.mu.value": state.mu}

@@ -146,6 +146,7 @@ const stridorMap = (() => {
   function clear() {
     Object.assign(page, { map: null, here: null });
     if (chart()) chart().getDom().hidden = true;
+    running(false);
     said("Another case is open.");
   }
   function start(id, colour) {

@@ -249,6 +249,7 @@ const stridor = (() => {
     else if (on.first) text = `Growth begins at μ = ${on.first.mu.toPrecision(5)}, ${on.first.frequency_hz.toFixed(1)} Hz (${on.onsets.length} onset${on.onsets.length === 1 ? "" : "s"} solved).`;
     else text = on.growing_at_start.length ? `Something grows already at μ = ${on.friction_range[0]}.` : `Nothing grows up to μ = ${on.friction_range[1]}.`;
     if (on && !on.complete) text += ` ${on.completeness}`;
+    if (state.refused && state.locus) text = `Of the last numbers that could be computed: ${text[0].toLowerCase()}${text.slice(1)}`;
     const box = $("st-said");
     if (box && box.textContent !== text) box.textContent = text;
     document.body.classList.toggle("st-busy", Boolean(busy));
@@ -304,6 +305,7 @@ const stridor = (() => {
     box.append(element("ul", {}, ...lines.map((l) => element("li", {}, l))));
   }
   function tornado(given) {
+    if (given.branch !== state.branch || (state.shape && given.mu !== state.shape.mu)) return; // of another mode
     const box = $("st-tornado");
     box.replaceChildren();
     const most = Math.max(...given.bars.map((b) => Math.abs(b.growth)), 1e-300);
@@ -320,7 +322,11 @@ const stridor = (() => {
   }
 
   // -- what the server says ----------------------------------------------------------------------------------------
+  // What was refused of an answer is over with the next answer; what was refused of a file or a link stays to be read.
+  function unanswered(text) { problem(text); state.refused = true; }
+  function answered() { if (state.refused) problem(""); state.refused = false; }
   function problem(text) {
+    state.refused = false;
     const box = $("st-problem");
     box.textContent = text;
     box.hidden = !text;
@@ -336,23 +342,35 @@ const stridor = (() => {
     placeLines();
     history.replaceState(null, "", given.link ? `#${given.link}` : location.pathname + location.search);
   }
+  // Another case is open: nothing of the one before is shown under its name.
+  function forget() {
+    Object.assign(state, { locus: null, at: null, onsets: null, shape: null, geometry: null, refused: false });
+    for (const name of Object.keys(KINDS)) chartOf(name)?.clear();
+    document.querySelectorAll(".st-mu").forEach((e) => { e.hidden = true; });
+    for (const id of ["st-model", "st-modes-list", "st-mode-facts", "st-tornado"]) $(id)?.replaceChildren();
+    for (const id of ["st-title", "st-modes-said"]) $(id).textContent = "";
+    $("st-modes-title").textContent = "Modes";
+    shape();
+    said(true);
+  }
   const parts = {
     model(c) {
       $("st-model").innerHTML = c.svg || "<p class='st-note'>Matrices without places: there is nothing to draw.</p>";
       $("st-title").textContent = c.title;
       if (c.why) problem(c.why);
     },
-    locus(c) { state.locus = c; state.onsets = null; state.progress = ""; problem(""); draw(); stamp("locus"); },
-    at(c) { state.at = c; list(); problem(""); stamp("at"); },
+    locus(c) { state.locus = c; state.onsets = null; state.progress = ""; answered(); draw(); document.querySelectorAll(".st-mu").forEach((e) => { e.hidden = false; }); stamp("locus"); },
+    at(c) { state.at = c; list(); answered(); stamp("at"); },
     onsets(c) { state.onsets = c; draw(); },
     shape(c) {
-      if (state.shape?.branch !== c.branch) $("st-tornado").replaceChildren(element("p", { class: "st-note" }, "Being computed."));
+      const later = state.at?.said ? "Left to `stridor sensitivities` for a model of this size." : "Being computed.";
+      if (state.shape?.branch !== c.branch || state.shape?.mu !== c.mu) $("st-tornado").replaceChildren(element("p", { class: "st-note" }, later));
       state.shape = c;
       shape();
     },
     tornado,
     progress(c) { state.progress = c.what; },
-    refused: problem, unanswered: problem, failed: problem,
+    refused: unanswered, unanswered, failed: unanswered,
   };
   // How often each part was drawn, for measurements: counted when it is on the screen.
   const stamp = (part) => requestAnimationFrame(() => { state.drawn[part] = (state.drawn[part] ?? 0) + 1; });
@@ -385,5 +403,5 @@ const stridor = (() => {
   };
   setTimeout(hello, 0);
   const copyLink = () => navigator.clipboard?.writeText(location.href).catch(() => problem("the link could not be copied: take the address of the page"));
-  return { state, levers, follow, show, problem, start, turnDark, copyLink };
+  return { state, levers, follow, forget, show, problem, start, turnDark, copyLink };
 })();

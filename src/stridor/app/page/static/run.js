@@ -146,6 +146,8 @@ const stridorRun = (() => {
   function begin(mu, growing) {
     Object.assign(page, { mu, growing, picture: null, sonogramAt: 0 });
     silence();
+    stale(false);
+    document.querySelectorAll(".st-run-chart").forEach((e) => { e.hidden = true; });
     $("st-run-listen").disabled = true;
     $("st-run-progress").value = 0;
     running(true);
