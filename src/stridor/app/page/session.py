@@ -147,7 +147,10 @@ class Session:
         """The state of a link. Raises CaseError, and the page stays as it is."""
         state = from_link(link, self._own)
         state.case()
-        self.go(state)
+        if state == self.state:
+            self._changed()  # a page that has just been opened: nothing is computed yet
+        else:
+            self.go(state)
 
     def undo(self) -> None:
         """One step back."""
