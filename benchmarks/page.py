@@ -19,7 +19,8 @@ CHROMIUM = Path("/usr/bin/chromium")
 MOVE = """([path, share]) => new Promise((done) => {
   const slider = document.querySelector(`[data-path="${path}"]`), part = path === "mu" ? "at" : "locus";
   const before = stridor.state.drawn[part] ?? 0, began = performance.now();
-  slider.value = Math.round(share * slider.max);
+  const value = Math.round(share * slider.max);
+  slider.value = value === Number(slider.value) ? value + 1 : value; // what stays where it is draws nothing
   slider.dispatchEvent(new Event("input", { bubbles: true }));
   const drawn = () => (stridor.state.drawn[part] ?? 0) > before;
   const look = () => (drawn() ? done(performance.now() - began) : requestAnimationFrame(look));
