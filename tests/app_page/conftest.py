@@ -1,4 +1,4 @@
-"""One browser and one server for all tests of the page in a browser."""
+"""A browser and a server for the tests of a module: while a browser is there, nothing else may run an event loop."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import pytest
 from browsing import CHROMIUM, page_at, serving
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def address() -> Generator[str]:
     with serving() as (_, found):
         yield found
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Generator[Any]:
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with sync_api.sync_playwright() as playwright:

@@ -271,7 +271,7 @@ const stridor = (() => {
       return element("tr", { class: `${m.unstable ? "st-grows" : ""} ${m.branch === state.branch ? "st-chosen" : ""}` },
         element("td", {}, button), element("td", {}, m.frequency_hz.toFixed(1)), element("td", {}, shown(m.growth_rate)), element("td", {}, m.unstable ? "growing" : "stable"));
     });
-    const head = element("tr", {}, ...["mode", "frequency [Hz]", "growth [1/s]", ""].map((h) => (h ? element("th", { scope: "col" }, h) : element("td"))));
+    const head = element("tr", {}, ...["mode", "frequency [Hz]", "growth [1/s]", ""].map((h) => element("th", { scope: "col" }, h)));
     box.replaceChildren(element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows)));
     box.scrollTop = scroll;
     if (held) box.querySelector(`[data-branch="${held}"]`)?.focus({ preventScroll: true });
@@ -316,7 +316,7 @@ const stridor = (() => {
       return element("tr", {}, element("th", { scope: "row", title: b.path }, ...b.path.split(/(?<=\.)/).flatMap((part) => [part, element("wbr")])), element("td", { class: "st-bars", "aria-hidden": "true" }, bar),
         element("td", {}, `${b.growth > 0 ? "+" : ""}${shown(b.growth, 3)}`), element("td", {}, `${b.frequency_hz > 0 ? "+" : ""}${shown(Math.abs(b.frequency_hz) < 1e-9 * Math.abs(given.frequency_hz) ? 0 : b.frequency_hz, 3)}`));
     });
-    const head = element("tr", {}, ...["number, + 1 %", "", "growth [1/s]", "frequency [Hz]"].map((h) => (h ? element("th", { scope: "col" }, h) : element("td"))));
+    const head = element("tr", {}, ...["number, + 1 %", "", "growth [1/s]", "frequency [Hz]"].map((h) => element("th", { scope: "col" }, h)));
     if (rows.length) box.append(element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows)));
     for (const w of given.warnings) box.append(element("p", { class: "st-note" }, w));
   }
