@@ -156,14 +156,16 @@ def test_two_hundred_moves_in_a_row_make_no_queue(page: Any):
       }
     }""")
     began = time.monotonic()
-    last = page.locator('[data-number="bodies.beam1.angle_deg"]').input_value()
-    wanted = st.onsets(st.loads(template_text("two-beams")).with_({"bodies.beam1.angle_deg": float(last)})).first.mu
+    # Of the last of them; the field may show an earlier one, which the server repeats, a moment longer.
+    last = 55 + 60 * (60 + 199 % 80) / 200
+    wanted = st.onsets(st.loads(template_text("two-beams")).with_({"bodies.beam1.angle_deg": last})).first.mu
     try:
         wait(page, f"stridor.state.onsets?.first?.mu === {wanted!r}")
     except Exception as error:  # of playwright, which may not be installed
         told = "[stridor.state.values, stridor.state.onsets?.first, stridor.state.drawn, document.body.innerText.slice(0, 400)]"
         raise AssertionError(f"not at {last}, {wanted!r}: {page.evaluate(told)}") from error
-    assert time.monotonic() - began < 8.0  # one answer, and not what is left of two hundred
+    assert float(page.locator('[data-number="bodies.beam1.angle_deg"]').input_value()) == last
+    assert time.monotonic() - began < 15.0  # one answer, and not what is left of two hundred
     assert page.evaluate("stridor.state.drawn.locus") < 150
 
 
