@@ -54,7 +54,7 @@ OF_A_CASE = {  # of what is in a case file beside the matrices
     "stability_boundary",
 }  # fmt: skip
 OTHERS = {  # what takes no problem
-    "AnalysisError", "Case", "CaseError", "StridorError", "Study", "System", "build_system", "load", "loads", "open",
+    "AnalysisError", "Case", "CaseError", "StridorError", "Study", "System", "app", "build_system", "load", "loads", "open",
     "open_study", "plot", "run_study", "save", "sound", "study_figures", "to_dataset",
 }  # fmt: skip
 
