@@ -65,6 +65,24 @@ def test_a_column_that_buckles(damping: float):
     assert [o.frequency_hz for o in found] == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("seeds", [range(12), pytest.param(range(1000), marks=pytest.mark.slow)])
+def test_columns_that_buckle_in_any_basis(seeds):
+    """Where k − p is zero only rounding is left of that mode's entries: their size is that of k and p."""
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        n = int(rng.integers(2, 8))
+        k = np.cumsum(rng.integers(1, 4, n) if seed % 2 else rng.uniform(0.3, 1.5, n)).astype(float)
+        turn = np.linalg.qr(rng.standard_normal((n, n)))[0]
+        terms = [(turn @ turn.T, "mass", CONSTANT), (turn @ np.diag(k) @ turn.T, "stiffness", CONSTANT),
+                 (-turn @ turn.T, "stiffness", P)]  # fmt: skip
+        if seed % 3:
+            terms.append((rng.choice([1e-4, 0.05, 1.0]) * turn @ turn.T, "damping", CONSTANT))
+        found = along(terms, float(k[-1] + 1), 3 * float(np.sqrt(k[-1])))
+        assert [o.value for o in found] == pytest.approx(k, rel=1e-9), seed
+        assert {(o.kind, o.stabilising) for o in found} == {("divergence", False)}, seed
+        assert found.complete, seed
+
+
 def test_divergence_that_ends_and_flutter_that_begins():
     """(λ² + cλ)² + (4 − 2p)(λ² + cλ) + (1 − p)(3 − p) + s² p² = 0 with K = diag(1, 3) − p and circulatory s p: the constant
     vanishes at 1 and 3 for s = 0; flutter follows the closed form of two modes with equal damping."""

@@ -231,7 +231,7 @@ def test_strong_dashpots_far_from_the_band_bring_modes_into_it(first):
 
 def close_pairs(seed: int) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
     """M, D, K and a band: modes that nearly coincide, some joined by friction before or beyond their meeting, with
-    dashpots, proportional damping and now and then gyroscopic forces that couple all."""
+    dashpots, proportional damping and now and then gyroscopic forces that couple all, or a load that buckles some."""
     random = np.random.default_rng(seed)
     r = int(random.integers(10, 60))
     omega = np.sort(random.uniform(0.2, 1.0, r) * np.geomspace(1, 10 ** random.uniform(0.5, 2.5), r))
@@ -239,6 +239,8 @@ def close_pairs(seed: int) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], f
         omega[j + 1] = omega[j] * (1 + 10 ** random.uniform(-7, -2))
     shapes = np.linalg.qr(random.standard_normal((r, r)))[0]
     stiffness = np.diag(omega**2)
+    if seed % 4 == 2:  # buckled, about to, or not held
+        stiffness -= omega[int(random.integers(0, r))] ** 2 * (1 + random.choice([0, -1, 1]) * 1e-5) * np.eye(r)
     for j in random.integers(0, r - 1, int(random.integers(0, 4))):
         coupling = random.uniform(0, 1.5) * abs(omega[j + 1] ** 2 - omega[j] ** 2) / 2
         stiffness[j, j + 1] += coupling
@@ -266,7 +268,7 @@ def test_modes_that_damping_mixes_are_all_there_and_none_is_there_twice(seeds):
         one_to_one = linear_sum_assignment(away)
         # Of two that all but coincide the companion matrix has no more digits.
         assert away[one_to_one].max(initial=0.0) < 1e-6, seed
-    assert cheap > 0.7 * len(seeds)
+    assert cheap > 0.6 * len(seeds)
 
 
 def strongly_damped() -> ParametricProblem:

@@ -122,7 +122,7 @@ class DenseProblem(OverNumber):
         return v[-1].conj() / columns, u[:, -1].conj() / rows
 
     def _entries(self, lam: complex, mu: complex) -> Array:
-        """What the entries (r, r) of P(λ, μ) are made of."""
+        """What the entries (r, r) of P(λ, μ) are made of: of their terms where it is known, as these may cancel."""
         mass, damping, stiffness = self.matrices(mu)
         size: Array = abs(lam) ** 2 * np.abs(mass) + abs(lam) * np.abs(damping) + np.abs(stiffness)
         return size

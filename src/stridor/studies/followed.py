@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from ..case import Case
 from ..errors import StridorError
 from ..io.atomic import replacing
 from ..modal.parametric import ReducedModel
-from ..modal.parametric.line import matched_numbers, numbers_at
+from ..modal.parametric.line import Numbered, matched_numbers, numbers_at
 from ..modal.parametric.model import ReducedModes
 from ..stages import stage
 from ..study.analyses import modes
@@ -29,14 +28,6 @@ STEP = 0.05  # of μ, from one anchor to the next
 MOST = 21
 ASIDE = 0.02  # of the range
 NEAR = 1e-5  # of |λ|: how near the model's modes are to those of the full problem
-
-
-@dataclass(frozen=True)
-class Anchor:
-    """Modes of a model whose numbers (k,) are known; 0 where they are not."""
-
-    modes: ReducedModes
-    numbers: IntArray
 
 
 def anchors_noted(model: ReducedModel, case: Case, names: Mapping[str, str], path: Path) -> None:
@@ -65,7 +56,7 @@ def anchors_noted(model: ReducedModel, case: Case, names: Mapping[str, str], pat
         temporary.write_text(json.dumps(told), encoding="utf-8")
 
 
-def anchors_read(model: ReducedModel, path: Path) -> tuple[Anchor, ...]:
+def anchors_read(model: ReducedModel, path: Path) -> tuple[Numbered, ...]:
     """What `anchors_noted` wrote, at the model's own modes; nothing where there is no file or it is damaged."""
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
@@ -75,20 +66,20 @@ def anchors_read(model: ReducedModel, path: Path) -> tuple[Anchor, ...]:
         ]
     except (OSError, ValueError, KeyError, TypeError):
         return ()
-    anchors: list[Anchor] = []
+    anchors: list[Numbered] = []
     for mu, values, numbers in known:
         point = model.problem.reference
         found = model.modes({**point, FRICTION: mu} if FRICTION in point else point)
         upper = found.values.imag >= 0
         if upper.all():
-            anchors.append(Anchor(found, matched_numbers(values, numbers, found.values, NEAR)))
+            anchors.append(Numbered(model, found, matched_numbers(values, numbers, found.values, NEAR)))
     return tuple(anchors)
 
 
-def numbered(model: ReducedModel, anchors: tuple[Anchor, ...], found: ReducedModes) -> IntArray:
+def numbered(anchors: tuple[Numbered, ...], found: ReducedModes) -> IntArray:
     """Numbers (k,) of the modes of a row, 0 where they are not known."""
     if not anchors:
         return np.zeros(len(found.values), dtype=np.int64)
     mu = found.point.get(FRICTION, 0.0)
     nearest = min(anchors, key=lambda a: abs(a.modes.point.get(FRICTION, 0.0) - mu))
-    return numbers_at(model, nearest.modes, nearest.numbers, found)
+    return numbers_at(nearest, found)

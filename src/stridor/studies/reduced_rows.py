@@ -18,6 +18,7 @@ from ..errors import AnalysisError, CaseError
 from ..io.reduced_models import load_reduced, save_reduced
 from ..modal.full import onsets_along
 from ..modal.parametric import ReducedModel
+from ..modal.parametric.line import Numbered
 from ..modal.tolerances import UNSTABLE_RELATIVE
 from ..sliding.stretches import stretches
 from ..study.options import options_of
@@ -25,7 +26,7 @@ from ..study.reduced import reduced_model
 from ..system import build_system
 from ..typing import Array
 from .checks import FRICTION
-from .followed import Anchor, anchors_noted, anchors_read, numbered
+from .followed import anchors_noted, anchors_read, numbered
 from .rows import Row, modes_row, onsets_row
 from .schema import Study
 from .tables import OF_ONSETS, ROUNDING, SAME, Compute, Keep
@@ -45,7 +46,7 @@ class Reduced:
     models: tuple[ReducedModel, ...]
     compute: Compute
     names: Mapping[str, str]
-    anchors: tuple[tuple[Anchor, ...], ...] = ()
+    anchors: tuple[tuple[Numbered, ...], ...] = ()
 
     @staticmethod
     def read(path: str, case: Case) -> Reduced:
@@ -68,12 +69,12 @@ class Reduced:
         return None
 
     def _modes(
-        self, model: ReducedModel, anchors: tuple[Anchor, ...], point: Mapping[str, float], keep: Keep
+        self, model: ReducedModel, anchors: tuple[Numbered, ...], point: Mapping[str, float], keep: Keep
     ) -> Row:
         found = model.modes(point)
         upper = found.values.imag >= 0
         lam, error = found.values[upper], found.error[upper]
-        row = modes_row(lam, numbered(model, anchors, found)[upper], keep.modes, model.frequency)
+        row = modes_row(lam, numbered(anchors, found)[upper], keep.modes, model.frequency)
         near = np.abs(lam.real) <= np.maximum(SAFE * error, NEAR) * np.abs(lam)
         if not np.any(model.problem.powers == 1):
             # Without damping what is stable lies on the axis, but for rounding.

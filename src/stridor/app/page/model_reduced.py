@@ -15,7 +15,7 @@ from ...modal.complex_modes import ComplexModes
 from ...modal.full import ParametricOnset, ParametricOnsets, onsets_along
 from ...modal.parametric import ReducedModel
 from ...modal.parametric.contacts import ContactsProblem
-from ...modal.parametric.line import numbers_at
+from ...modal.parametric.line import Numbered, numbers_at
 from ...modal.parametric.model import ReducedModes
 from ...stages import heard
 from ...study.reduced import reduced_model
@@ -41,7 +41,7 @@ class Reduced:
     stiffness_path: str
     words: str
     base: Any
-    _numbered: list[tuple[ReducedModes, IntArray]] = field(default_factory=list[tuple[ReducedModes, IntArray]])
+    _numbered: list[Numbered] = field(default_factory=list[Numbered])
 
     @staticmethod
     def made(state: State, tell: Tell) -> Reduced:
@@ -82,7 +82,7 @@ class Reduced:
         for mu in np.unique(np.append(0.0, mus)):
             found = self.model.modes(self._point(replace(state, mu=float(mu))))
             number = self._numbers(found, state)
-            self._numbered.append((found, number))
+            self._numbered.append(Numbered(self.model, found, number))
             if mu in mus:
                 rows.append(found)
                 numbers.append(number)
@@ -118,9 +118,9 @@ class Reduced:
             return numbers
         if not self._numbered:
             start = self.model.modes(self._point(replace(state, mu=0.0)))
-            self._numbered = [(start, self._numbers(start, state))]
-        nearest, numbers = min(self._numbered, key=lambda k: self._apart(k[0].point, found.point))
-        return numbers_at(self.model, nearest, numbers, found)
+            self._numbered = [Numbered(self.model, start, self._numbers(start, state))]
+        nearest = min(self._numbered, key=lambda k: self._apart(k.modes.point, found.point))
+        return numbers_at(nearest, found)
 
     def _apart(self, one: Mapping[str, float], other: Mapping[str, float]) -> float:
         """How far two points are from each other, of the ranges; friction counts most, as branches meet over it."""

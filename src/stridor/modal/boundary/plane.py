@@ -24,7 +24,7 @@ from ..newton import Border, BorderedFactor
 from ..options import Options
 from ..parametric import Parameter, ParametricProblem, Term
 from ..parametric.basis import expanded
-from ..parametric.dense import DenseModes, assembled, dense_modes
+from ..parametric.dense import DenseModes, assembled, dense_modes, made_of
 from ..quadratic import Quadratic
 from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
@@ -69,6 +69,10 @@ class Plane:
             found = assembled(self.terms, self.problem.factors(self.values(p)), self.problem.powers)
             self._last = key, found
         return self._last[1]
+
+    def made_of(self, p: Array, lam: complex) -> Array:
+        """What the entries (r, r) of P(λ) are made of at a point."""
+        return made_of(self.terms, self.problem.factors(self.values(p)), self.problem.powers, lam)
 
     def changes(self, p: Array, direction: Array) -> tuple[Array, Array, Array]:
         """What M, D and K (r, r) change by per unit of a direction (2,)."""
@@ -174,6 +178,9 @@ class Chord(DenseProblem):
     def changes(self, mu: complex) -> tuple[Array, Any, Any]:
         """dM, dD and dK (r, r) over a."""
         return self._plane.changes(self.point(mu.real), self.direction)
+
+    def _entries(self, lam: complex, mu: complex) -> Array:
+        return self._plane.made_of(self.point(mu.real), lam)
 
     @property
     def reversible(self) -> bool:

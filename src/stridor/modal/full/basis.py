@@ -155,6 +155,13 @@ class Projected(OnBasis):
         """dM, dD and dK over μ (r, r) at μ − low, which may be complex."""
         return self._summed([self._form[role].slopes(self.family.low + mu) for role in ROLES])
 
+    def _entries(self, lam: complex, mu: complex) -> Array:
+        total = np.zeros((self._size, self._size))
+        factors = [self._form[role].factors(self.family.low + mu) for role in ROLES]
+        for row, k, part in self._parts:
+            total += abs(lam) ** (2 - row) * abs(factors[row][k]) * np.abs(part)
+        return total
+
     def _summed(self, factors: list[Any]) -> tuple[Array, Any, Any]:
         size = self._size
         totals = [np.zeros((size, size), dtype=f.dtype) for f in factors]

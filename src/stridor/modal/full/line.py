@@ -17,7 +17,7 @@ from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
 from ..options import Options
 from ..parametric import Parameter, ParametricProblem, ReducedModel, Term
-from ..parametric.dense import assembled
+from ..parametric.dense import assembled, made_of
 from ..quadratic import Quadratic
 from .basis import OnBasis
 from .family import EXACT, ROLES, Family, deviation, wide
@@ -131,3 +131,7 @@ class OnTerms(OnBasis):
     def changes(self, mu: complex) -> tuple[Array, Any, Any]:
         """dM, dD and dK over s (r, r), of the real part of it."""
         return assembled(self._terms, self._line.factor_slopes(float(mu.real)), self._line.problem.powers)
+
+    def _entries(self, lam: complex, mu: complex) -> Array:
+        problem = self._line.problem
+        return made_of(self._terms, problem.factors(self._line.point(float(mu.real))), problem.powers, lam)

@@ -10,14 +10,20 @@ import scipy.linalg as sl
 from ...direct.dense import lu_factors
 from ...errors import AnalysisError
 from ...typing import Array, BoolArray, ComplexArray
+from .basis import expanded
 
-NEAR = (1.6, 4.0)  # modes up to this much above the band are solved for together: first try, second try
+NEAR = (1.2, 4.0)  # modes up to this much above the band are solved for together: first try, second try
 SMALL = 1e-13
 HIDDEN = 0.3  # share of their stiffness that damping of modes far away may reach at the end of the band
 ANSWERS = 6
 FEW = 20  # modes that others' answers leave unsettled, solved for one by one
 OFF = 1e-10  # of λ: how far beside it is factorised, so that the matrix is not singular
 JUMP = 0.1  # of the distance to the next mode: what an inverse iteration may move one
+MIXED = 0.1  # share of a mode in another by damping from which the two are not told apart by answers
+MOVED = 0.5  # of the distance to the next mode: what answers may move one
+
+Matrices = tuple[Array, Array, Array]  # M, D, K (r, r)
+Images = tuple[ComplexArray, ComplexArray, ComplexArray]  # what they make of vectors (r, k)
 
 
 @dataclass(frozen=True)
@@ -91,12 +97,13 @@ def _by_undamped(mass: Array, damping: Array, stiffness: Array, frequency: float
 
 
 def _with_damping(
-    matrices: tuple[Array, Array, Array], squares: ComplexArray, right: ComplexArray, left: ComplexArray,
+    matrices: Matrices, squares: ComplexArray, right: ComplexArray, left: ComplexArray,
     frequency: float, reach: float, nearby: float,
 ) -> DenseModes | None:  # fmt: skip
-    """The damped modes from all the undamped ones, of which those up to ``nearby`` times the band are solved together;
-    None where the others' answer does not settle."""
+    """The damped modes from all the undamped ones, of which those up to ``nearby`` times the band are solved together
+    and all but the close ones answer for what is left; None where the answers do not settle."""
     mass, damping, stiffness = matrices
+    transposed = mass.T, damping.T, stiffness.T
     finite = np.isfinite(squares)
     near = finite & (np.abs(squares) <= (nearby * reach * frequency) ** 2)
     far = np.flatnonzero(finite & ~near)
@@ -119,29 +126,53 @@ def _with_damping(
     scale = np.where(finite, 1.0 / (np.sqrt(np.abs(weight)) * np.maximum(np.sqrt(np.abs(squares)), top)), 0.0)
     if top * _coupling(damping, right[:, far] * scale[far], left * scale) > HIDDEN:
         return None
-    weight = weight[far]
-    number, open_modes = len(lam) + 1, np.ones(len(lam), dtype=bool)
+    ours, theirs = _images(matrices, z), _images(transposed, w)
+    open_modes = np.ones(len(lam), dtype=bool)
+    first, number, answering = lam, len(lam) + 1, _answering(lam, squares, weight, right, left, ours, theirs)
+    answering[far] = True
     for _ in range(ANSWERS):
-        inverse = 1.0 / ((lam**2 - squares[far, None]) * weight[:, None])
-        z = z - right[:, far] @ (inverse * (left[:, far].T @ _rest(lam, z, mass, damping, stiffness)))
-        w = w - left[:, far] @ (inverse * (right[:, far].T @ _rest(lam, w, mass.T, damping.T, stiffness.T)))
-        lam = _functional(lam, z, w, mass, damping, stiffness)
-        before, open_modes = number, _unsettled(lam, z, w, matrices)
+        inverse = np.where(answering, 1.0 / ((lam**2 - squares[:, None]) * weight[:, None]), 0.0)
+        z = z - right @ (inverse * (left.T @ _rest(lam, ours)))
+        w = w - left @ (inverse * (right.T @ _rest(lam, theirs)))
+        ours, theirs = _images(matrices, z), _images(transposed, w)
+        lam = _functional(lam, w, ours)
+        before, open_modes = number, _unsettled(lam, w, ours, theirs)
         number = int(open_modes.sum())
         if not number or number == before:
             break
-    if number > FEW:
+    if number > FEW or np.any(np.abs(lam - first) >= MOVED * _apart(first)):
         return None
     for k in np.flatnonzero(open_modes):
         # Two modes that are about to meet take the inverse itself.
-        apart = np.abs(np.delete(lam, k) - lam[k]).min(initial=np.inf)
+        apart = _apart(lam)[k]
         value, z[:, k], w[:, k] = _inverse_iteration(complex(lam[k]), z[:, k], w[:, k], matrices)
         if not abs(value - lam[k]) < JUMP * apart:
             return None
         lam[k] = value
-    if number and _unsettled(lam, z, w, matrices).any():
+    if number and _unsettled(lam, w, _images(matrices, z), _images(transposed, w)).any():
         return None
     return None if np.any(np.abs(lam) > reach * frequency * 1.001) else DenseModes(lam, z, w, whole=False)
+
+
+def _answering(
+    lam: ComplexArray, squares: ComplexArray, weight: ComplexArray, right: ComplexArray, left: ComplexArray,
+    ours: Images, theirs: Images,
+) -> BoolArray:  # fmt: skip
+    """Which undamped modes (r, k) answer for what each damped one leaves: all but its own, for which λ answers, and
+    those that damping mixes with it, which the small problem has told apart."""
+    distance = np.abs((lam**2 - squares[:, None]) * weight[:, None])
+    sizes = np.maximum(np.abs(left.T @ ours[1]), np.abs(right.T @ theirs[1])) * np.abs(lam)
+    apart: BoolArray = sizes <= MIXED * distance
+    apart[np.argmin(np.abs(lam**2 - squares[:, None]), axis=0), np.arange(len(lam))] = False
+    return apart
+
+
+def _apart(lam: ComplexArray) -> Array:
+    """Of each λ (k,) how far the next one is away."""
+    distance = np.abs(lam[:, None] - lam)
+    np.fill_diagonal(distance, np.inf)
+    nearest: Array = distance.min(axis=1, initial=np.inf)
+    return nearest
 
 
 def _coupling(damping: Array, right: ComplexArray, left: ComplexArray) -> float:
@@ -157,18 +188,16 @@ def _coupling(damping: Array, right: ComplexArray, left: ComplexArray) -> float:
     return norm
 
 
-def _unsettled(lam: ComplexArray, z: ComplexArray, w: ComplexArray, matrices: tuple[Array, Array, Array]) -> BoolArray:
+def _unsettled(lam: ComplexArray, w: ComplexArray, ours: Images, theirs: Images) -> BoolArray:
     """Of which modes (k,) what is left on both sides allows for an error above SMALL."""
-    mass, damping, stiffness = matrices
-    right = np.linalg.norm(_rest(lam, z, mass, damping, stiffness), axis=0)
-    left = np.linalg.norm(_rest(lam, w, mass.T, damping.T, stiffness.T), axis=0)
-    slope = np.einsum("ij,ij->j", w, 2 * lam * (mass @ z) + damping @ z)
+    right, left = (np.linalg.norm(_rest(lam, images), axis=0) for images in (ours, theirs))
+    slope = np.einsum("ij,ij->j", w, 2 * lam * ours[0] + ours[1])
     unsettled: BoolArray = ~(right * left <= SMALL * np.abs(lam * slope))
     return unsettled
 
 
 def _inverse_iteration(
-    lam: complex, z: ComplexArray, w: ComplexArray, matrices: tuple[Array, Array, Array]
+    lam: complex, z: ComplexArray, w: ComplexArray, matrices: Matrices
 ) -> tuple[complex, ComplexArray, ComplexArray]:
     """λ, right and left vectors (r,) of one mode from those close by, by one factorisation."""
     mass, damping, stiffness = matrices
@@ -178,18 +207,23 @@ def _inverse_iteration(
     for _ in range(2):
         z, w = sl.lu_solve(factor, slope @ z), sl.lu_solve(factor, slope.T @ w, trans=1)
         z, w = z / np.linalg.norm(z), w / np.linalg.norm(w)
-    return complex(_functional(np.array([lam]), z[:, None], w[:, None], *matrices)[0]), z, w
+    return complex(_functional(np.array([lam]), w[:, None], _images(matrices, z[:, None]))[0]), z, w
 
 
-def _rest(lam: ComplexArray, z: ComplexArray, mass: Array, damping: Array, stiffness: Array) -> ComplexArray:
-    return lam**2 * (mass @ z) + lam * (damping @ z) + stiffness @ z
+def _images(matrices: Matrices, z: ComplexArray) -> Images:
+    """Mz, Dz and Kz (r, k)."""
+    mass, damping, stiffness = matrices
+    return expanded(mass, z), expanded(damping, z), expanded(stiffness, z)
 
 
-def _functional(
-    lam: ComplexArray, z: ComplexArray, w: ComplexArray, mass: Array, damping: Array, stiffness: Array
-) -> ComplexArray:
+def _rest(lam: ComplexArray, images: Images) -> ComplexArray:
+    of_mass, of_damping, of_stiffness = images
+    return lam**2 * of_mass + lam * of_damping + of_stiffness
+
+
+def _functional(lam: ComplexArray, w: ComplexArray, images: Images) -> ComplexArray:
     """λ (k,) that makes wᵀP(λ)z zero, by Newton from the one before."""
-    a, b, c = (np.einsum("ij,ij->j", w, matrix @ z) for matrix in (mass, damping, stiffness))
+    a, b, c = (np.einsum("ij,ij->j", w, image) for image in images)
     for _ in range(3):
         lam = lam - (a * lam**2 + b * lam + c) / (2 * a * lam + b)
     return lam
@@ -201,6 +235,12 @@ def _real_span(vectors: ComplexArray, squares: ComplexArray) -> Array:
     upper = vectors[:, squares.imag > 0]
     columns += [upper.real, upper.imag]
     return np.hstack(columns)
+
+
+def made_of(projected: Array, factors: Array, powers: Array, lam: complex) -> Array:
+    """What the entries (r, r) of P(λ) are made of: sizes of the terms, not of a sum in which they may cancel."""
+    mass, damping, stiffness = assembled(np.abs(projected), np.abs(factors), powers)
+    return np.asarray(abs(lam) ** 2 * mass + abs(lam) * damping + stiffness)
 
 
 def assembled(projected: Array, factors: Array, powers: Array) -> tuple[Array, Array, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -170,16 +170,11 @@ class Axis:
 
     def weights(self, value: float) -> Array:
         """Lagrange's polynomials (k,) at a value of the parameter (barycentric; Berrut and Trefethen, SIAM Rev. 46)."""
-        distance = self._coordinate(value) - self._nodes
-        hit = np.flatnonzero(distance == 0.0)
-        if len(hit):
-            return np.eye(len(distance))[hit[0]]
-        share = self._barycentric / distance
-        return share / share.sum()
+        return _weights(self, value)
 
     def slopes(self, value: float) -> Array:
         """Their derivatives (k,) over the parameter."""
-        x, w = self._nodes, self._barycentric
+        x, w = self.nodes, self.barycentric
         with np.errstate(divide="ignore"):
             matrix = w[None, :] / w[:, None] / (x[:, None] - x[None, :])
         np.fill_diagonal(matrix, 0.0)
@@ -187,22 +182,38 @@ class Axis:
         slopes = self.weights(value) @ matrix
         return slopes / value if self.logarithmic else slopes
 
-    def _coordinate(self, value: float) -> float:
+    def coordinate(self, value: float) -> float:
+        """What the polynomials are polynomials in."""
         with np.errstate(all="ignore"):
             return float(np.log(value)) if self.logarithmic else value
 
     @cached_property
-    def _nodes(self) -> Array:
-        return np.array([self._coordinate(p) for p in self.points])
+    def nodes(self) -> Array:
+        """Where the points are (k,)."""
+        return np.array([self.coordinate(p) for p in self.points])
 
     @cached_property
-    def _barycentric(self) -> Array:
-        x = self._nodes
+    def barycentric(self) -> Array:
+        """Weights (k,) of the barycentric formula."""
+        x = self.nodes
         # In units in which products of distances neither grow nor shrink with their number.
         unit = max(float(np.ptp(x)), 1e-300) / 4
         apart = (x[:, None] - x[None, :]) / unit
         np.fill_diagonal(apart, 1.0)
         return 1.0 / apart.prod(axis=1)
+
+
+@lru_cache(maxsize=1000)  # all terms of a problem have the same few axes
+def _weights(axis: Axis, value: float) -> Array:
+    distance = axis.coordinate(value) - axis.nodes
+    hit = np.flatnonzero(distance == 0.0)
+    if len(hit):
+        weights = np.eye(len(distance))[hit[0]]
+    else:
+        share = axis.barycentric / distance
+        weights = share / share.sum()
+    weights.setflags(write=False)
+    return weights
 
 
 @dataclass(frozen=True)
@@ -226,7 +237,7 @@ class Tabulated:
     def _combined(self, weights: list[Array]) -> float:
         table = self._table
         for own in weights:
-            table = np.tensordot(own, table, axes=1)
+            table = (own @ table.reshape(len(own), -1)).reshape(table.shape[1:])
         return float(table)
 
     @cached_property

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ...errors import AnalysisError
-from ...typing import ComplexArray, IntArray
+from ...typing import Array, ComplexArray, IntArray
 from ..dense_problem import Eigenpairs, OverNumber, combined
 from ..krylov.follow import Follower, State
 from .dense import assembled
@@ -19,16 +20,30 @@ DIFFERENCE = 1e-5  # of the line: for slopes of its matrices
 NEAR_TOP = 1e-3  # of the band: modes this close to its end at the end of the line may be outside of it
 
 
-class Line(OverNumber):
-    """Modes of a model from ``start`` (t = 0) to ``end`` (t = 1). known: modes at some t."""
+@dataclass(frozen=True)
+class Numbered:
+    """Modes of a model whose numbers (k,) are known; 0 where they are not."""
 
-    def __init__(
-        self, model: ReducedModel, start: Mapping[str, float], end: Mapping[str, float],
-        known: Mapping[float, ReducedModes],
-    ) -> None:  # fmt: skip
+    model: ReducedModel
+    modes: ReducedModes
+    numbers: IntArray
+
+    @cached_property
+    def shares(self) -> ComplexArray:
+        """wᵀA_jz (t, k) of the terms: slopes in any direction follow from them."""
+        left, right = self.modes.left, self.modes.right
+        return np.array([np.einsum("ij,ij->j", left, combined(part, right)) for part in self.model.projected])
+
+
+class Line(OverNumber):
+    """Modes of a model from ``start`` (t = 0) to ``end`` (t = 1)."""
+
+    def __init__(self, start: Numbered, end: ReducedModes) -> None:
+        model = start.model
         super().__init__(model.frequency, (0.0, 1.0), damped=bool(np.any(model.problem.powers == 1)))
-        self.model, self.start, self.end = model, start, end
-        self._modes = dict(known)
+        self.model, self._begin = model, start
+        self.start, self.end = start.modes.point, end.point
+        self._modes = {0.0: start.modes, 1.0: end}
 
     def point(self, t: float) -> dict[str, float]:
         """The parameters at t."""
@@ -52,37 +67,41 @@ class Line(OverNumber):
 
     def _slopes(self, t: float, modes: ReducedModes) -> ComplexArray:
         """dx/dt (k,) of the coordinates."""
-        problem, projected = self.model.problem, self.model.projected
+        problem, lam = self.model.problem, modes.values
         low, high = max(t - DIFFERENCE, 0.0), min(t + DIFFERENCE, 1.0)
         change = (problem.factors(self.point(high)) - problem.factors(self.point(low))) / (high - low)
-        lam, right = modes.values, modes.right
-        moved = [combined(part, right) for part in assembled(projected, change, problem.powers)]
-        mass, damping, _ = assembled(projected, problem.factors(self.point(t)), problem.powers)
-        by_x = combined(mass, right)
-        if self.damped:
-            by_x = 2 * lam * by_x + combined(damping, right)
+        here = problem.factors(self.point(t))
+        moved, sizes = (self._sandwiched(t, modes, factors) for factors in (change, here))
+        by_x = 2 * lam * sizes[0] + sizes[1] if self.damped else sizes[0]
         with np.errstate(all="ignore"):
-            over = np.einsum("ij,ij->j", modes.left, lam**2 * moved[0] + lam * moved[1] + moved[2])
-            slopes: ComplexArray = -over / np.einsum("ij,ij->j", modes.left, by_x)
+            slopes: ComplexArray = -(lam**2 * moved[0] + lam * moved[1] + moved[2]) / by_x
         return slopes
 
+    def _sandwiched(self, t: float, modes: ReducedModes, factors: Array) -> ComplexArray:
+        """wᵀAz (3, k) of what the terms on each power of λ add up to, with these factors, M first."""
+        powers = self.model.problem.powers
+        if t == 0.0:
+            return np.array([factors[powers == p] @ self._begin.shares[powers == p] for p in (2, 1, 0)])
+        parts = assembled(self.model.projected, factors, powers)
+        return np.array([np.einsum("ij,ij->j", modes.left, combined(part, modes.right)) for part in parts])
 
-def numbers_at(model: ReducedModel, start: ReducedModes, numbers: IntArray, end: ReducedModes) -> IntArray:
-    """Numbers (k,) of the modes ``end``, followed straight from those of ``start``, (j,) with 0 for unknown ones; 0
-    where a mode is none of theirs, comes in from above the band, or the way is too long to tell."""
+
+def numbers_at(start: Numbered, end: ReducedModes) -> IntArray:
+    """Numbers (k,) of the modes ``end``, followed straight from those of ``start``; 0 where a mode is none of theirs,
+    comes in from above the band, or the way is too long to tell."""
     found = np.zeros(len(end.values), dtype=np.int64)
     # What leaves the band on the way cannot be followed: modes are, as far as all of them move, the lowest ones.
-    mine, theirs = np.sort(np.abs(start.values)), np.sort(np.abs(end.values))
+    mine, theirs = np.sort(np.abs(start.modes.values)), np.sort(np.abs(end.values))
     both = min(len(mine), len(theirs))
     rise = float(np.max(theirs[:both] / np.maximum(mine[:both], 1e-300), initial=1.0))
-    stays = np.abs(start.values) * rise <= (1 - NEAR_TOP) * model.frequency
-    known = np.flatnonzero(stays & (numbers > 0))
+    stays = np.abs(start.modes.values) * rise <= (1 - NEAR_TOP) * start.model.frequency
+    known = np.flatnonzero(stays & (start.numbers > 0))
     if not len(known):
         return found
-    line = Line(model, start.point, end.point, {0.0: start, 1.0: end})
+    line = Line(start, end)
     follower = Follower.resumed(line, State(line.eigenpairs(0.0), known))
     with contextlib.suppress(AnalysisError):
-        found[follower.advance(1.0).index] = numbers[known]
+        found[follower.advance(1.0).index] = start.numbers[known]
     return found
 
 
