@@ -48,7 +48,6 @@ class LocalWorkers:
         self.task, self.count, self.answer = task, count, answer
         self.lost = 0
         self._workers: list[_Worker] = []
-        self._context = multiprocessing.get_context("spawn")
 
     @property
     def words(self) -> str:
@@ -130,15 +129,20 @@ class LocalWorkers:
         return {}
 
     def _started(self) -> _Worker:
-        ours, theirs = self._context.Pipe()
-        given = theirs, self.task, self.answer
-        process = self._context.Process(target=_work, args=given, daemon=True, name="stridor study")
-        with one_thread_each(), main_left_out():
-            process.start()
-        theirs.close()
-        worker = _Worker(process, ours)
+        worker = _Worker(*spawned(_work, "stridor study", self.task, self.answer))
         self._workers.append(worker)
         return worker
+
+
+def spawned(target: Callable[..., object], name: str, *given: Any) -> tuple[Any, Any]:
+    """A new process with one BLAS thread, ``target(pipe, *given)`` in it, and our end of the pipe."""
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=target, args=(theirs, *given), name=name, daemon=True)
+    with one_thread_each(), main_left_out():
+        process.start()
+    theirs.close()  # so that the pipe ends with the process
+    return process, ours
 
 
 @contextlib.contextmanager

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from functools import partial
-from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from nicegui import Client, events, ui
@@ -15,6 +14,7 @@ from ...errors import CaseError, StridorError
 from ...view.style import BLUE, GREEN, INK, VERMILION
 from . import panel_compare, panel_locus, panel_map, panel_mode, panel_model, panel_run
 from .levers import friction_range
+from .panel import asset
 from .session import Session, refused
 from .state import LARGEST_TEXT, Source, checked
 
@@ -48,8 +48,8 @@ class Layout:
         self.client, self.session = client, session
         self._source: Source | None = None
         self.dark = ui.dark_mode(None)
-        ui.add_css(_asset("page.css"))
-        ui.add_body_html(f"<script>{_asset('page.js')}</script>")
+        ui.add_css(asset("page.css"))
+        ui.add_body_html(f"<script>{asset('page.js')}</script>")
         self._head()
         self.problem = ui.html('<div id="st-problem" class="st-problem" role="alert" hidden></div>', sanitize=False)
         with ui.tabs(on_change=lambda event: self._tab(str(event.value))).classes("st-tabs") as tabs:
@@ -196,7 +196,3 @@ def _source_of(name: str, data: bytes) -> Source:
         return Source(name[:200], data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise CaseError(name[:200], None, f"not UTF-8 text (byte {error.start}); save the file as UTF-8") from None
-
-
-def _asset(name: str) -> str:
-    return (resources.files("stridor.app.page") / "static" / name).read_text(encoding="utf-8")

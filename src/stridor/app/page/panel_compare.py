@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from pathlib import Path
 from typing import Any
 
-from nicegui import context, ui
+from nicegui import ui
 
 from ...errors import CaseError
-from .panel_run import asset
-from .runs import ENDS, Run, What, Wish
-from .session import Session, started
+from .panel import Panel
+from .runs import ENDS, What, Wish
+from .session import Session
 from .state import State, file_text
 
 _PARTS = """
@@ -33,65 +32,44 @@ def build(container: ui.element, session: Session) -> None:
     _Panel(container, session)
 
 
-class _Panel:
+class _Panel(Panel):
     """What of it is Python; static/compare.js draws."""
 
     def __init__(self, container: ui.element, session: Session) -> None:
-        self.session, self.client = session, context.client
-        self.run: Run | None = None
-        self.of: State | None = None
+        super().__init__(session, "stridorBoth", "compare.js", stop="stridor-compare-stop")
         self.what: What = "compare"
         self.reported = ""
-        ui.add_body_html(f"<script>{asset('compare.js')}</script>")
         with container:
             ui.html(_PARTS, sanitize=False)
         ui.on("stridor-compare", lambda: self._go("compare"))
         ui.on("stridor-report", lambda: self._go("report"))
-        ui.on("stridor-compare-stop", self._stop)
-        session.on_change(self._stale)
-        session.on_close(self._close)
-
-    def _script(self, name: str, *given: Any) -> None:
-        self.client.run_javascript(f"stridorBoth.{name}({', '.join(json.dumps(g) for g in given)})")
+        session.on_change(self.stale)
 
     def _go(self, what: What) -> None:
-        if self.run is not None and not self.run.over:
-            self._script("show", "refused", "what is under way has not ended yet")
+        if self.busy():
             return
         state = self.session.state
         try:
             wish = Wish(_text(state), state.mu, str(_folder(self.session)), what)
         except CaseError as error:
-            self._script("show", "refused", str(error))
+            self.refuse(error)
             return
         self.what = what
-        self._script("begin", state.mu, what)
+        self.script("begin", state.mu, what)
         if what == "report":
             self.reported = state.source.name
         if what == "compare":
             self.of = state
-        self.run = started(wish, self.session, self._heard, lambda: self.run)
+        self.start(wish)
 
-    def _stop(self) -> None:
-        if self.run is not None:
-            self.run.stop()
-
-    def _heard(self, part: str, content: Any) -> None:
+    def heard(self, part: str, content: Any) -> None:
+        """Tables of a comparison, or the report as a file."""
         if part == "done" and self.what == "report":
             with self.client:
                 name = f"{self.reported.removesuffix('.toml')}-report.html"
                 ui.download(Path(content["file"]).read_bytes(), name, "text/html")
         if part in ENDS or part in ("waiting", "begun", "log"):
-            self._script("show", part, content)
-
-    def _stale(self) -> None:
-        of, now = self.of, self.session.state
-        if of is not None:
-            self._script("stale", (of.model, of.mu) != (now.model, now.mu))
-
-    def _close(self) -> None:
-        if self.run is not None:
-            self.run.close()
+            super().heard(part, content)
 
 
 def _text(state: State) -> str:

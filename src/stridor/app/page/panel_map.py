@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import Any
 
-from nicegui import context, events, ui
+from nicegui import events, ui
 
 from ...errors import CaseError
 from ...view.style import VERMILION
 from .levers import Lever, friction_range
-from .panel_run import asset
-from .runs import ENDS, Run, Wish
-from .session import Session, started
+from .panel import Panel
+from .runs import ENDS, Wish
+from .session import Session
 from .state import State, checked, friction_changes
 
 FRICTION = "mu"
@@ -42,39 +41,31 @@ def build(container: ui.element, session: Session) -> None:
     _Panel(container, session)
 
 
-class _Panel:
+class _Panel(Panel):
     """What of it is Python; static/map.js draws."""
 
     def __init__(self, container: ui.element, session: Session) -> None:
-        self.session, self.client = session, context.client
-        self.run: Run | None = None
-        self.of: State | None = None
+        super().__init__(session, "stridorMap", "map.js", stop="stridor-map-stop")
         self.axes: tuple[str, str] = ("", "")
         self.source = session.state.source
         self.picture: Any = None
-        ui.add_body_html(f"<script>{asset('map.js')}</script>")
         with container:
             ui.html(_PARTS, sanitize=False)
             self.chart = ui.echart({"series": []}).classes("st-chart st-map-chart").style("height: 520px")
         ui.on("stridor-map-hello", self._hello)
         ui.on("stridor-map", self._go)
-        ui.on("stridor-map-stop", lambda: None if self.run is None else self.run.stop())
         ui.on("stridor-map-to", self._to)
         ui.on("stridor-map-sample", self._sample)
         session.on_change(self._follow)
-        session.on_close(lambda: None if self.run is None else self.run.close())
-
-    def _script(self, name: str, *given: Any) -> None:
-        self.client.run_javascript(f"stridorMap.{name}({', '.join(json.dumps(g) for g in given)})")
 
     def _hello(self) -> None:
-        self._script("start", self.chart.id, VERMILION)
+        self.script("start", self.chart.id, VERMILION)
         self._offer()
         if self.session.study is not None:
-            self._script("samples", self.session.study)
+            self.script("samples", self.session.study)
             self.session.look("map")
         if self.picture is not None:
-            self._script("show", "map", self.picture)
+            self.script("show", "map", self.picture)
 
     def _offer(self) -> None:
         """The numbers that there are, of the case that is open."""
@@ -86,13 +77,12 @@ class _Panel:
                 numbers.append(
                     {"path": lever.path, "words": lever.label, "unit": lever.unit, "low": ends[0], "high": ends[1]}
                 )
-        self._script("offer", numbers)
+        self.script("offer", numbers)
 
     # -- what is asked --------------------------------------------------------------------------------------------
 
     def _go(self, event: events.GenericEventArguments) -> None:
-        if self.run is not None and not self.run.over:
-            self._script("show", "refused", "what is under way has not ended yet")
+        if self.busy():
             return
         state = self.session.state
         try:
@@ -100,17 +90,18 @@ class _Panel:
             changes = friction_changes(state) if FRICTION not in (options["x"], options["y"]) else {}
             wish = Wish(state.case().with_(changes).to_toml(), None, str(self.session.folder), "map", options=options)
         except CaseError as error:
-            self._script("show", "refused", str(error))
+            self.refuse(error)
             return
         self.of, self.axes = state, (options["x"], options["y"])
-        self._script("begin")
-        self.run = started(wish, self.session, self._heard, lambda: self.run)
+        self.script("begin")
+        self.start(wish)
 
-    def _heard(self, part: str, content: Any) -> None:
+    def heard(self, part: str, content: Any) -> None:
+        """A map, ever finer, and what is said of it."""
         if part == "map":
             self.picture = content
         if part in ENDS or part in ("waiting", "begun", "log", "map"):
-            self._script("show", part, content)
+            super().heard(part, content)
         if part == "map":
             self._follow()
 
@@ -139,18 +130,17 @@ class _Panel:
         if now.source != self.source:
             self.source = now.source
             self.of, self.axes, self.picture = None, ("", ""), None
-            if self.run is not None:
-                self.run.close()
-                self.run = None
+            self._close()
+            self.run = None
             self._offer()
-            self._script("clear")
+            self.script("clear")
             return
         if of is None:
             return
         at = [now.mu if path == FRICTION else now.changes.get(path) for path in self.axes]
         known = {lever.path: lever.value for lever in self.session.levers()}
         at = [known.get(path) if value is None else value for path, value in zip(self.axes, at, strict=True)]
-        self._script("here", at, _others(of, self.axes) != _others(now, self.axes))
+        self.script("here", at, _others(of, self.axes) != _others(now, self.axes))
 
 
 def _others(state: State, axes: tuple[str, str]) -> Any:

@@ -8,7 +8,6 @@ process (`running`) ends with its pipe, and so with the page and the server.
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import os
 import threading
 from collections import deque
@@ -16,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from ...studies.workers import main_left_out, one_thread_each
+from ...studies.workers import spawned
 from .running import serve
 
 AT_ONCE = max(1, (os.cpu_count() or 2) - 1)  # runs; one core is left to the pages
@@ -111,12 +110,7 @@ class Run:
 
     def begin(self) -> None:
         """Its turn has come."""
-        context = multiprocessing.get_context("spawn")
-        own, its = context.Pipe()
-        process = context.Process(target=serve, args=(its, self.wish), name="stridor run", daemon=True)
-        with one_thread_each(), main_left_out():
-            process.start()
-        its.close()  # so that the pipe ends with the process
+        process, own = spawned(serve, "stridor run", self.wish)
         with self._lock:
             self._process, self._pipe = process, own
         if self.over:  # closed or stopped while it began

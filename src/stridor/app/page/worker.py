@@ -8,7 +8,6 @@ The process ends with its pipe, and so with the page and with the server, howeve
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import os
 import signal
 import threading
@@ -19,7 +18,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-from ...studies.workers import main_left_out, one_thread_each
+from ...studies.workers import spawned
 
 PATIENCE = 0.5  # seconds that an answer may take before a newer question stops it
 IDLE = "idle"  # the part that says: what comes now is for when nobody asks
@@ -109,13 +108,8 @@ class Worker:
 
     def _started(self) -> Any:
         """The pipe of a new process."""
-        context = multiprocessing.get_context("spawn")
-        own, its = context.Pipe()
-        process = context.Process(target=_serve, args=(its, self._program), name="stridor page", daemon=True)
-        with one_thread_each(), main_left_out():
-            process.start()
-        its.close()  # so that the pipe ends with the process
-        self._pipe, self._process = own, process
+        self._process, own = spawned(_serve, "stridor page", self._program)
+        self._pipe = own
         threading.Thread(target=self._listening, args=(own,), name="stridor-page-listener", daemon=True).start()
         return own
 
