@@ -33,8 +33,12 @@ def serving(*words: str) -> Generator[tuple[subprocess.Popen[str], str]]:
         assert address.startswith("http://127.0.0.1:"), process.stderr.read()
         yield process, address
     finally:
-        process.kill()
-        process.wait(20)
+        process.terminate()  # with which its folders go, too
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait(20)
         process.stdout.close()
         process.stderr.close()
 

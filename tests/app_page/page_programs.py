@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 
@@ -54,5 +55,19 @@ def importing() -> Callable[[Any, Callable[[str, Any], None]], None]:
         import page_slow_module
 
         send("answer", page_slow_module.WHOLE)
+
+    return answer
+
+
+def lingering() -> Callable[[Any, Callable[[str, Any], None]], None]:
+    """Goes on writing into a folder, which it makes, and does not end with its pipe."""
+    os._exit = lambda _: None  # pyright: ignore[reportAttributeAccessIssue]
+
+    def answer(question: Any, send: Callable[[str, Any], None]) -> None:
+        folder = Path(question)
+        while True:
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / "part").touch()
+            time.sleep(0.001)
 
     return answer

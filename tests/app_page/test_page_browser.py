@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import PATIENT, SOLVED, WITH_BROWSER, page_at, serving, shot, slide, wait
+from browsing import PATIENT, READY, SOLVED, WITH_BROWSER, page_at, serving, shot, slide, wait
 
 import stridor as st
 from stridor.case import template_text
@@ -209,18 +209,26 @@ def test_who_has_not_the_token_is_refused(address: str):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-def test_ctrl_c_ends_it_with_its_processes_and_without_a_word(browser: Any):
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_ends_it_with_its_processes_and_files_and_without_a_word(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
     with serving() as (process, address):
         context = browser.new_context()
         page = context.new_page()
         page.goto(address)
-        page.wait_for_function(SOLVED, timeout=PATIENT)
+        page.wait_for_function(f"{SOLVED} && {READY}", timeout=PATIENT)
+        page.click("#st-both-report")  # which writes files
+        wait(page, "document.querySelector('#st-both-said').textContent.endsWith('…') && !document.querySelector('#st-both-stop').disabled")
+        until = time.monotonic() + 3.0
+        while time.monotonic() < until and not list(tmp_path.glob("stridor-page-*/both-*/*")):
+            time.sleep(0.05)
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
         own = [int(p) for task in children.parents[1].iterdir() for p in (task / "children").read_text().split()]
         assert own
-        process.send_signal(signal.SIGINT)
+        process.send_signal(getattr(signal, name))
         out, err = process.communicate(timeout=20)
         assert (process.returncode, out, err) == (0, "", "")
+        assert list(tmp_path.iterdir()) == []
         until = time.monotonic() + 5.0
         while time.monotonic() < until and any(Path(f"/proc/{pid}").exists() for pid in own):
             time.sleep(0.1)

@@ -16,6 +16,8 @@ from typing import Any
 
 import pytest
 
+from stridor.app.page.session import Session
+from stridor.app.page.state import Source
 from stridor.app.page.worker import PATIENCE, Program, Worker
 
 HERE = Path(__file__).parent
@@ -144,3 +146,18 @@ def test_an_import_is_not_left_halfway():
         time.sleep(0.2)
         second = worker.ask(None)
         assert until(heard, "answer", second)[-1][2] == 1  # begun once, and not again
+
+
+def test_the_folder_of_a_page_goes_when_nobody_writes_into_it_any_more(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("stridor.app.page.worker.END", 0.3)
+    session = Session(Source.template("two-beams"), {}, lambda call, *given: call(*given), program=Program("page_programs", "lingering"))
+    inside = session.folder / "inside"
+    session._worker.ask(inside)
+    for _ in range(int(PATIENT / 0.05)):
+        if (inside / "part").exists():
+            break
+        time.sleep(0.05)
+    session.close()
+    session.end()
+    assert session._worker.process.exitcode is not None
+    assert not session.folder.exists()

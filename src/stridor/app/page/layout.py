@@ -37,7 +37,7 @@ def page(server: Server) -> None:
         except StridorError as error:
             ui.label(str(error))
             return
-        client.on_delete(session.close)
+        client.on_delete(session.leave)
         Layout(client, session)
 
 

@@ -16,8 +16,7 @@ from .state import State
 class Panel:
     """The Python side of a panel; ``script`` is the name of its side in the browser, the object of a file of static/.
 
-    run: what was started last, of: the state that it was started with. It is stopped at the event ``stop`` and closed
-    with the page.
+    run: what was started last, of: the state that it was started with. The event ``stop`` stops it.
     """
 
     def __init__(self, session: Session, script: str, file: str, *, stop: str) -> None:
@@ -27,7 +26,6 @@ class Panel:
         self._script_name = script
         ui.add_body_html(f"<script>{asset(file)}</script>")
         ui.on(stop, self._stop)
-        session.on_close(self._close)
 
     def script(self, name: str, *given: Any) -> None:
         """Call a function of the script."""
@@ -61,10 +59,6 @@ class Panel:
     def _stop(self) -> None:
         if self.run is not None:
             self.run.stop()
-
-    def _close(self) -> None:
-        if self.run is not None:
-            self.run.close()
 
 
 def asset(name: str) -> str:

@@ -130,8 +130,9 @@ class _Panel(Panel):
         if now.source != self.source:
             self.source = now.source
             self.of, self.axes, self.picture = None, ("", ""), None
-            self._close()
-            self.run = None
+            if self.run is not None:
+                self.session.drop(self.run)
+                self.run = None
             self._offer()
             self.script("clear")
             return

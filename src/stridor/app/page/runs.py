@@ -17,9 +17,10 @@ from typing import Any, Literal
 
 from ...studies.workers import spawned
 from .running import serve
+from .worker import ended
 
 AT_ONCE = max(1, (os.cpu_count() or 2) - 1)  # runs; one core is left to the pages
-END = 3.0  # seconds that a process has to end
+PATIENCE = 0.2  # seconds that a process has to end
 
 ENDS = ("done", "stopped", "refused", "failed")
 Heard = Callable[[str, Any], None]
@@ -94,7 +95,7 @@ class Run:
         self._queue = queue or QUEUE
         self._process: Any = None
         self._pipe: Any = None
-        self._lock = threading.Lock()
+        self._lock, self._end = threading.Lock(), threading.Lock()
         self.over = False
         self._queue.add(self)
 
@@ -132,16 +133,20 @@ class Run:
         self._ask(("listen", slow))
 
     def close(self) -> None:
-        """Nobody wants it any more: its process ends now."""
+        """Nobody wants it any more: its process ends with its pipe. Returns at once."""
         self.over = True
         with self._lock:
             pipe, self._pipe = self._pipe, None
         if pipe is not None:
             with contextlib.suppress(OSError):
                 pipe.close()
-        if self._process is not None:
-            threading.Thread(target=_killed, args=(self._process,), name="stridor-run-end").start()
         self._queue.drop(self)
+
+    def end(self) -> None:
+        """Wait until its process is gone, once closed; what does not end by itself is killed."""
+        with self._end:
+            if self._process is not None:
+                ended(self._process, PATIENCE)
 
     def _ask(self, question: tuple[str, Any]) -> None:
         with self._lock:
@@ -167,9 +172,3 @@ class Run:
         self.over = True
         self._queue.drop(self)
 
-
-def _killed(process: Any) -> None:
-    process.join(0.2)
-    if process.is_alive():
-        process.kill()
-    process.join(END)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import atexit
 import contextlib
 import logging
 import os
+import signal
 import socket
 import threading
 import webbrowser
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -49,12 +51,14 @@ class Server:
         return self._thread is not None and self._thread.is_alive()
 
     def run(self, *, ready: Callable[[str], None] | None = None) -> None:
-        """Serve until Ctrl-C. ready is called with the address once it answers."""
+        """Serve until Ctrl-C, SIGTERM or the end of the terminal. ready is called with the address once it answers."""
         self._prepare(ready)
-        with contextlib.suppress(KeyboardInterrupt):
+        with contextlib.suppress(KeyboardInterrupt), _hung_up(self._server):
             self._server.run(sockets=[self._socket])
-        interrupts.heard()  # it is how a page is ended
-        self._end()
+        with interrupts.held() as block:  # it is how a page is ended, and what it leaves behind is removed
+            interrupts.heard()
+            self._end()
+            block.met = True
 
     def start(self) -> Server:
         """Serve in a thread, as in a notebook; returns once it answers. Raises AnalysisError where it does not."""
@@ -65,6 +69,7 @@ class Server:
             self._server.run(sockets=[self._socket])
             self._end()
 
+        atexit.register(self.stop)
         self._thread = threading.Thread(target=serving, name="stridor-page", daemon=True)
         self._thread.start()
         if not answering.wait(START):
@@ -72,7 +77,8 @@ class Server:
         return self
 
     def stop(self) -> None:
-        """Stop serving; pages that are open end with it."""
+        """Stop serving; pages that are open end with it. The end of this process does so too."""
+        atexit.unregister(self.stop)
         if self._server is not None:
             self._server.should_exit = True
         if self._thread is not None:
@@ -94,7 +100,7 @@ class Server:
         session = Session(self.source_of(key), own, call)
         session.study = self.study
         self.sessions.add(session)
-        session.on_close(lambda: self.sessions.discard(session))
+        session.on_end(lambda: self.sessions.discard(session))
         return session
 
     def _prepare(self, ready: Callable[[str], None] | None) -> None:
@@ -119,27 +125,55 @@ class Server:
             guard, host=HOST, port=self.port, log_level="error", lifespan="on", timeout_graceful_shutdown=2,
             server_header=False, ws_max_size=LARGEST_MESSAGE,
         )  # fmt: skip
-        self._server = _announcing(uvicorn, config, lambda: ready(self.address()) if ready else None)
+        self._server = _announcing(uvicorn, config, lambda: ready(self.address()) if ready else None, self._close)
 
-    def _end(self) -> None:
+    def _close(self) -> None:
+        """Let all processes of all pages end, before one by one is waited for."""
         for session in list(self.sessions):
             session.close()
+
+    def _end(self) -> None:
+        self._close()
+        for session in list(self.sessions):
+            session.end()
 
 
 LARGEST_MESSAGE = 1_000_000  # bytes that a page may send at once by its socket
 
 
-def _announcing(uvicorn: Any, config: Any, ready: Callable[[], None]) -> Any:
-    """A server that says when it answers."""
+@contextlib.contextmanager
+def _hung_up(server: Any) -> Generator[None]:
+    """The end of the terminal is an end like the others, of which uvicorn knows nothing."""
+    number: Any = getattr(signal, "SIGHUP", None)
+    if number is None or signal.getsignal(number) is signal.SIG_IGN:  # nohup
+        yield
+        return
+
+    def end(_: int, __: object) -> None:
+        server.should_exit = True
+
+    before = signal.signal(number, end)
+    try:
+        yield
+    finally:
+        signal.signal(number, before)
+
+
+def _announcing(uvicorn: Any, config: Any, ready: Callable[[], None], ending: Callable[[], None]) -> Any:
+    """A server that says when it answers, and when it begins to end."""
     server = uvicorn.Server(config)
-    before = server.startup
+    before, after = server.startup, server.shutdown
 
     async def startup(*given: Any, **named: Any) -> None:
         await before(*given, **named)
         if not server.should_exit:
             ready()
 
-    server.startup = startup
+    async def shutdown(*given: Any, **named: Any) -> None:
+        ending()
+        await after(*given, **named)
+
+    server.startup, server.shutdown = startup, shutdown
     return server
 
 

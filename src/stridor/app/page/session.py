@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -51,7 +52,9 @@ class Session:
         self._history = History(first_state(source))
         self._listeners: list[Callable[[], None]] = []
         self._viewers: list[Callable[[str, Any], None]] = []
-        self._closers: list[Callable[[], None]] = []
+        self._enders: list[Callable[[], None]] = []
+        self._runs: list[Run] = []
+        self._ending = threading.Lock()
         self._moving: object = None
         self.picture = Picture()
         self.folder = Path(tempfile.mkdtemp(prefix="stridor-page-"))
@@ -101,9 +104,9 @@ class Session:
         """Call back with every piece of the picture: its name and its content."""
         self._viewers.append(callback)
 
-    def on_close(self, callback: Callable[[], None]) -> None:
-        """Call back when the page is gone."""
-        self._closers.append(callback)
+    def on_end(self, callback: Callable[[], None]) -> None:
+        """Call back when nothing is left of the page, in any thread."""
+        self._enders.append(callback)
 
     # -- what a control does --------------------------------------------------------------------------------------
 
@@ -168,15 +171,38 @@ class Session:
         """Ask for the picture of the state."""
         self.picture.number = self._worker.ask(self.state)
 
+    def started(self, run: Run) -> None:
+        """A run of this page, which ends with it."""
+        self._runs = [r for r in self._runs if not r.over or (r.process and r.process.is_alive())] + [run]
+
+    def drop(self, run: Run) -> None:
+        """Nobody wants what a run computes."""
+        run.close()
+        threading.Thread(target=run.end, name="stridor-run-end").start()
+
+    def leave(self) -> None:
+        """The page is gone. Returns at once; the rest goes on in a thread."""
+        if not self.closed:
+            self.close()
+            threading.Thread(target=self.end, name="stridor-page-end").start()
+
     def close(self) -> None:
-        """The page is gone: its process ends, its folder is removed."""
+        """Let its processes end, and hear nothing of them any more. Returns at once; `end` is the rest of it."""
         if self.closed:
             return
         self.closed = True
         self._worker.close()
-        for callback in self._closers:
+        for run in self._runs:
+            run.close()
+
+    def end(self) -> None:
+        """Wait until its processes are gone, and remove its folder only then: they write into it."""
+        with self._ending:
+            for process in (self._worker, *self._runs):
+                process.end()
+            shutil.rmtree(self.folder, ignore_errors=True)
+        for callback in self._enders:
             callback()
-        shutil.rmtree(self.folder, ignore_errors=True)
 
     # -- inside ---------------------------------------------------------------------------------------------------
 
@@ -225,4 +251,5 @@ def started(wish: Wish, session: Session, heard: Callable[[str, Any], None], new
             heard(part, content)
 
     made.append(Run(wish, lambda part, content: session.later(told, part, content)))
+    session.started(made[0])
     return made[0]

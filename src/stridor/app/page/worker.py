@@ -64,6 +64,7 @@ class Worker:
         self._closed = False
         self._process: Any = None
         self._pipe: Any = None
+        self._end = threading.Lock()
         self._sender = threading.Thread(target=self._sending, name="stridor-page-sender", daemon=True)
         self._sender.start()
 
@@ -81,17 +82,20 @@ class Worker:
         return self._process
 
     def close(self) -> None:
-        """End the process. Returns at once; what does not end by itself is killed."""
+        """Let the process end, as it does with its pipe. Returns at once."""
         with self._wake:
             self._closed = True
             self._wake.notify()
-            pipe, process = self._pipe, self._process
-            self._pipe = None
+            pipe, self._pipe = self._pipe, None
         if pipe is not None:
             with contextlib.suppress(OSError):
                 pipe.close()
-        if process is not None:
-            threading.Thread(target=_ended, args=(process,), name="stridor-page-end").start()
+
+    def end(self) -> None:
+        """Wait until the process is gone, once closed; what does not end by itself is killed."""
+        with self._end:
+            if self._process is not None:
+                ended(self._process, END)
 
     def _sending(self) -> None:
         while True:
@@ -134,8 +138,9 @@ class Worker:
                                           "another one")  # fmt: skip
 
 
-def _ended(process: Any) -> None:
-    process.join(END)
+def ended(process: Any, patience: float) -> None:
+    """Wait for a process to end, and kill it where that takes longer than ``patience`` [s]."""
+    process.join(patience)
     if process.is_alive():
         process.kill()
         process.join(END)
