@@ -91,7 +91,12 @@ def test_a_click_on_a_branch_chooses_its_mode(page: Any):
       return [box.left + x, box.top + y, b.branch];
     }""")
     page.mouse.click(place[0], place[1])
-    wait(page, f"stridor.state.branch === {place[2]} && stridor.state.shape?.branch === {place[2]}")
+    wait(page, f"stridor.state.shape?.branch === {place[2]}")
+    assert page.locator("#st-mode-title").inner_text() == f"Mode {place[2]} at μ = 0.1"
+    assert page.locator("#st-mode-shown").is_visible()
+    assert page.locator(".st-chosen button").all_inner_texts() == [str(place[2])]
+    drawn = page.evaluate("getElement(stridor.state.charts.frequency).chart.getOption().series.find((s) => s.id === 'chosen mode').data")
+    assert {point[2] for point in drawn if point[0] != "-"} == {place[2]}
 
 
 def test_a_broken_file_is_refused_as_on_the_command_line(page: Any, tmp_path: Path):
@@ -106,6 +111,7 @@ def test_a_broken_file_is_refused_as_on_the_command_line(page: Any, tmp_path: Pa
     shot(page, "refused")
     slide(page, "mu", 0.2)  # the page goes on with the last good state
     wait(page, "stridor.state.at.mu === 0.2")
+    assert page.locator("#st-modes-title").inner_text() == "Modes at μ = 0.2"
     mended = tmp_path / "mended.toml"
     mended.write_text(template_text("two-beams").replace("angle_deg = 85.0", "angle_deg = 84.0"), encoding="utf-8")
     page.set_input_files("input[type=file]", mended)
@@ -143,20 +149,26 @@ def test_two_pages_at_once_do_not_know_of_each_other(page: Any, browser: Any, ad
         slide(other, "mu", 0.4)
         wait(page, "stridor.state.at.mu === 0.3")
         wait(other, "stridor.state.at.mu === 0.4")
-        assert page.locator('[data-number="mu"]').input_value() == "0.3"
+        for one, mu in ((page, "0.3"), (other, "0.4")):
+            assert one.locator('[data-number="mu"]').input_value() == mu
+            assert one.locator("#st-modes-title").inner_text() == f"Modes at μ = {mu}"
 
 
 def test_two_hundred_moves_in_a_row_make_no_queue(page: Any):
-    page.evaluate("""async () => {
-      const slider = document.querySelector('[data-path="bodies.beam1.angle_deg"]');
+    older = page.evaluate("""async () => {
+      const slider = document.querySelector('[data-path="bodies.beam1.angle_deg"]'), older = [];
+      const number = document.querySelector('[data-number="bodies.beam1.angle_deg"]');
       for (let k = 0; k < 200; k++) {
         slider.value = 60 + (k % 80);
         slider.dispatchEvent(new Event("input", { bubbles: true }));
+        const moved = number.value;
         await new Promise((done) => setTimeout(done, 10));
+        if (number.value !== moved || Number(slider.value) !== 60 + (k % 80)) older.push([moved, number.value]);
       }
+      return older;
     }""")
+    assert older == []  # what the server repeats of moves before does not take the hand from the slider
     began = time.monotonic()
-    # Of the last of them; the field may show an earlier one, which the server repeats, a moment longer.
     last = 55 + 60 * (60 + 199 % 80) / 200
     wanted = st.onsets(st.loads(template_text("two-beams")).with_({"bodies.beam1.angle_deg": last})).first.mu
     try:
@@ -167,6 +179,22 @@ def test_two_hundred_moves_in_a_row_make_no_queue(page: Any):
     assert float(page.locator('[data-number="bodies.beam1.angle_deg"]').input_value()) == last
     assert time.monotonic() - began < 15.0  # one answer, and not what is left of two hundred
     assert page.evaluate("stridor.state.drawn.locus") < 150
+
+
+def test_friction_of_contacts_that_is_replaced_is_said(page: Any, tmp_path: Path):
+    assert page.locator(".st-lever .st-note").count() == 0
+    text = template_text("two-beams")
+    contact = text[text.index("[contacts.A]") : text.index("# Other laws:")]
+    second = contact.replace("contacts.A", "contacts.B").replace("beam1.tip", "beam1@0.025").replace("coefficient = 0.1", "coefficient = 0.3")
+    path = tmp_path / "two.toml"
+    path.write_text(text.replace("# Other laws:", f"{second}\n# Other laws:"), encoding="utf-8")
+    page.set_input_files("input[type=file]", path)
+    note = page.locator(".st-lever .st-note")
+    note.wait_for(state="visible", timeout=PATIENT)
+    assert note.inner_text() == "The case gives its contacts different μ (A 0.1, B 0.3): this one replaces them all."
+    slider = page.locator('[data-path="mu"]')
+    assert slider.get_attribute("aria-describedby") == note.get_attribute("id")
+    assert page.locator('[data-number="mu"]').input_value() == "0.3"
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -52,7 +52,7 @@ def test_a_grid_where_no_curves_can_be_traced(monkeypatch: pytest.MonkeyPatch, t
     (x, xs), (y, ys) = numbers[::-1] if turned else numbers
     told, said = maps(x, y, xs, ys)
     assert [len(m["xs"]) for m in told] == [2, 3]
-    assert said.startswith("A grid of 3 × 3 solves; what lies between its points is not known. No curves: ")
+    assert said.startswith("A grid of 3 × 3 solves, not checked against anything; what lies between its points is not known. No curves: ")
     assert all(not m["curves"] for m in told)
     case = paper_case().with_(SMALL)
     for i, a in enumerate(told[-1]["xs"]):

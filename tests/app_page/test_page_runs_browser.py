@@ -91,6 +91,7 @@ def test_a_run_grows_is_stopped_and_waits_for_its_turn(browser: Any, endless: tu
         wait(page, "stridorRun.page.picture !== null")
         end = page.evaluate("stridorRun.page.picture.end")
         wait(page, f"stridorRun.page.picture.end > {end}")
+        assert all(page.evaluate("[...document.querySelectorAll('.st-run-chart')].map((c) => c.getAttribute('aria-label'))"))
         other.click("#st-run-go")
         if page.evaluate("navigator.hardwareConcurrency") <= 2:
             wait(other, "document.querySelector('#st-run-said').textContent === 'Waiting for its turn: number 1 in the queue.'")
@@ -98,7 +99,10 @@ def test_a_run_grows_is_stopped_and_waits_for_its_turn(browser: Any, endless: tu
         wait(page, "stridorRun.page.sound !== null || document.querySelector('#st-run-said').textContent.startsWith('No sound')")
         page.click("#st-run-stop")
         wait(page, "document.querySelector('#st-run-said').textContent.includes('stopped after')")
+        done, planned = page.evaluate("[stridorRun.page.picture.done, stridorRun.page.picture.planned]")
+        assert f"stopped after {done} of {planned} steps" in said(page)
         wait(other, "stridorRun.page.picture !== null")
+        assert other.is_disabled("#st-run-go")
         assert page.is_enabled("#st-run-go")
 
 
@@ -159,6 +163,11 @@ def test_a_click_on_the_map_goes_there(browser: Any, short: str) -> None:
         assert stiffness == pytest.approx(1.5e10, rel=0.02)
         mu = page.evaluate("stridor.state.values.mu")
         wait(page, f"stridor.state.at.mu === {mu}")
+        page.get_by_role("button", name="Undo").click()  # once, of both numbers
+        wait(page, "stridor.state.values.mu === 0.3 && stridor.state.at.mu === 0.3")
+        given = paper_case().contacts["A"].stiffness
+        assert float(page.locator('[data-number="contacts.A.stiffness"]').input_value()) == given
+        assert page.get_by_role("button", name="Undo").is_disabled()
         # Nonsense in a field is refused in words, and the page goes on.
         page.get_by_role("tab", name="Stability map").click()
         page.fill("#st-map-x-high", "much")

@@ -70,3 +70,8 @@ def test_a_click_on_a_sample_takes_the_bench_there(browser, store: Path) -> None
         page.locator(".st-map-chart").click(position={"x": x, "y": y}, timeout=PATIENT)
         wait(page, f"stridor.state.values['{first}'] === {xs[k]} && stridor.state.values['{second}'] === {ys[k]}")
         assert rows["words"][k] in page.inner_text("#st-map-said")
+        for path, values in rows["numbers"].items():
+            assert page.evaluate(f"stridor.state.values['{path}']") == values[k]
+        page.get_by_role("button", name="Undo").click()  # once, of all numbers
+        wait(page, f"stridor.state.values['{first}'] !== {xs[k]} && stridor.state.values['{second}'] !== {ys[k]}")
+        assert page.get_by_role("button", name="Undo").is_disabled()

@@ -148,6 +148,27 @@ def test_an_import_is_not_left_halfway():
         assert until(heard, "answer", second)[-1][2] == 1  # begun once, and not again
 
 
+def test_numbers_that_are_put_together_are_one_step_for_undo():
+    session = Session(Source.template("two-beams"), {}, lambda call, *given: call(*given), program=Program("page_programs", "threads"))
+    first, both = session.state, {"mu": 0.3, "contacts.A.stiffness": 2e10}
+    try:
+        session.put(both)
+        assert (session.state.mu, session.state.changes) == (0.3, {"contacts.A.stiffness": 2e10})
+        session.put({"mu": 0.4, "contacts.A.stiffness": 3e10})  # another click: another step
+        session.undo()
+        assert (session.state.mu, session.state.changes) == (0.3, {"contacts.A.stiffness": 2e10})
+        session.undo()
+        assert session.state == first
+        assert not session.history.can_undo
+        for mu in (0.5, 0.6, 0.7):  # arrows in a row
+            session.put(both | {"mu": mu}, moving="map")
+        session.undo()
+        assert session.state == first
+    finally:
+        session.close()
+        session.end()
+
+
 def test_the_folder_of_a_page_goes_when_nobody_writes_into_it_any_more(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("stridor.app.page.worker.END", 0.3)
     session = Session(Source.template("two-beams"), {}, lambda call, *given: call(*given), program=Program("page_programs", "lingering"))

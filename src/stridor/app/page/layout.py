@@ -124,7 +124,7 @@ class Layout:
         low, high = friction_range(checked(state.source))
         self._script("follow", {
             "values": panel_model.lever_values(state, session.levers()), "branch": state.branch, "link": session.link(),
-            "low": low, "high": high, "name": state.source.name,
+            "low": low, "high": high, "name": state.source.name, "heard": session.heard,
         })  # fmt: skip
         self.undo.set_enabled(session.history.can_undo)
         self.redo.set_enabled(session.history.can_redo)

@@ -54,7 +54,7 @@ def _curves(found: Boundary) -> dict[str, Any]:
         for c, (x, y, f) in zip(found.curves, found.polylines(), strict=True)
     ]
     counts = found.unstable_modes_over(xs, ys).tolist()
-    return {"xs": xs.tolist(), "ys": ys.tolist(), "counts": counts, "curves": curves, "agree": found.agree}
+    return {"xs": xs.tolist(), "ys": ys.tolist(), "counts": counts, "curves": curves}
 
 
 def _solved_on_grids(
@@ -71,9 +71,12 @@ def _solved_on_grids(
             if error:
                 failures[error] = failures.get(error, 0) + 1
         counts = [[known[float(x), float(y)] for y in ys] for x in xs]
-        grid = {"xs": xs.tolist(), "ys": ys.tolist(), "counts": counts, "curves": [], "agree": None}
+        grid = {"xs": xs.tolist(), "ys": ys.tolist(), "counts": counts, "curves": []}
         tell("map", grid)
-    said = f"A grid of {count} × {count} solves; what lies between its points is not known. No curves: {why}."
+    said = (
+        f"A grid of {count} × {count} solves, not checked against anything; what lies between its points is not known. "
+        f"No curves: {why}."
+    )
     for error, number in failures.items():
         said += f" {number} points have no modes: {error}."
     return said

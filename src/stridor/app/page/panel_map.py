@@ -112,17 +112,15 @@ class _Panel(Panel):
         if not all(self.axes) or not all(isinstance(v, int | float) and math.isfinite(v) for v in values):
             return
         known = {FRICTION, *(lever.path for lever in self.session.levers())}
-        for path, value in zip(self.axes, values, strict=True):
-            if path in known:
-                self.session.move(path, float(value))  # type: ignore[arg-type]
+        numbers = {path: float(value) for path, value in zip(self.axes, values, strict=True) if path in known}  # type: ignore[arg-type]
+        self.session.put(numbers, moving="map" if given.get("held") else None)
 
     def _sample(self, event: events.GenericEventArguments) -> None:
         """To a sample of the study: all of its numbers."""
         study, row = self.session.study, event.args.get("row") if isinstance(event.args, dict) else None
         if study is None or not isinstance(row, int) or not 0 <= row < len(study["grows"]):
             return
-        for path, values in study["numbers"].items():
-            self.session.move(path, values[row])
+        self.session.put({path: values[row] for path, values in study["numbers"].items()})
 
     def _follow(self) -> None:
         """Where the page is on the map, and whether the map is of another case by now."""

@@ -7,9 +7,10 @@ from typing import Any
 
 from nicegui import events, ui
 
+from ...case import Case
 from .levers import STEPS, Lever, friction_range
 from .session import Session
-from .state import State, checked
+from .state import State, checked, different_frictions
 
 
 def build(container: ui.element, session: Session) -> None:
@@ -21,7 +22,9 @@ def build(container: ui.element, session: Session) -> None:
         given: Any = event.args
         if not isinstance(given, dict) or not {"path", "value"} <= set(given):
             return
-        path, value = str(given["path"]), given["value"]
+        path, value, number = str(given["path"]), given["value"], given.get("number")
+        if isinstance(number, int):
+            session.heard = max(session.heard, number)
         known = {lever.path for lever in session.levers()} | {"mu"}
         if path in known and isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
             session.move(path, float(value))
@@ -32,6 +35,13 @@ def build(container: ui.element, session: Session) -> None:
 def lever_values(state: State, found: list[Lever]) -> dict[str, float]:
     """Where each lever stands, by its path."""
     return {"mu": state.mu, **{lever.path: state.changes.get(lever.path, lever.value) for lever in found}}
+
+
+def _replaced(case: Case) -> str:
+    """What the μ of the page stands in for, where that is not one number."""
+    own = different_frictions(case)
+    given = ", ".join(f"{name} {value:g}" for name, value in own.items())
+    return f"The case gives its contacts different μ ({given}): this one replaces them all." if own else ""
 
 
 def lever_data(session: Session) -> dict[str, Any]:
@@ -46,6 +56,7 @@ def lever_data(session: Session) -> dict[str, Any]:
             {
                 "path": lever.path, "label": lever.label, "unit": lever.unit, "low": lever.low, "high": lever.high,
                 "log": lever.scale == "log", "group": lever.group, "steps": STEPS,
+                "note": _replaced(case) if lever is friction else "",
             }
             for lever in ([friction] if rubs else []) + found
         ],

@@ -57,6 +57,7 @@ class Session:
         self._ending = threading.Lock()
         self._moving: object = None
         self.picture = Picture()
+        self.heard = 0  # number of the newest move of the page that has come here
         self.folder = Path(tempfile.mkdtemp(prefix="stridor-page-"))
         self._worker = Worker(self._answered, program)
         self.closed = False
@@ -123,10 +124,17 @@ class Session:
 
     def move(self, path: str, value: float) -> None:
         """A lever to a value; "mu" is the friction coefficient of the page."""
-        if path == "mu":
-            self.go(replace(self.state, mu=min(max(float(value), 0.0), LARGEST_MU)), moving="mu")
-        else:
-            self.go(self.state.with_change(path, value), moving=path)
+        self.put({path: value}, moving=path)
+
+    def put(self, numbers: Mapping[str, float], *, moving: object = None) -> None:
+        """Several levers to values, as one step for undo. moving: as for `go`."""
+        state = self.state
+        for path, value in numbers.items():
+            if path == "mu":
+                state = replace(state, mu=min(max(float(value), 0.0), LARGEST_MU))
+            else:
+                state = state.with_change(path, value)
+        self.go(state, moving=moving)
 
     def choose(self, branch: int | None) -> None:
         """A mode by its number, None for none."""

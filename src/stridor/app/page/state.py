@@ -118,7 +118,7 @@ def _files_named(text: str) -> list[str]:
 
 
 def first_state(source: Source) -> State:
-    """A source as it is, at the friction of the case (0 where contacts differ). Raises CaseError."""
+    """A source as it is, at the friction of the case (`own_friction`). Raises CaseError."""
     return State(source, mu=own_friction(checked(source)))
 
 
@@ -127,6 +127,12 @@ def own_friction(case: Case) -> float:
     if "mu" in case.parameters:
         return case.parameters["mu"].value
     return max((c.friction.coefficient for c in case.contacts.values()), default=0.0)
+
+
+def different_frictions(case: Case) -> dict[str, float]:
+    """The friction coefficients of contacts that do not have the same one; none where one is meant for all."""
+    own = {name: contact.friction.coefficient for name, contact in case.contacts.items()}
+    return own if len(set(own.values())) > 1 and "mu" not in case.parameters else {}
 
 
 class History:
@@ -250,8 +256,7 @@ def file_text(state: State) -> str:
 def friction_changes(state: State) -> dict[str, float]:
     """What the μ of the page changes in the case: every contact's law scaled, as all analyses do with a μ."""
     case = state.case()
-    same = "mu" in case.parameters or len({c.friction.coefficient for c in case.contacts.values()}) <= 1
-    if same and math.isclose(state.mu, own_friction(case), rel_tol=1e-12):
+    if not different_frictions(case) and math.isclose(state.mu, own_friction(case), rel_tol=1e-12):
         return {}
     if "mu" in case.parameters:
         return {"parameters.mu.value": state.mu}

@@ -162,7 +162,7 @@ const stridorMap = (() => {
         page.here = [page.samples.numbers[page.asked.x][sample], page.samples.numbers[page.asked.y][sample]];
         said(`Sample ${sample + 1}: ${page.samples.words[sample]}. The bench has its numbers now.`);
         draw();
-      } else if (page.map.xs.length) go(at);
+      } else if (page.map.xs.length) goTo(at);
     });
     new MutationObserver(draw).observe(document.body, { attributes: true, attributeFilter: ["class"] });
     // By keyboard: arrows move by a hundredth of the range.
@@ -171,12 +171,13 @@ const stridorMap = (() => {
       const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] }[event.key];
       if (!step || !page.map || !page.here) return;
       event.preventDefault();
-      go(page.here.map((v, k) => v + (step[k] * (page.asked[k ? "y_range" : "x_range"][1] - page.asked[k ? "y_range" : "x_range"][0])) / 100));
+      goTo(page.here.map((v, k) => v + (step[k] * (page.asked[k ? "y_range" : "x_range"][1] - page.asked[k ? "y_range" : "x_range"][0])) / 100), true);
     });
   }
-  function go(at) {
+  // held: arrows in a row are one step for undo.
+  function goTo(at, held = false) {
     const within = (v, [low, high]) => Math.min(Math.max(Number(v.toPrecision(5)), low), high);
-    emitEvent("stridor-map-to", { x: within(at[0], page.asked.x_range), y: within(at[1], page.asked.y_range) });
+    emitEvent("stridor-map-to", { x: within(at[0], page.asked.x_range), y: within(at[1], page.asked.y_range), held });
   }
   const hello = () => {
     if (typeof emitEvent === "function" && window.socket?.connected && $("st-map-go")) {

@@ -5,7 +5,7 @@ const stridor = (() => {
   const $ = (id) => document.getElementById(id);
   const state = {
     charts: {}, colours: {}, levers: [], values: {}, low: 0, high: 1, branch: null, locus: null, at: null, onsets: null,
-    shape: null, geometry: null, link: "", waiting: {}, timer: null, drawn: {},
+    shape: null, geometry: null, link: "", waiting: {}, moves: 0, sent: {}, timer: null, drawn: {},
   };
   const dark = () => document.body.classList.contains("body--dark");
   const paint = () => ({ text: dark() ? "#d8d8d8" : "#222", line: dark() ? "#5a5e66" : "#999", grid: dark() ? "#33373e" : "#e4e4e4",
@@ -46,7 +46,7 @@ const stridor = (() => {
     state.timer = null;
     const moved = Object.entries(state.waiting);
     state.waiting = {};
-    for (const [path, value] of moved) emitEvent("stridor-move", { path, value });
+    for (const [path, value] of moved) emitEvent("stridor-move", { path, value, number: (state.sent[path] = ++state.moves) });
     if (moved.length) state.timer = setTimeout(send, 25);
   }
 
@@ -89,14 +89,18 @@ const stridor = (() => {
     number.addEventListener("change", taken);
     const row = element("div", { class: "st-lever" }, element("label", { for: id }, lever.label), slider, number,
       element("span", { class: "st-unit" }, lever.unit));
+    if (lever.note) {
+      slider.setAttribute("aria-describedby", `${id}-note`);
+      row.append(element("p", { class: "st-note", id: `${id}-note` }, lever.note));
+    }
     return row;
   }
   const told = (slider, lever, value) => slider.setAttribute("aria-valuetext", `${written(value)} ${lever.unit}`);
-  function values(given) {
+  // heard: the number of the newest move that the server knew of when it said so. What was moved after that stays.
+  function values(given, heard = Infinity) {
     for (const lever of state.levers) {
-      const value = given[lever.path];
-      // What is just being moved goes on as it is.
-      if (value === undefined || lever.path in state.waiting) continue;
+      const value = given[lever.path], newer = lever.path in state.waiting || (state.sent[lever.path] ?? 0) > heard;
+      if (value === undefined || (newer && heard !== Infinity)) continue;
       state.values[lever.path] = value;
       const slider = document.querySelector(`[data-path="${CSS.escape(lever.path)}"]`);
       const number = document.querySelector(`[data-number="${CSS.escape(lever.path)}"]`);
@@ -338,7 +342,7 @@ const stridor = (() => {
       if (given.branch === null) { state.shape = null; shape(); }
       list();
     }
-    values(given.values);
+    values(given.values, given.heard);
     placeLines();
     history.replaceState(null, "", given.link ? `#${given.link}` : location.pathname + location.search);
   }
