@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from benches import paper_case
-from stridor.modal.receptance_modes import prepare
-from stridor.modal.vectors import expand
+from stridor.modal.backward_error import BackwardError
+from stridor.modal.receptance_modes import modes_by_receptance, prepare
+from stridor.modal.vectors import closed, expand, modal_coordinates
 from stridor.system import build_system
 
 
@@ -30,3 +31,28 @@ def test_the_shape_on_a_pole_is_its_own_mode(damping: float) -> None:
     assert np.linalg.norm(shape) == pytest.approx(1.0)
     own = block.vectors[:, 2] / np.linalg.norm(block.vectors[:, 2])
     assert abs(own @ shape[block.freedoms]) == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("damping", [0.0, 1.0])
+def test_the_shape_beside_a_pole_closes_its_contact(damping: float) -> None:
+    """Where a node of a mode all but touches, its root has no digits left against the pole; the vectors still have all."""
+    case = paper_case().with_({"bodies.beam1.start": [0.075, 0.0]})
+    system = build_system(case)
+    system = replace(system, damping=damping * system.damping)
+    mus = np.linspace(0.1, 1.0, 10)
+    found = modes_by_receptance(
+        system, mus, count=40, max_frequency_hz=4e4, damped=True, vectors=True, progress=None
+    )
+    spectrum, coupling, _ = prepare(system)
+    judge, improved = BackwardError(coupling), 0
+    for k, mu in enumerate(mus):
+        lam = found.eigenvalues[k]
+        push, pull = modal_coordinates(spectrum, lam, float(mu))
+        friction = np.full((len(lam), 1), mu * coupling.sense[0])
+        for left, forces in ((False, push), (True, pull)):
+            summed = judge(lam, expand(spectrum, lam, forces), mu, left=left)
+            near = summed > 1e-10
+            closing = closed(spectrum, lam[near], forces[near], friction[near] if left else None)
+            assert np.all(judge(lam[near], closing, mu, left=left) < 1e-12)
+            improved += int(near.sum())
+    assert improved > 10

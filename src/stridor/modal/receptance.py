@@ -72,7 +72,15 @@ class Receptance:
         """H and dH/dλ (k, r, r) at λ (k,)."""
         rows = self.real.shape[0]
         first, second = self.pairs
-        sums = np.empty((len(lam), len(first), 4))
+        value, slope = self.entries(lam)
+        full = np.zeros((2, len(lam), rows, rows), dtype=complex)
+        full[0][:, first, second] = full[0][:, second, first] = value
+        full[1][:, first, second] = full[1][:, second, first] = slope
+        return full[0], full[1]
+
+    def entries(self, lam: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """The wanted entries of H and dH/dλ (k, p) at λ (k,)."""
+        sums = np.empty((len(lam), self.pairs.shape[1], 4))
         _real_mode_sums(
             np.ascontiguousarray(lam.real),
             np.ascontiguousarray(lam.imag),
@@ -88,10 +96,7 @@ class Receptance:
             inverse = 1.0 / (lam[:, None] - self._poles)  # type: ignore[attr-defined]
             value = value + inverse @ gain
             slope = slope - inverse**2 @ gain
-        full = np.zeros((2, len(lam), rows, rows), dtype=complex)
-        full[0][:, first, second] = full[0][:, second, first] = value
-        full[1][:, first, second] = full[1][:, second, first] = slope
-        return full[0], full[1]
+        return value, slope
 
 
 def wanted_pairs(contacts: int, *, slip: bool) -> IntArray:

@@ -20,7 +20,7 @@ from .results import ComplexModes, Progress, require_memory
 from .roots import ReceptanceProblem, spectrum_of
 from .tracking import Tracker
 from .unfit import Unfit
-from .vectors import expand, fixed_vectors, modal_coordinates
+from .vectors import closed, expand, fixed_vectors, modal_coordinates
 
 CHUNK = 256
 DOUBTFUL = 1e-11  # backward errors above it are refined on the assembled matrices
@@ -201,6 +201,18 @@ def _pairs(
         left = np.zeros_like(right)
         if len(chosen):
             left[:, chosen] = expand(spectrum, lam[part[chosen]], pull[part[chosen]])
+        if len(doubtful):
+            at = part[doubtful]
+            better = closed(spectrum, lam[at], push[at])
+            error = judge(lam[at], better, each[at])
+            sound = ~(errors[at] <= error) & np.isfinite(error)
+            right[:, doubtful[sound]], errors[at[sound]] = better[:, sound], error[sound]
+            if shapes is not None and not spectrum.coupling.sloped:
+                better = closed(spectrum, lam[at], pull[at], np.multiply.outer(each[at], spectrum.coupling.sense))
+                before, after = (judge(lam[at], y, each[at], left=True) for y in (left[:, doubtful], better))
+                sound = ~(before <= after) & np.isfinite(after)
+                left[:, doubtful[sound]] = better[:, sound]
+            doubtful = doubtful[~(errors[at] < DOUBTFUL)]
         for k in doubtful:
             at = part[k]
             pencil = spectrum.coupling.pencil(float(each[at]))

@@ -17,6 +17,7 @@ from ..errors import AnalysisError
 from ..system.uncoupled import UncoupledModes
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .coupling import PointCoupling
+from .deflation import deflation
 from .receptance import Receptance, wanted_pairs
 
 CONVERGED = 1e-9  # of the step before last: convergence is at least quadratic
@@ -57,7 +58,14 @@ class ReceptanceProblem:
         return bool(np.any(seen.max(axis=0) <= UNCOUPLED_TOLERANCE * seen.max()))
 
     def evaluate(self, lam: ComplexArray, mu: float) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """T, ∂T/∂λ, ∂T/∂μ at λ (k,)."""
+        """T, ∂T/∂λ, ∂T/∂μ (k, q, q) at λ (k,)."""
+        if self.coupling.contacts == 1 and not self.coupling.sloped:
+            # Most of what branches are followed by: one number each, H_nn + μ s H_nt.
+            value, slope = self.receptance.entries(lam)
+            sense = float(self.coupling.sense[0])
+            single = float(self.coupling.compliance[0]) + value[:, 0] + mu * sense * value[:, 1]
+            by_lambda = slope[:, 0] + mu * sense * slope[:, 1]
+            return single[:, None, None], by_lambda[:, None, None], (sense * value[:, 1])[:, None, None]
         return self.coupling.matrices(lam, mu, *self.receptance(lam))
 
     def tangents(self, lam: ComplexArray, mu: float) -> ComplexArray:
@@ -304,11 +312,6 @@ def _coupled_columns(spectrum: ReceptanceProblem) -> IntArray:
     return np.flatnonzero(np.abs(seen).max(axis=0, initial=0.0) > UNCOUPLED_TOLERANCE * scale)
 
 
-def mirrored(roots: ComplexArray, implied: BoolArray) -> ComplexArray:
-    """Conjugates (k,) of the roots where they are implied, not-a-number elsewhere."""
-    return np.where(implied, np.conj(roots), np.nan)
-
-
 def polish(
     spectrum: ReceptanceProblem, starts: ComplexArray, implied: BoolArray, mu: float, *, steps: int = MAX_STEPS
 ) -> tuple[ComplexArray, bool]:
@@ -322,7 +325,7 @@ def polish(
     active = np.ones(len(roots), dtype=bool)
     for _ in range(steps):
         index = np.flatnonzero(active)
-        step = _step(spectrum, roots, mirrored(roots, implied), index, nearby, mu)
+        step = _step(spectrum, roots, implied, index, nearby, mu)
         relative = np.abs(step) / np.maximum(np.abs(roots[index]), 1e-300)
         roots[index] = roots[index] - step
         # Beside a coalescence the last digits stagnate above that; no step helps further then.
@@ -346,7 +349,7 @@ def _poles_near(spectrum: ReceptanceProblem, roots: ComplexArray) -> tuple[Array
 def _step(
     spectrum: ReceptanceProblem,
     roots: ComplexArray,
-    mirror: ComplexArray,
+    implied: BoolArray,
     index: IntArray,
     poles: tuple[Array, Array],
     mu: float,
@@ -356,17 +359,7 @@ def _step(
         value, by_lambda, _ = spectrum.evaluate(lam, mu)
         single = value.shape[1] == 1
         slope = by_lambda[:, 0, 0] / value[:, 0, 0] if single else _trace_of_quotient(value, by_lambda)
-        stiffness, damping = poles
-        column = lam[:, None]
-        slope = slope + ((2 * column + damping) / (column * (column + damping) + stiffness)).sum(axis=1)
-        if spectrum.modes.general:
-            slope = slope + (1.0 / (column - spectrum.modes.poles)).sum(axis=1)
-        others = column - roots
-        others[np.arange(len(index)), index] = np.inf
-        slope = slope - (1.0 / others).sum(axis=1)
-        pairs = column - mirror
-        slope = slope - np.where(np.isnan(mirror), 0.0, 1.0 / pairs).sum(axis=1)
-        step = 1.0 / slope
+        step = 1.0 / (slope + deflation(roots, implied, index, poles, spectrum.modes.poles))
     # On a pole to the last bit there is no step: a nudge leads off it.
     return np.where(np.isfinite(step), step, 1e-9 * lam)
 

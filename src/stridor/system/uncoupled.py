@@ -8,6 +8,7 @@ Both give the same sum, the receptance D(λ)⁻¹ with D = λ²M + λC + K.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sl
@@ -78,7 +79,7 @@ class UncoupledModes:
         empty = np.zeros((len(rows), 0))
         return np.hstack([empty, *real]), np.hstack([empty.astype(complex), *general])
 
-    @property
+    @cached_property
     def poles(self) -> ComplexArray:
         """Poles of the general blocks in turn [1/s]."""
         return np.concatenate([b.poles for b in self.general] or [np.zeros(0, dtype=complex)])

@@ -35,6 +35,15 @@ DIGITS = 6  # of numbers that are drawn only
 Send = Callable[[str, Any], None]
 
 
+class _Drawn(Workspace):
+    """Of what is drawn, not saved: no text of the case goes with its results, which takes as long as some of them."""
+
+    @property
+    def text(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Nothing."""
+        return ""
+
+
 @dataclass
 class _Model:
     """The workspace of the case on the page and what was told of it. reduced: of a large one, where it has one; why:
@@ -92,7 +101,7 @@ class Bench:
         if self._model is None or self._model.key != state.model:
             self._model = None
             case = state.case()
-            model = _Model(state.model, Workspace(case))
+            model = _Model(state.model, _Drawn(case))
             if self._reduced is not None and self._reduced.holds(state):
                 model.reduced = self._reduced
             elif model.work.system().size > LARGE:
@@ -134,7 +143,7 @@ class Bench:
             self._shape(model, work.system(state.mu), here, state.branch, send, energy=True)
         self._leisure = True
         send(IDLE, None)
-        model.idle = model.idle or Workspace(work.case("the page"))
+        model.idle = model.idle or _Drawn(work.case("the page"))
         self._at_leisure(state, model, model.idle, send)
 
     def _at_leisure(self, state: State, model: _Model, work: Workspace, send: Send) -> None:
@@ -162,7 +171,7 @@ class Bench:
         model.onsets = model.onsets or reduced.onsets(state)
         send("onsets", model.onsets)
         if state.branch is not None:
-            model.idle = model.idle or Workspace(model.work.case("the page"))
+            model.idle = model.idle or _Drawn(model.work.case("the page"))
             self._shape(model, model.idle.system(), here, state.branch, send, energy=True)
             why = f"Not computed on this page for a model of this size: stridor sensitivities --branch {state.branch}"
             send("tornado", {"branch": state.branch, "bars": [], "warnings": [why]})
