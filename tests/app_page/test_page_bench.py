@@ -12,7 +12,9 @@ import pytest
 import stridor as st
 from stridor.app.page.bench import Bench
 from stridor.app.page.drawing import drawing
+from stridor.app.page.mesh_marks import held_nodes, pushes, slides
 from stridor.app.page.state import Source, State, first_state
+from stridor.case import template_text
 from stridor.system import build_system
 
 BEAMS = Source.template("two-beams")
@@ -123,3 +125,25 @@ def test_the_drawing_names_what_it_shows():
     svg = drawing(case, build_system(case))
     for words in ("beam1", "beam2", "20 N", "0.02 m/s", "holds x, y, φ", "50 mm", 'role="img"', "contact A: beam1.tip on beam2"):
         assert words in svg
+
+
+def test_the_drawing_of_a_model_in_space_shows_what_holds_loads_and_moves_it():
+    """Disc and pad: 5e5 Pa on the plate, the disc turns under the lining from 4.5 m/s inside to 6.75 outside."""
+    meshes = {"disc": [2, 24, 1], "lining": [2, 6, 1], "plate": [2, 6, 1]}
+    case = st.loads(template_text("pad-on-disc"))
+    case = case.with_({f"bodies.{name}.mesh.divisions": value for name, value in meshes.items()})
+    system = build_system(case)
+    (push,) = pushes(system)
+    assert push.direction == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
+    area = float(np.nansum(system.contact_nodes().area))
+    assert float(push.words.removesuffix(" N")) == pytest.approx(5e5 * area, rel=0.01)
+    (slide,) = slides(system)
+    # The disc turns about z: what comes out of the pad moves across the radius.
+    assert abs(slide.direction @ slide.at) < 0.5 * np.linalg.norm(slide.at[:2])
+    assert slide.words == "4.5 to 6.75 m/s"
+    held = held_nodes(system)
+    radius = np.hypot(held[:, 0], held[:, 1])
+    assert np.any(np.isclose(radius, radius.min())) and len(held) > 20
+    svg = drawing(case, system)
+    assert svg.count('class="support"') == len(held)
+    assert "slides with 4.5 to 6.75 m/s" in svg

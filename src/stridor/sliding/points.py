@@ -19,6 +19,8 @@ from ..system import System
 from ..typing import Array, BoolArray
 from .redundant import closed, redundant
 
+LEAST = 0.2  # of the speeds: a mean velocity below that is no direction (a whole turning ring)
+
 
 @dataclass(frozen=True)
 class SteadySliding:
@@ -41,6 +43,14 @@ class SteadySliding:
 def slip_speeds(system: System, motion_factors: Array) -> Array:
     """Slip (m,) [m/s] of slave relative to master at rest in the moving frame."""
     return np.array([float(c.tangent_lift @ motion_factors) for c in system.contacts])
+
+
+def mean_direction(slip: Array) -> Array | None:
+    """Unit vector (q,) of slip velocities (m, q), None where they have no direction in common."""
+    speeds = np.linalg.norm(slip, axis=1)
+    mean = slip.mean(axis=0) if len(slip) else np.zeros(1)
+    size = float(np.linalg.norm(mean))
+    return mean / size if size > LEAST * float(speeds.max(initial=0.0)) > 0.0 else None
 
 
 def full_motion(system: System) -> Array:

@@ -5,19 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..sliding.points import mean_direction
 from ..typing import Array
 from .interface_columns import seen_from_normal
 from .style import GREY, INK
-
-LEAST = 0.2  # of the speeds: a mean velocity below that is no direction (a whole turning ring)
-
-
-def mean_direction(slip: Array) -> Array | None:
-    """Unit vector (q,) of slip velocities (m, q), None where they have no direction in common."""
-    speeds = np.linalg.norm(slip, axis=1)
-    mean = slip.mean(axis=0) if len(slip) else np.zeros(1)
-    size = float(np.linalg.norm(mean))
-    return mean / size if size > LEAST * float(speeds.max(initial=0.0)) > 0.0 else None
 
 
 def mark_on_patch(ax: Axes, position: Array, tangents: Array, slip: Array) -> None:

@@ -14,6 +14,7 @@ from ...system import System
 from ...typing import Array
 from ...view.skin import Skin, skin_of
 from ...view.style import COLOURS, GREEN, VERMILION
+from .mesh_marks import held_nodes, pushes, slides
 
 WIDTH = 300.0  # units of the drawing, which the page fits into its column
 MARGIN = 46.0  # around the model, for supports, arrows and words
@@ -80,21 +81,25 @@ def drawing(case: Case, system: System) -> str:
         skin = skin_of(system)
     except CaseError:
         return ""
-    seen = _seen(skin)
+    seen = _seen(skin.points)
     sheet = _Sheet(seen.min(axis=0), seen.max(axis=0))
     names = list(skin.names)
     sheet.words.append(f"bodies {', '.join(names)}")
     _draw_mesh(sheet, skin, seen)
+    middles: list[tuple[float, float, str]] = []
     for index, name in enumerate(names):
         body = case.bodies.get(name)
         if isinstance(body, BeamBody):
             _draw_beam(sheet, name, body, COLOURS[index % len(COLOURS)])
         elif skin.dimension == 2 or len(names) > 1:
-            middle = seen[skin.point_body == index].mean(axis=0)
-            sheet.name(*sheet.at(middle), name)
+            x, y = sheet.at(seen[skin.point_body == index].mean(axis=0))
+            middles.append((y, x, name))
+    for y, x, name in sorted(middles):  # those above before those that make way for them
+        sheet.name(x, y, name)
     _draw_supports(sheet, case)
     _draw_loads(sheet, case)
     _draw_contacts(sheet, case, system)
+    _draw_on_meshes(sheet, system)
     _scale_bar(sheet)
     label = escape(f"The model to scale: {'; '.join(sheet.words)}.")
     return (
@@ -103,14 +108,14 @@ def drawing(case: Case, system: System) -> str:
     )
 
 
-def _seen(skin: Skin) -> Array:
-    """Points (k, 2) [m] as seen: in the plane as they are, of space from the usual direction."""
-    if skin.dimension == 2:
-        return skin.points
+def _seen(points: Array) -> Array:
+    """Points or vectors (k, d) as seen (k, 2): in the plane as they are, of space from the usual direction."""
+    if points.shape[1] == 2:
+        return points
     rise, turn = np.radians(28.0), np.radians(-58.0)
     right = np.array([-np.sin(turn), np.cos(turn), 0.0])
     up = np.array([-np.sin(rise) * np.cos(turn), -np.sin(rise) * np.sin(turn), np.cos(rise)])
-    return np.column_stack([skin.points @ right, skin.points @ up])
+    return np.column_stack([points @ right, points @ up])
 
 
 def _draw_mesh(sheet: _Sheet, skin: Skin, seen: Array) -> None:
@@ -198,6 +203,30 @@ def _draw_contacts(sheet: _Sheet, case: Case, system: System) -> None:
         sheet.text(x + 10, y - 6, contact.name, kind="name", anchor="start")
     for name, contact in case.contacts.items():
         sheet.words.append(f"contact {name}: {contact.slave} on {contact.master}")
+
+
+def _draw_on_meshes(sheet: _Sheet, system: System) -> None:
+    """Held nodes, resultants of loads, and which way contacts slide."""
+    if not system.solids:
+        return
+    for node in _seen(held_nodes(system)):
+        x, y = sheet.at(node)
+        sheet.parts.append(f'<rect x="{x - 1.5:.1f}" y="{y - 1.5:.1f}" width="3" height="3" class="support"/>')
+    for load in pushes(system):
+        tip, (ux, uy) = sheet.at(_seen(load.at[None])[0]), _unit(_seen(load.direction[None])[0])
+        sheet.arrow((tip[0] - ARROW * ux, tip[1] + ARROW * uy), tip, VERMILION)
+        sheet.text(tip[0] - ARROW * ux + 6, tip[1] + ARROW * uy, load.words, kind="load", anchor="start")
+    for slide in slides(system):
+        (x, y), (ux, uy) = sheet.at(_seen(slide.at[None])[0]), _unit(_seen(slide.direction[None])[0])
+        tip = (x + 1.2 * ARROW * ux, y - 1.2 * ARROW * uy)
+        sheet.arrow((x + 0.2 * ARROW * ux, y - 0.2 * ARROW * uy), tip, GREEN)
+        sheet.text(max(x, tip[0]), min(y, tip[1]) - 7, slide.words, kind="speed", anchor="end")
+        sheet.words.append(f"contact {slide.name} slides with {slide.words}")
+
+
+def _unit(vector: Array) -> tuple[float, float]:
+    size = float(np.linalg.norm(vector)) or 1.0
+    return float(vector[0]) / size, float(vector[1]) / size
 
 
 def _scale_bar(sheet: _Sheet) -> None:

@@ -1,0 +1,65 @@
+"""What is drawn on meshed bodies beside their facets: which nodes are held, where loads push, which way contacts slide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...sliding.points import full_motion, mean_direction
+from ...system import System
+from ...typing import Array
+
+MOST_HELD = 60  # marks of each body
+
+
+@dataclass(frozen=True)
+class Pointer:
+    """An arrow of the model: where (d,) [m], its direction (d,), and the words beside it."""
+
+    name: str
+    at: Array
+    direction: Array
+    words: str
+
+
+def held_nodes(system: System) -> Array:
+    """Some of the nodes (k, d) [m] that a support holds in some direction."""
+    parts = [np.zeros((0, system.dimension))]
+    for solid in system.solids:
+        free = np.diff(solid.rows.free.tocsr().indptr).reshape(len(solid.points), -1)
+        held = np.flatnonzero((free == 0).any(axis=1))
+        parts.append(solid.points[held[:: max(1, -(-len(held) // MOST_HELD))]])
+    return np.vstack(parts)
+
+
+def pushes(system: System) -> Iterator[Pointer]:
+    """The resultant of each load on meshed bodies, in the middle of what it acts on; none of one without a resultant."""
+    for name, load in system.loads.items():
+        forces = [(s.points, (s.rows.free @ load).reshape(len(s.points), -1)) for s in system.solids]
+        sizes = [np.linalg.norm(f, axis=1) for _, f in forces]
+        whole = sum(float(size.sum()) for size in sizes)
+        total = sum((f.sum(axis=0) for _, f in forces), np.zeros(system.dimension))
+        resultant = float(np.linalg.norm(total))
+        if resultant > 1e-6 * whole > 0.0:
+            middle = sum((size @ at for (at, _), size in zip(forces, sizes, strict=True)), np.zeros(system.dimension))
+            yield Pointer(name, middle / whole, total / resultant, f"{resultant:.4g} N")
+
+
+def slides(system: System) -> Iterator[Pointer]:
+    """Of each contact over a surface, how its master moves against the slave, where it comes out under it."""
+    nodes = system.contact_nodes()
+    if not nodes.count:
+        return
+    slip = np.einsum("mq,mqd->md", nodes.slip_velocity(full_motion(system)), nodes.tangents)
+    for surface, own in system.nodes_of_surfaces():
+        direction = mean_direction(slip[own])
+        if direction is None:
+            continue
+        speeds = np.linalg.norm(slip[own], axis=1)
+        low, high = f"{speeds.min():.3g}", f"{speeds.max():.3g}"
+        words = f"{high} m/s" if low == high else f"{low} to {high} m/s"
+        along, middle = -(nodes.position[own] @ direction), nodes.position[own].mean(axis=0)
+        out = middle - direction * float(along.max() - along.mean())
+        yield Pointer(nodes.names[int(nodes.owner[own][0])], out, -direction, words)
