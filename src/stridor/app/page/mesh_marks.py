@@ -1,4 +1,4 @@
-"""What is drawn on meshed bodies beside their facets: which nodes are held, where loads push, which way contacts slide."""
+"""What is drawn on meshed bodies beside facets: which nodes are held, where loads push, which way contacts slide."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def held_nodes(system: System) -> Array:
 
 
 def pushes(system: System) -> Iterator[Pointer]:
-    """The resultant of each load on meshed bodies, in the middle of what it acts on; none of one without a resultant."""
+    """The resultant of each load on meshed bodies, in the middle of what it acts on; of one without any, nothing."""
     for name, load in system.loads.items():
         forces = [(s.points, (s.rows.free @ load).reshape(len(s.points), -1)) for s in system.solids]
         sizes = [np.linalg.norm(f, axis=1) for _, f in forces]
@@ -53,7 +53,7 @@ def slides(system: System) -> Iterator[Pointer]:
     if not nodes.count:
         return
     slip = np.einsum("mq,mqd->md", nodes.slip_velocity(full_motion(system)), nodes.tangents)
-    for surface, own in system.nodes_of_surfaces():
+    for _, own in system.nodes_of_surfaces():
         direction = mean_direction(slip[own])
         if direction is None:
             continue
