@@ -1,6 +1,7 @@
 """From a slider to the picture, in a real browser: how long until the branches of the moved case are on the screen.
 
-python benchmarks/page.py [--short] [CASE.toml]
+python benchmarks/page.py [--short] [--lever PATH …] [CASE.toml]
+Of a large model, which has a reduced one over μ and the contact stiffness, --lever mu: others make that anew.
 Needs the extra app, playwright, and Chromium at /usr/bin/chromium; without them it says so and leaves.
 """
 
@@ -31,6 +32,7 @@ MOVE = """([path, share]) => new Promise((done) => {
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--short", action="store_true", help="fewer moves")
+    parser.add_argument("--lever", action="append", default=[], help="its path (default: the first four)")
     parser.add_argument("case", nargs="*", help="a case file (default: the two beams)")
     args = parser.parse_args()
     if find_spec("nicegui") is None or find_spec("playwright") is None or not CHROMIUM.exists():
@@ -40,24 +42,25 @@ def main() -> None:
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     try:
-        measure(server.stdout.readline().strip(), 12 if args.short else 60)
+        measure(server.stdout.readline().strip(), 12 if args.short else 60, args.lever)
     finally:
         server.terminate()
         server.wait(20)
         server.stdout.close()
 
 
-def measure(address: str, moves: int) -> None:
-    """Moves of three sliders, one after the other."""
+def measure(address: str, moves: int, levers: list[str]) -> None:
+    """Moves of some sliders, one after the other."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1280, "height": 720})
+        page.set_default_timeout(900_000)  # large models take minutes to be made
         page.goto(address)
-        page.wait_for_function("typeof stridor !== 'undefined' && stridor.state.onsets !== null", timeout=600_000)
+        page.wait_for_function("typeof stridor !== 'undefined' && stridor.state.onsets !== null")
         paths: list[str] = page.evaluate("stridor.state.levers.map((lever) => lever.path)")
-        for path in paths[:4]:
+        for path in levers or paths[:4]:
             each = [moved(page, path, k / moves) for k in range(1, moves)]
             ordered = sorted(each)
             p95 = ordered[min(len(ordered) - 1, int(0.95 * len(ordered)))]

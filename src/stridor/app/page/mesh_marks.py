@@ -26,7 +26,7 @@ class Pointer:
 
 def held_nodes(system: System) -> Array:
     """Some of the nodes (k, d) [m] that a support holds in some direction."""
-    parts = [np.zeros((0, system.dimension))]
+    parts: list[Array] = [np.zeros((0, system.dimension))]
     for solid in system.solids:
         free = np.diff(solid.rows.free.tocsr().indptr).reshape(len(solid.points), -1)
         held = np.flatnonzero((free == 0).any(axis=1))
