@@ -37,8 +37,12 @@ class Page(Shown):
         return self.address if self.server.serving else "stopped"
 
     def _repr_html_(self) -> str:
+        if not self.server.serving:
+            return f"<p>{self._line}</p>"
         style = f"width: 100%; height: {HEIGHT}px; border: 1px solid #ccc"
-        return f'<iframe title="stridor" src="{self.address}" style="{style}" allow="clipboard-write"></iframe>'
+        frame = f'<iframe title="stridor" src="{self.address}" style="{style}" allow="clipboard-write"></iframe>'
+        # Editors that show notebooks under other addresses than those of this computer show no frames of it.
+        return f'{frame}<p><a href="{self.address}" target="_blank" rel="noopener">In a window of its own</a></p>'
 
 
 def app(problem: Case | str | PathLike[str] | None = None, *, port: int = 0) -> Page:

@@ -24,6 +24,11 @@ if TYPE_CHECKING:
 TOO_LARGE = f"a case file of at most {LARGEST_TEXT / 1e6:g} MB"
 SECTIONS = (("left", "Model and numbers"), ("middle", "Modes over friction"), ("right", "Run in time and comparison"))
 TABS = (("bench", "Bench"), ("map", "Stability map"))
+# Browsers may give frames of other sites no storage, and 127.0.0.1 is one in a notebook of localhost: without this
+# nothing starts there.
+STORAGE = """<script>try { window.sessionStorage.length } catch {
+  Object.defineProperty(window, "sessionStorage", { value: {}, configurable: true })
+}</script>"""
 COLOURS = {"stable": BLUE, "unstable": VERMILION, "ink": INK, "speed": GREEN}
 
 
@@ -48,6 +53,7 @@ class Layout:
         self.client, self.session = client, session
         self._source: Source | None = None
         self.dark = ui.dark_mode(None)
+        ui.add_head_html(STORAGE)
         ui.add_css(asset("page.css"))
         ui.add_body_html(f"<script>{asset('page.js')}</script>")
         self._head()
