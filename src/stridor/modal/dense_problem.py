@@ -4,7 +4,7 @@ Newton's method need them."""
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -58,7 +58,7 @@ class OverNumber(ABC):
 
     def remembered(self, found: Eigenpairs) -> Eigenpairs:
         """The same, known from now on."""
-        if len(self._known) >= REMEMBERED:
+        if found.mu not in self._known and len(self._known) >= REMEMBERED:
             self._known.pop(next(iter(self._known)))
         self._known[found.mu] = found
         return found
@@ -77,11 +77,18 @@ class DenseProblem(OverNumber):
 
     def eigenpairs(self, mu: float) -> Eigenpairs:
         """All eigenpairs at ``mu`` with |λ| up to REACH times the frequency of interest."""
+        found = self.untracked(mu)
+        if len(found.tangents) == len(found.values):
+            return found
+        tangents = self.tangents(mu, found.coordinate, found.values, found.right, found.left)
+        return self.remembered(replace(found, tangents=tangents))
+
+    def untracked(self, mu: float) -> Eigenpairs:
+        """The same for what asks for no tangents, which may not have them: they take the matrices' changes over μ."""
         if mu not in self._known:
             coordinate, right, left = self.solve(mu)
             values = coordinate if self.damped else upper_root(coordinate)
-            tangents = self.tangents(mu, coordinate, values, right, left)
-            self.remembered(Eigenpairs(mu, coordinate, values, right, left, tangents, len(right)))
+            self.remembered(Eigenpairs(mu, coordinate, values, right, left, coordinate[:0], len(right)))
         return self._known[mu]
 
     def solve(self, mu: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -246,7 +246,8 @@ class Reduced(DenseProblem):
     def _projected(self, extras: Extras) -> tuple[Array, Array]:
         own = self.pairs.count
         damping, stiffness = np.zeros((2, self.count, self.count))
-        tests = np.hstack([self.pairs.u, self.lifts])
+        # Most have no rigid contact, and the vectors of a large problem are not copied for nothing.
+        tests = np.hstack([self.pairs.u, self.lifts]) if self.lifts.shape[1] else self.pairs.u
         if extras.weakening is not None:
             damping[:, :own] += self._slide.T @ (extras.weakening[:, None] * self._slide[:, :own])
         if extras.damping is not None:
@@ -256,11 +257,11 @@ class Reduced(DenseProblem):
         return damping, stiffness
 
     # -- eigenpairs ---------------------------------------------------------------------------------------------------
-    def eigenpairs(self, mu: float) -> Eigenpairs:
+    def untracked(self, mu: float) -> Eigenpairs:
         """See `DenseProblem`; own says how many of the unknowns belong to pairs."""
         if mu in self._known:
             return self._known[mu]
-        return self.remembered(replace(super().eigenpairs(mu), own=self.pairs.count))
+        return self.remembered(replace(super().untracked(mu), own=self.pairs.count))
 
     def padded(self, found: Eigenpairs, vectors: ComplexArray) -> ComplexArray:
         """Vectors (r, k) of pairs found before the basis grew, on the basis as it is now."""

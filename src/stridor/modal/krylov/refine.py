@@ -145,7 +145,7 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
                     continue
                 stuck.append(mu)  # there is nothing to take in
             pending.remove(mu)
-            found = reduced.eigenpairs(mu)
+            found = reduced.untracked(mu)
             reduced.keep(found.right[:, wanted(reduced, found)])
     stuck = [mu for mu in (*stuck, *pending) if worst[mu] > BELIEVED]
     if stuck:
@@ -182,7 +182,7 @@ def unbalanced(reduced: Reduced, mu: float, tolerance: float, *, left: bool = Fa
     """Largest backward error at ``mu``, and what the band's eigenpairs that are not exact leave unbalanced: forces
     (n, k) against their inertia forces, and for left vectors the slips (m, l) that must open the gaps."""
     problem = reduced.problem
-    found = reduced.eigenpairs(mu)
+    found = reduced.untracked(mu)
     chosen = wanted(reduced, found)
     lam = found.values[chosen]
     u, p = reduced.expand(found.right[:, chosen])
