@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
+from stridor.fe.assembly import beside, plus
 from stridor.system import System
 from stridor.temporal.steppers.sparse.damping import split_damping
 
@@ -60,3 +62,17 @@ def test_rows_without_an_excess_keep_their_diagonal_unless_they_stand_alone() ->
     found = split([[4.0, -5, 0], [-5, 9, 0], [0, 0, 6]])
     assert found.factor is None
     assert list(found.diagonal) == [0.0, 0.0, 6.0]
+
+
+def test_sums_and_blocks_are_those_of_scipy_whether_places_are_shared_or_not() -> None:
+    rng = np.random.default_rng(1)
+    matrix = sp.csr_array(sp.random_array((12, 12), density=0.3, rng=rng))
+    other = sp.csr_array(sp.random_array((12, 12), density=0.3, rng=rng))
+    same = sp.csr_array((matrix.data**2, matrix.indices, matrix.indptr), shape=matrix.shape)
+    for second in (same, other):
+        assert np.array_equal(plus(matrix, second).toarray(), (matrix + second).toarray())
+    wide = sp.csr_array((other.data, other.indices.astype(np.int64), other.indptr.astype(np.int64)), shape=(12, 12))
+    found = beside([matrix, sp.csr_array((0, 0)), sp.csr_array((3, 3)), wide])
+    assert np.array_equal(found.toarray(), sp.block_diag([matrix, sp.csr_array((3, 3)), other]).toarray())
+    assert found.indices.dtype == found.indptr.dtype == np.int32
+    assert found.has_canonical_format

@@ -15,6 +15,7 @@ from stridor.contact.facets import FacetSurface
 from stridor.contact.obstacles import Flat
 from stridor.contact.ties import Bond, tie, tie_transformation
 from stridor.errors import CaseError
+from stridor.system.supports import Tied
 
 
 def line(places, kind="line"):
@@ -264,3 +265,22 @@ def test_a_node_beside_the_master_says_how_far_and_where_to_move_it():
     assert found.distance[0] == pytest.approx(0.003)
     np.testing.assert_allclose(found.point, [[0.5, 0]], atol=1e-15)
     assert math.isclose(found.weights.sum(), 1.0)
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_rows_that_know_of_no_tie_stay_and_the_others_are_those_of_the_product(symmetric):
+    rng = np.random.default_rng(3)
+    n = 30
+    matrix = sp.random_array((n, n), density=0.1, format="csr", rng=rng) + sp.eye_array(n)
+    matrix = sp.csr_array(matrix + matrix.T if symmetric else matrix)
+    shares = sp.eye_array(n).tolil()
+    for follower, leaders in ((3, [7, 8]), (20, [1, 7, 29])):
+        shares[follower] = 0.0
+        shares[follower, leaders] = rng.random(len(leaders))
+    transformation = sp.csr_array(shares)
+    found = Tied(transformation, np.array([3, 20])).within(matrix)
+    assert found.toarray() == pytest.approx((transformation.T @ matrix @ transformation).toarray(), rel=1e-14)
+    assert found.has_sorted_indices
+    apart = np.setdiff1d(np.arange(n), [3, 20, 1, 7, 8, 29, *np.flatnonzero(matrix[:, [3, 20]].sum(axis=1))])
+    assert len(apart) > 5
+    assert np.array_equal(found[apart].toarray(), matrix[apart].toarray())

@@ -51,7 +51,7 @@ def check(call: Call) -> None:
     """Validate a case and print the model in words: bodies, contacts, time step against its limit."""
     work = call.workspace()
 
-    from ..study.analyses import describe
+    from ..study.description import describe
     from .output import stdout
 
     description = describe(work)

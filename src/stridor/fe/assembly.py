@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -31,9 +33,39 @@ def _scatter(element: Array, rows: IntArray, columns: IntArray, elements: int, s
     return matrix
 
 
+def beside(matrices: Sequence[Sparse]) -> Sparse:
+    """One matrix (N, N) csr with square ones on its diagonal, entries of each row in order."""
+    parts = [sp.csr_array(m) for m in matrices]
+    sizes, counts = (np.cumsum([0, *of]) for of in ([m.shape[0] for m in parts], [m.nnz for m in parts]))
+    short = np.int32 if max(sizes[-1], counts[-1]) <= np.iinfo(np.int32).max else np.int64
+    columns = [m.indices.astype(short) + short(n) for m, n in zip(parts, sizes[:-1], strict=True)]
+    ends = [m.indptr[1:] + count for m, count in zip(parts, counts[:-1], strict=True)]
+    joined = sp.csr_array(
+        (np.concatenate([m.data for m in parts]), np.concatenate(columns), np.concatenate([[0], *ends]).astype(short)),
+        shape=(int(sizes[-1]), int(sizes[-1])),
+    )
+    joined.sum_duplicates()
+    return joined
+
+
+def plus(first: Sparse, second: Sparse) -> Sparse:
+    """A + B (n, n) csr; where both have entries at the same places, which damping shares with stiffness, at the cost of
+    adding these."""
+    if not shaped_alike(first, second):
+        return sp.csr_array(first + second)
+    return sp.csr_array((first.data + second.data, first.indices, first.indptr), shape=first.shape)
+
+
+def shaped_alike(first: Sparse, second: Sparse) -> bool:
+    """Whether two csr matrices have entries at the same places, in the same order."""
+    return np.array_equal(first.indptr, second.indptr) and np.array_equal(first.indices, second.indices)
+
+
 def connected_components(*matrices: Sparse) -> list[IntArray]:
     """Index sets of freedoms that the matrices together leave uncoupled, each sorted."""
-    pattern = sum(abs(m) for m in matrices)
+    # Neither signs nor values matter, so no sum is needed where one pattern is that of all.
+    first, *others = matrices
+    pattern = first if all(shaped_alike(first, m) for m in others) else sum(abs(m) for m in matrices)
     count, label = sp.csgraph.connected_components(pattern, directed=False)
     order = np.argsort(label, kind="stable")
     edges = np.searchsorted(label[order], np.arange(count + 1))

@@ -20,7 +20,6 @@ from collections.abc import Iterator
 
 from ..case import Case
 from ..case.bodies import SolidBody
-from ..modal.source import by_receptance
 from ..system.pairs import is_point_on_line
 from .workspace import Workspace
 
@@ -54,7 +53,11 @@ def _of_few_points(work: Workspace, case: Case) -> bool:
     # Contact over a surface never is, which the case tells without a model.
     if not case.imported and any(not is_point_on_line(case, contact) for contact in case.contacts.values()):
         return False
-    return not work.varies and by_receptance(work.system())
+    if work.varies:
+        return False
+    from ..modal.source import by_receptance  # all of the modal approach, which `check` has no need of
+
+    return by_receptance(work.system())
 
 
 def _given(case: Case, solver: str | None) -> bool:

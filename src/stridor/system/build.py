@@ -14,6 +14,7 @@ from ..case.points import BoundaryRef
 from ..case.schema import Load, SteadyStep
 from ..contact.interface import Rows
 from ..errors import CaseError
+from ..fe.assembly import beside
 from ..fe.solid import stress_stiffness
 from ..mesh.boundary import require_boundary
 from ..mesh.facets import facet_areas, pressure_load, traction_load
@@ -117,16 +118,12 @@ def _load_steps(case: Case, motion: PrescribedMotion) -> tuple[LoadStep, ...]:
 
 def _structure(bodies: Mapping[str, BuiltBody], links: Links, tied: Tied | None) -> Structure:
     parts = list(bodies.values())
-    mass, damping, stiffness = (
-        sp.csr_array(sp.block_diag([getattr(b, kind) for b in parts], format="csr"))
-        for kind in ("mass", "damping", "stiffness")
-    )
+    mass, damping, stiffness = (beside([getattr(b, kind) for b in parts]) for kind in ("mass", "damping", "stiffness"))
     if links.rows.shape[0]:
         damping = damping + links.rows.T @ sp.diags_array(links.damping) @ links.rows
         stiffness = stiffness + links.rows.T @ sp.diags_array(links.stiffness) @ links.rows
     if tied is not None:
-        mass, tie = tied.mass(mass), tied.matrix
-        damping, stiffness = tie.T @ damping @ tie, tie.T @ stiffness @ tie
+        mass, damping, stiffness = tied.mass(mass), tied.within(damping), tied.within(stiffness)
     return Structure(sp.csr_array(mass), sp.csr_array(damping), sp.csr_array(stiffness))
 
 

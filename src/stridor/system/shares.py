@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case import Case
+from ..fe.assembly import beside
 from ..typing import Sparse
 from .bodies import BuiltBody, build_bodies
 from .imported import ROLES, Share, load_shares
@@ -35,7 +36,7 @@ def system_shares(case: Case, mu: float | None = None) -> tuple[Share, ...]:
         shares += [replace(share, matrix=_placed(share.matrix, bodies[name], total)) for share in mine]
     others = [_emptied(b) if b.name in case.imported else b for b in bodies.values()]
     for role in ROLES:
-        rest = sp.csr_array(sp.block_diag([getattr(b, role) for b in others], format="csr"))
+        rest = beside([getattr(b, role) for b in others])
         if links.rows.shape[0] and role != "mass":
             factor = links.damping if role == "damping" else links.stiffness
             rest = sp.csr_array(rest + links.rows.T @ sp.diags_array(factor) @ links.rows)
@@ -61,4 +62,4 @@ def _tied(share: Share, tied: Tied, *, lumped: bool) -> Sparse:
     """TᵀAT, as a diagonal mass of all bodies together has it where that is diagonal."""
     if share.role == "mass" and lumped:
         return tied.mass(share.matrix)
-    return sp.csr_array(tied.matrix.T @ share.matrix @ tied.matrix)
+    return tied.within(share.matrix)

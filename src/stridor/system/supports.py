@@ -120,6 +120,20 @@ class Tied:
     followers: IntArray
     shares: Sparse | None = None
 
+    def within(self, matrix: Sparse) -> Sparse:
+        """TᵀAT (N, N) csr. Few rows of a large A know of a tie: the others stay as they are."""
+        follows = np.zeros(matrix.shape[0], dtype=bool)
+        follows[self.followers] = True
+        met = np.searchsorted(matrix.indptr, np.flatnonzero(follows[matrix.indices]), side="right") - 1
+        changed = np.unique(np.concatenate([self.followers, self.matrix[self.followers].indices, met]))
+        place = np.arange(matrix.shape[0])
+        place[changed] = matrix.shape[0] + np.arange(len(changed))
+        new = sp.csr_array(self.matrix.T)[changed] @ matrix @ self.matrix
+        found = sp.csr_array(sp.vstack([matrix, new], format="csr")[place])
+        found.eliminate_zeros()
+        found.sort_indices()
+        return found
+
     def mass(self, mass: Sparse) -> Sparse:
         """TᵀMT, for a diagonal mass diagonal again: each node's mass goes to its leaders in their shares."""
         if np.any(mass.tocoo().row != mass.tocoo().col):

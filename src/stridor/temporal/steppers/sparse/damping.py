@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ....fe.assembly import plus, shaped_alike
 from ....system import System
 from ....typing import Array, Sparse
 from .unsymmetric import halves
@@ -45,7 +46,7 @@ def split_damping(system: System) -> SplitDamping:
     between = _off_diagonal(damping)
     if between.nnz == 0:
         return SplitDamping(own, np.zeros(system.size), sp.csr_array(damping.shape))
-    factor = _factors(system, between, _off_diagonal(stiffness))
+    factor = _factors(between, _off_diagonal(stiffness))
     if factor is not None:
         rest = sp.csr_array(stiffness.multiply(factor[:, None]))
         diagonal = own - rest.diagonal()
@@ -69,19 +70,18 @@ def _off_diagonal(matrix: Sparse) -> Sparse:
     return off
 
 
-def _factors(system: System, damping: Sparse, stiffness: Sparse) -> Array | None:
+def _factors(damping: Sparse, stiffness: Sparse) -> Array | None:
     """b (n,) with damping = diag(b) stiffness off the diagonal, constant on each uncoupled part; None if there is
     none."""
-    size = system.size
-    count, label = sp.csgraph.connected_components(abs(stiffness) + abs(damping), directed=False)
-    product, square = np.zeros(count), np.zeros(count)
-    rows = label[np.repeat(np.arange(size), np.diff(stiffness.indptr))]
+    pattern = stiffness if shaped_alike(stiffness, damping) else abs(stiffness) + abs(damping)
+    count, label = sp.csgraph.connected_components(pattern, directed=False)
+    rows = np.repeat(label, np.diff(stiffness.indptr))
     common = sp.csr_array(stiffness.multiply(damping))
-    np.add.at(product, label, np.asarray(common.sum(axis=1)).ravel())
-    np.add.at(square, rows, stiffness.data**2)
+    product = np.bincount(label, np.asarray(common.sum(axis=1)).ravel(), count)
+    square = np.bincount(rows, stiffness.data**2, count)
     factor = np.where(square > 0.0, product / np.where(square > 0.0, square, 1.0), 0.0)[label]
-    left = damping - stiffness.multiply(factor[:, None])
+    left = plus(damping, sp.csr_array(stiffness.multiply(-factor[:, None])))
     scale = np.zeros(count)
     np.maximum.at(scale, label, np.asarray(abs(damping).max(axis=1).todense()).ravel())
-    worst = np.asarray(abs(sp.csr_array(left)).max(axis=1).todense()).ravel()
+    worst = np.asarray(abs(left).max(axis=1).todense()).ravel()
     return factor if np.all(worst <= PROPORTIONAL * scale[label]) else None

@@ -35,7 +35,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from ....errors import AnalysisError
-from ....fe.assembly import connected_components
+from ....fe.assembly import connected_components, plus
 from ....system import System
 from ....typing import Array, Sparse
 from ...beta2 import StepLimit, share_of
@@ -102,7 +102,7 @@ def _part_limit(stiffness: Sparse, lagged: Sparse, beta2: float) -> tuple[float,
         step = min(step, found)
         if converged or lagged.nnz == 0:
             break
-        mode = _largest(sp.csr_array(stiffness + lagged / (beta2 * step)), mode.vector)
+        mode = _largest(plus(stiffness, lagged / (beta2 * step)), mode.vector)
     return step, math.sqrt(max(square, 0.0)), mode.vector
 
 
