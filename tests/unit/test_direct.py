@@ -247,24 +247,3 @@ def test_pivots_without_exchanges_are_believed_only_where_they_answer_exactly(mo
     lossy = inertia.SuperluFactor.solve
     monkeypatch.setattr(inertia.SuperluFactor, "solve", lambda self, b, t: lossy(self, b, t) * (1 if self._checked else 1.01))
     assert direct.negative_eigenvalues(matrix, solver="superlu") is None
-
-
-def test_mumps_takes_the_order_of_a_matrix_with_entries_at_the_same_places_and_no_other() -> None:
-    backend = pytest.importorskip("stridor.direct.mumps_backend")
-    backend._ordered.clear()
-    plain = plate()
-    for matrix, symmetric in ((plain, True), (plain, False), (plain + 1j * plain, False), (plate(8), True)):
-        right = np.ones(matrix.shape[0])
-        for size in (1.0, 3.0):
-            with direct.factorise(size * matrix, symmetric=symmetric, solver="mumps") as found:
-                first = found._backend._context.analysis_stats
-                assert (size * matrix) @ found.solve(right) == pytest.approx(right, rel=1e-6)
-            # The second has taken over what the first left, and nobody has it while it is in use.
-            assert len(backend._ordered) <= backend.KEPT
-            with direct.factorise(2 * size * matrix, symmetric=symmetric, solver="mumps") as again:
-                assert again._backend._context.analysis_stats is first
-                with direct.factorise(matrix, symmetric=symmetric, solver="mumps") as beside:
-                    assert beside._backend._context.analysis_stats is not first
-                    assert matrix @ beside.solve(right) == pytest.approx(right, rel=1e-6)
-                assert (2 * size * matrix) @ again.solve(right) == pytest.approx(right, rel=1e-6)
-    assert len(backend._ordered) == backend.KEPT

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import Any
 
 import mumps
@@ -16,25 +15,17 @@ from .interface import Breakdown
 SINGULAR = (-6, -10)
 OUT_OF_MEMORY = (-5, -7, -13)
 COLUMNS = 64  # right-hand sides that are solved for at once: an eighth faster than MUMPS's 32
-# Of a matrix of some thousand freedoms half of factorising is finding the order of elimination. Another with entries at
-# the same places takes that of the one before, whose factors MUMPS holds in memory until then.
-KEPT = 3  # orders
-SMALL = 64e6  # bytes of factors
-
-_ordered: dict[tuple[Any, ...], Any] = {}
 
 
 class MumpsFactor:
     """Factors kept by MUMPS. inertia is its count of negative pivots where the matrix is real and symmetric."""
 
     def __init__(self, matrix: Sparse, symmetric: bool, saddle: bool) -> None:
-        self._pattern = _pattern(matrix, symmetric)
-        known = _ordered.pop(self._pattern, None)
-        self._context: Any = mumps.Context() if known is None else known
+        self._context: Any = mumps.Context()
         # MUMPS counts its entries from the coordinates: handing the upper triangle saves it half the work.
         self._context.set_matrix(sp.triu(matrix, format="coo") if symmetric else matrix, symmetric=symmetric)
         try:
-            self._context.factor(reuse_analysis=known is not None)
+            self._context.factor()
         except mumps.MUMPSError as error:
             if error.error in SINGULAR:
                 raise Breakdown(str(error)) from error
@@ -57,17 +48,5 @@ class MumpsFactor:
         return answer.reshape(right.shape)
 
     def free(self) -> None:
-        """MUMPS frees its memory when the last reference goes, which of small matrices is that to their order."""
-        if self._context is not None and self.memory_bytes <= SMALL:
-            _ordered.pop(self._pattern, None)
-            while len(_ordered) >= KEPT:
-                _ordered.pop(next(iter(_ordered)))
-            _ordered[self._pattern] = self._context
+        """MUMPS frees its memory when the last reference goes."""
         self._context = self._instance = None
-
-
-def _pattern(matrix: Sparse, symmetric: bool) -> tuple[Any, ...]:
-    """What two csr matrices share that have entries at the same places and are eliminated alike."""
-    places = hashlib.blake2b(matrix.indptr.tobytes())
-    places.update(matrix.indices.tobytes())
-    return matrix.shape, matrix.indices.dtype.str, matrix.dtype.kind, symmetric, places.digest()
