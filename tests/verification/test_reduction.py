@@ -201,8 +201,11 @@ def test_dense_modes_that_are_about_to_meet_do_not_take_the_companion_matrix(mon
     for lam, z, y in zip(found.values, found.right.T, found.left.T, strict=True):
         whole = lam**2 * matrices[0] + lam * matrices[1] + matrices[2]
         assert max(np.linalg.norm(whole @ z), np.linalg.norm(y @ whole)) < 1e-7 * np.linalg.norm(whole)
+    # What others' answers leave unsettled takes the inverse itself; where that is too much, the companion matrix.
+    unsettled, top = close_pairs(5)
+    assert not dense_modes(*unsettled, top, 1.0).whole
     monkeypatch.setattr("stridor.modal.parametric.dense.FEW", 0)
-    assert dense_modes(*matrices, 30.0, 1.0).whole
+    assert dense_modes(*unsettled, top, 1.0).whole
 
 
 @pytest.mark.parametrize("first", [0, 150])
@@ -269,6 +272,37 @@ def test_modes_that_damping_mixes_are_all_there_and_none_is_there_twice(seeds):
         # Of two that all but coincide the companion matrix has no more digits.
         assert away[one_to_one].max(initial=0.0) < 1e-6, seed
     assert cheap > 0.6 * len(seeds)
+
+
+@pytest.mark.parametrize("seeds", [range(100), pytest.param(range(3000), marks=pytest.mark.slow)])
+def test_modes_that_gyroscopic_forces_bring_into_the_band_are_there(seeds):
+    """Beside the end of the band damping of modes far away moves others across it, either way."""
+    cheap = crossed = 0
+    for seed in seeds:
+        random = np.random.default_rng(seed)
+        r = int(random.integers(3, 12))
+        omega = np.sort(np.concatenate([random.uniform(0.3, 0.95, r // 3), random.uniform(0.9, 2.0, r - r // 3)]))
+        turn = random.standard_normal((r, r)) * 10 ** random.uniform(-2, -0.3) / np.sqrt(r)
+        shapes = np.linalg.qr(random.standard_normal((r, r)))[0]
+        damping = shapes @ (turn - turn.T + 0.01 * np.diag(omega)) @ shapes.T
+        matrices = np.eye(r), damping, shapes @ np.diag(omega**2) @ shapes.T
+        found, reference = dense_modes(*matrices, 1.0, 1.0), dense_modes(*matrices, 1.0, 1.0, whole=True)
+        cheap += not found.whole
+        mine, theirs = (m.values[np.abs(np.abs(m.values) - 1.0) > 1e-6] for m in (found, reference))
+        assert len(mine) == len(theirs), seed
+        assert np.abs(np.sort_complex(mine) - np.sort_complex(theirs)).max(initial=0.0) < 1e-8, seed
+        crossed += int(np.sum(omega < 1)) != len(theirs)
+    assert min(cheap, crossed) > 0.1 * len(seeds)
+
+
+@pytest.mark.parametrize(("near", "far"), [(1.02, 1.3), (1.01, 1.22)])
+def test_one_mode_that_gyroscopic_forces_bring_into_the_band(near: float, far: float):
+    damping = np.diag([0.005, 0.01, 0.01])
+    damping[1, 2], damping[2, 1] = -0.3, 0.3
+    matrices = np.eye(3), damping, np.diag([0.25, near**2, far**2])
+    found = dense_modes(*matrices, 1.0, 1 + 1e-9)
+    assert found.values == pytest.approx(dense_modes(*matrices, 1.0, 1 + 1e-9, whole=True).values, abs=1e-10)
+    assert len(found.values) == 2
 
 
 def strongly_damped() -> ParametricProblem:

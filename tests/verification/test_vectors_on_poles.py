@@ -56,3 +56,20 @@ def test_the_shape_beside_a_pole_closes_its_contact(damping: float) -> None:
             assert np.all(judge(lam[near], closing, mu, left=left) < 1e-12)
             improved += int(near.sum())
     assert improved > 10
+
+
+def test_left_vectors_beside_a_pole_under_falling_friction() -> None:
+    """The left vector's gap is not the right one's: what is judged well on the right may be wrong on the left."""
+    friction = {"law": "weakening", "coefficient": 0.3, "static_coefficient": 0.5, "decay_speed": 0.5}
+    case = paper_case().with_({
+        "bodies.beam1.start": [0.075 + 1e-8, 0.0], "contacts.A.friction": friction, "bodies.beam1.elements": 12,
+        "bodies.beam2.elements": 12, "supports.end": {"at": "beam2.end", "fixed": ["y", "rotation"]},
+    })  # fmt: skip
+    system = build_system(case)
+    found = modes_by_receptance(
+        system, np.array([0.3]), count=40, max_frequency_hz=4e4, damped=True, vectors=True, progress=None
+    )
+    coupling = prepare(system, mu=0.3)[1]
+    assert found.left is not None
+    errors = BackwardError(coupling)(found.eigenvalues[0], found.left[0].T, 0.3, left=True)
+    assert np.all(errors < 1e-10)

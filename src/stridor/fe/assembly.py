@@ -53,7 +53,7 @@ def plus(first: Sparse, second: Sparse) -> Sparse:
     adding these."""
     if not shaped_alike(first, second):
         return sp.csr_array(first + second)
-    return sp.csr_array((first.data + second.data, first.indices, first.indptr), shape=first.shape)
+    return sp.csr_array((first.data + second.data, first.indices.copy(), first.indptr.copy()), shape=first.shape)
 
 
 def shaped_alike(first: Sparse, second: Sparse) -> bool:
@@ -63,9 +63,10 @@ def shaped_alike(first: Sparse, second: Sparse) -> bool:
 
 def connected_components(*matrices: Sparse) -> list[IntArray]:
     """Index sets of freedoms that the matrices together leave uncoupled, each sorted."""
-    # Neither signs nor values matter, so no sum is needed where one pattern is that of all.
+    # Neither signs nor values matter, so no sum is needed where one pattern, without stored zeros, is that of all.
     first, *others = matrices
-    pattern = first if all(shaped_alike(first, m) for m in others) else sum(abs(m) for m in matrices)
+    alike = bool(np.all(first.data)) and all(shaped_alike(first, m) for m in others)
+    pattern = first if alike else sum(abs(m) for m in matrices)
     count, label = sp.csgraph.connected_components(pattern, directed=False)
     order = np.argsort(label, kind="stable")
     edges = np.searchsorted(label[order], np.arange(count + 1))

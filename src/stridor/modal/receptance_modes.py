@@ -207,19 +207,28 @@ def _pairs(
             error = judge(lam[at], better, each[at])
             sound = ~(errors[at] <= error) & np.isfinite(error)
             right[:, doubtful[sound]], errors[at[sound]] = better[:, sound], error[sound]
-            if shapes is not None and not spectrum.coupling.sloped:
-                better = closed(spectrum, lam[at], pull[at], np.multiply.outer(each[at], spectrum.coupling.sense))
-                before, after = (judge(lam[at], y, each[at], left=True) for y in (left[:, doubtful], better))
-                sound = ~(before <= after) & np.isfinite(after)
-                left[:, doubtful[sound]] = better[:, sound]
-            doubtful = doubtful[~(errors[at] < DOUBTFUL)]
+            still = ~(errors[at] < DOUBTFUL)
+            if shapes is not None:
+                of_left = judge(lam[at], left[:, doubtful], each[at], left=True)
+                if not spectrum.coupling.sloped:
+                    better = closed(spectrum, lam[at], pull[at], np.multiply.outer(each[at], spectrum.coupling.sense))
+                    error = judge(lam[at], better, each[at], left=True)
+                    sound = ~(of_left <= error) & np.isfinite(error)
+                    left[:, doubtful[sound]], of_left[sound] = better[:, sound], error[sound]
+                still |= ~(of_left < DOUBTFUL)
+            doubtful = doubtful[still]
         for k in doubtful:
             at = part[k]
             pencil = spectrum.coupling.pencil(float(each[at]))
             value, x, y = _refined(pencil, complex(lam[at]), right[:, k], left[:, k])
             error = float(judge(np.array([value]), x[:, None], each[at])[0])
             if error < errors[at] or not np.isfinite(errors[at]):
-                errors[at], lam[at], right[:, k], left[:, k] = error, value, x, y
+                errors[at], lam[at], right[:, k] = error, value, x
+            if shapes is not None:
+                one = lam[at : at + 1]
+                before, after = (judge(one, v[:, None], each[at], left=True)[0] for v in (left[:, k], y))
+                if after < before or not np.isfinite(before):
+                    left[:, k] = y
         if shapes is not None:
             shapes[0, part // count, columns[part % count]] = right.T
             shapes[1, part // count, columns[part % count]] = left.T

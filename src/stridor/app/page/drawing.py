@@ -99,7 +99,7 @@ def drawing(case: Case, system: System) -> str:
     _draw_supports(sheet, case)
     _draw_loads(sheet, case)
     _draw_contacts(sheet, case, system)
-    _draw_on_meshes(sheet, system)
+    _draw_on_meshes(sheet, case, system)
     _scale_bar(sheet)
     label = escape(f"The model to scale: {'; '.join(sheet.words)}.")
     return (
@@ -205,23 +205,36 @@ def _draw_contacts(sheet: _Sheet, case: Case, system: System) -> None:
         sheet.words.append(f"contact {name}: {contact.slave} on {contact.master}")
 
 
-def _draw_on_meshes(sheet: _Sheet, system: System) -> None:
-    """Held nodes, resultants of loads, and which way contacts slide."""
+def _draw_on_meshes(sheet: _Sheet, case: Case, system: System) -> None:
+    """Held nodes, loads that are not drawn at their point, and which way contacts slide."""
     if not system.solids:
         return
     for node in _seen(held_nodes(system)):
         x, y = sheet.at(node)
         sheet.parts.append(f'<rect x="{x - 1.5:.1f}" y="{y - 1.5:.1f}" width="3" height="3" class="support"/>')
-    for load in pushes(system):
-        tip, (ux, uy) = sheet.at(_seen(load.at[None])[0]), _unit(_seen(load.direction[None])[0])
+    for push in pushes(system):
+        load = case.loads.get(push.name)
+        ahead = _seen(push.direction[None])[0]
+        if load is None or (load.at is not None and _place(case, load.at) is not None) or not _across(ahead):
+            continue
+        tip, (ux, uy) = sheet.at(_seen(push.at[None])[0]), _unit(ahead)
+        size = float(np.linalg.norm(load.force))
+        words = f"{load.pressure:g} Pa" if load.pressure else f"{size:g} N" if size else push.name
         sheet.arrow((tip[0] - ARROW * ux, tip[1] + ARROW * uy), tip, VERMILION)
-        sheet.text(tip[0] - ARROW * ux + 6, tip[1] + ARROW * uy, load.words, kind="load", anchor="start")
+        sheet.text(tip[0] - ARROW * ux + 6, tip[1] + ARROW * uy, words, kind="load", anchor="start")
     for slide in slides(system):
+        if not _across(_seen(slide.direction[None])[0]):
+            continue
         (x, y), (ux, uy) = sheet.at(_seen(slide.at[None])[0]), _unit(_seen(slide.direction[None])[0])
         tip = (x + 1.2 * ARROW * ux, y - 1.2 * ARROW * uy)
         sheet.arrow((x + 0.2 * ARROW * ux, y - 0.2 * ARROW * uy), tip, GREEN)
         sheet.text(max(x, tip[0]), min(y, tip[1]) - 7, slide.words, kind="speed", anchor="end")
         sheet.words.append(f"contact {slide.name} slides with {slide.words}")
+
+
+def _across(direction: Array) -> bool:
+    """Whether a direction as seen is one on the sheet, not towards whoever looks."""
+    return float(np.linalg.norm(direction)) > 0.05
 
 
 def _unit(vector: Array) -> tuple[float, float]:

@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from ...sliding.points import full_motion, mean_direction
 from ...system import System
-from ...typing import Array
+from ...typing import Array, IntArray, Sparse
 
 MOST_HELD = 60  # marks of each body
 
@@ -35,16 +36,31 @@ def held_nodes(system: System) -> Array:
 
 
 def pushes(system: System) -> Iterator[Pointer]:
-    """The resultant of each load on meshed bodies, in the middle of what it acts on; of one without any, nothing."""
+    """Where and which way each load pushes the free nodes of meshed bodies; none of one without a resultant."""
+    solids = [(s.points, *_own_freedoms(s.rows.free)) for s in system.solids]
     for name, load in system.loads.items():
-        forces = [(s.points, (s.rows.free @ load).reshape(len(s.points), -1)) for s in system.solids]
-        sizes = [np.linalg.norm(f, axis=1) for _, f in forces]
-        whole = sum(float(size.sum()) for size in sizes)
-        total = sum((f.sum(axis=0) for _, f in forces), np.zeros(system.dimension))
+        total, middle, whole = np.zeros(system.dimension), np.zeros(system.dimension), 0.0
+        seen = np.zeros(system.size, dtype=bool)
+        for points, places, freedoms in solids:
+            new = ~seen[freedoms]  # nodes that follow another one alone have its freedoms
+            seen[freedoms] = True
+            forces = np.zeros(points.size)
+            forces[places[new]] = load[freedoms[new]]
+            forces = forces.reshape(points.shape)
+            sizes = np.linalg.norm(forces, axis=1)
+            total, middle, whole = total + forces.sum(axis=0), middle + sizes @ points, whole + float(sizes.sum())
         resultant = float(np.linalg.norm(total))
         if resultant > 1e-6 * whole > 0.0:
-            middle = sum((size @ at for (at, _), size in zip(forces, sizes, strict=True)), np.zeros(system.dimension))
-            yield Pointer(name, middle / whole, total / resultant, f"{resultant:.4g} N")
+            yield Pointer(name, middle / whole, total / resultant, name)
+
+
+def _own_freedoms(rows: Sparse) -> tuple[IntArray, IntArray]:
+    """Displacements (q,) that are a freedom themselves, and that freedom (q,): neither held nor weighed of others."""
+    rows = sp.csr_array(rows)
+    alone = np.flatnonzero(np.diff(rows.indptr) == 1)
+    entry = rows.indptr[alone]
+    same = rows.data[entry] == 1.0
+    return alone[same], rows.indices[entry[same]]
 
 
 def slides(system: System) -> Iterator[Pointer]:

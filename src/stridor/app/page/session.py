@@ -200,7 +200,7 @@ class Session:
             return
         self.closed = True
         self._worker.close()
-        for run in self._runs:
+        for run in reversed(self._runs):  # those that wait first: the place of one under way is not for them
             run.close()
 
     def end(self) -> None:

@@ -15,6 +15,9 @@ from .basis import expanded
 NEAR = (1.2, 4.0)  # modes up to this much above the band are solved for together: first try, second try
 SMALL = 1e-13
 HIDDEN = 0.3  # share of their stiffness that damping of modes far away may reach at the end of the band
+EDGE = 1.2  # times the band: modes up to here are carried along, as damping may bring them into it; of those further
+# away half of HIDDEN is what it may do to their frequency
+WATCHED = 1.1  # times the band: and up to here they must settle
 ANSWERS = 6
 FEW = 20  # modes that others' answers leave unsettled, solved for one by one
 OFF = 1e-10  # of λ: how far beside it is factorised, so that the matrix is not singular
@@ -88,6 +91,7 @@ def _by_undamped(mass: Array, damping: Array, stiffness: Array, frequency: float
     theta, left, right = sl.eig(sl.lu_solve(factor, shift * mass), left=True, right=True)
     left = left.conj()
     left = sl.lu_solve(factor, left.real, trans=1) + 1j * sl.lu_solve(factor, left.imag, trans=1)
+    left = left / np.linalg.norm(left, axis=0)
     squares = shift - shift / theta
     for near in NEAR:
         found = _with_damping((mass, damping, stiffness), squares, right, left, frequency, reach, near)
@@ -114,7 +118,7 @@ def _with_damping(
     inner_mass, inner_damping, inner_stiffness = (
         inner_left.T @ (matrix @ inner_right) for matrix in (mass, damping, stiffness)
     )
-    inner = _by_companion(inner_mass, inner_damping, inner_stiffness, frequency, reach)
+    inner = _by_companion(inner_mass, inner_damping, inner_stiffness, frequency, EDGE * reach)
     lam = inner.values
     if not len(lam) or np.any(lam.imag <= 1e-3 * frequency):
         return None
@@ -127,7 +131,7 @@ def _with_damping(
     if top * _coupling(damping, right[:, far] * scale[far], left * scale) > HIDDEN:
         return None
     ours, theirs = _images(matrices, z), _images(transposed, w)
-    open_modes = np.ones(len(lam), dtype=bool)
+    open_modes = watched = np.ones(len(lam), dtype=bool)
     first, number, answering = lam, len(lam) + 1, _answering(lam, squares, weight, right, left, ours, theirs)
     answering[far] = True
     for _ in range(ANSWERS):
@@ -136,11 +140,12 @@ def _with_damping(
         w = w - left @ (inverse * (right.T @ _rest(lam, theirs)))
         ours, theirs = _images(matrices, z), _images(transposed, w)
         lam = _functional(lam, w, ours)
-        before, open_modes = number, _unsettled(lam, w, ours, theirs)
+        watched = np.abs(lam) <= WATCHED * top
+        before, open_modes = number, watched & _unsettled(lam, w, ours, theirs)
         number = int(open_modes.sum())
         if not number or number == before:
             break
-    if number > FEW or np.any(np.abs(lam - first) >= MOVED * _apart(first)):
+    if number > FEW or np.any(watched & (np.abs(lam - first) >= MOVED * _apart(first))):
         return None
     for k in np.flatnonzero(open_modes):
         # Two modes that are about to meet take the inverse itself.
@@ -149,9 +154,10 @@ def _with_damping(
         if not abs(value - lam[k]) < JUMP * apart:
             return None
         lam[k] = value
-    if number and _unsettled(lam, w, _images(matrices, z), _images(transposed, w)).any():
+    if number and np.any(watched & _unsettled(lam, w, _images(matrices, z), _images(transposed, w))):
         return None
-    return None if np.any(np.abs(lam) > reach * frequency * 1.001) else DenseModes(lam, z, w, whole=False)
+    inside = np.abs(lam) <= top
+    return DenseModes(lam[inside], z[:, inside], w[:, inside], whole=False) if inside.any() else None
 
 
 def _answering(
