@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 from ...studies.workers import spawned
 from .running import serve
-from .worker import ended
+from .worker import ended, hung_up
 
 AT_ONCE = max(1, (os.cpu_count() or 2) - 1)  # runs; one core is left to the pages
 PATIENCE = 0.2  # seconds that a process has to end
@@ -138,8 +138,7 @@ class Run:
         with self._lock:
             pipe, self._pipe = self._pipe, None
         if pipe is not None:
-            with contextlib.suppress(OSError):
-                pipe.close()
+            hung_up(pipe)
         self._queue.drop(self)
 
     def end(self) -> None:
@@ -171,4 +170,3 @@ class Run:
     def _ended(self) -> None:
         self.over = True
         self._queue.drop(self)
-

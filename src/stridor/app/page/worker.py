@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import socket
 import threading
 import time
 from _thread import interrupt_main
@@ -88,8 +89,7 @@ class Worker:
             self._wake.notify()
             pipe, self._pipe = self._pipe, None
         if pipe is not None:
-            with contextlib.suppress(OSError):
-                pipe.close()
+            hung_up(pipe)
 
     def end(self) -> None:
         """Wait until the process is gone, once closed; what does not end by itself is killed."""
@@ -136,6 +136,17 @@ class Worker:
         if died and not again:
             self._heard(number, "failed", "the process that computes for this page has died; the next change starts "
                                           "another one")  # fmt: skip
+
+
+def hung_up(pipe: Any) -> None:
+    """Close one end of a pipe. A thread that reads it at that moment keeps it open, and the other end would hear
+    nothing: sockets, which such pipes are on POSIX, are shut down first."""
+    with contextlib.suppress(OSError):
+        if os.name == "posix":
+            with socket.socket(fileno=os.dup(pipe.fileno())) as end:
+                end.shutdown(socket.SHUT_RDWR)
+    with contextlib.suppress(OSError):
+        pipe.close()
 
 
 def ended(process: Any, patience: float) -> None:
