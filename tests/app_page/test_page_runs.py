@@ -21,6 +21,7 @@ import stridor as st
 from benches import paper_case
 from stridor.app.page.running import sound_of_file
 from stridor.app.page.runs import Queue, Run, Wish
+from stridor.studies.workers import spawned
 
 SHORT = {
     "bodies.beam1.elements": 4, "bodies.beam2.elements": 8, "temporal.step": 2e-7, "temporal.record_every": 5,
@@ -123,6 +124,32 @@ def test_a_closed_page_ends_its_run(start) -> None:
     run.close()
     assert gone(run.process)
     assert len(told.parts) <= heard + 1
+
+
+def test_a_run_that_is_on_its_way_when_its_page_closes_is_waited_for(monkeypatch, tmp_path: Path) -> None:
+    begun, go_on = threading.Event(), threading.Event()
+
+    def slowly(*given: Any) -> Any:
+        begun.set()
+        assert go_on.wait(PATIENCE)
+        return spawned(*given)
+
+    monkeypatch.setattr("stridor.app.page.runs.spawned", slowly)
+    wish = Wish(paper_case().with_(ENDLESS).to_toml(), None, str(tmp_path))
+    run = Run(wish, lambda *_: None, Queue(0))
+    beginning = threading.Thread(target=run.begin)
+    beginning.start()
+    assert begun.wait(PATIENCE)
+    run.close()
+    ending = threading.Thread(target=run.end)
+    ending.start()
+    ending.join(0.3)
+    assert ending.is_alive()  # the process is not there yet
+    go_on.set()
+    ending.join(PATIENCE)
+    beginning.join(PATIENCE)
+    assert run.process is not None
+    assert not run.process.is_alive()
 
 
 def test_no_more_at_once_than_there_may_be(start) -> None:

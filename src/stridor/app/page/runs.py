@@ -111,12 +111,15 @@ class Run:
 
     def begin(self) -> None:
         """Its turn has come."""
-        process, own = spawned(serve, "stridor run", self.wish)
-        with self._lock:
-            self._process, self._pipe = process, own
-        if self.over:  # closed or stopped while it began
-            self.close()
-            return
+        with self._end:  # whoever waits for its end waits for a process that is on its way, too
+            if self.over:
+                return
+            process, own = spawned(serve, "stridor run", self.wish)
+            with self._lock:
+                self._process, self._pipe = process, own
+            if self.over:  # closed or stopped while it began
+                self.close()
+                return
         threading.Thread(target=self._listening, args=(own,), name="stridor-run-listener", daemon=True).start()
         self.told("begun")
 
