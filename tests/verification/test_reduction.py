@@ -282,7 +282,7 @@ def test_modes_that_gyroscopic_forces_bring_into_the_band_are_there(seeds):
         random = np.random.default_rng(seed)
         r = int(random.integers(3, 12))
         omega = np.sort(np.concatenate([random.uniform(0.3, 0.95, r // 3), random.uniform(0.9, 2.0, r - r // 3)]))
-        turn = random.standard_normal((r, r)) * 10 ** random.uniform(-2, -0.3) / np.sqrt(r)
+        turn = random.standard_normal((r, r)) * 10 ** random.uniform(-1.2, 0.1) / np.sqrt(r)
         shapes = np.linalg.qr(random.standard_normal((r, r)))[0]
         damping = shapes @ (turn - turn.T + 0.01 * np.diag(omega)) @ shapes.T
         matrices = np.eye(r), damping, shapes @ np.diag(omega**2) @ shapes.T
