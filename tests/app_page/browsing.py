@@ -74,3 +74,16 @@ def slide(page: Any, path: str, value: float) -> None:
 
 def wait(page: Any, condition: str) -> None:
     page.wait_for_function(condition, timeout=PATIENT)
+
+
+def number(page: Any, path: str, value: float) -> None:
+    """A number field shows that value."""
+    wait(page, f"Number(document.querySelector('[data-number=\"{path}\"]').value) === {value!r}")
+
+
+def expect(locator: Any) -> Any:
+    """What the page has to show soon: parts of it arrive one after the other."""
+    from playwright.sync_api import expect as soon
+
+    soon.set_options(timeout=PATIENT)
+    return soon(locator)

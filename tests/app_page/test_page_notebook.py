@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import PATIENT, SOLVED, WITH_BROWSER, shot
+from browsing import PATIENT, SOLVED, WITH_BROWSER, expect, shot
 
 pytest.importorskip("nicegui", reason="the extra app is not installed")
 
@@ -83,7 +83,7 @@ def test_a_frame_below_a_cell_shows_the_page(browser: Any, kernel: Any, notebook
     page.frame_locator("iframe").first.locator("#st-modes-list button").first.wait_for(timeout=PATIENT)
     frame = next(frame for frame in page.frames if "127.0.0.1" in frame.url and frame.parent_frame == page.main_frame)
     frame.wait_for_function(SOLVED, timeout=PATIENT)
-    assert "Growth begins at μ = 0.076725" in frame.locator("#st-said").inner_text()
+    expect(frame.locator("#st-said")).to_contain_text("Growth begins at μ = 0.076725")
     assert failed == []
     shot(page, f"notebook-{host}")
     assert list(tmp_path.iterdir())

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import PATIENT, READY, SOLVED, WITH_BROWSER, page_at, serving, shot, wait
+from browsing import PATIENT, READY, SOLVED, WITH_BROWSER, expect, number, page_at, serving, shot, wait
 
 import stridor as st
 from benches import paper_case
@@ -42,10 +42,6 @@ def endless(tmp_path_factory: pytest.TempPathFactory) -> Generator[tuple[Any, st
         yield found
 
 
-def said(page: Any, part: str = "run") -> str:
-    return str(page.locator(f"#st-{part}-said").inner_text())
-
-
 def runs_of(server: Any) -> int:
     """How many processes of runs the server has: each with its own pipe, beside the one of the page."""
     children = 0
@@ -74,10 +70,10 @@ def test_a_run_is_drawn_and_heard(browser: Any, short: str) -> None:
         page.click("#st-run-listen")
         wait(page, "stridorRun.page.sound !== null")
         assert page.evaluate("stridorRun.page.sound.seconds") == pytest.approx(heard.seconds, rel=0.01)
-        assert heard.sentence in said(page)
-        assert page.inner_text("#st-run-listen") == "Silence"
+        expect(page.locator("#st-run-said")).to_contain_text(heard.sentence)
+        expect(page.locator("#st-run-listen")).to_have_text("Silence")
         page.click("#st-run-listen")
-        assert page.evaluate("stridorRun.page.sound") is None
+        wait(page, "stridorRun.page.sound === null")
         page.fill('[data-number="mu"]', "0.35")
         page.press('[data-number="mu"]', "Enter")
         wait(page, "document.querySelector('#st-run-title').textContent === 'Run in time at μ = 0.3: the numbers have changed since'")
@@ -100,10 +96,10 @@ def test_a_run_grows_is_stopped_and_waits_for_its_turn(browser: Any, endless: tu
         page.click("#st-run-stop")
         wait(page, "document.querySelector('#st-run-said').textContent.includes('stopped after')")
         done, planned = page.evaluate("[stridorRun.page.picture.done, stridorRun.page.picture.planned]")
-        assert f"stopped after {done} of {planned} steps" in said(page)
+        expect(page.locator("#st-run-said")).to_contain_text(f"stopped after {done} of {planned} steps")
         wait(other, "stridorRun.page.picture !== null")
-        assert other.is_disabled("#st-run-go")
-        assert page.is_enabled("#st-run-go")
+        expect(other.locator("#st-run-go")).to_be_disabled()
+        expect(page.locator("#st-run-go")).to_be_enabled()
 
 
 def test_a_reload_in_the_middle_of_a_run_ends_it_and_the_page_goes_on(browser: Any, endless: tuple[Any, str]) -> None:
@@ -131,8 +127,8 @@ def test_both_approaches_and_the_report(browser: Any, short: str, tmp_path: Path
         wait(page, "document.querySelectorAll('#st-both-tables table').length === 2")
         # At the μ of the page, whatever the case says of comparisons.
         found = st.compare(paper_case().with_(SHORT), [0.3])
-        assert page.locator("#st-both-tables caption").first.inner_text() == "Both approaches at μ = 0.3"
-        assert said(page, "both") == found.comparisons[0].verdict
+        expect(page.locator("#st-both-tables caption").first).to_have_text("Both approaches at μ = 0.3")
+        expect(page.locator("#st-both-said")).to_have_text(found.comparisons[0].verdict)
         cells = page.locator("#st-both-tables").inner_text()
         assert f"{found.comparisons[0].modal_eigenvalue.real:.1f}" in cells
         with page.expect_download(timeout=2 * PATIENT) as got:
@@ -166,14 +162,14 @@ def test_a_click_on_the_map_goes_there(browser: Any, short: str) -> None:
         page.get_by_role("button", name="Undo").click()  # once, of both numbers
         wait(page, "stridor.state.values.mu === 0.3 && stridor.state.at.mu === 0.3")
         given = paper_case().contacts["A"].stiffness
-        assert float(page.locator('[data-number="contacts.A.stiffness"]').input_value()) == given
-        assert page.get_by_role("button", name="Undo").is_disabled()
+        number(page, "contacts.A.stiffness", float(given))
+        expect(page.get_by_role("button", name="Undo")).to_be_disabled()
         # Nonsense in a field is refused in words, and the page goes on.
         page.get_by_role("tab", name="Stability map").click()
         page.fill("#st-map-x-high", "much")
         page.click("#st-map-go")
         wait(page, "document.querySelector('#st-map-said').textContent.includes('two numbers, the smaller one first')")
-        assert page.is_enabled("#st-map-go")
+        expect(page.locator("#st-map-go")).to_be_enabled()
 
 
 def test_another_case_has_nothing_of_the_one_before(browser: Any, short: str) -> None:
@@ -194,7 +190,7 @@ def test_another_case_has_nothing_of_the_one_before(browser: Any, short: str) ->
         assert first_rows == 0
         page.wait_for_timeout(3000)  # the map of the case before, were it still made
         assert page.evaluate("stridorMap.page.map") is None
-        assert page.is_enabled("#st-map-go")
+        expect(page.locator("#st-map-go")).to_be_enabled()
 
 
 def test_a_run_may_follow_at_once(browser: Any, short: str) -> None:
@@ -205,7 +201,7 @@ def test_a_run_may_follow_at_once(browser: Any, short: str) -> None:
             wait(page, f"stridor.state.values.mu === {mu} && !document.querySelector('#st-run-go').disabled")
             page.click("#st-run-go")
             wait(page, f"document.querySelector('#st-run-said').textContent.startsWith('At μ = {mu}: ')")
-            assert page.inner_text("#st-run-title") == "Run in time"
+            expect(page.locator("#st-run-title")).to_have_text("Run in time")
 
 
 def test_words_about_a_file_stay_to_be_read(browser: Any, short: str, tmp_path: Path) -> None:

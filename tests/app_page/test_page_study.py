@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browsing import PATIENT, WITH_BROWSER, page_at, serving, wait
+from browsing import PATIENT, WITH_BROWSER, expect, page_at, serving, wait
 
 import stridor as st
 from benches import paper_case
@@ -69,9 +69,9 @@ def test_a_click_on_a_sample_takes_the_bench_there(browser, store: Path) -> None
         x, y = page.evaluate(f"{chart}.convertToPixel({{gridIndex: 0}}, [{xs[k]}, {ys[k]}])")
         page.locator(".st-map-chart").click(position={"x": x, "y": y}, timeout=PATIENT)
         wait(page, f"stridor.state.values['{first}'] === {xs[k]} && stridor.state.values['{second}'] === {ys[k]}")
-        assert rows["words"][k] in page.inner_text("#st-map-said")
+        expect(page.locator("#st-map-said")).to_contain_text(rows["words"][k])
         for path, values in rows["numbers"].items():
             assert page.evaluate(f"stridor.state.values['{path}']") == values[k]
         page.get_by_role("button", name="Undo").click()  # once, of all numbers
         wait(page, f"stridor.state.values['{first}'] !== {xs[k]} && stridor.state.values['{second}'] !== {ys[k]}")
-        assert page.get_by_role("button", name="Undo").is_disabled()
+        expect(page.get_by_role("button", name="Undo")).to_be_disabled()
