@@ -14,7 +14,7 @@ from matrix_cases import rubbing
 from stridor.case import template_text
 from stridor.errors import CaseError
 from stridor.modal import complex_modes, over_friction, receptance_modes
-from stridor.system import build
+from stridor.system import build, uncoupled
 from stridor.system.model import MOST_ANSWERS, Answers
 from stridor.system.uncoupled import uncoupled_modes
 from stridor.view import report
@@ -36,6 +36,24 @@ COARSE = {
 @pytest.fixture(scope="module")
 def case() -> st.Case:
     return st.loads(template_text("two-beams")).with_(COARSE)
+
+
+def test_a_body_that_stays_as_it_is_is_solved_once(case: st.Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    uncoupled._solved_once.cache_clear()
+    solved = count(monkeypatch, uncoupled._solve_block)
+    angles = (84.0, 85.0, 86.0)
+    found = [uncoupled_modes(build.build_system(case.with_({"bodies.beam1.angle_deg": angle}))) for angle in angles]
+    assert len(solved) == 5  # the beam that is turned each time, and the other once, along its axis and across it
+    moved = uncoupled_modes(build.build_system(case.with_({"bodies.beam1.start": [0.09, 0.0]})))
+    assert len(solved) == 5
+    for one, other in zip(moved.real, found[1].real, strict=True):  # at 85 degrees, as the case has it
+        assert np.array_equal(one.freedoms, other.freedoms)
+        assert one.vectors is other.vectors
+    uncoupled._solved_once.cache_clear()
+    anew = uncoupled_modes(build.build_system(case.with_({"bodies.beam1.angle_deg": 86.0})))
+    for one, other in zip(found[2].real, anew.real, strict=True):  # to the last digit, whatever was solved before
+        assert np.array_equal(one.vectors, other.vectors)
+        assert np.array_equal(one.stiffness, other.stiffness)
 
 
 def test_a_run_computes_each_thing_once_and_its_document_nothing(

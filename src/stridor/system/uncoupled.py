@@ -7,11 +7,13 @@ Both give the same sum, the receptance D(λ)⁻¹ with D = λ²M + λC + K.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
+import scipy.sparse as sp
 
 from ..errors import AnalysisError
 from ..typing import Array, ComplexArray, IntArray
@@ -21,6 +23,10 @@ PROPORTIONAL_TOLERANCE = 1e-9
 DENSE_LIMIT = 6000
 FEW = 2500  # freedoms for which a complete basis pays
 NEGATIVE = 10.0  # times rounding: a negative stiffness that is meant
+KEPT = 400  # freedoms of a component that is not solved again where its matrices come back
+MOST_KEPT = 8  # of them: at most 5 MB each
+
+_Entries = tuple[bytes, bytes, bytes]  # of a sparse matrix: where rows begin, columns, values
 
 
 @dataclass(frozen=True)
@@ -116,14 +122,41 @@ def _solved(system: System) -> UncoupledModes:
             raise AnalysisError(
                 f"a component of {len(part)} freedoms is too large for a complete modal basis (limit {DENSE_LIMIT})"
             )
-        m, c, k = (a[part][:, part].toarray() for a in (mass, damping, stiffness))
-        block, negative = _solve_block(part, m, c, k)
+        block, negative = _block_of(part, *(a[part][:, part] for a in (mass, damping, stiffness)))
         indefinite |= negative
         if isinstance(block, RealBlock):
             real.append(block)
         else:
             general.append(block)
     return UncoupledModes(system.size, tuple(real), tuple(general), indefinite)
+
+
+def _block_of(part: IntArray, m: Any, c: Any, k: Any) -> tuple[RealBlock | ComplexBlock, bool]:
+    """The block of a component with matrices m, c, k (CSR), and whether some motion has a negative stiffness.
+
+    A body that stays as it is while another one is turned, or a contact moved, is solved once.
+    """
+    if len(part) > KEPT:
+        return _solve_block(part, m.toarray(), c.toarray(), k.toarray())
+    block, negative = _solved_once(len(part), _entries(m), _entries(c), _entries(k))
+    return replace(block, freedoms=part), negative
+
+
+@lru_cache(MOST_KEPT)
+def _solved_once(size: int, *matrices: _Entries) -> tuple[RealBlock | ComplexBlock, bool]:
+    return _solve_block(np.arange(size), *(_dense(size, entries) for entries in matrices))
+
+
+def _entries(matrix: Any) -> _Entries:
+    return (
+        matrix.indptr.astype(np.int64).tobytes(), matrix.indices.astype(np.int64).tobytes(), matrix.data.tobytes()
+    )  # fmt: skip
+
+
+def _dense(size: int, entries: _Entries) -> Array:
+    starts, columns = (np.frombuffer(part, dtype=np.int64) for part in entries[:2])
+    values = np.frombuffer(entries[2], dtype=float)
+    return sp.csr_array((values, columns, starts), shape=(size, size)).toarray()
 
 
 def _solve_block(part: IntArray, m: Array, c: Array, k: Array) -> tuple[RealBlock | ComplexBlock, bool]:
