@@ -71,3 +71,16 @@ def lingering() -> Callable[[Any, Callable[[str, Any], None]], None]:
             time.sleep(0.001)
 
     return answer
+
+
+def spending() -> Callable[[Any, Callable[[str, Any], None]], None]:
+    """Tells how much memory [MB] the process has, and then uses a question's worth of it, in pieces among which one
+    stays: what the C library keeps by itself."""
+    kept: list[bytes] = []
+
+    def answer(question: Any, send: Callable[[str, Any], None]) -> None:
+        send("resident", int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6)
+        pieces = [bytes(60_000) + b"x" for _ in range(int(question / 0.06))]
+        kept.append(pieces[-1])
+
+    return answer

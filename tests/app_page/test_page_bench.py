@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 from dataclasses import replace
 from typing import Any
@@ -14,8 +15,9 @@ from stridor.app.page.bench import Bench
 from stridor.app.page.drawing import drawing
 from stridor.app.page.mesh_marks import held_nodes, pushes, slides
 from stridor.app.page.state import Source, State, first_state
-from stridor.case import template_text
-from stridor.system import build_system
+from stridor.case import Case, template_text
+from stridor.study.workspace import Workspace
+from stridor.system import System, build_system
 
 BEAMS = Source.template("two-beams")
 
@@ -100,6 +102,22 @@ def test_the_geometry_is_sent_once(bench: Bench, state: State, unstable: Any, fo
     assert "locus" not in again  # nothing of it has changed
     moved = answered(bench, replace(state, branch=unstable[1]).with_change("bodies.beam1.angle_deg", 82.0))
     assert "geometry" in moved["shape"]
+
+
+def test_twenty_moves_leave_nothing_behind():
+    case = st.loads(template_text("two-beams")).with_({
+        "bodies.beam1.elements": 6, "bodies.beam2.elements": 12, "modal.max_frequency_hz": 8e3,
+    })  # fmt: skip
+    first, bench = first_state(Source("coarse", case.to_toml())), Bench()
+
+    def moved(count: int) -> int:
+        for k in range(count):
+            answered(bench, replace(first, mu=0.01 * k, branch=1 + k % 5).with_change("bodies.beam1.angle_deg", 80.0 + 0.1 * k))
+        gc.collect()
+        return sum(isinstance(o, Workspace | System | Case) for o in gc.get_objects())
+
+    few = moved(3)
+    assert moved(20) <= few
 
 
 def test_what_the_case_refuses_is_said_and_the_next_is_answered():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import queue
 import signal
@@ -138,6 +139,15 @@ def test_ctrl_c_is_none_of_its_business():
         until(heard, "begun", number)
         os.kill(worker.process.pid, signal.SIGINT)
         assert until(heard, "done", number)
+
+
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None) if os.name == "posix" else None, "malloc_trim"), reason="no glibc")
+def test_what_an_answer_used_is_given_back():
+    with working("spending") as (worker, heard):
+        before, after = (
+            next(c for _, part, c in until(heard, "done", worker.ask(200.0)) if part == "resident") for _ in range(2)
+        )
+    assert after - before < 50.0  # of 200 MB
 
 
 def test_an_import_is_not_left_halfway():

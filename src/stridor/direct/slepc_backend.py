@@ -7,7 +7,6 @@ One process, the first, runs the program and calls `SlepcFactor` as it would any
 from __future__ import annotations
 
 import atexit
-import ctypes
 import itertools
 import threading
 from collections import deque
@@ -20,6 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import AnalysisError, CaseError
+from ..heap import give_back
 from ..typing import Sparse
 from .interface import SLEPC_BUILD, Breakdown
 from .ranks import Ranks, all_processes, deaf_to_interrupts, only_this, undisturbed
@@ -74,9 +74,7 @@ class Share:
     def free(self) -> None:
         """Give this process's memory back, also to the system, as others need it: PETSc sets malloc to keep it."""
         self._factor.destroy()
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # where there is glibc
-        if trim is not None:
-            trim(0)
+        give_back()
 
 
 def _distributed(petsc: Any, ranks: Any, size: int, rows: tuple[Any, Any, Any], symmetric: bool) -> Any:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
+from ...heap import give_back
 from ...studies.workers import spawned
 
 PATIENCE = 0.5  # seconds that an answer may take before a newer question stops it
@@ -267,3 +268,4 @@ def _answer_next(questions: _Questions, answer: Answer) -> None:
 
     answer(question, send)
     send("done", None)
+    give_back()  # nobody waits for anything now
