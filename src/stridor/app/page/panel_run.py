@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import base64
+from dataclasses import replace
 from typing import Any
 
 from nicegui import events, ui
@@ -11,9 +11,8 @@ from nicegui import events, ui
 from ...errors import CaseError
 from ...view.style import BLUE, STATUS_COLOURS, VERMILION
 from .panel import Panel, asset
-from .running import sound_of_file
-from .runs import ENDS, Wish
-from .session import Session
+from .runs import ENDS, SOUNDS, Run, Wish
+from .session import Session, started
 
 CHARTS = (("acceleration", 150), ("force", 150), ("status", 80), ("sonogram", 170), ("portrait", 190))
 SLOWEST = 1000.0
@@ -47,6 +46,7 @@ class _Panel(Panel):
         super().__init__(session, "stridorRun", "run.js", stop="stridor-run-stop")
         self.file: str | None = None
         self.picture: Any = None
+        self.sound: Run | None = None
         ui.add_css(asset("run.css"))
         charts: dict[str, int] = {}
         with container:
@@ -89,14 +89,23 @@ class _Panel(Panel):
             return []
         return [m["frequency_hz"] for m in at.get("modes", ()) if m.get("unstable")]
 
-    async def _listen(self, event: events.GenericEventArguments) -> None:
+    def _listen(self, event: events.GenericEventArguments) -> None:
         slow = event.args.get("slow") if isinstance(event.args, dict) else None
         if not isinstance(slow, int | float) or not 1.0 <= slow <= SLOWEST:
             return
-        if self.run is not None and not self.run.over:
-            self.run.listen(slow)
-        elif self.file is not None:
-            self.heard(*await asyncio.to_thread(sound_of_file, self.file, slow))
+        run, file = self.run, self.file
+        if run is None or (self.sound is not None and not self.sound.over):
+            return
+        if not run.over:
+            run.listen(slow)
+        elif file is not None:
+            wish = replace(run.wish, what="sound", options={"file": file, "slow": slow})
+            self.sound = started(wish, self.session, self._sounded, lambda: self.sound, SOUNDS)
+
+    def _sounded(self, part: str, content: Any) -> None:
+        """What the sound of a run that has ended says, if none was begun since."""
+        if part in ("sound", "silent", "failed") and self.file is not None:
+            self.heard("silent" if part == "failed" else part, content)
 
     # -- what the run says ----------------------------------------------------------------------------------------
 

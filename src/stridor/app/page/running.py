@@ -59,7 +59,7 @@ def serve(pipe: Any, wish: Wish) -> None:
     from ...study.workspace import Workspace
 
     kinds: dict[str, Callable[[_Page, Wish, Workspace], None]] = {
-        "run": _run, "compare": _compare, "report": _report, "map": _map
+        "run": _run, "compare": _compare, "report": _report, "map": _map, "sound": _sound,
     }  # fmt: skip
     try:
         kinds[wish.what](page, wish, Workspace(loads(wish.case)))
@@ -137,6 +137,12 @@ def _map(page: _Page, wish: Wish, work: Workspace) -> None:
     from .mapping import mapped
 
     page.tell("done", {"sentence": mapped(page.tell, work, wish.options), "file": None})
+
+
+def _sound(page: _Page, wish: Wish, _: Workspace) -> None:
+    """Of a run that has ended. What reads its file and makes the sound takes more memory than all the server does."""
+    page.tell(*sound_of_file(wish.options["file"], wish.options["slow"]))
+    page.tell("done", {"sentence": "", "file": None})
 
 
 def sounded(run: Any, slow: float) -> tuple[str, Any]:

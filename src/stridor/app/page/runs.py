@@ -24,7 +24,7 @@ PATIENCE = 0.2  # seconds that a process has to end
 
 ENDS = ("done", "stopped", "refused", "failed")
 Heard = Callable[[str, Any], None]
-What = Literal["run", "compare", "report", "map"]
+What = Literal["run", "compare", "report", "map", "sound"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Wish:
     what: What = "run"
     point: str | None = None
     max_frequency_hz: float = 40e3
-    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  # of a map
+    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  # of a map, or of the sound of a file
 
 
 class Queue:
@@ -79,6 +79,7 @@ class Queue:
 
 
 QUEUE = Queue()
+SOUNDS = Queue(1)  # of runs that have ended: a moment each, for which no run is waited for
 
 
 class Run:

@@ -122,7 +122,7 @@ class Server:
         guard = Guard(outer, self.token, self.port, framed=self.framed)
         logging.getLogger("nicegui").setLevel(logging.ERROR)
         config = uvicorn.Config(
-            guard, host=HOST, port=self.port, log_level="error", lifespan="on", timeout_graceful_shutdown=2,
+            guard, host=HOST, port=self.port, log_level="error", lifespan="on", timeout_graceful_shutdown=1,
             server_header=False, ws_max_size=LARGEST_MESSAGE,
         )  # fmt: skip
         self._server = _announcing(uvicorn, config, lambda: ready(self.address()) if ready else None, self._close)

@@ -13,7 +13,7 @@ from typing import Any
 from ...case import Case
 from ...errors import CaseError
 from .levers import Lever, levers
-from .runs import Run, Wish
+from .runs import Queue, Run, Wish
 from .state import History, Source, State, checked, file_text, first_state, from_link, to_link
 from .worker import BENCH, Program, Worker
 
@@ -250,7 +250,10 @@ def refused(call: Callable[[], None]) -> str:
     return ""
 
 
-def started(wish: Wish, session: Session, heard: Callable[[str, Any], None], newest: Callable[[], Run | None]) -> Run:
+def started(
+    wish: Wish, session: Session, heard: Callable[[str, Any], None], newest: Callable[[], Run | None],
+    queue: Queue | None = None,
+) -> Run:  # fmt: skip
     """A run whose parts are heard in the thread of the page as long as it is the ``newest`` of its panel."""
     made: list[Run] = []
 
@@ -258,6 +261,6 @@ def started(wish: Wish, session: Session, heard: Callable[[str, Any], None], new
         if not made or newest() is made[0]:
             heard(part, content)
 
-    made.append(Run(wish, lambda part, content: session.later(told, part, content)))
+    made.append(Run(wish, lambda part, content: session.later(told, part, content), queue))
     session.started(made[0])
     return made[0]

@@ -165,6 +165,10 @@ const stridorRun = (() => {
     page.sound = null;
     $("st-run-listen").textContent = "Listen";
   }
+  function listen() {
+    if ($("st-run-stop").disabled) said("The sound is being made …"); // of a run that has ended
+    emitEvent("stridor-run-listen", { slow: Number($("st-run-slow").value) });
+  }
   async function play(c) {
     silence();
     const bytes = Uint8Array.from(atob(c.wav), (x) => x.charCodeAt(0));
@@ -189,7 +193,7 @@ const stridorRun = (() => {
       page.ready = true;
       $("st-run-go").addEventListener("click", () => { running(true); emitEvent("stridor-run", {}); });
       $("st-run-stop").addEventListener("click", () => emitEvent("stridor-run-stop", {}));
-      $("st-run-listen").addEventListener("click", () => (page.sound ? silence() : emitEvent("stridor-run-listen", { slow: Number($("st-run-slow").value) })));
+      $("st-run-listen").addEventListener("click", () => (page.sound ? silence() : listen()));
     } else setTimeout(hello, 30);
   };
   setTimeout(hello, 0);
