@@ -2,7 +2,8 @@
 
 python benchmarks/page_memory.py [--minutes 60] [--short]
 Moves, modes, tabs, undo, runs begun, heard and stopped, at random. Printed are the memory of the server with its
-processes and the heap of the page, rubbish collected, after a twelfth of the time (five minutes of an hour) and at the
+processes, what of it is their own (the rest are files of libraries, whose share is less the more other programs use
+them), and the heap of the page, rubbish collected, after a twelfth of the time (five minutes of an hour) and at the
 end. Needs the extra app, playwright, Linux, and Chromium at /usr/bin/chromium; without them it says so and leaves.
 """
 
@@ -61,7 +62,8 @@ def use(address: str, server: int, seconds: float) -> None:
         late = told(page, counter, server, acts, "at the end")
         if early is not None:
             ratios = [b / a for a, b in zip(early, late, strict=True)]
-            print(f"  ratio of the end to a twelfth of the time: server {ratios[0]:.2f}, page {ratios[1]:.2f}")
+            server_, own, heap = ratios
+            print(f"  ratio of the end to a twelfth of the time: server {server_:.2f} (own {own:.2f}), page {heap:.2f}")
         print(f"  errors of the page's script: {len(failures)}{': ' + failures[0] if failures else ''}")
         browser.close()
 
@@ -90,35 +92,38 @@ def act(page: Any, chance: random.Random) -> None:
     time.sleep(chance.expovariate(1 / 0.4))
 
 
-def told(page: Any, counter: Any, server: int, acts: int, when: str) -> tuple[float, float]:
-    """Memory of the server with its processes, no run under way, and of the page [MB]; printed."""
+def told(page: Any, counter: Any, server: int, acts: int, when: str) -> tuple[float, float, float]:
+    """Memory of the server with its processes, no run under way, what of it is their own, and of the page [MB];
+    printed."""
     page.evaluate("document.getElementById('st-run-stop').click()")
     time.sleep(5)
     counter.send("HeapProfiler.collectGarbage")
     heap = page.evaluate("performance.memory.usedJSHeapSize") / 1e6
-    memory = resident(server)
-    print(f"{when}, {acts} acts: server and its processes {memory:.0f} MB, heap of the page {heap:.1f} MB", flush=True)
-    return memory, heap
+    memory, own = resident(server)
+    words = f"server and its processes {memory:.0f} MB (own {own:.0f}), heap of the page {heap:.1f} MB"
+    print(f"{when}, {acts} acts: {words}", flush=True)
+    return memory, own, heap
 
 
-def resident(process: int) -> float:
-    """Memory of a process and all below it, what several share divided among them [MB]."""
+def resident(process: int) -> tuple[float, float]:
+    """Memory of a process and all below it, what several share divided among them, and that without files [MB]."""
     parents: dict[int, int] = {}
     for place in Path("/proc").glob("[0-9]*/stat"):
         try:
             parents[int(place.parent.name)] = int(place.read_text().rpartition(")")[2].split()[1])
         except OSError:
             continue
-    total, below = 0.0, [process]
+    total, own, below = 0.0, 0.0, [process]
     while below:
         one = below.pop()
         below += [child for child, parent in parents.items() if parent == one]
         try:
-            words = Path(f"/proc/{one}/smaps_rollup").read_text().split("Pss:")[1].split()
+            text = Path(f"/proc/{one}/smaps_rollup").read_text()
         except OSError:
             continue
-        total += int(words[0]) / 1e3
-    return total
+        total += int(text.split("Pss:")[1].split()[0]) / 1e3
+        own += int(text.split("Pss_Anon:")[1].split()[0]) / 1e3
+    return total, own
 
 
 if __name__ == "__main__":

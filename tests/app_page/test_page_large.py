@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
+import queue
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import stridor as st
 from stridor.app.page import bench as bench_module
 from stridor.app.page.bench import Bench
+from stridor.app.page.mode_data import tornado_at
+from stridor.app.page.runs import ENDS, Queue, Run, Wish
 from stridor.app.page.state import Source, State, first_state
 from stridor.case import template_text
+from stridor.study.workspace import Workspace
 
 FINE = template_text("two-beams").replace("elements = 90", "elements = 180").replace("stiffness = 1e-8", "stiffness = 1e-9")
 STATE = replace(first_state(Source("fine.toml", FINE)), mu=0.3)
@@ -77,12 +84,58 @@ def test_a_mode_of_it_moves_all_of_the_model(answered: Callable[[State], list[tu
     assert fed == pytest.approx(2 * shape["growth_rate"] / shape["frequency_hz"], rel=1e-3)
 
 
+def test_curves_come_coarse_first_and_then_whole(answered: Callable[[State], list[tuple[str, Any]]]):
+    answered(STATE)
+    drawn = [content for part, content in answered(STATE.with_change(STIFF, 7e9)) if part == "locus"]
+    few, all_ = (len(content["mu"]) for content in drawn)
+    assert 2 * few < all_
+    assert set(drawn[0]["mu"]) < set(drawn[1]["mu"])
+    assert STATE.mu in drawn[0]["mu"]
+
+
+def test_sensitivities_are_those_of_the_full_model_once_they_are_asked_for(
+    answered: Callable[[State], list[tuple[str, Any]]], tmp_path: Path
+):
+    state = replace(STATE, branch=8)
+    found = answered(state)
+    offered = [content for part, content in found if part == "tornado"]
+    assert [(o["branch"], o["mu"], o["bars"]) for o in offered] == [(8, 0.3, [])]  # nothing is computed silently
+    assert 0.1 < offered[0]["seconds"] < 600
+    shape = next(content for part, content in found if part == "shape")
+    value = (shape["growth_rate"], 2 * math.pi * shape["frequency_hz"])
+    options = {"mu": 0.3, "branch": 8, "eigenvalue": value}
+    heard: queue.Queue[tuple[str, Any]] = queue.Queue()
+    run = Run(Wish(state.case().to_toml(), 0.3, str(tmp_path), "sensitivities", options=options), lambda *said: heard.put(said), Queue(1))
+    said = [heard.get(timeout=120)]
+    while said[-1][0] not in ENDS:
+        said.append(heard.get(timeout=120))
+    run.end()
+    assert said[-1][0] == "done"
+    assert any(part == "log" for part, _ in said)
+    tornado = next(content for part, content in said if part == "tornado")
+    modes = st.modes(state.case(), mu=0.3, max_frequency_hz=40e3)
+    own = int(modes.branch[np.nanargmin(np.abs(modes.eigenvalues[0] - complex(*value)))])
+    wanted = st.sensitivities(state.case(), ["mu"], mu=0.3, modes=[own], max_frequency_hz=40e3)
+    bars = {bar["path"]: bar["growth"] for bar in tornado["bars"]}
+    assert bars["mu"] == pytest.approx(float(wanted.growth_per_percent[0, 0]), rel=1e-6)
+    assert tornado["branch"] == 8  # as the page numbers it
+
+
+def test_a_mode_that_is_not_there_has_no_sensitivities():
+    work = Workspace(STATE.case())
+    assert tornado_at(work, 0.3, 4, complex(0.0, 2 * math.pi * 1000.0))["warnings"] == [
+        "no mode of the full problem lies at 1000.0 Hz: choose it again"
+    ]
+
+
 def test_where_there_is_none_that_is_said(monkeypatch: pytest.MonkeyPatch):
     def none(*_: object) -> None:
         raise st.AnalysisError("friction jams")
 
     monkeypatch.setattr(bench_module.Reduced, "made", none)
     found: dict[str, Any] = {}
-    Bench()(STATE, lambda part, content: found.__setitem__(part, content))
+    Bench()(replace(STATE, branch=8), lambda part, content: found.__setitem__(part, content))
+    assert found["tornado"]["bars"] == []
+    assert found["tornado"]["seconds"] > 0  # here, too, they wait to be asked for
     assert found["model"]["why"] == "No reduced model (friction jams): every answer takes its time."
     assert found["at"]["checked"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import PATIENT, READY, SOLVED, WITH_BROWSER, expect, number, page_at, serving, shot, wait
+from browsing import PATIENT, READY, SOLVED, WITH_BROWSER, expect, number, page_at, serving, shot, slide, wait
 
 import stridor as st
 from benches import paper_case
@@ -221,3 +221,25 @@ def test_words_about_a_file_stay_to_be_read(browser: Any, short: str, tmp_path: 
         words = page.inner_text("#st-problem")
         page.evaluate("stridor.show('at', stridor.state.at, false)")  # an answer that was under way
         assert page.inner_text("#st-problem") == words
+
+
+def test_sensitivities_of_a_large_model_are_asked_for(browser: Any, tmp_path: Path) -> None:
+    path = tmp_path / "fine.toml"
+    path.write_text(paper_case().with_({"bodies.beam2.elements": 180, "bodies.beam2.damping.stiffness": 1e-9}).to_toml(), encoding="utf-8")
+    with serving(str(path)) as (_, address), page_at(browser, address) as page:
+        page.click('#st-modes-list [data-branch="8"]')
+        button = page.locator("#st-tornado-go")
+        expect(button).to_contain_text("Sensitivities of this mode (takes about ")
+        shot(page, "sensitivities-offered", full_page=True)
+        button.click()
+        expect(page.locator("#st-tornado-stop")).to_be_visible()
+        page.click("#st-tornado-stop")
+        expect(page.locator("#st-tornado-said")).to_have_text("Stopped.")
+        button.click()
+        wait(page, "document.querySelectorAll('#st-tornado tbody tr').length > 5")
+        expect(page.locator("#st-tornado-ask")).to_be_hidden()
+        expect(page.locator("#st-tornado")).to_contain_text("materials.steel.density")
+        shot(page, "sensitivities", full_page=True)
+        slide(page, "mu", 0.2)  # another mode: what it was is not shown under it
+        wait(page, "document.querySelectorAll('#st-tornado tbody tr').length === 0")
+        expect(button).to_be_visible()

@@ -8,6 +8,7 @@ a case is kept in its workspace as long as the case is the one on the page.
 from __future__ import annotations
 
 import gc
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +23,7 @@ from ...study.workspace import Workspace
 from ...system import System
 from .drawing import drawing
 from .levers import friction_range
-from .mode_data import energy_of, participation, shape_of, tornado
+from .mode_data import energy_of, participation, shape_of, tornado, tornado_seconds
 from .model_reduced import Reduced
 from .state import State
 from .worker import IDLE
@@ -53,6 +54,7 @@ class _Model:
     work: Workspace
     reduced: Reduced | None = None
     why: str = ""
+    build: float = 0.0  # seconds that its matrices took
     idle: Workspace | None = None  # of its own, for what may be given up halfway
     locus: ComplexModes | None = None
     onsets: dict[str, Any] | None = None
@@ -64,7 +66,7 @@ class Bench:
 
     Parts: "model" (drawing, freedoms), "refused" (what is wrong with the case), "progress" (of large models), "locus"
     (branches over μ), "at" (modes at the μ of the page), "unanswered" (why there are no modes), "onsets", "shape" (the
-    mode chosen), "tornado" (its sensitivities).
+    mode chosen), "tornado" (its sensitivities, or of large models how long they would take).
     """
 
     def __init__(self) -> None:
@@ -104,7 +106,7 @@ class Bench:
             model = _Model(state.model, _Drawn(case))
             if self._reduced is not None and self._reduced.holds(state):
                 model.reduced = self._reduced
-            elif model.work.system().size > LARGE:
+            elif _built(model).size > LARGE:
                 send("model", _described(model))  # what follows takes a while
                 self._reduce(model, state, send)
             self._model = model
@@ -150,21 +152,31 @@ class Bench:
         """What takes longer than a slider waits."""
         model.onsets = model.onsets or onsets_of(onsets(work))
         send("onsets", model.onsets)
+        began = time.perf_counter()
         send("at", modes_at(modes(work, state.mu, max_frequency_hz=_band(work)), state.mu, checked=True))
-        if state.branch is not None:
+        if state.branch is None:
+            return
+        if work.system().size > LARGE:
+            solve = time.perf_counter() - began
+            case = work.case("the page")
+            send("tornado", _asked_for(state, tornado_seconds(case, state.mu, solve=solve, build=model.build)))
+        else:
             send("tornado", tornado(work, state.mu, state.branch))
 
     def _answer_reduced(self, state: State, model: _Model, reduced: Reduced, send: Send) -> None:
         """On a reduced model: first the modes at the μ of the page, then the curves."""
         here, error = reduced.here(state, vectors=state.branch is not None)
         send("at", {**modes_at(here, state.mu, checked=False), "said": _certified(reduced, error)})
-        if state.branch is not None:
-            self._shape(model, reduced.work.system(), here, state.branch, send, energy=False)
+        branch, whole = state.branch, reduced.work.system()
+        if branch is not None and self._shape(model, whole, here, branch, send, energy=False):
+            send("tornado", _asked_for(state, reduced.seconds))
         self._leisure = True
         send(IDLE, None)
         if model.locus is None:
-            model.locus, error = reduced.sweep(state)
-            send("locus", {**locus_of(model.locus), "said": _certified(reduced, error)})
+            found = model.locus
+            for found, error in reduced.sweep(state):
+                send("locus", {**locus_of(found), "said": _certified(reduced, error)})
+            model.locus = found  # of all points: what is given up halfway is drawn anew
             send("model", _described(model))
             here, error = reduced.here(state, vectors=state.branch is not None)
             send("at", {**modes_at(here, state.mu, checked=False), "said": _certified(reduced, error)})
@@ -173,8 +185,6 @@ class Bench:
         if state.branch is not None:
             model.idle = model.idle or _Drawn(model.work.case("the page"))
             self._shape(model, model.idle.system(), here, state.branch, send, energy=True)
-            why = f"Not computed on this page for a model of this size: stridor sensitivities --branch {state.branch}"
-            send("tornado", {"branch": state.branch, "bars": [], "warnings": [why]})
 
     def _swept(self, work: Workspace, mu: float, send: Send) -> ComplexModes:
         """Branches over the range of μ and at the μ of the page."""
@@ -191,18 +201,20 @@ class Bench:
 
     def _shape(
         self, model: _Model, system: System, here: ComplexModes, branch: int, send: Send, *, energy: bool
-    ) -> None:
-        """The chosen mode, if it is one of those at this μ; its geometry only where the page has another one."""
+    ) -> bool:
+        """The chosen mode, if it is one of those at this μ, and whether it is; its geometry only where the page has
+        another one."""
         where = np.flatnonzero(here.branch == branch)
         if not len(where) or not np.isfinite(here.eigenvalues[0, where[0]]):
             send("shape", {"branch": branch, "missing": f"mode {branch} is not in the band at μ = {here.mu[0]:g}"})
-            return
+            return False
         column = int(where[0])
         shape, model.geometry = shape_of(system, here, column, known=model.geometry)
         fed = energy_of(system, model.work.options, here, column) if energy else {"each": [], "why": "being computed"}
         send("shape", {
             "branch": branch, **shape, "bodies": participation(system, here, column), "contacts": fed,
         })  # fmt: skip
+        return True
 
 
 def bench() -> Bench:
@@ -215,6 +227,18 @@ def bench() -> Bench:
 
 def _modes_here(work: Workspace, mu: float) -> ComplexModes:
     return modes(work, mu, max_frequency_hz=_band(work), vectors="right", check=False)
+
+
+def _built(model: _Model) -> System:
+    began = time.perf_counter()
+    system = model.work.system()
+    model.build = time.perf_counter() - began
+    return system
+
+
+def _asked_for(state: State, seconds: float) -> dict[str, Any]:
+    """In place of sensitivities that take a while: about how long [s], for whoever wants them all the same."""
+    return {"branch": state.branch, "mu": state.mu, "bars": [], "warnings": [], "seconds": seconds}
 
 
 def _certified(reduced: Reduced, error: float) -> str:

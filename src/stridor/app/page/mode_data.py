@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ...case import Case
 from ...errors import CaseError, StridorError
 from ...modal.complex_modes import ComplexModes
 from ...modal.krylov import friction_energy
 from ...modal.options import Options
+from ...study.analyses import modes as modes_of
 from ...study.countermeasures import default_numbers, whole_matrices
 from ...study.sensitivities import sensitivities
 from ...study.workspace import Workspace
@@ -18,6 +20,7 @@ from ...system import System
 from ...view.animation import growth_in_words, page_data
 from ...view.skin import mode_title, skin_of
 
+SAME = 1e-4  # of λ: how far apart one mode may lie in the full problem and in a reduced one
 MOVING = ("real", "imag", "scale", "bent")  # what of a shape differs from mode to mode
 
 
@@ -86,10 +89,33 @@ def energy_of(system: System, options: Options, modes: ComplexModes, column: int
     }  # fmt: skip
 
 
+def tornado_at(work: Workspace, mu: float, branch: int, eigenvalue: complex) -> dict[str, Any]:
+    """The same of the mode of the full problem that has an eigenvalue [1/s], under the number that the page has for
+    it."""
+    try:
+        found = modes_of(work, mu, max_frequency_hz=work.modal.max_frequency_hz)
+    except StridorError as error:
+        return {"branch": branch, "mu": mu, "bars": [], "warnings": [str(error)]}
+    apart = np.abs(found.eigenvalues[0] - eigenvalue)
+    if not np.nanmin(apart, initial=np.inf) <= SAME * abs(eigenvalue):
+        told = f"no mode of the full problem lies at {eigenvalue.imag / (2 * np.pi):.1f} Hz: choose it again"
+        return {"branch": branch, "mu": mu, "bars": [], "warnings": [told]}
+    return {**tornado(work, mu, int(found.branch[np.nanargmin(apart)])), "branch": branch, "mu": mu}
+
+
+def tornado_seconds(case: Case, mu: float, *, solve: float, build: float) -> float:
+    """About how long `tornado` takes [s], of what one solve of the modes and one assembly of the matrices take: each
+    number is moved both ways, twice as far as well."""
+    return solve + 4 * build * len(_numbers_of(case, mu))
+
+
+def _numbers_of(case: Case, mu: float) -> list[str]:
+    return ["mu", *default_numbers(case, whole_matrices(case, mu))]
+
+
 def tornado(work: Workspace, mu: float, branch: int) -> dict[str, Any]:
     """What a per cent of each number of the case does to a mode, the strongest first: growth [1/s], frequency [Hz]."""
-    case = work.case("sensitivities")
-    numbers = ["mu", *default_numbers(case, whole_matrices(case, mu))]
+    numbers = _numbers_of(work.case("sensitivities"), mu)
     skipped: list[str] = []
     while True:
         try:

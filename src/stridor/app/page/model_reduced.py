@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -22,11 +22,13 @@ from ...study.reduced import reduced_model
 from ...study.workspace import Workspace
 from ...typing import IntArray
 from .levers import friction_range
+from .mode_data import tornado_seconds
 from .state import State, checked
 
 FRICTION, STIFFNESS = "mu", "contact_stiffness"
 REACH = (0.1, 10.0)  # times the contact stiffness of the case
 POINTS = 21  # of the curves
+COARSE = 4  # every so many of them are drawn first
 
 Tell = Callable[[str], None]
 
@@ -41,6 +43,7 @@ class Reduced:
     stiffness_path: str
     words: str
     base: Any
+    seconds: float = 0.0  # about, of sensitivities in the full problem
     _numbered: list[Numbered] = field(default_factory=list[Numbered])
 
     @staticmethod
@@ -50,6 +53,8 @@ class Reduced:
         began = time.perf_counter()
         work = Workspace(base_of(state).case())
         case = work.case("a reduced model")
+        work.system()
+        build = time.perf_counter() - began
         box = {FRICTION: (0.0, friction_range(case)[1])}
         path = stiffness_path(case)
         if path:
@@ -60,7 +65,8 @@ class Reduced:
         took = time.perf_counter() - began
         over = "μ and contact stiffness" if path else "μ"
         words = f"Reduced model over {over}: {model.size} of {work.system().size} freedoms, made in {took:.0f} s"
-        return Reduced(model, work, path, words, base_of(state).model)
+        seconds = tornado_seconds(case, state.mu, solve=took, build=build)
+        return Reduced(model, work, path, words, base_of(state).model, seconds)
 
     def holds(self, state: State) -> bool:
         """Whether a state differs in nothing but what the model is over, and lies in the ranges of that."""
@@ -72,21 +78,23 @@ class Reduced:
         found = self.model.modes(self._point(state))
         return self._modes([found], [self._numbers(found, state)], vectors=vectors), float(found.error.max(initial=0.0))
 
-    def sweep(self, state: State) -> tuple[ComplexModes, float]:
-        """Branches over the range of μ and at the μ of a state, and the largest estimated error."""
+    def sweep(self, state: State) -> Iterator[tuple[ComplexModes, float]]:
+        """Branches over the range of μ and at the μ of a state, and the largest estimated error: of few points first,
+        then of all. Numbers of the first may differ from those of the second, which follow in smaller steps."""
         low, high = friction_range(self.work.case("the page"))
-        mus = np.unique(np.append(np.linspace(low, high, POINTS), [state.mu] if low <= state.mu <= high else []))
-        rows: list[ReducedModes] = []
-        numbers: list[IntArray] = []
-        self._numbered = []
-        for mu in np.unique(np.append(0.0, mus)):
-            found = self.model.modes(self._point(replace(state, mu=float(mu))))
-            number = self._numbers(found, state)
-            self._numbered.append(Numbered(self.model, found, number))
-            if mu in mus:
-                rows.append(found)
-                numbers.append(number)
-        return self._modes(rows, numbers), max(float(r.error.max(initial=0.0)) for r in rows)
+        line = np.linspace(low, high, POINTS)
+        own = [state.mu] if low <= state.mu <= high else []
+        known: dict[float, ReducedModes] = {}
+        for mus in (np.unique(np.append(line[::COARSE], own)), np.unique(np.append(line, own))):
+            for mu in np.append(0.0, mus).tolist():
+                if mu not in known:
+                    known[mu] = self.model.modes(self._point(replace(state, mu=mu)))
+            self._numbered = []
+            for mu in sorted(known):
+                self._numbered.append(Numbered(self.model, known[mu], self._numbers(known[mu], state)))
+            drawn = [one for one in self._numbered if one.modes.point[FRICTION] in mus]
+            rows, numbers = [one.modes for one in drawn], [one.numbers for one in drawn]
+            yield self._modes(rows, numbers), max(float(r.error.max(initial=0.0)) for r in rows)
 
     def onsets(self, state: State) -> dict[str, Any]:
         """Onsets found on the model, each solved in the full problem, as `bench.onsets_of` has them."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 
 from nicegui import ui
 
+from ...errors import CaseError
 from ...view.animation import animation_shell
+from .panel import Panel
+from .runs import Wish
 from .session import Session
 
 _PARTS = """
@@ -23,6 +27,10 @@ _PARTS = """
     <div id="st-mode-facts"></div>
     <h3>What a change of 1 % does to its growth</h3>
     <div id="st-tornado"></div>
+    <div id="st-tornado-ask" class="st-run-tools" hidden>
+      <button type="button" id="st-tornado-go"></button><button type="button" id="st-tornado-stop" hidden>Stop</button>
+      <p id="st-tornado-said" class="st-note" role="status"></p>
+    </div>
   </div>
 </section>
 """
@@ -32,3 +40,39 @@ def build(container: ui.element, session: Session) -> None:
     """Fill the container of a page; the page's script draws what the picture says."""
     with container:
         ui.html(_PARTS.format(shell=escape(animation_shell())), sanitize=False).classes("st-below")
+        _Panel(session)
+
+
+class _Panel(Panel):
+    """Sensitivities of the chosen mode where they take a while; static/tornado.js asks for them and shows how far they
+    are."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session, "stridorTornado", "tornado.js", stop="stridor-sensitivities-stop")
+        ui.on("stridor-sensitivities", self._go)
+        session.on_change(self._follow)
+
+    def _go(self) -> None:
+        state, shape = self.session.state, self.session.picture.parts.get("shape") or {}
+        if self.busy():
+            return
+        if (shape.get("branch"), shape.get("mu")) != (state.branch, state.mu) or "growth_rate" not in shape:
+            self.refuse("the mode is being computed still")
+            return
+        value = shape["growth_rate"], 2 * math.pi * shape["frequency_hz"]
+        options = {"mu": state.mu, "branch": state.branch, "eigenvalue": value}
+        try:
+            text = self.session.case().to_toml()
+        except CaseError as error:
+            self.refuse(error)
+            return
+        self.of = state
+        self.start(Wish(text, state.mu, str(self.session.folder), "sensitivities", options=options))
+
+    def _follow(self) -> None:
+        """Those of another mode, or of other numbers, nobody asks for any more."""
+        of, now = self.of, self.session.state
+        if of is not None and (of.model, of.mu, of.branch) != (now.model, now.mu, now.branch):
+            self.of, run, self.run = None, self.run, None
+            if run is not None and not run.over:
+                self.session.drop(run)

@@ -60,6 +60,7 @@ def serve(pipe: Any, wish: Wish) -> None:
 
     kinds: dict[str, Callable[[_Page, Wish, Workspace], None]] = {
         "run": _run, "compare": _compare, "report": _report, "map": _map, "sound": _sound,
+        "sensitivities": _sensitivities,
     }  # fmt: skip
     try:
         kinds[wish.what](page, wish, Workspace(loads(wish.case)))
@@ -137,6 +138,26 @@ def _map(page: _Page, wish: Wish, work: Workspace) -> None:
     from .mapping import mapped
 
     page.tell("done", {"sentence": mapped(page.tell, work, wish.options), "file": None})
+
+
+def _sensitivities(page: _Page, wish: Wish, work: Workspace) -> None:
+    """Of one mode in the full problem, which is told by its eigenvalue: numbers of modes may differ from those of a
+    reduced model where two all but met."""
+    from ...stages import Stage, heard
+    from .mode_data import tornado_at
+
+    last = 0.0
+
+    def told(stage: Stage | None) -> None:
+        nonlocal last
+        if stage is not None and stage.began - last >= TOLD_SECONDS:
+            last = stage.began
+            page.tell("log", stage.what)
+
+    with heard(told):
+        found = tornado_at(work, wish.options["mu"], wish.options["branch"], complex(*wish.options["eigenvalue"]))
+    page.tell("tornado", found)
+    page.tell("done", {"sentence": "", "file": None})
 
 
 def _sound(page: _Page, wish: Wish, _: Workspace) -> None:

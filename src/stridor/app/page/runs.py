@@ -24,7 +24,7 @@ PATIENCE = 0.2  # seconds that a process has to end
 
 ENDS = ("done", "stopped", "refused", "failed")
 Heard = Callable[[str, Any], None]
-What = Literal["run", "compare", "report", "map", "sound"]
+What = Literal["run", "compare", "report", "map", "sound", "sensitivities"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Wish:
     what: What = "run"
     point: str | None = None
     max_frequency_hz: float = 40e3
-    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  # of a map, or of the sound of a file
+    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  # of a map, a sound, sensitivities
 
 
 class Queue:

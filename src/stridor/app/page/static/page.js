@@ -312,6 +312,7 @@ const stridor = (() => {
     if (given.branch !== state.branch || (state.shape && given.mu !== state.shape.mu)) return; // of another mode
     const box = $("st-tornado");
     box.replaceChildren();
+    if (given.seconds !== undefined) { stridorTornado.offer(given.seconds); return; }
     const most = Math.max(...given.bars.map((b) => Math.abs(b.growth)), 1e-300);
     const rows = given.bars.slice(0, 10).map((b) => {
       if (Math.abs(b.growth) < 1e-9 * most) b.growth = 0;
@@ -354,6 +355,7 @@ const stridor = (() => {
     for (const id of ["st-model", "st-modes-list", "st-mode-facts", "st-tornado"]) $(id)?.replaceChildren();
     for (const id of ["st-title", "st-modes-said"]) $(id).textContent = "";
     $("st-modes-title").textContent = "Modes";
+    stridorTornado.hide();
     shape();
     said(true);
   }
@@ -367,8 +369,10 @@ const stridor = (() => {
     at(c) { state.at = c; list(); answered(); stamp("at"); },
     onsets(c) { state.onsets = c; draw(); },
     shape(c) {
-      const later = state.at?.said ? "Left to `stridor sensitivities` for a model of this size." : "Being computed.";
-      if (state.shape?.branch !== c.branch || state.shape?.mu !== c.mu) $("st-tornado").replaceChildren(element("p", { class: "st-note" }, later));
+      if (state.shape?.branch !== c.branch || state.shape?.mu !== c.mu) {
+        stridorTornado.hide();
+        $("st-tornado").replaceChildren(element("p", { class: "st-note" }, c.missing ? "" : "Being computed."));
+      }
       state.shape = c;
       shape();
     },
