@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,12 @@ from ..contact.nodes import ContactNodes
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
+from .prepared import Preparing
 
 # Contact springs stiffer than this, relative to the structure, would drown it in rounding if added to its matrix.
 CONDENSED = 1e3
 NEWTON_STEPS = 60
+BALANCED = 1e-14  # of the largest force: what an equilibrium by prepared factors may leave
 
 
 @dataclass(frozen=True)
@@ -38,19 +40,22 @@ class ContactRows:
 
 @dataclass(frozen=True)
 class NodeState:
-    """Displacement (n,) [m], normal force (m,) [N] and gap (m,) [m] for one set of touching nodes."""
+    """Displacement (n,) [m], normal force (m,) [N] and gap (m,) [m] for one set of touching nodes; residual: that of
+    `Equilibrium.residual` where it is known."""
 
     active: BoolArray
     displacement: Array
     normal_force: Array
     gap: Array
+    residual: float | None = None
 
 
 class Equilibrium:
     """K u + cubic(u) − Pᵀ N = f,  g₀ + n u + c N = 0 on the touching nodes, with P = n + μ s·t.
 
     Touching nodes of finite stiffness go into K; rigid and nearly rigid ones become unknown multipliers. travel (p,)
-    [s]: how far the prescribed motions have run, which springs beyond the linear feel.
+    [s]: how far the prescribed motions have run, which springs beyond the linear feel. rubbing (m, d−1): μ s, where P
+    has nothing else beside n; many equilibria that differ in it and in who touches then share one factorisation.
     """
 
     def __init__(
@@ -63,8 +68,10 @@ class Equilibrium:
         symmetric: bool,
         solver: str | None,
         travel: Array | None = None,
+        rubbing: Array | None = None,
     ) -> None:
         self.system, self.nodes, self.push, self.force = system, nodes, push, force
+        self.rubbing = rubbing
         self.symmetric, self.solver = symmetric, solver
         self.scale = float(np.abs(system.stiffness.data).max(initial=0.0)) or 1.0
         # Of Newton's step: contact with a cubic term has another compliance, and meets its force from another gap.
@@ -86,6 +93,8 @@ class Equilibrium:
         nodes, cubic = self.nodes, self.system.cubic
         springs = cubic is not None and bool(cubic.coefficient.size)
         if not springs and not np.any(nodes.cubic):
+            if (found := self._by_prepared(active)) is not None:
+                return found
             u, normal = self._linear(active, None, None)
             return NodeState(active, u, normal, nodes.gap + nodes.normal @ u)
         for _ in range(NEWTON_STEPS):
@@ -99,6 +108,27 @@ class Equilibrium:
             "steady sliding: the springs beyond the linear find no equilibrium in "
             f"{NEWTON_STEPS} steps; check their coefficients (softening springs may have none)"
         )
+
+    def _by_prepared(self, active: BoolArray) -> NodeState | None:
+        """The equilibrium by the factors that many share; None where there are none, or not as good as its own."""
+        nodes, shared = self.nodes, self.system.of_matrices
+        if self.rubbing is None or not isinstance(nodes, ContactNodes):
+            return None
+        preparing = shared.once("equilibria prepared", Preparing)
+        try:
+            found = preparing.at(self.system, nodes, self.force, active, self.rubbing, self.solver)
+        except direct.SingularMatrix:
+            return None
+        if found is None:
+            return None
+        u, normal = found
+        state = NodeState(active, u, normal, nodes.gap + nodes.normal @ u)
+        residual = self.residual(state)
+        if not residual <= BALANCED:
+            return None
+        shared.once("factors nearby", direct.Nearby).free()
+        self.solved += 1
+        return replace(state, residual=residual)
 
     def _springs(self, u: Array) -> tuple[Sparse | None, Array | None]:
         """Tangent (n, n) of the cubic springs at u, and the force (n,) that it misses; None where there are none."""
@@ -141,6 +171,8 @@ class Equilibrium:
 
     def residual(self, state: NodeState) -> float:
         """Largest imbalance of a freedom over the largest force that takes part."""
+        if state.residual is not None:
+            return state.residual
         u, normal = state.displacement, state.normal_force
         internal = self.system.stiffness @ u
         terms = abs(self.system.stiffness) @ np.abs(u) + np.abs(self.force) + abs(self.push).T @ np.abs(normal)

@@ -143,7 +143,7 @@ def steady_sliding_nodes(
         # Friction is μ|N| against the slip: where a contact kept closed pulls, it goes with −N.
         rubbing = (sign * coefficient)[:, None] * sense
         push = sp.csr_array(nodes.normal + nodes.along(rubbing)) if rubs else nodes.normal
-        equilibrium = Equilibrium(system, nodes, push, force, symmetric=symmetric, solver=solver)
+        equilibrium = Equilibrium(system, nodes, push, force, symmetric=symmetric, solver=solver, rubbing=rubbing)
         try:
             state, tried = find_touching(equilibrium, guess) if held is None else (equilibrium.solve(held), 1)
         except SingularMatrix as error:
