@@ -25,6 +25,7 @@ from stridor.io.datasets import load_trajectory
 from stridor.io.reduced_models import load_reduced
 from stridor.io.result_files import accept, damage_told, open_results
 from stridor.io.seals import seal
+from stridor.study.boundary_result import Boundary, BoundaryCurve, CountedAt, SolvedAgain
 from stridor.temporal.signals import Components
 
 pytestmark = pytest.mark.bad_input
@@ -39,7 +40,7 @@ COARSE = {
 }
 # One damage in so many is enough to see a mechanism fail; all of them take minutes.
 SAMPLED = pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 13])
-KINDS = ("beams", "solids", "modes", "onsets", "compare")
+KINDS = ("beams", "solids", "modes", "onsets", "compare", "boundary")
 
 
 @functools.cache
@@ -59,6 +60,14 @@ def result(kind: str):
         return st.modes(case("beams"), [0.0, 0.1], count=4, vectors=True)
     if kind == "onsets":
         return st.onsets(case("beams"), (0.0, 1.0), max_frequency_hz=20e3)
+    if kind == "boundary":
+        first, second = np.array([0.1, 0.4, 0.7]), np.array([1, -1, 1])
+        curve = BoundaryCurve(
+            first, first + 1, 100 * first, first, -first, second, np.abs(second) - 1, "flutter", False,
+            ("edge", "band"), 1e-14 * first, np.full(3, np.nan), 1e-4, 1,
+        )  # fmt: skip
+        places = (CountedAt(0.2, 0.3, 1),), True, "one curve", "reduced", 30, 200, 40, 7, (SolvedAgain(0, 0.4, 1.4, 1e-6, 1e-13),)
+        return Boundary("x", "mu", (0.0, 1.0), (0.0, 2.0), 1e3, (curve, curve), (0.0, 1.0), (0.0, 2.0), *places)
     if kind == "compare":
         part = Perturbation(0.2, 3 + 4e4j, np.zeros(3), 1e-5, Components(np.zeros(0, complex), np.zeros(0)))
         row = Comparison(0.2, 3 + 4e4j, (6e3,), (3.0,), part, 6.1e3, None, 1e-3, 2e-3, 0.97, 0, True, "agrees")

@@ -380,3 +380,20 @@ def test_the_verb(tmp_path: Path) -> None:
     assert data["x"].values.tolist() == curve["x"]
     assert called.to_dataframe()["frequency_hz"].tolist() == curve["frequency_hz"]
     assert "Stability boundary over x and mu" in called._repr_html_()
+    assert st.open(tmp_path / "case.out" / "boundary.nc").to_json() == called.to_json()
+
+
+@pytest.mark.parametrize("empty", [False, True])
+def test_a_boundary_comes_back_from_its_file(tmp_path: Path, empty: bool) -> None:
+    high = 1e-3 if empty else 3.0
+    found = st.stability_boundary(flutter(tmp_path), "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, high))
+    assert (len(found.curves) == 0) == empty
+    back = st.open(st.save(found, tmp_path / "boundary.nc"))
+    assert isinstance(back, Boundary)
+    assert back.to_json() == found.to_json()
+    assert back.provenance == json.loads(json.dumps(found.provenance))
+    xs, ys = np.linspace(-1.0, 2.0, 9), np.linspace(0.0, high, 11)
+    assert np.array_equal(back.unstable_modes_over(xs, ys), found.unstable_modes_over(xs, ys))
+    for one, other in zip(back.curves, found.curves, strict=True):
+        for name, values in vars(other).items():
+            assert np.array_equal(getattr(one, name), values, equal_nan=isinstance(values, np.ndarray)), name

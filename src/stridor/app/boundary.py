@@ -46,7 +46,9 @@ def boundary(
             loaded, x, y, x_range=ranges[0], y_range=ranges[1], method=chosen, lines=lines, tolerance=tolerance,
             progress=progress,
         )  # fmt: skip
-    files = [call.tabulate(result, "boundary.csv"), call.draw(draw(result), "boundary.png")]
+    call.keep(result, "boundary.nc")
+    tables = call.folder / "boundary.nc", call.tabulate(result, "boundary.csv")
+    files = [*tables, call.draw(draw(result), "boundary.png")]
     call.warn(result.warnings)
     if call.json:
         call.document(result.to_json() | {"files": [str(f) for f in files]})

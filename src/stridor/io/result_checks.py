@@ -124,9 +124,18 @@ def _ensemble(dims: tuple[str, ...]) -> dict[str, _Rule]:
     }
 
 
+_BOUNDARY = {
+    **{name: _Rule(("point",)) for name in ("x", "y", "tangent_x", "tangent_y")},
+    "frequency_hz": _Rule(("point",), low=0.0),
+    "curve": _Rule(("point",), "i", 1),
+    "kind": _Rule(("point",), "O"),
+    "growth_side": _Rule(("point",), "i", -1, 1),
+    "modes_beside": _Rule(("point",), "i", 0),
+    **{name: _Rule(("point",), low=0.0, missing=True) for name in ("boundary_error", "residual")},
+}
 _RULES: dict[str, dict[str, _Rule]] = {
     "modes": _MODES, "onsets": _ONSETS, "sensitivities": _SENSITIVITIES, "compare": _AGREEMENT, "simulate": _RUN,
-    "ensemble": _ensemble(_GRID),
+    "ensemble": _ensemble(_GRID), "boundary": _BOUNDARY,
 }  # fmt: skip
 _COUNTS = ("record_every", "steps", "planned_steps", "most_sweeps", "unconverged_steps")
 _NUMBERS = ("step", "beta2", "step_limit", "wall_seconds")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
@@ -11,14 +12,18 @@ import numpy as np
 from ..digits import hertz
 from ..modal.boundary import Drawn, crossings, drawn
 from ..notebook import Shown, counted, html_table
-from ..tabular import Cell, Rows, Tabular
+from ..tabular import Cell, Rows, Tabular, dataset
 from ..typing import Array, BoolArray, IntArray
 
 BESIDE = 1e-9  # of the ranges: how far inside the rectangle a point on its edge counts as
+WHOLE = ("curve", "growth_side", "modes_beside")
 HEADS = (
     "curve", "kind", "frequency_hz", "tangent_x", "tangent_y", "growth_side", "modes_beside", "boundary_error",
     "residual",
 )  # fmt: skip
+POINTS = {"x": "x", "y": "y", "error": "boundary_error"} | {
+    name: name for name in HEADS if name not in {"curve", "kind", "boundary_error"}
+}  # what a curve has at its points, and the name of that in tables
 
 
 @dataclass(frozen=True, repr=False)
@@ -247,9 +252,8 @@ class Boundary(Tabular):
         return html_table(title, heads, rows, (self.sentence, *self.warnings, *self.notes))
 
     def to_xarray(self) -> Any:
-        """xarray.Dataset with dimension point, the curves one after the other, ``curve`` their numbers from 1."""
-        import xarray as xr
-
+        """xarray.Dataset with dimension point, as `st.save` writes it: the curves one after the other, ``curve`` their
+        numbers from 1; what has no point is JSON in the attribute ``boundary``."""
         heads, rows = self.table()
         words = dict(zip(heads[3:], (
             "flutter or divergence", "frequency [Hz]", f"direction, {self.x}", f"direction, {self.y}",
@@ -257,17 +261,44 @@ class Boundary(Tabular):
             "componentwise backward error",
         ), strict=True))  # fmt: skip
         columns = list(zip(*rows, strict=True)) if rows else [()] * len(heads)
-        named = dict(zip(("x", "y", *heads[2:]), columns, strict=True))
+        kinds = {"kind": object} | dict.fromkeys(WHOLE, np.int64)
         variables = {
-            name: xr.Variable(("point",), np.array(values, dtype=object if name == "kind" else float),
-                              {"long_name": words.get(name, name)})
-            for name, values in named.items()
+            name: ("point", np.array(values, dtype=kinds.get(name, float)), {"long_name": words.get(name, name)})
+            for name, values in zip(("x", "y", *heads[2:]), columns, strict=True)
+        }
+        data = dataset("boundary", variables, {}, self.provenance)
+        document = self.to_json()
+        for curve in document["curves"]:
+            for name in POINTS:
+                del curve[name]
+        data.attrs |= {
+            "x_path": self.x, "y_path": self.y, "method": self.method, "agree": int(self.agree),
+            "sentence": self.sentence, "boundary": json.dumps(document),
         }  # fmt: skip
-        attributes = {
-            "analysis": "boundary", "x_path": self.x, "y_path": self.y, "method": self.method,
-            "agree": int(self.agree), "sentence": self.sentence,
-        }  # fmt: skip
-        return xr.Dataset(variables, attrs=attributes)
+        return data
+
+    @classmethod
+    def from_xarray(cls, data: Any) -> Boundary:
+        """The boundary whose `to_xarray` that is. Raises KeyError, TypeError or ValueError where it is none's."""
+        document = json.loads(data.attrs["boundary"])
+        curves: list[BoundaryCurve] = []
+        for number, told in enumerate(document.pop("curves"), start=1):
+            here = data["curve"].values == number
+            if not np.any(here):
+                raise ValueError(f"curve {number} has no point")
+            values = {own: data[name].values[here] for own, name in POINTS.items()}
+            deviation = np.nan if told["deviation"] is None else told["deviation"]
+            curves.append(BoundaryCurve(**told | {"ends": tuple(told["ends"]), "deviation": deviation} | values))
+        if np.any((data["curve"].values < 1) | (data["curve"].values > len(curves))):
+            raise ValueError("points of curves that it does not have")
+        for name in ("x_range", "y_range", "lines_x", "lines_y", "notes", "warnings"):
+            document[name] = tuple(document[name])
+        document |= {
+            "curves": tuple(curves),
+            "counted": tuple(CountedAt(**c) for c in document["counted"]),
+            "confirmed": tuple(SolvedAgain(**c) for c in document["confirmed"]),
+        }
+        return cls(**document, provenance=json.loads(data.attrs["provenance"]))
 
 
 def drawn_curve(curve: BoundaryCurve, low: Array, width: Array) -> Drawn:
