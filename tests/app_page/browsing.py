@@ -16,7 +16,7 @@ CHROMIUM = Path(os.environ.get("STRIDOR_CHROMIUM", "/usr/bin/chromium"))
 WITH_BROWSER = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no browser at {CHROMIUM} (Debian: apt install chromium)")
 ROOT = Path(__file__).parents[2]
 SHOTS = Path(os.environ.get("STRIDOR_SCREENSHOTS", ROOT / "build" / "screenshots"))
-PATIENT = 60_000  # ms
+PATIENT = 180_000  # ms
 SOLVED = "typeof stridor !== 'undefined' && stridor.state.onsets !== null"
 READY = "[stridorRun, stridorBoth, stridorMap].every((s) => s.page.ready)"
 
