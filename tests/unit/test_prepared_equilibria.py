@@ -158,3 +158,15 @@ def test_in_space_with_stiffness_and_rigid(monkeypatch: pytest.MonkeyPatch) -> N
         for mu in FRICTION:
             assert_same(together(system, mu, monkeypatch), alone(system, mu, monkeypatch))
         assert prepared_of(system) is not None
+
+
+def test_where_nothing_touches_nothing_is_prepared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prepared, "FEWEST", 1)  # the first set is solved alone, of the second nobody is a member
+    system = random_system(3)
+    apart = System.from_matrices(
+        system.mass, None, system.stiffness, loads={"away": -system.loads["push"]},
+        contacts={"c0": {"normal": {0: 1.0}, "tangent": {1: 1.0}, "gap": 1e3, "friction": RUBS, "stiffness": "rigid"}},
+    )  # fmt: skip
+    with pytest.raises(AnalysisError, match="no contact"):
+        steady_sliding_nodes(apart, mu=0.3)
+    assert prepared_of(apart) is None

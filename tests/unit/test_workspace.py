@@ -220,3 +220,11 @@ def test_the_oldest_of_very_many_answers_is_forgotten() -> None:
     assert answers.known(0) is None
     assert answers.known(1) == -1
     assert answers.once(1, lambda: 7) == -1
+
+
+def test_components_of_whole_numbers_are_those_of_the_same_matrices() -> None:
+    whole = st.System(np.eye(2, dtype=int), np.zeros((2, 2), dtype=int), np.array([[20, 4], [4, 15]]))
+    same = st.System(np.eye(2), np.zeros((2, 2)), np.array([[20.0, 4.0], [4.0, 15.0]]))
+    (mine,), (theirs,) = uncoupled_modes(whole).real, uncoupled_modes(same).real
+    assert np.array_equal(mine.stiffness, theirs.stiffness)
+    assert np.array_equal(mine.vectors, theirs.vectors)

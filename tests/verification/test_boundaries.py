@@ -15,6 +15,7 @@ from benches import paper_case
 from matrix_cases import matrix_case
 from program import stridor
 from random_boundaries import disagreement, distance, eigenvalues, growing, off_the_curves, random_plane
+from stridor.io.seals import seal
 from stridor.modal.boundary import Found, Plane, boundaries, march, search
 from stridor.study.boundary_problem import Asked, plane_of, solved_problem
 from stridor.study.boundary_result import Boundary
@@ -397,3 +398,19 @@ def test_a_boundary_comes_back_from_its_file(tmp_path: Path, empty: bool) -> Non
     for one, other in zip(back.curves, found.curves, strict=True):
         for name, values in vars(other).items():
             assert np.array_equal(getattr(one, name), values, equal_nan=isinstance(values, np.ndarray)), name
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("x_range", []), ("y_range", [1.0, 0.0]), ("method", 7), ("counted", [{}]), ("curves", None), ("lines_x", ["a"])],
+)
+def test_a_boundary_that_is_none_is_refused_in_one_message(tmp_path: Path, name: str, value: object) -> None:
+    found = st.stability_boundary(flutter(tmp_path), "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0))
+    data = found.to_xarray()
+    document = json.loads(data.attrs["boundary"]) | {name: value}
+    for text in (json.dumps(document), "null"):
+        seal(data.assign_attrs({"boundary": text})).to_netcdf(tmp_path / "boundary.nc", engine="h5netcdf")
+        with pytest.raises(st.CaseError, match="damaged or changed") as refused:
+            st.open(tmp_path / "boundary.nc")
+        assert "\n" not in str(refused.value)

@@ -140,8 +140,8 @@ class Preparing:
         self, system: System, nodes: ContactNodes, force: Array, active: BoolArray, rubbing: Array, solver: str | None
     ) -> tuple[Array, Array] | None:
         """As `Prepared.at`; None also as long as nothing is prepared."""
-        if self._refused or nodes.count > MOST_NODES or system.size < LEAST:
-            return None
+        if self._refused or nodes.count > MOST_NODES or system.size < LEAST or not np.any(active):
+            return None  # nobody touches: there is nothing to share
         if self.prepared is not None and not self.prepared.serves(nodes, solver):
             self.free()
         self._asked += 1
@@ -158,9 +158,9 @@ class Preparing:
     def free(self) -> None:
         """Give the memory of the factorisation back; what is asked for is counted anew."""
         self._asked = 0
-        if self.prepared is not None:
-            self.prepared.factor.free()
-            self.prepared = None
+        prepared, self.prepared = self.prepared, None  # first, as an interrupt may come between
+        if prepared is not None:
+            prepared.factor.free()
 
 
 def _same(one: Sparse, other: Sparse) -> bool:

@@ -281,6 +281,9 @@ class Boundary(Tabular):
     def from_xarray(cls, data: Any) -> Boundary:
         """The boundary whose `to_xarray` that is. Raises KeyError, TypeError or ValueError where it is none's."""
         document = json.loads(data.attrs["boundary"])
+        _check_document(document)
+        if np.any(data["growth_side"].values == 0):
+            raise ValueError("growth_side is 0")
         curves: list[BoundaryCurve] = []
         for number, told in enumerate(document.pop("curves"), start=1):
             here = data["curve"].values == number
@@ -299,6 +302,27 @@ class Boundary(Tabular):
             "confirmed": tuple(SolvedAgain(**c) for c in document["confirmed"]),
         }
         return cls(**document, provenance=json.loads(data.attrs["provenance"]))
+
+
+def _check_document(document: Any) -> None:
+    """Raise ValueError for what stands for no boundary: its kinds of values, ranges, counted points."""
+    if not isinstance(document, dict):
+        raise ValueError("its boundary is no table")
+    told: dict[str, Any] = document
+    for name in ("x", "y", "sentence", "method"):
+        if not isinstance(told[name], str):
+            raise ValueError(f"{name} is no text")
+    for name in ("x_range", "y_range"):
+        low, high = told[name]
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            raise ValueError(f"{name} is no range")
+    points = [[place[k] for k in ("x", "y", "unstable_modes")] for place in told["counted"]]
+    numbers = [told["lines_x"], told["lines_y"], *points, [told["max_frequency_hz"]]]
+    if not all(np.all(np.isfinite(np.array(row, dtype=float))) for row in numbers):
+        raise ValueError("it holds numbers that are not finite")
+    for curve in told["curves"]:
+        if curve["kind"] not in ("flutter", "divergence") or len(curve["ends"]) != 2:
+            raise ValueError("a curve of no known kind")
 
 
 def drawn_curve(curve: BoundaryCurve, low: Array, width: Array) -> Drawn:

@@ -149,7 +149,8 @@ def _solved_once(size: int, *matrices: _Entries) -> tuple[RealBlock | ComplexBlo
 
 def _entries(matrix: Any) -> _Entries:
     return (
-        matrix.indptr.astype(np.int64).tobytes(), matrix.indices.astype(np.int64).tobytes(), matrix.data.tobytes()
+        matrix.indptr.astype(np.int64).tobytes(), matrix.indices.astype(np.int64).tobytes(),
+        matrix.data.astype(float).tobytes(),
     )  # fmt: skip
 
 

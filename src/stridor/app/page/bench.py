@@ -168,7 +168,8 @@ class Bench:
         here, error = reduced.here(state, vectors=state.branch is not None)
         send("at", {**modes_at(here, state.mu, checked=False), "said": _certified(reduced, error)})
         branch, whole = state.branch, reduced.work.system()
-        if branch is not None and self._shape(model, whole, here, branch, send, energy=False):
+        offered = branch is not None and self._shape(model, whole, here, branch, send, energy=False)
+        if offered:
             send("tornado", _asked_for(state, reduced.seconds))
         self._leisure = True
         send(IDLE, None)
@@ -184,7 +185,9 @@ class Bench:
         send("onsets", model.onsets)
         if state.branch is not None:
             model.idle = model.idle or _Drawn(model.work.case("the page"))
-            self._shape(model, model.idle.system(), here, state.branch, send, energy=True)
+            found = self._shape(model, model.idle.system(), here, state.branch, send, energy=True)
+            if found and not offered:  # its number was not known before the curves were
+                send("tornado", _asked_for(state, reduced.seconds))
 
     def _swept(self, work: Workspace, mu: float, send: Send) -> ComplexModes:
         """Branches over the range of μ and at the μ of the page."""

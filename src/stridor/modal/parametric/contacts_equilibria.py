@@ -60,14 +60,17 @@ class Equilibria:
 
     def free(self) -> None:
         """Give the memory of a factorisation back."""
-        if self._many is not None:
-            self._many.factor.free()
-            self._many = None
+        many, self._many = self._many, None  # first, as an interrupt may come between
+        if many is not None:
+            many.factor.free()
 
     def _together(self, many: Prepared, mu: Array, stiffness: float) -> HeldEquilibria | None:
         chosen, rubbing = many.nodes, (mu[:, None] * self._sense)[self._touching]
         active = np.ones(chosen.count, dtype=bool)
-        found = many.at(self._force, active, rubbing, chosen.compliance / stiffness, chosen.gap)
+        try:
+            found = many.at(self._force, active, rubbing, chosen.compliance / stiffness, chosen.gap)
+        except SingularMatrix:  # its own factors may do
+            return None
         if found is None:
             return None
         u, forces = found
