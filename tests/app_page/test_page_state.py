@@ -165,3 +165,16 @@ def test_a_link_to_a_file_of_the_server_is_to_its_text_not_its_name():
     assert from_link(link, {mine.key: mine, other.key: other}).source == mine
     with pytest.raises(st.CaseError, match="holds no state of this page"):
         from_link(link, {other.key: other})
+
+
+def test_a_shape_of_another_model_is_not_that_of_the_page():
+    """Its eigenvalue would be sought in the full problem of a case that never had it."""
+    pytest.importorskip("nicegui", reason="the extra app is not installed")
+    from stridor.app.page.panel_mode import is_of
+
+    state = replace(first_state(Source.template("two-beams")), mu=0.3, branch=8)
+    shape = {"branch": 8, "mu": 0.3, "stamp": state.stamp, "growth_rate": 1.0, "frequency_hz": 8640.0}
+    assert is_of(shape, state)
+    for other in (replace(state, mu=0.2), replace(state, branch=7), state.with_change("materials.steel.density", 7900.0)):
+        assert not is_of(shape, other)
+    assert not is_of({"branch": 8, "missing": "not in the band"}, state)

@@ -51,6 +51,7 @@ class _Model:
     why it has none."""
 
     key: Any
+    stamp: str
     work: Workspace
     reduced: Reduced | None = None
     why: str = ""
@@ -103,7 +104,7 @@ class Bench:
         if self._model is None or self._model.key != state.model:
             self._model = None
             case = state.case()
-            model = _Model(state.model, _Drawn(case))
+            model = _Model(state.model, state.stamp, _Drawn(case))
             if self._reduced is not None and self._reduced.holds(state):
                 model.reduced = self._reduced
             elif _built(model).size > LARGE:
@@ -215,7 +216,8 @@ class Bench:
         shape, model.geometry = shape_of(system, here, column, known=model.geometry)
         fed = energy_of(system, model.work.options, here, column) if energy else {"each": [], "why": "being computed"}
         send("shape", {
-            "branch": branch, **shape, "bodies": participation(system, here, column), "contacts": fed,
+            "branch": branch, "stamp": model.stamp, **shape,
+            "bodies": participation(system, here, column), "contacts": fed,
         })  # fmt: skip
         return True
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from html import escape
+from typing import Any
 
 from nicegui import ui
 
@@ -12,6 +14,7 @@ from ...view.animation import animation_shell
 from .panel import Panel
 from .runs import Wish
 from .session import Session
+from .state import State
 
 _PARTS = """
 <section class="st-modes" aria-labelledby="st-modes-title">
@@ -43,6 +46,12 @@ def build(container: ui.element, session: Session) -> None:
         _Panel(session)
 
 
+def is_of(shape: Mapping[str, Any], state: State) -> bool:
+    """Whether a shape is that of the mode, at the μ and of the model that the page is at, and has its eigenvalue."""
+    found = tuple(shape.get(name) for name in ("branch", "mu", "stamp"))
+    return found == (state.branch, state.mu, state.stamp) and "growth_rate" in shape
+
+
 class _Panel(Panel):
     """Sensitivities of the chosen mode where they take a while; static/tornado.js asks for them and shows how far they
     are."""
@@ -56,7 +65,7 @@ class _Panel(Panel):
         state, shape = self.session.state, self.session.picture.parts.get("shape") or {}
         if self.busy():
             return
-        if (shape.get("branch"), shape.get("mu")) != (state.branch, state.mu) or "growth_rate" not in shape:
+        if not is_of(shape, state):
             self.refuse("the mode is being computed still")
             return
         value = shape["growth_rate"], 2 * math.pi * shape["frequency_hz"]

@@ -104,8 +104,9 @@ class _Panel(Panel):
 
     def _sounded(self, part: str, content: Any) -> None:
         """What the sound of a run that has ended says, if none was begun since."""
-        if part in ("sound", "silent", "failed") and self.file is not None:
-            self.heard("silent" if part == "failed" else part, content)
+        of_this = self.sound is not None and self.sound.wish.options["file"] == self.file
+        if of_this and part in ("sound", "silent", "refused", "failed"):
+            self.heard("silent" if part in ("refused", "failed") else part, content)
 
     # -- what the run says ----------------------------------------------------------------------------------------
 
