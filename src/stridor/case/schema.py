@@ -394,6 +394,10 @@ class Temporal(Table):
     contact: Literal["as given", "rigid"] = Field(
         default="as given", description='"as given" or "rigid", the stiffness of contacts in time'
     )
+    stepper: Literal["explicit", "exact"] = Field(
+        default="explicit",
+        description='"explicit" or "exact", step by step or from one change of contact to the next',
+    )
     watch: tuple[str, ...] = Field(default=(), description=f"a list of points, each {POINT[8:]}")
 
 

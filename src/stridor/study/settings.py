@@ -31,4 +31,7 @@ def phases_of(case: Marches) -> list[PhaseSpec]:
 def settings_of(case: Marches) -> Settings:
     """The settings of [temporal]."""
     t = case.temporal
-    return Settings(t.step, t.beta2, t.record_every, t.path, t.initial, t.perturbation, tuple(t.watch), t.contact)
+    watch = tuple(t.watch)
+    return Settings(
+        t.step, t.beta2, t.record_every, t.path, t.initial, t.perturbation, watch, t.contact, t.stepper
+    )  # fmt: skip

@@ -16,7 +16,9 @@ from .beta2 import StepLimit
 class Settings:
     """How to march: step Δt [s] (None: `StepLimit.share` of the limit), β2 in [0.5, 1], steps between
     records, path, initial state, perturbation [m/s] of the slip speed (steady sliding only), watched points. contact
-    "rigid" takes contact stiffness out of the time loop, as the paper has it; "as given" leaves it in."""
+    "rigid" takes contact stiffness out of the time loop, as the paper has it; "as given" leaves it in. stepper
+    "explicit" is the scheme of the paper; "exact" goes from one change of contact to the next, and its step is that of
+    the records alone."""
 
     step: float | None = None
     beta2: float = 0.5
@@ -26,6 +28,7 @@ class Settings:
     perturbation: float = 0.0
     watch: tuple[str, ...] = ()
     contact: Literal["as given", "rigid"] = "as given"
+    stepper: Literal["explicit", "exact"] = "explicit"
 
     def system(self, system: System) -> System:
         """The system that the time loop takes."""

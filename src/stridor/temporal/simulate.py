@@ -15,6 +15,7 @@ from .restart import settings_of_restart
 from .schedule import PhaseSpec, lay_out
 from .settings import Settings
 from .stepper import Disturbance, Stepper
+from .steppers.exact import exact_stepper, why_not_exact
 from .steppers.modal import choose_path, modal_stepper, refuses
 from .steppers.sparse import sparse_stepper, step_limit_assembled
 from .trajectory import Trajectory
@@ -78,6 +79,8 @@ def simulate(
 def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
     """How a system would be marched: path, why it is taken, and the limit of the step."""
     system = settings.system(system)
+    if settings.stepper == "exact":
+        return "exact", why_not_exact(system) or "asked for", step_limit(system, 0.5)
     if why := _why_sparse(system, settings):
         return "assembled", why, step_limit_assembled(system, settings.beta2)
     modes, reason = choose_path(system, settings)
@@ -86,6 +89,8 @@ def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
 
 def stepper_for(system: System, settings: Settings, mu: float | None) -> Stepper:
     """The method of time stepping that suits a system, or the one that the settings ask for."""
+    if settings.stepper == "exact":
+        return exact_stepper(system, settings, mu)
     if why := _why_sparse(system, settings):
         return sparse_stepper(system, settings, mu, why)
     return modal_stepper(system, settings, mu)

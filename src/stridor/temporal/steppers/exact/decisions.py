@@ -1,0 +1,209 @@
+"""What contacts do where their status may change: impacts, and the one status whose forces go with it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....errors import AnalysisError
+from ....typing import Array
+from .statuses import BACKWARD, FORWARD, GAP, STICK, Driven, Pairs, Status, sense
+
+CLOSE = 1e-9  # of the forces at hand: how far off a condition rounding may be
+ROUNDING = 1e-12  # of the terms of a force
+MOST = 4**6  # combinations that are tried
+
+
+@dataclass(frozen=True)
+class Impact:
+    """Velocity (k,) behind an impact, which way each contact of it then slips (0: it sticks), what it took from the
+    motion [J] along normals and tangents; carried: what its impulses did on what supports move [J]."""
+
+    velocity: Array
+    slips: Mapping[int, float]
+    open: frozenset[int]
+    normal_work: float
+    friction_work: float
+    carried: float
+
+
+def impact(
+    pairs: Pairs, velocity: Array, speeds: tuple[Array, Array], met: Sequence[int], was: Status
+) -> Impact:
+    """The velocities right behind an impact of contacts ``met``: inelastic, with Coulomb's law between the impulses.
+
+    Velocity (k,) before it; speeds (m,), (m,): those along normals and tangents that supports add. Normal impulses
+    P ≥ 0 leave no approach, and none where the contact parts; |T| ≤ μP where it sticks afterwards, T = −μP sign(slip)
+    where it slips (what the explicit scheme does as its step goes to zero). Raises AnalysisError where there is no such
+    impulse, which friction too strong for the pair can bring about.
+    """
+    normal = {c: float(pairs.normal[c] @ velocity + speeds[0][c]) for c in met}
+    slip = {c: float(pairs.tangent[c] @ velocity + speeds[1][c]) for c in met}
+    options: list[list[int]] = []
+    for c in met:
+        ahead = [FORWARD, BACKWARD] if slip[c] > 0.0 else [BACKWARD, FORWARD]
+        stuck = [STICK] if pairs.sticking[c] > 0.0 and _along(pairs, c) else []
+        options.append([*stuck, *ahead, GAP])
+    size = max([abs(n) for n in normal.values()] + [abs(s) for s in slip.values()] + [1e-300])
+    for combination in itertools.islice(itertools.product(*options), MOST):
+        found = _impulses(pairs, combination, met, normal, slip, was, size)
+        if found is None:
+            continue
+        pushed, along = found
+        after = velocity + sum(
+            (pushed[i] * pairs.normal[c] + along[i] * pairs.tangent[c] for i, c in enumerate(met)),
+            np.zeros_like(velocity),
+        )
+        lost_normal = lost_friction = carried = 0.0
+        for i, c in enumerate(met):
+            behind = float(pairs.normal[c] @ after + speeds[0][c]), float(pairs.tangent[c] @ after + speeds[1][c])
+            lost_normal -= 0.5 * pushed[i] * (normal[c] + behind[0])
+            lost_friction -= 0.5 * along[i] * (slip[c] + behind[1])
+            carried += pushed[i] * speeds[0][c] + along[i] * speeds[1][c]
+        slips = {c: sense(now) for c, now in zip(met, combination, strict=True) if now != GAP}
+        away = frozenset(c for c, now in zip(met, combination, strict=True) if now == GAP)
+        return Impact(after, slips, away, lost_normal, lost_friction, carried)
+    raise AnalysisError("friction jams the contacts in an impact: no impulses bring them to rest against one another")
+
+
+def _along(pairs: Pairs, c: int) -> bool:
+    """Whether a contact can be stopped along its tangent at all, beside along its normal."""
+    n, t = pairs.normal[c], pairs.tangent[c]
+    nn, tt, nt = float(n @ n), float(t @ t), float(n @ t)
+    return nn * tt - nt * nt > 1e-13 * nn * tt and tt > 0.0
+
+
+def _impulses(
+    pairs: Pairs,
+    combination: Sequence[int],
+    met: Sequence[int],
+    normal: Mapping[int, float],
+    slip: Mapping[int, float],
+    was: Status,
+    size: float,
+) -> tuple[Array, Array] | None:
+    """Impulses (c,), (c,) along normals and tangents of one combination, None where they break its conditions."""
+    rows: list[Array] = []
+    directions: list[Array] = []
+    wanted: list[float] = []
+    for c, now in zip(met, combination, strict=True):
+        if now == GAP:
+            continue
+        rows.append(pairs.normal[c])
+        directions.append(pairs.normal[c] - sense(now) * pairs.sliding[c] * pairs.tangent[c])
+        wanted.append(-normal[c])
+        if now == STICK:
+            rows.append(pairs.tangent[c])
+            directions.append(pairs.tangent[c])
+            wanted.append(-slip[c])
+    solved = np.zeros(0)
+    if rows:
+        matrix = np.array(rows) @ np.array(directions).T
+        try:
+            solved = np.linalg.solve(matrix, np.array(wanted))
+        except np.linalg.LinAlgError:
+            return None
+    change = np.array(directions).T @ solved if rows else np.zeros(pairs.normal.shape[1])
+    pushed, along = np.zeros(len(met)), np.zeros(len(met))
+    at = 0
+    for i, (c, now) in enumerate(zip(met, combination, strict=True)):
+        behind = normal[c] + float(pairs.normal[c] @ change), slip[c] + float(pairs.tangent[c] @ change)
+        if now == GAP:
+            if behind[0] < -CLOSE * size:
+                return None
+            continue
+        pushed[i] = solved[at]
+        weight = float(pairs.normal[c] @ pairs.normal[c])
+        if pushed[i] * weight < -CLOSE * size:
+            return None
+        if now == STICK:
+            along[i] = solved[at + 1]
+            at += 2
+            limit = pairs.sticking[c] if was[c] == STICK else pairs.sliding[c]
+            if abs(along[i]) > limit * pushed[i] + CLOSE * size / weight:
+                return None
+            continue
+        at += 1
+        along[i] = -sense(now) * pairs.sliding[c] * pushed[i]
+        if sense(now) * behind[1] < -CLOSE * size:
+            return None
+    return pushed, along
+
+
+@dataclass(frozen=True)
+class Touching:
+    """A contact whose gap is closed without approach: the sign of its slip, 0 where it has none; what it may do."""
+
+    slip: float
+    options: tuple[int, ...]
+
+
+def choices(pairs: Pairs, c: int, slip: float, now: int) -> Touching:
+    """All that a touching contact may do, what it does now first."""
+    if slip != 0.0:
+        options = [FORWARD if slip > 0.0 else BACKWARD, GAP]
+    else:
+        stuck = [STICK] if pairs.sticking[c] > 0.0 and _along(pairs, c) else []
+        options = [*stuck, FORWARD, BACKWARD, GAP]
+    if now in options:
+        options.remove(now)
+        options.insert(0, now)
+    if pairs.compliance[c] > 0.0 and now != GAP:
+        options.remove(GAP)  # a spring that is pressed pushes
+    return Touching(slip, tuple(options))
+
+
+def settle(
+    touching: Mapping[int, Touching],
+    was: Status,
+    driven: Callable[[Status], Driven],
+    state: tuple[Array, Array, Array],
+) -> Status:
+    """The status whose forces and accelerations go with it, of contacts that touch; all others are open.
+
+    was: the status before. Raises AnalysisError where there is none: friction jams.
+    """
+    named = list(touching)
+    for combination in itertools.islice(itertools.product(*(touching[c].options for c in named)), MOST):
+        status = list(was)
+        for c in range(len(status)):
+            status[c] = GAP
+        for c, now in zip(named, combination, strict=True):
+            status[c] = now
+        found = tuple(status)
+        try:
+            algebra = driven(found)
+        except AnalysisError:
+            continue
+        if _consistent(algebra, touching, was, state):
+            return found
+    raise AnalysisError("friction jams the contacts: no status of them goes with the forces that it makes")
+
+
+def _consistent(
+    driven: Driven, touching: Mapping[int, Touching], was: Status, state: tuple[Array, Array, Array]
+) -> bool:
+    status, pairs = driven.regime.status, driven.regime.pairs
+    forces = [(n.at(*state), t.at(*state)) for n, t in driven.forces]
+    rounding = max((row.size(*state) for both in driven.forces for row in both), default=0.0)
+    size = max([abs(f) for both in forces for f in both] + [ROUNDING * rounding / CLOSE, 1e-300])
+    for c, touch in touching.items():
+        now, (normal, tangential) = status[c], forces[c]
+        weight = max(float(pairs.normal[c] @ pairs.normal[c]), float(pairs.tangent[c] @ pairs.tangent[c]))
+        if now == GAP:
+            opening = driven.opening(c)
+            if pairs.compliance[c] == 0.0 and driven.rate_of(opening).at(*state) < -CLOSE * size * weight:
+                return False
+            continue
+        if normal < -CLOSE * size:
+            return False
+        if now == STICK:
+            limit = pairs.sticking[c] if was[c] == STICK else pairs.sliding[c]
+            if abs(tangential) > limit * normal + CLOSE * size:
+                return False
+        elif touch.slip == 0.0 and sense(now) * driven.rate_of(driven.slip(c)).at(*state) < -CLOSE * size * weight:
+            return False
+    return True

@@ -1,0 +1,327 @@
+"""From event to event: the motion between two changes of status is known, and the next change is a root of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....errors import AnalysisError
+from ....typing import Array, ComplexArray
+from ...columns import FRICTION, NORMAL, SUPPORT, WORKS
+from .basis import Basis
+from .decisions import Touching, choices, impact, settle
+from .drive import Piece
+from .powers import Powers
+from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, parts_of
+from .statuses import BACKWARD, FORWARD, GAP, STICK, TAYLOR, Driven, Flow, Pairs, Regime, Status, sense
+
+STRETCH = 256  # longest parts that are looked through from one beginning of the modes
+STORM, MOMENT = 300, 0.3  # so many events within so much of the fastest mode's time [rad]: they accumulate
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A flow with the numbers that end it: for each what it means and of which contact; tables of the search."""
+
+    flow: Flow
+    meanings: tuple[tuple[str, int], ...]
+    weights: ComplexArray
+    sizes: Array
+    slow: Array
+    table: Parts
+    powers: Powers
+
+
+@dataclass
+class Anchor:
+    """The motion from ``time`` on: modes ζ, terms of what is slow, and how long these may be used."""
+
+    time: float
+    watched: Watched
+    zeta: ComplexArray
+    slow: Array
+    terms: Array
+    span: float
+
+    def state(self, time: float) -> tuple[Array, Array]:
+        """Displacement and velocity (k,) at a time."""
+        after = time - self.time
+        zeta = self.zeta * np.exp(self.watched.flow.split.poles * after)
+        return self.watched.flow.state(zeta, self.slow_at(after))
+
+    def works(self, after: Array) -> Array:
+        """Works (t, 5) [J] from the beginning of these modes to some times (t,) after it."""
+        return self.watched.powers.works(self.zeta, self.terms, after)
+
+    def slow_at(self, after: float) -> Array:
+        """What is slow, some time after."""
+        return after ** np.arange(len(self.terms)) @ self.terms
+
+
+class Motion:
+    """The state of a system that goes from event to event.
+
+    Displacement q and velocity v (k,) at ``time``, the status of the contacts and where each began to stick.
+    """
+
+    def __init__(self, basis: Basis, pairs: Pairs, pieces: list[Piece]) -> None:
+        self.basis, self.pairs, self.pieces = basis, pairs, pieces
+        self.piece = 0
+        self.time = 0.0
+        self.q, self.v = np.zeros(basis.size), np.zeros(basis.size)
+        self.status: Status = (GAP,) * pairs.count
+        self.holds = np.zeros(pairs.count)
+        self.level = 0
+        self.events = self.unsure = self.crowded = 0
+        self.crowd_since = 0.0
+        self.works = np.zeros(WORKS)  # [J] up to the beginning of the present modes
+        self._regimes: dict[Status, Regime] = {}
+        self._driven: dict[tuple[Status, int], Driven] = {}
+        self._watched: dict[tuple[Status, int], Watched] = {}
+        self.anchor: Anchor | None = None
+        self.next: tuple[float, str, int] | None = None
+
+    # -- what is kept of each status ---------------------------------------------------------------------------------
+
+    def regime(self, status: Status) -> Regime:
+        """Modes of a status."""
+        if status not in self._regimes:
+            self._regimes[status] = Regime(self.basis, self.pairs, status)
+        return self._regimes[status]
+
+    def driven(self, status: Status) -> Driven:
+        """A status under what drives it now, without its modes."""
+        key = status, self.piece
+        if key not in self._driven:
+            self._driven[key] = Driven(self.regime(status), self.pieces[self.piece])
+        return self._driven[key]
+
+    def watched(self) -> Watched:
+        """The present status with its modes."""
+        key = self.status, self.piece
+        if key not in self._watched:
+            self._watched[key] = _watched(self.regime(self.status), self.pieces[self.piece])
+        return self._watched[key]
+
+    def drive(self, time: float) -> Array:
+        """p: powers of time, and where contacts began to stick."""
+        return np.concatenate([self.pieces[self.piece].powers(time), self.holds])
+
+    def support_speeds(self) -> tuple[Array, Array]:
+        """What moving supports add to the velocities (m,) along normals and tangents now."""
+        piece = self.pieces[self.piece]
+        speed = piece.displacements @ piece.derivative @ piece.powers(self.time)
+        return self.pairs.normal_lift @ speed, self.pairs.tangent_lift @ speed
+
+    # -- from one event to the next ----------------------------------------------------------------------------------
+
+    def reach(self, end: float) -> float:
+        """Find the next event unless it is beyond ``end``; the time up to which the motion is known."""
+        while self.next is None:
+            anchor = self._anchored()
+            last = self.pieces[self.piece].end
+            limit = min(anchor.span, last - anchor.time)
+            code, which, after, level, _, unsure = first_root(
+                Numbers(anchor.watched.weights, anchor.watched.sizes, anchor.watched.slow @ anchor.terms.T),
+                anchor.watched.flow.split.poles, anchor.zeta, anchor.watched.table, limit, self.level,
+            )  # fmt: skip
+            self.level, self.unsure = level, self.unsure + unsure
+            if code == UNDECIDED:
+                raise AnalysisError(
+                    "a force, gap or slip of a contact stays so close to zero that no change of status can be told from "
+                    'rounding, which the exact stepper does not pass; take stepper = "explicit"'
+                )
+            if code == CROSSED:
+                self.next = (min(anchor.time + after, last), *anchor.watched.meanings[which])
+            elif anchor.time + limit >= last * (1 - 1e-15):
+                self.next = (last, "piece", 0)
+            else:
+                self.next = (anchor.time + limit, "stretch", 0)
+        return min(self.next[0], end)
+
+    def _anchored(self) -> Anchor:
+        """The motion in the modes of the present status, begun anew where there is none."""
+        if self.anchor is None:
+            watched = self.watched()
+            zeta, slow = watched.flow.enter(self.q, self.v, self.drive(self.time))
+            self._begin(watched, zeta, slow)
+        assert self.anchor is not None
+        return self.anchor
+
+    def _begin(self, watched: Watched, zeta: ComplexArray, slow: Array) -> None:
+        terms = watched.flow.series(slow)
+        span = STRETCH * watched.table.longest
+        sizes = np.abs(terms).max(axis=1)
+        # The last term must be nothing beside the first ones.
+        while sizes[-1] > 0.0 and sizes[-1] * span ** (TAYLOR - 1) > 1e-17 * max(float(sizes[0]), 1e-300):
+            span *= 0.5
+        used = int(np.flatnonzero(sizes).max(initial=0)) + 1
+        self.anchor = Anchor(self.time, watched, zeta, slow, terms[:used], span)
+
+    def passed(self) -> None:
+        """Go to the next event and through it."""
+        assert self.next is not None
+        assert self.anchor is not None
+        time, meaning, c = self.next
+        anchor = self.anchor
+        self.next, self.anchor = None, None
+        self.works = self.works + anchor.works(np.array([time - anchor.time]))[0]
+        self.q, self.v = anchor.state(time)
+        self.time = time
+        if meaning == "stretch":
+            return
+        if meaning == "piece":
+            self._change_piece()
+            return
+        self.events += 1
+        if time - self.crowd_since > MOMENT / max(anchor.watched.flow.regime.fastest, 1e-300):
+            self.crowd_since, self.crowded = time, 0
+        self.crowded += 1
+        if self.crowded > STORM:
+            raise AnalysisError(
+                f"{STORM} changes of contact within {time - self.crowd_since:.3g} s, faster than anything swings: they "
+                'accumulate, which the exact stepper does not pass; take stepper = "explicit"'
+            )
+        self._go_through(meaning, c)
+
+    def _go_through(self, meaning: str, c: int) -> None:
+        """What a number that reached zero brings about."""
+        pairs, was = self.pairs, self.status
+        touching = self._touching()
+        if meaning == "closes":
+            if pairs.compliance[c] == 0.0:
+                self._collide([c, *(o for o in touching if pairs.compliance[o] == 0.0)])
+                return
+            speed = float(pairs.tangent[c] @ self.v + self.support_speeds()[1][c])
+            touching[c] = Touching(speed, (FORWARD if speed >= 0.0 else BACKWARD,))
+        elif meaning == "opens":
+            del touching[c]
+        elif meaning in ("slips forward", "slips backward"):
+            touching[c] = Touching(0.0, (FORWARD if meaning == "slips forward" else BACKWARD,))
+        else:  # stops
+            back = BACKWARD if was[c] == FORWARD else FORWARD
+            options = choices(pairs, c, 0.0, STICK).options
+            touching[c] = Touching(0.0, tuple(o for o in (STICK, back, was[c]) if o in options))
+        self._take(settle(touching, was, self.driven, (self.q, self.v, self.drive(self.time))))
+
+    def _touching(self) -> dict[int, Touching]:
+        """Contacts that are closed now, and what they may do if something else changes."""
+        return {
+            c: choices(self.pairs, c, sense(now), now) for c, now in enumerate(self.status) if now != GAP
+        }
+
+    def _collide(self, met: list[int], slips: Mapping[int, float] | None = None) -> None:
+        """An impact of contacts ``met``; slips: those of others that are closed, where they are not what their status
+        says."""
+        struck = impact(self.pairs, self.v, self.support_speeds(), met, self.status)
+        piece = self.pieces[self.piece]
+        speed = piece.displacements @ piece.derivative @ piece.powers(self.time)
+        self.works[SUPPORT] += float(speed @ (self.pairs.inertia @ (struck.velocity - self.v)))
+        self.v = struck.velocity
+        self.works[NORMAL] += struck.normal_work
+        self.works[FRICTION] += struck.friction_work
+        self.works[SUPPORT] -= struck.carried
+        touching = {c: t for c, t in self._touching().items() if c not in met}
+        for c, slip in ({} if slips is None else slips).items():
+            if c not in met:
+                touching[c] = choices(self.pairs, c, slip, self.status[c])
+        for c, slip in struck.slips.items():
+            touching[c] = choices(self.pairs, c, slip, self.status[c])
+        was = tuple(
+            STICK if struck.slips.get(c, 1.0) == 0.0 and now == STICK else now for c, now in enumerate(self.status)
+        )
+        self._take(settle(touching, was, self.driven, (self.q, self.v, self.drive(self.time))))
+
+    def _take(self, status: Status) -> None:
+        """Another status from here on."""
+        piece, pairs = self.pieces[self.piece], self.pairs
+        for c, now in enumerate(status):
+            if now == STICK and self.status[c] != STICK:
+                place = piece.displacements @ piece.powers(self.time)
+                self.holds[c] = float(pairs.tangent[c] @ self.q + pairs.tangent_lift[c] @ place)
+        self.status, self.anchor = status, None
+
+    # -- changes of what drives the system ---------------------------------------------------------------------------
+
+    def start(self, touching: Mapping[int, float]) -> None:
+        """Begin with q, v as they are; touching: contacts that are closed, with their slip."""
+        self.status = tuple(
+            (FORWARD if touching[c] >= 0.0 else BACKWARD) if c in touching else GAP for c in range(self.pairs.count)
+        )
+        self._collide([c for c in touching if self.pairs.compliance[c] == 0.0], touching)
+
+    def take_up(self, ratio: Array) -> None:
+        """Go on with q, v at ``time`` under other loads, friction or speeds of supports; ratio (p,): how many times as
+        fast these are as before."""
+        while self.piece and self.time < self.pieces[self.piece].start:
+            self.piece -= 1
+        piece = self.pieces[self.piece]
+        speed = piece.displacements @ piece.derivative @ piece.powers(self.time)
+        self._jump(speed, speed / ratio)
+
+    def _change_piece(self) -> None:
+        """Other loads and other speeds of the supports from here on."""
+        old = self.pieces[self.piece]
+        self.piece += 1
+        if self.piece == len(self.pieces):
+            self.piece -= 1
+            self.next = (np.inf, "end", 0)
+            self.anchor = None
+            return
+        new = self.pieces[self.piece]
+        self._jump(
+            new.displacements @ new.derivative @ new.powers(self.time),
+            old.displacements @ old.derivative @ old.powers(self.time),
+        )
+
+    def _jump(self, speed: Array, before: Array) -> None:
+        """Loads are others from here on, and supports have another speed (p,) than before."""
+        jump = speed - before
+        closed = [c for c, now in enumerate(self.status) if now != GAP]
+        if not np.any(jump):
+            touching = {c: choices(self.pairs, c, sense(self.status[c]), self.status[c]) for c in closed}
+            self._take(settle(touching, self.status, self.driven, (self.q, self.v, self.drive(self.time))))
+            return
+        push = self.pairs.inertia.T @ jump
+        self.v = self.v - push
+        self.works[SUPPORT] += float((self.pairs.mass_own @ jump - self.pairs.inertia @ push) @ (speed - 0.5 * jump))
+        along = self.support_speeds()[1]
+        slips = {c: float(self.pairs.tangent[c] @ self.v + along[c]) for c in closed}
+        self._collide([c for c in slips if self.pairs.compliance[c] == 0.0], slips)
+
+
+def _watched(regime: Regime, piece: Piece) -> Watched:
+    flow = Flow(regime, piece)
+    pairs = regime.pairs
+    meanings: list[tuple[str, int]] = []
+    weights: list[ComplexArray] = []
+    slow: list[Array] = []
+    for c, now in enumerate(regime.status):
+        normal, tangential = flow.forces[c]
+        rows = []
+        if now == GAP:
+            rows = [("closes", flow.gap(c))]
+        elif now == STICK:
+            limit = pairs.sticking[c]
+            for name, sign in (("slips forward", 1.0), ("slips backward", -1.0)):
+                # What holds a slave back that would go forward acts against the tangent.
+                rows.append((name, type(normal)(*(limit * n + sign * t for n, t in zip(
+                    (normal.q, normal.v, normal.p), (tangential.q, tangential.v, tangential.p), strict=True
+                )))))  # fmt: skip
+        else:
+            slip = flow.slip(c)
+            s = sense(now)
+            rows = [("opens", normal), ("stops", type(slip)(s * slip.q, s * slip.v, s * slip.p))]
+        for name, row in rows:
+            weight, rest = flow.signal(row)
+            meanings.append((name, c))
+            weights.append(weight)
+            slow.append(rest)
+    poles = flow.split.poles
+    slowest = float(np.abs(poles).min(initial=np.inf))
+    longest = min(1.0 / slowest if np.isfinite(slowest) else np.inf, piece.end - piece.start)
+    stacked = np.array(weights, dtype=complex).reshape(len(meanings), len(poles))
+    rest = np.array(slow).reshape(len(meanings), len(flow.slow))
+    return Watched(flow, tuple(meanings), stacked, np.abs(stacked), rest, parts_of(poles, longest), Powers(flow))

@@ -1,0 +1,363 @@
+"""The exact stepper: see `temporal.stepper.Stepper`; its step is only that of the records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from ....errors import AnalysisError, CaseError
+from ....sliding import slip_speeds, steady_sliding
+from ....system import System
+from ....system.uncoupled import no_complete_basis
+from ....typing import Array
+from ...beta2 import StepLimit, scheme, step_limit
+from ...columns import (
+    CONTACT_RECORD,
+    ENERGY_RECORD,
+    FIRST_OPEN,
+    FIRST_STICK,
+    MAX_NORMAL,
+    MAX_SPEED,
+    MAX_TANGENTIAL,
+    OPEN_STEPS,
+    REC_NORMAL,
+    REC_POSITION,
+    REC_SLIP,
+    REC_TANGENTIAL,
+    SLIP_STEPS,
+    STATISTICS,
+    STICK_STEPS,
+    WORK_COLUMNS,
+)
+from ...node_history import NodeHistory
+from ...phase_results import fresh_statistics
+from ...restart import motion_ratio
+from ...saved import INFINITY, Bounds
+from ...schedule import Schedule
+from ...settings import Settings, choose_step, not_finite
+from ...sketch import sketch
+from ...stepper import Disturbance
+from ...trajectory import Trajectory
+from .basis import Basis, complete_basis
+from .drive import pieces
+from .motion import Motion
+from .outputs import Outputs, Records
+from .statuses import BACKWARD, GAP, STICK, Pairs
+
+MOST_CONTACTS = 4
+MOST_FREEDOMS = 1500
+DONE = 0  # where the counters have the steps done
+
+
+def why_not_exact(system: System) -> str:
+    """Why it does not take a system; "" where it does."""
+    if why := no_complete_basis(system):
+        return why
+    if system.size > MOST_FREEDOMS:
+        return f"{system.size} freedoms are too many: each status of the contacts has its own modes, of all of them"
+    if len(system.contacts) > MOST_CONTACTS:
+        return f"{len(system.contacts)} contacts are too many: up to {MOST_CONTACTS}"
+    for contact in system.contacts:
+        if contact.sliding == "finite":
+            return f"contact {contact.name} slides finitely, so that its rows move"
+        if contact.closed:
+            return f"contact {contact.name} is kept closed"
+        if not contact.law.constant:
+            return f"the friction of contact {contact.name} varies with the slip speed"
+    return ""
+
+
+def exact_stepper(system: System, settings: Settings, mu: float | None) -> ExactStepper:
+    """A system made ready; mu scales every contact's friction law at its slip speed. Raises CaseError for a system that
+    it does not take."""
+    if mu is not None:
+        system = system.with_friction(mu, np.abs(slip_speeds(system, system.motion.full)))
+    if why := why_not_exact(system):
+        raise CaseError("temporal.stepper", "exact", f'no such system: {why}; take "explicit"')
+    return ExactStepper(system, settings)
+
+
+def pairs_of(system: System, basis: Basis) -> Pairs:
+    """The contacts, loads and moving supports of a system in coordinates."""
+    contacts, motion = system.contacts, system.motion
+    m, p, k = len(contacts), len(motion.names), basis.size
+
+    def projected(rows: Sequence[Array]) -> Array:
+        return np.array(rows, dtype=float).reshape(len(rows), system.size) @ basis.vectors
+
+    def plain(values: Sequence[Array | float], *shape: int) -> Array:
+        return np.array(values, dtype=float).reshape(shape)
+
+    loads = list(system.loads.values())
+    return Pairs(
+        normal=projected([c.normal_row for c in contacts]).reshape(m, k),
+        tangent=projected([c.tangent_row for c in contacts]).reshape(m, k),
+        normal_lift=plain([c.normal_lift for c in contacts], m, p),
+        tangent_lift=plain([c.tangent_lift for c in contacts], m, p),
+        gap=plain([c.gap for c in contacts], m),
+        compliance=plain([c.compliance for c in contacts], m),
+        sliding=plain([c.law.sliding(0.0) for c in contacts], m),
+        sticking=plain([c.law.sticking for c in contacts], m),
+        loads=projected(loads).reshape(len(loads), k),
+        loads_lift=plain([load @ motion.lift for load in loads], len(loads), p),
+        inertia=motion.mass.T @ basis.vectors,
+        drag=motion.damping.T @ basis.vectors,
+        mass_own=motion.mass_own,
+        damping_own=motion.damping_own,
+        stiffness_own=motion.stiffness_own,
+    )
+
+
+class ExactStepper:
+    """See `temporal.stepper.Stepper`."""
+
+    threaded = False
+    path = "exact"
+    reason = "asked for: from one change of contact to the next, in the complete modes of each status"
+    works = WORK_COLUMNS
+
+    def __init__(self, system: System, settings: Settings) -> None:
+        self._system = system
+        self.limit = StepLimit(np.inf, 0.0, "nothing: the step is that of the records")
+        step = settings.step if settings.step is not None else choose_step(step_limit(system, 0.5), settings)
+        self.scheme = scheme(step, 0.5)
+        self.basis = complete_basis(system)
+        self.pairs = pairs_of(system, self.basis)
+        self.contact_names = tuple(c.name for c in system.contacts)
+        self.closed = ()
+        self.parts = sketch(system, system.contact_nodes())
+        self.statistics = fresh_statistics(len(system.contacts), STATISTICS)
+        self._done = self._recorded = 0
+        self._counted = 0.0
+
+    @property
+    def system(self) -> System:
+        """What is marched."""
+        return self._system
+
+    @property
+    def done(self) -> int:
+        """Steps done."""
+        return self._done
+
+    @property
+    def recorded(self) -> int:
+        """How many records are filled."""
+        return self._recorded
+
+    @property
+    def sweeps(self) -> tuple[int, int]:
+        """None are needed; parts of the time in which a number was too close to zero to be decided."""
+        return 0, self.motion.unsure
+
+    @property
+    def counted(self) -> tuple[str, int]:
+        """Where the state has the steps done."""
+        return "exact_counters", DONE
+
+    def use_threads(self, *, two: bool) -> None:
+        """One thread is what it takes."""
+
+    def node_history(self, start: int) -> NodeHistory | None:
+        """A contact is one node."""
+        return None
+
+    def begin(self, schedule: Schedule, settings: Settings, mu: float | None, disturbance: Disturbance | None) -> None:
+        """At rest or in steady sliding, disturbed if so asked."""
+        self._lay_out(schedule)
+        system, basis, motion = self._system, self.basis, self.motion
+        stretch = schedule.stretches[0]
+        u, v = np.zeros(system.size), np.zeros(system.size)
+        steady = settings.initial == "steady-sliding"
+        active = np.zeros(len(system.contacts), dtype=bool)
+        if steady:
+            if stretch.ramp_steps:
+                ramp = stretch.ramp_steps * schedule.step
+                raise CaseError("phases.0.ramp", ramp, "0 when starting from steady sliding")
+            found = steady_sliding(
+                system.in_place(stretch.distances_after),
+                load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
+                motion_factors=stretch.velocities_after,
+            )
+            active = np.asarray(found.active, dtype=bool)
+            u = u + found.displacement - system.motion.lift @ stretch.distances_after
+            for contact in system.contacts:
+                answer = spl.splu(sp.csc_array(system.mass)).solve(contact.tangent_row)
+                v = v + settings.perturbation * answer / float(contact.tangent_row @ answer)
+        else:
+            u = u if system.initial_displacement is None else u + system.initial_displacement
+            v = v if system.initial_velocity is None else v + system.initial_velocity
+        if disturbance is not None:
+            u, v = u + disturbance[0], v + disturbance[1]
+        weight = system.mass @ basis.vectors
+        motion.q, motion.v = weight.T @ u, weight.T @ v
+        piece = motion.pieces[0]
+        speed = piece.displacements @ piece.derivative @ piece.powers(0.0)
+        if not steady:
+            push = self.pairs.inertia.T @ speed
+            motion.v = motion.v - push
+        motion.start(self._touching(active, steady=steady))
+
+    def _touching(self, active: Array, *, steady: bool) -> dict[int, float]:
+        """Contacts that are closed at the start, and their slip [m/s]."""
+        motion, pairs, piece = self.motion, self.pairs, self.motion.pieces[0]
+        moved = piece.displacements @ piece.powers(0.0)
+        speed = piece.displacements @ piece.derivative @ piece.powers(0.0)
+        found: dict[int, float] = {}
+        for c, contact in enumerate(self._system.contacts):
+            parts = np.concatenate([pairs.normal[c] * motion.q, pairs.normal_lift[c] * moved, pairs.gap[c : c + 1]])
+            gap, size = float(parts.sum()), float(np.abs(parts).sum())
+            closed = bool(active[c]) if steady else gap <= 1e-12 * size
+            if closed and pairs.compliance[c] == 0.0 and gap < -1e-6 * size:
+                raise CaseError(
+                    f"contacts.{contact.name}",
+                    f"a gap of {gap:.4g} m at the start",
+                    'a gap >= 0 where contact is rigid; start from steady sliding, press with a ramp, or take '
+                    'stepper = "explicit"',
+                )
+            if closed:
+                found[c] = float(pairs.tangent[c] @ motion.v + pairs.tangent_lift[c] @ speed)
+        return found
+
+    def _lay_out(self, schedule: Schedule) -> None:
+        for stretch in schedule.stretches:
+            if stretch.ramp_steps == 0 and np.any(stretch.distances_after != stretch.distances_before):
+                raise CaseError(
+                    "phases",
+                    f"a distance that changes at once in phase {stretch.name}",
+                    'a ramp [s] > 0 where supports are pressed away, or stepper = "explicit"',
+                )
+        self.motion = Motion(self.basis, self.pairs, pieces(schedule))
+
+    def state(self) -> dict[str, Array]:
+        """What moves on from step to step: where the present modes began, and the state now."""
+        motion, now = self.motion, self._done * self.scheme.step
+        q, v, holds = motion.q, motion.v, motion.holds
+        if motion.anchor is not None:
+            q, v = motion.anchor.state(now)
+        counters = [self._done, motion.piece, motion.level, motion.events, motion.unsure, motion.crowded]
+        return {
+            "exact_q": motion.q, "exact_v": motion.v, "exact_holds": holds, "exact_works": motion.works,
+            "exact_now_q": q, "exact_now_v": v,
+            "exact_times": np.array([motion.time, self._counted, motion.crowd_since]),
+            "exact_status": np.array(motion.status, dtype=np.int64), "exact_counters": np.array(counters),
+            "exact_statistics": self.statistics,
+        }  # fmt: skip
+
+    def bounds(self) -> Bounds:
+        """What is counted, and what points into arrays."""
+        pieces_, levels = len(self.motion.pieces) - 1, 60
+        return {
+            "exact_status": (GAP, BACKWARD),
+            "exact_counters": (0, np.array([INFINITY, pieces_, levels, INFINITY, INFINITY, INFINITY])),
+            "exact_times": (0.0, INFINITY),
+            "exact_statistics": (-1.0, INFINITY),
+        }
+
+    def check(self, restart: Trajectory) -> None:
+        """Nothing but the arrays themselves."""
+
+    def resume(self, restart: Trajectory, schedule: Schedule, *, changed: bool) -> None:
+        """Take up a state that was checked."""
+        self._lay_out(schedule)
+        motion, saved = self.motion, restart.state
+        counters = [int(n) for n in saved["exact_counters"]]
+        self._done, motion.piece, motion.level, motion.events, motion.unsure, motion.crowded = counters
+        self.statistics[:] = saved["exact_statistics"]
+        motion.holds = np.array(saved["exact_holds"], dtype=float)
+        motion.works = np.array(saved["exact_works"], dtype=float)
+        motion.status = tuple(int(n) for n in saved["exact_status"])
+        motion.time, self._counted, motion.crowd_since = (float(t) for t in saved["exact_times"])
+        if not changed:
+            motion.q, motion.v = (np.array(saved[f"exact_{name}"], dtype=float) for name in ("q", "v"))
+            return
+        motion.q, motion.v = (np.array(saved[f"exact_now_{name}"], dtype=float) for name in ("q", "v"))
+        motion.time = self._done * self.scheme.step
+        motion.take_up(motion_ratio(self.parts, restart, self._system.motion.names))
+
+    def make_room(self, schedule: Schedule, settings: Settings) -> None:
+        """Room for all records from the present step on; loads the compiled search."""
+        every = settings.record_every
+        count = max((schedule.steps - 1) // every - (self._done - 1) // every, 0)
+        rows, lifts = [np.zeros((0, self._system.size))], [np.zeros((0, len(self._system.motion.names)))]
+        for name in settings.watch:
+            rows.append(self._system.points[name].free[:2].toarray())
+            lifts.append(self._system.points[name].lift[:2])
+        watch = np.vstack(rows) @ self.basis.vectors
+        self.outputs = Outputs(watch, np.vstack(lifts))
+        self.every = every
+        self.record = Records(
+            np.zeros((count, len(self.contact_names), CONTACT_RECORD)),
+            np.zeros((count, len(watch), 3)),
+            np.zeros((count, ENERGY_RECORD)),
+        )
+        for c, contact in enumerate(self._system.contacts):
+            self.record.contacts[:, c, REC_POSITION] = contact.segment + contact.xi
+
+    def advance(self, steps: int, schedule: Schedule, phase: str) -> None:
+        """Up to so many steps, and through all events on the way."""
+        motion, step = self.motion, self.scheme.step
+        last = self._done + steps
+        end = last * step
+        try:
+            while True:
+                time = motion.reach(end)
+                self._keep(time, last)
+                self._count(min(time, end))
+                if time >= end:
+                    break
+                motion.passed()
+        except AnalysisError as error:
+            self._done = min(max(self._done, int(motion.time / step)), last)
+            raise AnalysisError(f"{error} (t = {motion.time:.9g} s, phase {phase})") from error
+        self._done = last
+        if motion.anchor is not None and not np.all(np.isfinite(motion.anchor.state(end)[0])):
+            raise AnalysisError(not_finite(end, phase, step))
+
+    def _keep(self, time: float, last: int) -> None:
+        """Records that fall before ``time`` and before step ``last``."""
+        anchor, step, every = self.motion.anchor, self.scheme.step, self.every
+        if anchor is None:
+            return
+        first = -(-self._done // every) if self._recorded == 0 else self._next
+        stop = min(int(np.ceil(time / step / every - 1e-9)), -(-last // every))
+        stop = min(stop, first + len(self.record.contacts) - self._recorded)
+        self._next = max(first, stop)
+        if stop <= first:
+            return
+        after = np.maximum(np.arange(first, stop) * every * step - anchor.time, 0.0)
+        here = slice(self._recorded, self._recorded + stop - first)
+        self.outputs.write(anchor, after, self.motion.works, self.record, here)
+        self._recorded = here.stop
+        contacts = self.record.contacts[here]
+        self._extremes(np.abs(contacts[..., [REC_NORMAL, REC_TANGENTIAL, REC_SLIP]]).max(axis=0, initial=0.0))
+
+    def _extremes(self, values: Array) -> None:
+        for column, number in ((MAX_NORMAL, 0), (MAX_TANGENTIAL, 1)):
+            self.statistics[:, column] = np.maximum(self.statistics[:, column], values[:, number])
+        slips = np.array([s not in (GAP, STICK) for s in self.motion.status])
+        self.statistics[:, MAX_SPEED] = np.maximum(self.statistics[:, MAX_SPEED], np.where(slips, values[:, 2], 0.0))
+
+    def _count(self, time: float) -> None:
+        """Time spent in the present status, in steps; forces at its end."""
+        step = self.scheme.step
+        share = max(time - self._counted, 0.0) / step
+        for c, now in enumerate(self.motion.status):
+            column = {GAP: OPEN_STEPS, STICK: STICK_STEPS}.get(now, SLIP_STEPS)
+            self.statistics[c, column] += share
+            first = {GAP: FIRST_OPEN, STICK: FIRST_STICK}.get(now)
+            if first is not None and share > 0.0 and self.statistics[c, first] < 0.0:
+                self.statistics[c, first] = self._counted / step
+        self._counted = max(time, self._counted)
+        anchor = self.motion.anchor
+        if anchor is not None and len(self.contact_names):
+            self._extremes(np.abs(self.outputs.contacts_at(anchor, time - anchor.time)))
+
+    def velocity(self) -> Array:
+        """Velocity (n,) of the freedoms now."""
+        motion = self.motion
+        v = motion.v if motion.anchor is None else motion.anchor.state(self._done * self.scheme.step)[1]
+        return self.basis.vectors @ v

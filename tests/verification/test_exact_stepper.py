@@ -1,0 +1,241 @@
+"""The exact stepper against closed forms, and as what the explicit scheme goes to with a smaller step."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stridor as st
+from marching import belt_motion, block_on_belt, in_chunks, points_of, run, touch
+from stridor.case import template_text
+from stridor.laws import Coulomb, StaticKinetic, Weakening
+from stridor.system import System
+from stridor.temporal.energy import energy_balance
+from stridor.temporal.schedule import PhaseSpec
+from stridor.temporal.simulate import Settings, simulate
+
+pytestmark = pytest.mark.verification
+
+OPEN, STICK, SLIP = 0, 1, 2
+CLOSED = 1e-9  # of what was exchanged
+
+
+def exact(system: System, duration: float, **settings: Any):
+    return run(system, duration, stepper="exact", **settings)
+
+
+def test_mass_on_a_belt():
+    """μs 0.4, μk 0.3, v 0.2, m = k = N = 1: period 5.355890 + 1, x between 0.3 ∓ A (closed form)."""
+    system = block_on_belt(law=StaticKinetic(0.3, 0.4), speed=0.2)
+    step = 1e-3
+    result = exact(system, 60.0, step=step, velocities={"belt": 1.0}, watch=("block",))
+    u, status = result.displacement[:, 0, 0], result.status[:, 0]
+    drop, amplitude = 0.1, math.hypot(0.1, 0.2)
+    slips = 2 * math.pi - 2 * math.atan(drop / 0.2)
+    begins = np.flatnonzero((status[1:] == SLIP) & (status[:-1] == STICK)) + 1
+    ends = np.flatnonzero((status[1:] == STICK) & (status[:-1] == SLIP)) + 1
+    assert np.diff(result.time[begins]) == pytest.approx(slips + 1.0, abs=1.1 * step)
+    # From the moment of letting go at u = 0.4, with the speed of the belt.
+    let_go = result.time[ends[0]] + (0.4 - u[ends[0]]) / 0.2
+    after = np.mod(result.time - let_go, slips + 1.0)
+    wanted = np.where(
+        after < slips,
+        0.3 + drop * np.cos(after) + 0.2 * np.sin(after),
+        0.3 + drop * math.cos(slips) + 0.2 * math.sin(slips) + 0.2 * (after - slips),
+    )
+    later = result.time > let_go
+    assert np.abs(u - wanted)[later].max() < 1e-9
+    assert u[later].min() == pytest.approx(0.3 - amplitude, abs=1e-6)
+    assert u[later].max() == pytest.approx(0.3 + amplitude, abs=1e-6)
+    assert energy_balance(result).error < CLOSED
+
+
+def test_coulomb_oscillator():
+    """SDND100: M 1, K 1e4, μN 1 N, from 0.85e-3: extrema −0.65, 0.45, −0.25, 0.05 (×1e-3) at nπ/100, then stuck."""
+    system = block_on_belt(stiffness=1e4, law=Coulomb(0.1), press=10.0)
+    result = exact(system, 0.2, step=math.pi / 1e4, start=([0.85e-3, 0.0], 0.0, 0.0), watch=("block",))
+    u = result.displacement[:, 0, 0]
+    assert u[[100, 200, 300, 400]] == pytest.approx([-0.65e-3, 0.45e-3, -0.25e-3, 0.05e-3], abs=1e-12)
+    assert np.all(result.status[401:, 0] == STICK)
+    assert np.ptp(u[401:]) < 1e-16
+    assert result.normal_force == pytest.approx(10.0, rel=1e-12)
+    assert energy_balance(result).error < CLOSED
+
+
+def test_two_masses():
+    """SDND106: two masses of 5 kg, k 1e4, 1e4 N on the first, μs 0.3, μd 0.2, 3000 N on the second up to 0.2 s."""
+    spring = 1e4 * np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
+    contact = touch([0.0, 0.0, 1.0], [1.0, 0.0, 0.0], law=StaticKinetic(0.2, 0.3))
+    loads = {"pull": np.array([0.0, 3000.0, 0.0]), "press": np.array([0.0, 0.0, -1e4])}
+    system = System(5 * np.eye(3), np.zeros((3, 3)), spring, (contact,), loads, points=points_of(3, one=0, two=1))
+    step = 5e-6
+    phases = [PhaseSpec("pull", 0.2, {}, {}), PhaseSpec("free", 0.15, {"pull": 0.0}, {})]
+    result = simulate(system, phases, Settings(step=step, record_every=1, stepper="exact", watch=("one", "two")))
+    one, two = result.displacement[:, 0, 0], result.displacement[:, 1, 0]
+    slips = np.flatnonzero(result.status[:, 0] == SLIP)
+    assert result.time[slips[0]] == pytest.approx(0.0351241, abs=1.1 * step)
+    assert two[4000] == pytest.approx(0.112210, abs=1e-6)
+    assert (one[30000], two[30000]) == pytest.approx((1.353338, 1.807532), abs=1e-6)
+    again = slips[0] + np.flatnonzero(result.status[slips[0] :, 0] == STICK)[0]
+    assert result.time[again] == pytest.approx(0.314923, abs=1e-6 + 1.1 * step)
+    assert two[67993] == pytest.approx(3.968131, abs=1e-6)
+    assert energy_balance(result).error < CLOSED
+
+
+def test_a_block_falls_and_slides():
+    """A free block on which nothing pulls but gravity and friction: parabola, inelastic impact, μg of deceleration."""
+    contact = touch([0.0, 1.0], [1.0, 0.0], gap=0.1, law=Coulomb(0.2))
+    system = System(
+        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), (contact,), {"weight": np.array([0.0, -10.0])},
+        points=points_of(2, along=0, across=1),
+    )  # fmt: skip
+    result = exact(system, 1.0, step=1e-3, start=(0.0, [2.0, 0.0], 0.0), watch=("along", "across"))
+    x, y, time = result.displacement[:, 0, 0], result.displacement[:, 1, 0], result.time
+    struck = math.sqrt(2 * 0.1 / 10.0)
+    before = time < struck
+    assert y[before] == pytest.approx(-5 * time[before] ** 2, abs=1e-14)
+    assert y[~before] == pytest.approx(-0.1, abs=1e-14)
+    left = 2.0 - 0.2 * 10.0 * struck  # friction acts in the impact, too
+    after = np.minimum(time[~before] - struck, left / 2.0)
+    assert x[~before] == pytest.approx(2.0 * struck + left * after - after**2, abs=1e-12)
+    assert result.works["contact"][-1] == pytest.approx(1.0, rel=1e-12)  # m g h
+    assert energy_balance(result).error < CLOSED
+
+
+def random_system(seed: int) -> tuple[System, np.ndarray]:
+    """Three to five masses on springs, rubbing on belts at one or two contacts that open and close; their start."""
+    rng = np.random.default_rng(seed)
+    n, m = int(rng.integers(3, 6)), int(rng.integers(1, 3))
+    shape = np.linalg.qr(rng.normal(size=(n, n)))[0]
+    stiffness = shape @ np.diag(rng.uniform(1.0, 60.0, n)) @ shape.T
+    damping = 0.02 * np.eye(n) + 0.01 * np.outer(shape[0], shape[0])
+    contacts = []
+    for k in range(m):
+        friction = float(rng.uniform(0.1, 0.5))
+        law = Coulomb(friction) if rng.random() < 0.5 else StaticKinetic(friction, 1.3 * friction)
+        rows = np.linalg.qr(rng.normal(size=(n, 2)))[0].T
+        contact = touch(*rows, law=law, slip=-float(rng.uniform(0.1, 0.5)), motions=1, name="AB"[k])
+        contacts.append(replace(contact, stiffness=300.0) if rng.random() < 0.3 else contact)
+    press = -sum(rng.uniform(0.5, 2.0) * c.normal_row for c in contacts)
+    start = 0.3 * rng.normal(size=n)
+    for contact in contacts:  # open at first
+        start = start + max(0.1 - contact.normal_row @ start, 0.0) * contact.normal_row
+    points = {k: replace(r, lift=np.zeros((2, 1))) for k, r in points_of(n, first=0, last=n - 1).items()}
+    system = System(
+        np.eye(n), damping, stiffness, tuple(contacts), {"press": press}, belt_motion(n), points
+    )  # fmt: skip
+    return system, start
+
+
+def off_explicit(seed: int) -> tuple[list[float], float, int]:
+    """How far explicit runs of three steps are off the exact one, up to where the second one is still close; its energy
+    balance; and the changes of status met."""
+    system, start = random_system(seed)
+    grid, duration = 0.01, 12.0
+    asked = {"velocities": {"belt": 1.0}, "start": (start, 0.0, 0.0), "watch": ("first", "last")}
+    wanted = exact(system, duration, step=grid, **asked)
+    found = []
+    for parts in (20, 80, 320):
+        result = run(system, duration, step=grid / parts, **asked | {"record_every": parts})
+        found.append(np.abs(result.displacement - wanted.displacement).max(axis=(1, 2)))
+    size = np.abs(wanted.displacement).max()
+    # What is chaotic parts ways in the end: as far as the middle step stays within a hundredth.
+    close = np.flatnonzero(found[1] > 0.01 * size)
+    last = int(close[0]) if len(close) else len(wanted.time)
+    changes = int(np.count_nonzero(np.diff(wanted.status[:last], axis=0)))
+    return [float(f[:last].max() / size) for f in found], energy_balance(wanted).error, changes
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(8), pytest.param(range(100, 400), marks=pytest.mark.slow)], ids=["few", "many"]
+)
+def test_explicit_runs_go_to_it_with_smaller_steps(seeds: range):
+    changes = accumulated = 0
+    for seed in seeds:
+        try:
+            (coarse, middle, fine), error, met = off_explicit(seed)
+        except st.AnalysisError as refused:  # two contacts that throw one another off without end
+            if "which the exact stepper does not pass" not in str(refused):
+                raise
+            accumulated += 1
+            continue
+        assert fine < max(0.6 * middle, 1e-6), (seed, coarse, middle, fine)
+        assert error < CLOSED, (seed, error)
+        changes += met
+    assert changes > 3 * len(seeds)
+    assert accumulated <= 0.25 * len(seeds)
+
+
+SHORT = {
+    "bodies.beam1.elements": 6,
+    "bodies.beam2.elements": 12,
+    "contacts.A.friction.coefficient": 0.35,
+    "temporal.step": 2e-8,
+    "temporal.record_every": 50,
+    "phases.press.duration": 2e-4,
+    "phases.press.ramp": 1e-4,
+    "phases.slide.duration": 1e-3,
+}
+
+
+@pytest.mark.parametrize("contact", ["rigid", "as given"])
+def test_the_bench_from_rest_as_in_explicit_steps(contact: str):
+    """Pressed by a ramp, then suddenly slid: loads and speeds that change, impacts, the same forces and works."""
+    case = st.loads(template_text("two-beams")).with_(SHORT | {"temporal.contact": contact, "contacts.A.stiffness": 2e8})
+    result = st.simulate(case.with_({"temporal.stepper": "exact"}))
+    off = []
+    for step, every in ((2e-8, 50), (5e-9, 200)):
+        other = st.simulate(case.with_({"temporal.step": step, "temporal.record_every": every}))
+        assert other.time == pytest.approx(result.time)
+        off.append(np.abs(other.displacement - result.displacement).max() / np.abs(result.displacement).max())
+        # Impulses in steps of time aside, which are no forces.
+        assert np.median(np.abs(other.normal_force - result.normal_force)) < 1e-3 * np.abs(result.normal_force).max()
+        for name, values in result.works.items():
+            turned = max(float(np.abs(w).max()) for w in result.works.values())
+            assert np.abs(other.works[name] - values).max() < 0.01 * turned, name
+    assert off[1] < max(0.5 * off[0], 1e-6)
+    assert energy_balance(result).error < CLOSED
+    assert result.path == "exact"
+
+
+def test_a_run_that_is_cut_goes_on_to_the_last_digit(monkeypatch: pytest.MonkeyPatch, tmp_path):
+    case = st.loads(template_text("two-beams")).with_(SHORT | {"temporal.stepper": "exact"})
+    whole = st.simulate(case)
+
+    def stop(done: int, planned: int) -> None:
+        if done > 0.6 * planned:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        in_chunks(patch, 777)
+        part = st.simulate(case, progress=stop)
+    assert part.interrupted
+    saved = st.open(st.save(part, tmp_path / "part.nc"))
+    again = st.simulate(case, restart=saved)
+    for name in ("time", "normal_force", "displacement", "status", "kinetic"):
+        assert np.array_equal(getattr(again, name), getattr(whole, name)), name
+    changed = st.simulate(
+        case.with_({"contacts.A.friction.coefficient": 0.2}), restart=saved, changed=True
+    )
+    assert energy_balance(changed).error < 1e-3  # another friction from there on: no jump in anything that moves
+    assert np.abs(changed.displacement[len(part.time)] - whole.displacement[len(part.time)]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("contact", "said"),
+    [
+        ({"sliding": "finite"}, "slides finitely"),
+        ({"law": Weakening(0.1, 0.3, 0.1)}, "varies with the slip speed"),
+        ({"closed": True}, "is kept closed"),
+    ],
+)
+def test_what_it_does_not_take_is_said(contact: dict[str, Any], said: str):
+    system = block_on_belt(speed=0.2)
+    system = replace(system, contacts=(replace(system.contacts[0], **contact),))
+    with pytest.raises(st.CaseError, match=said) as refused:
+        exact(system, 1.0, step=1e-2)
+    assert 'take "explicit"' in str(refused.value)
