@@ -118,8 +118,39 @@ def boundary() -> None:
     save(st.plot.stability_boundary(found), "boundary", (7, 4.2))
 
 
+def exact_steps() -> None:
+    """Explicit runs of the bench from steady sliding, with stick, separation and impacts, beside the exact one."""
+    sliding = case.with_(
+        {"temporal.initial": "steady-sliding", "temporal.perturbation": 1e-6, "phases.press.ramp": 0.0,
+         "phases.press.duration": 1e-6, "phases.press.velocities": {"clamp": 1.0}, "phases.slide.duration": 6.1e-3,
+         "contacts.A.friction.coefficient": 0.1}
+    )  # fmt: skip
+    steps = np.array([2e-8, 1e-8, 5e-9, 2.5e-9, 1.25e-9])
+    exact = st.simulate(sliding.with_({"temporal.stepper": "exact", "temporal.step": 5e-7, "temporal.record_every": 1}))
+    figure, (left, right) = plt.subplots(1, 2, layout="constrained", width_ratios=(3, 2))
+    shown = (exact.time > 5.85e-3) & (exact.time < 6e-3)
+    time, force, off = 1e3 * exact.time[shown], exact.normal_force[shown, 0], []
+    for step in steps:
+        run = st.simulate(sliding.with_({"temporal.step": step, "temporal.record_every": round(5e-7 / step)}))
+        off.append(np.abs(run.normal_force[shown, 0] - force).max())
+        if step == steps[0]:
+            left.plot(time, run.normal_force[shown, 0], color="C1", lw=2, label="explicit, 2e-8 s")
+    left.plot(time, force, "k--", lw=1, label="exact")
+    left.set(xlabel="time [ms]", ylabel="normal force [N]", ylim=(-2, 52))
+    left.legend(loc="upper left", ncols=2)
+    right.loglog(steps * 1e9, off, "o-")
+    right.loglog(steps * 1e9, off[0] * (steps / steps[0]) ** 2, ":", color="0.5", label="second order")
+    right.loglog(steps * 1e9, off[-1] * (steps / steps[-1]) ** -2, "--", color="0.5", label="rounding")
+    right.set(xlabel="explicit step [ns]", ylabel="largest difference [N]")
+    right.set_xticks([1.25, 2.5, 5, 10, 20], ["1.25", "2.5", "5", "10", "20"])
+    right.minorticks_off()
+    right.legend()
+    save(figure, "exact", (8, 3.2))
+
+
 if __name__ == "__main__":
     save(st.plot.model(case), "two-beams", (8, 3.4))
     save(st.plot.model(pad), "pad-on-disc", (7, 4.4))
-    for draw in (imported_branches, steady_pressure, factors, listing, ensemble, study, study_cost, boundary):
+    listed = imported_branches, steady_pressure, factors, listing, ensemble, study, study_cost, boundary, exact_steps
+    for draw in listed:
         draw()

@@ -123,6 +123,18 @@ def test_onsets_json(folder: Path) -> None:
     assert (folder / "there" / "onsets.nc").exists()
 
 
+def test_simulate_from_event_to_event(folder: Path) -> None:
+    short = ["--set", "phases.press.duration=2e-4", "--set", "phases.press.ramp=1e-4"]
+    short += ["--set", "phases.slide.duration=2e-4", "--set", "bodies.beam1.elements=6", "--set", "bodies.beam2.elements=12"]
+    done = stridor("simulate", "two-beams.toml", "--stepper", "exact", *short, "--out", "exact", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "exact path" in done.stdout
+    assert st.open(folder / "exact" / "simulate.nc").path == "exact"
+    refused = stridor("simulate", "two-beams.toml", "--stepper", "exakt", "--out", "exact", cwd=folder)
+    assert refused.returncode == 2
+    assert "did you mean 'exact'?" in refused.stderr
+
+
 def test_simulate_and_compare_json(folder: Path) -> None:
     done = stridor("simulate", "two-beams.toml", "--json", "--quiet", *SETS, cwd=folder)
     data = document(done)

@@ -102,6 +102,16 @@ def test_what_changes_no_motion_is_told(change: dict[str, Any], verbs: set[str])
     assert bool(told) is bool(same)
 
 
+@pytest.mark.parametrize("change", [{"temporal.beta2": 0.6}, {"temporal.path": "nodal"}])
+def test_what_steps_need_has_no_effect_without_steps(change: dict[str, Any]) -> None:
+    case = beams().with_({"temporal.stepper": "exact"})
+    one, two = st.simulate(case), st.simulate(case.with_(change))
+    assert np.array_equal(one.normal_force, two.normal_force)
+    (setting,) = change
+    assert without_effect(case, "simulate") == []
+    assert [x.partition(" ")[0] for x in without_effect(case.with_(change), "simulate")] == [setting]
+
+
 def test_stiffness_acts_on_the_modes_of_a_comparison_alone_where_time_is_to_be_rigid() -> None:
     case = beams().with_({"temporal.contact": "rigid"})
     changed = case.with_({"contacts.A.stiffness": 1e7})

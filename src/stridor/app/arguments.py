@@ -79,16 +79,17 @@ class Call:
         friction_range: str | None = None,
         *,
         undamped: bool = False,
+        stepper: str | None = None,
     ) -> Workspace:
         """The case in the file with overrides, its warnings printed and its folder claimed; settings without effect are
         told with the results. source, max_frequency [Hz], friction_range ("low:high"), undamped: options that stand for
-        a setting of [modal], which the case then has. Raises CaseError.
+        a setting of [modal], which the case then has; stepper: for one of [temporal]. Raises CaseError.
 
         A verb asks for it before it imports what it computes with: what is wrong with the file is said at once."""
         from ..case import load
 
         named = {"solver": self.solver, "source": source}
-        given = {"--source": source, "--max-frequency": max_frequency, "--range": friction_range}
+        given = {"--stepper": stepper, "--source": source, "--max-frequency": max_frequency, "--range": friction_range}
         self.asked.extend((name, str(value)) for name, value in given.items() if value is not None)
         self.asked.extend([("--undamped",)] if undamped else [])
         own = [f"modal.{key}={json.dumps(name)}" for key, name in named.items() if name is not None]
@@ -100,6 +101,8 @@ class Call:
             own.append(f"modal.friction_range={list(self.range_of_friction(friction_range))}")
         if undamped:
             own.append("modal.damped=false")
+        if stepper is not None:
+            own.append(f"temporal.stepper={json.dumps(stepper)}")
         case = load(self.path, [*(self.set_ or ()), *own])
         if self.solver is not None and self.solver != "auto":
             os.environ["STRIDOR_SOLVER"] = self.solver
@@ -196,7 +199,7 @@ class Call:
         changes = [("--set", change) for change in self.set_ or ()]
         kept = [] if path is not None else [*self.asked, *changes, *given]
         words = ["stridor", verb, str(path or self.path), *options]
-        words += [str(word) for option in kept if verb in TABLE[option[0]].on for word in option]
+        words += [str(word) for option in kept if option[0] in TABLE and verb in TABLE[option[0]].on for word in option]
         literal(f"Next: {command(words, stdout.page - 6)}")
 
     def tabulate(self, result: Tabular, name: str) -> Path:

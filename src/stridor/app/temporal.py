@@ -49,13 +49,22 @@ def simulate(
         bool,
         typer.Option("--changed", help="With --restart: go on with another model, and record what was changed."),
     ] = False,
+    stepper: Annotated[
+        str | None,
+        typer.Option(
+            "--stepper",
+            metavar="NAME",
+            help="explicit: by steps; exact: from one change of contact to the next; auto: by size "
+            "[default: temporal.stepper].",
+        ),
+    ] = None,
     copies: Annotated[
         int,
         typer.Option("--copies", min=0, help="Run this many copies, perturbed by 1e-12: how far results scatter."),
     ] = 0,
 ) -> None:
     """The temporal approach: explicit dynamics with stick, slip and separation. Ctrl-C keeps what was computed."""
-    work = call.workspace()
+    work = call.workspace(stepper=stepper)
 
     from ..io.datasets import load_trajectory, save
     from ..study import analyses

@@ -394,9 +394,9 @@ class Temporal(Table):
     contact: Literal["as given", "rigid"] = Field(
         default="as given", description='"as given" or "rigid", the stiffness of contacts in time'
     )
-    stepper: Literal["explicit", "exact"] = Field(
+    stepper: Literal["explicit", "exact", "auto"] = Field(
         default="explicit",
-        description='"explicit" or "exact", step by step or from one change of contact to the next',
+        description='"explicit", "exact" or "auto": step by step, from one change of contact to the next, or by size',
     )
     watch: tuple[str, ...] = Field(default=(), description=f"a list of points, each {POINT[8:]}")
 

@@ -193,9 +193,11 @@ def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     step = choose_step(limit, settings)
     steps = sum(round(p.duration / step) for p in case.phases)
     data |= {"step": step, "step_limit": limit.step, "limiting_body": limit.body, "path": path, "steps": steps}
+    share = f"{100 * step / limit.step:.0f} % of the stability limit {limit.step:.4g} s (set by {limit.body})"
+    if path == "exact":
+        share = "which is that of the records alone"
     return [
-        f"time step {step:.4g} s, {100 * step / limit.step:.0f} % of the stability limit {limit.step:.4g} s "
-        f"(set by {limit.body}); {steps} steps",
+        f"time step {step:.4g} s, {share}; {steps} steps",
         f"time loop: {path} path ({reason})",
     ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ..stages import passing, stage
 from ..system import System
@@ -15,10 +16,12 @@ from .restart import settings_of_restart
 from .schedule import PhaseSpec, lay_out
 from .settings import Settings
 from .stepper import Disturbance, Stepper
-from .steppers.exact import exact_stepper, why_not_exact
+from .steppers.exact import exact_stepper, refuse, why_not_exact
 from .steppers.modal import choose_path, modal_stepper, refuses
 from .steppers.sparse import sparse_stepper, step_limit_assembled
 from .trajectory import Trajectory
+
+SMALL = 40  # freedoms up to which "auto" goes from event to event: there that is faster than steps, and exact
 
 __all__ = ["Checkpoint", "Progress", "Settings", "plan", "simulate"]
 
@@ -63,7 +66,8 @@ def simulate(
         record_every=settings.record_every,
         watch=settings.watch,
     )
-    stepper = stepper_for(system, settings, mu)
+    settings, why = _chosen(system, settings)
+    stepper = stepper_for(system, settings, mu, why)
     motion = system.motion
     schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
     if settings.initial == "steady-sliding":
@@ -77,20 +81,33 @@ def simulate(
 
 
 def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
-    """How a system would be marched: path, why it is taken, and the limit of the step."""
+    """How a system would be marched: path, why it is taken, and the limit of the step. Raises CaseError where the
+    stepper that is asked for does not take it."""
     system = settings.system(system)
+    settings, exactly = _chosen(system, settings)
     if settings.stepper == "exact":
-        return "exact", why_not_exact(system) or "asked for", step_limit(system, 0.5)
+        refuse(system)
+        return "exact", exactly, step_limit(system, 0.5)
     if why := _why_sparse(system, settings):
         return "assembled", why, step_limit_assembled(system, settings.beta2)
     modes, reason = choose_path(system, settings)
     return "modal" if modes else "nodal", reason, step_limit(system, settings.beta2)
 
 
-def stepper_for(system: System, settings: Settings, mu: float | None) -> Stepper:
-    """The method of time stepping that suits a system, or the one that the settings ask for."""
+def _chosen(system: System, settings: Settings) -> tuple[Settings, str]:
+    """Settings with the stepper that "auto" comes to, and why it is the exact one, "" where it is not."""
+    if settings.stepper != "auto":
+        return settings, "asked for" if settings.stepper == "exact" else ""
+    small = system.size <= SMALL and settings.path == "auto" and not why_not_exact(system)
+    if small:
+        return replace(settings, stepper="exact"), f"{system.size} freedoms, up to {SMALL} are few"
+    return replace(settings, stepper="explicit"), ""
+
+
+def stepper_for(system: System, settings: Settings, mu: float | None, why: str = "asked for") -> Stepper:
+    """The method of time stepping that suits a system, or the one that the settings ask for; ``why`` the exact one."""
     if settings.stepper == "exact":
-        return exact_stepper(system, settings, mu)
+        return exact_stepper(system, settings, mu, why)
     if why := _why_sparse(system, settings):
         return sparse_stepper(system, settings, mu, why)
     return modal_stepper(system, settings, mu)

@@ -37,10 +37,14 @@ class Stepper(Protocol):
     """
 
     path: str
-    reason: str
     scheme: Scheme
     limit: StepLimit
     parts: tuple[Part, ...]
+
+    @property
+    def reason(self) -> str:
+        """Why it is this one, and at the end what it did on the way that is to be known."""
+        ...
 
     @property
     def works(self) -> Mapping[str, int]:

@@ -315,9 +315,10 @@ def simulation_table(inputs: ReportInputs) -> Table:
     if inputs.mu is not None:
         lines.append(("friction coefficient μ", f"{inputs.mu:g}"))
     if run is not None:
+        limit = f"stability limit of {'explicit steps' if run.path == 'exact' else 'the time step'}"
         lines += [
             ("time step Δt", f"{significant(run.step)} s"),
-            ("stability limit of the time step", f"{significant(run.step_limit)} s, set by {run.limiting_body}"),
+            (limit, f"{significant(run.step_limit)} s, set by {run.limiting_body}"),
             ("numerical damping β₂", f"{run.beta2:g}"),
             ("steps", f"{run.steps} of {run.planned_steps}" if run.interrupted else str(run.steps)),
             ("recorded", f"every {run.record_every} steps, {significant(run.sampling)} s"),

@@ -30,9 +30,7 @@ class Impact:
     carried: float
 
 
-def impact(
-    pairs: Pairs, velocity: Array, speeds: tuple[Array, Array], met: Sequence[int], was: Status
-) -> Impact:
+def impact(pairs: Pairs, velocity: Array, speeds: tuple[Array, Array], met: Sequence[int], was: Status) -> Impact:
     """The velocities right behind an impact of contacts ``met``: inelastic, with Coulomb's law between the impulses.
 
     Velocity (k,) before it; speeds (m,), (m,): those along normals and tangents that supports add. Normal impulses
@@ -67,6 +65,27 @@ def impact(
         away = frozenset(c for c, now in zip(met, combination, strict=True) if now == GAP)
         return Impact(after, slips, away, lost_normal, lost_friction, carried)
     raise AnalysisError("friction jams the contacts in an impact: no impulses bring them to rest against one another")
+
+
+def landing(
+    pairs: Pairs, velocity: Array, speeds: tuple[Array, Array], rest: Sequence[int], stuck: Sequence[int]
+) -> Impact:
+    """Contacts ``rest`` brought to rest along their normals at once, those of ``stuck`` along their tangents too: where
+    impacts that throw one another off accumulate, this is what they end in.
+
+    Velocity (k,) before it; speeds as in `impact`. The least change of velocity, in kinetic energy, that does so.
+    """
+    rows = np.vstack([pairs.normal[list(rest)], pairs.tangent[list(stuck)]])
+    added = np.concatenate([speeds[0][list(rest)], speeds[1][list(stuck)]])
+    before = rows @ velocity + added
+    impulses = -np.linalg.lstsq(rows @ rows.T, before, rcond=1e-12)[0]
+    after = velocity + rows.T @ impulses
+    taken = -0.5 * impulses * (before + rows @ after + added)
+    slips = {c: 0.0 if c in stuck else float(pairs.tangent[c] @ after + speeds[1][c]) for c in rest}
+    count = len(rest)
+    return Impact(
+        after, slips, frozenset(), float(taken[:count].sum()), float(taken[count:].sum()), float(impulses @ added)
+    )
 
 
 def _along(pairs: Pairs, c: int) -> bool:
@@ -134,6 +153,17 @@ def _impulses(
 
 
 @dataclass(frozen=True)
+class State:
+    """Displacement q, velocity v (k,) and p (P,), and what the terms of q and v amount to."""
+
+    q: Array
+    v: Array
+    p: Array
+    q_size: Array
+    v_size: Array
+
+
+@dataclass(frozen=True)
 class Touching:
     """A contact whose gap is closed without approach: the sign of its slip, 0 where it has none; what it may do."""
 
@@ -157,20 +187,16 @@ def choices(pairs: Pairs, c: int, slip: float, now: int) -> Touching:
 
 
 def settle(
+    count: int,
     touching: Mapping[int, Touching],
-    was: Status,
     driven: Callable[[Status], Driven],
-    state: tuple[Array, Array, Array],
+    state: State,
 ) -> Status:
-    """The status whose forces and accelerations go with it, of contacts that touch; all others are open.
-
-    was: the status before. Raises AnalysisError where there is none: friction jams.
-    """
+    """The status of ``count`` contacts whose forces and accelerations go with it, of those that touch; all others are
+    open. Raises AnalysisError where there is none: friction jams."""
     named = list(touching)
     for combination in itertools.islice(itertools.product(*(touching[c].options for c in named)), MOST):
-        status = list(was)
-        for c in range(len(status)):
-            status[c] = GAP
+        status = [GAP] * count
         for c, now in zip(named, combination, strict=True):
             status[c] = now
         found = tuple(status)
@@ -178,32 +204,32 @@ def settle(
             algebra = driven(found)
         except AnalysisError:
             continue
-        if _consistent(algebra, touching, was, state):
+        if _consistent(algebra, touching, state):
             return found
     raise AnalysisError("friction jams the contacts: no status of them goes with the forces that it makes")
 
 
-def _consistent(
-    driven: Driven, touching: Mapping[int, Touching], was: Status, state: tuple[Array, Array, Array]
-) -> bool:
-    status, pairs = driven.regime.status, driven.regime.pairs
-    forces = [(n.at(*state), t.at(*state)) for n, t in driven.forces]
-    rounding = max((row.size(*state) for both in driven.forces for row in both), default=0.0)
+def _consistent(driven: Driven, touching: Mapping[int, Touching], state: State) -> bool:
+    status, pairs, now_at = driven.regime.status, driven.regime.pairs, (state.q, state.v, state.p)
+    forces = [(n.at(*now_at), t.at(*now_at)) for n, t in driven.forces]
+    rounding = max(
+        (row.size(state.q_size, state.v_size, state.p) for both in driven.forces for row in both), default=0.0
+    )
     size = max([abs(f) for both in forces for f in both] + [ROUNDING * rounding / CLOSE, 1e-300])
     for c, touch in touching.items():
         now, (normal, tangential) = status[c], forces[c]
         weight = max(float(pairs.normal[c] @ pairs.normal[c]), float(pairs.tangent[c] @ pairs.tangent[c]))
         if now == GAP:
             opening = driven.opening(c)
-            if pairs.compliance[c] == 0.0 and driven.rate_of(opening).at(*state) < -CLOSE * size * weight:
+            if pairs.compliance[c] == 0.0 and driven.rate_of(opening).at(*now_at) < -CLOSE * size * weight:
                 return False
             continue
         if normal < -CLOSE * size:
             return False
         if now == STICK:
-            limit = pairs.sticking[c] if was[c] == STICK else pairs.sliding[c]
-            if abs(tangential) > limit * normal + CLOSE * size:
+            # A slip that comes to its end stays there up to the stick limit, as the law has it.
+            if abs(tangential) > pairs.sticking[c] * normal + CLOSE * size:
                 return False
-        elif touch.slip == 0.0 and sense(now) * driven.rate_of(driven.slip(c)).at(*state) < -CLOSE * size * weight:
+        elif touch.slip == 0.0 and sense(now) * driven.rate_of(driven.slip(c)).at(*now_at) < -CLOSE * size * weight:
             return False
     return True

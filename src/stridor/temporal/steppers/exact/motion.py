@@ -11,7 +11,7 @@ from ....errors import AnalysisError
 from ....typing import Array, ComplexArray
 from ...columns import FRICTION, NORMAL, SUPPORT, WORKS
 from .basis import Basis
-from .decisions import Touching, choices, impact, settle
+from .decisions import CLOSE, Impact, State, Touching, choices, impact, landing, settle
 from .drive import Piece
 from .powers import Powers
 from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, parts_of
@@ -19,6 +19,8 @@ from .statuses import BACKWARD, FORWARD, GAP, STICK, TAYLOR, Driven, Flow, Pairs
 
 STRETCH = 256  # longest parts that are looked through from one beginning of the modes
 STORM, MOMENT = 300, 0.3  # so many events within so much of the fastest mode's time [rad]: they accumulate
+# Contacts that throw one another off: behind so many events of a moment, throws shorter than this [rad] end at once.
+LANDINGS = ((8, 1e-4), (100, 1e-2))
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Watched:
     powers: Powers
 
 
-@dataclass
+@dataclass(frozen=True)
 class Anchor:
     """The motion from ``time`` on: modes ζ, terms of what is slow, and how long these may be used."""
 
@@ -50,6 +52,12 @@ class Anchor:
         after = time - self.time
         zeta = self.zeta * np.exp(self.watched.flow.split.poles * after)
         return self.watched.flow.state(zeta, self.slow_at(after))
+
+    def sizes(self, time: float) -> tuple[Array, Array]:
+        """What the terms of displacement and velocity (k,) amount to at a time."""
+        after = time - self.time
+        zeta = self.zeta * np.exp(self.watched.flow.split.poles * after)
+        return self.watched.flow.sizes(zeta, self.slow_at(after))
 
     def works(self, after: Array) -> Array:
         """Works (t, 5) [J] from the beginning of these modes to some times (t,) after it."""
@@ -75,8 +83,12 @@ class Motion:
         self.holds = np.zeros(pairs.count)
         self.level = 0
         self.events = self.unsure = self.crowded = 0
-        self.crowd_since = 0.0
+        self.crowd_since = self.latest = 0.0  # [s], the first and the last event of a moment
+        self.parted = np.full(pairs.count, -1.0)  # [s], when each contact opened
+        self.parted_from = np.zeros(pairs.count, dtype=np.int64)  # and its status before
+        self.landed = 0
         self.works = np.zeros(WORKS)  # [J] up to the beginning of the present modes
+        self._sizes = np.zeros(basis.size), np.zeros(basis.size)  # of the terms of q and v
         self._regimes: dict[Status, Regime] = {}
         self._driven: dict[tuple[Status, int], Driven] = {}
         self._watched: dict[tuple[Status, int], Watched] = {}
@@ -109,6 +121,9 @@ class Motion:
         """p: powers of time, and where contacts began to stick."""
         return np.concatenate([self.pieces[self.piece].powers(time), self.holds])
 
+    def _state(self) -> State:
+        return State(self.q, self.v, self.drive(self.time), *self._sizes)
+
     def support_speeds(self) -> tuple[Array, Array]:
         """What moving supports add to the velocities (m,) along normals and tangents now."""
         piece = self.pieces[self.piece]
@@ -130,8 +145,8 @@ class Motion:
             self.level, self.unsure = level, self.unsure + unsure
             if code == UNDECIDED:
                 raise AnalysisError(
-                    "a force, gap or slip of a contact stays so close to zero that no change of status can be told from "
-                    'rounding, which the exact stepper does not pass; take stepper = "explicit"'
+                    "a force, gap or slip of a contact stays so close to zero that no change of status can be told "
+                    'from rounding, which the exact stepper does not pass; take stepper = "explicit"'
                 )
             if code == CROSSED:
                 self.next = (min(anchor.time + after, last), *anchor.watched.meanings[which])
@@ -169,6 +184,7 @@ class Motion:
         self.next, self.anchor = None, None
         self.works = self.works + anchor.works(np.array([time - anchor.time]))[0]
         self.q, self.v = anchor.state(time)
+        self._sizes = anchor.sizes(time)
         self.time = time
         if meaning == "stretch":
             return
@@ -176,15 +192,39 @@ class Motion:
             self._change_piece()
             return
         self.events += 1
-        if time - self.crowd_since > MOMENT / max(anchor.watched.flow.regime.fastest, 1e-300):
+        fastest = max(anchor.watched.flow.regime.fastest, 1e-300)
+        if time - self.crowd_since > MOMENT / fastest:
             self.crowd_since, self.crowded = time, 0
         self.crowded += 1
+        short = max((throw for events, throw in LANDINGS if self.crowded > events), default=0.0) / fastest
+        before, self.latest = self.latest, time
         if self.crowded > STORM:
             raise AnalysisError(
                 f"{STORM} changes of contact within {time - self.crowd_since:.3g} s, faster than anything swings: they "
                 'accumulate, which the exact stepper does not pass; take stepper = "explicit"'
             )
+        if meaning == "closes" and time - before < short and self._land(c, 4.0 * short):
+            return
         self._go_through(meaning, c)
+
+    def _land(self, c: int, moment: float) -> bool:
+        """Contact ``c`` closes, which was thrown off within a ``moment`` [s], and all that are closed or were thrown
+        off stay closed; whether there are forces that keep them so."""
+        pairs, status = self.pairs, self.status
+        rigid, thrown = pairs.compliance == 0.0, self.parted >= self.time - moment
+        rest = [o for o, now in enumerate(status) if rigid[o] and (now != GAP or thrown[o])]
+        was = [int(self.parted_from[o]) if now == GAP else now for o, now in enumerate(status)]
+        stuck = [o for o, now in enumerate(status) if was[o] == STICK and (o in rest or now != GAP)]
+        if not (rigid[c] and thrown[c]) or len({*rest, *stuck}) < 2:
+            return False
+        kept = self.q, self.v, self.works.copy(), self.status
+        try:
+            self._strike(landing(pairs, self.v, self.support_speeds(), rest, stuck), rest)
+        except AnalysisError:
+            self.q, self.v, self.works, self.status = kept
+            return False
+        self.landed += 1
+        return True
 
     def _go_through(self, meaning: str, c: int) -> None:
         """What a number that reached zero brings about."""
@@ -204,18 +244,19 @@ class Motion:
             back = BACKWARD if was[c] == FORWARD else FORWARD
             options = choices(pairs, c, 0.0, STICK).options
             touching[c] = Touching(0.0, tuple(o for o in (STICK, back, was[c]) if o in options))
-        self._take(settle(touching, was, self.driven, (self.q, self.v, self.drive(self.time))))
+        self._take(settle(pairs.count, touching, self.driven, self._state()))
 
     def _touching(self) -> dict[int, Touching]:
         """Contacts that are closed now, and what they may do if something else changes."""
-        return {
-            c: choices(self.pairs, c, sense(now), now) for c, now in enumerate(self.status) if now != GAP
-        }
+        return {c: choices(self.pairs, c, sense(now), now) for c, now in enumerate(self.status) if now != GAP}
 
     def _collide(self, met: list[int], slips: Mapping[int, float] | None = None) -> None:
         """An impact of contacts ``met``; slips: those of others that are closed, where they are not what their status
         says."""
-        struck = impact(self.pairs, self.v, self.support_speeds(), met, self.status)
+        self._strike(impact(self.pairs, self.v, self.support_speeds(), met, self.status), met, slips)
+
+    def _strike(self, struck: Impact, met: list[int], slips: Mapping[int, float] | None = None) -> None:
+        """Go on behind an impact."""
         piece = self.pieces[self.piece]
         speed = piece.displacements @ piece.derivative @ piece.powers(self.time)
         self.works[SUPPORT] += float(speed @ (self.pairs.inertia @ (struck.velocity - self.v)))
@@ -223,16 +264,19 @@ class Motion:
         self.works[NORMAL] += struck.normal_work
         self.works[FRICTION] += struck.friction_work
         self.works[SUPPORT] -= struck.carried
-        touching = {c: t for c, t in self._touching().items() if c not in met}
-        for c, slip in ({} if slips is None else slips).items():
-            if c not in met:
-                touching[c] = choices(self.pairs, c, slip, self.status[c])
+        touching: dict[int, Touching] = {}
+        along = self.support_speeds()[1]
+        for c, now in enumerate(self.status):
+            if now == GAP or c in met:
+                continue
+            # A spring takes no impulse, so what slides or sticks on one is carried along by what strikes elsewhere.
+            parts = np.append(self.pairs.tangent[c] * self.v, along[c])
+            slip = float(parts.sum()) if slips is None else slips[c]
+            at_rest = abs(slip) <= CLOSE * float(np.abs(parts).sum())
+            touching[c] = choices(self.pairs, c, 0.0 if at_rest and now == STICK else slip, now)
         for c, slip in struck.slips.items():
             touching[c] = choices(self.pairs, c, slip, self.status[c])
-        was = tuple(
-            STICK if struck.slips.get(c, 1.0) == 0.0 and now == STICK else now for c, now in enumerate(self.status)
-        )
-        self._take(settle(touching, was, self.driven, (self.q, self.v, self.drive(self.time))))
+        self._take(settle(self.pairs.count, touching, self.driven, self._state()))
 
     def _take(self, status: Status) -> None:
         """Another status from here on."""
@@ -241,12 +285,15 @@ class Motion:
             if now == STICK and self.status[c] != STICK:
                 place = piece.displacements @ piece.powers(self.time)
                 self.holds[c] = float(pairs.tangent[c] @ self.q + pairs.tangent_lift[c] @ place)
+            if now == GAP and self.status[c] != GAP:
+                self.parted[c], self.parted_from[c] = self.time, self.status[c]
         self.status, self.anchor = status, None
 
     # -- changes of what drives the system ---------------------------------------------------------------------------
 
     def start(self, touching: Mapping[int, float]) -> None:
         """Begin with q, v as they are; touching: contacts that are closed, with their slip."""
+        self._sizes = np.abs(self.q), np.abs(self.v)
         self.status = tuple(
             (FORWARD if touching[c] >= 0.0 else BACKWARD) if c in touching else GAP for c in range(self.pairs.count)
         )
@@ -255,6 +302,7 @@ class Motion:
     def take_up(self, ratio: Array) -> None:
         """Go on with q, v at ``time`` under other loads, friction or speeds of supports; ratio (p,): how many times as
         fast these are as before."""
+        self._sizes = np.abs(self.q), np.abs(self.v)
         while self.piece and self.time < self.pieces[self.piece].start:
             self.piece -= 1
         piece = self.pieces[self.piece]
@@ -282,7 +330,7 @@ class Motion:
         closed = [c for c, now in enumerate(self.status) if now != GAP]
         if not np.any(jump):
             touching = {c: choices(self.pairs, c, sense(self.status[c]), self.status[c]) for c in closed}
-            self._take(settle(touching, self.status, self.driven, (self.q, self.v, self.drive(self.time))))
+            self._take(settle(self.pairs.count, touching, self.driven, self._state()))
             return
         push = self.pairs.inertia.T @ jump
         self.v = self.v - push

@@ -12,6 +12,7 @@ from ...columns import REC_GAP, REC_NORMAL, REC_SLIP, REC_STATUS, REC_TANGENTIAL
 from .motion import Anchor, Watched
 from .statuses import GAP, STICK, Flow, Row
 
+BLOCK = 32  # records at a time
 CONTACT_ROWS = 4  # normal and tangential force, slip speed, gap
 
 
@@ -30,7 +31,7 @@ class _Observed(NamedTuple):
     slow: Array
 
 
-@dataclass
+@dataclass(frozen=True)
 class Outputs:
     """What is recorded: watched rows (w, k) with their lift (w, p)."""
 
@@ -39,7 +40,18 @@ class Outputs:
     _known: dict[int, tuple[Watched, _Observed]] = field(default_factory=dict[int, "tuple[Watched, _Observed]"])
 
     def write(self, anchor: Anchor, after: Array, works: Array, record: Records, here: slice) -> None:
-        """Records at times (t,) after the beginning of some modes; works (5,) up to there."""
+        """Records at times (t,) after the beginning of some modes; works (5,) up to there.
+
+        In full blocks, filled up where there are fewer: a product of matrices rounds by how many columns it has, and a
+        run that was cut elsewhere has the same digits."""
+        for first in range(0, len(after), BLOCK):
+            times = after[first : first + BLOCK]
+            count = len(times)
+            filled = np.concatenate([times, np.full(BLOCK - count, times[-1])])
+            self._write(anchor, filled, works, record, slice(here.start + first, here.start + first + count))
+
+    def _write(self, anchor: Anchor, after: Array, works: Array, record: Records, here: slice) -> None:
+        count = here.stop - here.start
         flow, observed = anchor.watched.flow, self._observed(anchor.watched)
         modes = anchor.zeta[:, None] * np.exp(flow.split.poles[:, None] * after)
         slow = (after[:, None] ** np.arange(len(anchor.terms))) @ anchor.terms
@@ -47,12 +59,12 @@ class Outputs:
         m, w = flow.regime.pairs.count, len(self.watch)
         contacts = found[: CONTACT_ROWS * m].reshape(m, CONTACT_ROWS, len(after))
         for column, number in ((REC_NORMAL, 0), (REC_TANGENTIAL, 1), (REC_SLIP, 2), (REC_GAP, 3)):
-            record.contacts[here, :, column] = contacts[:, number].T
+            record.contacts[here, :, column] = contacts[:, number, :count].T
         record.contacts[here, :, REC_STATUS] = [{GAP: 0, STICK: 1}.get(now, 2) for now in flow.regime.status]
-        record.watch[here] = found[CONTACT_ROWS * m :].reshape(3, w, len(after)).transpose(2, 1, 0)
+        record.watch[here] = found[CONTACT_ROWS * m :].reshape(3, w, len(after)).transpose(2, 1, 0)[:count]
         kinetic, elastic = _energies(flow, modes, slow)
-        record.energies[here, 0], record.energies[here, 1] = kinetic, elastic
-        record.energies[here, 2 : 2 + WORKS] = works + anchor.works(after)
+        record.energies[here, 0], record.energies[here, 1] = kinetic[:count], elastic[:count]
+        record.energies[here, 2 : 2 + WORKS] = works + anchor.works(after)[:count]
 
     def contacts_at(self, anchor: Anchor, after: float) -> Array:
         """Normal and tangential force and slip speed (m, 3) at one time."""

@@ -88,16 +88,17 @@ class Powers:
         return Row(q, v, own)
 
     def _of_pairs(self, rows: list[tuple[Row, Row]]) -> _Form:
-        first = [self.flow.signal(a) for a, _ in rows]
-        second = [self.flow.signal(b) for _, b in rows]
-        return self._form(*(np.array([part[i] for part in side]) for side in (first, second) for i in range(2)))
+        first, second = [self.flow.signal(a) for a, _ in rows], [self.flow.signal(b) for _, b in rows]
+        modes = [np.array([modes for modes, _ in side], dtype=complex) for side in (first, second)]
+        slow = [np.array([slow for _, slow in side]) for side in (first, second)]
+        return self._form(modes[0], slow[0], modes[1], slow[1])
 
     def _of_damping(self, speed: Array) -> _Form:
         flow, pairs = self.flow, self.flow.regime.pairs
         damping = flow.regime.basis.damping
         few = len(flow.slow) - len(flow.rate)
         moving = np.hstack([np.zeros((len(speed), few)), speed])
-        modes = np.vstack([flow.modes_v, np.zeros((len(speed), flow.modes_v.shape[1]))])
+        modes: ComplexArray = np.vstack([flow.modes_v, np.zeros((len(speed), flow.modes_v.shape[1]), dtype=complex)])
         slow = np.vstack([flow.rest_v, moving])
         whole = np.block([[damping, pairs.drag.T], [pairs.drag, pairs.damping_own]])
         return self._form(modes, slow, whole @ modes, whole @ slow)

@@ -9,6 +9,7 @@ far as `LET_GO` below it until it has risen as far above.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,12 +21,12 @@ from ...arithmetic import CAREFUL
 NONE, CROSSED, UNDECIDED = range(3)
 MOST_UNSURE = 200  # parts of the finest in one search
 LET_GO = 1e-12  # of the size of its terms
-LEVELS = 44  # parts from the longest to 2⁻⁴³ of it
+SHORTEST = 1e-7  # rad of the fastest mode on the finest parts: on finer ones rounding holds the modes still
 
 
 class Parts(NamedTuple):
-    """Of parts h = longest/2ʲ: factors exp(λ h) (LEVELS, f), how far off its cubic a mode of size one can be (bent),
-    and off the line between its ends its rate (turned)."""
+    """Of parts h = longest/2ʲ, j = 0 … L − 1: factors exp(λ h) (L, f), how far off its cubic a mode of size one can be
+    (bent), and off the line between its ends its rate (turned)."""
 
     longest: float
     factors: ComplexArray
@@ -43,7 +44,9 @@ class Numbers(NamedTuple):
 
 def parts_of(poles: ComplexArray, longest: float) -> Parts:
     """Tables of parts for modes λ (f,)."""
-    lengths = longest * 0.5 ** np.arange(LEVELS)
+    fastest = float(np.abs(poles).max(initial=0.0))
+    levels = 1 + max(math.ceil(math.log2(longest * fastest / SHORTEST)), 0) if fastest else 24
+    lengths = longest * 0.5 ** np.arange(levels)
     moved = poles[None] * lengths[:, None]
     size, grown = np.abs(moved), np.exp(np.maximum(moved.real, 0.0))
     # A mode that turns many times on a part is bounded by itself and by its cubic.
@@ -97,13 +100,14 @@ def _most(sizes: Array, zeta: ComplexArray, bounds: Array) -> float:  # pragma: 
 
 @njit(cache=True)
 def _root(
-    weights: ComplexArray, row: Array, poles: ComplexArray, zeta: ComplexArray, time: float, length: float
+    weights: ComplexArray, row: Array, poles: ComplexArray, zeta: ComplexArray, time: float, length: float, let: float
 ) -> float:  # pragma: no cover - compiled
-    """Where a number falls through zero behind ``time``, at which the modes are ζ: Newton's method, kept between."""
+    """Where a number falls through −let behind ``time``, at which the modes are ζ: Newton's method, kept between."""
     low, high = 0.0, length
     t = 0.5 * length
     for _ in range(200):
         y, rate = polynomial(row, time + t)
+        y += let
         for k in range(zeta.shape[0]):
             term = weights[k] * zeta[k] * np.exp(poles[k] * t)
             y += term.real
@@ -142,7 +146,7 @@ def first_root(
         for k in range(f):
             size += LET_GO * numbers.sizes[i, k] * abs(zeta[k])
         if now[i] < size:
-            let[i] = size
+            let[i] = size - min(now[i], 0.0)
     time, parts, unsure = 0.0, 0, 0
     lowest = table.factors.shape[0] - 1
     while time < limit:
@@ -168,11 +172,11 @@ def first_root(
                 least -= _most(numbers.sizes[i], zeta, table.bent[level])
             if least <= 0.0:
                 doubtful += 1
-        if below == 1 and doubtful == 0 and now[which] > 0.0:
+        if below == 1 and doubtful == 0 and now[which] + let[which] > 0.0:
             bend = _derivative(numbers.rows[which], time + length, 3) * length * length / 8
             bend += _most(numbers.sizes[which], zeta, table.turned[level])
             if max(rate[which], later[which]) + bend < 0.0:
-                t = _root(numbers.weights[which], numbers.rows[which], poles, zeta, time, length)
+                t = _root(numbers.weights[which], numbers.rows[which], poles, zeta, time, length, let[which])
                 return CROSSED, which, time + t, level, parts, unsure
         if below + doubtful and level < lowest:
             level += 1

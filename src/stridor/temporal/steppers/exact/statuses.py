@@ -167,7 +167,11 @@ class Regime:
         count = int(np.count_nonzero(np.abs(poles) <= slow))
         together, small = np.zeros((len(poles), 0)), np.zeros((0, 0))
         if count:
-            schur, turn, count = sl.schur(self.states, sort=lambda re, im: np.hypot(re, im) <= slow)
+
+            def is_slow(real: float, imag: float) -> bool:
+                return bool(np.hypot(real, imag) <= slow)
+
+            schur, turn, count = sl.schur(self.states, sort=is_slow)
             together, small = turn[:, :count], schur[:count, :count]
         fast = np.sort(order[count:])
         inverse = np.linalg.inv(np.hstack([vectors[:, fast], together]))
@@ -342,6 +346,17 @@ class Flow(Driven):
     def state(self, zeta: ComplexArray, slow: Array) -> tuple[Array, Array]:
         """Displacement and velocity (k,)."""
         return (self.modes_q @ zeta).real + self.rest_q @ slow, (self.modes_v @ zeta).real + self.rest_v @ slow
+
+    def sizes(self, zeta: ComplexArray, slow: Array) -> tuple[Array, Array]:
+        """What the terms of displacement and velocity (k,) amount to, by which their rounding is judged: from rest they
+        cancel nearly all."""
+        (modes_q, modes_v), (rest_q, rest_v) = self._amounts
+        size, still = np.abs(zeta), np.abs(slow)
+        return modes_q @ size + rest_q @ still, modes_v @ size + rest_v @ still
+
+    @cached_property
+    def _amounts(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        return (np.abs(self.modes_q), np.abs(self.modes_v)), (np.abs(self.rest_q), np.abs(self.rest_v))
 
     def signal(self, row: Row) -> tuple[ComplexArray, Array]:
         """A number on modes (f,) and on what is slow (z + P,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,7 +14,7 @@ from ....sliding import slip_speeds, steady_sliding
 from ....system import System
 from ....system.uncoupled import no_complete_basis
 from ....typing import Array
-from ...beta2 import StepLimit, scheme, step_limit
+from ...beta2 import scheme, step_limit
 from ...columns import (
     CONTACT_RECORD,
     ENERGY_RECORD,
@@ -70,14 +71,19 @@ def why_not_exact(system: System) -> str:
     return ""
 
 
-def exact_stepper(system: System, settings: Settings, mu: float | None) -> ExactStepper:
-    """A system made ready; mu scales every contact's friction law at its slip speed. Raises CaseError for a system that
-    it does not take."""
-    if mu is not None:
-        system = system.with_friction(mu, np.abs(slip_speeds(system, system.motion.full)))
+def refuse(system: System) -> None:
+    """Raise CaseError for a system that it does not take."""
     if why := why_not_exact(system):
         raise CaseError("temporal.stepper", "exact", f'no such system: {why}; take "explicit"')
-    return ExactStepper(system, settings)
+
+
+def exact_stepper(system: System, settings: Settings, mu: float | None, why: str = "asked for") -> ExactStepper:
+    """A system made ready, and why this way; mu scales every contact's friction law at its slip speed. Raises CaseError
+    for a system that it does not take."""
+    refuse(system)
+    if mu is not None:
+        system = system.with_friction(mu, np.abs(slip_speeds(system, system.motion.full)))
+    return ExactStepper(system, settings, why)
 
 
 def pairs_of(system: System, basis: Basis) -> Pairs:
@@ -116,20 +122,19 @@ class ExactStepper:
 
     threaded = False
     path = "exact"
-    reason = "asked for: from one change of contact to the next, in the complete modes of each status"
     works = WORK_COLUMNS
 
-    def __init__(self, system: System, settings: Settings) -> None:
-        self._system = system
-        self.limit = StepLimit(np.inf, 0.0, "nothing: the step is that of the records")
-        step = settings.step if settings.step is not None else choose_step(step_limit(system, 0.5), settings)
-        self.scheme = scheme(step, 0.5)
+    def __init__(self, system: System, settings: Settings, why: str) -> None:
+        self._system, self._why = system, why
+        self.limit = step_limit(system, 0.5)  # of explicit steps
+        self.scheme = scheme(choose_step(self.limit, settings), 0.5)
         self.basis = complete_basis(system)
         self.pairs = pairs_of(system, self.basis)
         self.contact_names = tuple(c.name for c in system.contacts)
         self.closed = ()
         self.parts = sketch(system, system.contact_nodes())
         self.statistics = fresh_statistics(len(system.contacts), STATISTICS)
+        self.motion = Motion(self.basis, self.pairs, [])
         self._done = self._recorded = 0
         self._counted = 0.0
 
@@ -137,6 +142,14 @@ class ExactStepper:
     def system(self) -> System:
         """What is marched."""
         return self._system
+
+    @property
+    def reason(self) -> str:
+        """Why this method, and what it did that is not exact."""
+        said = f"{self._why}: from one change of contact to the next, in the complete modes of each status"
+        if landed := self.motion.landed:
+            said += f"; contacts that threw one another off ever faster were brought to rest {landed} times"
+        return said
 
     @property
     def done(self) -> int:
@@ -215,7 +228,7 @@ class ExactStepper:
                 raise CaseError(
                     f"contacts.{contact.name}",
                     f"a gap of {gap:.4g} m at the start",
-                    'a gap >= 0 where contact is rigid; start from steady sliding, press with a ramp, or take '
+                    "a gap >= 0 where contact is rigid; start from steady sliding, press with a ramp, or take "
                     'stepper = "explicit"',
                 )
             if closed:
@@ -235,25 +248,30 @@ class ExactStepper:
     def state(self) -> dict[str, Array]:
         """What moves on from step to step: where the present modes began, and the state now."""
         motion, now = self.motion, self._done * self.scheme.step
-        q, v, holds = motion.q, motion.v, motion.holds
+        q, v, holds, works = motion.q, motion.v, motion.holds, motion.works
         if motion.anchor is not None:
             q, v = motion.anchor.state(now)
-        counters = [self._done, motion.piece, motion.level, motion.events, motion.unsure, motion.crowded]
-        return {
+            works = works + motion.anchor.works(np.array([now - motion.anchor.time]))[0]
+        counters = [self._done, motion.piece, motion.level, motion.events, motion.unsure, motion.crowded, motion.landed]
+        found: dict[str, Any] = {
             "exact_q": motion.q, "exact_v": motion.v, "exact_holds": holds, "exact_works": motion.works,
-            "exact_now_q": q, "exact_now_v": v,
-            "exact_times": np.array([motion.time, self._counted, motion.crowd_since]),
+            "exact_now_q": q, "exact_now_v": v, "exact_now_works": works,
+            "exact_times": np.array([motion.time, self._counted, motion.crowd_since, motion.latest]),
+            "exact_parted": motion.parted, "exact_parted_from": motion.parted_from,
             "exact_status": np.array(motion.status, dtype=np.int64), "exact_counters": np.array(counters),
             "exact_statistics": self.statistics,
         }  # fmt: skip
+        return found
 
     def bounds(self) -> Bounds:
         """What is counted, and what points into arrays."""
-        pieces_, levels = len(self.motion.pieces) - 1, 60
+        levels = 60
         return {
             "exact_status": (GAP, BACKWARD),
-            "exact_counters": (0, np.array([INFINITY, pieces_, levels, INFINITY, INFINITY, INFINITY])),
+            "exact_counters": (0, np.array([INFINITY, INFINITY, levels, INFINITY, INFINITY, INFINITY, INFINITY])),
             "exact_times": (0.0, INFINITY),
+            "exact_parted": (-1.0, INFINITY),
+            "exact_parted_from": (GAP, BACKWARD),
             "exact_statistics": (-1.0, INFINITY),
         }
 
@@ -265,16 +283,21 @@ class ExactStepper:
         self._lay_out(schedule)
         motion, saved = self.motion, restart.state
         counters = [int(n) for n in saved["exact_counters"]]
-        self._done, motion.piece, motion.level, motion.events, motion.unsure, motion.crowded = counters
+        self._done, motion.piece, motion.level, motion.events, motion.unsure, motion.crowded, motion.landed = counters
+        if motion.piece >= len(motion.pieces):
+            raise CaseError("restart", f"a state in piece {motion.piece} of the phases", "a run with these phases")
         self.statistics[:] = saved["exact_statistics"]
         motion.holds = np.array(saved["exact_holds"], dtype=float)
         motion.works = np.array(saved["exact_works"], dtype=float)
         motion.status = tuple(int(n) for n in saved["exact_status"])
-        motion.time, self._counted, motion.crowd_since = (float(t) for t in saved["exact_times"])
+        motion.time, self._counted, motion.crowd_since, motion.latest = (float(t) for t in saved["exact_times"])
+        motion.parted = np.array(saved["exact_parted"], dtype=float)
+        motion.parted_from = np.array(saved["exact_parted_from"], dtype=np.int64)
         if not changed:
             motion.q, motion.v = (np.array(saved[f"exact_{name}"], dtype=float) for name in ("q", "v"))
             return
         motion.q, motion.v = (np.array(saved[f"exact_now_{name}"], dtype=float) for name in ("q", "v"))
+        motion.works = np.array(saved["exact_now_works"], dtype=float)
         motion.time = self._done * self.scheme.step
         motion.take_up(motion_ratio(self.parts, restart, self._system.motion.names))
 
@@ -282,7 +305,8 @@ class ExactStepper:
         """Room for all records from the present step on; loads the compiled search."""
         every = settings.record_every
         count = max((schedule.steps - 1) // every - (self._done - 1) // every, 0)
-        rows, lifts = [np.zeros((0, self._system.size))], [np.zeros((0, len(self._system.motion.names)))]
+        rows: list[Array] = [np.zeros((0, self._system.size))]
+        lifts: list[Array] = [np.zeros((0, len(self._system.motion.names)))]
         for name in settings.watch:
             rows.append(self._system.points[name].free[:2].toarray())
             lifts.append(self._system.points[name].lift[:2])
