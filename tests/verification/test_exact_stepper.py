@@ -254,6 +254,55 @@ def test_the_first_root_is_the_first():
     assert missed == 0
 
 
+def mode_coupling(**changes: Any) -> st.Case:
+    """A mass between two oblique springs on a belt (Hoffmann et al. 2002): flutter from μ = 3/4 on."""
+
+    def oblique(angle_deg: float, stiffness: float) -> dict[str, Any]:
+        angle = math.radians(angle_deg)
+        return {"between": ("m", "ground"), "direction": (math.cos(angle), math.sin(angle)), "stiffness": stiffness}
+
+    case = st.Case(
+        units="nondimensional",
+        bodies={
+            "m": {"type": "mass", "mass": 1.0, "position": (0, 0)},
+            "belt": {
+                "type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (0, 1), "sliding": {"velocity": (-1, 0)}
+            },
+        },
+        springs={"k1": oblique(150, 2 / 3 * (2 - 3**0.5)), "k2": oblique(30, 2 / 3 * (2 + 3**0.5))},
+        loads={"press": {"at": "m", "force": (0, -1)}},
+        contacts={
+            "rub": {
+                "slave": "m", "master": "belt", "stiffness": 4 / 3, "friction": {"law": "coulomb", "coefficient": 0.9}
+            }
+        },
+        modal={"max_frequency_hz": 1.0},
+        phases=[{"name": "slide", "duration": 60.0}],
+        temporal={
+            "initial": "steady-sliding", "perturbation": 1e-4, "step": 0.05, "record_every": 1, "watch": ["m"],
+            "stepper": "exact",
+        },
+    )  # fmt: skip
+    return case.with_(changes)
+
+
+@pytest.mark.parametrize("mu", [None, 1.1])
+def test_a_mass_on_an_obstacle_grows_and_parts_as_in_explicit_steps(mu: float | None):
+    case = mode_coupling()
+    wanted = st.simulate(case, mu=mu)
+    assert wanted.path == "exact"
+    assert {OPEN, SLIP} <= set(wanted.status[:, 0].tolist())
+    off = []
+    for parts in (20, 80):
+        steps = {"temporal.stepper": "explicit", "temporal.step": 0.05 / parts, "temporal.record_every": parts}
+        other = st.simulate(case.with_(steps), mu=mu)
+        off.append(np.abs(other.displacement - wanted.displacement).max() / np.abs(wanted.displacement).max())
+        assert np.abs(other.normal_force - wanted.normal_force).max() < 30 * off[-1]
+    assert off[0] < 1e-3
+    assert off[1] < 0.08 * off[0]  # of second order
+    assert energy_balance(wanted).error < CLOSED
+
+
 def test_auto_takes_it_where_it_is_small_enough_and_says_so():
     system = block_on_belt(law=StaticKinetic(0.3, 0.4), speed=0.2)
     asked = {"step": 1e-2, "velocities": {"belt": 1.0}, "watch": ("block",)}
@@ -323,7 +372,7 @@ def test_a_run_that_is_cut_goes_on_to_the_last_digit(monkeypatch: pytest.MonkeyP
 def test_large_models_are_refused_before_anything_is_computed():
     pad = st.loads(template_text("pad-on-disc")).with_({"temporal.stepper": "exact"})
     pad = pad.with_({f"bodies.{name}.mesh.divisions": [3, 6, 1] for name in ("disc", "lining", "plate")})
-    with pytest.raises(st.CaseError, match=r"there is contact over surfaces; take \"explicit\""):
+    with pytest.raises(st.CaseError, match=r"friction turns with the slip in space; take \"explicit\""):
         st.simulate(pad)
     assert st.simulate(pad.with_({"temporal.stepper": "auto", "phases": [{"name": "press", "duration": 1e-6}]})).path != "exact"
 

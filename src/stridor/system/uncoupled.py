@@ -91,11 +91,12 @@ class UncoupledModes:
         return np.concatenate([b.poles for b in self.general] or [np.zeros(0, dtype=complex)])
 
 
-def no_complete_basis(system: System) -> str:
-    """Why it is no structure with a few point contacts on a complete basis of modes; "" where it is."""
+def no_complete_basis(system: System, *, nodes: bool = False) -> str:
+    """Why it is no structure with a few point contacts on a complete basis of modes; "" where it is. nodes: whether
+    those of contact over surfaces will do as well."""
     if system.not_symmetric_definite:
         return system.not_symmetric_definite
-    if system.surfaces:
+    if system.surfaces and not nodes:
         return "there is contact over surfaces"
     if system.load_steps:
         return "contacts may stick"

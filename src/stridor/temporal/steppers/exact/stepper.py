@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from ....errors import AnalysisError, CaseError
-from ....sliding import slip_speeds, steady_sliding
+from ....sliding import slip_speeds, steady_sliding, steady_sliding_nodes
 from ....system import System
 from ....system.uncoupled import no_complete_basis
 from ....typing import Array
@@ -42,6 +42,7 @@ from ...settings import Settings, choose_step, not_finite
 from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
+from ..sparse.stepper import with_friction
 from .basis import Basis, complete_basis
 from .drive import pieces
 from .motion import Motion
@@ -55,19 +56,26 @@ DONE = 0  # where the counters have the steps done
 
 def why_not_exact(system: System) -> str:
     """Why it does not take a system; "" where it does."""
-    if why := no_complete_basis(system):
-        return why
     if system.size > MOST_FREEDOMS:
         return f"{system.size} freedoms are too many: each status of the contacts has its own modes, of all of them"
-    if len(system.contacts) > MOST_CONTACTS:
-        return f"{len(system.contacts)} contacts are too many: up to {MOST_CONTACTS}"
-    for contact in system.contacts:
+    if why := no_complete_basis(system, nodes=True):
+        return why
+    if system.surfaces and system.dimension == 3:
+        return "friction turns with the slip in space"
+    nodes = system.contact_nodes()
+    if len(nodes.names) > MOST_CONTACTS:
+        return f"{len(nodes.names)} contacts are too many: up to {MOST_CONTACTS}"
+    for contact in (*system.contacts, *system.surfaces):
         if contact.sliding == "finite":
             return f"contact {contact.name} slides finitely, so that its rows move"
-        if contact.closed:
-            return f"contact {contact.name} is kept closed"
-        if not contact.law.constant:
-            return f"the friction of contact {contact.name} varies with the slip speed"
+    kept = dict(zip(nodes.names, nodes.closed or (False,) * len(nodes.names), strict=True))
+    for number, (name, law) in enumerate(zip(nodes.names, nodes.laws, strict=True)):
+        if np.count_nonzero(nodes.owner == number) != 1:
+            return f"contact {name} has {np.count_nonzero(nodes.owner == number)} nodes, not one"
+        if kept[name]:
+            return f"contact {name} is kept closed"
+        if not law.constant:
+            return f"the friction of contact {name} varies with the slip speed"
     return ""
 
 
@@ -82,33 +90,29 @@ def exact_stepper(system: System, settings: Settings, mu: float | None, why: str
     for a system that it does not take."""
     refuse(system)
     if mu is not None:
-        system = system.with_friction(mu, np.abs(slip_speeds(system, system.motion.full)))
+        full = system.motion.full
+        surfaces = [replace(s, nodes=with_friction(s.nodes, mu, full)) for s in system.surfaces]
+        surfaces = tuple(replace(s, law=s.nodes.laws[0]) for s in surfaces)
+        system = replace(system.with_friction(mu, np.abs(slip_speeds(system, full))), surfaces=surfaces)
     return ExactStepper(system, settings, why)
 
 
 def pairs_of(system: System, basis: Basis) -> Pairs:
     """The contacts, loads and moving supports of a system in coordinates."""
-    contacts, motion = system.contacts, system.motion
-    m, p, k = len(contacts), len(motion.names), basis.size
-
-    def projected(rows: Sequence[Array]) -> Array:
-        return np.array(rows, dtype=float).reshape(len(rows), system.size) @ basis.vectors
-
-    def plain(values: Sequence[Array | float], *shape: int) -> Array:
-        return np.array(values, dtype=float).reshape(shape)
-
-    loads = list(system.loads.values())
+    nodes, motion = system.contact_nodes(), system.motion
+    laws = [nodes.laws[owner] for owner in nodes.owner]
+    loads = np.array(list(system.loads.values()), dtype=float).reshape(len(system.loads), system.size)
     return Pairs(
-        normal=projected([c.normal_row for c in contacts]).reshape(m, k),
-        tangent=projected([c.tangent_row for c in contacts]).reshape(m, k),
-        normal_lift=plain([c.normal_lift for c in contacts], m, p),
-        tangent_lift=plain([c.tangent_lift for c in contacts], m, p),
-        gap=plain([c.gap for c in contacts], m),
-        compliance=plain([c.compliance for c in contacts], m),
-        sliding=plain([c.law.sliding(0.0) for c in contacts], m),
-        sticking=plain([c.law.sticking for c in contacts], m),
-        loads=projected(loads).reshape(len(loads), k),
-        loads_lift=plain([load @ motion.lift for load in loads], len(loads), p),
+        normal=nodes.normal @ basis.vectors,
+        tangent=nodes.tangent @ basis.vectors,
+        normal_lift=nodes.normal_lift,
+        tangent_lift=nodes.tangent_lift,
+        gap=nodes.gap,
+        compliance=nodes.compliance,
+        sliding=np.array([law.sliding(0.0) for law in laws]),
+        sticking=np.array([law.sticking for law in laws]),
+        loads=loads @ basis.vectors,
+        loads_lift=loads @ motion.lift,
         inertia=motion.mass.T @ basis.vectors,
         drag=motion.damping.T @ basis.vectors,
         mass_own=motion.mass_own,
@@ -130,10 +134,10 @@ class ExactStepper:
         self.scheme = scheme(choose_step(self.limit, settings), 0.5)
         self.basis = complete_basis(system)
         self.pairs = pairs_of(system, self.basis)
-        self.contact_names = tuple(c.name for c in system.contacts)
+        self.contact_names = system.contact_nodes().names
         self.closed = ()
         self.parts = sketch(system, system.contact_nodes())
-        self.statistics = fresh_statistics(len(system.contacts), STATISTICS)
+        self.statistics = fresh_statistics(self.pairs.count, STATISTICS)
         self.motion = Motion(self.basis, self.pairs, [])
         self._done = self._recorded = 0
         self._counted = 0.0
@@ -185,21 +189,26 @@ class ExactStepper:
         stretch = schedule.stretches[0]
         u, v = np.zeros(system.size), np.zeros(system.size)
         steady = settings.initial == "steady-sliding"
-        active = np.zeros(len(system.contacts), dtype=bool)
+        active = np.zeros(self.pairs.count, dtype=bool)
         if steady:
             if stretch.ramp_steps:
                 ramp = stretch.ramp_steps * schedule.step
                 raise CaseError("phases.0.ramp", ramp, "0 when starting from steady sliding")
-            found = steady_sliding(
+            equilibrium = steady_sliding_nodes if system.surfaces else steady_sliding
+            found = equilibrium(
                 system.in_place(stretch.distances_after),
                 load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
                 motion_factors=stretch.velocities_after,
             )
             active = np.asarray(found.active, dtype=bool)
             u = u + found.displacement - system.motion.lift @ stretch.distances_after
-            for contact in system.contacts:
-                answer = spl.splu(sp.csc_array(system.mass)).solve(contact.tangent_row)
-                v = v + settings.perturbation * answer / float(contact.tangent_row @ answer)
+            mass = spl.splu(sp.csc_array(system.mass))
+            nodes = system.contact_nodes()
+            ways = np.sign(nodes.slip_velocity(system.motion.full)[:, 0])
+            ways[: len(system.contacts)] = 1.0
+            for way, row in zip(ways, nodes.tangent.toarray(), strict=True):
+                answer = mass.solve(row)
+                v = v + settings.perturbation * (way or 1.0) * answer / float(row @ answer)
         else:
             u = u if system.initial_displacement is None else u + system.initial_displacement
             v = v if system.initial_velocity is None else v + system.initial_velocity
@@ -220,13 +229,13 @@ class ExactStepper:
         moved = piece.displacements @ piece.powers(0.0)
         speed = piece.displacements @ piece.derivative @ piece.powers(0.0)
         found: dict[int, float] = {}
-        for c, contact in enumerate(self._system.contacts):
+        for c, name in enumerate(self.contact_names):
             parts = np.concatenate([pairs.normal[c] * motion.q, pairs.normal_lift[c] * moved, pairs.gap[c : c + 1]])
             gap, size = float(parts.sum()), float(np.abs(parts).sum())
             closed = bool(active[c]) if steady else gap <= 1e-12 * size
             if closed and pairs.compliance[c] == 0.0 and gap < -1e-6 * size:
                 raise CaseError(
-                    f"contacts.{contact.name}",
+                    f"contacts.{name}",
                     f"a gap of {gap:.4g} m at the start",
                     "a gap >= 0 where contact is rigid; start from steady sliding, press with a ramp, or take "
                     'stepper = "explicit"',
