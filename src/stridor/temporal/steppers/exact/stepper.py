@@ -24,9 +24,11 @@ from ...columns import (
     MAX_SPEED,
     MAX_TANGENTIAL,
     OPEN_STEPS,
+    REC_GAP,
     REC_NORMAL,
     REC_POSITION,
     REC_SLIP,
+    REC_STATUS,
     REC_TANGENTIAL,
     SLIP_STEPS,
     STATISTICS,
@@ -136,6 +138,9 @@ class ExactStepper:
         self.pairs = pairs_of(system, self.basis)
         self.contact_names = system.contact_nodes().names
         self.closed = ()
+        # Slip and friction of surfaces are told along their sliding, those of points along the tangent.
+        self._ways = np.where(system.contact_nodes().slip_velocity(system.motion.full)[:, 0] < 0.0, -1.0, 1.0)
+        self._ways[: len(system.contacts)] = 1.0
         self.parts = sketch(system, system.contact_nodes())
         self.statistics = fresh_statistics(self.pairs.count, STATISTICS)
         self.motion = Motion(self.basis, self.pairs, [])
@@ -179,8 +184,18 @@ class ExactStepper:
         """One thread is what it takes."""
 
     def node_history(self, start: int) -> NodeHistory | None:
-        """A contact is one node."""
-        return None
+        """Histories of the nodes where contacts are of surfaces: each has one."""
+        if not self._system.surfaces:
+            return None
+        nodes, values = self._system.contact_nodes(), self.record.contacts[: self._recorded]
+        along = self._ways[None, :, None]
+        return NodeHistory(
+            names=nodes.names, owner=nodes.owner, position=nodes.position, area=nodes.area, tangents=nodes.tangents,
+            time=(start + np.arange(self._recorded)) * self.every * self.scheme.step,
+            normal_force=values[:, :, REC_NORMAL], tangential_force=along * values[:, :, REC_TANGENTIAL, None],
+            slip_velocity=along * values[:, :, REC_SLIP, None], gap=values[:, :, REC_GAP],
+            status=values[:, :, REC_STATUS].astype(np.int64),
+        )  # fmt: skip
 
     def begin(self, schedule: Schedule, settings: Settings, mu: float | None, disturbance: Disturbance | None) -> None:
         """At rest or in steady sliding, disturbed if so asked."""
@@ -203,12 +218,9 @@ class ExactStepper:
             active = np.asarray(found.active, dtype=bool)
             u = u + found.displacement - system.motion.lift @ stretch.distances_after
             mass = spl.splu(sp.csc_array(system.mass))
-            nodes = system.contact_nodes()
-            ways = np.sign(nodes.slip_velocity(system.motion.full)[:, 0])
-            ways[: len(system.contacts)] = 1.0
-            for way, row in zip(ways, nodes.tangent.toarray(), strict=True):
+            for way, row in zip(self._ways, system.contact_nodes().tangent.toarray(), strict=True):
                 answer = mass.solve(row)
-                v = v + settings.perturbation * (way or 1.0) * answer / float(row @ answer)
+                v = v + settings.perturbation * way * answer / float(row @ answer)
         else:
             u = u if system.initial_displacement is None else u + system.initial_displacement
             v = v if system.initial_velocity is None else v + system.initial_velocity
@@ -366,6 +378,7 @@ class ExactStepper:
         self.outputs.write(anchor, after, self.motion.works, self.record, here)
         self._recorded = here.stop
         contacts = self.record.contacts[here]
+        contacts[:, :, [REC_TANGENTIAL, REC_SLIP]] *= self._ways[:, None]
         self._extremes(np.abs(contacts[..., [REC_NORMAL, REC_TANGENTIAL, REC_SLIP]]).max(axis=0, initial=0.0))
 
     def _extremes(self, values: Array) -> None:
