@@ -12,7 +12,7 @@ from ...columns import REC_GAP, REC_NORMAL, REC_SLIP, REC_STATUS, REC_TANGENTIAL
 from .motion import Anchor, Watched
 from .statuses import GAP, STICK, Flow, Row
 
-BLOCK = 32  # records at a time
+BLOCK = 8  # records at a time
 CONTACT_ROWS = 4  # normal and tangential force, slip speed, gap
 
 
