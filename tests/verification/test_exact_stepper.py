@@ -53,7 +53,7 @@ def test_mass_on_a_belt():
         0.3 + drop * math.cos(slips) + 0.2 * math.sin(slips) + 0.2 * (after - slips),
     )
     later = result.time > let_go
-    assert np.abs(u - wanted)[later].max() < 1e-9
+    assert np.abs(u - wanted)[later].max() < 1e-12
     assert u[later].min() == pytest.approx(0.3 - amplitude, abs=1e-6)
     assert u[later].max() == pytest.approx(0.3 + amplitude, abs=1e-6)
     assert energy_balance(result).error < CLOSED

@@ -117,7 +117,7 @@ def _root(
         else:
             high = t
         following = t - y / rate if rate != 0.0 else low
-        if abs(following - t) <= 1e-15 * length:
+        if abs(following - t) <= 4e-16 * abs(following):
             break
         if not low < following < high:
             following = 0.5 * (low + high)
@@ -182,7 +182,13 @@ def first_root(
             level += 1
             continue
         if below:
-            return CROSSED, which, time + length, level, parts, unsure
+            first = length
+            for i in range(m):
+                if then[i] + let[i] <= 0.0 < now[i] + let[i]:
+                    t = _root(numbers.weights[i], numbers.rows[i], poles, zeta, time, length, let[i])
+                    if t < first:
+                        which, first = i, t
+            return CROSSED, which, time + first, level, parts, unsure
         unsure += doubtful
         if unsure > MOST_UNSURE:
             return UNDECIDED, -1, time, level, parts, unsure
