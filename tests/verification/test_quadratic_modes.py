@@ -17,6 +17,7 @@ from stridor.modal.quadratic import Quadratic, Region, find_modes, undamped_coun
 from stridor.modal.quadratic import count as counting
 from stridor.modal.quadratic import find as finding
 from stridor.modal.quadratic import search as searching
+from stridor.modal.quadratic.problem import times
 from stridor.modal.quadratic.region import Disc, cells, uncovered
 
 pytestmark = pytest.mark.verification
@@ -424,3 +425,15 @@ def test_undamped_count_is_the_number_of_modes_in_the_band():
     number = undamped_count(problem, Region.box(-1, 1, 0.1, 0.5))
     exact = 2 * np.sin(np.arange(1, n + 1) * math.pi / (2 * (n + 1)))
     assert number in (None, int(((exact > 0.1) & (exact < 0.5)).sum()))
+
+
+@pytest.mark.parametrize("columns", [None, 0, 1, 2, 5])
+@pytest.mark.parametrize("given", [float, complex])
+def test_products_with_complex_columns(columns, given):
+    rng = np.random.default_rng(6)
+    shape = (30,) if columns is None else (30, columns)
+    matrix = sp.random_array((20, 30), density=0.2, rng=rng).tocsr().astype(given)
+    matrix = matrix * (1 + 2j) if given is complex else matrix
+    block = np.asarray(rng.standard_normal(shape) + 1j * rng.standard_normal(shape), order="F")
+    np.testing.assert_allclose(times(matrix, block), matrix.toarray() @ block, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(times(matrix.T, block[:20]), matrix.toarray().T @ block[:20], rtol=1e-13, atol=1e-13)

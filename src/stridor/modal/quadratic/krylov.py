@@ -19,7 +19,7 @@ import numpy as np
 import scipy.linalg as sl
 
 from ...typing import Array, ComplexArray, IntArray
-from .problem import Quadratic
+from .problem import Quadratic, times
 
 WIDTH = 64  # columns allocated at once
 NOTHING = 1e-14  # of a vector's length: what orthogonalisation may leave of one that adds nothing
@@ -178,8 +178,3 @@ def _independent(block: ComplexArray, room: int) -> tuple[ComplexArray, ComplexA
     rank = min(int((np.abs(np.diag(upper)) > NOTHING).sum()), max(room, 0))
     back = np.argsort(order)
     return basis[:, :rank], upper[:rank][:, back]
-
-
-def times(matrix: Any, block: ComplexArray) -> ComplexArray:
-    """A real matrix times complex columns in real arithmetic; a complex row read as real has its parts side by side."""
-    return (matrix @ np.ascontiguousarray(block).view(np.float64)).view(np.complex128)

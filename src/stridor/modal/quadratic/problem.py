@@ -102,7 +102,10 @@ def _places(matrix: Sparse, n: int) -> IntArray:
 
 
 def times(matrix: Sparse, block: Any) -> Any:
-    """matrix @ block for a real sparse matrix and a real or complex block (n, k), in real arithmetic."""
+    """matrix @ block of a block (n,) or (n, k); where the matrix is real and the block complex, in real arithmetic."""
     if block.dtype.kind != "c":
         return matrix @ block
+    if block.ndim > 1 and block.shape[1] > 1 and matrix.dtype.kind != "c":
+        # A row of complex numbers, read as real, has their parts side by side: the matrix is read once for both.
+        return (matrix @ np.ascontiguousarray(block).view(np.float64)).view(np.complex128)
     return matrix @ np.ascontiguousarray(block.real) + 1j * (matrix @ np.ascontiguousarray(block.imag))
