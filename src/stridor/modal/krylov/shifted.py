@@ -201,8 +201,8 @@ def orthonormal(
     new = block.combined(np.eye(len(length))[:, alive] / length[alive])
     weight = np.sqrt(np.maximum(mass.diagonal(), 1e-6 * mass.diagonal().mean()))[:, None]
     for last in (False, True):
-        for _ in range(2):
-            new = new.less(basis, basis.u.T @ (mass @ new.u))
+        # Once for the ranks, and once more for what is left: twice is enough.
+        new = new.less(basis, basis.u.T @ (mass @ new.u))
         if not new.count:
             break
         if last:
