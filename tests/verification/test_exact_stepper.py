@@ -307,6 +307,143 @@ def test_a_mass_on_an_obstacle_grows_and_parts_as_in_explicit_steps(mu: float | 
     assert energy_balance(wanted).error < CLOSED
 
 
+def corner(**changes: Any) -> st.Case:
+    """A mass on two springs over a belt."""
+    case = st.Case(
+        units="nondimensional",
+        bodies={
+            "m": {"type": "mass", "mass": 1.0, "position": (0, 0)},
+            "belt": {
+                "type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (0, 1), "sliding": {"velocity": (-1, 0)}
+            },
+        },
+        springs={
+            "kx": {"between": ("m", "ground"), "direction": (1, 0), "stiffness": 1.0},
+            "ky": {"between": ("m", "ground"), "direction": (0, 1), "stiffness": 4.0},
+        },
+        loads={"press": {"at": "m", "force": (0, -1)}},
+        contacts={
+            "rub": {
+                "slave": "m", "master": "belt", "stiffness": 100.0, "friction": {"law": "coulomb", "coefficient": 0.3}
+            }
+        },
+        modal={"max_frequency_hz": 1.0},
+        phases=[{"name": "slide", "duration": 20.0}],
+        temporal={"step": 0.01, "record_every": 1, "watch": ["m"], "stepper": "exact"},
+    )  # fmt: skip
+    return case.with_(changes)
+
+
+WALL = {
+    "bodies.wall": {"type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (1, 0)},
+    "loads.press.force": (-1, -1),
+}
+
+
+def as_explicit(case: st.Case, off: float = 1e-3):
+    """The exact run of a case, which explicit steps of a hundredth come near to."""
+    exactly = st.simulate(case)
+    assert exactly.path == "exact"
+    fine = case.temporal.step / 100
+    other = st.simulate(case.with_({"temporal.stepper": "explicit", "temporal.step": fine, "temporal.record_every": 100}))
+    assert other.time == pytest.approx(exactly.time)
+    size = np.abs(exactly.displacement).max()
+    assert np.abs(other.displacement - exactly.displacement).max() < off * size
+    assert energy_balance(exactly).error < CLOSED
+    return exactly, other
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"phases": [{"name": "a", "duration": 1.01}, {"name": "b", "duration": 1.0, "loads": {"press": 2.0}}],
+         "bodies.belt.point": (0, -0.16)},  # contact is due soon after the end of a phase
+        {"springs.ky.stiffness": -1.0, "contacts.rub.friction.coefficient": 0.0, "phases.slide.duration": 3.0},
+        {"phases": [{"name": "a", "duration": 0.52, "ramp": 0.52}, {"name": "b", "duration": 3.0}]},
+        {"springs.kx.damping": 1.9999},
+        {"contacts.rub.stiffness": "rigid", "contacts.rub.friction.coefficient": 0.0, "bodies.belt.point": (0, -0.1)},
+    ],
+    ids=["phase ends", "divergence", "ramp", "nearly critical", "no friction"],
+)  # fmt: skip
+def test_strange_but_sound_cases_as_in_explicit_steps(changes: dict[str, Any]):
+    as_explicit(corner(**changes))
+
+
+def test_two_contacts_that_do_the_same_at_once():
+    """Dropped, pressed and lifted together; the search may tell neither before the other."""
+    twin = {
+        "bodies.n": {"type": "mass", "mass": 1.0, "position": (3, 0)},
+        "springs.nx": {"between": ("n", "ground"), "direction": (1, 0), "stiffness": 1.0},
+        "springs.ny": {"between": ("n", "ground"), "direction": (0, 1), "stiffness": 4.0},
+        "loads.second": {"at": "n", "force": (0, -1)},
+        "contacts.other": {
+            "slave": "n", "master": "belt", "stiffness": 100.0, "friction": {"law": "coulomb", "coefficient": 0.3}
+        },
+        "bodies.belt.point": (0, -0.1),
+        "phases": [
+            {"name": "a", "duration": 5.0},
+            {"name": "b", "duration": 5.0, "ramp": 1.0, "loads": {"press": -1.0, "second": -1.0}},
+        ],
+    }  # fmt: skip
+    for stiffness in (100.0, "rigid"):
+        both = {"contacts.rub.stiffness": stiffness, "contacts.other.stiffness": stiffness}
+        found, _ = as_explicit(corner(**twin).with_(both))
+        assert np.array_equal(found.status[:, 0], found.status[:, 1])
+        assert {0, 2} <= set(found.status[:, 0].tolist())
+
+
+def test_a_mass_that_two_walls_hold():
+    wall = {"slave": "m", "master": "wall", "stiffness": "rigid", "friction": {"law": "coulomb", "coefficient": 0.0}}
+    still = corner(**WALL, **{"contacts.wall": wall, "contacts.rub.stiffness": "rigid", "phases.slide.duration": 2.0})
+    found = st.simulate(still.with_({"contacts.rub.friction.coefficient": 0.0}))
+    assert found.normal_force[-1] == pytest.approx([1.0, 1.0], abs=1e-12)
+
+
+def test_critical_damping_is_refused():
+    with pytest.raises(st.AnalysisError, match=r"two modes at 1 rad/s are all but one .* take stepper = \"explicit\""):
+        st.simulate(corner(**{"springs.kx.damping": 2.0, "contacts.rub.stiffness": "rigid"}))
+
+
+def test_a_step_that_phases_are_no_multiples_of_is_refused():
+    phases = [{"name": "a", "duration": 1.0}, {"name": "b", "duration": 0.25}]
+    with pytest.raises(st.CaseError, match=r"temporal.step: 0.4 – a step that phases are multiples of: a of 1 s"):
+        st.simulate(corner(**{"phases": phases, "temporal.step": 0.4}))
+
+
+def test_extremes_belong_to_their_phase_and_not_to_the_records():
+    phases = [{"name": "a", "duration": 4.0}, {"name": "b", "duration": 4.0, "loads": {"press": 0.2}}]
+    damped = {"springs.ky.damping": 20.0, "springs.kx.damping": 0.5, "contacts.rub.stiffness": "rigid", "phases": phases}
+    fine, coarse = (st.simulate(corner(**damped, **{"temporal.record_every": every})) for every in (1, 400))
+    for run_ in (fine, coarse):
+        most = [p.contacts["rub"].max_normal_force for p in run_.phases]
+        assert most == pytest.approx([1.0, 0.2], rel=1e-9)
+    loose = [st.simulate(corner(**{"temporal.record_every": every})).phases[0].contacts["rub"] for every in (1, 61)]
+    assert loose[0].max_normal_force == pytest.approx(1.923077, rel=1e-5)
+    assert loose[1].max_normal_force == pytest.approx(loose[0].max_normal_force, rel=2e-3)
+    assert loose[1].max_slip_speed == pytest.approx(loose[0].max_slip_speed, rel=2e-3)
+
+
+@pytest.mark.parametrize("change", [{"bodies.m.mass": 4.0}, {"springs.kx.direction": (0.8, 0.6)}])
+def test_another_structure_takes_up_where_the_freedoms_were(change: dict[str, Any]):
+    """Modes are others in it, freedoms are not."""
+    case = corner(**{"phases.slide.duration": 6.0})
+    part = st.simulate(case.with_({"phases.slide.duration": 3.0}))
+    other = st.simulate(case.with_(change), restart=part, changed=True)
+    near = len(part.time)
+    assert np.abs(np.diff(other.displacement[near - 2 : near + 2], axis=0)).max() < 0.02
+    assert np.abs(np.diff(other.velocity[near - 1 : near + 1], axis=0)).max() < 0.1
+
+
+def test_another_gap_opens_the_contact():
+    case = corner(**{"contacts.rub.stiffness": "rigid", "phases.slide.duration": 6.0})
+    part = st.simulate(case.with_({"phases.slide.duration": 3.0}))
+    other = st.simulate(case.with_({"bodies.belt.point": (0, -0.1)}), restart=part, changed=True)
+    now = len(part.time)
+    assert part.status[-1, 0] != OPEN
+    assert other.status[now + 1, 0] == OPEN
+    assert other.gap[now + 1, 0] == pytest.approx(0.1, abs=1e-3)
+
+
 def test_auto_takes_it_where_it_is_small_enough_and_says_so():
     system = block_on_belt(law=StaticKinetic(0.3, 0.4), speed=0.2)
     asked = {"step": 1e-2, "velocities": {"belt": 1.0}, "watch": ("block",)}

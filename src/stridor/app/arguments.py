@@ -89,9 +89,10 @@ class Call:
         from ..case import load
 
         named = {"solver": self.solver, "source": source}
-        given = {"--stepper": stepper, "--source": source, "--max-frequency": max_frequency, "--range": friction_range}
+        given = {"--source": source, "--max-frequency": max_frequency, "--range": friction_range}
         self.asked.extend((name, str(value)) for name, value in given.items() if value is not None)
         self.asked.extend([("--undamped",)] if undamped else [])
+        self.asked.extend([] if stepper is None else [("--set", f"temporal.stepper={stepper}")])
         own = [f"modal.{key}={json.dumps(name)}" for key, name in named.items() if name is not None]
         if max_frequency is not None:
             if not 0.0 < max_frequency < INFINITY:
@@ -199,7 +200,7 @@ class Call:
         changes = [("--set", change) for change in self.set_ or ()]
         kept = [] if path is not None else [*self.asked, *changes, *given]
         words = ["stridor", verb, str(path or self.path), *options]
-        words += [str(word) for option in kept if option[0] in TABLE and verb in TABLE[option[0]].on for word in option]
+        words += [str(word) for option in kept if verb in TABLE[option[0]].on for word in option]
         literal(f"Next: {command(words, stdout.page - 6)}")
 
     def tabulate(self, result: Tabular, name: str) -> Path:

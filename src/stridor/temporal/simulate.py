@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..errors import CaseError
 from ..stages import passing, stage
 from ..system import System
 from ..threads import one_thread
@@ -13,7 +14,7 @@ from .inputs import check_inputs
 from .march import Checkpoint, March, Progress
 from .observe import Observer
 from .restart import settings_of_restart
-from .schedule import PhaseSpec, lay_out
+from .schedule import PhaseSpec, Schedule, lay_out
 from .settings import Settings
 from .stepper import Disturbance, Stepper
 from .steppers.exact import exact_stepper, refuse, why_not_exact
@@ -21,6 +22,7 @@ from .steppers.modal import choose_path, modal_stepper, refuses
 from .steppers.sparse import sparse_stepper, step_limit_assembled
 from .trajectory import Trajectory
 
+ROUNDED = 1e-3  # of a phase: as far as whole steps may end beside it
 SMALL = 40  # freedoms up to which "auto" goes from event to event: there that is faster than steps, and exact
 
 __all__ = ["Checkpoint", "Progress", "Settings", "plan", "simulate"]
@@ -70,6 +72,8 @@ def simulate(
     stepper = stepper_for(system, settings, mu, why)
     motion = system.motion
     schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
+    if settings.stepper == "exact":
+        _check_step(phases, schedule)
     if settings.initial == "steady-sliding":
         schedule = schedule.from_steady()
     march = March(stepper, schedule, settings, join=join, observe=observe)
@@ -78,6 +82,17 @@ def simulate(
     else:
         march.resume(restart, changed=changed)
     return march.run(progress, checkpoint, checkpoint_seconds)
+
+
+def _check_step(phases: Sequence[PhaseSpec], schedule: Schedule) -> None:
+    """Refuse steps that round phases to other lengths, which the stability limit keeps explicit ones from."""
+    for phase, stretch in zip(phases, schedule.stretches, strict=True):
+        taken = (stretch.last - stretch.first) * schedule.step
+        if abs(taken - phase.duration) > ROUNDED * phase.duration:
+            raise CaseError(
+                "temporal.step", schedule.step,
+                f"a step that phases are multiples of: {phase.name} of {phase.duration:g} s would take {taken:g} s",
+            )  # fmt: skip
 
 
 def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
@@ -98,7 +113,7 @@ def _chosen(system: System, settings: Settings) -> tuple[Settings, str]:
     """Settings with the stepper that "auto" comes to, and why it is the exact one, "" where it is not."""
     if settings.stepper != "auto":
         return settings, "asked for" if settings.stepper == "exact" else ""
-    small = system.size <= SMALL and settings.path == "auto" and not why_not_exact(system)
+    small = system.size <= SMALL and settings.path == "auto" and settings.beta2 == 0.5 and not why_not_exact(system)
     if small:
         return replace(settings, stepper="exact"), f"{system.size} freedoms, up to {SMALL} are few"
     return replace(settings, stepper="explicit"), ""

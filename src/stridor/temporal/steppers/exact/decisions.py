@@ -181,8 +181,6 @@ def choices(pairs: Pairs, c: int, slip: float, now: int) -> Touching:
     if now in options:
         options.remove(now)
         options.insert(0, now)
-    if pairs.compliance[c] > 0.0 and now != GAP:
-        options.remove(GAP)  # a spring that is pressed pushes
     return Touching(slip, tuple(options))
 
 
@@ -206,7 +204,10 @@ def settle(
             continue
         if _consistent(algebra, touching, state):
             return found
-    raise AnalysisError("friction jams the contacts: no status of them goes with the forces that it makes")
+    raise AnalysisError(
+        "friction jams the contacts: no status of them goes with the forces that it makes, which the exact stepper "
+        'does not pass; take stepper = "explicit"'
+    )
 
 
 def _consistent(driven: Driven, touching: Mapping[int, Touching], state: State) -> bool:
@@ -219,9 +220,17 @@ def _consistent(driven: Driven, touching: Mapping[int, Touching], state: State) 
     for c, touch in touching.items():
         now, (normal, tangential) = status[c], forces[c]
         weight = max(float(pairs.normal[c] @ pairs.normal[c]), float(pairs.tangent[c] @ pairs.tangent[c]))
+        if now == GAP and pairs.compliance[c] > 0.0:
+            # Only a spring that is not pressed lets go.
+            gap = driven.gap(c)
+            pressed = -gap.at(*now_at) / pairs.compliance[c]
+            noise = ROUNDING * gap.size(state.q_size, state.v_size, state.p) / pairs.compliance[c]
+            if pressed > CLOSE * size + noise or driven.opening(c).at(*now_at) < 0.0:
+                return False
+            continue
         if now == GAP:
             opening = driven.opening(c)
-            if pairs.compliance[c] == 0.0 and driven.rate_of(opening).at(*now_at) < -CLOSE * size * weight:
+            if driven.rate_of(opening).at(*now_at) < -CLOSE * size * weight:
                 return False
             continue
         if normal < -CLOSE * size:

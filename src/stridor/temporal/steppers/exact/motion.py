@@ -18,6 +18,7 @@ from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, parts_of
 from .statuses import BACKWARD, FORWARD, GAP, STICK, TAYLOR, Driven, Flow, Pairs, Regime, Status, sense
 
 STRETCH = 256  # longest parts that are looked through from one beginning of the modes
+HELD = 1e-9  # of a row: what is left of it where contacts leave it no motion
 STORM, MOMENT = 300, 0.3  # so many events within so much of the fastest mode's time [rad]: they accumulate
 # Contacts that throw one another off: behind so many events of a moment, throws shorter than this [rad] end at once.
 LANDINGS = ((8, 1e-4), (100, 1e-2))
@@ -192,7 +193,7 @@ class Motion:
             self._change_piece()
             return
         self.events += 1
-        fastest = max(anchor.watched.flow.regime.fastest, 1e-300)
+        fastest = self.fastest()
         if time - self.crowd_since > MOMENT / fastest:
             self.crowd_since, self.crowded = time, 0
         self.crowded += 1
@@ -206,6 +207,13 @@ class Motion:
         if meaning == "closes" and time - before < short and self._land(c, 4.0 * short):
             return
         self._go_through(meaning, c)
+
+    def fastest(self) -> float:
+        """What the length of a moment is told by [1/s]: the fastest of all modes met, or else the phase."""
+        piece = self.pieces[self.piece]
+        own = float(np.sqrt(np.abs(self.basis.stiffness).max(initial=0.0)))
+        met = [r.fastest for r in self._regimes.values() if "modes" in vars(r)]
+        return max(own, *met, 1.0 / (piece.end - piece.start))
 
     def _land(self, c: int, moment: float) -> bool:
         """Contact ``c`` closes, which was thrown off within a ``moment`` [s], and all that are closed or were thrown
@@ -239,7 +247,8 @@ class Motion:
         elif meaning == "opens":
             del touching[c]
         elif meaning in ("slips forward", "slips backward"):
-            touching[c] = Touching(0.0, (FORWARD if meaning == "slips forward" else BACKWARD,))
+            first, other = (FORWARD, BACKWARD) if meaning == "slips forward" else (BACKWARD, FORWARD)
+            touching[c] = Touching(0.0, (first, GAP, other))
         else:  # stops
             back = BACKWARD if was[c] == FORWARD else FORWARD
             options = choices(pairs, c, 0.0, STICK).options
@@ -299,9 +308,13 @@ class Motion:
         )
         self._collide([c for c in touching if self.pairs.compliance[c] == 0.0], touching)
 
-    def take_up(self, ratio: Array) -> None:
-        """Go on with q, v at ``time`` under other loads, friction or speeds of supports; ratio (p,): how many times as
-        fast these are as before."""
+    def take_up(self, ratio: Array, touching: Mapping[int, float]) -> None:
+        """Go on with q, v at ``time`` in another model; ratio (p,): how many times as fast supports are as before;
+        touching: contacts that are closed in it, with their slip."""
+        self.status = tuple(
+            (GAP if c not in touching else now if now != GAP else (FORWARD if touching[c] >= 0.0 else BACKWARD))
+            for c, now in enumerate(self.status)
+        )
         self._sizes = np.abs(self.q), np.abs(self.v)
         while self.piece and self.time < self.pieces[self.piece].start:
             self.piece -= 1
@@ -361,7 +374,11 @@ def _watched(regime: Regime, piece: Piece) -> Watched:
         else:
             slip = flow.slip(c)
             s = sense(now)
-            rows = [("opens", normal), ("stops", type(slip)(s * slip.q, s * slip.v, s * slip.p))]
+            rows = [("opens", normal)]
+            # Slip that other contacts hold, or that nothing hangs on, ends with none of these.
+            free = np.linalg.norm(regime.free[0].T @ slip.v) > HELD * np.linalg.norm(slip.v)
+            if free and pairs.sticking[c] > 0.0:
+                rows.append(("stops", type(slip)(s * slip.q, s * slip.v, s * slip.p)))
         for name, row in rows:
             weight, rest = flow.signal(row)
             meanings.append((name, c))

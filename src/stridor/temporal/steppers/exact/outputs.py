@@ -66,13 +66,14 @@ class Outputs:
         record.energies[here, 0], record.energies[here, 1] = kinetic[:count], elastic[:count]
         record.energies[here, 2 : 2 + WORKS] = works + anchor.works(after)[:count]
 
-    def contacts_at(self, anchor: Anchor, after: float) -> Array:
-        """Normal and tangential force and slip speed (m, 3) at one time."""
+    def contacts_at(self, anchor: Anchor, after: Array) -> Array:
+        """Normal and tangential force and slip speed (t, m, 3) at some times (t,)."""
         observed = self._observed(anchor.watched)
         count = CONTACT_ROWS * anchor.watched.flow.regime.pairs.count
-        modes = anchor.zeta * np.exp(anchor.watched.flow.split.poles * after)
-        found = (observed.modes[:count] @ modes).real + observed.slow[:count] @ anchor.slow_at(after)
-        return found.reshape(-1, CONTACT_ROWS)[:, :3]
+        modes = anchor.zeta[:, None] * np.exp(anchor.watched.flow.split.poles[:, None] * after)
+        slow = (after[:, None] ** np.arange(len(anchor.terms))) @ anchor.terms
+        found = (observed.modes[:count] @ modes).real + observed.slow[:count] @ slow.T
+        return found.T.reshape(len(after), -1, CONTACT_ROWS)[:, :, :3]
 
     def _observed(self, watched: Watched) -> _Observed:
         if id(watched) not in self._known:

@@ -8,6 +8,7 @@ of two of these.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,16 +19,22 @@ from .statuses import GAP, STICK, Flow, Row
 RESONANT = 1e-7  # of their size: exponents that cancel so far are integrated one by one
 
 
+class _Still(NamedTuple):
+    """Pairs (r, 2) of modes whose exponents cancel, their weights (r,) and what is left of the exponents (r,)."""
+
+    pairs: IntArray
+    weights: ComplexArray
+    sums: ComplexArray
+
+
 @dataclass(frozen=True)
 class _Form:
-    """One work: forms (f, f) of modes with modes and with their conjugates, pairs of the latter that do not oscillate,
+    """One work: forms (f, f) of modes with modes and with their conjugates, pairs of either whose exponents cancel,
     cross (f, S) of modes with what is slow, slow (S, S)."""
 
     together: ComplexArray | None
     conjugate: ComplexArray | None
-    pairs: IntArray
-    weights: ComplexArray
-    sums: ComplexArray
+    still: tuple[_Still, ...]
     cross: ComplexArray
     slow: Array
 
@@ -107,20 +114,13 @@ class Powers:
         poles = self.flow.split.poles
         cross = first.T @ second_slow + second.T @ first_slow
         slow = first_slow.T @ second_slow
-        none = np.zeros((0, 2), dtype=np.int64)
-        nothing = np.zeros(0, dtype=complex)
         if not (np.any(first) and np.any(second)):
-            return _Form(None, None, none, nothing, nothing, cross, slow)
+            return _Form(None, None, (), cross, slow)
         together = 0.5 * (first.T @ second)
-        together = 0.5 * (together + together.T) / (poles[:, None] + poles[None])
         conjugate = 0.5 * (first.conj().T @ second)
-        conjugate = 0.5 * (conjugate + conjugate.conj().T)
-        sums = poles.conj()[:, None] + poles[None]
-        still = np.abs(sums) <= RESONANT * np.abs(poles)[None]
-        pairs = np.argwhere(still)
-        weights, exponents = conjugate[still], sums[still]
-        conjugate = np.where(still, 0.0, conjugate / np.where(still, 1.0, sums))
-        return _Form(together, conjugate, pairs, weights, exponents, cross, slow)
+        plain = _parted(0.5 * (together + together.T), poles[:, None] + poles[None], poles)
+        turned = _parted(0.5 * (conjugate + conjugate.conj().T), poles.conj()[:, None] + poles[None], poles)
+        return _Form(plain[0], turned[0], (plain[1], turned[1]), cross, slow)
 
     def works(self, zeta: ComplexArray, terms: Array, after: Array) -> Array:
         """Works (t, 5) [J] of modes ζ (f,) and terms (J, S) of what is slow, from zero to some times after (t,)."""
@@ -142,14 +142,21 @@ class Powers:
 
     @staticmethod
     def _resonant(form: _Form, zeta: ComplexArray, times: Array) -> Array:
-        if len(form.pairs) == 0:
-            return np.zeros(len(times))
-        size = form.weights * zeta[form.pairs[:, 0]].conj() * zeta[form.pairs[:, 1]]
-        grown = form.sums[:, None] * times
-        small = np.abs(grown) < 1e-8
-        share = np.where(small, 1.0 + grown / 2, np.expm1(grown) / np.where(small, 1.0, grown))
-        total: Array = (size[:, None] * share * times).sum(axis=0).real
+        total = np.zeros(len(times))
+        for (pairs, weights, sums), first in zip(form.still, (zeta, zeta.conj()), strict=False):
+            size = weights * first[pairs[:, 0]] * zeta[pairs[:, 1]]
+            grown = sums[:, None] * times
+            small = np.abs(grown) < 1e-8
+            share = np.where(small, 1.0 + grown / 2, np.expm1(grown) / np.where(small, 1.0, grown))
+            total += (size[:, None] * share * times).sum(axis=0).real
         return total
+
+
+def _parted(weights: ComplexArray, sums: ComplexArray, poles: ComplexArray) -> tuple[ComplexArray, _Still]:
+    """Weights (f, f) over the sums of exponents, and the pairs for which these cancel."""
+    still = np.abs(sums) <= RESONANT * np.abs(poles)[None]
+    found = _Still(np.argwhere(still), weights[still], sums[still])
+    return np.where(still, 0.0, weights / np.where(still, 1.0, sums)), found
 
 
 def _minus(row: Row) -> Row:

@@ -129,7 +129,7 @@ def _root(
 def first_root(
     numbers: Numbers, poles: ComplexArray, start: ComplexArray, table: Parts, limit: float, level: int
 ) -> tuple[int, int, float, int, int, int]:  # pragma: no cover - compiled
-    """The first of several numbers y_i (m,) to reach zero before ``limit`` [s].
+    """The first of several numbers y_i (m,) to reach zero before ``limit`` [s]; the last part may end behind it.
 
     start ζ (f,): the modes at t = 0; level: that of the first part. Returns what ended it, which number, when, the
     level of the last part, how many parts there were, and how many of the finest could not be decided.
@@ -149,6 +149,7 @@ def first_root(
             let[i] = size - min(now[i], 0.0)
     time, parts, unsure = 0.0, 0, 0
     lowest = table.factors.shape[0] - 1
+    level = min(level, lowest)  # that of another status, whose table may be longer
     while time < limit:
         length = table.longest * 0.5**level
         parts += 1
@@ -177,6 +178,8 @@ def first_root(
             bend += _most(numbers.sizes[which], zeta, table.turned[level])
             if max(rate[which], later[which]) + bend < 0.0:
                 t = _root(numbers.weights[which], numbers.rows[which], poles, zeta, time, length, let[which])
+                if time + t > limit:
+                    break
                 return CROSSED, which, time + t, level, parts, unsure
         if below + doubtful and level < lowest:
             level += 1
@@ -188,6 +191,8 @@ def first_root(
                     t = _root(numbers.weights[i], numbers.rows[i], poles, zeta, time, length, let[i])
                     if t < first:
                         which, first = i, t
+            if time + first > limit:
+                break
             return CROSSED, which, time + first, level, parts, unsure
         unsure += doubtful
         if unsure > MOST_UNSURE:

@@ -25,9 +25,10 @@ from .drive import Piece
 GAP, STICK, FORWARD, BACKWARD = range(4)  # a slave that slips moves along the tangent, or against it
 Status = tuple[int, ...]
 SLOW = 1e-7  # of the fastest mode: what is slower is one small system, moved on by its Taylor series
-RAMP = 0.5  # rad over a ramp: likewise
+RAMP = 3.0  # rad over a ramp: likewise
 TAYLOR = 24  # terms of that series
 JAMMED = 1e-9
+DEFECTIVE = 1e4  # condition of a mode by whose square rounding grows: balances then still close to 1e-8
 
 
 @dataclass(frozen=True)
@@ -176,6 +177,13 @@ class Regime:
         fast = np.sort(order[count:])
         inverse = np.linalg.inv(np.hstack([vectors[:, fast], together]))
         spread = np.linalg.norm(inverse[: len(fast)], axis=1) * np.linalg.norm(vectors[:, fast], axis=0)
+        if spread.max(initial=1.0) > DEFECTIVE:
+            worst = abs(complex(poles[fast][int(np.argmax(spread))]))
+            raise AnalysisError(
+                f"two modes at {worst:.6g} rad/s are all but one while contacts are {self._words()} (critical damping, "
+                "or friction right at an onset): the exact stepper has no modes to go on with; change the damping or μ "
+                'a little, or take stepper = "explicit"'
+            )
         kept = fast[poles[fast].imag >= 0.0]
         rows = np.flatnonzero(poles[fast].imag >= 0.0)
         weight = np.where(poles[kept].imag > 0.0, 2.0, 1.0)
@@ -183,6 +191,10 @@ class Regime:
             poles[kept], vectors[:, kept] * weight, np.ascontiguousarray(inverse[rows]), small, together,
             np.ascontiguousarray(inverse[len(fast) :].real), float(spread.max(initial=1.0)),
         )  # fmt: skip
+
+    def _words(self) -> str:
+        words = {GAP: "open", STICK: "stuck"}
+        return ", ".join(words.get(now, "slipping") for now in self.status)
 
     def slower_than(self, rate: float) -> Split:
         """The same with modes slower than a rate [1/s] kept together too."""

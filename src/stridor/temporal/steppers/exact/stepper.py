@@ -53,6 +53,8 @@ from .statuses import BACKWARD, GAP, STICK, Pairs
 
 MOST_CONTACTS = 4
 MOST_FREEDOMS = 1500
+SAMPLE = 0.1  # rad of the fastest mode between times at which the largest forces are looked for
+MOST_SAMPLES = 100_000  # numbers for that between two changes
 DONE = 0  # where the counters have the steps done
 
 
@@ -200,7 +202,7 @@ class ExactStepper:
     def begin(self, schedule: Schedule, settings: Settings, mu: float | None, disturbance: Disturbance | None) -> None:
         """At rest or in steady sliding, disturbed if so asked."""
         self._lay_out(schedule)
-        system, basis, motion = self._system, self.basis, self.motion
+        system, motion = self._system, self.motion
         stretch = schedule.stretches[0]
         u, v = np.zeros(system.size), np.zeros(system.size)
         steady = settings.initial == "steady-sliding"
@@ -226,29 +228,29 @@ class ExactStepper:
             v = v if system.initial_velocity is None else v + system.initial_velocity
         if disturbance is not None:
             u, v = u + disturbance[0], v + disturbance[1]
-        weight = system.mass @ basis.vectors
-        motion.q, motion.v = weight.T @ u, weight.T @ v
+        motion.q, motion.v = self._coordinates(u, v)
         piece = motion.pieces[0]
         speed = piece.displacements @ piece.derivative @ piece.powers(0.0)
         if not steady:
             push = self.pairs.inertia.T @ speed
             motion.v = motion.v - push
-        motion.start(self._touching(active, steady=steady))
+        motion.start(self._touching(active if steady else None))
 
-    def _touching(self, active: Array, *, steady: bool) -> dict[int, float]:
-        """Contacts that are closed at the start, and their slip [m/s]."""
-        motion, pairs, piece = self.motion, self.pairs, self.motion.pieces[0]
-        moved = piece.displacements @ piece.powers(0.0)
-        speed = piece.displacements @ piece.derivative @ piece.powers(0.0)
+    def _touching(self, active: Array | None, rounding: float = 1e-12) -> dict[int, float]:
+        """Contacts that are closed now, and their slip [m/s]; active (m,): which those are, where that is known."""
+        motion, pairs = self.motion, self.pairs
+        piece = motion.pieces[motion.piece]
+        moved = piece.displacements @ piece.powers(motion.time)
+        speed = piece.displacements @ piece.derivative @ piece.powers(motion.time)
         found: dict[int, float] = {}
         for c, name in enumerate(self.contact_names):
             parts = np.concatenate([pairs.normal[c] * motion.q, pairs.normal_lift[c] * moved, pairs.gap[c : c + 1]])
             gap, size = float(parts.sum()), float(np.abs(parts).sum())
-            closed = bool(active[c]) if steady else gap <= 1e-12 * size
+            closed = gap <= rounding * size if active is None else bool(active[c])
             if closed and pairs.compliance[c] == 0.0 and gap < -1e-6 * size:
                 raise CaseError(
                     f"contacts.{name}",
-                    f"a gap of {gap:.4g} m at the start",
+                    f"a gap of {gap:.4g} m at t = {motion.time:g} s",
                     "a gap >= 0 where contact is rigid; start from steady sliding, press with a ramp, or take "
                     'stepper = "explicit"',
                 )
@@ -274,9 +276,11 @@ class ExactStepper:
             q, v = motion.anchor.state(now)
             works = works + motion.anchor.works(np.array([now - motion.anchor.time]))[0]
         counters = [self._done, motion.piece, motion.level, motion.events, motion.unsure, motion.crowded, motion.landed]
+        vectors = self.basis.vectors
         found: dict[str, Any] = {
-            "exact_q": motion.q, "exact_v": motion.v, "exact_holds": holds, "exact_works": motion.works,
-            "exact_now_q": q, "exact_now_v": v, "exact_now_works": works,
+            "exact_u": vectors @ motion.q, "exact_w": vectors @ motion.v, "exact_q": motion.q, "exact_v": motion.v,
+            "exact_now_u": vectors @ q, "exact_now_w": vectors @ v, "exact_now_works": works,
+            "exact_holds": holds, "exact_works": motion.works,
             "exact_times": np.array([motion.time, self._counted, motion.crowd_since, motion.latest]),
             "exact_parted": motion.parted, "exact_parted_from": motion.parted_from,
             "exact_status": np.array(motion.status, dtype=np.int64), "exact_counters": np.array(counters),
@@ -316,11 +320,21 @@ class ExactStepper:
         motion.parted_from = np.array(saved["exact_parted_from"], dtype=np.int64)
         if not changed:
             motion.q, motion.v = (np.array(saved[f"exact_{name}"], dtype=float) for name in ("q", "v"))
+            # Modes may have another sign or order elsewhere: then what freedoms do counts.
+            u = saved["exact_u"]
+            if np.abs(self.basis.vectors @ motion.q - u).max(initial=0.0) > 1e-12 * np.abs(u).max(initial=0.0):
+                motion.q, motion.v = self._coordinates(saved["exact_u"], saved["exact_w"])
             return
-        motion.q, motion.v = (np.array(saved[f"exact_now_{name}"], dtype=float) for name in ("q", "v"))
+        motion.q, motion.v = self._coordinates(saved["exact_now_u"], saved["exact_now_w"])
         motion.works = np.array(saved["exact_now_works"], dtype=float)
         motion.time = self._done * self.scheme.step
-        motion.take_up(motion_ratio(self.parts, restart, self._system.motion.names))
+        ratio = motion_ratio(self.parts, restart, self._system.motion.names)
+        motion.take_up(ratio, self._touching(None, 1e-9))
+
+    def _coordinates(self, u: Array, w: Array) -> tuple[Array, Array]:
+        """Displacement and velocity (n,) of the freedoms in coordinates (k,)."""
+        weight = self._system.mass @ self.basis.vectors
+        return weight.T @ np.asarray(u, dtype=float), weight.T @ np.asarray(w, dtype=float)
 
     def make_room(self, schedule: Schedule, settings: Settings) -> None:
         """Room for all records from the present step on; loads the compiled search."""
@@ -399,8 +413,12 @@ class ExactStepper:
                 self.statistics[c, first] = self._counted / step
         self._counted = max(time, self._counted)
         anchor = self.motion.anchor
-        if anchor is not None and len(self.contact_names):
-            self._extremes(np.abs(self.outputs.contacts_at(anchor, time - anchor.time)))
+        if anchor is None or share == 0.0 or not len(self.contact_names):
+            return
+        fine = share * step * self.motion.fastest() / SAMPLE
+        count = int(min(np.ceil(fine) + 1, max(MOST_SAMPLES // max(len(anchor.zeta), 1), 64)))
+        times = np.linspace(time - share * step, time, max(count, 2)) - anchor.time
+        self._extremes(np.abs(self.outputs.contacts_at(anchor, np.maximum(times, 0.0))).max(axis=0))
 
     def velocity(self) -> Array:
         """Velocity (n,) of the freedoms now."""
