@@ -16,7 +16,7 @@ from stridor.system import System
 SOURCES = Path(stridor.__file__).parent
 KINDS = {"assembled", "beyond_points", "general", "kind", "is_assembled", "is_general"}
 # Who says by facts alone which systems it takes.
-REFUSING = {"modal/source.py", "temporal/steppers/modal/stepper.py"}
+REFUSING = {"modal/source.py", "temporal/steppers/exact/stepper.py", "temporal/steppers/modal/stepper.py"}
 
 
 def modules() -> Iterator[tuple[str, ast.Module]]:
