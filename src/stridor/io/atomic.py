@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import platform
 import re
 import tempfile
 from collections.abc import Generator
@@ -12,9 +11,9 @@ from pathlib import Path
 
 from ..errors import AnalysisError
 from ..interrupts import held
-from .processes import Process, this_process
+from .processes import left_behind, this_process
 
-_TEMPORARY = re.compile(r"^\..+\.stridor-(?P<host>[^.]+)\.(?P<number>\d+)\.(?P<started>\d+)\.[^.]+(\.[^.]*)?$")
+_TEMPORARY = re.compile(r"^\..+\.stridor-(?P<mark>[^.]+\.\d+\.\d+)\.[^.]+(\.[^.]*)?$")
 
 
 @contextlib.contextmanager
@@ -59,14 +58,9 @@ def write_text(path: Path, text: str) -> None:
 
 def remove_remains(folder: Path) -> None:
     """Remove temporary files that processes left which are dead; of other computers nothing is known, so they stay."""
-    own = this_process()
     with contextlib.suppress(OSError):
         for file in folder.iterdir():
             found = _TEMPORARY.match(file.name)
-            if found is None or not own.mark.startswith(f"{found['host']}."):
-                continue
-            number, started = int(found["number"]), found["started"]
-            left = Process(platform.node(), number, "" if started == "0" else started)
-            if left != own and left.dead:
+            if found is not None and left_behind(found["mark"]):
                 with contextlib.suppress(OSError):
                     file.unlink()

@@ -41,6 +41,17 @@ def this_process() -> Process:
     return Process(platform.node(), os.getpid(), _started(os.getpid()))
 
 
+def left_behind(mark: str) -> bool:
+    """Whether what has this `Process.mark` in its name is of a process that is known to be dead; never so of those of
+    other computers, of which nothing is known."""
+    host, number, started = mark.split(".")
+    own = this_process()
+    if not own.mark.startswith(f"{host}."):
+        return False
+    left = Process(own.host, int(number), "" if started == "0" else started)
+    return left != own and left.dead
+
+
 def _started(number: int) -> str:
     """Start of a process, "" where the system does not tell."""
     try:

@@ -17,6 +17,7 @@ from typing import Any
 
 from ... import interrupts
 from ...errors import AnalysisError, CaseError
+from .folders import remove_left
 from .guard import Guard, new_token
 from .session import Session
 from .state import Source, template_sources
@@ -109,6 +110,7 @@ class Server:
 
         from .layout import page
 
+        remove_left()
         self._socket = bound(self.port)
         self.port = self._socket.getsockname()[1]
         outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 from ...case import Case
 from ...errors import CaseError
+from .folders import new_folder
 from .levers import Lever, levers
 from .runs import Queue, Run, Wish
 from .state import History, Source, State, checked, file_text, first_state, from_link, to_link
@@ -58,7 +57,7 @@ class Session:
         self._moving: object = None
         self.picture = Picture()
         self.heard = 0  # number of the newest move of the page that has come here
-        self.folder = Path(tempfile.mkdtemp(prefix="stridor-page-"))
+        self.folder = new_folder()
         self._worker = Worker(self._answered, program)
         self.closed = False
         self.study: Mapping[str, Any] | None = None  # samples of a study, for the map
