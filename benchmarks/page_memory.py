@@ -1,24 +1,30 @@
 """Random use of the page: does the server, the page's processes or the browser's page grow?
 
 python benchmarks/page_memory.py [--minutes 60] [--short]
-Moves, modes, tabs, undo, runs begun, heard and stopped, at random. Printed are the memory of the server with its
-processes, what of it is their own (the rest are files of libraries, whose share is less the more other programs use
-them), and the heap of the page, rubbish collected, after a twelfth of the time (five minutes of an hour) and at the
-end. Needs the extra app, playwright, Linux, and Chromium at /usr/bin/chromium; without them it says so and leaves.
+Moves, modes, tabs, undo, runs begun, heard and stopped, at random. Printed are, after each twelfth of the time (five
+minutes of an hour), the memory of the server with its processes, what of it is their own (the rest are files of
+libraries, whose share is less the more other programs use them), and of the page, rubbish collected: the heap, what of
+it is compiled script, and how many nodes and listeners there are. Needs the extra app, playwright, Linux, and Chromium
+at /usr/bin/chromium; without them it says so and leaves.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import random
 import subprocess
 import sys
 import time
+from collections import Counter
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 CHROMIUM = Path("/usr/bin/chromium")
+SAMPLES = 12  # over the time
+SCRIPT = "code"  # of the heap, as its browser calls it
 START = "typeof stridor !== 'undefined' && stridor.state.onsets !== null && stridorRun.page.ready"
 
 
@@ -34,15 +40,15 @@ def main() -> None:
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     try:
-        use(server.stdout.readline().strip(), server.pid, 60 * (0.5 if args.short else args.minutes))
+        use(server.stdout.readline().strip(), server.pid, *((30.0, 2) if args.short else (60 * args.minutes, SAMPLES)))
     finally:
         server.terminate()
         server.wait(20)
         server.stdout.close()
 
 
-def use(address: str, server: int, seconds: float) -> None:
-    """Use the page for so long, and say what it takes."""
+def use(address: str, server: int, seconds: float, times: int) -> None:
+    """Use the page for so long, and say what it takes, so many times."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -53,17 +59,17 @@ def use(address: str, server: int, seconds: float) -> None:
         page.goto(address)
         page.wait_for_function(START, timeout=600_000)
         counter = page.context.new_cdp_session(page)
-        began, early, chance, acts = time.monotonic(), None, random.Random(7), 0
-        while time.monotonic() - began < seconds:
+        counter.send("Performance.enable")
+        began, chance, acts, samples = time.monotonic(), random.Random(7), 0, list[Sample]()
+        while len(samples) < times:
             act(page, chance)
             acts += 1
-            if early is None and time.monotonic() - began > seconds / 12:
-                early = told(page, counter, server, acts, "after a twelfth")
-        late = told(page, counter, server, acts, "at the end")
-        if early is not None:
-            ratios = [b / a for a, b in zip(early, late, strict=True)]
-            server_, own, heap = ratios
-            print(f"  ratio of the end to a twelfth of the time: server {server_:.2f} (own {own:.2f}), page {heap:.2f}")
+            if time.monotonic() - began > seconds * (len(samples) + 1) / times:
+                samples.append(sample(page, counter, server))
+                print(f"{(time.monotonic() - began) / 60:5.1f} min, {acts} acts: {samples[-1].words()}", flush=True)
+        early, late = samples[0].mb, samples[-1].mb
+        ratios = ", ".join(f"{key} {late[key] / early[key]:.2f}" for key in early)
+        print(f"  ratio of the last to the first: {ratios}")
         print(f"  errors of the page's script: {len(failures)}{': ' + failures[0] if failures else ''}")
         browser.close()
 
@@ -92,17 +98,50 @@ def act(page: Any, chance: random.Random) -> None:
     time.sleep(chance.expovariate(1 / 0.4))
 
 
-def told(page: Any, counter: Any, server: int, acts: int, when: str) -> tuple[float, float, float]:
-    """Memory of the server with its processes, no run under way, what of it is their own, and of the page [MB];
-    printed."""
+@dataclass(frozen=True)
+class Sample:
+    """Memory [MB] of what, and numbers of things in the page."""
+
+    mb: dict[str, float]
+    counts: dict[str, int]
+
+    def words(self) -> str:
+        """One line of all."""
+        memory = ", ".join(f"{key} {value:.1f} MB" for key, value in self.mb.items())
+        return f"{memory}; {', '.join(f'{value} {key}' for key, value in self.counts.items())}"
+
+
+def sample(page: Any, counter: Any, server: int) -> Sample:
+    """What the server with its processes and the page take, no run under way."""
     page.evaluate("document.getElementById('st-run-stop').click()")
     time.sleep(5)
-    counter.send("HeapProfiler.collectGarbage")
-    heap = page.evaluate("performance.memory.usedJSHeapSize") / 1e6
+    sizes = by_type(counter)
+    script = sizes[SCRIPT] / 1e6
+    told = {one["name"]: one["value"] for one in counter.send("Performance.getMetrics")["metrics"]}
     memory, own = resident(server)
-    words = f"server and its processes {memory:.0f} MB (own {own:.0f}), heap of the page {heap:.1f} MB"
-    print(f"{when}, {acts} acts: {words}", flush=True)
-    return memory, own, heap
+    heap = told["JSHeapUsedSize"] / 1e6
+    counts = {"nodes": int(told["Nodes"]), "listeners": int(told["JSEventListeners"])}
+    return Sample({"server": memory, "own": own, "heap": heap, "script": script, "objects": heap - script}, counts)
+
+
+def by_type(counter: Any) -> Counter[str]:
+    """Bytes of the page's heap by the type that the browser gives them, rubbish collected."""
+    chunks: list[str] = []
+
+    def heard(event: Any) -> None:
+        chunks.append(event["chunk"])
+
+    counter.on("HeapProfiler.addHeapSnapshotChunk", heard)
+    counter.send("HeapProfiler.takeHeapSnapshot")
+    counter.remove_listener("HeapProfiler.addHeapSnapshotChunk", heard)
+    taken = json.loads("".join(chunks))
+    fields = taken["snapshot"]["meta"]["node_fields"]
+    kinds = taken["snapshot"]["meta"]["node_types"][0]
+    nodes, step, size = taken["nodes"], len(fields), fields.index("self_size")
+    found: Counter[str] = Counter()
+    for start in range(0, len(nodes), step):
+        found[kinds[nodes[start]]] += nodes[start + size]
+    return found
 
 
 def resident(process: int) -> tuple[float, float]:
