@@ -148,9 +148,19 @@ def exact_steps() -> None:
     save(figure, "exact", (8, 3.2))
 
 
+def cycles() -> None:
+    """The minimal model of mode coupling over friction: the branch from the onset, and the loud one."""
+    text = (Path(__file__).parent / "limit-cycles.md").read_text(encoding="utf-8")
+    block = text.partition("```python\n")[2].partition("found = ")[0].replace("(-0.1, 0)", "(-1, 0)")
+    known: dict = {}
+    exec(block, known)  # the case of the page, on a faster belt
+    save(st.plot.cycle_branches(st.cycles(known["case"], between=(0.6, 1.8))), "cycles", (7, 4.4))
+
+
 if __name__ == "__main__":
     save(st.plot.model(case), "two-beams", (8, 3.4))
     save(st.plot.model(pad), "pad-on-disc", (7, 4.4))
     listed = imported_branches, steady_pressure, factors, listing, ensemble, study, study_cost, boundary, exact_steps
+    listed += (cycles,)
     for draw in listed:
         draw()

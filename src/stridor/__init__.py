@@ -6,6 +6,7 @@
     st.onsets(case)              # every critical friction coefficient, solved
     st.modes(case, mu=0.1)       # complex modes, branches followed from μ = 0
     st.simulate(case)            # explicit dynamics with unregularised Coulomb friction
+    st.cycles(case)              # what it then swings in: limit cycles, followed over friction
     st.compare(case)             # do both approaches agree?
     st.run(case, "out")          # all of it, and a report
 
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from .study.boundary import stability_boundary
     from .study.copies import perturbed_copies
     from .study.countermeasures import rank_countermeasures
+    from .study.cycles import cycles
     from .study.damping_map import damping_map
     from .study.ensemble import ensemble
     from .study.pencil import pencil
@@ -63,6 +65,7 @@ _HOMES = {
     "body_modes": ".study.analyses",
     "build_system": ".system",
     "compare": ".study.analyses",
+    "cycles": ".study.cycles",
     "damping_map": ".study.damping_map",
     "describe": ".study.analyses",
     "ensemble": ".study.ensemble",
@@ -107,6 +110,7 @@ __all__ = [
     "body_modes",
     "build_system",
     "compare",
+    "cycles",
     "damping_map",
     "describe",
     "ensemble",

@@ -17,6 +17,7 @@ import xarray as xr
 
 import stridor as st
 from marching import in_chunks
+from mode_coupling import mode_coupling
 from program import stridor
 from rubbing_block import rubbing_block
 from stridor.agreement import Perturbation
@@ -40,7 +41,7 @@ COARSE = {
 }
 # One damage in so many is enough to see a mechanism fail; all of them take minutes.
 SAMPLED = pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 13])
-KINDS = ("beams", "solids", "modes", "onsets", "compare", "boundary")
+KINDS = ("beams", "solids", "modes", "onsets", "compare", "boundary", "cycles")
 
 
 @functools.cache
@@ -68,6 +69,8 @@ def result(kind: str):
         )  # fmt: skip
         places = (CountedAt(0.2, 0.3, 1),), True, "one curve", "reduced", 30, 200, 40, 7, (SolvedAgain(0, 0.4, 1.4, 1e-6, 1e-13),)
         return Boundary("x", "mu", (0.0, 1.0), (0.0, 2.0), 1e3, (curve, curve), (0.0, 1.0), (0.0, 2.0), *places)
+    if kind == "cycles":
+        return st.cycles(mode_coupling(0.02, 0.1), [0.9, 1.0, 1.1])
     if kind == "compare":
         part = Perturbation(0.2, 3 + 4e4j, np.zeros(3), 1e-5, Components(np.zeros(0, complex), np.zeros(0)))
         row = Comparison(0.2, 3 + 4e4j, (6e3,), (3.0,), part, 6.1e3, None, 1e-3, 2e-3, 0.97, 0, True, "agrees")

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import stridor as st
+from mode_coupling import mode_coupling
 from program import stridor
 from stridor.case import template_text
 from stridor.io import atomic
@@ -30,6 +31,7 @@ VERBS = {
     "countermeasures": (["--mu", "0.2", "--verify", "1"], ["countermeasures.csv"]),
     "damping-map": (MAP, ["damping_map.csv"]),
     "boundary": (BOUNDARY, ["boundary.csv"]),
+    "cycles": (["--mu", "1.0"], ["cycles.csv"]),
     "ensemble": (["--mu", "0.05,0.2", "--set", "temporal.record_every=5"], ["ensemble.csv"]),
     "reduce": (REDUCE, ["reduced.csv", "reduced-onsets.csv"]),
 }
@@ -58,6 +60,7 @@ def read(path: Path) -> list[dict[str, str]]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("csv")
     (made / "case.toml").write_text(st.loads(template_text("two-beams"), FEW).text, encoding="utf-8")
+    (made / "rub.toml").write_text(mode_coupling(0.02, 0.1).text, encoding="utf-8")
     return made
 
 
@@ -65,7 +68,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def documents(folder: Path) -> dict[str, dict]:
     found: dict[str, dict] = {}
     for name, (words, files) in VERBS.items():
-        done = stridor(name.split()[0], "case.toml", *words, "--json", cwd=folder)
+        case = "rub.toml" if name == "cycles" else "case.toml"
+        done = stridor(name.split()[0], case, *words, "--json", "--out", "case.out", cwd=folder)
         assert done.returncode == 0, done.stderr
         for file in files:
             assert f"written: case.out/{file}" in done.stderr or file in str(json.loads(done.stdout).get("files"))

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import stridor as st
+from mode_coupling import mode_coupling
 from program import stridor
 from stridor.app.option_table import EVERY
 from stridor.case import template_text
@@ -39,6 +40,7 @@ WORDS = {
     "damping-map": ["case.toml", *DAMPINGS.split()],
     "boundary": ["case.toml", *BOUNDARY.split()],
     "reduce": ["case.toml", "--box", "mu=0:0.3", "--at", "mu=0.1", "--onsets", "mu"],
+    "cycles": ["rub.toml", "--mu", "1.0"],
     "steady": ["case.toml"],
     "shapes": ["case.toml", "--mu", "0.2"],
     "simulate": ["case.toml", "--copies", "2"],
@@ -57,7 +59,7 @@ parameters."bodies.beam1.damping.mass".range = [1.0, 10.0]
 sampling = { method = "sobol", samples = 4 }
 """
 # Tables whose keys are names of the case or of the result, not words of the document.
-NAMED = {"contacts", "bodies", "first_regime", "settled", "matrices", "copies", "seconds", "point", "parameters"}
+NAMED = {"amplitudes", "contacts", "bodies", "first_regime", "settled", "matrices", "copies", "seconds", "point", "parameters"}
 
 
 def told() -> tuple[set[str], dict[str, set[str]]]:
@@ -90,6 +92,7 @@ def names(value: Any) -> Iterator[str]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("json")
     (made / "case.toml").write_text(st.loads(template_text("two-beams"), FEW).text, encoding="utf-8")
+    (made / "rub.toml").write_text(mode_coupling(0.02, 0.1).text, encoding="utf-8")
     (made / "study.toml").write_text(STUDY, encoding="utf-8")
     assert stridor("study", "study.toml", "--quiet", cwd=made).returncode == 0
     assert stridor("export", "case.toml", "--quiet", cwd=made).returncode == 0

@@ -51,6 +51,7 @@ VERBS = {
     "damping-map": ["--x", "bodies.beam1.damping.mass", "--y", "bodies.beam2.damping.mass", "--x-range", "0:5",
                     "--y-range", "0:5", "--points", "2"],
     "boundary": ["--x", "bodies.beam1.damping.mass", "--x-range", "0:5", "--y", "mu", "--y-range", "0:0.5", "--lines", "2"],
+    "cycles": ["--mu", "0.01", "--push", "1e-4"],
     "ensemble": ["--mu", "0.4,0.5", "--sweep", "both", "--set", "temporal.record_every=5"],
     "run": [],
 }
@@ -71,7 +72,7 @@ for verb in sys.argv[2].split(";"):
     ("template", "changes", "left_out"),
     [
         ("two-beams", BEAMS, ()),
-        pytest.param("pad-on-disc", PAD, ("compare", "run", "damping-map", "ensemble", "boundary"), marks=pytest.mark.slow),
+        pytest.param("pad-on-disc", PAD, ("compare", "run", "cycles", "damping-map", "ensemble", "boundary"), marks=pytest.mark.slow),
     ],
 )
 def test_every_verb_is_silent(tmp_path: Path, template: str, changes: list[str], left_out: tuple[str, ...]) -> None:

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mode_coupling import mode_coupling
 from program import stridor
 from stridor.app import output, tables
 from stridor.app.arguments import Call
@@ -95,6 +96,9 @@ ENDS = {
     "ensemble two-beams.toml --mu 0.3 --load 0.5,0.5 COARSE": (
         "2 members: ", "simulate two-beams.toml --mu 0.3 COARSE"
     ),
+    "cycles rub.toml --mu 1.0": (
+        "1 limit cycle at μ = 1: 1 stable", "simulate rub.toml --stepper exact --mu 1"
+    ),
     "simulate two-beams.toml COARSE": ("last phase: 5970.1 Hz dominates, ", "compare two-beams.toml COARSE"),
     "compare two-beams.toml --no-critical COARSE": (
         "agree: μ = 0.1: both unstable at 8651.1 Hz, growth 642.2 against 641.6 1/s (0.1 %)",
@@ -113,6 +117,7 @@ ENDS = {
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("page")
+    (path / "rub.toml").write_text(mode_coupling(0.02, 0.1).text, encoding="utf-8")
     for name in ("two-beams", "pad-on-disc"):
         done = stridor("new", name, cwd=path)
         assert done.stdout == f"{NEXT}check {name}.toml\n"

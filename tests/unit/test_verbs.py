@@ -25,6 +25,7 @@ ANY = "a case, the path of its file, a system or a workspace"
 VERBS: dict[str, Callable[[Any, Path], object]] = {
     "body_modes": lambda p, _: st.body_modes(p),
     "compare": lambda p, _: st.compare(p, only=["growth"]),
+    "cycles": lambda p, _: st.cycles(p, 0.01, push=1e-4),
     "damping_map": lambda p, _: st.damping_map(
         p, *MASS, x_range=(1, 20), y_range=(1, 20), grid=(2, 2), mu_range=(0, 0.2)
     ),

@@ -11,6 +11,7 @@ import pytest
 
 import stridor as st
 from marching import belt_motion, block_on_belt, in_chunks, points_of, run, touch
+from mode_coupling import mode_coupling
 from stridor.case import template_text
 from stridor.laws import Coulomb, StaticKinetic, Weakening
 from stridor.study.settings import settings_of
@@ -252,38 +253,6 @@ def test_the_first_root_is_the_first():
         assert abs(at) < 1e-12
     assert met > 100
     assert missed == 0
-
-
-def mode_coupling(**changes: Any) -> st.Case:
-    """A mass between two oblique springs on a belt (Hoffmann et al. 2002): flutter from μ = 3/4 on."""
-
-    def oblique(angle_deg: float, stiffness: float) -> dict[str, Any]:
-        angle = math.radians(angle_deg)
-        return {"between": ("m", "ground"), "direction": (math.cos(angle), math.sin(angle)), "stiffness": stiffness}
-
-    case = st.Case(
-        units="nondimensional",
-        bodies={
-            "m": {"type": "mass", "mass": 1.0, "position": (0, 0)},
-            "belt": {
-                "type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (0, 1), "sliding": {"velocity": (-1, 0)}
-            },
-        },
-        springs={"k1": oblique(150, 2 / 3 * (2 - 3**0.5)), "k2": oblique(30, 2 / 3 * (2 + 3**0.5))},
-        loads={"press": {"at": "m", "force": (0, -1)}},
-        contacts={
-            "rub": {
-                "slave": "m", "master": "belt", "stiffness": 4 / 3, "friction": {"law": "coulomb", "coefficient": 0.9}
-            }
-        },
-        modal={"max_frequency_hz": 1.0},
-        phases=[{"name": "slide", "duration": 60.0}],
-        temporal={
-            "initial": "steady-sliding", "perturbation": 1e-4, "step": 0.05, "record_every": 1, "watch": ["m"],
-            "stepper": "exact",
-        },
-    )  # fmt: skip
-    return case.with_(changes)
 
 
 @pytest.mark.parametrize("mu", [None, 1.1])

@@ -13,7 +13,7 @@ import typer
 
 from .. import interrupts
 from ..errors import CaseError, StridorError
-from . import about, ensemble, explore, launch, modal, page_command, sound, study, temporal
+from . import about, cycles, ensemble, explore, launch, modal, page_command, sound, study, temporal
 
 app = typer.Typer(
     name="stridor",
@@ -25,7 +25,7 @@ app = typer.Typer(
 )
 
 
-TOPICS = (about, modal, temporal, explore, study, ensemble, sound, page_command)
+TOPICS = (about, modal, temporal, cycles, explore, study, ensemble, sound, page_command)
 for verbs in (topic.VERBS for topic in TOPICS):
     for name, call in verbs.items():
         app.command(name=name)(call)

@@ -13,8 +13,8 @@ from typing import Annotated, Any
 import typer
 
 COMPUTING = (
-    "steady", "shapes", "modes", "onsets", "simulate", "compare", "run", "report", "sensitivities", "countermeasures",
-    "damping-map", "boundary", "reduce",
+    "steady", "shapes", "modes", "onsets", "simulate", "cycles", "compare", "run", "report", "sensitivities",
+    "countermeasures", "damping-map", "boundary", "reduce",
 )  # fmt: skip
 ABOUT = ("new", "check", "matrices", "export")  # verbs about the case itself
 STUDIES = ("study", "plot", "ensemble")  # of many samples of a case
@@ -52,10 +52,10 @@ Mu = Annotated[
     str | None,
     _option(
         "--mu",
-        "Friction coefficient of every contact; modes, compare and ensemble take several: a,b or start:stop:count "
-        "[default: the case's own, of compare comparison.mu].",
+        "Friction coefficient of every contact; modes, compare and ensemble take several: a,b or start:stop:count, "
+        "and cycles a range low:high [default: the case's own, of compare comparison.mu].",
         metavar="MU",
-        on="steady shapes modes simulate compare report sensitivities countermeasures export ensemble",
+        on="steady shapes modes simulate cycles compare report sensitivities countermeasures export ensemble",
         lacks="onsets=sought run=--range damping-map=sought boundary=--set reduce=--at",
     ),
 ]
@@ -63,9 +63,9 @@ Range = Annotated[
     str | None,
     _option(
         "--range",
-        "Range of μ in which onsets are sought [default: modal.friction_range].",
+        "Range of μ in which onsets are sought and cycles followed [default: modal.friction_range].",
         metavar="LOW:HIGH",
-        on="onsets compare run report damping-map",
+        on="onsets cycles compare run report damping-map",
         lacks="steady=--mu shapes=--mu modes=--mu simulate=--mu sensitivities=--mu countermeasures=--mu "
         "boundary=--y-range reduce=--box",
     ),
@@ -86,7 +86,8 @@ Band = Annotated[
         "Only what has a frequency [Hz] in this band; numbers of modes stay those of the whole list.",
         metavar="LOW:HIGH",
         on="modes shapes onsets sensitivities",
-        lacks="steady=static simulate=time compare=pairs run=page report=page countermeasures=sum damping-map=lowest "
+        lacks="steady=static simulate=time cycles=all compare=pairs run=page "
+        "report=page countermeasures=sum damping-map=lowest "
         "boundary=curves reduce=unnumbered",
     ),
 ]
@@ -97,7 +98,8 @@ Branch = Annotated[
         "Mode by its number in `modes`. Repeatable [default: the unstable ones].",
         metavar="NUMBER",
         on="shapes sensitivities countermeasures",
-        lacks="steady=static modes=--band onsets=--band simulate=time compare=fastest run=fastest report=fastest "
+        lacks="steady=static modes=--band onsets=--band simulate=time cycles=all "
+        "compare=fastest run=fastest report=fastest "
         "damping-map=lowest boundary=curves reduce=unnumbered",
     ),
 ]
@@ -107,7 +109,7 @@ Unstable = Annotated[
         "--unstable",
         "List unstable modes alone.",
         on="modes",
-        lacks="steady=static shapes=default onsets=all simulate=time compare=fastest run=page report=page "
+        lacks="steady=static shapes=default onsets=all simulate=time cycles=all compare=fastest run=page report=page "
         "sensitivities=default countermeasures=default damping-map=lowest boundary=curves reduce=unnumbered",
     ),
 ]
@@ -118,7 +120,8 @@ Sort = Annotated[
         "What comes first: lowest or fastest growing.",
         metavar="frequency|growth",
         on="modes",
-        lacks="steady=static shapes=growth onsets=μ simulate=time compare=μ run=page report=page sensitivities=growth "
+        lacks="steady=static shapes=growth onsets=μ simulate=time cycles=μ "
+        "compare=μ run=page report=page sensitivities=growth "
         "countermeasures=effect damping-map=grid boundary=curves reduce=frequency",
     ),
 ]
@@ -137,7 +140,8 @@ Undamped = Annotated[
         "--undamped",
         "Leave structural damping out.",
         on="modes shapes onsets sensitivities countermeasures",
-        lacks="steady=static simulate=time compare=time run=both report=both damping-map=damping boundary=kept "
+        lacks="steady=static simulate=time cycles=time compare=time run=both "
+        "report=both damping-map=damping boundary=kept "
         "reduce=kept",
     ),
 ]
@@ -149,7 +153,8 @@ Box = Annotated[
         "[parameters], else mu over modal.friction_range].",
         metavar="NAME=LOW:HIGH",
         on="reduce",
-        lacks="steady=--mu shapes=--mu modes=--mu onsets=--between simulate=--mu compare=--range run=--range "
+        lacks="steady=--mu shapes=--mu modes=--mu onsets=--between simulate=--mu "
+        "cycles=--range compare=--range run=--range "
         "report=--mu sensitivities=--mu countermeasures=--mu damping-map=--x-range boundary=--x-range",
     ),
 ]
@@ -160,7 +165,8 @@ At = Annotated[
         "Values to solve at: 0.1,0.2 or start:stop:count. Repeatable.",
         metavar="NAME=VALUES",
         on="reduce",
-        lacks="steady=--set shapes=--set modes=--set onsets=--set simulate=--set compare=--set run=--set report=--set "
+        lacks="steady=--set shapes=--set modes=--set onsets=--set simulate=--set "
+        "cycles=--set compare=--set run=--set report=--set "
         "sensitivities=--set countermeasures=--set damping-map=--set boundary=--set",
     ),
 ]
@@ -171,7 +177,8 @@ Parameter = Annotated[
         "A number of the case, or mu. Repeatable [default: mu; of countermeasures what can be built].",
         metavar="PATH",
         on="sensitivities countermeasures",
-        lacks="steady=--set shapes=--set modes=--set onsets=--along simulate=--set compare=--set run=--set report=page "
+        lacks="steady=--set shapes=--set modes=--set onsets=--along simulate=--set "
+        "cycles=--set compare=--set run=--set report=page "
         "damping-map=--x boundary=--x reduce=--box",
     ),
 ]

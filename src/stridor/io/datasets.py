@@ -13,6 +13,7 @@ from ..errors import CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
 from ..modal.parametric import ReducedModel
+from ..periodic import Cycles
 from ..reading import is_reduced_file, starts_with
 from ..study.boundary_result import Boundary
 from ..study.ensemble_result import Ensemble
@@ -26,7 +27,7 @@ from .result_files import HDF5, damage_told, open_results
 from .seals import seal
 from .streams import NotedErrors
 
-Result = ComplexModes | Onsets | Sensitivities | Trajectory | Agreement | Ensemble | Boundary
+Result = ComplexModes | Onsets | Sensitivities | Trajectory | Agreement | Ensemble | Boundary | Cycles
 
 
 def to_dataset(result: Result) -> Any:
@@ -35,8 +36,8 @@ def to_dataset(result: Result) -> Any:
     if isinstance(result, Result):  # pyright: ignore[reportUnnecessaryIsInstance]
         return result.to_xarray()
     accepted = (
-        "complex modes, onsets, sensitivities, a trajectory, an ensemble, an agreement or a stability "
-        "boundary; reduced models are no datasets, but can be saved"
+        "complex modes, onsets, sensitivities, a trajectory, an ensemble, an agreement, a stability "
+        "boundary or limit cycles; reduced models are no datasets, but can be saved"
     )
     raise CaseError("result", f"a {type(result).__name__}", accepted)
 
@@ -76,8 +77,8 @@ def save(
 
 def open(path: str | Path) -> Any:
     """What is in a file that `save` or a command wrote, by its content: a Trajectory with the state that a restart
-    needs, a ReducedModel whose modes are the same to the last bit, a Boundary, or of other results the dataset of
-    `to_dataset`.
+    needs, a ReducedModel whose modes are the same to the last bit, a Boundary, Cycles, or of other results the dataset
+    of `to_dataset`.
 
     Raises CaseError for files that are none, damaged, changed since, or of a newer format.
     """
@@ -88,6 +89,9 @@ def open(path: str | Path) -> Any:
     if data.attrs["analysis"] == "boundary":
         with damage_told(target):
             return Boundary.from_xarray(data)
+    if data.attrs["analysis"] == "cycles":
+        with damage_told(target):
+            return Cycles.from_xarray(data)
     return _trajectory_in(data, target) if data.attrs["analysis"] == "simulate" else data
 
 

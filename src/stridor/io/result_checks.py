@@ -133,9 +133,26 @@ _BOUNDARY = {
     "modes_beside": _Rule(("point",), "i", 0),
     **{name: _Rule(("point",), low=0.0, missing=True) for name in ("boundary_error", "residual")},
 }
+_CYCLE, _CYCLE_CONTACT = ("cycle", "sample"), ("cycle", "sample", "contact")
+_CYCLES = {
+    "part": _PART,
+    "contact": _Rule(("contact",), "O"),
+    "point": _Rule(("point",), "O"),
+    "mu": _Rule(("cycle",), low=0.0),
+    "period": _Rule(("cycle",), low=0.0),
+    "residual": _Rule(("cycle",), low=0.0),
+    "grazed": _Rule(("cycle",), low=0.0),
+    "time": _Rule(_CYCLE, low=0.0),
+    "multiplier": _Rule(("cycle", "multiplier_number", "part"), missing=True),
+    "status": _Rule(_CYCLE_CONTACT, "i", 0, 2),
+    **dict.fromkeys(("normal_force", "tangential_force", "slip_velocity", "gap"), _Rule(_CYCLE_CONTACT)),
+    **dict.fromkeys(("displacement", "velocity", "acceleration"), _Rule((*_CYCLE, "point", "direction"))),
+    "shares": _Rule(("cycle", "contact", "kind"), low=-1e-12, high=1.0 + 1e-12),
+    **dict.fromkeys(("slip_range", "force_range"), _Rule(("cycle", "contact", "end"))),
+}
 _RULES: dict[str, dict[str, _Rule]] = {
     "modes": _MODES, "onsets": _ONSETS, "sensitivities": _SENSITIVITIES, "compare": _AGREEMENT, "simulate": _RUN,
-    "ensemble": _ensemble(_GRID), "boundary": _BOUNDARY,
+    "ensemble": _ensemble(_GRID), "boundary": _BOUNDARY, "cycles": _CYCLES,
 }  # fmt: skip
 _COUNTS = ("record_every", "steps", "planned_steps", "most_sweeps", "unconverged_steps")
 _NUMBERS = ("step", "beta2", "step_limit", "wall_seconds")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from . import plots
     from .boundary_plots import stability_boundary
+    from .cycle_plots import cycle_branches, cycle_period
     from .ensemble_plots import ensemble_map
     from .inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
     from .plots import (
@@ -58,6 +59,8 @@ __all__ = [
     "contact_map",
     "contact_snapshot",
     "countermeasure_bars",
+    "cycle_branches",
+    "cycle_period",
     "damping_branches",
     "damping_map",
     "energy_plot",
@@ -96,6 +99,8 @@ _HOME = {
     "ensemble_map": "ensemble_plots",
     "sensitivity_bars": "sensitivity_plots",
     "stability_boundary": "boundary_plots",
+    "cycle_branches": "cycle_plots",
+    "cycle_period": "cycle_plots",
     "write_report": "report",
 }
 

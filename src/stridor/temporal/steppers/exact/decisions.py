@@ -20,7 +20,11 @@ MOST = 4**6  # combinations that are tried
 @dataclass(frozen=True)
 class Impact:
     """Velocity (k,) behind an impact, which way each contact of it then slips (0: it sticks), what it took from the
-    motion [J] along normals and tangents; carried: what its impulses did on what supports move [J]."""
+    motion [J] along normals and tangents; carried: what its impulses did on what supports move [J].
+
+    held and pushed (r, k): along the rows ``held`` nothing moves behind it, by impulses along the rows ``pushed``; so a
+    velocity that differs by δ before it differs by δ − pushedᵀ (held pushedᵀ)⁻¹ held δ behind.
+    """
 
     velocity: Array
     slips: Mapping[int, float]
@@ -28,6 +32,8 @@ class Impact:
     normal_work: float
     friction_work: float
     carried: float
+    held: Array
+    pushed: Array
 
 
 def impact(pairs: Pairs, velocity: Array, speeds: tuple[Array, Array], met: Sequence[int], was: Status) -> Impact:
@@ -63,7 +69,8 @@ def impact(pairs: Pairs, velocity: Array, speeds: tuple[Array, Array], met: Sequ
             carried += pushed[i] * speeds[0][c] + along[i] * speeds[1][c]
         slips = {c: sense(now) for c, now in zip(met, combination, strict=True) if now != GAP}
         away = frozenset(c for c, now in zip(met, combination, strict=True) if now == GAP)
-        return Impact(after, slips, away, lost_normal, lost_friction, carried)
+        held, pushing = _rows(pairs, combination, met)
+        return Impact(after, slips, away, lost_normal, lost_friction, carried, held, pushing)
     raise AnalysisError("friction jams the contacts in an impact: no impulses bring them to rest against one another")
 
 
@@ -84,8 +91,9 @@ def landing(
     slips = {c: 0.0 if c in stuck else float(pairs.tangent[c] @ after + speeds[1][c]) for c in rest}
     count = len(rest)
     return Impact(
-        after, slips, frozenset(), float(taken[:count].sum()), float(taken[count:].sum()), float(impulses @ added)
-    )
+        after, slips, frozenset(), float(taken[:count].sum()), float(taken[count:].sum()), float(impulses @ added),
+        rows, rows,
+    )  # fmt: skip
 
 
 def _along(pairs: Pairs, c: int) -> bool:
@@ -93,6 +101,21 @@ def _along(pairs: Pairs, c: int) -> bool:
     n, t = pairs.normal[c], pairs.tangent[c]
     nn, tt, nt = float(n @ n), float(t @ t), float(n @ t)
     return nn * tt - nt * nt > 1e-13 * nn * tt and tt > 0.0
+
+
+def _rows(pairs: Pairs, combination: Sequence[int], met: Sequence[int]) -> tuple[Array, Array]:
+    """What one combination holds, and along which rows it pushes: (r, k) each."""
+    none = np.zeros((0, pairs.normal.shape[1]))
+    rows, directions = [none], [none]
+    for c, now in zip(met, combination, strict=True):
+        if now == GAP:
+            continue
+        rows.append(pairs.normal[c][None])
+        directions.append((pairs.normal[c] - sense(now) * pairs.sliding[c] * pairs.tangent[c])[None])
+        if now == STICK:
+            rows.append(pairs.tangent[c][None])
+            directions.append(pairs.tangent[c][None])
+    return np.vstack(rows), np.vstack(directions)
 
 
 def _impulses(
@@ -105,27 +128,18 @@ def _impulses(
     size: float,
 ) -> tuple[Array, Array] | None:
     """Impulses (c,), (c,) along normals and tangents of one combination, None where they break its conditions."""
-    rows: list[Array] = []
-    directions: list[Array] = []
+    rows, directions = _rows(pairs, combination, met)
     wanted: list[float] = []
     for c, now in zip(met, combination, strict=True):
-        if now == GAP:
-            continue
-        rows.append(pairs.normal[c])
-        directions.append(pairs.normal[c] - sense(now) * pairs.sliding[c] * pairs.tangent[c])
-        wanted.append(-normal[c])
+        if now != GAP:
+            wanted.append(-normal[c])
         if now == STICK:
-            rows.append(pairs.tangent[c])
-            directions.append(pairs.tangent[c])
             wanted.append(-slip[c])
-    solved = np.zeros(0)
-    if rows:
-        matrix = np.array(rows) @ np.array(directions).T
-        try:
-            solved = np.linalg.solve(matrix, np.array(wanted))
-        except np.linalg.LinAlgError:
-            return None
-    change = np.array(directions).T @ solved if rows else np.zeros(pairs.normal.shape[1])
+    try:
+        solved = np.linalg.solve(rows @ directions.T, np.array(wanted))
+    except np.linalg.LinAlgError:
+        return None
+    change = directions.T @ solved
     pushed, along = np.zeros(len(met)), np.zeros(len(met))
     at = 0
     for i, (c, now) in enumerate(zip(met, combination, strict=True)):

@@ -75,6 +75,8 @@ class Motion:
     Displacement q and velocity v (k,) at ``time``, the status of the contacts and where each began to stick.
     """
 
+    works_counted = True  # what comes after may do without
+
     def __init__(self, basis: Basis, pairs: Pairs, pieces: list[Piece]) -> None:
         self.basis, self.pairs, self.pieces = basis, pairs, pieces
         self.piece = 0
@@ -183,7 +185,8 @@ class Motion:
         time, meaning, c = self.next
         anchor = self.anchor
         self.next, self.anchor = None, None
-        self.works = self.works + anchor.works(np.array([time - anchor.time]))[0]
+        if self.works_counted:
+            self.works = self.works + anchor.works(np.array([time - anchor.time]))[0]
         self.q, self.v = anchor.state(time)
         self._sizes = anchor.sizes(time)
         self.time = time

@@ -75,6 +75,17 @@ class Outputs:
         found = (observed.modes[:count] @ modes).real + observed.slow[:count] @ slow.T
         return found.T.reshape(len(after), -1, CONTACT_ROWS)[:, :, :3]
 
+    def values(self, anchor: Anchor, after: Array) -> tuple[Array, Array]:
+        """Normal and tangential force, slip speed and gap (t, m, 4); displacement, velocity and acceleration (t, w, 3)
+        of the watched rows, at some times (t,)."""
+        observed = self._observed(anchor.watched)
+        modes = anchor.zeta[:, None] * np.exp(anchor.watched.flow.split.poles[:, None] * after)
+        slow = (after[:, None] ** np.arange(len(anchor.terms))) @ anchor.terms
+        found = (observed.modes @ modes).real + observed.slow @ slow.T
+        count = CONTACT_ROWS * anchor.watched.flow.regime.pairs.count
+        contacts = found[:count].T.reshape(len(after), -1, CONTACT_ROWS)
+        return contacts, found[count:].reshape(3, len(self.watch), len(after)).transpose(2, 1, 0)
+
     def _observed(self, watched: Watched) -> _Observed:
         if id(watched) not in self._known:
             self._known[id(watched)] = (watched, self._rows(watched.flow))

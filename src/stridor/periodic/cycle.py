@@ -1,0 +1,158 @@
+"""One limit cycle, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..digits import hertz
+from ..notebook import Shown
+from ..typing import Array, ComplexArray, IntArray
+
+NEUTRAL = 1e-6  # a largest multiplier as close to one as this decides nothing
+OPEN, STICK, SLIP = 0, 1, 2  # as in histories of runs
+
+WORDS = {
+    "closes": "closes", "opens": "opens", "stops": "stops slipping", "slips forward": "slips forward",
+    "slips backward": "slips backward",
+}  # fmt: skip
+
+
+class Change(NamedTuple):
+    """A change of contact: when in the period [s], at which contact, what, and how each contact is behind it: 0 open, 1
+    stick, 2 slip along its tangent, 3 slip against it."""
+
+    time: float
+    contact: str
+    what: str
+    behind: tuple[int, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class Cycle(Shown):
+    """A periodic motion at the friction coefficient ``mu``, of m contacts and w watched points.
+
+    period [s]; residual: how far from closing it is after one, in shares of its amplitude (root of energy).
+    multipliers: Floquet's, largest first, without the one of the motion itself. changes: of contact, in their order.
+
+    time (t,) [s] over one period, both ends included: normal_force, tangential_force (t, m) [N], slip_velocity (t, m)
+    [m/s], gap (t, m) [m], status (t, m): 0 open, 1 stick, 2 slip; displacement [m], velocity, acceleration (t, w, 2).
+    shares (m, 3): of the period that a contact is open, sticks and slips. slip_range (m, 2), force_range (m, 2): least
+    and largest slip velocity and normal force, at those times and at the changes.
+
+    grazed: the least rate at which a force, gap or slip goes through zero, over what its terms amount to; a small one
+    tells that a change is about to come or go. landed: how often contacts that threw one another off were brought to
+    rest, which is not exact. reached_from: how it was found.
+    """
+
+    mu: float
+    period: float
+    residual: float
+    multipliers: ComplexArray
+    changes: tuple[Change, ...]
+    contact_names: tuple[str, ...]
+    watch_names: tuple[str, ...]
+    time: Array
+    normal_force: Array
+    tangential_force: Array
+    slip_velocity: Array
+    gap: Array
+    status: IntArray
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+    shares: Array
+    slip_range: Array
+    force_range: Array
+    grazed: float
+    landed: int
+    reached_from: str
+
+    @property
+    def frequency_hz(self) -> float:
+        """1/period [Hz]."""
+        return 1.0 / self.period
+
+    @property
+    def largest_multiplier(self) -> float:
+        """|largest multiplier|."""
+        return float(np.abs(self.multipliers).max(initial=0.0))
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether disturbances die out; None where the largest multiplier is one within 1e-6."""
+        size = self.largest_multiplier
+        return None if abs(size - 1.0) <= NEUTRAL else size < 1.0
+
+    @property
+    def slip_amplitude(self) -> float:
+        """Half the range of the slip velocity [m/s], of the contact where it is largest."""
+        return 0.5 * float((self.slip_range[:, 1] - self.slip_range[:, 0]).max())
+
+    def amplitude(self, quantity: str = "acceleration") -> dict[str, tuple[float, float]]:
+        """Half the range of each watched point's x and y, of "displacement", "velocity" or "acceleration"."""
+        values = getattr(self, quantity)
+        ranges = 0.5 * np.ptp(values, axis=0)
+        return {name: (float(x), float(y)) for name, (x, y) in zip(self.watch_names, ranges, strict=True)}
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What happens in it: "slip", "stick", "reversal", "separation"."""
+        found = ["slip"] if np.any(self.shares[:, 2] > 0.0) else []
+        if np.any(self.shares[:, 1] > 0.0):
+            found.append("stick")
+        if self._turns():
+            found.append("reversal")
+        if np.any((self.shares[:, 0] > 0.0) & (self.shares[:, 0] < 1.0)):
+            found.append("separation")
+        return tuple(found)
+
+    def _turns(self) -> bool:
+        ways = [{c.behind[k] for c in self.changes} for k in range(len(self.contact_names))]
+        return any({2, 3} <= met for met in ways)
+
+    @property
+    def word(self) -> tuple[tuple[str, str], ...]:
+        """The changes without their times: contact and what."""
+        return tuple((c.contact, c.what) for c in self.changes)
+
+    @property
+    def _line(self) -> str:
+        said = {True: "stable", False: "unstable", None: "on the edge of stability"}[self.stable]
+        return f"μ = {self.mu:.6g}, {hertz(self.frequency_hz)}, {said}, with {', '.join(self.kinds)}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values, without the histories over the period."""
+        return {
+            "mu": self.mu,
+            "frequency_hz": self.frequency_hz,
+            "period_s": self.period,
+            "stable": self.stable,
+            "largest_multiplier": self.largest_multiplier,
+            "multipliers": [[float(z.real), float(z.imag)] for z in self.multipliers],
+            "residual": self.residual,
+            "kinds": list(self.kinds),
+            "slip_amplitude": self.slip_amplitude,
+            "contacts": {name: one for name, one in zip(self.contact_names, self._contacts(), strict=True)},
+            "amplitudes": {
+                name: {q: list(self.amplitude(q)[name]) for q in ("displacement", "velocity", "acceleration")}
+                for name in self.watch_names
+            },
+            "changes": [
+                {"time": c.time, "contact": c.contact, "what": WORDS[c.what], "behind": list(c.behind)}
+                for c in self.changes
+            ],
+            "grazed": self.grazed if np.isfinite(self.grazed) else None,
+            "landed": self.landed,
+            "reached_from": self.reached_from,
+        }
+
+    def _contacts(self) -> Iterator[dict[str, Any]]:
+        for shares, slip, force in zip(self.shares, self.slip_range, self.force_range, strict=True):
+            yield {
+                "open": float(shares[0]), "stick": float(shares[1]), "slip": float(shares[2]),
+                "slip_velocity": slip.tolist(), "normal_force": force.tolist(),
+            }  # fmt: skip

@@ -1,0 +1,174 @@
+"""Cycles by shooting: states that a motion comes back to, and how it comes back from beside them.
+
+φ(ξ, T) − ξ = 0 with ẋ₀ᵀ(ξ − ξ₀) = 0 (R. Seydel, Practical Bifurcation and Stability Analysis, Springer 2010, ch. 7), by
+Newton's method with the derivative of the exact motion; its eigenvalues are Floquet's multipliers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..temporal.steppers.exact.statuses import Status
+from ..temporal.steppers.exact.varied import VariedMotion
+from ..typing import Array, ComplexArray
+from .chart import Chart
+from .problem import SlidingProblem
+
+CLOSED = 1e-11  # of the amplitude: a return that close has come back
+ENOUGH = 1e-7  # where rounding lets no step come closer
+STEPS = 14
+MOST_CHANGES = 4000  # of contact within a period
+
+
+@dataclass(frozen=True)
+class Shot:
+    """Where a start of a cycle is after a period: end (s,) and its rate, rate of the start (s,), matrix (s, s) of the
+    derivative (empty where not asked for), changes of contact on the way: time, meaning, contact, status behind.
+
+    amplitude: the largest distance from steady sliding at these changes, in the root of energy. grazed: see
+    `VariedMotion`; landed: how often contacts were brought to rest.
+    """
+
+    end: Array
+    end_rate: Array
+    start_rate: Array
+    matrix: Array
+    words: tuple[tuple[float, str, int, Status], ...]
+    status: Status
+    amplitude: float
+    grazed: float
+    landed: int
+
+
+@dataclass(frozen=True)
+class Closed:
+    """A cycle in its chart: start ξ (s,), period [s], the shot that shows it, and how far from closing it is, in shares
+    of the amplitude."""
+
+    problem: SlidingProblem
+    chart: Chart
+    xi: Array
+    period: float
+    shot: Shot
+    residual: float
+
+    @property
+    def word(self) -> tuple[tuple[str, int, Status], ...]:
+        """The changes of contact of a period, without their times."""
+        return tuple((meaning, c, status) for _, meaning, c, status in self.shot.words)
+
+
+def distance(problem: SlidingProblem, q: Array, v: Array) -> float:
+    """How far a state is from steady sliding, in the root of energy."""
+    stretched = np.sqrt(np.abs(problem.basis.stiffness)) * (q - problem.q)
+    return float(np.hypot(np.linalg.norm(stretched), np.linalg.norm(v)))
+
+
+def started(problem: SlidingProblem, chart: Chart, xi: Array, *, varied: bool) -> VariedMotion:
+    """A motion from a start of a chart."""
+    motion = problem.motion()
+    q, v = chart.state(xi)
+    dq, dv, places = chart.directions
+    none = np.zeros((0, 0))
+    if varied:
+        motion.place(q, v, chart.status, dq, dv, places)
+    else:
+        motion.place(q, v, chart.status, np.zeros((len(q), 0)), np.zeros((len(q), 0)), none.reshape(0, 0))
+        motion.dholds = np.zeros((problem.pairs.count, 0))
+    return motion
+
+
+def shoot(problem: SlidingProblem, chart: Chart, xi: Array, period: float, *, varied: bool = True) -> Shot:
+    """A period of motion. Raises AnalysisError where the exact stepper does not pass, where a change only just
+    happens, and for more than MOST_CHANGES of them."""
+    motion = started(problem, chart, xi, varied=varied)
+    if not motion.belongs():
+        raise AnalysisError("a force, gap or slip of the start has another sign than its status says")
+    motion.reach(0.0)
+    v, a, _, _ = motion.at(0.0)
+    start_rate = chart.differences(v, a)
+    amplitude = distance(problem, *chart.state(xi))
+    while motion.reach(period) < period:
+        motion.passed()
+        amplitude = max(amplitude, distance(problem, motion.q, motion.v))
+        if len(motion.words) > MOST_CHANGES:
+            raise AnalysisError(f"more than {MOST_CHANGES} changes of contact within a period of {period:.6g} s")
+    v, a, dq, dv = motion.at(period)
+    assert motion.anchor is not None
+    q, _ = motion.anchor.state(period)
+    return Shot(
+        chart.numbers(q, v), chart.differences(v, a), start_rate,
+        chart.differences(dq, dv) if varied else np.zeros((0, 0)),
+        tuple(motion.words), motion.status, amplitude, motion.grazed, motion.landed,
+    )  # fmt: skip
+
+
+def close(problem: SlidingProblem, chart: Chart, xi: Array, period: float) -> Closed:
+    """The cycle near a start and a period. Raises AnalysisError where Newton's method does not come to one."""
+    shot = shoot(problem, chart, xi, period)
+    before = residual = _residual(shot, xi)
+    for _ in range(STEPS):
+        if residual <= CLOSED:
+            break
+        s = chart.size
+        matrix = np.zeros((s + 1, s + 1))
+        matrix[:s, :s] = shot.matrix - np.eye(s)
+        matrix[:s, s], matrix[s, :s] = shot.end_rate, shot.start_rate / max(np.linalg.norm(shot.start_rate), 1e-300)
+        try:
+            step = np.linalg.solve(matrix, np.append(xi - shot.end, 0.0))
+        except np.linalg.LinAlgError as error:
+            raise AnalysisError("the cycle is not isolated: another lies beside it") from error
+        share = min(1.0, 0.5 * shot.amplitude / max(float(np.linalg.norm(step[:s])), 1e-300))
+        share = min(share, 0.2 * period / max(abs(float(step[s])), 1e-300))
+        found = _shortened(problem, chart, xi, period, step, share, residual)
+        if found is None:
+            break
+        xi, period, shot = found
+        before, residual = residual, _residual(shot, xi)
+        if residual > 0.5 * before and residual < ENOUGH:
+            break
+    if residual > ENOUGH or shot.status != chart.status:
+        raise AnalysisError(
+            f"no cycle closes near a return within {before:.2g} of the amplitude: Newton's method ends {residual:.2g} "
+            "off"
+        )
+    return Closed(problem, chart, xi, period, shot, residual)
+
+
+def _shortened(
+    problem: SlidingProblem, chart: Chart, xi: Array, period: float, step: Array, share: float, residual: float
+) -> tuple[Array, float, Shot] | None:
+    """A step so short that it comes closer, None where none does."""
+    for _ in range(5):
+        there, longer = xi + share * step[:-1], period + share * float(step[-1])
+        try:
+            shot = shoot(problem, chart, there, longer)
+        except AnalysisError:
+            share *= 0.4
+            continue
+        if _residual(shot, there) < residual or residual < 1e-9:
+            return there, longer, shot
+        share *= 0.4
+    return None
+
+
+def _residual(shot: Shot, xi: Array) -> float:
+    return float(np.linalg.norm(shot.end - xi)) / max(shot.amplitude, 1e-300)
+
+
+def multipliers(closed: Closed) -> ComplexArray:
+    """Floquet's multipliers without the one of the motion itself, largest first; complex (s − 1,)."""
+    found: ComplexArray = np.linalg.eigvals(closed.shot.matrix).astype(complex)
+    # The motion's own is one, but for rounding.
+    own = int(np.argmin(np.abs(found - _along(closed))))
+    rest = np.delete(found, own)
+    return rest[np.argsort(-np.abs(rest), kind="stable")]
+
+
+def _along(closed: Closed) -> complex:
+    """What the matrix multiplies the motion's own direction by: one, but for rounding."""
+    rate = closed.shot.start_rate
+    return complex(rate @ (closed.shot.matrix @ rate) / max(float(rate @ rate), 1e-300))

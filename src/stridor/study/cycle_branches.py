@@ -1,0 +1,148 @@
+"""Branches of cycles of a search: from where they begin, both ways, each once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..periodic import (
+    Branch,
+    Closed,
+    Cycle,
+    CycleBranch,
+    CycleOnset,
+    Family,
+    bifurcations,
+    born,
+    close,
+    follow,
+    same,
+    sampled,
+)
+
+Kept = Callable[[], bool]
+
+
+@dataclass
+class Traced:
+    """A branch while it is followed: its cycles, closed and as data, which of them are folds, and how it ends."""
+
+    closed: list[Closed] = field(default_factory=list[Closed])
+    cycles: list[Cycle] = field(default_factory=list[Cycle])
+    folds: list[bool] = field(default_factory=list[bool])
+    begins: str = ""
+    ends: str = "it was stopped"
+    onset: int | None = None
+
+    def add(self, closed: Closed, said: str, *, fold: bool) -> None:
+        """Another cycle behind the last."""
+        self.cycles.append(sampled(closed, said))
+        # The matrix is large, and what is asked of it is known now.
+        self.closed.append(replace(closed, shot=replace(closed.shot, matrix=np.zeros((0, 0)))))
+        self.folds.append(fold)
+
+    def reverse(self) -> None:
+        """The other way round."""
+        for row in (self.closed, self.cycles, self.folds):
+            row.reverse()
+        self.begins, self.ends = self.ends, self.begins
+
+    def has(self, closed: Closed) -> bool:
+        """Whether a cycle lies on it: one of the branch, closed at its μ, is the same."""
+        mu = closed.problem.value
+        for k in range(len(self.closed) - 1):
+            one, other = self.closed[k], self.closed[k + 1]
+            if not min(one.problem.value, other.problem.value) <= mu <= max(one.problem.value, other.problem.value):
+                continue
+            shortest, longest = sorted((one.period, other.period))
+            if not shortest * (1 - APART) < closed.period < longest * (1 + APART):
+                continue
+            for start in (one, other):
+                try:
+                    if same(close(closed.problem, start.chart, start.xi, start.period), closed):
+                        return True
+                except (AnalysisError, np.linalg.LinAlgError):
+                    continue
+        return False
+
+    def result(self, first: int) -> CycleBranch:
+        """As data; first: the number of its first cycle."""
+        folds = [k for k, fold in enumerate(self.folds) if fold]
+        return CycleBranch(
+            tuple(range(first, first + len(self.cycles))), self.begins, self.ends, self.onset,
+            tuple(first + k for k in folds), bifurcations(self.cycles, folds),
+        )  # fmt: skip
+
+
+APART = 0.02  # of a period, between two neighbours of a branch
+
+
+class Tracer:
+    """Follows branches within a range (low, high) of μ, of up to ``points`` cycles each; ``kept`` is called behind each
+    cycle, and says whether to go on."""
+
+    def __init__(self, family: Family, between: tuple[float, float], points: int, kept: Kept) -> None:
+        self.family, self.between, self.points, self.kept = family, between, points, kept
+        self.traced: list[Traced] = []
+
+    def from_onset(self, number: int, onset: CycleOnset, others: tuple[CycleOnset, ...]) -> str:
+        """The branch that begins at an onset; why there is none, "" where there is one."""
+        branch = Branch(self.family, self.between)
+        try:
+            first, heading = born(branch, onset.mu, onset.frequency_hz)
+        except AnalysisError as error:
+            return f"no branch was found from the onset at μ = {onset.mu:.6g} ({onset.frequency_hz:.6g} Hz): {error}"
+        low, high = self.between
+        if not low <= first.problem.value <= high:
+            return f"the branch from the onset at μ = {onset.mu:.6g} leaves the range at once"
+        if any(t.has(first) for t in self.traced):
+            return ""
+        traced = Traced(begins=f"it begins at the onset at μ = {onset.mu:.6g}", onset=number)
+        self.traced.append(traced)
+        self._follow(branch, traced, first, heading, traced.begins.removeprefix("it "), include=True, others=others)
+        return ""
+
+    def from_cycle(self, closed: Closed, said: str, others: tuple[CycleOnset, ...]) -> None:
+        """The branch that a cycle lies on, both ways."""
+        traced = Traced()
+        self.traced.append(traced)
+        for sense in (-1.0, 1.0):
+            branch = Branch(self.family, self.between)
+            try:
+                heading = branch.towards(closed, sense)
+            except (AnalysisError, np.linalg.LinAlgError) as error:
+                traced.ends = f"it could not be followed beyond μ = {closed.problem.value:.6g}: {error}"
+                heading = None
+            if sense < 0.0:
+                traced.add(closed, said, fold=False)
+            if heading is not None:
+                self._follow(branch, traced, closed, heading, "along its branch", include=False, others=others)
+            if sense < 0.0:
+                traced.reverse()
+        if traced.onset is None:
+            for end in (traced.begins, traced.ends):
+                for number, onset in enumerate(others):
+                    if end.startswith("it begins at the onset") and f"{onset.mu:.6g}" in end:
+                        traced.onset = number
+
+    def _follow(
+        self, branch: Branch, traced: Traced, first: Closed, heading: np.ndarray, said: str, *, include: bool,
+        others: tuple[CycleOnset, ...],
+    ) -> None:  # fmt: skip
+        def seen(closed: Closed, *, fold: bool) -> bool:
+            traced.add(closed, said, fold=fold)
+            return self.kept()
+
+        if include and not seen(first, fold=False):
+            return
+        traced.ends = follow(branch, first, heading, seen, self.points)
+        if traced.ends.startswith("it comes to steady sliding"):
+            last = traced.cycles[-1]
+            for onset in others:
+                if abs(onset.frequency_hz - last.frequency_hz) < 0.02 * last.frequency_hz and (
+                    abs(onset.mu - last.mu) < 0.1 * branch.width
+                ):
+                    traced.ends = f"it begins at the onset at μ = {onset.mu:.6g}"

@@ -1,0 +1,127 @@
+"""Figures of limit cycles: branches over friction, and one period of one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from ..periodic import Cycle, Cycles
+from ..temporal.trajectory import Trajectory
+from .style import BLUE, COLOURS, GREY, INK, STATUS_COLOURS, VERMILION, legend_above, stacked, styled
+
+DASHED = (0, (4, 2))
+STRIPS = ("separation", "stick", "slip")  # by status
+
+
+@styled
+def cycle_branches(
+    result: Cycles, runs: Sequence[tuple[float, Trajectory]] = (), *, axes: Sequence[Axes] | None = None
+) -> Figure:
+    """Slip amplitude and frequency of limit cycles over μ: stable ones drawn through, unstable ones dashed, folds as
+    diamonds, onsets of steady sliding as triangles on the axis. runs: a μ with a run in time each, whose half range of
+    slip over its last phase is drawn as a cross."""
+    figure, (upper, lower) = stacked(axes, 2, 5.4, (3, 2))
+    for number, branch in enumerate(result.branches):
+        cycles = [result.cycles[k] for k in branch.cycles]
+        colour = COLOURS[number % len(COLOURS)]
+        for first, last, stable in _stretches(cycles):
+            part = cycles[first : last + 1]
+            line = "-" if stable else DASHED
+            upper.plot([c.mu for c in part], [c.slip_amplitude for c in part], ls=line, color=colour)
+            lower.plot([c.mu for c in part], [c.frequency_hz for c in part], ls=line, color=colour)
+        folds = [result.cycles[k] for k in branch.folds]
+        upper.plot([c.mu for c in folds], [c.slip_amplitude for c in folds], "D", color=colour, ms=5, mec="white")
+        lower.plot([c.mu for c in folds], [c.frequency_hz for c in folds], "D", color=colour, ms=5, mec="white")
+    followed = {k for branch in result.branches for k in branch.cycles}
+    for k, cycle in enumerate(result.cycles):
+        if k not in followed:
+            face = BLUE if cycle.stable else "white"
+            upper.plot([cycle.mu], [cycle.slip_amplitude], "o", ms=5, color=BLUE, mfc=face)
+            lower.plot([cycle.mu], [cycle.frequency_hz], "o", ms=5, color=BLUE, mfc=face)
+    for mu, run in runs:
+        last = run.time >= run.phases[-1].start if run.phases else np.ones(len(run.time), dtype=bool)
+        slip = run.slip_speed[last]
+        upper.plot([mu], [0.5 * float(np.ptp(slip, axis=0).max())], "x", color=INK, ms=6)
+    low, _ = upper.get_ylim()
+    upper.set_ylim(min(low, 0.0), None)
+    if result.onsets:
+        upper.plot([o.mu for o in result.onsets], [0.0] * len(result.onsets), "^", color=INK, ms=6, clip_on=False)
+        lower.plot([o.mu for o in result.onsets], [o.frequency_hz for o in result.onsets], "^", color=INK, ms=6)
+    if result.between is not None:
+        upper.set_xlim(*result.between)
+    if result.cycles:
+        _from_to(lower, [c.frequency_hz for c in result.cycles])
+    upper.set_ylabel("slip amplitude [m/s]")
+    lower.set(xlabel="friction coefficient μ", ylabel="frequency [Hz]")
+    legend_above(upper, _handles(result, bool(runs)), columns=5)
+    return figure
+
+
+def _from_to(ax: Axes, values: list[float]) -> None:
+    low, high = min(values), max(values)
+    if high - low < 1e-4 * high:
+        ax.set_ylim(low - 1e-3 * high, high + 1e-3 * high)
+
+
+def _stretches(cycles: Sequence[Cycle]) -> list[tuple[int, int, bool]]:
+    """Where a branch stays stable or not: first and last cycle, which the next shares."""
+    found: list[tuple[int, int, bool]] = []
+    begun = 0
+    for k in range(1, len(cycles)):
+        if k == len(cycles) - 1 or (cycles[k].stable is True) != (cycles[begun].stable is True):
+            found.append((begun, k, cycles[begun].stable is True))
+            begun = k
+    return found
+
+
+def _handles(result: Cycles, runs: bool) -> list[Line2D]:
+    stable = {c.stable for c in result.cycles}
+    found: list[Line2D] = []
+    if True in stable:
+        found.append(Line2D([], [], color=GREY, label="stable"))
+    if stable - {True}:
+        found.append(Line2D([], [], color=GREY, ls=DASHED, label="unstable"))
+    if any(branch.folds for branch in result.branches):
+        found.append(Line2D([], [], color=GREY, ls="", marker="D", ms=5, label="fold"))
+    if result.onsets:
+        found.append(Line2D([], [], color=INK, ls="", marker="^", ms=6, label="onset of steady sliding"))
+    if runs:
+        found.append(Line2D([], [], color=INK, ls="", marker="x", ms=6, label="run in time"))
+    return found
+
+
+@styled
+def cycle_period(cycle: Cycle, contact: str | None = None, *, axes: Sequence[Axes] | None = None) -> Figure:
+    """Normal and friction force of a contact (default: the first) over one period, and its slip velocity, on the colour
+    of what it does. Raises ValueError for a contact that there is not."""
+    names = cycle.contact_names
+    if contact is not None and contact not in names:
+        raise ValueError(f"contact: {contact!r} given, the cycle has {', '.join(names)}")
+    k = 0 if contact is None else names.index(contact)
+    figure, (upper, lower) = stacked(axes, 2, 4.6)
+    share = cycle.time / cycle.period
+    for ax in (upper, lower):
+        _coloured(ax, share, cycle.status[:, k])
+        ax.axhline(0.0, color=INK, lw=0.6)
+    upper.plot(share, cycle.normal_force[:, k], color=BLUE, label="normal force")
+    upper.plot(share, cycle.tangential_force[:, k], color=VERMILION, label="friction force")
+    lower.plot(share, cycle.slip_velocity[:, k], color=INK)
+    upper.set_ylabel("force [N]")
+    lower.set(xlabel=f"time / period of {cycle.period:.6g} s", ylabel="slip velocity [m/s]", xlim=(0, 1))
+    met = [s for s in range(3) if np.any(cycle.status[:, k] == s)]
+    strips = [Patch(fc=STATUS_COLOURS[STRIPS[s]], label=STRIPS[s]) for s in met]
+    legend_above(upper, [*upper.get_legend_handles_labels()[0], *strips], columns=5)
+    return figure
+
+
+def _coloured(ax: Axes, share: np.ndarray, status: np.ndarray) -> None:
+    """Strips of what a contact does, from halfway between two samples to the next such place."""
+    edges = np.flatnonzero(np.diff(status)) + 1
+    places = [0.0, *(0.5 * (share[edges] + share[edges - 1])).tolist(), 1.0]
+    for first, last, begin in zip(places[:-1], places[1:], [0, *edges.tolist()], strict=True):
+        ax.axvspan(first, last, color=STATUS_COLOURS[STRIPS[int(status[begin])]], lw=0, zorder=0)

@@ -1,0 +1,259 @@
+"""Limit cycles by shooting, and branches of them, against closed forms, other motions and finite differences."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_exact_stepper import random_system
+
+import stridor as st
+from marching import block_on_belt
+from mode_coupling import mode_coupling
+from stridor.laws import Coulomb, StaticKinetic
+from stridor.periodic import Closed, Cycles, Family, NoReturn, close, cycles_reached, growing, multipliers, pushed
+from stridor.periodic.chart import Chart
+from stridor.periodic.shooting import shoot, started
+from stridor.study.cycle_branches import Tracer
+
+DAMPED = 0.02
+
+
+def advanced(closed: Closed, xi: np.ndarray, periods: int) -> np.ndarray:
+    """Where a start of the chart is after some periods, by the plain motion."""
+    motion = started(closed.problem, closed.chart, xi, varied=False)
+    end = periods * closed.period
+    while motion.reach(end) < end:
+        motion.passed()
+    assert motion.anchor is not None
+    return closed.chart.numbers(*motion.anchor.state(end))
+
+
+def test_mass_on_a_belt_sticks_and_slips():
+    """Period and stick in closed form; the state at which it lets go is always the same, so every multiplier is zero."""
+    system = block_on_belt(law=StaticKinetic(0.3, 0.4), speed=0.2)
+    found = st.cycles(system, 0.3, push=0.3)
+    (cycle,) = found.cycles
+    assert not found.missing
+    slip = 2 * math.pi - 2 * math.atan(0.1 / 0.2)
+    assert cycle.period == pytest.approx(slip + 1.0, abs=1e-9)
+    assert cycle.shares[0] * cycle.period == pytest.approx([0.0, 1.0, slip], abs=1e-9)
+    x = cycle.displacement[:, 0, 0]
+    # Twice static over kinetic friction apart from its mean, and at its speed where it slips fastest.
+    assert (x.min(), x.max()) == pytest.approx((0.3 - math.hypot(0.1, 0.2), 0.3 + math.hypot(0.1, 0.2)), abs=2e-5)
+    assert np.abs(cycle.multipliers).max() < 1e-9
+    assert cycle.stable
+    assert cycle.kinds == ("slip", "stick")
+    assert [c.what for c in cycle.changes] in (["stops", "slips backward"], ["slips backward", "stops"],
+                                               ["stops", "slips forward"], ["slips forward", "stops"])  # fmt: skip
+
+
+@pytest.mark.parametrize("seeds", [range(8), pytest.param(range(8, 200), marks=pytest.mark.slow)], ids=["few", "many"])
+def test_the_variation_is_the_difference_of_two_motions(seeds: range):
+    """Through sticking, slipping, parting and impacts of one or two contacts."""
+    compared = changes = 0
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        try:
+            problem = Family(random_system(seed)[0]).at(0.45)
+        except st.AnalysisError:  # friction jams
+            continue
+        chart = Chart.of(problem, problem.status)
+        steady = chart.numbers(problem.q, np.zeros_like(problem.q))
+        for period in (0.5, 2.0, 5.0, 0.7, 3.0, 4.0):
+            xi, way, step = steady + 0.6 * rng.normal(size=chart.size), rng.normal(size=chart.size), 1e-6
+            try:
+                shot = shoot(problem, chart, xi, period)
+                beside = [shoot(problem, chart, xi + s * step * way, period, varied=False) for s in (1, -1)]
+            except st.AnalysisError:  # no state of this status, or friction jams
+                continue
+            if shot.landed or shot.grazed < 1e-3:
+                continue
+            wanted = (beside[0].end - beside[1].end) / (2 * step)
+            assert shot.matrix @ way == pytest.approx(wanted, abs=2e-5 * np.linalg.norm(wanted)), (seed, period)
+            compared, changes = compared + 1, changes + len(shot.words)
+    assert compared >= len(seeds)
+    assert changes > 3 * compared
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(46, 52), pytest.param(range(100, 200), marks=pytest.mark.slow)], ids=["few", "many"]
+)
+def test_motions_beside_a_cycle_come_to_it_or_leave_it(seeds: range):
+    """Random systems: what is near a cycle after n periods is as much nearer, or further, as its multipliers say."""
+    looked = 0
+    for seed in seeds:
+        family = Family(random_system(seed if seed % 4 else seed + 1)[0])  # with damping
+        found: list[Closed] = []
+        for mu in (0.5, 0.8, 1.2):
+            try:
+                problem = family.at(mu)
+                motions = [pushed(problem, 3.0 * problem.sliding_speed), *(m for _, m in growing(problem))]
+                for motion in motions:
+                    found += cycles_reached(problem, motion, seconds=3.0)
+            except st.AnalysisError:  # it dies out, or friction jams
+                continue
+        for closed in found:
+            if closed.shot.landed or closed.shot.grazed < 1e-3:
+                continue
+            whole = multipliers(closed)
+            off = 1e-7 * closed.shot.amplitude * np.random.default_rng(seed).normal(size=closed.chart.size)
+            wanted = np.linalg.matrix_power(closed.shot.matrix, 3) @ off
+            got = 0.5 * (advanced(closed, closed.xi + off, 3) - advanced(closed, closed.xi - off, 3))
+            assert got == pytest.approx(wanted, abs=1e-5 * np.linalg.norm(off) * max(1.0, abs(whole[0])) ** 3), seed
+            looked += 1
+    assert looked >= len(seeds) // 6
+
+
+@pytest.mark.parametrize("mu", [1.4, 1.7])
+def test_a_run_of_explicit_steps_comes_to_the_same_cycle(mu: float):
+    """Hoffmann's minimal model with stick, reversal and separation."""
+    case = mode_coupling(DAMPED, 0.1)
+    cycle = next(c for c in st.cycles(case, mu).cycles if c.stable)
+    steps = {"temporal.stepper": "explicit", "temporal.step": 5e-5, "temporal.record_every": 20,
+             "phases": [{"name": "slide", "duration": 110.0}], "temporal.perturbation": 0.05}  # fmt: skip
+    run = st.simulate(case.with_(steps), mu=mu)
+    last = run.time > run.time[-1] - 8.2 * cycle.period
+    x, time = run.displacement[last, 0, 0], run.time[last]
+    middle = 0.5 * (x.max() + x.min())
+    up = np.flatnonzero((x[:-1] < middle) & (x[1:] >= middle))
+    crossed = time[up] + (middle - x[up]) / (x[up + 1] - x[up]) * (time[1] - time[0])
+    ups = int(np.count_nonzero(np.diff(np.sign(cycle.displacement[:-1, 0, 0] - middle)) > 0)) or 1
+    period = (crossed[-1] - crossed[-1 - 4 * ups]) / 4
+    assert period == pytest.approx(cycle.period, rel=1e-5)
+    assert 0.5 * np.ptp(x) == pytest.approx(cycle.amplitude("displacement")["m"][0], rel=1e-4)
+    shares = [np.count_nonzero(run.status[last] == s) / np.count_nonzero(last) for s in range(3)]
+    assert shares == pytest.approx(cycle.shares[0], abs=0.02)
+
+
+@pytest.fixture(scope="module")
+def slow_belt() -> Cycles:
+    return st.cycles(mode_coupling(DAMPED, 0.1), between=(0.1, 1.8))
+
+
+def test_a_branch_begins_at_the_onset(slow_belt: Cycles):
+    """With the frequency of the onset, as large as it can be without a change of contact; then more and more happens."""
+    (onset,) = slow_belt.onsets
+    assert onset.mu == pytest.approx(0.750600, abs=1e-6)
+    (branch,) = slow_belt.branches
+    first = slow_belt.cycles[branch.cycles[0]]
+    assert branch.onset == 0
+    assert branch.begins == "it begins at the onset at μ = 0.7506"
+    assert branch.ends == "it leaves the range at μ = 1.8"
+    assert 0.0 < first.mu - onset.mu < 2e-3
+    assert first.frequency_hz == pytest.approx(onset.frequency_hz, rel=1e-3)
+    assert first.kinds == ("slip", "separation")
+    assert first.shares[0, 0] < 0.1
+    kinds = [b.kind for b in branch.bifurcations]
+    assert kinds == ["reversal of slip begins", "sticking begins"]
+    assert not slow_belt.missing
+
+
+def test_motions_come_to_the_cycles_of_the_branch(slow_belt: Cycles):
+    """At every fourth of them, from a push and from the growing mode."""
+    branch = slow_belt.branches[0]
+    family = Family(st.Workspace(mode_coupling(DAMPED, 0.1)).system())
+    for number in branch.cycles[2::4]:
+        wanted = slow_belt.cycles[number]
+        assert wanted.stable
+        problem = family.at(wanted.mu)
+        closed = cycles_reached(problem, pushed(problem, 0.2))[-1]
+        assert closed.period == pytest.approx(wanted.period, rel=1e-8)
+        assert multipliers(closed)[0] == pytest.approx(wanted.multipliers[0], abs=1e-5)
+
+
+@pytest.fixture(scope="module")
+def fast_belt() -> Cycles:
+    return st.cycles(mode_coupling(DAMPED, 1.0), between=(0.1, 1.8))
+
+
+def test_an_unstable_cycle_lies_between_two_that_are_reached(fast_belt: Cycles):
+    """Below the onset steady sliding and a loud cycle are both stable; the unstable one is the border: beside it on one
+    side motions die out, on the other they come to the loud one."""
+    assert any(c.stable is False for c in fast_belt.cycles)
+    unstable = min((c for c in fast_belt.cycles if c.stable is False), key=lambda c: abs(c.mu - 0.72))
+    assert unstable.mu < fast_belt.onsets[0].mu
+    assert sum(abs(complex(m)) > 1.0 for m in unstable.multipliers) == 1
+    assert fast_belt.branch_of(fast_belt.cycles.index(unstable)) is not None
+    family = Family(st.Workspace(mode_coupling(DAMPED, 1.0)).system())
+    tracer = Tracer(family, (unstable.mu, 1.8), 60, lambda: True)
+    loud = cycles_reached(family.at(1.8), pushed(family.at(1.8), 3.0))
+    for closed in loud:
+        tracer.from_cycle(closed, "", ())
+    met = [c for t in tracer.traced for c in t.closed if abs(c.problem.value - unstable.mu) < 1e-9]
+    met = [close(c.problem, c.chart, c.xi, c.period) for c in met]
+    (begun,) = [c for c in met if np.abs(multipliers(c)).max() > 1.0]
+    values, vectors = np.linalg.eig(begun.shot.matrix)
+    way = np.real(vectors[:, int(np.argmax(np.abs(values)))])
+    ends, died = [], []
+    for side in (1.0, -1.0):
+        start = begun.xi + side * 0.01 * begun.shot.amplitude * way / np.linalg.norm(way)
+        motion = started(begun.problem, begun.chart, start, varied=False)
+        try:
+            ends.append(cycles_reached(begun.problem, motion)[-1])
+        except NoReturn as none:
+            died.append(none.steady)
+    assert died == [True]
+    (loud,) = ends
+    assert np.abs(multipliers(loud)).max() < 1.0
+    assert loud.shot.amplitude > 0.5 * begun.shot.amplitude
+
+
+def test_cycles_come_back_from_their_file(slow_belt: Cycles, tmp_path: Path):
+    st.save(slow_belt, tmp_path / "cycles.nc")
+    back = st.open(tmp_path / "cycles.nc")
+    assert isinstance(back, Cycles)
+    assert back.to_json() == slow_belt.to_json()
+    assert back.provenance == slow_belt.provenance
+    for one, other in zip(back.cycles, slow_belt.cycles, strict=True):
+        assert np.array_equal(one.normal_force, other.normal_force)
+        assert one.changes == other.changes
+
+
+def test_what_was_found_is_kept_when_the_search_is_stopped():
+    seen: list[Cycles] = []
+
+    def keep(found: Cycles) -> None:
+        seen.append(found)
+        if len(found.cycles) == 4:
+            raise KeyboardInterrupt
+
+    found = st.cycles(mode_coupling(DAMPED, 0.1), between=(0.1, 1.8), keep=keep)
+    assert found.interrupted
+    assert len(found.cycles) == len(seen) == 4
+    assert found.branches[0].ends == "it was stopped"
+    assert "stopped early: 4 limit cycles at μ = 0.751901 to " in found.warnings[0]
+
+
+def test_undamped_modes_that_meet_have_no_branch_of_their_own():
+    """The onset is a double root: two modes in one, which the exact motion cannot go on with. That is said, not hidden."""
+    found = st.cycles(mode_coupling(), between=(0.5, 0.9), push=[0.5], seconds=2.0, points=2)
+    assert found.missing[0].startswith("no branch was found from the onset at μ = 0.75 ")
+
+
+def test_a_still_contact_and_strange_numbers_are_refused():
+    case = mode_coupling(DAMPED, 0.1)
+    for given, said in (
+        ({"mu": -0.1}, "mu: -0.1"),
+        ({"between": (0.5, 0.1)}, "between: [0.5, 0.1]"),
+        ({"mu": 0.5, "push": []}, "push: []"),
+        ({"mu": 0.5, "points": 1}, "points: 1"),
+        ({"mu": 0.5, "seconds": 0.0}, "seconds: 0.0"),
+    ):
+        with pytest.raises(st.CaseError, match=said.replace("[", r"\[")):
+            st.cycles(case, **given)
+    with pytest.raises(st.CaseError, match="nothing slides: no support has a velocity"):
+        st.cycles(block_on_belt(law=Coulomb(0.3)), 0.3)
+
+
+def test_a_cycle_is_no_cycle_of_another_friction():
+    """A broken one is seen: its residual is that of the start in another problem."""
+    family = Family(st.Workspace(mode_coupling(DAMPED, 0.1)).system())
+    closed = cycles_reached(family.at(1.0), pushed(family.at(1.0), 0.2))[-1]
+    other = shoot(family.at(1.05), closed.chart, closed.xi, closed.period)
+    assert closed.residual < 1e-9
+    assert np.linalg.norm(other.end - closed.xi) > 1e-3 * closed.shot.amplitude
+    assert replace(closed, residual=0.0).word == closed.word
