@@ -13,8 +13,22 @@ from test_exact_stepper import random_system
 import stridor as st
 from marching import block_on_belt
 from mode_coupling import mode_coupling
+from stridor.case import template_text
 from stridor.laws import Coulomb, StaticKinetic
-from stridor.periodic import Closed, Cycles, Family, NoReturn, close, cycles_reached, growing, multipliers, pushed
+from stridor.periodic import (
+    Branch,
+    Closed,
+    Cycles,
+    Family,
+    NoReturn,
+    born,
+    close,
+    cycles_reached,
+    follow,
+    growing,
+    multipliers,
+    pushed,
+)
 from stridor.periodic.chart import Chart
 from stridor.periodic.shooting import shoot, started
 from stridor.study.cycle_branches import Tracer
@@ -257,3 +271,27 @@ def test_a_cycle_is_no_cycle_of_another_friction():
     assert closed.residual < 1e-9
     assert np.linalg.norm(other.end - closed.xi) > 1e-3 * closed.shot.amplitude
     assert replace(closed, residual=0.0).word == closed.word
+
+
+def test_a_fold_is_solved_for():
+    """The two beams: behind their onset the branch turns back, and goes on unstable below it."""
+    case = st.loads(template_text("two-beams")).with_({"bodies.beam1.elements": 20, "bodies.beam2.elements": 18})
+    (onset,) = st.onsets(case, (0.06, 0.1)).onsets
+    branch = Branch(Family(st.Workspace(case).system()), (0.06, 0.1))
+    first, heading = born(branch, onset.mu, onset.frequency_hz)
+    met: list[tuple[float, float, bool]] = []
+
+    def seen(closed: Closed, *, fold: bool) -> bool:
+        met.append((closed.problem.value, float(np.abs(multipliers(closed)[0])), fold))
+        return True
+
+    seen(first, fold=False)
+    assert follow(branch, first, heading, seen, 6) == "6 points were made"
+    (k,) = [k for k, (_, _, fold) in enumerate(met) if fold]
+    mus, sizes = [mu for mu, _, _ in met], [size for _, size, _ in met]
+    assert sizes[k] == pytest.approx(1.0, abs=2e-4)
+    assert all(size < 1.0 - 1e-4 for size in sizes[:k])
+    assert all(size > 1.0 + 1e-4 for size in sizes[k + 1 :])
+    assert mus[: k + 1] == sorted(mus[: k + 1])
+    assert mus[k:] == sorted(mus[k:], reverse=True)
+    assert mus[-1] < onset.mu < mus[0]
