@@ -13,7 +13,7 @@ import scipy.sparse.linalg as spl
 from scipy.optimize import linear_sum_assignment
 
 from stridor.errors import AnalysisError
-from stridor.modal.quadratic import Quadratic, Region, find_modes, undamped_count
+from stridor.modal.quadratic import Quadratic, Region, dense, find_modes, undamped_count
 from stridor.modal.quadratic import count as counting
 from stridor.modal.quadratic import find as finding
 from stridor.modal.quadratic import search as searching
@@ -437,3 +437,39 @@ def test_products_with_complex_columns(columns, given):
     block = np.asarray(rng.standard_normal(shape) + 1j * rng.standard_normal(shape), order="F")
     np.testing.assert_allclose(times(matrix, block), matrix.toarray() @ block, rtol=1e-13, atol=1e-13)
     np.testing.assert_allclose(times(matrix.T, block[:20]), matrix.toarray().T @ block[:20], rtol=1e-13, atol=1e-13)
+
+
+def held(seed: int) -> tuple[Quadratic, np.ndarray]:
+    """Contacts that hold rigidly while friction pushes, and all finite eigenvalues, with the contacts eliminated."""
+    rng = np.random.default_rng([seed, 11])
+    n, m = int(rng.integers(8, 41)), int(rng.integers(1, 4))
+    mass, stiffness = np.diag(10.0 ** rng.uniform(-3, 0, n)), 10.0 ** rng.uniform(0, 8) * chain(n).toarray()
+    normals, pushes = rng.standard_normal((m, n)), rng.standard_normal((m, n))
+    pushes = normals + rng.uniform(0, 1) * pushes
+    none = np.zeros((m, m))
+    whole = np.block([[stiffness, pushes.T], [normals, none]])
+    right, left = sl.null_space(normals), sl.null_space(pushes)
+    truth = 1j * np.sqrt(sl.eigvals(left.T @ stiffness @ right, left.T @ mass @ right).astype(complex))
+    padded = sl.block_diag(mass, none)
+    return quadratic(padded, np.zeros_like(padded), whole), np.concatenate([truth, -truth])
+
+
+@pytest.mark.parametrize("seeds", [range(60), pytest.param(range(60, 2000), marks=pytest.mark.slow)], ids=len)
+def test_infinite_eigenvalues_of_rigid_contacts_are_told_from_fast_ones(seeds) -> None:
+    for seed in seeds:
+        problem, truth = held(seed)
+        values, _, _ = dense.all_modes(problem)
+        assert len(values) == len(truth), seed
+        np.testing.assert_allclose(np.sort(np.abs(values)), np.sort(np.abs(truth)), rtol=1e-4, err_msg=str(seed))
+
+
+def test_fast_eigenvalues_are_not_taken_for_infinite_ones() -> None:
+    """Masses over eight decades and springs over ten have all of theirs."""
+    for seed in range(40):
+        rng = np.random.default_rng([seed, 12])
+        n = int(rng.integers(3, 40))
+        mass, spring = (np.diag(10.0 ** (most * rng.uniform() * rng.uniform(size=n))) for most in (-8, 10))
+        rows = rng.standard_normal((n, n))
+        damping = 10.0 ** rng.uniform(-4, 3) * np.diag(rng.uniform(0, 1, n))
+        values, _, _ = dense.all_modes(quadratic(mass, damping, rows @ rows.T + 0.5 * rows + spring))
+        assert len(values) == 2 * n, seed

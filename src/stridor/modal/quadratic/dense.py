@@ -7,27 +7,30 @@ import scipy.linalg as sl
 
 from ...errors import AnalysisError
 from ...stages import passing, stage
-from ...typing import ComplexArray
+from ...typing import Array, ComplexArray
 from .problem import Quadratic, times
 
 ALONE = 1e-4  # of the way to the next eigenvalue: by how much one is corrected at most
 LONG = 300  # unknowns from which it takes seconds
 SMALL = 1e-13  # of the matrices: α and β below it at once are those of a pencil that is singular for every λ
+ROUNDS = 8  # of balancing
+SAFE = 100.0  # times the rounding that QZ leaves in 1/λ: what is no larger may as well be zero, and λ infinite
 
 
 @passing()
 def all_modes(problem: Quadratic) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Finite λ (k,) [1/s], right and left vectors (n, k) of unit norm.
 
-    Scaled as Fan, Lin and Van Dooren (2004) do: λ = γμ with γ² = ‖K‖/‖M‖, and all by 2/(‖K‖ + γ‖D‖). Raises
-    AnalysisError where det P(λ) is zero for every λ.
+    Rows and columns are brought to like size (Ruiz 2001) and, as Fan, Lin and Van Dooren (2004) do, λ = γμ with
+    γ² = ‖K‖/‖M‖, all divided by (‖K‖ + γ‖D‖)/2. Raises AnalysisError where det P(λ) is zero for every λ.
     """
     if problem.size >= LONG:
         stage(f"all modes of {problem.size} unknowns, dense", logged=False)
     m, d, k = (np.asarray(a.toarray(), dtype=float) for a in (problem.mass, problem.damping, problem.stiffness))
-    sizes = [float(np.linalg.norm(a, 2)) for a in (m, d, k)]
-    gamma = float(np.sqrt(sizes[2] / sizes[0])) if sizes[0] > 0 and sizes[2] > 0 else 1.0
-    delta = 2 / max(sizes[2] + gamma * sizes[1], gamma**2 * sizes[0], 1e-300)
+    gamma, _ = _units(m, d, k)
+    rows, columns = _balance(gamma**2 * np.abs(m) + gamma * np.abs(d) + np.abs(k))
+    m, d, k = (rows[:, None] * a * columns for a in (m, d, k))
+    gamma, delta = _units(m, d, k)
     m, d, k = gamma**2 * delta * m, gamma * delta * d, delta * k
     n = problem.size
     one, none = np.eye(n), np.zeros((n, n))
@@ -35,12 +38,42 @@ def all_modes(problem: Quadratic) -> tuple[ComplexArray, ComplexArray, ComplexAr
     (alpha, beta), left, right = sl.eig(left_side, right_side, left=True, homogeneous_eigvals=True)
     if (np.hypot(np.abs(alpha), np.abs(beta)) < SMALL).any():
         raise AnalysisError("the quadratic problem is singular for every λ: some motion has no mass, damping or spring")
-    finite = np.abs(beta) > SMALL * np.abs(alpha)
+    finite = np.abs(beta) > np.maximum(SMALL, _uncertain(left_side, right_side, left, right)) * np.abs(alpha)
     mu = alpha[finite] / beta[finite]
     upper = np.abs(mu) >= 1
     x = np.where(upper, right[:n, finite], right[n:, finite])
-    x, y = unit(x), unit(left[:n, finite].conj())
+    x, y = unit(columns[:, None] * x), unit(rows[:, None] * left[:n, finite].conj())
     return _tuned(problem, gamma * mu, x, y), x, y
+
+
+def _units(m: Array, d: Array, k: Array) -> tuple[float, float]:
+    """γ and δ, of which γ²δM, γδD and δK are of like size."""
+    sizes = [float(np.linalg.norm(a, 2)) for a in (m, d, k)]
+    gamma = float(np.sqrt(sizes[2] / sizes[0])) if sizes[0] > 0 and sizes[2] > 0 else 1.0
+    return gamma, 2 / max(sizes[2] + gamma * sizes[1], gamma**2 * sizes[0], 1e-300)
+
+
+def _balance(sizes: Array) -> tuple[Array, Array]:
+    """Powers of two (n,) for rows and columns, so that the largest of each is about one: they round nothing. Without
+    them QZ may lose what is small beside contact forces or among stiff and soft bodies."""
+    rows = columns = np.ones(len(sizes))
+    for _ in range(ROUNDS):
+        now = rows[:, None] * sizes * columns
+        rows, columns = (
+            by / np.sqrt(np.where(largest > 0.0, largest, 1.0))
+            for by, largest in ((rows, now.max(axis=1, initial=0.0)), (columns, now.max(axis=0, initial=0.0)))
+        )
+    return 2.0 ** np.round(np.log2(rows)), 2.0 ** np.round(np.log2(columns))
+
+
+def _uncertain(a: Array, b: Array, left: ComplexArray, right: ComplexArray) -> Array:
+    """What rounding of QZ may do to β/α (k,) of a pencil (a, b), to first order: ε‖(A, B)‖/|(yᴴAx, yᴴBx)| (Stewart and
+    Sun, Matrix Perturbation Theory, VI.2). A rigid contact makes three infinite eigenvalues that hang together; rounding
+    drives them apart to λ of 1e10 of the others, of any sign."""
+    size = np.hypot(np.linalg.norm(a, 2), np.linalg.norm(b, 2))
+    projected = [np.abs(np.einsum("ij,ij->j", left.conj(), matrix @ right)) for matrix in (a, b)]
+    length = np.linalg.norm(left, axis=0) * np.linalg.norm(right, axis=0)
+    return SAFE * np.finfo(float).eps * size * length / np.maximum(np.hypot(*projected), 1e-300)
 
 
 def _tuned(problem: Quadratic, lam: ComplexArray, x: ComplexArray, y: ComplexArray) -> ComplexArray:
