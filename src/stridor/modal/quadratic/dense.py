@@ -68,8 +68,8 @@ def _balance(sizes: Array) -> tuple[Array, Array]:
 
 def _uncertain(a: Array, b: Array, left: ComplexArray, right: ComplexArray) -> Array:
     """What rounding of QZ may do to β/α (k,) of a pencil (a, b), to first order: ε‖(A, B)‖/|(yᴴAx, yᴴBx)| (Stewart and
-    Sun, Matrix Perturbation Theory, VI.2). A rigid contact makes three infinite eigenvalues that hang together; rounding
-    drives them apart to λ of 1e10 of the others, of any sign."""
+    Sun, Matrix Perturbation Theory, VI.2). A rigid contact makes three infinite eigenvalues that hang together, which
+    rounding drives apart to λ of 1e10 of the others, of any sign."""
     size = np.hypot(np.linalg.norm(a, 2), np.linalg.norm(b, 2))
     projected = [np.abs(np.einsum("ij,ij->j", left.conj(), matrix @ right)) for matrix in (a, b)]
     length = np.linalg.norm(left, axis=0) * np.linalg.norm(right, axis=0)
