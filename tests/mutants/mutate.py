@@ -73,6 +73,51 @@ if __import__("os").environ.get("NUMBA_DISABLE_JIT"):
     def borrow(array):
         return array
 ''',
+    "kernels/denormals.py": '''
+
+if __import__("os").environ.get("NUMBA_DISABLE_JIT"):
+    exchange = _nothing
+''',
+    "temporal/steppers/modal/vectors.py": '''
+
+if __import__("os").environ.get("NUMBA_DISABLE_JIT"):
+    import ctypes as _ctypes
+
+    import numpy as _np
+
+    def _seen(at, count):
+        return _np.ctypeslib.as_array((_ctypes.c_double * count).from_address(int(at)))
+
+    def address(array):
+        return array.ctypes.data
+
+    def load(rows, at):
+        return _seen(rows + 8 * LANES * at, LANES).copy()
+
+    def store(rows, at, value):
+        _seen(rows + 8 * LANES * at, LANES)[:] = value
+
+    def number(flat, at):
+        return float(_seen(flat + 8 * at, 1)[0])
+
+    def zero():
+        return _np.zeros(LANES)
+
+    def plus(x, y):
+        return x + y
+
+    def plus_product(z, x, y):
+        return z + x * y
+
+    def minus_product(z, x, y):
+        return z - x * y
+
+    def total(x):
+        return float(x.sum())
+
+    times = product = lambda x, y: x * y
+    plus_times = plus_product
+''',
     "temporal/steppers/sparse/lanes.py": '''
 
 

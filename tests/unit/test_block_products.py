@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from stridor.temporal.aligned import LINE, aligned_zeros
 from stridor.temporal.steppers.sparse.lanes import LANES
 from stridor.temporal.steppers.sparse.products import add_rows
-from stridor.temporal.steppers.sparse.storage import LINE, Layout, aligned_zeros, upper_blocks
+from stridor.temporal.steppers.sparse.storage import Layout, upper_blocks
 
 
 def _symmetric(blocks: int, width: int, seed: int) -> sp.csr_array:

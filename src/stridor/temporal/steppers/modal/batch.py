@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ....kernels import denormals_flushed
 from ....laws.friction import friction_rows
 from ....system import System
 from ....system.uncoupled import UncoupledModes
@@ -87,21 +88,12 @@ class Batch:
 
     def advance(self, steps: int, acting: Acting, record: BatchRecord) -> None:
         """So many steps under what acts over steps + 1."""
-        run_batch(
-            steps,
-            self.done,
-            self.modal,
-            self.table.contacts,
-            self.friction,
-            self.scheme,
-            self._forcing(*acting.spread()),
-            self.compliance,
-            self.fields,
-            self.states,
-            self.scratch,
-            record,
-            self.lost,
-        )
+        forcing = self._forcing(*acting.spread())
+        with denormals_flushed():
+            run_batch(
+                steps, self.done, self.modal, self.table.contacts, self.friction, self.scheme, forcing,
+                self.compliance, self.fields, self.states, self.scratch, record, self.lost,
+            )  # fmt: skip
         self.done += steps
         for lane in range(self.members):
             if self.lost[lane] < 0 and not np.isfinite(self.fields.ud[:, lane]).all():

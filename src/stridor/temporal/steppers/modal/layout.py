@@ -20,14 +20,12 @@ class Fields(NamedTuple):
 
 
 class ModalRows(NamedTuple):
-    """Active rows on modes: values (a + 1, n), a zero row at the end. For each block of modes the rows that
-    push on it (contact forces) and those that read it, with offsets (b + 1,) into both lists."""
+    """Active rows on modes: values (a + 1, n), a zero row at the end. met (k,): for each block of modes the rows that
+    push on it or read it, with offsets at (b + 1,)."""
 
     values: Array
-    pushing: IntArray
-    push_at: IntArray
-    pulling: IntArray
-    pull_at: IntArray
+    met: IntArray
+    at: IntArray
 
 
 class NodalRows(NamedTuple):

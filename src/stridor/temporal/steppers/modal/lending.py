@@ -38,7 +38,7 @@ def lent_nodal(x: NodalArrays) -> NodalArrays:  # pragma: no cover - compiled
 @njit(cache=True, inline="always")
 def lent_modal_rows(x: ModalRows) -> ModalRows:  # pragma: no cover - compiled
     """The same ModalRows, its arrays borrowed."""
-    return ModalRows(borrow(x.values), borrow(x.pushing), borrow(x.push_at), borrow(x.pulling), borrow(x.pull_at))
+    return ModalRows(borrow(x.values), borrow(x.met), borrow(x.at))
 
 
 @njit(cache=True, inline="always")

@@ -9,9 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
+from ....kernels import denormals_flushed
 from ....system import System
 from ....system.uncoupled import UncoupledModes
 from ....typing import Array, IntArray
+from ...aligned import aligned, aligned_zeros
 from ...beta2 import Scheme
 from ...columns import FIRST_OPEN, FIRST_STICK, STATISTICS, WORKS
 from ...schedule import Schedule
@@ -27,9 +29,9 @@ from .operators import (
     row_table,
 )
 from .stage import Forcing, LoopState, Scratch
+from .vectors import LANES
 
 MODAL_LIMIT = 3000
-LANES = 16
 
 
 @dataclass
@@ -98,7 +100,7 @@ class Machine:
         values = np.ascontiguousarray(self.table_values[np.append(chosen, zero)])
         force_rows = values[: table.force_rows]
         if self.modal is not None:
-            self.rows = _modal_rows(values, self.modal, table.force_rows)
+            self.rows = _modal_rows(values, self.modal)
             self.compliance = np.ascontiguousarray(values[:-1] @ (self.modal.drive[:, None] * force_rows.T))
         else:
             assert self.nodal is not None
@@ -168,34 +170,21 @@ class Machine:
         arrays: Any = self.modal if self.modal is not None else self.nodal
         rows: Any = self.rows
         loop: Any = run_modal if self.modal is not None else run_nodal
-        return loop(
-            steps,
-            arrays,
-            rows,
-            self.table.contacts,
-            self.scheme,
-            forcing,
-            self.compliance,
-            self.fields,
-            self.state,
-            self.scratch,
-            record,
-            self.table.force_rows,
-        )
+        with denormals_flushed():
+            return loop(
+                steps, arrays, rows, self.table.contacts, self.scheme, forcing, self.compliance, self.fields,
+                self.state, self.scratch, record, self.table.force_rows,
+            )  # fmt: skip
 
 
-def _modal_rows(values: Array, modal: ModalArrays, force_rows: int) -> ModalRows:
-    """For each block of modes the rows that push on it and those that read it."""
-    pushing: list[int] = []
-    pulling: list[int] = []
-    push_at, pull_at = [0], [0]
+def _modal_rows(values: Array, modal: ModalArrays) -> ModalRows:
+    """For each block of modes the rows that are not zero on it."""
+    met: list[int] = []
+    at = [0]
     for lo, hi in zip(modal.blocks[:-1], modal.blocks[1:], strict=True):
-        met = [r for r in range(values.shape[0] - 1) if np.any(values[r, lo:hi])]
-        pulling += met
-        pushing += [r for r in met if r < force_rows]
-        push_at.append(len(pushing))
-        pull_at.append(len(pulling))
-    return ModalRows(values, *(np.array(x, dtype=np.int64) for x in (pushing, push_at, pulling, pull_at)))
+        met += [r for r in range(values.shape[0] - 1) if np.any(values[r, lo:hi])]
+        at.append(len(met))
+    return ModalRows(aligned(values), np.array(met, dtype=np.int64), np.array(at, dtype=np.int64))
 
 
 def _padded(sizes: list[int]) -> tuple[IntArray, IntArray]:
@@ -223,7 +212,7 @@ def modal_machine(system: System, scheme: Scheme, modes: UncoupledModes) -> Mach
     def padded(values: Array) -> Array:
         out = np.zeros((*values.shape[:-1], int(blocks[-1])))
         out[..., index] = values
-        return out
+        return aligned(out)
 
     arrays = ModalArrays(
         forward=padded((dt - dt**2 / 2 * c) / effective),
@@ -273,10 +262,10 @@ def _machine(
         motion=np.zeros((2, table.motions)),
     )
     fields = Fields(
-        u=np.zeros(size),
-        q=np.zeros(size),
-        d=np.zeros(size),
-        constant=np.zeros(size),
+        u=aligned_zeros((size,)),
+        q=aligned_zeros((size,)),
+        d=aligned_zeros((size,)),
+        constant=aligned_zeros((size,)),
         coefficients=np.zeros(table.auxiliary),
         buffer=np.zeros(size),
     )

@@ -1,9 +1,10 @@
-"""Numbers of several members of an ensemble side by side, as one value of compiled code.
+"""Several numbers side by side as one value of compiled code: members of an ensemble, or neighbouring modes of one run.
 
 A sum over modes for eight members at once is eight sums that have nothing to do with each other. Written as loops, the
 compiler has to find that out, and it seldom does: what it needs is one loop over the modes whose partial sums stay in
 registers. Here a row of ``LANES`` numbers is a value that functions compute with, so each member is added up in the
-order that is written, whoever sits beside it and whatever vector registers the processor has.
+order that is written, whoever sits beside it and whatever vector registers the processor has. So it is with modes of
+one run: one loop over many arrays, which the compiler would have to prove distinct.
 
 Arrays are given by their `address`; ``rows`` are C-contiguous with ``LANES`` numbers in the last axis, ``flat`` ones
 are read number by number. Nothing is checked: places must be inside.
@@ -141,6 +142,60 @@ def _plus_times(typing_context: Any, y: Any, factor: Any, x: Any) -> Any:
     return _lanes(y, factor, x), codegen
 
 
+@intrinsic
+def _product(typing_context: Any, x: Any, y: Any) -> Any:
+    """x·y, lane by lane."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.fmul(arguments[0], arguments[1], flags=_FUSED)
+
+    return _lanes(x, y), codegen
+
+
+@intrinsic
+def _plus_product(typing_context: Any, z: Any, x: Any, y: Any) -> Any:
+    """z + x·y, lane by lane."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        product = builder.fmul(arguments[1], arguments[2], flags=_FUSED)
+        return builder.fadd(arguments[0], product, flags=_FUSED)
+
+    return _lanes(z, x, y), codegen
+
+
+@intrinsic
+def _minus_product(typing_context: Any, z: Any, x: Any, y: Any) -> Any:
+    """z − x·y, lane by lane."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        product = builder.fmul(arguments[1], arguments[2], flags=_FUSED)
+        return builder.fsub(arguments[0], product, flags=_FUSED)
+
+    return _lanes(z, x, y), codegen
+
+
+@intrinsic
+def _total(typing_context: Any, x: Any) -> Any:
+    """The sum of all lanes, by halves."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        value, width = arguments[0], LANES
+        index = _ir.IntType(32)
+        while width > 1:
+            width //= 2
+            undefined = _ir.Constant(value.type, _ir.Undefined)
+            low, high = (
+                builder.shuffle_vector(
+                    value, undefined, _ir.Constant(_ir.VectorType(index, width), [at + k for k in range(width)])
+                )
+                for at in (0, width)
+            )
+            value = builder.fadd(low, high, flags=_FUSED)
+        return builder.extract_element(value, _ir.Constant(index, 0))
+
+    return _types.float64(x), codegen
+
+
 # As compiled code calls them: numba gives the typing context itself.
 address: Any = _address
 load: Any = _load
@@ -150,3 +205,7 @@ zero: Any = _zero
 plus: Any = _plus
 times: Any = _times
 plus_times: Any = _plus_times
+product: Any = _product
+plus_product: Any = _plus_product
+minus_product: Any = _minus_product
+total: Any = _total

@@ -10,8 +10,10 @@ import scipy.sparse as sp
 from ....contact.nodes import ContactNodes
 from ....contact.surfaces import SurfaceContact
 from ....errors import AnalysisError, CaseError
+from ....kernels import denormals_flushed
 from ....system import System
 from ....typing import Array, IntArray, Sparse
+from ...aligned import aligned_zeros
 from ...beta2 import Scheme
 from ...columns import FIRST_OPEN, FIRST_STICK, STATISTICS
 from ...inputs import DIAGONAL
@@ -23,7 +25,7 @@ from .node_stage import NodeScratch, NodeState
 from .node_table import NodeTable, node_table
 from .products import DASHPOTS, WITH_STIFFNESS, Fields, Structure, stored_energies
 from .recording import Record
-from .storage import Layout, aligned_zeros, lay_out_freedoms, parts, upper_blocks
+from .storage import Layout, lay_out_freedoms, parts, upper_blocks
 from .unsymmetric import Unsymmetric, halves, unsymmetric
 
 OFFSET_STEPS = 100  # in which the gap that a renewal of the rows made fades
@@ -99,9 +101,11 @@ class Machine:
         )
         work = _step_work(forcing, self.table, self.state, record)
         structure, fields, table, nodes = self.structure, self.fields, self.table, self.contacts
-        return run_steps(
-            steps, structure, fields, self.unsymmetric, forcing, table, nodes, self.scratch, self.state, work, record
-        )
+        with denormals_flushed():
+            return run_steps(
+                steps, structure, fields, self.unsymmetric, forcing, table, nodes, self.scratch, self.state, work,
+                record,
+            )  # fmt: skip
 
 
 def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Machine:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from numba import get_num_threads, prange
 
-from ....kernels import njit
+from ....kernels import flush_denormals, njit
 from ....typing import Array, IntArray
 from ...arithmetic import FAST
 from .lanes import rows2, rows3
@@ -136,6 +136,7 @@ def _two_parts(
     """Both parts at once. Array by array, as threads do not take nested tuples."""
     blocks = k_ptr.shape[0] - 1
     for t in prange(2):
+        flush_denormals()  # this thread may be one of numba's own
         a = Structure(
             Blocks(k_ptr, k_col, k_val), Blocks(c_ptr, c_col, c_val), keep, kick, factor, mass, damping, parts, flags,
             numbers,

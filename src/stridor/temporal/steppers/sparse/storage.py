@@ -19,11 +19,11 @@ import scipy.sparse as sp
 
 from ....system import System
 from ....typing import Array, IntArray, Sparse
+from ...aligned import aligned_zeros
 from .lanes import LANES
 
 THREADED_FREEDOMS = 20_000
 LARGEST_BLOCK = 3
-LINE = 8  # numbers to a line of the cache
 
 
 class Blocks(NamedTuple):
@@ -33,15 +33,6 @@ class Blocks(NamedTuple):
     ptr: IntArray
     col: IntArray
     val: Array
-
-
-def aligned_zeros(shape: tuple[int, ...]) -> Array:
-    """Zeros that begin where a line of the cache does: registers that straddle two lines cost a third of the speed."""
-    size = int(np.prod(shape))
-    room = np.empty(size + LINE)
-    room[:] = 0.0
-    first = -room.ctypes.data // room.itemsize % LINE
-    return room[first : first + size].reshape(shape)
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,9 @@ import scipy.sparse as sp
 from ....kernels import njit
 from ....system import System
 from ....typing import Array, IntArray, Sparse
+from ...aligned import aligned_zeros
 from .products import WITH_STIFFNESS, Fields, Structure
-from .storage import Layout, aligned_zeros
+from .storage import Layout
 
 CONVERGED = 1e-14  # of the largest q: change by a further pass
 MOST_PASSES = 100
