@@ -295,3 +295,10 @@ def test_a_fold_is_solved_for():
     assert mus[: k + 1] == sorted(mus[: k + 1])
     assert mus[k:] == sorted(mus[k:], reverse=True)
     assert mus[-1] < onset.mu < mus[0]
+
+
+def test_a_search_that_time_ends_says_so():
+    found = st.cycles(mode_coupling(DAMPED), 1.0, seconds=1e-9)
+    assert not found.cycles
+    assert found.missing
+    assert all("its 1e-09 s of computing were over" in m and "chaotic" not in m for m in found.missing)

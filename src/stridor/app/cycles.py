@@ -37,7 +37,7 @@ def cycles(
     ] = None,
     points: Annotated[int, typer.Option("--most", min=2, help="Most cycles of a branch, each way.")] = 120,
     seconds: Annotated[
-        float, typer.Option("--seconds", help="How long a motion is followed that comes back to nowhere.")
+        float, typer.Option("--seconds", help="Processor time for a motion that comes back to nowhere.")
     ] = 60.0,
     max_frequency: MaxFrequency = None,
     source: Source = None,

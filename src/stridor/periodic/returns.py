@@ -100,8 +100,8 @@ def _begun(problem: SlidingProblem, motion: VariedMotion, q: Array, v: Array) ->
 def cycles_reached(problem: SlidingProblem, motion: VariedMotion, seconds: float = SECONDS) -> list[Closed]:
     """The cycle that a motion runs into, behind the unstable ones that it passed near to.
 
-    Raises NoReturn where it comes to rest, or within CHANGES changes of contact or ``seconds`` of computing near to no
-    cycle at all.
+    Raises NoReturn where it comes to rest, or within CHANGES changes of contact or ``seconds`` of processor time near
+    to no cycle at all.
     """
     met: list[_Met] = []
     found: list[Closed] = []
@@ -109,9 +109,9 @@ def cycles_reached(problem: SlidingProblem, motion: VariedMotion, seconds: float
     scale = np.sqrt(np.abs(problem.basis.stiffness))
     moving = scale[scale > 1e-6 * scale.max(initial=0.0)]
     quiet = QUIET / float(moving.min(initial=1.0) if len(moving) else 1.0)
-    until = clock.monotonic() + seconds
+    until = clock.process_time() + seconds  # so that what is found does not hang on what runs beside
     amplitude, last = 0.0, ""
-    while len(met) < CHANGES and clock.monotonic() < until:
+    while len(met) < CHANGES and clock.process_time() < until:
         change = _next_change(motion, (met[-1].time if met else 0.0) + quiet)
         if change is None:
             if found:
@@ -135,9 +135,11 @@ def cycles_reached(problem: SlidingProblem, motion: VariedMotion, seconds: float
             return found
     if found:
         return found
+    why = "the motion is quasi-periodic or chaotic, or takes longer to come to its cycle"
+    if len(met) < CHANGES:
+        why = f"its {seconds:g} s of computing were over, which says nothing of whether there is a cycle"
     raise NoReturn(
-        f"no return within {len(met)} changes of contact, the nearest {nearest:.2g} of the amplitude off{last}: the "
-        "motion is quasi-periodic or chaotic, or takes longer to come to its cycle"
+        f"no return within {len(met)} changes of contact, the nearest {nearest:.2g} of the amplitude off{last}: {why}"
     )
 
 
