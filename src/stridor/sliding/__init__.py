@@ -1,5 +1,6 @@
 """Steady sliding: the equilibrium that both approaches start from, of point contacts and of whole surfaces."""
 
+from .equilibrium import share_factors
 from .points import SteadySliding, full_motion, slip_speeds, steady_points, steady_sliding
 from .pressing import least_force, nothing_presses, require_pressed, taken_as_closed
 from .resultants import Balance, Resultant
@@ -15,6 +16,7 @@ __all__ = [
     "least_force",
     "nothing_presses",
     "require_pressed",
+    "share_factors",
     "slip_speeds",
     "steady_nodes",
     "steady_points",

@@ -18,6 +18,7 @@ from .prepared import Preparing
 # Contact springs stiffer than this, relative to the structure, would drown it in rounding if added to its matrix.
 CONDENSED = 1e3
 NEWTON_STEPS = 60
+NEARBY = "factors nearby"  # the question of `System.of_matrices` whose answer is a `direct.Nearby`
 BALANCED = 1e-14  # of the largest force: what an equilibrium by prepared factors may leave
 
 
@@ -126,7 +127,7 @@ class Equilibrium:
         residual = self.residual(state)
         if not residual <= BALANCED:
             return None
-        shared.once("factors nearby", direct.Nearby).free()
+        shared.once(NEARBY, direct.Nearby).free()
         self.solved += 1
         return replace(state, residual=residual)
 
@@ -204,8 +205,10 @@ class Equilibrium:
             )
             right = np.concatenate([right, np.where(touches, s * self.gap[rigid], 0.0)])
         self.solved += 1
-        answer = self.system.of_matrices.once("factors nearby", direct.Nearby).solve(
-            sp.csr_array(matrix), right, kind=active.tobytes(), symmetric=self.symmetric, saddle=len(rigid) > 0,
+        # Other matrices, with which factors may be shared, are regular or singular by themselves.
+        kind = active.tobytes(), self.system.of_matrices.once("matrices", object)
+        answer = self.system.of_matrices.once(NEARBY, direct.Nearby).solve(
+            sp.csr_array(matrix), right, kind=kind, symmetric=self.symmetric, saddle=len(rigid) > 0,
             solver=self.solver,
         )  # fmt: skip
         normal = np.zeros(nodes.count)
@@ -213,6 +216,11 @@ class Equilibrium:
         if len(springs):
             normal[springs] = -(self.gap[springs] + nodes.normal[springs] @ answer[:n]) / self.compliance[springs]
         return answer[:n], normal
+
+
+def share_factors(system: System, factors: direct.Nearby) -> None:
+    """Let equilibria of a system take and leave ``factors``, which serve systems of almost the same matrices."""
+    system.in_place().of_matrices.keep(NEARBY, factors)
 
 
 def find_touching(

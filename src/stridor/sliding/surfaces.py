@@ -205,9 +205,12 @@ def steady_sliding_nodes(
     )
 
 
-def steady_nodes(system: System, mu: float | None = None, solver: str | None = None) -> SurfaceSliding:
-    """`steady_sliding_nodes` under all loads and motions, solved once for each μ and kept with the system."""
-    return system.once((STEADY, mu, solver), lambda: steady_sliding_nodes(system, mu=mu, solver=solver))
+def steady_nodes(
+    system: System, mu: float | None = None, solver: str | None = None, *, guess: BoolArray | None = None
+) -> SurfaceSliding:
+    """`steady_sliding_nodes` under all loads and motions, solved once for each μ and kept with the system; guess: where
+    it begins if it is not known."""
+    return system.once((STEADY, mu, solver), lambda: steady_sliding_nodes(system, mu=mu, guess=guess, solver=solver))
 
 
 def _after_load_steps(system: System, mu: float | None, solver: str | None) -> SurfaceSliding:

@@ -15,12 +15,15 @@ from ..case.overrides import number_at as number_of
 from ..case.overrides import split_path
 from ..case.points import choice
 from ..digits import measured
+from ..direct import Nearby
 from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.derivatives import Mode, PencilChange, by_compliance, by_friction, hold, pencil_of, rate_of, solve_mode
 from ..modal.growing import doubt
 from ..modal.pencil import Pencil
-from ..system import System
+from ..sliding import share_factors
+from ..system import System, build_system
+from ..system.bodies import KnownBodies
 from ..system.imported import cleaned
 from ..typing import Array, ComplexArray
 from .analyses import modes as modes_at
@@ -166,6 +169,8 @@ class Linearised:
         doubtful = doubt(modes.completeness[0]) if modes.completeness else ""
         self.warnings: list[str] = [f"modes at μ = {mu:g}: {doubtful}"] if doubtful else []
         self._solved: dict[int, Mode | None] = {}
+        # What systems in which one number is another have in common.
+        self._bodies, self._factors = KnownBodies(), Nearby()
 
     @staticmethod
     def of(
@@ -223,7 +228,11 @@ class Linearised:
         steps = split_path(path)
         # The range of a parameter says where onsets are sought; a little beyond its end nothing is amiss.
         beyond = {".".join([*steps[:2], "range"]): None} if steps[0] == "parameters" else {}
-        return self._as_asked(Workspace(self.case.with_({**beyond, path: value})).system(self.mu))
+        case = self.case.with_({**beyond, path: value})
+        mu = self.mu if self.work.varies else None
+        system = self._as_asked(build_system(case, mu, known=self._bodies))
+        share_factors(system, self._factors)
+        return system
 
     def _as_asked(self, system: System) -> System:
         """The system with damping or without; gyroscopic forces are none."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -65,6 +66,11 @@ class BuiltBody:
         """Freedoms (s, d) in the structure of the displacements of nodes (s,)."""
         return self.offset + self.stride * nodes[:, None] + np.arange(self.dimension)
 
+    @cached_property
+    def freedom_names(self) -> tuple[str, ...]:
+        """What all freedoms (size,) of the body are, in words."""
+        return tuple(self.freedom_name(local) for local in range(self.size))
+
     def freedom_name(self, local: int) -> str:
         """What a freedom of the body is, in words."""
         node, direction = divmod(local, self.stride)
@@ -75,8 +81,45 @@ class BuiltBody:
         return f"{self.name} node {node} {'rotation' if direction >= self.dimension else AXES[direction]}"
 
 
-def build_bodies(case: Case, mu: float | None = None) -> dict[str, BuiltBody]:
-    """Every body that deforms or moves, in the order of the case; factors of imported matrices at ``mu``.
+@dataclass(frozen=True)
+class _Known:
+    """A solid as it was built, and from what."""
+
+    table: SolidBody
+    material: Material
+    mesh: LoadedMesh
+    built: BuiltBody
+
+
+class KnownBodies:
+    """Solids of cases that differ in a few numbers, by name: what is the same in the next case is not built again."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, _Known] = {}
+
+    def mesh(self, name: str, body: SolidBody) -> LoadedMesh | None:
+        """The mesh, if the last body of this name had it; of files, which may have changed, none is known."""
+        last = self._last.get(name)
+        if last is None or body.file is not None or last.table.file is not None:
+            return None
+        same = last.table.mesh == body.mesh and last.table.points == body.points and last.table.model == body.model
+        return last.mesh if same else None
+
+    def built(self, name: str, body: SolidBody, material: Material, offset: int) -> BuiltBody | None:
+        """The body, if all of it is as it was."""
+        last = self._last.get(name)
+        if last is None or body.file is not None or (last.table, last.material) != (body, material):
+            return None
+        return last.built if last.built.offset == offset else None
+
+    def keep(self, name: str, body: SolidBody, material: Material, mesh: LoadedMesh, built: BuiltBody) -> None:
+        """The first of a name is known from now on: the others are varied from it and back."""
+        self._last.setdefault(name, _Known(body, material, mesh, built))
+
+
+def build_bodies(case: Case, mu: float | None = None, known: KnownBodies | None = None) -> dict[str, BuiltBody]:
+    """Every body that deforms or moves, in the order of the case; factors of imported matrices at ``mu``; what is
+    ``known`` from like cases is taken from there.
 
     Raises CaseError for meshes and matrices that will not do.
     """
@@ -88,7 +131,7 @@ def build_bodies(case: Case, mu: float | None = None) -> dict[str, BuiltBody]:
             if isinstance(body, BeamBody):
                 built = _beam(case, name, body, offset)
             elif isinstance(body, SolidBody):
-                built = _solid(case, name, body, offset)
+                built = _solid(case, name, body, offset, known or KnownBodies())
             elif isinstance(body, MatrixBody):
                 built = _imported(case, name, body, offset, mu)
             elif isinstance(body, MassBody):
@@ -117,16 +160,18 @@ def _beam(case: Case, name: str, body: BeamBody, offset: int) -> BuiltBody:
     return BuiltBody(name, offset, DOF_PER_NODE, mesh.coordinates(), mass, damping, stiffness, beam=mesh)
 
 
-def _solid(case: Case, name: str, body: SolidBody, offset: int) -> BuiltBody:
-    loaded: LoadedMesh = load_mesh(name, body)
+def _solid(case: Case, name: str, body: SolidBody, offset: int, known: KnownBodies) -> BuiltBody:
+    loaded: LoadedMesh = known.mesh(name, body) or load_mesh(name, body)
     if body.file is not None:
         refuse_too_many_read(f"bodies.{name}", body.file, loaded.mesh.points.size, offset)
     material = _material(case, name, body, loaded)
+    if (before := known.built(name, body, material, offset)) is not None:
+        return before
     matrices = assemble_solid(
         loaded.mesh, material, model=body.model, thickness=body.thickness, lumped=body.mass == "lumped"
     )
     damping = body.damping.mass * matrices.mass + body.damping.stiffness * matrices.stiffness
-    return BuiltBody(
+    built = BuiltBody(
         name,
         offset,
         body.dimension,
@@ -137,6 +182,8 @@ def _solid(case: Case, name: str, body: SolidBody, offset: int) -> BuiltBody:
         mesh=loaded.mesh,
         material=material,
     )
+    known.keep(name, body, material, loaded, built)
+    return built
 
 
 def _material(case: Case, name: str, body: SolidBody, loaded: LoadedMesh) -> Material:

@@ -20,7 +20,7 @@ from ..mesh.boundary import require_boundary
 from ..mesh.facets import facet_areas, pressure_load, traction_load
 from ..stages import passing, stage
 from ..typing import Array, IntArray, Sparse
-from .bodies import BuiltBody, build_bodies
+from .bodies import BuiltBody, KnownBodies, build_bodies
 from .body_loads import body_load
 from .given_matrices import not_symmetric_definite
 from .holders import holders_of
@@ -34,9 +34,11 @@ from .view import View
 
 
 @passing()
-def build_system(case: Case | str | PathLike[str], mu: float | None = None) -> System:
+def build_system(
+    case: Case | str | PathLike[str], mu: float | None = None, *, known: KnownBodies | None = None
+) -> System:
     """Assemble a case, or that in the file at a path; mu is that in the factors of imported matrices (None: the case's
-    own), and nothing else.
+    own), and nothing else. known: bodies of like cases, taken as they are where nothing of them differs.
 
     Raises CaseError where a mesh or a matrix will not do or bodies that shall touch do not.
     """
@@ -46,7 +48,7 @@ def build_system(case: Case | str | PathLike[str], mu: float | None = None) -> S
         accepted = "a case or the path of its file; the system of a workspace is work.system()"
         raise CaseError("case", f"a {type(case).__name__}", accepted)
     stage("matrices of the bodies")
-    bodies = build_bodies(case, mu)
+    bodies = build_bodies(case, mu, known)
     total = sum(body.size for body in bodies.values())
     links = links_of(case, bodies, total)
     constraints = constraints_of(case, bodies)
@@ -229,7 +231,7 @@ def _cells(body: BuiltBody) -> Mapping[str, IntArray]:
 
 
 def _dof_names(bodies: Mapping[str, BuiltBody]) -> list[str]:
-    return [body.freedom_name(local) for body in bodies.values() for local in range(body.size)]
+    return [name for body in bodies.values() for name in body.freedom_names]
 
 
 def _stress_stiffness(case: Case, view: View) -> Callable[..., Sparse] | None:

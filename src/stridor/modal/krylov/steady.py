@@ -141,7 +141,7 @@ class Steadiness:
     def terms(self, mu: float) -> tuple[Array | None, Sparse | None, Sparse | None]:
         """Weakening d (m,) [N s/m], damping (n, n) and stiffness (n, n) at ``mu``, None where there is none."""
         try:
-            steady = steady_sliding_nodes(self.system, mu=mu, held=self._held, solver=self.solver)
+            steady = self._steady(mu)
         except AnalysisError as error:
             raise AnalysisError(f"{error}; that is at μ = {mu:g}, of the range that was asked for") from error
         weakening = damping = None
@@ -162,6 +162,16 @@ class Steadiness:
             change = self._hardening(mu, steady.normal_force)
             stiffness = change if stiffness is None else sp.csr_array(stiffness + change)
         return weakening, damping, stiffness
+
+    def _steady(self, mu: float) -> SurfaceSliding:
+        """Steady sliding at ``mu``: with the nodes held where they are, else kept with the system, and sought from the
+        nodes that touch here on."""
+        held = self._held
+        if held is not None:
+            return steady_sliding_nodes(self.system, mu=mu, held=held, solver=self.solver)
+        guess = np.zeros(self.nodes.count, dtype=bool)
+        guess[self.touching] = True
+        return steady_nodes(self.system, mu, self.solver, guess=guess)
 
     @property
     def _held(self) -> BoolArray | None:

@@ -256,7 +256,9 @@ class _Run:
                 raise AnalysisError(
                     f"{len(self.sites)} factorisations do not get through the region; ask for a narrower one"
                 )
-            site = self._visit(cell, cell.shift())
+            # Where a first disc about a real shift has not got as far as it was to, the next ones are smaller.
+            real = None if self.sites else cell.real_shift()
+            site = self._visit(cell, cell.shift() if real is None else real)
             if not site.disc.covers(cell):
                 pending = remaining(cell, [s.disc for s in self.sites]) + pending
 
@@ -267,24 +269,24 @@ class _Run:
             site.factor.free()
 
     @passing()
-    def _visit(self, cell: Region, shift: complex) -> _Site:
+    def _visit(self, cell: Region, shift: complex | float) -> _Site:
         """One factorisation, and all it gives."""
         problem, rng = self.problem, np.random.default_rng(3)
         for _ in range(MOVES):
             stage(f"all modes around {abs(shift) / 6.283185307179586:.4g} Hz, {problem.size} unknowns")
             radius = MARGIN * cell.farthest(shift)
             try:
-                factor = factorise(problem.at(complex(shift)), solver=self.solver)
+                factor = factorise(problem.at(shift), solver=self.solver)
             except SingularMatrix:
                 self.factorisations += 1
-                shift += 0.03 * radius * complex(*rng.standard_normal(2))
+                shift = _beside(shift, radius, rng)
                 continue
             self.factorisations += 1
             try:
                 site = self._searched(factor, shift, radius)
             except (TooClose, SingularMatrix):
                 factor.free()
-                shift += 0.03 * radius * complex(*rng.standard_normal(2))
+                shift = _beside(shift, radius, rng)
                 continue
             self.sites.append(site)
             self.alive += factor.memory_bytes
@@ -301,15 +303,16 @@ class _Run:
             f"P(λ) is singular at λ = {shift:.6g} 1/s and everywhere near it; does some motion lack mass and stiffness?"
         )
 
-    def _searched(self, factor: Factor, shift: complex, radius: float) -> _Site:
-        def forward(right: ComplexArray) -> ComplexArray:
+    def _searched(self, factor: Factor, shift: complex | float, radius: float) -> _Site:
+        def forward(right: Any) -> Any:
             return factor.solve(right, refine=False)
 
-        def transposed(right: ComplexArray) -> ComplexArray:
+        def transposed(right: Any) -> Any:
             return factor.solve(right, transpose=True, refine=False)
 
         n = self.problem.size
-        most = min(max(int(BASIS_BYTES / (16 * n)), FEWEST), LARGEST, 2 * n)
+        each = 1 if isinstance(shift, complex) else 2  # real vectors take half the room, and of conjugates there are two
+        most = min(max(int(each * BASIS_BYTES / (16 * n)), each * FEWEST), each * LARGEST, 2 * n)
         searches: list[Search] = []
         sides = [(self.problem, forward)] + ([(self.problem.transposed, transposed)] if self.left else [])
         for problem, solve in sides:
@@ -415,6 +418,12 @@ class _Run:
 
     def _cut(self) -> str:
         return f" Growth rates above {self.region.re_max:.6g} 1/s were not searched."
+
+
+def _beside(shift: complex | float, radius: float, rng: np.random.Generator) -> complex | float:
+    """Another shift nearby, on the real axis where this one is."""
+    step = 0.03 * radius * complex(*rng.standard_normal(2))
+    return shift + step if isinstance(shift, complex) else shift + step.real
 
 
 def _collected(search: Search) -> DiscModes:

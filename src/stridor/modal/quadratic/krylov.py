@@ -7,7 +7,7 @@ With λ = σ + ρ/θ, P(λ)x = 0 reads θ²x + θ ρP(σ)⁻¹(2σM + D)x + ρ²
 ρ is the radius of the disc looked at, so that the wanted θ are those of modulus one and more and both halves of their
 vectors are of one size. It plays the part of the scaling of Fan, Lin and Van Dooren (2004), about σ instead of zero,
 where their second factor cancels. Both halves of all Krylov vectors lie in one orthonormal basis Q (n, q) with q close
-to their number, which is all that is stored of length n. An infinite eigenvalue is θ = 0 and does no harm.
+to their number, which is all that is stored of length n. About a real σ all of it is real. An infinite eigenvalue is θ = 0 and does no harm.
 """
 
 from __future__ import annotations
@@ -26,33 +26,35 @@ NOTHING = 1e-14  # of a vector's length: what orthogonalisation may leave of one
 
 
 class Columns:
-    """Orthonormal complex columns of length n, kept in pieces so that growing never copies."""
+    """Orthonormal columns of length n, real or complex, kept in pieces so that growing never copies."""
 
-    def __init__(self, n: int) -> None:
-        self.n = n
+    def __init__(self, n: int, kind: type = complex) -> None:
+        self.n, self.kind = n, kind
         self.count = 0
-        self._pieces: list[ComplexArray] = []
+        self._pieces: list[Any] = []
 
-    def append(self, block: ComplexArray) -> None:
+    def append(self, block: Any) -> None:
         """Add columns (n, b) as they are."""
         for column in range(block.shape[1]):
             index = self.count % WIDTH
             if index == 0:
-                self._pieces.append(np.empty((self.n, WIDTH), dtype=complex, order="F"))
+                self._pieces.append(np.empty((self.n, WIDTH), dtype=self.kind, order="F"))
             self._pieces[-1][:, index] = block[:, column]
             self.count += 1
 
-    def project(self, block: ComplexArray) -> ComplexArray:
-        """Qᴴ block, (q, b)."""
-        result = np.empty((self.count, block.shape[1]), dtype=complex)
+    def project(self, block: Any) -> Any:
+        """Qᴴ block, (q, b), of a block as real as the columns are."""
+        result = np.empty((self.count, block.shape[1]), dtype=self.kind)
         conjugate = block.conj().T
         for first, piece in self._filled():
             result[first : first + piece.shape[1]] = (conjugate @ piece).conj().T
         return result
 
-    def combine(self, weights: ComplexArray) -> ComplexArray:
+    def combine(self, weights: Any) -> Any:
         """Q weights, (n, b)."""
-        result = np.zeros((self.n, weights.shape[1]), dtype=complex, order="F")
+        if self.kind is float and weights.dtype.kind == "c":
+            return self.combine(weights.real) + 1j * self.combine(weights.imag)
+        result = np.zeros((self.n, weights.shape[1]), dtype=self.kind, order="F")
         for first, piece in self._filled():
             result += piece @ weights[first : first + piece.shape[1]]
         return result
@@ -66,20 +68,20 @@ class Columns:
 class Krylov:
     """S V = V H + … on a growing orthonormal basis V of pairs (u, w) = (Q U₀, Q U₁).
 
-    Vectors of V are numbered in the order they come; S has been applied to some, and the rest wait.
+    Vectors of V are numbered in the order they come; S has been applied to some, and the rest wait. They are real where
+    the shift is.
     """
 
-    def __init__(
-        self, problem: Quadratic, solve: Callable[[ComplexArray], ComplexArray], shift: complex, radius: float
-    ) -> None:
+    def __init__(self, problem: Quadratic, solve: Callable[[Any], Any], shift: complex | float, radius: float) -> None:
         self.problem = problem
+        self.kind: type = complex if isinstance(shift, complex) else float
         self.shift = shift
         self.radius = radius
         self.solves = 0
         self._solve = solve
-        self._columns = Columns(problem.size)
-        self._pairs = np.zeros((2, 0, 0), dtype=complex)
-        self._image = np.zeros((0, 0), dtype=complex)  # one column for each vector S has been applied to
+        self._columns = Columns(problem.size, self.kind)
+        self._pairs: Any = np.zeros((2, 0, 0), dtype=self.kind)
+        self._image: Any = np.zeros((0, 0), dtype=self.kind)  # one column for each vector S has been applied to
         self._applied = np.zeros(0, dtype=np.int64)
 
     @property
@@ -89,18 +91,23 @@ class Krylov:
 
     def forget(self) -> None:
         """Give the memory of the vectors back."""
-        self._columns = Columns(self.problem.size)
+        self._columns = Columns(self.problem.size, self.kind)
 
-    def smooth(self, block: ComplexArray) -> ComplexArray:
+    def own(self, block: Any) -> Any:
+        """A block (n, b) as these vectors are: about a real shift its real part, in which eigenvectors of real matrices
+        come with their conjugates."""
+        return np.ascontiguousarray(block.real) if self.kind is float else np.asarray(block, dtype=complex)
+
+    def smooth(self, block: Any) -> Any:
         """P(σ)⁻¹ block: what an arbitrary block (n, b) has of the eigenvectors near the shift, mostly."""
         self.solves += block.shape[1]
-        return self._solve(np.asarray(block, dtype=complex))
+        return self._solve(self.own(block))
 
-    def add(self, u: ComplexArray, w: ComplexArray | None = None) -> IntArray:
+    def add(self, u: Any, w: Any = None) -> IntArray:
         """Numbers of the vectors that (u, w) adds, w zero by default; none where they are in V already."""
         halves = u if w is None else np.hstack([u, w])
         seen = self._absorb(halves)
-        coordinates = np.zeros((2, self._columns.count, u.shape[1]), dtype=complex)
+        coordinates = np.zeros((2, self._columns.count, u.shape[1]), dtype=self.kind)
         coordinates[0] = seen[:, : u.shape[1]]
         if w is not None:
             coordinates[1] = seen[:, u.shape[1] :]
@@ -116,11 +123,11 @@ class Krylov:
         force += rate * times(self.problem.damping, u)
         self.solves += b
         seen = self._absorb(-self._solve(force))
-        coordinates = np.zeros((2, columns.count, b), dtype=complex)
+        coordinates = np.zeros((2, columns.count, b), dtype=self.kind)
         coordinates[0] = seen
         coordinates[1, : self._pairs.shape[1]] = self._pairs[0][:, which]
         new, weights = self._orthogonal(coordinates)
-        image = np.zeros((len(weights), len(self._applied) + b), dtype=complex)
+        image = np.zeros((len(weights), len(self._applied) + b), dtype=self.kind)
         image[: len(self._image), : len(self._applied)] = self._image
         image[:, len(self._applied) :] = weights
         self._image, self._applied = image, np.concatenate([self._applied, which])
@@ -143,7 +150,7 @@ class Krylov:
         x = self._columns.combine(np.where(np.abs(values) >= 1, upper, lower))
         return x / np.maximum(np.linalg.norm(x, axis=0), 1e-300)
 
-    def _absorb(self, block: ComplexArray) -> ComplexArray:
+    def _absorb(self, block: Any) -> Any:
         """Coordinates (q, b) of ``block`` in Q, to which it adds what it brings."""
         columns = self._columns
         length = np.maximum(np.linalg.norm(block, axis=0), 1e-300)
@@ -156,10 +163,10 @@ class Krylov:
         columns.append(new)
         return np.vstack([first + (again @ upper) * length, (more @ upper) * length])
 
-    def _orthogonal(self, coordinates: ComplexArray) -> tuple[IntArray, ComplexArray]:
+    def _orthogonal(self, coordinates: Any) -> tuple[IntArray, Any]:
         """Numbers of the vectors that pairs of these coordinates (2, q, b) add to V, and their weights (m, b) in it."""
         q, m = coordinates.shape[1], self._pairs.shape[2]
-        held = np.zeros((2, q, m), dtype=complex)
+        held = np.zeros((2, q, m), dtype=self.kind)
         held[:, : self._pairs.shape[1]] = self._pairs
         old, block = held.reshape(2 * q, m), coordinates.reshape(2 * q, -1)
         length = np.maximum(np.linalg.norm(block, axis=0), 1e-300)
@@ -172,7 +179,7 @@ class Krylov:
         return np.arange(m, m + new.shape[1]), weights
 
 
-def _independent(block: ComplexArray, room: int) -> tuple[ComplexArray, ComplexArray]:
+def _independent(block: Any, room: int) -> tuple[Any, Any]:
     """An orthonormal basis (n, r) of the columns (n, b) of about unit length, and R (r, b): block = basis R."""
     basis, upper, order = sl.qr(block, mode="economic", pivoting=True, check_finite=False)
     rank = min(int((np.abs(np.diag(upper)) > NOTHING).sum()), max(room, 0))

@@ -14,6 +14,7 @@ BORDER = 1e-9  # of the region's size: what rounding may put an eigenvalue outsi
 PAD = 0.02  # of the region's size: searched beyond its border, so that no contour need touch an eigenvalue
 STRIP = 0.25  # half width, over its height, of the part beside the imaginary axis that gets shifts of its own
 WORTH = 1.5  # width over height of a region from which on that strip and what lies beyond it get discs of their own
+SQUARE = 0.8  # width over height of a region on the real axis from which on it gets a real shift
 DEPTH = 8  # bisections at most in telling what discs leave uncovered, along each side
 MARGIN = 1.01  # a disc meant to cover a rectangle is this much larger than it has to be
 
@@ -101,6 +102,12 @@ class Region:
         """Where to factorise for it: its middle. Beside the imaginary axis a disc holds fewer of the modes that crowd
         there than one about a point on it that reaches as far."""
         return complex((self.re_min + self.re_max) / 2, (self.im_min + self.im_max) / 2)
+
+    def real_shift(self) -> float | None:
+        """Where on the real axis: a disc about it holds each mode with its conjugate, found in real arithmetic at half
+        of what a disc about the middle costs. None where that would reach over much that is not asked for."""
+        wide = self.im_min <= 0.0 < self.im_max and self.width >= SQUARE * self.height
+        return (self.re_min + self.re_max) / 2 if wide else None
 
 
 @dataclass(frozen=True)

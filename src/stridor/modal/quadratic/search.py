@@ -77,19 +77,21 @@ class Search:
         The new vectors are orthogonal to the whole Krylov space, so that an eigenvector that the first block did not
         excite is now the largest of what is left and shows within a few steps.
         """
-        before = self.disc
+        before, krylov = self.disc, self.krylov
         self.looks += 1
         block = start(self.problem.size, self._width(width), self.seed + self.looks)
-        fresh = self.krylov.add(self.krylov.smooth(block))
+        fresh = krylov.add(krylov.smooth(block))
         for _ in range(steps):
             if not len(fresh):
                 break
-            fresh = self.krylov.advance(fresh)
+            fresh = krylov.advance(fresh)
         self._waiting = np.concatenate([self._waiting, fresh])
-        self.most = max(self.most, self.krylov.count + 8 * (width + BLOCK))
+        self.most = max(self.most, krylov.count + 8 * (width + BLOCK))
         self._grow(0)
         # The disc may have grown, where there was no room for more vectors; what that brings had not been missed.
         new = max(int((np.abs(self._values - before.centre) <= before.radius).sum()) - before.count, 0)
+        if krylov.kind is float:
+            new -= new // 2  # of conjugates, which come together, one
         self.later += new
         return new
 
@@ -127,12 +129,13 @@ class Search:
         good: BoolArray = left <= np.maximum(asked, 50 * np.finfo(float).eps * size.max(initial=0.0))
         nearly: BoolArray = good | (left <= NEARLY * size)
         last = not len(self._waiting)
-        beyond = int((size >= 1).sum()) + GUARDS
+        guards = GUARDS if krylov.kind is complex else 2 * GUARDS  # and their conjugates
+        beyond = int((size >= 1).sum()) + guards
         stop = bool(good[size >= 1].all() and nearly[size >= 1 / BEYOND].all() and nearly[:beyond].all())
         stop = stop and (last or len(size) >= beyond)
         full = last or krylov.count >= self.most
         if not (stop or full):
-            return False, int((~good[size >= 1]).sum() + (~nearly[size < 1][:GUARDS]).sum())
+            return False, int((~good[size >= 1]).sum() + (~nearly[size < 1][:guards]).sum())
         reach = 1.0
         bad = np.flatnonzero(~good)
         if not stop and len(bad):
@@ -146,7 +149,7 @@ class Search:
         if stop and not full and (error > self.tolerance).any() and krylov.count < self._patience():
             return False, int((error > self.tolerance).sum())
         guard = float(np.abs(values[~inside] - krylov.shift).min(initial=np.inf))
-        self.disc = Disc(krylov.shift, reach * krylov.radius, int(inside.sum()), guard)
+        self.disc = Disc(complex(krylov.shift), reach * krylov.radius, int(inside.sum()), guard)
         self._values = values[inside]
         self.found = DiscModes(values[kept], shapes, error)
         self.guards = values[nearly & ~kept]
@@ -177,7 +180,7 @@ class Search:
         u, w = x @ (theta[:, None] * mix), x @ mix
         noise = krylov.smooth(start(p.size, width, self.seed + 1))
         noise *= 1e-4 * np.linalg.norm(u, axis=0) / np.maximum(np.linalg.norm(noise, axis=0), 1e-300)
-        return u + noise, w
+        return krylov.own(u) + noise, krylov.own(w)
 
 
 def _gaps(theta: ComplexArray) -> Array:
