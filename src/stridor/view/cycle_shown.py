@@ -16,8 +16,8 @@ STRIPS = ("separation", "stick", "slip")  # by status
 
 @dataclass(frozen=True)
 class ContactPeriod:
-    """A contact over one period: normal_force, tangential_force (t,) [N], slip_velocity (t,) [m/s]; strips: what it does
-    from where to where in shares of the period; shares of separation, stick and slip."""
+    """A contact over one period: normal_force, tangential_force (t,) [N], slip_velocity (t,) [m/s]; strips: what it
+    does from where to where in shares of the period; shares of separation, stick and slip."""
 
     name: str
     normal_force: list[float]

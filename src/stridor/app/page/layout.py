@@ -22,7 +22,11 @@ if TYPE_CHECKING:
     from .server import Server
 
 TOO_LARGE = f"a case file of at most {LARGEST_TEXT / 1e6:g} MB"
-SECTIONS = (("left", "Model and numbers"), ("middle", "Modes over friction"), ("right", "Run in time, limit cycles and comparison"))
+SECTIONS = (
+    ("left", "Model and numbers"),
+    ("middle", "Modes over friction"),
+    ("right", "Run in time, limit cycles, comparison"),
+)
 TABS = (("bench", "Bench"), ("map", "Stability map"))
 # Browsers may give frames of other sites no storage, and 127.0.0.1 is one in a notebook of localhost: without this
 # nothing starts there.

@@ -22,8 +22,8 @@ _PARTS = """
   <button type="button" id="st-cycle-stop" disabled>Stop</button>
 </div>
 <progress id="st-cycle-progress" aria-label="Limit cycles are sought" hidden></progress>
-<p id="st-cycle-said" class="st-note" role="status">What it swings in, for good, at the μ of the page. Motions from every
-growing mode and from pushes are followed exactly until they come back to where they were.</p>
+<p id="st-cycle-said" class="st-note" role="status">What it swings in for good at the μ of the page: motions
+from every growing mode and from pushes are followed exactly, until they come back to where they were.</p>
 <div id="st-cycle-found"></div>
 <div id="st-cycle-more"></div>
 """

@@ -87,8 +87,9 @@ class Run:
 
     heard(part, content) is called, in a thread of its own, with "waiting" (the place in the queue), "begun",
     "progress" (steps done and planned), "log" (what is being done), "picture" (of `run_so_far`), "sound" (a WAV file's
-    bytes and what it is) or "silent" (why there is none), "cycle" (a limit cycle, as `CycleShown`), and at last with one of "done" and "stopped" (sentence, file,
-    and the tables of a comparison, or what is to be said of cycles), "refused" (the words of the command line) and "failed".
+    bytes and what it is) or "silent" (why there is none), "cycle" (as `CycleShown`), and at last with one of "done" and
+    "stopped" (sentence, file, the tables of a comparison, what is missing of cycles), "refused" (the words of the
+    command line) and "failed".
     """
 
     def __init__(self, wish: Wish, heard: Heard, queue: Queue | None = None) -> None:
