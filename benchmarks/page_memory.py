@@ -1,11 +1,12 @@
 """Random use of the page: does the server, the page's processes or the browser's page grow?
 
 python benchmarks/page_memory.py [--minutes 60] [--short]
-Moves, modes, tabs, undo, runs begun, heard and stopped, at random. Printed are, after each twelfth of the time (five
-minutes of an hour), the memory of the server with its processes, what of it is their own (the rest are files of
-libraries, whose share is less the more other programs use them), and of the page, rubbish collected: the heap, what of
-it is compiled script, and how many nodes and listeners there are. Needs the extra app, playwright, Linux, and Chromium
-at /usr/bin/chromium; without them it says so and leaves.
+Moves, modes, tabs, undo, runs begun, heard and stopped, limit cycles sought, at random. Printed are, after each twelfth
+of the time (five minutes of an hour), the memory of the server with its processes, what of it is their own (the rest
+are files of libraries, whose share is less the more other programs use them), and of the page what is reachable in it:
+the heap, what of that is compiled script, what the browser holds beside it (nodes, styles, pictures), and how many
+nodes and listeners there are. What a page needs at all is there after five minutes: the ratio at the end is to that.
+Needs the extra app, playwright, Linux, and Chromium at /usr/bin/chromium; without them it says so and leaves.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from typing import Any
 
 CHROMIUM = Path("/usr/bin/chromium")
 SAMPLES = 12  # over the time
-SCRIPT = "code"  # of the heap, as its browser calls it
+SCRIPT, BROWSER = "code", "native"  # of the heap, as its browser calls them
+FIRST = 300.0  # seconds
 START = "typeof stridor !== 'undefined' && stridor.state.onsets !== null && stridorRun.page.ready"
 
 
@@ -65,16 +67,19 @@ def use(address: str, server: int, seconds: float, times: int) -> None:
             act(page, chance)
             acts += 1
             if time.monotonic() - began > seconds * (len(samples) + 1) / times:
-                samples.append(sample(page, counter, server))
+                samples.append(sample(page, counter, server, time.monotonic() - began))
                 print(f"{(time.monotonic() - began) / 60:5.1f} min, {acts} acts: {samples[-1].words()}", flush=True)
-        early, late = samples[0].mb, samples[-1].mb
-        ratios = ", ".join(f"{key} {late[key] / early[key]:.2f}" for key in early)
-        print(f"  ratio of the last to the first: {ratios}")
+        last = samples[-1]
+        first = next((s for s in samples if s.seconds >= FIRST), samples[0])
+        ratios = ", ".join(f"{key} {last.mb[key] / first.mb[key]:.2f}" for key in first.mb)
+        print(f"  ratio of {last.seconds / 60:.1f} to {first.seconds / 60:.1f} min: {ratios}")
         print(f"  errors of the page's script: {len(failures)}{': ' + failures[0] if failures else ''}")
         browser.close()
 
 
-ACTS = {"slide": 60, "mode": 8, "tab": 4, "Undo": 6, "Reset": 1, "go": 3, "stop": 4, "listen": 2, "Light/dark": 1}
+ACTS = {"slide": 60, "mode": 8, "tab": 4, "Undo": 6, "Reset": 1, "go": 3, "stop": 4, "listen": 2, "Light/dark": 1,
+        "find": 2, "leave": 4}  # fmt: skip
+BUTTONS = {"go": "run-go", "stop": "run-stop", "listen": "run-listen", "find": "cycle-go", "leave": "cycle-stop"}
 SLIDE = """([which, share]) => {
   const all = [...document.querySelectorAll("input[type=range][data-path]")], slider = all[which % all.length];
   slider.value = Math.round((0.35 + 0.3 * share) * slider.max);
@@ -91,8 +96,8 @@ def act(page: Any, chance: random.Random) -> None:
         page.evaluate(SLIDE, [chance.randrange(99), chance.random()])
     elif kind in ("mode", "tab"):
         page.evaluate(PRESS, [{"mode": "#st-modes-list button", "tab": "[role=tab]"}[kind], chance.randrange(99)])
-    elif kind in ("go", "stop", "listen"):
-        page.evaluate(PRESS, [f"#st-run-{kind}", 0])
+    elif kind in BUTTONS:
+        page.evaluate(PRESS, [f"#st-{BUTTONS[kind]}", 0])
     else:
         page.evaluate(NAMED, kind)
     time.sleep(chance.expovariate(1 / 0.4))
@@ -100,8 +105,9 @@ def act(page: Any, chance: random.Random) -> None:
 
 @dataclass(frozen=True)
 class Sample:
-    """Memory [MB] of what, and numbers of things in the page."""
+    """Memory [MB] of what, and numbers of things in the page, after so many seconds."""
 
+    seconds: float
     mb: dict[str, float]
     counts: dict[str, int]
 
@@ -111,17 +117,20 @@ class Sample:
         return f"{memory}; {', '.join(f'{value} {key}' for key, value in self.counts.items())}"
 
 
-def sample(page: Any, counter: Any, server: int) -> Sample:
+def sample(page: Any, counter: Any, server: int, seconds: float) -> Sample:
     """What the server with its processes and the page take, no run under way."""
-    page.evaluate("document.getElementById('st-run-stop').click()")
+    for kind in ("stop", "leave"):
+        page.evaluate(PRESS, [f"#st-{BUTTONS[kind]}", 0])
     time.sleep(5)
     sizes = by_type(counter)
-    script = sizes[SCRIPT] / 1e6
     told = {one["name"]: one["value"] for one in counter.send("Performance.getMetrics")["metrics"]}
     memory, own = resident(server)
-    heap = told["JSHeapUsedSize"] / 1e6
+    # JSHeapUsedSize of the metrics is not it: it holds megabytes of rubbish, some of which the counting makes.
+    script, browser = sizes[SCRIPT] / 1e6, sizes[BROWSER] / 1e6
+    heap = sum(sizes.values()) / 1e6 - browser
     counts = {"nodes": int(told["Nodes"]), "listeners": int(told["JSEventListeners"])}
-    return Sample({"server": memory, "own": own, "heap": heap, "script": script, "objects": heap - script}, counts)
+    mb = {"server": memory, "own": own, "heap": heap, "script": script, "objects": heap - script, "browser": browser}
+    return Sample(seconds, mb, counts)
 
 
 def by_type(counter: Any) -> Counter[str]:

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 SHOTS = Path(os.environ.get("STRIDOR_SCREENSHOTS", ROOT / "build" / "screenshots"))
 PATIENT = 180_000  # ms
 SOLVED = "typeof stridor !== 'undefined' && stridor.state.onsets !== null"
-READY = "[stridorRun, stridorBoth, stridorMap].every((s) => s.page.ready)"
+READY = "[stridorRun, stridorCycle, stridorBoth, stridorMap].every((s) => s.page.ready)"
 
 
 @contextmanager

@@ -9,10 +9,11 @@ from ..typing import Array, BoolArray, ComplexArray, IntArray
 
 
 @njit(cache=True, error_model="numpy")
-def _sums(
+def deflating_sums(
     roots: ComplexArray, implied: BoolArray, index: IntArray, stiffness: Array, damping: Array, poles: ComplexArray,
     out: ComplexArray,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """`deflation` into ``out`` (k,), for kernels."""
     for k in range(index.shape[0]):
         own = index[k]
         a, b = roots[own].real, roots[own].imag
@@ -52,5 +53,5 @@ def deflation(
     conjugate is one, too. Not a number on a pole to the last bit.
     """
     out = np.empty(len(index), dtype=complex)
-    _sums(roots, implied, index, *poles, general, out)
+    deflating_sums(roots, implied, index, *poles, general, out)
     return out

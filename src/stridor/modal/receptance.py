@@ -17,7 +17,7 @@ from ..typing import Array, ComplexArray, IntArray
 
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
-def _real_mode_sums(
+def real_mode_sums(
     lam_re: Array, lam_im: Array, damping: Array, stiffness: Array, products: Array, out: Array
 ) -> None:  # pragma: no cover - compiled
     """out (k, p, 4): Re and Im of Σ φφ/d with d = λ² + cλ + ω², and of its derivative in λ."""
@@ -68,6 +68,11 @@ class Receptance:
         object.__setattr__(self, "_stiffness", self.modes.stiffness[seen])
         object.__setattr__(self, "_poles", self.modes.poles)
 
+    @property
+    def sums(self) -> tuple[Array, Array, Array]:
+        """Damping c (n,), stiffness ω² (n,) and products of rows (p, n) of the real modes that wanted entries see."""
+        return self._damping, self._stiffness, self._products  # type: ignore[attr-defined]
+
     def __call__(self, lam: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """H and dH/dλ (k, r, r) at λ (k,)."""
         rows = self.real.shape[0]
@@ -81,7 +86,7 @@ class Receptance:
     def entries(self, lam: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """The wanted entries of H and dH/dλ (k, p) at λ (k,)."""
         sums = np.empty((len(lam), self.pairs.shape[1], 4))
-        _real_mode_sums(
+        real_mode_sums(
             np.ascontiguousarray(lam.real),
             np.ascontiguousarray(lam.imag),
             self._damping,  # type: ignore[attr-defined]

@@ -8,6 +8,7 @@ the simultaneous iteration of Ehrlich and Aberth with the known poles multiplied
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sl
@@ -19,6 +20,7 @@ from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .coupling import PointCoupling
 from .deflation import deflation
 from .receptance import Receptance, wanted_pairs
+from .single_contact import SingleContact, polish_single
 
 CONVERGED = 1e-9  # of the step before last: convergence is at least quadratic
 MAX_STEPS = 40
@@ -47,6 +49,12 @@ class ReceptanceProblem:
         """The uncoupled modes."""
         return self.receptance.modes
 
+    @cached_property
+    def slow_poles(self) -> tuple[BoolArray, Array]:
+        """Which pole pairs (n,) are overdamped, and how large the slower pole of each is [1/s]: far below its ω."""
+        half = self.pole_damping / 2
+        return half**2 > self.pole_stiffness, half - np.sqrt(np.maximum(half**2 - self.pole_stiffness, 0.0))
+
     @property
     def unseen(self) -> bool:
         """Whether a pole of a general block has no normal motion at any contact: it is a root of its own at every μ,
@@ -67,6 +75,14 @@ class ReceptanceProblem:
             by_lambda = slope[:, 0] + mu * sense * slope[:, 1]
             return single[:, None, None], by_lambda[:, None, None], (sense * value[:, 1])[:, None, None]
         return self.coupling.matrices(lam, mu, *self.receptance(lam))
+
+    def single(self, mu: float) -> SingleContact | None:
+        """T as one sum over real modes, where it is one."""
+        if self.coupling.contacts != 1 or self.coupling.sloped or self.receptance.general.shape[1]:
+            return None
+        damping, stiffness, products = self.receptance.sums
+        sense = float(self.coupling.sense[0])
+        return SingleContact(damping, stiffness, products, float(self.coupling.compliance[0]), mu * sense)
 
     def tangents(self, lam: ComplexArray, mu: float) -> ComplexArray:
         """dλ/dμ (k,) along the branches through the roots λ (k,)."""
@@ -321,6 +337,10 @@ def polish(
     """
     roots = np.array(starts, dtype=complex)
     nearby = _poles_near(spectrum, roots)
+    single = spectrum.single(mu)
+    if single is not None and len(roots):
+        left = polish_single(roots, implied, single, nearby, steps, CONVERGED)
+        return roots, bool(not left and np.all(np.isfinite(roots)))
     smallest = np.full(len(roots), np.inf)
     active = np.ones(len(roots), dtype=bool)
     for _ in range(steps):
@@ -338,11 +358,9 @@ def polish(
 
 
 def _poles_near(spectrum: ReceptanceProblem, roots: ComplexArray) -> tuple[Array, Array]:
-    # An overdamped pole pair has its slow one far below its ω.
-    half = spectrum.pole_damping / 2
-    slow = half - np.sqrt(np.maximum(half**2 - spectrum.pole_stiffness, 0.0))
     reach = 1.5 * np.abs(roots).max()
-    near = (spectrum.pole_stiffness <= reach**2) | ((half**2 > spectrum.pole_stiffness) & (slow <= reach))
+    overdamped, slow = spectrum.slow_poles
+    near = (spectrum.pole_stiffness <= reach**2) | (overdamped & (slow <= reach))
     return spectrum.pole_stiffness[near], spectrum.pole_damping[near]
 
 

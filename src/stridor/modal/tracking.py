@@ -231,7 +231,15 @@ class Tracker:
         np.fill_diagonal(distance, np.inf)
         own = np.where(old.implied, 2 * np.abs(old.roots.imag), np.inf)
         nearest = np.argmin(distance, axis=1)
-        for i in np.argsort(distance.min(axis=1) if len(old.roots) > 1 else own):
+        closest = distance[np.arange(len(nearest)), nearest]
+        # Most roots are far from all others: which are not is told of all at once.
+        alike = nearest[nearest] == np.arange(len(nearest))
+        near = alike & (closest < np.maximum(moved, moved[nearest]) / CLOSE)
+        near |= (own < closest) & (own < moved / CLOSE)
+        if not near.any():
+            return found
+        order = np.argsort(closest if len(old.roots) > 1 else own)
+        for i in order[near[order]]:
             i = int(i)
             j = int(nearest[i])
             if i in used:

@@ -150,8 +150,8 @@ class _Search:
             except AnalysisError as error:
                 self.missing.append(f"μ = {mu:.6g}, from a push of {speed:.4g} m/s: {error}")
         here: list[Closed] = []
-        for said, motion in begun:
-            self._say(f"motion at μ = {mu:.6g} from {said}")
+        for number, (said, motion) in enumerate(begun, start=1):
+            self._say(f"motion {number} of {len(begun)} at μ = {mu:.6g}, from {said}")
             try:
                 reached = cycles_reached(problem, motion, self.seconds)
             except NoReturn as none:

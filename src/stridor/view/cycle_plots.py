@@ -12,10 +12,10 @@ from matplotlib.patches import Patch
 
 from ..periodic import Cycle, Cycles
 from ..temporal.trajectory import Trajectory
+from .cycle_shown import STRIPS, strips
 from .style import BLUE, COLOURS, GREY, INK, STATUS_COLOURS, VERMILION, legend_above, stacked, styled
 
 DASHED = (0, (4, 2))
-STRIPS = ("separation", "stick", "slip")  # by status
 
 
 @styled
@@ -114,14 +114,11 @@ def cycle_period(cycle: Cycle, contact: str | None = None, *, axes: Sequence[Axe
     upper.set_ylabel("force [N]")
     lower.set(xlabel=f"time / period of {cycle.period:.6g} s", ylabel="slip velocity [m/s]", xlim=(0, 1))
     met = [s for s in range(3) if np.any(cycle.status[:, k] == s)]
-    strips = [Patch(fc=STATUS_COLOURS[STRIPS[s]], label=STRIPS[s]) for s in met]
-    legend_above(upper, [*upper.get_legend_handles_labels()[0], *strips], columns=5)
+    patches = [Patch(fc=STATUS_COLOURS[STRIPS[s]], label=STRIPS[s]) for s in met]
+    legend_above(upper, [*upper.get_legend_handles_labels()[0], *patches], columns=5)
     return figure
 
 
 def _coloured(ax: Axes, share: np.ndarray, status: np.ndarray) -> None:
-    """Strips of what a contact does, from halfway between two samples to the next such place."""
-    edges = np.flatnonzero(np.diff(status)) + 1
-    places = [0.0, *(0.5 * (share[edges] + share[edges - 1])).tolist(), 1.0]
-    for first, last, begin in zip(places[:-1], places[1:], [0, *edges.tolist()], strict=True):
-        ax.axvspan(first, last, color=STATUS_COLOURS[STRIPS[int(status[begin])]], lw=0, zorder=0)
+    for first, last, kind in strips(share, status):
+        ax.axvspan(first, last, color=STATUS_COLOURS[kind], lw=0, zorder=0)

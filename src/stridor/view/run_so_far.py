@@ -92,7 +92,7 @@ def run_so_far(run: Trajectory, *, point: str | None = None, max_frequency_hz: f
         place = run.watch_names.index(point) if point in run.watch_names else 0
         name = run.watch_names[place]
         with np.errstate(all="ignore"):  # a run that does not stay stable
-            direction = int(np.argmax(np.nan_to_num(run.acceleration[:, place].std(axis=0))))
+            direction = loudest_direction(run.acceleration[:, place])
         axis = "xyz"[direction]
         histories = (h[:, place, direction] for h in (run.displacement, run.velocity, run.acceleration))
         displacement, velocity, history = histories
@@ -113,6 +113,11 @@ def run_so_far(run: Trajectory, *, point: str | None = None, max_frequency_hz: f
         run.steps, run.planned_steps, end, count, middles, phases, acceleration, forces(run.normal_force),
         forces(run.tangential_force), status, portrait, sonogram,
     )  # fmt: skip
+
+
+def loudest_direction(acceleration: Array) -> int:
+    """Number of the direction in which accelerations (t, d) vary most."""
+    return int(np.argmax(np.nan_to_num(acceleration.std(axis=0))))
 
 
 def _plain(values: Array) -> list[float]:

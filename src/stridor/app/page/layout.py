@@ -12,7 +12,7 @@ from nicegui import Client, events, ui
 from ...case import templates
 from ...errors import CaseError, StridorError
 from ...view.style import BLUE, GREEN, INK, VERMILION
-from . import panel_compare, panel_locus, panel_map, panel_mode, panel_model, panel_run
+from . import panel_compare, panel_cycle, panel_locus, panel_map, panel_mode, panel_model, panel_run
 from .levers import friction_range
 from .panel import asset
 from .session import Session, refused
@@ -22,7 +22,11 @@ if TYPE_CHECKING:
     from .server import Server
 
 TOO_LARGE = f"a case file of at most {LARGEST_TEXT / 1e6:g} MB"
-SECTIONS = (("left", "Model and numbers"), ("middle", "Modes over friction"), ("right", "Run in time and comparison"))
+SECTIONS = (
+    ("left", "Model and numbers"),
+    ("middle", "Modes over friction"),
+    ("right", "Run in time, limit cycles, comparison"),
+)
 TABS = (("bench", "Bench"), ("map", "Stability map"))
 # Browsers may give frames of other sites no storage, and 127.0.0.1 is one in a notebook of localhost: without this
 # nothing starts there.
@@ -100,8 +104,9 @@ class Layout:
         charts = panel_locus.build(middle, self.session)
         panel_mode.build(middle, self.session)
         with right:
-            run, compare = ui.element("div").classes("st-run"), ui.element("div").classes("st-compare")
+            run, cycle, compare = (ui.element("div").classes(f"st-{name}") for name in ("run", "cycle", "compare"))
         panel_run.build(run, self.session)
+        panel_cycle.build(cycle, self.session)
         panel_compare.build(compare, self.session)
         return charts
 

@@ -1,15 +1,18 @@
-"""Inside of the process of a run in time, a comparison or a report: what it computes and what it tells."""
+"""Inside of the process of a run in time, a comparison, a report, …: what it computes and what it tells."""
 
 from __future__ import annotations
 
 import os
 import signal
 import threading
+from _thread import interrupt_main
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ...periodic import Cycles
     from ...study.workspace import Workspace
     from ...temporal.trajectory import Trajectory
     from ...view.tables import Table
@@ -27,6 +30,7 @@ class _Page:
         self._pipe, self._whole = pipe, threading.Lock()
         self.stop = threading.Event()
         self.gives_up = True  # whether to stop is to leave everything as it is
+        self.breaks_off = False  # whether what is under way hears of it as of Ctrl-C
         self.slow: float | None = None
         threading.Thread(target=self._reading, daemon=True).start()
 
@@ -34,6 +38,12 @@ class _Page:
         """Tell it, whole: what is half written into a pipe spoils it."""
         with self._whole:
             self._pipe.send((part, content))
+
+    def interrupted(self, _: int, __: FrameType | None) -> None:
+        """A signal: Ctrl-C goes to all processes of a terminal and means nothing here, the pipe will end."""
+        if self.breaks_off and self.stop.is_set() and not self._whole.locked():
+            self.breaks_off = False
+            raise KeyboardInterrupt
 
     def _reading(self) -> None:
         while True:
@@ -48,19 +58,22 @@ class _Page:
                 os._exit(0)
             else:
                 self.stop.set()
+                if self.breaks_off:
+                    interrupt_main(signal.SIGINT)
 
 
 def serve(pipe: Any, wish: Wish) -> None:
     """Do what is wished for and tell of it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all processes of a terminal; the pipe will end
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     page = _Page(pipe)
+    signal.signal(signal.SIGINT, page.interrupted)
     from ...case import loads
     from ...errors import StridorError
     from ...study.workspace import Workspace
 
     kinds: dict[str, Callable[[_Page, Wish, Workspace], None]] = {
         "run": _run, "compare": _compare, "report": _report, "map": _map, "sound": _sound,
-        "sensitivities": _sensitivities,
+        "sensitivities": _sensitivities, "cycles": _cycles,
     }  # fmt: skip
     try:
         kinds[wish.what](page, wish, Workspace(loads(wish.case)))
@@ -138,6 +151,39 @@ def _map(page: _Page, wish: Wish, work: Workspace) -> None:
     from .mapping import mapped
 
     page.tell("done", {"sentence": mapped(page.tell, work, wish.options), "file": None})
+
+
+def _cycles(page: _Page, wish: Wish, work: Workspace) -> None:
+    """Limit cycles at one friction coefficient, each told as it is found; what is stopped keeps those it has."""
+    from ...study.cycles import cycles
+    from ...view.cycle_shown import cycle_shown
+
+    told = 0
+    page.gives_up, page.breaks_off = False, True
+
+    def keep(found: Cycles) -> None:
+        nonlocal told
+        for cycle in found.cycles[told:]:  # of one friction coefficient, so the newest are the last
+            page.tell("cycle", cycle_shown(cycle).to_json())
+        told = len(found.cycles)
+
+    def progress(_: int, doing: str) -> None:
+        page.tell("log", doing)
+        if page.stop.is_set():
+            page.breaks_off = False
+            raise KeyboardInterrupt
+
+    try:
+        found = cycles(work, wish.mu, progress=progress, keep=keep)
+    except KeyboardInterrupt:  # before there was anything to be kept
+        page.tell("stopped", STOPPED)
+        return
+    page.breaks_off = False
+    keep(found)
+    page.tell("stopped" if found.interrupted else "done", {
+        "sentence": found.sentence, "file": None, "missing": found.missing, "notes": found.notes,
+        "warnings": [] if found.interrupted else found.warnings,
+    })  # fmt: skip
 
 
 def _sensitivities(page: _Page, wish: Wish, work: Workspace) -> None:

@@ -1,5 +1,5 @@
-"""What takes long, each in a process of its own: runs in time, comparisons, reports, maps. At most a few at once, the
-others wait for their turn.
+"""What takes long, each in a process of its own: runs in time, limit cycles, comparisons, reports, maps. At most a few
+at once, the others wait for their turn.
 
 A run tells what it has computed a few times a second, in so few numbers that each telling is the whole picture. A
 process (`running`) ends with its pipe, and so with the page and the server.
@@ -24,7 +24,7 @@ PATIENCE = 0.2  # seconds that a process has to end
 
 ENDS = ("done", "stopped", "refused", "failed")
 Heard = Callable[[str, Any], None]
-What = Literal["run", "compare", "report", "map", "sound", "sensitivities"]
+What = Literal["run", "compare", "report", "map", "sound", "sensitivities", "cycles"]
 
 
 @dataclass(frozen=True)
@@ -87,8 +87,9 @@ class Run:
 
     heard(part, content) is called, in a thread of its own, with "waiting" (the place in the queue), "begun",
     "progress" (steps done and planned), "log" (what is being done), "picture" (of `run_so_far`), "sound" (a WAV file's
-    bytes and what it is) or "silent" (why there is none), and at last with one of "done" and "stopped" (sentence, file,
-    and the tables of a comparison), "refused" (the words of the command line) and "failed".
+    bytes and what it is) or "silent" (why there is none), "cycle" (as `CycleShown`), and at last with one of "done" and
+    "stopped" (sentence, file, the tables of a comparison, what is missing of cycles), "refused" (the words of the
+    command line) and "failed".
     """
 
     def __init__(self, wish: Wish, heard: Heard, queue: Queue | None = None) -> None:

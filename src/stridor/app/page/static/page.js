@@ -17,6 +17,7 @@ const stridor = (() => {
     if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(digits - 1).replace(/\.?0+e/, "e").replace("e+", "e").replace(/^-/, "−");
     return String(Number(value.toPrecision(digits))).replace("-", "−");
   }
+  const hertz = (f, digits = 1) => (f >= 100 ? f.toFixed(digits) : shown(f));
   const element = (name, attributes = {}, ...content) => {
     const made = document.createElement(name);
     for (const [key, value] of Object.entries(attributes)) if (value !== null) made.setAttribute(key, value);
@@ -172,7 +173,7 @@ const stridor = (() => {
   function onsetPoints(name) {
     if (!state.onsets) return [];
     const inside = state.onsets.onsets.filter((o) => o.mu >= state.low && o.mu <= state.high);
-    return inside.map((o) => ({ value: [o.mu, name === "frequency" ? o.frequency_hz : 0], words: `μ = ${o.mu.toPrecision(4)}\n${Math.round(o.frequency_hz)} Hz` }));
+    return inside.map((o) => ({ value: [o.mu, name === "frequency" ? o.frequency_hz : 0], words: `μ = ${o.mu.toPrecision(4)}\n${hertz(o.frequency_hz, 0)} Hz` }));
   }
   function described(name) {
     const what = name === "frequency" ? "Frequencies" : "Growth rates";
@@ -250,7 +251,7 @@ const stridor = (() => {
     let text = "";
     if (state.progress) text = `${state.progress[0].toUpperCase()}${state.progress.slice(1)}.`;
     else if (!on) text = state.locus ? "The onsets are being solved." : "The modes are being computed.";
-    else if (on.first) text = `Growth begins at μ = ${on.first.mu.toPrecision(5)}, ${on.first.frequency_hz.toFixed(1)} Hz (${on.onsets.length} onset${on.onsets.length === 1 ? "" : "s"} solved).`;
+    else if (on.first) text = `Growth begins at μ = ${on.first.mu.toPrecision(5)}, ${hertz(on.first.frequency_hz)} Hz (${on.onsets.length} onset${on.onsets.length === 1 ? "" : "s"} solved).`;
     else text = on.growing_at_start.length ? `Something grows already at μ = ${on.friction_range[0]}.` : `Nothing grows up to μ = ${on.friction_range[1]}.`;
     if (on && !on.complete) text += ` ${on.completeness}`;
     if (state.refused && state.locus) text = `Of the last numbers that could be computed: ${text[0].toLowerCase()}${text.slice(1)}`;
@@ -270,10 +271,10 @@ const stridor = (() => {
     else if (at.completeness) box_.append(element("details", {}, element("summary", {}, at.completeness.split(/[.:]/)[0]), at.completeness));
     const scroll = box.scrollTop, held = document.activeElement?.dataset?.branch;
     const rows = at.modes.map((m) => {
-      const button = element("button", { type: "button", "data-branch": m.branch, "aria-pressed": String(m.branch === state.branch), "aria-label": `mode ${m.branch}, ${m.frequency_hz.toFixed(1)} Hz, ${m.unstable ? "growing" : "stable"}` }, String(m.branch));
+      const button = element("button", { type: "button", "data-branch": m.branch, "aria-pressed": String(m.branch === state.branch), "aria-label": `mode ${m.branch}, ${hertz(m.frequency_hz)} Hz, ${m.unstable ? "growing" : "stable"}` }, String(m.branch));
       button.addEventListener("click", () => choose(m.branch));
       return element("tr", { class: `${m.unstable ? "st-grows" : ""} ${m.branch === state.branch ? "st-chosen" : ""}` },
-        element("td", {}, button), element("td", {}, m.frequency_hz.toFixed(1)), element("td", {}, shown(m.growth_rate)), element("td", {}, m.unstable ? "growing" : "stable"));
+        element("td", {}, button), element("td", {}, hertz(m.frequency_hz)), element("td", {}, shown(m.growth_rate)), element("td", {}, m.unstable ? "growing" : "stable"));
     });
     const head = element("tr", {}, ...["mode", "frequency [Hz]", "growth [1/s]", ""].map((h) => element("th", { scope: "col" }, h)));
     box.replaceChildren(element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows)));
@@ -361,7 +362,7 @@ const stridor = (() => {
   }
   const parts = {
     model(c) {
-      $("st-model").innerHTML = c.svg || "<p class='st-note'>Matrices without places: there is nothing to draw.</p>";
+      $("st-model").innerHTML = c.svg || "<p class='st-note'>Matrices or masses without a shape: there is nothing to draw.</p>";
       $("st-title").textContent = c.title;
       if (c.why) problem(c.why);
     },

@@ -9,12 +9,12 @@ const stridorRun = (() => {
   const chartOf = (name) => getElement(page.charts[name])?.chart;
   const shown = (v) => (v === 0 ? "0" : Math.abs(v) < 1e-3 || Math.abs(v) >= 1e5 ? v.toExponential(1).replace("e+", "e").replace("-", "−") : String(Number(v.toPrecision(4))).replace("-", "−"));
 
-  function axes(bottom, unit) {
+  function axes(bottom, unit, [least, most] = span()) {
     const label = { color: text(), fontSize: 10 };
     return {
       animation: false, backgroundColor: "transparent",
       grid: { left: 58, right: 12, top: 22, bottom: bottom ? 32 : 8, outerBoundsMode: "none" },
-      xAxis: { type: "value", min: span()[0], max: span()[1], name: bottom ? "time [ms]" : "", nameLocation: "middle", nameGap: 18, nameTextStyle: label,
+      xAxis: { type: "value", min: least, max: most, name: bottom ? "time [ms]" : "", nameLocation: "middle", nameGap: 18, nameTextStyle: label,
         axisLabel: { ...label, show: bottom, hideOverlap: true }, axisLine: { onZero: false, lineStyle: { color: rule() } }, splitLine: { lineStyle: { color: grid() } } },
       yAxis: { type: "value", scale: true, name: unit, nameLocation: "end", nameGap: 6, nameTextStyle: { ...label, align: "left", padding: [0, 0, 0, -52] }, splitNumber: 3,
         axisLabel: { ...label, formatter: shown }, axisLine: { show: true, onZero: false, lineStyle: { color: rule() } }, splitLine: { lineStyle: { color: grid() } } },
@@ -70,19 +70,25 @@ const stridorRun = (() => {
   const phases = (p) => ({ silent: true, symbol: "none", animation: false, lineStyle: { color: rule(), type: "dotted" },
     label: { position: "insideEndTop", rotate: 0, fontSize: 10, color: text(), formatter: (d) => d.name, align: "left", offset: [9, 14] },
     data: p.phases.map(([name, start]) => ({ name, xAxis: 1e3 * start })) });
+  const strips = () => (dark() ? { separation: "#b8672a", stick: "#3f78a8", slip: "#8d8353" } : page.colours);
   function status(p, contact) {
     const t = ms(p), o = axes(true, ""), names = ["separation", "stick", "slip"], shares = p.status[contact];
     const mean = names.map((_, k) => shares[k].reduce((a, b) => a + b, 0) / t.length);
-    const colours = dark() ? { separation: "#b8672a", stick: "#3f78a8", slip: "#8d8353" } : page.colours;
+    const colours = strips();
     put("status", { ...o, grid: { ...o.grid, top: 20, bottom: 30 }, title: title(`contact ${contact}`),
       legend: { right: 12, top: 0, icon: "rect", itemWidth: 10, itemHeight: 10, data: names, selectedMode: false, textStyle: { color: text(), fontSize: 10 } },
       yAxis: { ...o.yAxis, min: 0, max: 1, scale: false, show: false },
       series: names.map((name, k) => ({ id: name, name, type: "line", stack: "s", silent: true, showSymbol: false, lineStyle: { width: 0 }, itemStyle: { color: colours[name] }, areaStyle: { color: colours[name], opacity: 1 }, data: t.map((x, i) => [x, shares[k][i]]) })) },
       `Contact ${contact} over the run so far: ${names.map((n, k) => `${(100 * mean[k]).toFixed(0)} % ${n}`).join(", ")}.`);
   }
+  // The largest of lengths [m], and the factor and the unit that suit it.
+  function length(values) {
+    const most = Math.max(...values.map(Math.abs), 1e-300);
+    return [most, ...(most > 0.5 ? [1, "m"] : most > 1e-4 ? [1e3, "mm"] : most > 1e-7 ? [1e6, "µm"] : [1e9, "nm"])];
+  }
   function portrait(q) {
     const o = axes(true, "m/s"), label = { color: text(), fontSize: 10 };
-    const most = Math.max(...q.displacement.map(Math.abs), 1e-300), [factor, unit] = most > 1e-4 ? [1e3, "mm"] : most > 1e-7 ? [1e6, "µm"] : [1e9, "nm"];
+    const [most, factor, unit] = length(q.displacement);
     const r = { min: Math.min(...q.velocity), max: Math.max(...q.velocity) };
     put("portrait", { ...o, title: title(`${q.label}, the last ${shown(1e3 * q.seconds)} ms`),
       xAxis: { ...o.xAxis, min: null, max: null, scale: true, name: `displacement about its mean [${unit}]`, axisLabel: { ...label, show: true, hideOverlap: true, formatter: shown } },
@@ -197,5 +203,7 @@ const stridorRun = (() => {
     } else setTimeout(hello, 30);
   };
   setTimeout(hello, 0);
-  return { page, start, show, begin, stale };
+  // What the limit cycles below are drawn with, too.
+  const tools = { text, clear, shown, axes, round, title, strips, length };
+  return { page, start, show, begin, stale, tools };
 })();
