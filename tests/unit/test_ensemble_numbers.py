@@ -163,6 +163,8 @@ def test_observables_that_are_none_say_what_is_accepted(name):
         ({"mu": [0.1, 0.2], "sweep": "up", "swept": "time"}, "swept: 'time' – mu, load or speed"),
         ({"mu": [0.1, 0.2], "sweep": "up", "grid": False}, "sweep: 'up' – goes over all combinations of values: grid=True"),
         ({"window": 0.0}, "window: 0.0 – the share of the last phase that is looked at, above 0 and at most 1"),
+        ({"window": float("nan")}, "window: nan – the share of the last phase that is looked at, above 0 and at most 1"),
+        ({"window": float("inf")}, "window: inf – the share of the last phase that is looked at, above 0 and at most 1"),
         ({"mu": [0.1, 0.2], "sweep": "up", "window": 0.95}, "window: 0.95 – at most 0.9: before it loads and speeds still change by a ramp"),
         ({"window": 1e-5}, "window: 1e-05 – a share of the last phase with 64 records at least, here it has 0: let that phase last longer, or record more often (temporal.record_every)"),
     ],

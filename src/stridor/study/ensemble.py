@@ -14,7 +14,7 @@ from ..errors import CaseError
 from ..sliding import full_motion
 from ..system import System
 from ..temporal.ensembles import Outcome, march_all
-from ..temporal.legs import Member
+from ..temporal.legs import Member, require_window
 from ..temporal.settings import Settings, choose_step
 from ..temporal.simulate import Progress
 from ..temporal.simulate import plan as step_limits
@@ -97,10 +97,11 @@ def ensemble(
 
 
 def _check_window(work: Workspace, system: System, settings: Settings, window: float) -> None:
-    """Refuse a window of too few records for a spectrum."""
+    """Refuse a window that is none, or of too few records for a spectrum."""
+    require_window(window)
     step = choose_step(step_limits(system, settings)[2], settings)
     count = int(window * work.phases[-1].duration / step / settings.record_every)
-    if 0.0 < window <= 1.0 and count < LEAST_RECORDS:
+    if count < LEAST_RECORDS:
         raise CaseError(
             "window", window,
             f"a share of the last phase with {LEAST_RECORDS} records at least, here it has {count}: let that phase "
