@@ -12,7 +12,7 @@ import pytest
 import stridor as st
 from rubbing_block import rubbing_block
 from solid_cases import BELT
-from stridor.app.reduce import _made
+from stridor.app.reduce import _ranges
 from stridor.case import template_text
 from stridor.study import workspace
 from stridor.study.without_effect import without_effect
@@ -222,7 +222,7 @@ def test_settings_of_the_other_paths() -> None:
 
 def test_a_box_with_two_ranges_of_one_parameter_is_refused() -> None:
     with pytest.raises(st.CaseError) as error:
-        _made(beams(), ["mu=0:0.1", "mu=0:0.2"], None, 1e-6)
+        _ranges(beams(), ["mu=0:0.1", "mu=0:0.2"])
     assert str(error.value) == "--box: 'mu=0:0.2' – mu has a range already, (0.0, 0.1); give each once"
 
 
