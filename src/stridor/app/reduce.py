@@ -88,6 +88,7 @@ def reduce(
 
     for note in getattr(model.problem, "notes", ()):
         call.say(f"note: {note}")
+    call.warn(model.problem.idle_words)
     files = [] if save is None else [_saved(model, save, origin, keep)]
     chosen = None if call.solver in (None, "auto") else call.solver
     points = _points(model, asked, corrections if kept_in(model) == "all" else 0, chosen)

@@ -72,7 +72,8 @@ def stability_boundary(
     return Boundary(
         x, y, *ends, top, curves, *_lines(found), _counted(found), found.agree, sentence(found, asked.paths),
         "full" if solved.model is None else "reduced", len(plane.sizes), plane.solves, plane.steps,
-        0 if solved.model is None else solved.model.solves, again, (*solved.notes, *notes, *result_notes), warnings,
+        0 if solved.model is None else solved.model.solves, again, (*solved.notes, *notes, *result_notes),
+        (*solved.problem.idle_words, *warnings),
         provenance(work, "boundary", time.perf_counter() - started, method=method, bound=bound, tolerance=tolerance),
     )  # fmt: skip
 

@@ -78,7 +78,8 @@ class ParametricOnset(Shown):
 
 class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
     """Onsets in ascending order, of a parameter over a range up to max_frequency_hz. complete: whether as many roots
-    grow, wherever that was looked at, as they say; sentence: that in words. notes: what else was taken how."""
+    grow, wherever that was looked at, as they say; sentence: that in words. notes: what else was taken how; warnings:
+    that the parameter has no effect."""
 
     parameter: str
     between: tuple[float, float]
@@ -86,6 +87,7 @@ class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
     complete: bool
     sentence: str
     notes: tuple[str, ...]
+    warnings: tuple[str, ...]
 
     @classmethod
     def of(
@@ -97,6 +99,7 @@ class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
         (own,) = (p for p in model.problem.parameters if p.name == parameter)
         made.between, made.max_frequency_hz = (own.low, own.high), model.frequency / (2 * np.pi)
         made.notes = tuple(getattr(model.problem, "notes", ()))
+        made.warnings = tuple(words for words in model.problem.idle_words if words.startswith(f"{parameter} "))
         return made
 
     def to_json(self) -> dict[str, Any]:
@@ -109,6 +112,7 @@ class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
             "completeness": self.sentence,
             "complete": self.complete,
             "notes": list(self.notes),
+            "warnings": list(self.warnings),
         }
 
     def table(self) -> Rows:
@@ -140,7 +144,7 @@ class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
         ]  # fmt: skip
         low, high = self.between
         title = f"{counted(len(self), 'onset')} for {self.parameter} from {low:g} to {high:g}"
-        return html_table(title, heads, rows, (*self.from_above_words(), self.sentence, *self.notes))
+        return html_table(title, heads, rows, (*self.from_above_words(), self.sentence, *self.warnings, *self.notes))
 
     def from_above_words(self) -> list[str]:
         """Onsets above the band whose mode comes into it, a line each."""
