@@ -64,6 +64,24 @@ def test_sensitivities_round_trip(case: st.Case, tmp_path: Path, mu: float) -> N
     assert st.loads(data.attrs["case"]) == case
 
 
+def test_onsets_along_a_number_come_back_as_they_were(case: st.Case, tmp_path: Path) -> None:
+    found = st.onsets(case, (0.0, 0.2), along="contacts.A.friction.coefficient", max_frequency_hz=9e3)
+    back = st.open(st.save(found, tmp_path / "along.nc"))
+    assert len(found) > 0
+    assert (list(back), back.to_json(), back.provenance) == (list(found), found.to_json(), found.provenance)
+    assert st.loads(back.provenance["case"]) == case
+    none = st.onsets(case, (0.0, 1e-3), along="contacts.A.friction.coefficient", max_frequency_hz=9e3)
+    assert (len(none), st.open(st.save(none, tmp_path / "none.nc")).to_json()) == (0, none.to_json())
+
+
+def test_a_damping_map_comes_back_as_it_was(case: st.Case, tmp_path: Path) -> None:
+    names = ("bodies.beam1.damping.mass", "bodies.beam2.damping.mass")
+    found = st.damping_map(case, *names, x_range=(1.0, 50.0), y_range=(1.0, 50.0), grid=(2, 3), max_frequency_hz=9e3)
+    back = st.open(st.save(found, tmp_path / "map.nc"))
+    assert (back.to_json(), back.provenance) == (found.to_json(), found.provenance)
+    assert np.array_equal(back.slope_x, found.slope_x, equal_nan=True)
+
+
 def test_no_onsets_is_a_file_too(case: st.Case, tmp_path: Path) -> None:
     found = st.onsets(case, (0.0, 1e-3), max_frequency_hz=5e3)
     assert found.onsets == ()

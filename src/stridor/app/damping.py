@@ -46,7 +46,9 @@ def damping_map(
         result = solve(
             loaded, x, y, x_range=ranges[0], y_range=ranges[1], grid=(points, points), method=chosen, progress=progress
         )
-    files = [call.tabulate(result, "damping_map.csv"), call.draw(draw(result), "damping_map.png")]
+    call.keep(result, "damping_map.nc")
+    tables = call.folder / "damping_map.nc", call.tabulate(result, "damping_map.csv")
+    files = [*tables, call.draw(draw(result), "damping_map.png")]
     call.warn(result.warnings)
     if call.json:
         call.document(result.to_json() | {"files": [str(f) for f in files]})

@@ -207,6 +207,7 @@ def _onsets_along(call: Call, case: Case, name: str, between: tuple[float, float
     chosen = None if call.solver in (None, "auto") else call.solver
     found = onsets_along(case, name, between, solver=chosen, said="--between")
     call.warn(found.warnings)
+    call.keep(found, "onsets-along.nc")
     call.tabulate(found, "onsets-along.csv")
     if call.json:
         call.document(found.to_json())

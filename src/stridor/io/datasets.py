@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +11,13 @@ from ..agreement import Agreement
 from ..case import Case
 from ..errors import CaseError
 from ..modal.complex_modes import ComplexModes
+from ..modal.full import ParametricOnsets
 from ..modal.onsets import Onsets
 from ..modal.parametric import ReducedModel
 from ..periodic import Cycles
 from ..reading import is_reduced_file, starts_with
 from ..study.boundary_result import Boundary
+from ..study.damping_result import DampingMap
 from ..study.ensemble_result import Ensemble
 from ..study.sensitivity_result import Sensitivities
 from ..temporal.node_history import NODE_FIELDS, NodeHistory
@@ -27,7 +29,15 @@ from .result_files import HDF5, damage_told, open_results
 from .seals import seal
 from .streams import NotedErrors
 
-Result = ComplexModes | Onsets | Sensitivities | Trajectory | Agreement | Ensemble | Boundary | Cycles
+Result = (
+    ComplexModes | Onsets | ParametricOnsets | Sensitivities | Trajectory | Agreement | Ensemble | Boundary | DampingMap
+    | Cycles
+)  # fmt: skip
+# Of the results that a file gives back as they were, by the analysis that it names.
+WHOLE: Mapping[str, Callable[[Any], Any]] = {
+    "boundary": Boundary.from_xarray, "cycles": Cycles.from_xarray, "onsets along": ParametricOnsets.from_xarray,
+    "damping map": DampingMap.from_xarray,
+}  # fmt: skip
 
 
 def to_dataset(result: Result) -> Any:
@@ -37,7 +47,7 @@ def to_dataset(result: Result) -> Any:
         return result.to_xarray()
     accepted = (
         "complex modes, onsets, sensitivities, a trajectory, an ensemble, an agreement, a stability "
-        "boundary or limit cycles; reduced models are no datasets, but can be saved"
+        "boundary, a damping map or limit cycles; reduced models are no datasets, but can be saved"
     )
     raise CaseError("result", f"a {type(result).__name__}", accepted)
 
@@ -77,8 +87,8 @@ def save(
 
 def open(path: str | Path) -> Any:
     """What is in a file that `save` or a command wrote, by its content: a Trajectory with the state that a restart
-    needs, a ReducedModel whose modes are the same to the last bit, a Boundary, Cycles, or of other results the dataset
-    of `to_dataset`.
+    needs, a ReducedModel whose modes are the same to the last bit, a Boundary, a DampingMap, Cycles, ParametricOnsets,
+    or of other results the dataset of `to_dataset`.
 
     Raises CaseError for files that are none, damaged, changed since, or of a newer format.
     """
@@ -86,12 +96,10 @@ def open(path: str | Path) -> Any:
     if is_reduced_file(target) and not starts_with(target, HDF5):
         return load_reduced(target)
     data = open_results(target)
-    if data.attrs["analysis"] == "boundary":
+    made = WHOLE.get(data.attrs["analysis"])
+    if made is not None:
         with damage_told(target):
-            return Boundary.from_xarray(data)
-    if data.attrs["analysis"] == "cycles":
-        with damage_told(target):
-            return Cycles.from_xarray(data)
+            return made(data)
     return _trajectory_in(data, target) if data.attrs["analysis"] == "simulate" else data
 
 

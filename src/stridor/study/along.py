@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import time
 
 from ..case import Case
 from ..errors import CaseError
 from ..modal.full import ParametricOnsets
 from ..modal.full import onsets_along as sought
 from .asked import require_frequency
+from .provenance import provenance
 from .reduced import reduced_model
 
 
@@ -26,10 +28,13 @@ def onsets_along(
     name: its path in the case, or a parameter of its matrices; mu is the friction coefficient. said: what the range is
     called in messages. Raises CaseError for a number that there is not or that has no range.
     """
+    started = time.perf_counter()
     chosen = _range(case, name, between, said)
     require_frequency(max_frequency_hz)
     model = reduced_model(case, {name: chosen}, max_frequency_hz=max_frequency_hz)
-    return sought(model, name, solver=solver)
+    found = sought(model, name, solver=solver)
+    found.provenance = provenance(case, "onsets along", time.perf_counter() - started, along=name)
+    return found
 
 
 def _range(case: Case, name: str, between: tuple[float, float] | None, said: str) -> tuple[float, float]:
