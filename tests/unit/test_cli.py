@@ -422,8 +422,8 @@ def test_reduce_solves_anywhere_in_the_box_and_confirms_onsets(folder: Path) -> 
     ("wrong", "message"),
     [
         ("--box mu", "--box: 'mu' – NAME=… such as mu=0:0.6"),
-        ("--box mu=0.3:0.1", "--box mu: '0.3:0.1' – low:high, low < high"),
-        ("--box mu=0:inf", "--box mu: '0:inf' – low:high, low < high"),
+        ("--box mu=0.3:0.1", "--box mu: '0.3:0.1' – low:high, two finite numbers low < high"),
+        ("--box mu=0:inf", "--box mu: '0:inf' – low:high, two finite numbers low < high"),
         ("--box mu=0:0.1 --at mu=abc", "--at mu: 'abc' – a number, numbers with commas, or start:stop:count"),
         ("--box mu=0:0.1 --at nu=1", "--at: 'nu' – no number of the model; there are: mu"),
         ("--box mu=0:0.1 --onsets nu", "--onsets: 'nu' – no number of the model; there are: mu"),

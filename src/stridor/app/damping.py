@@ -12,7 +12,7 @@ from .arguments import Call, verb
 from .closing import Conclusion
 from .option_table import MaxFrequency, Range, Source
 from .two_numbers import Method, X, XRange, Y, YRange
-from .values import pair
+from .values import range_of
 
 if TYPE_CHECKING:
     from ..study.damping_map import DampingMap
@@ -40,7 +40,7 @@ def damping_map(
     from ..view.sensitivity_plots import damping_map as draw
     from .output import progress_bar, stdout
 
-    ranges = pair(x_range, "--x-range"), pair(y_range, "--y-range")
+    ranges = range_of(x_range, "--x-range"), range_of(y_range, "--y-range")
     chosen: Any = method
     with progress_bar("damping map", quiet=call.quiet) as progress:
         result = solve(

@@ -16,7 +16,7 @@ from ..reading import is_reduced_file
 from .along import onset_document, show_onsets_along
 from .arguments import INCOMPLETE, Call, verb
 from .option_table import At, Box, MaxFrequency
-from .values import INFINITY, numbers, pair
+from .values import INFINITY, numbers, range_of
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -167,10 +167,7 @@ def _ranges(case: Case, box: list[str]) -> dict[str, tuple[float, float]]:
     for name, text in (_named(item, "--box") for item in box):
         if name in ranges:
             raise CaseError("--box", f"{name}={text}", f"{name} has a range already, {ranges[name]}; give each once")
-        low, high = pair(text, f"--box {name}")
-        if not -INFINITY < low < high < INFINITY:
-            raise CaseError(f"--box {name}", text, "low:high, low < high")
-        ranges[name] = low, high
+        ranges[name] = range_of(text, f"--box {name}")
     if not ranges:
         ranges = {name: p.range for name, p in case.parameters.items() if p.range is not None}
     return ranges or {"mu": case.modal.friction_range}

@@ -47,6 +47,14 @@ def pair(text: str, name: str) -> tuple[float, float]:
     return low, high
 
 
+def range_of(text: str, name: str) -> tuple[float, float]:
+    """Two finite numbers from "low:high", low < high. Raises CaseError."""
+    low, high = pair(text, name)
+    if not -INFINITY < low < high < INFINITY:
+        raise CaseError(name, text, "low:high, two finite numbers low < high")
+    return low, high
+
+
 def band_of(text: str | None, top: float, branches: list[int] | None = None) -> tuple[float, float] | None:
     """A band of frequencies [Hz] from "low:high" that ends at ``top`` [Hz] or below; None of None. Raises CaseError for
     another, and beside modes named by --branch."""

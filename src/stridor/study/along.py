@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import time
 
 from ..case import Case
 from ..errors import CaseError
 from ..modal.full import ParametricOnsets
 from ..modal.full import onsets_along as sought
-from .asked import require_frequency
+from .asked import require_frequency, require_range
 from .provenance import provenance
 from .reduced import reduced_model
 
@@ -43,6 +42,4 @@ def _range(case: Case, name: str, between: tuple[float, float] | None, said: str
         found = case.parameters[name].range
     if found is None:
         raise CaseError(said, None, f"missing – {name} has no range in the case: give {form}")
-    if not (all(math.isfinite(v) for v in found) and found[0] < found[1]):
-        raise CaseError(said, f"{found[0]:g}:{found[1]:g}", "two finite numbers low < high")
-    return found
+    return require_range(found, said)

@@ -21,6 +21,7 @@ from ..temporal.simulate import plan as step_limits
 from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
 from .analyses import check_extent
+from .asked import require_count
 from .ensemble_modes import Found, unstable_modes
 from .ensemble_numbers import LEAST_RECORDS, Numbers, Observable, last_phase, numbers_of, observable_of
 from .ensemble_result import AXES, Ensemble
@@ -72,6 +73,8 @@ def ensemble(
     cannot be had, and what `simulate` raises for all members.
     """
     started = time.perf_counter()
+    if cores is not None:
+        require_count(cores, "cores", more=", or None for all")
     work = Workspace.of(problem)
     values = _values(work, mu, load, speed, perturbation, initial)
     plan = _Plan.of(values, grid=grid, sweep=sweep, swept=swept)
