@@ -160,6 +160,7 @@ def test_observables_that_are_none_say_what_is_accepted(name):
         ({"mu": [0.1, 0.2], "load": [1.0, 2.0, 3.0], "grid": False}, "mu: '2 values' – one value or 3, as many as others have"),
         ({"mu": 0.1, "sweep": "up"}, "sweep: 'up' – goes over mu, of which two or more values are needed"),
         ({"mu": [0.1, 0.2], "sweep": "sideways"}, "sweep: 'sideways' – up, down or both"),
+        ({"mu": [0.1, 0.2], "swept": "load"}, "swept: 'load' – goes with sweep: up, down or both"),
         ({"mu": [0.1, 0.2], "sweep": "up", "swept": "time"}, "swept: 'time' – mu, load or speed"),
         ({"mu": [0.1, 0.2], "sweep": "up", "grid": False}, "sweep: 'up' – goes over all combinations of values: grid=True"),
         ({"window": 0.0}, "window: 0.0 – the share of the last phase that is looked at, above 0 and at most 1"),

@@ -16,7 +16,7 @@ import stridor as st
 from program import stridor
 from stridor.app import option_table
 from stridor.app.cli import app
-from stridor.app.option_table import COMPUTING, EVERY, PAGES, TABLE
+from stridor.app.option_table import COMPUTING, EVERY, PAGES, READING, TABLE
 from stridor.errors import CaseError
 
 DOCS = Path(__file__).parents[2] / "docs" / "commands.md"
@@ -148,6 +148,7 @@ def test_options_stand_for_settings_of_the_case(folder: Path) -> None:
         ("steady --mu=-1", "--mu: '-1' – a number, numbers with commas, or start:stop:count, each number ≥ 0"),
         ("compare --range 1:0", "--range: '1:0' – low:high, two friction coefficients 0 ≤ low < high"),
         ("modes --max-frequency nan", "--max-frequency: nan – a highest frequency is a finite number > 0 [Hz]"),
+        ("ensemble --mu 0.1,0.2 --swept load", "--swept: 'load' – goes with --sweep up|down|both"),
         ("modes --source ''", "modal.source: "),
         ("countermeasures --branch 5 --branch 6", "--branch: '5, 6' – one mode; without --branch all unstable ones"),
         ("onsets --along contacts.A.stiffness --between 1e9:1e11 --band 1:9", "--band: is not for onsets along "),
@@ -159,6 +160,12 @@ def test_wrong_values_are_told_by_the_name_of_the_option(folder: Path, words: st
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"stridor: {message}")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("verb", READING)
+def test_what_was_computed_before_has_no_case_to_change(verb: str) -> None:
+    assert {"--set", "--solver"} & set(VERBS[verb]) == set()
+    assert "--out" in VERBS[verb]
 
 
 def test_bands_in_python(folder: Path) -> None:

@@ -261,6 +261,12 @@ def _common(
     return call
 
 
+def _has(parameter: inspect.Parameter, verb: str) -> bool:
+    """Whether a verb has one of the common options, by the table."""
+    told = parameter.annotation.__metadata__[0]
+    return any(option.described is told and verb in option.on for option in TABLE.values())
+
+
 def verb(
     file: Any = CaseFile, *, writes: bool = True, parts: tuple[str, ...] = ()
 ) -> Callable[[Callable[Concatenate[Call, P], None]], Callable[..., None]]:
@@ -271,7 +277,8 @@ def verb(
     """
 
     def made(function: Callable[Concatenate[Call, P], None]) -> Callable[..., None]:
-        case, *common = inspect.signature(_common, eval_str=True).parameters.values()
+        case, *every = inspect.signature(_common, eval_str=True).parameters.values()
+        common = [p for p in every if _has(p, function.__name__.replace("_", "-"))]
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
         names = [p.name for p in (case, *common)]
 

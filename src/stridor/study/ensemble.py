@@ -44,7 +44,7 @@ def ensemble(
     initial: Literal["rest", "steady-sliding"] | None = None,
     grid: bool = True,
     sweep: Sweep | None = None,
-    swept: Literal["mu", "load", "speed"] = "mu",
+    swept: Literal["mu", "load", "speed"] | None = None,
     observable: str | None = None,
     window: float = 0.5,
     modes: bool = True,
@@ -59,7 +59,7 @@ def ensemble(
 
     mu scales every contact's friction law at the case's own speed; load and speed are factors on all loads and on all
     prescribed velocities (None: 1); perturbation [m/s] of the slip speed at the start, where runs begin in steady
-    sliding (initial; None: as [temporal] says). sweep: members that differ in the number ``swept`` follow one another,
+    sliding (initial; None: as [temporal] says). sweep: members that differ in the number ``swept`` (None: mu) follow one another,
     each from where the one before ended, for the duration of the last phase, with rising values ("up"), falling ones
     ("down") or both; loads and speeds change by a ramp over its first tenth, friction at once. observable: what
     amplitudes are of ("beam1.tip.velocity", "A.normal_force"; default the velocity of the first watched point); window:
@@ -137,9 +137,9 @@ def _values(
     return made
 
 
-def _asked(values: dict[str, Array], grid: bool, sweep: str | None, swept: str, window: float) -> dict[str, Any]:
+def _asked(values: dict[str, Array], grid: bool, sweep: str | None, swept: str | None, window: float) -> dict[str, Any]:
     asked = {name: [None if np.isnan(v) else float(v) for v in array] for name, array in values.items()}
-    return asked | {"grid": grid, "sweep": sweep, "swept": swept if sweep else None, "window": window}
+    return asked | {"grid": grid, "sweep": sweep, "swept": swept or "mu" if sweep else None, "window": window}
 
 
 @dataclass(frozen=True)
@@ -153,8 +153,11 @@ class _Plan:
     place: dict[tuple[int, int], int]
 
     @classmethod
-    def of(cls, values: dict[str, Array], *, grid: bool, sweep: str | None, swept: str) -> _Plan:
+    def of(cls, values: dict[str, Array], *, grid: bool, sweep: str | None, swept: str | None) -> _Plan:
         """Raises CaseError for lists of several lengths, and a sweep of what has one value."""
+        if swept is not None and sweep is None and swept in AXES[:3]:
+            raise CaseError("swept", swept, "goes with sweep: up, down or both")
+        swept = swept or "mu"
         if sweep not in (None, "up", "down", "both") or swept not in AXES[:3]:
             name, given = ("swept", swept) if swept not in AXES[:3] else ("sweep", sweep)
             raise CaseError(name, given, "mu, load or speed" if name == "swept" else "up, down or both")
