@@ -45,7 +45,7 @@ def test_what_is_none_is_refused_by_its_name(call: Callable[[], Any], said: str)
 def test_one_name_may_stand_without_a_list() -> None:
     many = st.sensitivities(CASE, ["mu"], mu=1.2)
     assert st.sensitivities(CASE, "mu", mu=1.2).to_json() == many.to_json()
-    with pytest.raises(st.CaseError, match="^nu: "):
+    with pytest.raises(st.CaseError, match=r"^nu: "):
         st.sensitivities(CASE, "nu", mu=1.2)
     found = st.rank_countermeasures(CASE, mu=1.2, numbers="springs.k1.stiffness", added_mass=False, verify=0)
     assert {m.name for m in found.measures} <= {"springs.k1.stiffness"}

@@ -258,7 +258,7 @@ def test_run_writes_a_self_contained_report(folder: Path) -> None:
         (
             ("modes", "two-beams.toml", "--mu", "0:1:0"),
             2,
-            "stridor: --mu: '0:1:0' – a number, numbers with commas, or start:stop:count, each number ≥ 0",
+            "stridor: --mu: '0:1:0' – start:stop:count, where count is a whole number from 1 to 1000000",
         ),
         (
             ("modes", "two-beams.toml", "--mu", "nan"),

@@ -68,8 +68,8 @@ def save(
     the full problem (`verified`, `Corrector`, backward errors, confirmed onsets); "eigenvalues" leaves the basis out
     too, and with it vectors on the full model.
 
-    Raises CaseError for what is no result, for another ending of the name, and for factors that are plain functions; AnalysisError where the file cannot be
-    written.
+    Raises CaseError for what is no result, for another ending of the name, and for factors that are plain functions;
+    AnalysisError where the file cannot be written.
     """
     if isinstance(result, ReducedModel):
         _check_ending(path, (".npz", ""), "a name that ends in .npz")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 from ..errors import CaseError
@@ -50,6 +50,6 @@ def require_count(value: Any, where: str, least: int = 1, more: str = "") -> Non
         raise CaseError(where, value, f"a whole number ≥ {least}{more}")
 
 
-def names_of(given: str | Sequence[str]) -> tuple[str, ...]:
+def names_of(given: str | Iterable[str]) -> tuple[str, ...]:
     """Names as a list of them; one may stand by itself."""
     return (given,) if isinstance(given, str) else tuple(given)
