@@ -14,7 +14,7 @@ import typer
 
 import stridor as st
 from program import stridor
-from stridor.app import option_table
+from stridor.app import arguments, option_table
 from stridor.app.cli import app
 from stridor.app.option_table import COMPUTING, EVERY, PAGES, READING, TABLE
 from stridor.errors import CaseError
@@ -176,6 +176,15 @@ def test_wrong_values_are_told_by_the_name_of_the_option(folder: Path, words: st
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"stridor: {message}")
     assert done.stderr.count("\n") == 1
+
+
+def test_a_verb_goes_by_the_name_that_is_typed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[str] = []
+    beating = arguments.beating
+    monkeypatch.setattr(arguments, "beating", lambda **options: (seen.append(options["verb"]), beating(**options))[1])
+    ranges = ("--x", "a", "--y", "b", "--x-range", "1:2", "--y-range", "1:2")
+    assert stridor("damping-map", "none.toml", *ranges, cwd=folder).returncode == 2
+    assert seen == ["damping-map"]
 
 
 @pytest.mark.parametrize("verb", READING)

@@ -314,7 +314,8 @@ def verb(
 
     def made(function: Callable[Concatenate[Call, P], None]) -> Callable[..., None]:
         case, *every = inspect.signature(_common, eval_str=True).parameters.values()
-        common = [p for p in every if _has(p, function.__name__.replace("_", "-"))]
+        name = function.__name__.replace("_", "-")
+        common = [p for p in every if _has(p, name)]
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
         names, options = [p.name for p in (case, *common)], _options((*own, *common))
 
@@ -323,7 +324,7 @@ def verb(
             as_given = dict(given)
             call = replace(
                 _common(**{name: given.pop(name) for name in names}),
-                verb=function.__name__,
+                verb=name,
                 writes=writes,
                 parts=parts,
             )

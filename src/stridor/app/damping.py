@@ -33,7 +33,7 @@ def damping_map(
     max_frequency: MaxFrequency = None,
     source: Source = None,
 ) -> None:
-    """The lowest onset over two dampings, and where more damping lowers it."""
+    """The lowest onset over two dampings, or other numbers, and where more of one lowers it."""
     loaded = call.case(source=source, max_frequency=max_frequency, friction_range=friction_range)
 
     from ..study.damping_map import damping_map as solve
@@ -67,7 +67,7 @@ def _conclusion(result: DampingMap) -> Conclusion:
         return Conclusion("no onset at any point of the map", "onsets")
     i, j = (int(k) for k in np.unravel_index(int(np.nanargmin(result.onset_mu)), result.onset_mu.shape))
     low, high = float(result.onset_mu[i, j]), float(np.nanmax(result.onset_mu))
-    said = f"over the two dampings the lowest onset goes from μ = {low:.6f} to {high:.6f}"
+    said = f"over both numbers the lowest onset goes from μ = {low:.6f} to {high:.6f}"
     there = (f"{result.x}={result.x_values[i]:.6g}", f"{result.y}={result.y_values[j]:.6g}")
     return Conclusion(said, "onsets", ("--set", there[0], "--set", there[1]))
 

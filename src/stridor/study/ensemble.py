@@ -61,11 +61,11 @@ def ensemble(
     prescribed velocities (None: 1); perturbation [m/s] of the slip speed at the start, where runs begin in steady
     sliding (initial; None: as [temporal] says). sweep: members that differ in the number ``swept`` (None: mu) follow
     one another, each from where the one before ended, for the duration of the last phase, with rising values ("up"),
-    falling ones ("down") or both; loads and speeds change by a ramp over its first tenth, friction at once.
-    observable: what amplitudes are of ("beam1.tip.velocity", "A.normal_force"; default the velocity of the first
-    watched point); window: the share of the last phase that is looked at. modes False leaves out the modal map. records keeps the members' runs
-    from the start of the last phase on. cores: threads (None: all). separately: one run after the other in any case.
-    device: "gpu" (`stridor[gpu]`), "cpu", or "auto", a GPU where there is one and members are many.
+    falling ones ("down") or both; loads and speeds change by a ramp over its first tenth, friction at once. observable:
+    what amplitudes are of ("beam1.tip.velocity", "A.normal_force"; default the velocity of the first watched point);
+    window: the share of the last phase that is looked at. modes False leaves out the modal map. records keeps the
+    members' runs from the start of the last phase on. cores: threads (None: all). separately: one run after the other
+    in any case. device: "gpu" (`stridor[gpu]`), "cpu", or "auto", a GPU where there is one and members are many.
 
     Members go side by side on the modal path with contacts that slide little; others take separate runs, and a note
     says so. A member that fails is a row with its error. progress is called with steps done and planned of all. Ctrl-C
