@@ -27,6 +27,7 @@ from stridor.io.reduced_models import load_reduced
 from stridor.io.result_files import accept, damage_told, open_results
 from stridor.io.seals import seal
 from stridor.study.boundary_result import Boundary, BoundaryCurve, CountedAt, SolvedAgain
+from stridor.study.damping_result import Confirmed, DampingMap
 from stridor.temporal.signals import Components
 
 pytestmark = pytest.mark.bad_input
@@ -41,7 +42,7 @@ COARSE = {
 }
 # One damage in so many is enough to see a mechanism fail; all of them take minutes.
 SAMPLED = pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 13])
-KINDS = ("beams", "solids", "modes", "onsets", "compare", "boundary", "cycles")
+KINDS = ("beams", "solids", "modes", "onsets", "compare", "boundary", "cycles", "along", "map")
 
 
 @functools.cache
@@ -69,6 +70,15 @@ def result(kind: str):
         )  # fmt: skip
         places = (CountedAt(0.2, 0.3, 1),), True, "one curve", "reduced", 30, 200, 40, 7, (SolvedAgain(0, 0.4, 1.4, 1e-6, 1e-13),)
         return Boundary("x", "mu", (0.0, 1.0), (0.0, 2.0), 1e3, (curve, curve), (0.0, 1.0), (0.0, 2.0), *places)
+    if kind == "along":
+        return st.onsets(case("beams"), (0.0, 0.3), along="contacts.A.friction.coefficient", max_frequency_hz=9e3)
+    if kind == "map":
+        values, found = np.array([1.0, 2.0, 4.0]), np.array([[0.1, 0.2], [0.3, np.nan], [0.15, 0.25]])
+        made = (Confirmed(1.0, 5.0, 0.1, 0.1001, 1e-14),)
+        return DampingMap(
+            "a", "b", values, values[:2] + 4, (0.0, 0.5), 9e3, found, 1e3 * found, found, -found, 1e-14 * found, 0.09,
+            ("a warning",), {"case": ""}, "reduced", 1e-9 * found, made, ("a note",),
+        )  # fmt: skip
     if kind == "cycles":
         return st.cycles(mode_coupling(0.02, 0.1), [0.9, 1.0, 1.1])
     if kind == "compare":
@@ -188,6 +198,7 @@ def test_what_no_stridor_can_have_written_is_refused_with_any_hash(kind, every):
     free = {"eigenvalue", "frequency", "growth_rate", "damping_ratio", "residual", "square_root_coefficient"}
     free |= {"growth_slope", "exceptional_mu", "modal_eigenvalue", "temporal_eigenvalue", "frequency_error"}
     free |= {"growth_rate_error", "mac", "dominant_frequency", "right_vector", "left_vector", "node_area"}
+    free |= {"enters_at", "onset_mu", "slope_x", "slope_y", "error"}
     wrong = [n for n in lost if n.split(" ")[0] not in free and not n.startswith("restart_")]
     assert not [n for n in wrong if not _blows_up(kind, n)], wrong
 

@@ -258,7 +258,7 @@ def test_run_writes_a_self_contained_report(folder: Path) -> None:
         (
             ("modes", "two-beams.toml", "--mu", "0:1:0"),
             2,
-            "stridor: --mu: '0:1:0' – a number, numbers with commas, or start:stop:count, each number ≥ 0",
+            "stridor: --mu: '0:1:0' – start:stop:count, where count is a whole number from 1 to 1000000",
         ),
         (
             ("modes", "two-beams.toml", "--mu", "nan"),
@@ -415,18 +415,36 @@ def test_reduce_solves_anywhere_in_the_box_and_confirms_onsets(folder: Path) -> 
     shown = stridor(*words, "--at", "mu=0.1", "--out", "here", cwd=folder)
     assert "unstable" in shown.stdout
     assert (folder / "here" / "reduced.csv").read_text().count("\n") == 20  # heads and 19 modes
-    for wrong, message in (
-        (["--box", "mu"], "stridor: --box: 'mu' – NAME=… such as mu=0:0.6"),
-        (["--box", "mu=0.3:0.1"], "stridor: box.mu: "),
-        (["--box", "mu=0:0.1", "--at", "nu=1"], "stridor: values: 'nu' – no such parameter; there are: mu"),
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ("--box mu", "--box: 'mu' – NAME=… such as mu=0:0.6"),
+        ("--box mu=0.3:0.1", "--box mu: '0.3:0.1' – low:high, two finite numbers low < high"),
+        ("--box mu=0:inf", "--box mu: '0:inf' – low:high, two finite numbers low < high"),
+        ("--box mu=0:0.1 --at mu=abc", "--at mu: 'abc' – a number, numbers with commas, or start:stop:count"),
+        ("--box mu=0:0.1 --at nu=1", "--at: 'nu' – no number of the model; there are: mu"),
+        ("--box mu=0:0.1 --onsets nu", "--onsets: 'nu' – no number of the model; there are: mu"),
+        ("--box mu=0:0.1 --at mu=0.1 --at mu=0.2", "--at: 'mu=0.2' – mu has values already"),
         (
-            ["--box", "mu=0:0.1", "--at", "mu=-0.1"],
-            "stridor: --at mu: '-0.1' – a number, numbers with commas, or start:stop:count, each number ≥ 0",
+            "--box mu=0:0.1 --at mu=-0.1",
+            "--at mu: '-0.1' – a number, numbers with commas, or start:stop:count, each number ≥ 0",
         ),
-    ):
-        refused = stridor("reduce", "two-beams.toml", *wrong, "--quiet", cwd=folder)
-        assert refused.returncode == 2
-        assert refused.stderr.startswith(message)
+    ],
+)
+def test_reduce_checks_what_it_is_asked_before_it_reduces(
+    folder: Path, wrong: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def reduced(*_: object, **__: object) -> None:
+        raise AssertionError("reduced before it was checked what is asked of the model")
+
+    monkeypatch.setattr("stridor.study.reduced.reduced_model", reduced)
+    refused = stridor("reduce", "two-beams.toml", *wrong.split(), "--quiet", cwd=folder)
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert refused.stderr.startswith(f"stridor: {message}")
+    assert refused.stderr.count("\n") == 1
 
 
 def test_reduce_says_that_it_keeps_damping(folder: Path) -> None:

@@ -64,6 +64,24 @@ def test_sensitivities_round_trip(case: st.Case, tmp_path: Path, mu: float) -> N
     assert st.loads(data.attrs["case"]) == case
 
 
+def test_onsets_along_a_number_come_back_as_they_were(case: st.Case, tmp_path: Path) -> None:
+    found = st.onsets(case, (0.0, 0.2), along="contacts.A.friction.coefficient", max_frequency_hz=9e3)
+    back = st.open(st.save(found, tmp_path / "along.nc"))
+    assert len(found) > 0
+    assert (list(back), back.to_json(), back.provenance) == (list(found), found.to_json(), found.provenance)
+    assert st.loads(back.provenance["case"]) == case
+    none = st.onsets(case, (0.0, 1e-3), along="contacts.A.friction.coefficient", max_frequency_hz=9e3)
+    assert (len(none), st.open(st.save(none, tmp_path / "none.nc")).to_json()) == (0, none.to_json())
+
+
+def test_a_damping_map_comes_back_as_it_was(case: st.Case, tmp_path: Path) -> None:
+    names = ("bodies.beam1.damping.mass", "bodies.beam2.damping.mass")
+    found = st.damping_map(case, *names, x_range=(1.0, 50.0), y_range=(1.0, 50.0), grid=(2, 3), max_frequency_hz=9e3)
+    back = st.open(st.save(found, tmp_path / "map.nc"))
+    assert (back.to_json(), back.provenance) == (found.to_json(), found.provenance)
+    assert np.array_equal(back.slope_x, found.slope_x, equal_nan=True)
+
+
 def test_no_onsets_is_a_file_too(case: st.Case, tmp_path: Path) -> None:
     found = st.onsets(case, (0.0, 1e-3), max_frequency_hz=5e3)
     assert found.onsets == ()
@@ -113,6 +131,30 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
         st.open(path)
 
 
+@pytest.mark.bad_input
+def test_names_by_which_a_file_would_be_taken_for_another_are_refused(
+    case: st.Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = st.onsets(case, (0.0, 1e-3), max_frequency_hz=5e3)
+    with pytest.raises(st.CaseError, match=r"^path: 'o.csv' – a name that ends in .nc \(netCDF\); as a table .*to_data"):
+        st.save(found, "o.csv")
+    model = st.reduced_model(case, {"mu": (0.0, 0.2)}, max_frequency_hz=2e3)
+    with pytest.raises(st.CaseError, match=r"^path: 'model.nc' – a name that ends in .npz$"):
+        st.save(model, "model.nc")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize("name", ["study.out", "study.out/study.zarr"])
+def test_a_study_is_opened_by_another_call(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.out" / "study.zarr").mkdir(parents=True)
+    (tmp_path / "study.out" / "study.zarr" / "zarr.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(st.CaseError, match=r"^file: '.*' – the store of a study, or its folder; st.open_study reads it$"):
+        st.open(name)
+
+
 def test_a_modes_file_is_no_trajectory(case: st.Case, tmp_path: Path) -> None:
     path = st.save(st.modes(case, 0.1, count=3), tmp_path / "modes.nc")
     with pytest.raises(st.CaseError, match="a file of `stridor simulate`"):
@@ -122,8 +164,9 @@ def test_a_modes_file_is_no_trajectory(case: st.Case, tmp_path: Path) -> None:
 def test_one_way_in_tells_by_the_content(case: st.Case, tmp_path: Path) -> None:
     run = st.simulate(case)
     model = st.reduced_model(case, {"mu": (0.0, 0.2)}, max_frequency_hz=2e3)
+    saved = [st.save(thing, tmp_path / name) for thing, name in ((run, "plain"), (run, "run.nc"), (model, "model.npz"))]
     names = ("plain", "run.npz", "model.nc")  # no name says what is in a file
-    back = [st.open(st.save(thing, tmp_path / name)) for thing, name in zip((run, run, model), names, strict=True)]
+    back = [st.open(path.rename(tmp_path / name)) for path, name in zip(saved, names, strict=True)]
     assert [type(thing) for thing in back] == [type(run), type(run), type(model)]
     assert np.array_equal(back[1].normal_force, run.normal_force)
     assert np.array_equal(back[2].vectors, model.vectors)

@@ -14,9 +14,9 @@ import typer
 
 import stridor as st
 from program import stridor
-from stridor.app import option_table
+from stridor.app import arguments, option_table
 from stridor.app.cli import app
-from stridor.app.option_table import COMPUTING, EVERY, PAGES, TABLE
+from stridor.app.option_table import COMPUTING, EVERY, PAGES, READING, TABLE
 from stridor.errors import CaseError
 
 DOCS = Path(__file__).parents[2] / "docs" / "commands.md"
@@ -145,10 +145,27 @@ def test_options_stand_for_settings_of_the_case(folder: Path) -> None:
         ("modes --band abc", "--band: 'abc' – two numbers, low:high"),
         ("shapes --band 1:9 --branch 5", "--band: '1:9' – goes without --branch, which says already which modes"),
         ("shapes --mu 0.1,0.2", "--mu: '0.1,0.2' – one friction coefficient for shapes; modes and compare take several"),
-        ("steady --mu=-1", "--mu: '-1' – a number, numbers with commas, or start:stop:count, each number ≥ 0"),
+        ("steady --mu=-1", "--mu: '-1' – a number ≥ 0"),
         ("compare --range 1:0", "--range: '1:0' – low:high, two friction coefficients 0 ≤ low < high"),
         ("modes --max-frequency nan", "--max-frequency: nan – a highest frequency is a finite number > 0 [Hz]"),
-        ("modes --source ''", "modal.source: "),
+        ("ensemble --mu 0.1,0.2 --swept load", "--swept: 'load' – goes with --sweep up|down|both"),
+        ("modes --source ''", "--source: "),
+        ("modes --source x", "--source: 'x' – must be "),
+        ("modes --set modal.source='x'", "modal.source: 'x' – must be "),
+        ("modes --solver x", "--solver: 'x' – must be "),
+        ("modes --mu 0:1:1e9", "--mu: '0:1:1e9' – start:stop:count, where count is a whole number from 1 to 1000000"),
+        ("steady --mu 0.1:0.2", "--mu: '0.1:0.2' – one friction coefficient for steady; modes and compare take several"),
+        ("countermeasures --percent 0", "--percent: 0.0 – a size of change between 0 and 100 %"),
+        ("reduce --bound 2", "--bound: 2.0 – "),
+        ("damping-map --x bodies.beam1.damping.mass --y bodies.beam2.damping.mass --x-range 1:2 --y-range 1:2 --points 1", "--points: 1 – "),
+        ("damping-map --x bodies.beam1.damping.mass --y bodies.beam2.damping.mass --x-range 1:2 --y-range 1:2 --method x", "--method: 'x' – "),
+        ("boundary --x mu --y mu --x-range 1:2 --y-range 1:2", "--y: 'mu' – the same number as x; give another one"),
+        ("boundary --x mu --y materials.steel.density --x-range 1:2 --y-range 1:2 --lines 1", "--lines: 1 – "),
+        ("boundary --x mu --y materials.steel.density --x-range 1:2 --y-range 1:2 --tolerance 1", "--tolerance: 1.0 – "),
+        ("ensemble --window nan", "--window: nan – the share of the last phase that is looked at, above 0 and at most 1"),
+        ("ensemble --observable x", "--observable: 'x' – "),
+        ("compare --only x", "--only: 'x' – "),
+        ("cycles --seconds 0", "--seconds: 0.0 – a time > 0 [s]"),
         ("countermeasures --branch 5 --branch 6", "--branch: '5, 6' – one mode; without --branch all unstable ones"),
         ("onsets --along contacts.A.stiffness --between 1e9:1e11 --band 1:9", "--band: is not for onsets along "),
     ],
@@ -159,6 +176,21 @@ def test_wrong_values_are_told_by_the_name_of_the_option(folder: Path, words: st
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"stridor: {message}")
     assert done.stderr.count("\n") == 1
+
+
+def test_a_verb_goes_by_the_name_that_is_typed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[str] = []
+    beating = arguments.beating
+    monkeypatch.setattr(arguments, "beating", lambda **options: (seen.append(options["verb"]), beating(**options))[1])
+    ranges = ("--x", "a", "--y", "b", "--x-range", "1:2", "--y-range", "1:2")
+    assert stridor("damping-map", "none.toml", *ranges, cwd=folder).returncode == 2
+    assert seen == ["damping-map"]
+
+
+@pytest.mark.parametrize("verb", READING)
+def test_what_was_computed_before_has_no_case_to_change(verb: str) -> None:
+    assert {"--set", "--solver"} & set(VERBS[verb]) == set()
+    assert "--out" in VERBS[verb]
 
 
 def test_bands_in_python(folder: Path) -> None:

@@ -86,7 +86,7 @@ ENDS = {
         "reduce two-beams.toml --at mu=0:1:5",
     ),
     f"damping-map two-beams.toml {' '.join(MAP)}": (
-        "over the two dampings the lowest onset goes from μ = 0.076493 to 0.077144",
+        "over both numbers the lowest onset goes from μ = 0.076493 to 0.077144",
         f"onsets two-beams.toml --set {DAMPING[0]}=1e-09 --set {DAMPING[1]}=5e-08",
     ),
     f"boundary two-beams.toml --x {DAMPING[0]} --x-range 1e-9:5e-8 --y mu --y-range 0:0.2 --lines 3": (

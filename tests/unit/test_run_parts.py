@@ -109,8 +109,8 @@ def test_the_comparison_has_what_the_case_and_the_run_allow() -> None:
 @pytest.mark.parametrize(
     ("only", "skip", "said"),
     [
-        (["mode"], None, "--only: 'mode' – modes, onsets, sensitivities, countermeasures, simulate, compare, report; of"),
-        (["modes"], ["modes"], "--skip: 'modes' – is named by --only, too"),
+        (["mode"], None, "only: 'mode' – modes, onsets, sensitivities, countermeasures, simulate, compare, report; of"),
+        (["modes"], ["modes"], "skip: 'modes' – is among those to be computed alone, too"),
         (None, [*OF_REPORT, "simulate", "compare"], "leaves nothing to do"),
     ],
 )

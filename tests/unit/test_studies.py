@@ -419,6 +419,19 @@ def test_the_program_prints_the_answer_and_draws(tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "elsewhere").glob("*.png")} == drawn
 
 
+def test_a_study_of_one_value_gives_its_answer(tmp_path: Path) -> None:
+    text = template_text("two-beams")
+    (tmp_path / "case.toml").write_text(st.loads(text, FEW).text, encoding="utf-8")
+    (tmp_path / "study.toml").write_text('case = "case.toml"\nparameters.mu.values = [0.3]\n', encoding="utf-8")
+    done = stridor("study", "study.toml", "--workers", "1", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "1 row is fewer than a model is worth" in done.stdout + done.stderr
+    assert (tmp_path / "study.out" / "root-locus.png").exists()
+    again = stridor("plot", "study.out", "--json", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert not any("over-mu" in name for name in json.loads(again.stdout)["files"])
+
+
 def test_the_document_holds_no_more_than_plain_values(case: st.Case, tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
     text = 'case = "case.toml"\ncompute = "onsets"\nsampling = { method = "saltelli", samples = 4 }\nset = { "modal.friction_range" = [0.0, 2.0] }\n'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import json
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ import numpy as np
 import pytest
 
 import stridor as st
+from program import stridor
 from rubbing_block import rubbing_block
 from solid_cases import BELT
-from stridor.app.reduce import _made
+from stridor.app.reduce import _ranges
 from stridor.case import template_text
 from stridor.study import workspace
 from stridor.study.without_effect import without_effect
@@ -220,9 +222,41 @@ def test_settings_of_the_other_paths() -> None:
     assert without_effect(beams().with_({"modal.prestress": True}), "check") == []
 
 
+POISSON = "materials.steel.poisson_ratio"
+FLAT = f"{POISSON} has no effect: no matrix of the problem depends on it"
+
+
+def few() -> st.Case:
+    """Beams of few elements with one damping and few modes: nothing but paths of numbers matters here."""
+    return beams().with_({"contacts.A.stiffness": 1e9, "modal.max_frequency_hz": 9e3, "modal.friction_range": [0.0, 0.2]})
+
+
+def test_a_boundary_over_a_number_that_changes_nothing_says_so() -> None:
+    ranges = {"x_range": (0.2, 0.4), "y_range": (0.0, 0.2)}
+    found = st.stability_boundary(few(), POISSON, "mu", lines=2, **ranges)
+    assert found.warnings[0] == FLAT
+    moved = st.stability_boundary(few(), "materials.steel.density", "mu", lines=2, x_range=(7e3, 8e3), y_range=(0.0, 0.2))
+    assert not any("no effect" in line for line in moved.warnings)
+
+
+def test_onsets_along_a_number_that_changes_nothing_say_so() -> None:
+    assert st.onsets(few(), (0.2, 0.4), along=POISSON).warnings == (FLAT,)
+    assert st.onsets(few(), (7e3, 8e3), along="materials.steel.density").warnings == ()
+
+
+def test_a_reduced_model_says_which_of_its_numbers_change_nothing(tmp_path: Path) -> None:
+    model = st.reduced_model(few(), {"mu": (0.0, 0.2), POISSON: (0.2, 0.4)}, bound=1e-4)
+    assert model.problem.idle == (POISSON,)
+    assert FLAT in model._repr_html_()
+    (tmp_path / "case.toml").write_text(few().text, encoding="utf-8")
+    done = stridor("reduce", "case.toml", "--box", f"{POISSON}=0.2:0.4", "--bound", "1e-4", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert FLAT in json.loads(done.stdout)["warnings"]
+
+
 def test_a_box_with_two_ranges_of_one_parameter_is_refused() -> None:
     with pytest.raises(st.CaseError) as error:
-        _made(beams(), ["mu=0:0.1", "mu=0:0.2"], None, 1e-6)
+        _ranges(beams(), ["mu=0:0.1", "mu=0:0.2"])
     assert str(error.value) == "--box: 'mu=0:0.2' – mu has a range already, (0.0, 0.1); give each once"
 
 

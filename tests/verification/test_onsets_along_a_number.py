@@ -80,7 +80,7 @@ def test_a_parameter_of_imported_matrices(tmp_path: Path) -> None:
     [
         (("--along", "bodies.beam1.length"), "--between: missing – bodies.beam1.length has no range in the case"),
         (("--along", "bodies.beam1.lenght", "--between", "0.04:0.06"), "bodies.beam1.lenght"),
-        (("--along", "contact_stiffness", "--between", "2:1"), "--between: '2:1' – two finite numbers low < high"),
+        (("--along", "contact_stiffness", "--between", "2:1"), "--between: '2:1' – low:high, two finite numbers low < high"),
         (("--along", "contact_stiffness", "--between", "1:2", "--range", "0:1"), "--range: is not for onsets along"),
         (("--along", "contact_stiffness", "--between", "1:2", "--undamped"), "--undamped: is not for onsets along"),
         (("--along", "mu", "--between", "0:1", "--range", "0:1"), "--between: '0:1' – is the range of --along"),

@@ -9,7 +9,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from functools import wraps
@@ -22,7 +22,7 @@ from .. import interrupts
 from ..errors import AnalysisError, CaseError, StridorError
 from .heartbeat import beating
 from .option_table import TABLE, Json, Out, Quiet, Set, Solver, Verbose
-from .values import INFINITY, numbers, pair
+from .values import INFINITY, number, pair
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -159,13 +159,13 @@ class Call:
 
     def one_friction(self, text: str | None) -> float | None:
         """The friction coefficient of --mu where a verb takes one; unusual ones are told. Raises CaseError."""
-        values = None if text is None else numbers(text, "--mu")
-        if values is None:
+        if text is None:
             return None
-        if len(values) > 1:
+        if "," in text or ":" in text:
             raise CaseError("--mu", text, f"one friction coefficient for {self.verb}; modes and compare take several")
-        self.check_friction(values)
-        return values[0]
+        value = number(text, "--mu", least=0.0)
+        self.check_friction(value)
+        return value
 
     @property
     def folder(self) -> Path:
@@ -261,6 +261,48 @@ def _common(
     return call
 
 
+# Arguments of analyses that options of another name stand for.
+_STANDS_FOR = {
+    "grid": "points", "max_frequency_hz": "max_frequency", "band_hz": "band", "numbers": "parameter",
+    "parameters": "parameter", "target": "branch", "modal.source": "source", "modal.solver": "solver",
+}  # fmt: skip
+
+
+def by_option(error: CaseError, options: Mapping[str, str], given: Mapping[str, Any]) -> CaseError:
+    """The error with options in place of the arguments of analyses that they stand for, as its user wrote them.
+
+    options: those of the verb by the names of its arguments; given: their values. What is a setting of the case too is
+    that of the option only where this was given."""
+
+    def where(name: str) -> str:
+        first, dot, rest = name.partition(".")
+        if first == "box" and dot:
+            return f"--box {rest}" if "box" in options else rest
+        own = _STANDS_FOR.get(name, name)
+        if own not in options or (name.startswith("modal.") and given.get(own) is None):
+            return name
+        return options[own]
+
+    return CaseError.many([replace(problem, where=where(problem.where)) for problem in error.problems])
+
+
+def _options(parameters: Iterable[inspect.Parameter]) -> dict[str, str]:
+    """Names of options by those of arguments."""
+    found: dict[str, str] = {}
+    for parameter in parameters:
+        told = parameter.annotation.__metadata__[0]
+        if isinstance(told, typer.models.OptionInfo):
+            words = [str(word) for word in (told.default, *(told.param_decls or ())) if str(word).startswith("--")]
+            found[parameter.name] = words[0]
+    return found
+
+
+def _has(parameter: inspect.Parameter, verb: str) -> bool:
+    """Whether a verb has one of the common options, by the table."""
+    told = parameter.annotation.__metadata__[0]
+    return any(option.described is told and verb in option.on for option in TABLE.values())
+
+
 def verb(
     file: Any = CaseFile, *, writes: bool = True, parts: tuple[str, ...] = ()
 ) -> Callable[[Callable[Concatenate[Call, P], None]], Callable[..., None]]:
@@ -271,21 +313,27 @@ def verb(
     """
 
     def made(function: Callable[Concatenate[Call, P], None]) -> Callable[..., None]:
-        case, *common = inspect.signature(_common, eval_str=True).parameters.values()
+        case, *every = inspect.signature(_common, eval_str=True).parameters.values()
+        name = function.__name__.replace("_", "-")
+        common = [p for p in every if _has(p, name)]
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
-        names = [p.name for p in (case, *common)]
+        names, options = [p.name for p in (case, *common)], _options((*own, *common))
 
         @wraps(function)
         def called(**given: Any) -> None:
+            as_given = dict(given)
             call = replace(
                 _common(**{name: given.pop(name) for name in names}),
-                verb=function.__name__,
+                verb=name,
                 writes=writes,
                 parts=parts,
             )
             width = shutil.get_terminal_size().columns
             with beating(quiet=call.quiet, terminal=sys.stderr.isatty(), width=width, verb=call.verb), call.stack:
-                function(call, **given)  # type: ignore[call-arg]
+                try:
+                    function(call, **given)  # type: ignore[call-arg]
+                except CaseError as error:
+                    raise by_option(error, options, as_given) from error
             call.warn(call.idle)
             interrupts.check()
 

@@ -11,7 +11,7 @@ from .arguments import INCOMPLETE, Call, verb
 from .closing import Conclusion
 from .option_table import MaxFrequency
 from .two_numbers import Method, X, XRange, Y, YRange
-from .values import pair
+from .values import range_of
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -39,7 +39,7 @@ def boundary(
     from ..view.boundary_plots import stability_boundary as draw
     from .output import progress_bar, stdout
 
-    ranges = pair(x_range, "--x-range"), pair(y_range, "--y-range")
+    ranges = range_of(x_range, "--x-range"), range_of(y_range, "--y-range")
     chosen: Any = method
     with progress_bar("boundary", quiet=call.quiet) as progress:
         result = solve(

@@ -12,7 +12,7 @@ from .arguments import Call, verb
 from .closing import Conclusion
 from .option_table import MaxFrequency, Range, Source
 from .two_numbers import Method, X, XRange, Y, YRange
-from .values import pair
+from .values import range_of
 
 if TYPE_CHECKING:
     from ..study.damping_map import DampingMap
@@ -33,20 +33,22 @@ def damping_map(
     max_frequency: MaxFrequency = None,
     source: Source = None,
 ) -> None:
-    """The lowest onset over two dampings, and where more damping lowers it."""
+    """The lowest onset over two dampings, or other numbers, and where more of one lowers it."""
     loaded = call.case(source=source, max_frequency=max_frequency, friction_range=friction_range)
 
     from ..study.damping_map import damping_map as solve
     from ..view.sensitivity_plots import damping_map as draw
     from .output import progress_bar, stdout
 
-    ranges = pair(x_range, "--x-range"), pair(y_range, "--y-range")
+    ranges = range_of(x_range, "--x-range"), range_of(y_range, "--y-range")
     chosen: Any = method
     with progress_bar("damping map", quiet=call.quiet) as progress:
         result = solve(
             loaded, x, y, x_range=ranges[0], y_range=ranges[1], grid=(points, points), method=chosen, progress=progress
         )
-    files = [call.tabulate(result, "damping_map.csv"), call.draw(draw(result), "damping_map.png")]
+    call.keep(result, "damping_map.nc")
+    tables = call.folder / "damping_map.nc", call.tabulate(result, "damping_map.csv")
+    files = [*tables, call.draw(draw(result), "damping_map.png")]
     call.warn(result.warnings)
     if call.json:
         call.document(result.to_json() | {"files": [str(f) for f in files]})
@@ -65,7 +67,7 @@ def _conclusion(result: DampingMap) -> Conclusion:
         return Conclusion("no onset at any point of the map", "onsets")
     i, j = (int(k) for k in np.unravel_index(int(np.nanargmin(result.onset_mu)), result.onset_mu.shape))
     low, high = float(result.onset_mu[i, j]), float(np.nanmax(result.onset_mu))
-    said = f"over the two dampings the lowest onset goes from μ = {low:.6f} to {high:.6f}"
+    said = f"over both numbers the lowest onset goes from μ = {low:.6f} to {high:.6f}"
     there = (f"{result.x}={result.x_values[i]:.6g}", f"{result.y}={result.y_values[j]:.6g}")
     return Conclusion(said, "onsets", ("--set", there[0], "--set", there[1]))
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..digits import measured, readable
+from ..errors import CaseError
 from ..interrupts import INTERRUPTED, heard
 from ..notebook import counted
 from .arguments import Call, verb
@@ -41,8 +42,9 @@ def ensemble(
         ),
     ] = None,
     swept: Annotated[
-        str, typer.Option("--swept", metavar="mu|load|speed", help="What rises or falls in a sweep.")
-    ] = "mu",
+        str | None,
+        typer.Option("--swept", metavar="mu|load|speed", help="What rises or falls in a sweep [default: mu]."),
+    ] = None,
     observable: Observable = None,
     window: Annotated[
         float, typer.Option("--window", metavar="SHARE", help="The end of the last phase that is looked at.")
@@ -62,7 +64,10 @@ def ensemble(
     }
     if sweep is not None:
         one_of(sweep, "--sweep", ("up", "down", "both"))
-    one_of(swept, "--swept", ("mu", "load", "speed"))
+    if swept is not None:
+        one_of(swept, "--swept", ("mu", "load", "speed"))
+        if sweep is None:
+            raise CaseError("--swept", swept, "goes with --sweep up|down|both")
     one_of(device, "--device", ("auto", "cpu", "gpu"))
     work = call.workspace()
     call.check_friction(values["mu"])

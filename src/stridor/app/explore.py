@@ -59,7 +59,9 @@ def countermeasures(
     branch: Branch = None,
     parameter: Parameter = None,
     percent: Annotated[float, typer.Option("--percent", help="Size of the change that is predicted.")] = 5.0,
-    verify: Annotated[int, typer.Option("--verify", help="How many of the best are solved again.")] = 3,
+    verify: Annotated[
+        int, typer.Option("--verify", metavar="N", min=0, help="How many of the best are solved again.")
+    ] = 3,
     max_frequency: MaxFrequency = None,
     undamped: Undamped = False,
     source: Source = None,

@@ -11,7 +11,7 @@ from ..errors import CaseError
 from .along import MU, show_onsets_along
 from .arguments import INCOMPLETE, Call, verb
 from .option_table import Band, Branch, MaxFrequency, Mu, Range, Sort, Source, Undamped, Unstable
-from .values import band_of, numbers, one_of, pair
+from .values import band_of, numbers, one_of, range_of
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -174,7 +174,7 @@ def onsets(
             }
             for option in [option for option, value in given.items() if value]:
                 raise CaseError(option, None, f"is not for onsets along {name}: {NOT_ALONG[option]}")
-            _onsets_along(call, loaded, name, None if between is None else pair(between, "--between"))
+            _onsets_along(call, loaded, name, None if between is None else range_of(between, "--between"))
             return
 
     from ..study import analyses
@@ -206,6 +206,8 @@ def _onsets_along(call: Call, case: Case, name: str, between: tuple[float, float
     call.warn(resolution_warnings(case))
     chosen = None if call.solver in (None, "auto") else call.solver
     found = onsets_along(case, name, between, solver=chosen, said="--between")
+    call.warn(found.warnings)
+    call.keep(found, "onsets-along.nc")
     call.tabulate(found, "onsets-along.csv")
     if call.json:
         call.document(found.to_json())

@@ -21,6 +21,8 @@ STUDIES = ("study", "plot", "ensemble")  # of many samples of a case
 SHOWING = ("sound",)  # what was computed before
 EVERY = (*ABOUT, *COMPUTING, *STUDIES, *SHOWING)  # that print or write what they find
 PAGES = ("app",)  # in a browser
+READING = ("plot", "sound")  # what was computed before: no case is changed for them any more
+CHANGING = tuple(verb for verb in EVERY if verb not in READING)
 
 
 @dataclass(frozen=True)
@@ -189,7 +191,7 @@ Set = Annotated[
         "--set",
         "Change a value of the case, e.g. contacts.A.friction.coefficient=0.3. Repeatable.",
         metavar="KEY=VALUE",
-        on=" ".join((*EVERY, *PAGES)),
+        on=" ".join((*CHANGING, *PAGES)),
     ),
 ]
 Solver = Annotated[
@@ -198,7 +200,7 @@ Solver = Annotated[
         "--solver",
         "Sparse direct solver: mumps, pardiso, superlu; slepc for all processes of mpiexec [default: the case's].",
         metavar="NAME",
-        on=" ".join(EVERY[1:]),
+        on=" ".join(verb for verb in CHANGING[1:] if verb != "study"),  # whose file says it: set."modal.solver"
     ),
 ]
 Out = Annotated[
@@ -242,6 +244,8 @@ def rows() -> list[str]:
     lines = ["| option | what it says | on | not on, and why |", "|---|---|---|---|"]
     everywhere: dict[tuple[str, ...], str] = {
         (*EVERY, *PAGES): "all", EVERY: "all but `app`", EVERY[1:]: "all but `new` and `app`",
+        (*CHANGING, *PAGES): "all but `plot` and `sound`",
+        TABLE["--solver"].on: "all but `new`, `study`, `plot`, `sound` and `app`",
     }  # fmt: skip
     for option in TABLE.values():
         flag = option.name if option.metavar is None else f"{option.name} {option.metavar}".replace("|", "\\|")

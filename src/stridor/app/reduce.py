@@ -16,7 +16,7 @@ from ..reading import is_reduced_file
 from .along import onset_document, show_onsets_along
 from .arguments import INCOMPLETE, Call, verb
 from .option_table import At, Box, MaxFrequency
-from .values import INFINITY, numbers, pair
+from .values import INFINITY, numbers, range_of
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -73,9 +73,12 @@ def reduce(
         given = {"--box": box, "--set": call.set_, "--max-frequency": max_frequency, "--bound": bound}
         call.claim()
         model, origin = _read(call.path, [name for name, value in given.items() if value], quiet=call.quiet)
+        asked = _asked(at or [], along, [p.name for p in model.problem.parameters])
     else:
         origin = call.case()
-        model = _made(origin, box or [], max_frequency, BOUND if bound is None else bound)
+        ranges = _ranges(origin, box or [])
+        asked = _asked(at or [], along, list(ranges))
+        model = _made(origin, ranges, max_frequency, BOUND if bound is None else bound)
         seconds = sum(model.seconds.values())
         call.say(f"{model.problem.size} freedoms reduced to {model.size} in {seconds:.2f} s")
 
@@ -85,17 +88,19 @@ def reduce(
 
     for note in getattr(model.problem, "notes", ()):
         call.say(f"note: {note}")
+    call.warn(model.problem.idle_words)
     files = [] if save is None else [_saved(model, save, origin, keep)]
     chosen = None if call.solver in (None, "auto") else call.solver
-    points = _points(model, at or [], corrections if kept_in(model) == "all" else 0, chosen)
-    if at:
+    points = _points(model, asked, corrections if kept_in(model) == "all" else 0, chosen)
+    if asked:
         files.append(_write(call.folder / "reduced.csv", model, points))
     for path in files:
         call.say(f"written: {path}")
     confirm = kept_in(model) == "all"
     onsets: ParametricOnsets | None = None
     if along is not None:
-        onsets = onsets_along(model, along, _first(at or [], model, along), confirm=confirm, solver=chosen)
+        fixed = {name: values[0] for name, values in asked.items() if name != along}
+        onsets = onsets_along(model, along, fixed, confirm=confirm, solver=chosen)
         files.append(call.tabulate(onsets, "reduced-onsets.csv"))
     if call.json:
         document = _about(model) | {"modes": points, "onsets": [onset_document(o) for o in onsets or ()]}
@@ -156,18 +161,42 @@ def _saved(model: ReducedModel, path: Path, origin: Case | dict[str, Any], keep:
     return save_reduced(model, path, case=origin, keep=kept_in(model) if keep is None else cast("Keep", keep))
 
 
-def _made(case: Case, box: list[str], limit: float | None, bound: float) -> ReducedModel:
-    from ..study.reduced import reduced_model
-
+def _ranges(case: Case, box: list[str]) -> dict[str, tuple[float, float]]:
+    """The ranges of --box by name; without one those of [parameters], else that of friction. Raises CaseError."""
     ranges: dict[str, tuple[float, float]] = {}
     for name, text in (_named(item, "--box") for item in box):
         if name in ranges:
             raise CaseError("--box", f"{name}={text}", f"{name} has a range already, {ranges[name]}; give each once")
-        ranges[name] = pair(text, f"--box {name}")
+        ranges[name] = range_of(text, f"--box {name}")
     if not ranges:
         ranges = {name: p.range for name, p in case.parameters.items() if p.range is not None}
-    if not ranges:
-        ranges = {"mu": case.modal.friction_range}
+    return ranges or {"mu": case.modal.friction_range}
+
+
+def _asked(at: list[str], along: str | None, names: list[str]) -> dict[str, list[float]]:
+    """The values of --at by name, and before minutes of work: that these and --onsets name parameters of the model.
+    Raises CaseError."""
+    given: dict[str, list[float]] = {}
+    for name, text in (_named(item, "--at") for item in at):
+        if name in given:
+            raise CaseError("--at", f"{name}={text}", f"{name} has values already; give all in one, with commas")
+        _check_name(name, "--at", names)
+        given[name] = numbers(text, f"--at {name}", least=0.0 if name in CONTACTS else -INFINITY)
+    if along is not None:
+        _check_name(along, "--onsets", names)
+    return given
+
+
+def _check_name(name: str, option: str, names: list[str]) -> None:
+    from ..case.points import choice
+
+    if name not in names:
+        raise CaseError(option, name, f"no number of the model{choice(name, names, 'there are')}")
+
+
+def _made(case: Case, ranges: dict[str, tuple[float, float]], limit: float | None, bound: float) -> ReducedModel:
+    from ..study.reduced import reduced_model
+
     return reduced_model(case, ranges, max_frequency_hz=limit, bound=bound)
 
 
@@ -178,27 +207,15 @@ def _named(text: str, option: str) -> tuple[str, str]:
     return name.strip(), rest
 
 
-def _values(at: list[str], model: ReducedModel) -> dict[str, list[float]]:
-    given: dict[str, list[float]] = {}
-    for name, text in (_named(item, "--at") for item in at):
-        if name in given:
-            raise CaseError("--at", f"{name}={text}", f"{name} has values already; give all in one, with commas")
-        given[name] = numbers(text, f"--at {name}", least=0.0 if name in CONTACTS else -INFINITY)
-    model.problem.point({name: values[0] for name, values in given.items()})
-    return {p.name: given.get(p.name, [p.value]) for p in model.problem.parameters}
-
-
-def _first(at: list[str], model: ReducedModel, along: str) -> dict[str, float]:
-    return {name: values[0] for name, values in _values(at, model).items() if name != along}
-
-
-def _points(model: ReducedModel, at: list[str], corrections: int, solver: str | None) -> list[dict[str, Any]]:
+def _points(
+    model: ReducedModel, at: dict[str, list[float]], corrections: int, solver: str | None
+) -> list[dict[str, Any]]:
     """The modes at all combinations of values, one document for each point; corrected where they do not pass."""
     from ..modal.parametric import Corrector
 
     if not at:
         return []
-    values = _values(at, model)
+    values = {p.name: at.get(p.name, [p.value]) for p in model.problem.parameters}
     corrector: Corrector | None = None
     found: list[dict[str, Any]] = []
     for combination in product(*values.values()):

@@ -7,6 +7,20 @@ from ..errors import CaseError
 INFINITY = float("inf")
 
 
+MOST = 1_000_000  # values of one option
+
+
+def number(text: str, name: str, *, least: float) -> float:
+    """One finite number, not below ``least``. Raises CaseError."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = INFINITY
+    if not least <= value < INFINITY:
+        raise CaseError(name, text, f"a number ≥ {least:g}")
+    return value
+
+
 def numbers(text: str, name: str, *, least: float = 0.0) -> list[float]:
     """Numbers from "0.1", "0.1,0.2" or "start:stop:count", none below ``least``. Raises CaseError."""
     accepted = "a number, numbers with commas, or start:stop:count"
@@ -15,9 +29,9 @@ def numbers(text: str, name: str, *, least: float = 0.0) -> list[float]:
     try:
         if ":" in text:
             start, stop, count = text.split(":")
-            amount = int(count)
-            if amount < 1 or amount > 1_000_000:
-                raise ValueError
+            amount = int(count) if count.strip().isdecimal() else 0
+            if not 1 <= amount <= MOST:
+                raise CaseError(name, text, f"start:stop:count, where count is a whole number from 1 to {MOST}")
             low, high = float(start), float(stop)
             step = (high - low) / max(amount - 1, 1)
             values = [low + k * step for k in range(amount)]
@@ -44,6 +58,14 @@ def pair(text: str, name: str) -> tuple[float, float]:
         low, high = (float(p) for p in parts)
     except ValueError:
         raise CaseError(name, text, "two numbers, low:high") from None
+    return low, high
+
+
+def range_of(text: str, name: str) -> tuple[float, float]:
+    """Two finite numbers from "low:high", low < high. Raises CaseError."""
+    low, high = pair(text, name)
+    if not -INFINITY < low < high < INFINITY:
+        raise CaseError(name, text, "low:high, two finite numbers low < high")
     return low, high
 
 

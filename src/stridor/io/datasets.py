@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +11,13 @@ from ..agreement import Agreement
 from ..case import Case
 from ..errors import CaseError
 from ..modal.complex_modes import ComplexModes
+from ..modal.full import ParametricOnsets
 from ..modal.onsets import Onsets
 from ..modal.parametric import ReducedModel
 from ..periodic import Cycles
 from ..reading import is_reduced_file, starts_with
 from ..study.boundary_result import Boundary
+from ..study.damping_result import DampingMap
 from ..study.ensemble_result import Ensemble
 from ..study.sensitivity_result import Sensitivities
 from ..temporal.node_history import NODE_FIELDS, NodeHistory
@@ -27,7 +29,16 @@ from .result_files import HDF5, damage_told, open_results
 from .seals import seal
 from .streams import NotedErrors
 
-Result = ComplexModes | Onsets | Sensitivities | Trajectory | Agreement | Ensemble | Boundary | Cycles
+Result = (
+    ComplexModes | Onsets | ParametricOnsets | Sensitivities | Trajectory | Agreement | Ensemble | Boundary | DampingMap
+    | Cycles
+)  # fmt: skip
+STORE = ("zarr.json", ".zgroup", "study.zarr")  # in the folder of a store, and in the folder that a study writes to
+# Of the results that a file gives back as they were, by the analysis that it names.
+WHOLE: Mapping[str, Callable[[Any], Any]] = {
+    "boundary": Boundary.from_xarray, "cycles": Cycles.from_xarray, "onsets along": ParametricOnsets.from_xarray,
+    "damping map": DampingMap.from_xarray,
+}  # fmt: skip
 
 
 def to_dataset(result: Result) -> Any:
@@ -37,7 +48,7 @@ def to_dataset(result: Result) -> Any:
         return result.to_xarray()
     accepted = (
         "complex modes, onsets, sensitivities, a trajectory, an ensemble, an agreement, a stability "
-        "boundary or limit cycles; reduced models are no datasets, but can be saved"
+        "boundary, a damping map or limit cycles; reduced models are no datasets, but can be saved"
     )
     raise CaseError("result", f"a {type(result).__name__}", accepted)
 
@@ -49,21 +60,24 @@ def save(
     case: Case | Mapping[str, Any] | None = None,
     keep: Keep | None = None,
 ) -> Path:
-    """Write a result (.nc) or a reduced model (.npz) to ``path`` by way of a temporary file; `open` reads it.
+    """Write a result (.nc) or a reduced model (.npz) to ``path`` by way of a temporary file; `open` reads it. A name
+    without an ending is taken as it is; folders that are missing are made, as the verbs make theirs.
 
     Of reduced models alone, case: what it was made of, for the file to say so, or what `provenance_of` said of the
     file it was read from. keep: "all" (None); "shapes" leaves the full matrices out, and with them what is solved in
     the full problem (`verified`, `Corrector`, backward errors, confirmed onsets); "eigenvalues" leaves the basis out
     too, and with it vectors on the full model.
 
-    Raises CaseError for what is no result, and factors that are plain functions; AnalysisError where the file cannot be
-    written.
+    Raises CaseError for what is no result, for another ending of the name, and for factors that are plain functions;
+    AnalysisError where the file cannot be written.
     """
     if isinstance(result, ReducedModel):
+        _check_ending(path, (".npz", ""), "a name that ends in .npz")
         return save_reduced(result, path, case=case, keep=keep or "all")
     if keep is not None or case is not None:
         name, given = ("case", None) if keep is None else ("keep", keep)
         raise CaseError(name, given, "goes with a reduced model; results are kept whole, and hold their case")
+    _check_ending(path, (".nc", ""), "a name that ends in .nc (netCDF); as a table a result is result.to_dataframe()")
     dataset = seal(to_dataset(result))
     target = Path(path)
     with replacing(target) as temporary:
@@ -77,22 +91,28 @@ def save(
 
 def open(path: str | Path) -> Any:
     """What is in a file that `save` or a command wrote, by its content: a Trajectory with the state that a restart
-    needs, a ReducedModel whose modes are the same to the last bit, a Boundary, Cycles, or of other results the dataset
-    of `to_dataset`.
+    needs, a ReducedModel whose modes are the same to the last bit, a Boundary, a DampingMap, Cycles, ParametricOnsets,
+    or of other results the dataset of `to_dataset`.
 
     Raises CaseError for files that are none, damaged, changed since, or of a newer format.
     """
     target = Path(path)
+    if any((target / mark).exists() for mark in STORE):
+        raise CaseError("file", str(path), "the store of a study, or its folder; st.open_study reads it")
     if is_reduced_file(target) and not starts_with(target, HDF5):
         return load_reduced(target)
     data = open_results(target)
-    if data.attrs["analysis"] == "boundary":
+    made = WHOLE.get(data.attrs["analysis"])
+    if made is not None:
         with damage_told(target):
-            return Boundary.from_xarray(data)
-    if data.attrs["analysis"] == "cycles":
-        with damage_told(target):
-            return Cycles.from_xarray(data)
+            return made(data)
     return _trajectory_in(data, target) if data.attrs["analysis"] == "simulate" else data
+
+
+def _check_ending(path: str | Path, endings: tuple[str, ...], accepted: str) -> None:
+    """Refuse a name by which other programs would take the file for something else. Raises CaseError."""
+    if Path(path).suffix.lower() not in endings:
+        raise CaseError("path", str(path), accepted)
 
 
 def load_trajectory(path: str | Path) -> Trajectory:

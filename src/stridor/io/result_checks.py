@@ -133,6 +133,22 @@ _BOUNDARY = {
     "modes_beside": _Rule(("point",), "i", 0),
     **{name: _Rule(("point",), low=0.0, missing=True) for name in ("boundary_error", "residual")},
 }
+_ALONG = {
+    "number": _Rule(("number",), "O"),
+    **{name: _Rule(("onset",)) for name in ("value", "reduced_value")},
+    "frequency_hz": _Rule(("onset",), low=0.0),
+    "residual": _Rule(("onset",), low=0.0, missing=True),
+    **{name: _Rule(("onset",), missing=True) for name in ("square_root_coefficient", "growth_slope", "enters_at")},
+    "kind": _Rule(("onset",), "O"),
+    "stabilising": _Rule(("onset",), "i", 0, 1),
+    "point": _Rule(("onset", "number")),
+}
+_MAP = {
+    **{name: _Rule((name,)) for name in ("x", "y")},
+    **{name: _Rule(("x", "y"), low=0.0, missing=True) for name in ("onset_mu", "frequency", "residual")},
+    **{name: _Rule(("x", "y"), missing=True) for name in ("slope_x", "slope_y")},
+    "error": _Rule(("x", "y"), low=0.0, missing=True, needed=False),
+}
 _CYCLE, _CYCLE_CONTACT = ("cycle", "sample"), ("cycle", "sample", "contact")
 _CYCLES = {
     "part": _PART,
@@ -152,7 +168,8 @@ _CYCLES = {
 }
 _RULES: dict[str, dict[str, _Rule]] = {
     "modes": _MODES, "onsets": _ONSETS, "sensitivities": _SENSITIVITIES, "compare": _AGREEMENT, "simulate": _RUN,
-    "ensemble": _ensemble(_GRID), "boundary": _BOUNDARY, "cycles": _CYCLES,
+    "ensemble": _ensemble(_GRID), "boundary": _BOUNDARY, "cycles": _CYCLES, "onsets along": _ALONG,
+    "damping map": _MAP,
 }  # fmt: skip
 _COUNTS = ("record_every", "steps", "planned_steps", "most_sweeps", "unconverged_steps")
 _NUMBERS = ("step", "beta2", "step_limit", "wall_seconds")

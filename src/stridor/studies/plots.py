@@ -109,7 +109,9 @@ def root_locus(result: StudyResult, *, ax: Axes | None = None) -> Figure:
 def growth_over(result: StudyResult, x: str | None = None, *, ax: Axes | None = None) -> Figure:
     """The largest growth rate over one parameter (default: the first that varies), or the critical friction
     coefficient of a study of onsets."""
-    name = x or _varied(result)[0]
+    name = x or next(iter(_varied(result)), None)
+    if name is None:
+        raise AnalysisError("no parameter has more than one value among the samples")
     what = {"modes": "largest_growth_rate", "onsets": "critical_mu"}.get(result.compute)
     if what is None:
         raise AnalysisError(f"{result.compute} has neither growth rates nor onsets")
@@ -184,10 +186,7 @@ def study_figures(result: StudyResult) -> dict[str, Figure]:
 
 def _varied(result: StudyResult) -> list[str]:
     """Parameters with more than one value among the samples."""
-    found = [name for name in result.parameters if len(np.unique(result.data[name].values)) > 1]
-    if not found:
-        raise AnalysisError("no parameter has more than one value among the samples")
-    return found
+    return [name for name in result.parameters if len(np.unique(result.data[name].values)) > 1]
 
 
 def _two(result: StudyResult, x: str | None, y: str | None) -> tuple[str, str]:

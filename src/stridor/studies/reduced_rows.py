@@ -20,6 +20,7 @@ from ..modal.full import onsets_along
 from ..modal.parametric import ReducedModel
 from ..modal.parametric.line import Numbered
 from ..modal.tolerances import UNSTABLE_RELATIVE
+from ..notebook import counted
 from ..sliding.stretches import stretches
 from ..study.options import options_of
 from ..study.reduced import reduced_model
@@ -161,7 +162,7 @@ def unfit(study: Study, case: Case, rows: int) -> str:
     if not case.modal.damped:
         return "modal.damped = false: a reduced model keeps the damping"
     if study.answers.source == "auto" and rows < WORTH:
-        return f"{rows} rows are fewer than a model is worth"
+        return f"{counted(rows, 'row')} {'is' if rows == 1 else 'are'} fewer than a model is worth"
     return ""
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
+import time
 
 from ..case import Case
 from ..errors import CaseError
 from ..modal.full import ParametricOnsets
 from ..modal.full import onsets_along as sought
-from .asked import require_frequency
+from .asked import require_frequency, require_range
+from .provenance import provenance
 from .reduced import reduced_model
 
 
@@ -26,10 +27,13 @@ def onsets_along(
     name: its path in the case, or a parameter of its matrices; mu is the friction coefficient. said: what the range is
     called in messages. Raises CaseError for a number that there is not or that has no range.
     """
+    started = time.perf_counter()
     chosen = _range(case, name, between, said)
     require_frequency(max_frequency_hz)
     model = reduced_model(case, {name: chosen}, max_frequency_hz=max_frequency_hz)
-    return sought(model, name, solver=solver)
+    found = sought(model, name, solver=solver)
+    found.provenance = provenance(case, "onsets along", time.perf_counter() - started, along=name)
+    return found
 
 
 def _range(case: Case, name: str, between: tuple[float, float] | None, said: str) -> tuple[float, float]:
@@ -38,6 +42,4 @@ def _range(case: Case, name: str, between: tuple[float, float] | None, said: str
         found = case.parameters[name].range
     if found is None:
         raise CaseError(said, None, f"missing – {name} has no range in the case: give {form}")
-    if not (all(math.isfinite(v) for v in found) and found[0] < found[1]):
-        raise CaseError(said, f"{found[0]:g}:{found[1]:g}", "two finite numbers low < high")
-    return found
+    return require_range(found, said)

@@ -34,7 +34,7 @@ from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
 from .along import onsets_along
-from .asked import require_band, require_frequency, require_friction
+from .asked import require_band, require_count, require_frequency, require_friction, require_range
 from .body_modes import BodyModes, body_modes
 from .description import Description, describe
 from .fingerprint import check_restart, fingerprint
@@ -88,6 +88,8 @@ def modes(
     where the steady sliding state does not exist.
     """
     require_frequency(max_frequency_hz)
+    if count is not None:
+        require_count(count, "count")
     work = Workspace.of(problem)
     values = work.one_friction() if mu is None else mu
     damped = work.modal.damped if damped is None else damped
@@ -210,7 +212,8 @@ def onsets(
     started = time.perf_counter()
     require_frequency(max_frequency_hz)
     work = Workspace.of(problem)
-    between = work.modal.friction_range if friction_range is None else friction_range
+    given = work.modal.friction_range if friction_range is None else friction_range
+    between = require_range(given, "friction_range", least=0.0)
     limit = max_frequency_hz or work.modal.max_frequency_hz
     require_band(band_hz, limit)
     damped = work.modal.damped if damped is None else damped

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any
 
 from ..errors import CaseError
 
@@ -29,3 +30,26 @@ def require_frequency(value: float | None, where: str = "max_frequency_hz") -> N
     """Refuse a highest frequency that is not positive and finite. Raises CaseError."""
     if value is not None and not 0.0 < value < math.inf:
         raise CaseError(where, value, "a highest frequency is a finite number > 0 [Hz]")
+
+
+def require_range(given: Any, where: str, least: float = -math.inf) -> tuple[float, float]:
+    """Two finite numbers low < high, the first not below ``least``. Raises CaseError for anything else."""
+    try:
+        low, high = (float(v) for v in given)
+    except (TypeError, ValueError):
+        low = high = math.nan
+    if not (least <= low < high < math.inf and low > -math.inf):
+        accepted = "low < high" if least == -math.inf else f"{least:g} ≤ low < high"
+        raise CaseError(where, given, f"two finite numbers {accepted}")
+    return low, high
+
+
+def require_count(value: Any, where: str, least: int = 1, more: str = "") -> None:
+    """Refuse what is no whole number or below ``least``; more: what else is accepted, in words. Raises CaseError."""
+    if isinstance(value, bool) or not hasattr(value, "__index__") or value < least:
+        raise CaseError(where, value, f"a whole number ≥ {least}{more}")
+
+
+def names_of(given: str | Iterable[str]) -> tuple[str, ...]:
+    """Names as a list of them; one may stand by itself."""
+    return (given,) if isinstance(given, str) else tuple(given)

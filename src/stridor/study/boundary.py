@@ -17,6 +17,7 @@ from ..errors import CaseError
 from ..modal.boundary import Curve, Found, boundaries
 from ..modal.parametric import ReducedModel
 from ..typing import IntArray
+from .asked import require_range
 from .boundary_again import position_error, solved_again
 from .boundary_problem import Asked, Method, plane_of, solved_problem
 from .boundary_result import Boundary, BoundaryCurve, CountedAt
@@ -57,7 +58,7 @@ def stability_boundary(
     started = time.perf_counter()
     work = Workspace.of(problem)
     case = work.case("a stability boundary")
-    ends = _range(x_range, "x_range"), _range(y_range, "y_range")
+    ends = require_range(x_range, "x_range"), require_range(y_range, "y_range")
     asked = Asked((x, y), ends, method, bound, tolerance, lines)
     asked.check(case)
     top = case.modal.max_frequency_hz if max_frequency_hz is None else float(max_frequency_hz)
@@ -72,7 +73,8 @@ def stability_boundary(
     return Boundary(
         x, y, *ends, top, curves, *_lines(found), _counted(found), found.agree, sentence(found, asked.paths),
         "full" if solved.model is None else "reduced", len(plane.sizes), plane.solves, plane.steps,
-        0 if solved.model is None else solved.model.solves, again, (*solved.notes, *notes, *result_notes), warnings,
+        0 if solved.model is None else solved.model.solves, again, (*solved.notes, *notes, *result_notes),
+        (*solved.problem.idle_words, *warnings),
         provenance(work, "boundary", time.perf_counter() - started, method=method, bound=bound, tolerance=tolerance),
     )  # fmt: skip
 
@@ -117,10 +119,3 @@ def _counted(found: Found) -> tuple[CountedAt, ...]:
     plane = found.plane
     places = [(plane.low + (plane.high - plane.low) * at.p, at.count.modes) for at in found.looked]
     return tuple(CountedAt(float(p[0]), float(p[1]), modes) for p, modes in places)
-
-
-def _range(given: tuple[float, float] | Sequence[float], name: str) -> tuple[float, float]:
-    values = np.asarray(given, dtype=float)
-    if values.shape != (2,) or not np.all(np.isfinite(values)) or not values[0] < values[1]:
-        raise CaseError(name, given, "two finite numbers low < high")
-    return float(values[0]), float(values[1])

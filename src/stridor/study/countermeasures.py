@@ -14,7 +14,7 @@ from ..case.matrix_checks import MU
 from ..errors import CaseError
 from ..modal.krylov.steady import refuse_stick
 from ..system.imported import Share, load_terms
-from .asked import require_frequency
+from .asked import names_of, require_count, require_frequency
 from .measure_ranking import Ranking
 from .measure_verification import verified
 from .measures import Countermeasures, Measure, Target, Verified
@@ -32,7 +32,7 @@ def rank_countermeasures(
     *,
     mu: float | None = None,
     target: Target = "sum",
-    numbers: Sequence[str] | None = None,
+    numbers: str | Sequence[str] | None = None,
     added_mass: bool = True,
     chamfers: int = 2,
     percent: float = 5.0,
@@ -60,6 +60,8 @@ def rank_countermeasures(
     started = time.perf_counter()
     if not 0.0 < percent < 100.0:
         raise CaseError("percent", percent, "a size of change between 0 and 100 %")
+    require_count(verify, "verify", least=0)
+    require_count(chamfers, "chamfers", least=0)
     require_frequency(max_frequency_hz)
     work = Workspace.of(problem)
     case = work.case("the ranking of countermeasures")
@@ -76,7 +78,7 @@ def rank_countermeasures(
     band = linear.columns("all") if watch == "all" else unstable
     ranking = Ranking(linear, [b for b in band if linear.mode(b) is not None], target, percent, margin)
     left = whole_matrices(case, linear.mu) if numbers is None else []
-    found = ranking.numbers(default_numbers(case, left) if numbers is None else list(numbers))
+    found = ranking.numbers(default_numbers(case, left) if numbers is None else names_of(numbers))
     if added_mass:
         found += ranking.masses()
     if chamfers > 0:

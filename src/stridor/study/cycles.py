@@ -66,8 +66,8 @@ def cycles(
     for value in values:
         require_friction(value)
     pushes = None if push is None else [float(p) for p in np.ravel(np.asarray(push, dtype=float))]
-    if pushes is not None and not (pushes and np.all(np.isfinite(pushes))):
-        raise CaseError("push", push, "finite speeds [m/s]")
+    if pushes is not None and not (pushes and np.all(np.isfinite(pushes)) and np.all(pushes)):
+        raise CaseError("push", push, "finite speeds above or below 0 [m/s]")
     if points < 2:
         raise CaseError("points", points, "at least 2 cycles of a branch")
     if not seconds > 0.0:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 
 from ..notebook import MOST_ROWS, counted, html_table
-from ..tabular import Cell, Rows, Tabular
+from ..tabular import Cell, Rows, Tabular, dataset
 from ..typing import Array, BoolArray
 
 ROUNDING = 1e-9
+POINTS = ("onset_mu", "frequency_hz", "slope_x", "slope_y", "residual", "error")
 
 
 @dataclass(frozen=True)
@@ -139,10 +141,8 @@ class DampingMap(Tabular):
         return html_table("Lowest onset, critical μ", heads, rows, (more, *self.warnings, *self.notes))
 
     def to_xarray(self) -> Any:
-        """xarray.Dataset with dimensions x and y."""
-        import xarray as xr
-
-        both = ("x", "y")
+        """xarray.Dataset with dimensions x and y, as `st.save` writes it; what has no point is JSON in the attribute
+        ``damping_map``."""
         table = {
             "onset_mu": (self.onset_mu, "lowest critical friction coefficient"),
             "frequency": (self.frequency_hz, "frequency of the onset [Hz]"),
@@ -152,8 +152,28 @@ class DampingMap(Tabular):
         }
         if self.error is not None:
             table["error"] = (self.error, "estimated error of the onset")
-        return xr.Dataset(
-            {name: xr.Variable(both, data, {"long_name": words}) for name, (data, words) in table.items()},
-            coords={"x": self.x_values, "y": self.y_values},
-            attrs={"analysis": "damping map", "x_path": self.x, "y_path": self.y, "method": self.method},
-        )
+        variables = {name: (("x", "y"), values, {"long_name": words}) for name, (values, words) in table.items()}
+        coords = {"x": ("x", self.x_values), "y": ("y", self.y_values)}
+        data = dataset("damping map", variables, coords, self.provenance)
+        once = {name: value for name, value in self.to_json().items() if name not in (*POINTS, "x_values", "y_values")}
+        return data.assign_attrs(x_path=self.x, y_path=self.y, method=self.method, damping_map=json.dumps(once))
+
+    @classmethod
+    def from_xarray(cls, data: Any) -> DampingMap:
+        """The map whose `to_xarray` that is. Raises KeyError, TypeError or ValueError where it is none's."""
+        told = json.loads(data.attrs["damping_map"])
+        texts = [told["x"], told["y"], *told["notes"], *told["warnings"]]
+        if not all(isinstance(text, str) for text in texts) or told["method"] not in ("full", "reduced"):
+            raise ValueError("its texts are none")
+        low, high = (float(v) for v in told["friction_range"])
+        undamped, top = told["undamped_mu"], float(told["max_frequency_hz"])
+        if not (0.0 <= low < high and top > 0 and (undamped is None or np.isfinite(undamped))):
+            raise ValueError("its ranges are none")
+        confirmed = [[float(c[name]) for name in Confirmed.__dataclass_fields__] for c in told["confirmed"]]
+        return cls(
+            told["x"], told["y"], data["x"].values, data["y"].values, (low, high), top, data["onset_mu"].values,
+            data["frequency"].values, data["slope_x"].values, data["slope_y"].values, data["residual"].values,
+            undamped, tuple(told["warnings"]), json.loads(data.attrs["provenance"]), told["method"],
+            data["error"].values if "error" in data else None, tuple(Confirmed(*c) for c in confirmed),
+            tuple(told["notes"]),
+        )  # fmt: skip

@@ -14,13 +14,14 @@ from ..errors import CaseError
 from ..sliding import full_motion
 from ..system import System
 from ..temporal.ensembles import Outcome, march_all
-from ..temporal.legs import Member
+from ..temporal.legs import Member, require_window
 from ..temporal.settings import Settings, choose_step
 from ..temporal.simulate import Progress
 from ..temporal.simulate import plan as step_limits
 from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
 from .analyses import check_extent
+from .asked import require_count
 from .ensemble_modes import Found, unstable_modes
 from .ensemble_numbers import LEAST_RECORDS, Numbers, Observable, last_phase, numbers_of, observable_of
 from .ensemble_result import AXES, Ensemble
@@ -43,7 +44,7 @@ def ensemble(
     initial: Literal["rest", "steady-sliding"] | None = None,
     grid: bool = True,
     sweep: Sweep | None = None,
-    swept: Literal["mu", "load", "speed"] = "mu",
+    swept: Literal["mu", "load", "speed"] | None = None,
     observable: str | None = None,
     window: float = 0.5,
     modes: bool = True,
@@ -58,13 +59,13 @@ def ensemble(
 
     mu scales every contact's friction law at the case's own speed; load and speed are factors on all loads and on all
     prescribed velocities (None: 1); perturbation [m/s] of the slip speed at the start, where runs begin in steady
-    sliding (initial; None: as [temporal] says). sweep: members that differ in the number ``swept`` follow one another,
-    each from where the one before ended, for the duration of the last phase, with rising values ("up"), falling ones
-    ("down") or both; loads and speeds change by a ramp over its first tenth, friction at once. observable: what
-    amplitudes are of ("beam1.tip.velocity", "A.normal_force"; default the velocity of the first watched point); window:
-    the share of the last phase that is looked at. modes False leaves out the modal map. records keeps the members' runs
-    from the start of the last phase on. cores: threads (None: all). separately: one run after the other in any case.
-    device: "gpu" (`stridor[gpu]`), "cpu", or "auto", a GPU where there is one and members are many.
+    sliding (initial; None: as [temporal] says). sweep: members that differ in the number ``swept`` (None: mu) follow
+    one another, each from where the one before ended, for the duration of the last phase, with rising values ("up"),
+    falling ones ("down") or both; loads and speeds change by a ramp over its first tenth, friction at once. observable:
+    what amplitudes are of ("beam1.tip.velocity", "A.normal_force"; default the velocity of the first watched point);
+    window: the share of the last phase that is looked at. modes False leaves out the modal map. records keeps the
+    members' runs from the start of the last phase on. cores: threads (None: all). separately: one run after the other
+    in any case. device: "gpu" (`stridor[gpu]`), "cpu", or "auto", a GPU where there is one and members are many.
 
     Members go side by side on the modal path with contacts that slide little; others take separate runs, and a note
     says so. A member that fails is a row with its error. progress is called with steps done and planned of all. Ctrl-C
@@ -72,6 +73,8 @@ def ensemble(
     cannot be had, and what `simulate` raises for all members.
     """
     started = time.perf_counter()
+    if cores is not None:
+        require_count(cores, "cores", more=", or None for all")
     work = Workspace.of(problem)
     values = _values(work, mu, load, speed, perturbation, initial)
     plan = _Plan.of(values, grid=grid, sweep=sweep, swept=swept)
@@ -97,10 +100,11 @@ def ensemble(
 
 
 def _check_window(work: Workspace, system: System, settings: Settings, window: float) -> None:
-    """Refuse a window of too few records for a spectrum."""
+    """Refuse a window that is none, or of too few records for a spectrum."""
+    require_window(window)
     step = choose_step(step_limits(system, settings)[2], settings)
     count = int(window * work.phases[-1].duration / step / settings.record_every)
-    if 0.0 < window <= 1.0 and count < LEAST_RECORDS:
+    if count < LEAST_RECORDS:
         raise CaseError(
             "window", window,
             f"a share of the last phase with {LEAST_RECORDS} records at least, here it has {count}: let that phase "
@@ -133,9 +137,9 @@ def _values(
     return made
 
 
-def _asked(values: dict[str, Array], grid: bool, sweep: str | None, swept: str, window: float) -> dict[str, Any]:
+def _asked(values: dict[str, Array], grid: bool, sweep: str | None, swept: str | None, window: float) -> dict[str, Any]:
     asked = {name: [None if np.isnan(v) else float(v) for v in array] for name, array in values.items()}
-    return asked | {"grid": grid, "sweep": sweep, "swept": swept if sweep else None, "window": window}
+    return asked | {"grid": grid, "sweep": sweep, "swept": swept or "mu" if sweep else None, "window": window}
 
 
 @dataclass(frozen=True)
@@ -149,8 +153,11 @@ class _Plan:
     place: dict[tuple[int, int], int]
 
     @classmethod
-    def of(cls, values: dict[str, Array], *, grid: bool, sweep: str | None, swept: str) -> _Plan:
+    def of(cls, values: dict[str, Array], *, grid: bool, sweep: str | None, swept: str | None) -> _Plan:
         """Raises CaseError for lists of several lengths, and a sweep of what has one value."""
+        if swept is not None and sweep is None and swept in AXES[:3]:
+            raise CaseError("swept", swept, "goes with sweep: up, down or both")
+        swept = swept or "mu"
         if sweep not in (None, "up", "down", "both") or swept not in AXES[:3]:
             name, given = ("swept", swept) if swept not in AXES[:3] else ("sweep", sweep)
             raise CaseError(name, given, "mu, load or speed" if name == "swept" else "up, down or both")

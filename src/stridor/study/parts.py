@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ..agreement import PARTS as OF_COMPARISON
 from ..errors import CaseError
+from .asked import names_of
 
 PARTS = ("modes", "onsets", "sensitivities", "countermeasures", "simulate", "compare", "report")
 OF_RUN = ("modes", "onsets", "simulate", "compare", "report")
@@ -35,13 +36,15 @@ class Parts:
 
 
 def chosen_parts(
-    only: Collection[str] | None = None, skip: Collection[str] | None = None, default: Collection[str] = OF_RUN
+    only: str | Collection[str] | None = None,
+    skip: str | Collection[str] | None = None,
+    default: Collection[str] = OF_RUN,
 ) -> Parts:
     """The parts named, or those of ``default``, without those skipped. Parts of the comparison may be named alone;
     its full run takes `simulate` with it. Raises CaseError for other names, and where nothing is left."""
-    named, left = _names(only, "--only"), _names(skip, "--skip")
+    named, left = _names(only, "only"), _names(skip, "skip")
     if both := named & left:
-        raise CaseError("--skip", ", ".join(sorted(both)), "is named by --only, too; leave one of them out")
+        raise CaseError("skip", ", ".join(sorted(both)), "is among those to be computed alone, too; leave one out")
     names = named or set(default)
     inner = names & set(OF_COMPARISON)
     of_comparison = (inner if inner and "compare" not in names else set(OF_COMPARISON)) - left
@@ -54,13 +57,13 @@ def chosen_parts(
         names |= {"report"}
     found = (names & set(PARTS)) - left
     if not found:
-        raise CaseError("--skip", ", ".join(sorted(left)), f"leaves nothing to do; parts: {', '.join(PARTS)}")
+        raise CaseError("skip", ", ".join(sorted(left)), f"leaves nothing to do; parts: {', '.join(PARTS)}")
     return Parts(frozenset(found), frozenset(of_comparison), "critical" in inner)
 
 
-def _names(given: Collection[str] | None, where: str) -> set[str]:
+def _names(given: str | Collection[str] | None, where: str) -> set[str]:
     """Names as given, several with commas in one. Raises CaseError."""
-    names = [name.strip() for text in given or () for name in text.split(",")]
+    names = [name.strip() for text in names_of(given or ()) for name in text.split(",")]
     for name in names:
         if name not in (*PARTS, *OF_COMPARISON):
             accepted = f"{', '.join(PARTS)}; of the comparison {', '.join(OF_COMPARISON)}"

@@ -27,7 +27,7 @@ from ..system.bodies import KnownBodies
 from ..system.imported import cleaned
 from ..typing import Array, ComplexArray
 from .analyses import modes as modes_at
-from .asked import require_band
+from .asked import names_of, require_band
 from .provenance import provenance
 from .sensitivity_result import Sensitivities
 from .workspace import Problem, Workspace
@@ -43,7 +43,7 @@ _FRICTION = ("mu", "parameters.mu.value")
 
 def sensitivities(
     problem: Problem,
-    parameters: Sequence[str] = ("mu",),
+    parameters: str | Sequence[str] = ("mu",),
     *,
     mu: float | None = None,
     modes: Choice = "unstable",
@@ -69,7 +69,7 @@ def sensitivities(
     nothing depends on it, AnalysisError where steady sliding does not exist. A mode without derivatives is left out,
     and a warning says so.
     """
-    started = time.perf_counter()
+    started, parameters = time.perf_counter(), names_of(parameters)
     work = Workspace.of(problem)
     linear = Linearised.of(work, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
     values = np.array([linear.value(path) for path in parameters])
@@ -88,7 +88,7 @@ def sensitivities(
             exceptional[:, column] = _meeting(values, found[column], partner, derivative[:, column], slopes)
     result = Sensitivities(
         mu=linear.mu,
-        parameters=tuple(parameters),
+        parameters=parameters,
         values=values,
         branch=linear.modes.branch[columns],
         eigenvalues=np.array([m.eigenvalue for m in found], dtype=complex),

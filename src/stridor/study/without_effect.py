@@ -25,7 +25,7 @@ from .workspace import Workspace
 
 IN_TIME = ("simulate", "compare", "run")
 MODAL = (
-    "steady", "modes", "shapes", "onsets", "run", "sensitivities", "countermeasures", "damping_map", "boundary",
+    "steady", "modes", "shapes", "onsets", "run", "sensitivities", "countermeasures", "damping-map", "boundary",
     "reduce", "report",
 )
 

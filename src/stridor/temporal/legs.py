@@ -146,13 +146,18 @@ def _side_by_side(pieces: Sequence[Sequence[Array]]) -> Array:
     return out
 
 
+def require_window(window: float) -> None:
+    """Refuse a share of the last phase that is none. Raises CaseError."""
+    if not 0.0 < window <= 1.0:
+        raise CaseError("window", window, "the share of the last phase that is looked at, above 0 and at most 1")
+
+
 def legs_of(
     phases: Sequence[PhaseSpec], system: System, step: float, count: int, window: float, *, steady: bool
 ) -> Legs:
     """The legs of ``count`` members one after the other; window: share of the last phase, in (0, 1]. Raises CaseError
-    for a window that begins before the ramp of that phase ends."""
-    if not 0.0 < window <= 1.0:
-        raise CaseError("window", window, "the share of the last phase that is looked at, above 0 and at most 1")
+    for another one, and one that begins before the ramp of that phase ends."""
+    require_window(window)
     last, names = phases[-1], list(system.motion.names)
     kept = last.duration * (1.0 - window)
     if last.ramp > kept or (count > 1 and last.duration * RISE > kept):

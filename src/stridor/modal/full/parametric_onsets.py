@@ -5,6 +5,7 @@ The reduced problem is searched as any other is (`search`), and what is found is
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +16,7 @@ from ...case.points import choice
 from ...digits import hertz, readable
 from ...errors import CaseError
 from ...notebook import Shown, counted, html_table
-from ...tabular import Rows, Tabular
+from ...tabular import Rows, Tabular, dataset
 from ...threads import one_thread
 from ...typing import ComplexArray
 from ..newton import Root, crossing, meeting, standstill
@@ -31,6 +32,10 @@ from .passages import quiet
 from .search import search
 from .words import sentence
 
+COLUMNS = (
+    "value", "frequency_hz", "residual", "square_root_coefficient", "reduced_value", "growth_slope", "enters_at",
+    "stabilising",
+)  # fmt: skip
 NEAR = 1e-3  # of the range and of λ: how far from the reduced model's onset the full problem's may be
 
 
@@ -78,7 +83,8 @@ class ParametricOnset(Shown):
 
 class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
     """Onsets in ascending order, of a parameter over a range up to max_frequency_hz. complete: whether as many roots
-    grow, wherever that was looked at, as they say; sentence: that in words. notes: what else was taken how."""
+    grow, wherever that was looked at, as they say; sentence: that in words. notes: what else was taken how; warnings:
+    that the parameter has no effect. provenance: of which case, where there is one."""
 
     parameter: str
     between: tuple[float, float]
@@ -86,6 +92,8 @@ class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
     complete: bool
     sentence: str
     notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    provenance: dict[str, Any]
 
     @classmethod
     def of(
@@ -97,6 +105,8 @@ class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
         (own,) = (p for p in model.problem.parameters if p.name == parameter)
         made.between, made.max_frequency_hz = (own.low, own.high), model.frequency / (2 * np.pi)
         made.notes = tuple(getattr(model.problem, "notes", ()))
+        made.warnings = tuple(words for words in model.problem.idle_words if words.startswith(f"{parameter} "))
+        made.provenance = {}
         return made
 
     def to_json(self) -> dict[str, Any]:
@@ -109,6 +119,7 @@ class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
             "completeness": self.sentence,
             "complete": self.complete,
             "notes": list(self.notes),
+            "warnings": list(self.warnings),
         }
 
     def table(self) -> Rows:
@@ -120,6 +131,62 @@ class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
             )
             for o in self
         ]  # fmt: skip
+
+    def to_xarray(self) -> Any:
+        """xarray.Dataset with dimensions onset and number (of those whose values ``point`` holds), as `st.save` writes
+        it; what there is once is JSON in the attribute ``onsets``."""
+
+        def column(name: str) -> list[float]:
+            return [np.nan if (v := getattr(o, name)) is None else float(v) for o in self]
+
+        units = {"frequency_hz": "Hz", "residual": "1", "square_root_coefficient": "1/s"}
+        variables: dict[str, Any] = {
+            name: ("onset", np.array(column(name)), {"units": units[name]} if name in units else {}) for name in COLUMNS
+        }
+        variables["kind"] = ("onset", np.array([o.kind for o in self], dtype=object))
+        variables["stabilising"] = ("onset", np.array([o.stabilising for o in self], dtype=np.int8))
+        names = list(self[0].point) if self else []
+        point = np.array([[float(o.point[n]) for n in names] for o in self]).reshape(len(self), len(names))
+        variables["point"] = (("onset", "number"), point)
+        coords = {"number": ("number", np.array(names, dtype=object))}
+        data = dataset("onsets along", variables, coords, self.provenance)
+        once = {name: value for name, value in self.to_json().items() if name != "onsets"}
+        return data.assign_attrs(parameter=self.parameter, onsets=json.dumps(once))
+
+    @classmethod
+    def from_xarray(cls, data: Any) -> ParametricOnsets:
+        """The onsets whose `to_xarray` that is. Raises KeyError, TypeError or ValueError where it is none's."""
+        told = json.loads(data.attrs["onsets"])
+        low, high = (float(v) for v in told["range"])
+        if not (np.isfinite(low) and np.isfinite(high) and low < high and told["max_frequency_hz"] > 0):
+            raise ValueError("its range is none")
+        texts = [told["parameter"], told["completeness"], *told["notes"], *told["warnings"]]
+        if not all(isinstance(text, str) for text in texts) or not isinstance(told["complete"], bool):
+            raise ValueError("its texts are none")
+        names = [str(name) for name in data["number"].values]
+
+        def maybe(value: float) -> float | None:
+            return None if np.isnan(value) else value
+
+        onsets: list[ParametricOnset] = []
+        for k in range(data.sizes["onset"]):
+            at = {name: float(data[name].values[k]) for name in COLUMNS}
+            if data["kind"].values[k] not in ("flutter", "divergence"):
+                raise ValueError("an onset of another kind")
+            onsets.append(
+                ParametricOnset(
+                    told["parameter"], at["value"], dict(zip(names, map(float, data["point"].values[k]), strict=True)),
+                    at["frequency_hz"], maybe(at["growth_slope"]), bool(at["stabilising"]), maybe(at["residual"]),
+                    at["reduced_value"], str(data["kind"].values[k]), maybe(at["square_root_coefficient"]),
+                    maybe(at["enters_at"]),
+                )
+            )  # fmt: skip
+        made = cls(onsets)
+        made.parameter, made.between, made.max_frequency_hz = told["parameter"], (low, high), told["max_frequency_hz"]
+        made.complete, made.sentence = told["complete"], told["completeness"]
+        made.notes, made.warnings = tuple(told["notes"]), tuple(told["warnings"])
+        made.provenance = json.loads(data.attrs["provenance"])
+        return made
 
     @property
     def _line(self) -> str:
@@ -140,7 +207,7 @@ class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
         ]  # fmt: skip
         low, high = self.between
         title = f"{counted(len(self), 'onset')} for {self.parameter} from {low:g} to {high:g}"
-        return html_table(title, heads, rows, (*self.from_above_words(), self.sentence, *self.notes))
+        return html_table(title, heads, rows, (*self.from_above_words(), self.sentence, *self.warnings, *self.notes))
 
     def from_above_words(self) -> list[str]:
         """Onsets above the band whose mode comes into it, a line each."""

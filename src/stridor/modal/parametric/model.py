@@ -114,7 +114,7 @@ class ReducedModel(Shown):
 
     def _repr_html_(self) -> str:
         rows = [(p.name, f"{p.low:g}", f"{p.high:g}") for p in self.problem.parameters]
-        return html_table(f"Reduced model: {self._line}", ("number", "from", "to"), rows)
+        return html_table(f"Reduced model: {self._line}", ("number", "from", "to"), rows, self.problem.idle_words)
 
     @property
     def size(self) -> int:

@@ -83,6 +83,23 @@ class ParametricProblem:
                 raise CaseError(f"values.{name}", value, "a finite number")
         return {**self.reference, **{k: float(v) for k, v in given.items()}}
 
+    @property
+    def idle(self) -> tuple[str, ...]:
+        """Parameters that change no factor anywhere in the box, and so no mode."""
+        shares = (0.0, 0.37, 0.71, 1.0)
+        # The others away from ends, at which a factor that is a product of several may be zero.
+        between = {p.name: p.low + 0.29 * (p.high - p.low) for p in self.parameters}
+        lines = {
+            p.name: [self.factors({**between, p.name: p.low + share * (p.high - p.low)}) for share in shares]
+            for p in self.parameters
+        }
+        return tuple(name for name, (first, *more) in lines.items() if all(np.array_equal(first, f) for f in more))
+
+    @property
+    def idle_words(self) -> tuple[str, ...]:
+        """A sentence for each parameter without effect."""
+        return tuple(f"{name} has no effect: no matrix of the problem depends on it" for name in self.idle)
+
     def inside(self, values: Mapping[str, float]) -> bool:
         """Whether values lie in the box, its border included."""
         slack = {p.name: 1e-12 * (p.high - p.low) for p in self.parameters}

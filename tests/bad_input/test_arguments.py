@@ -1,0 +1,51 @@
+"""Arguments of Python calls that are none: refused by name, with what would be accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import stridor as st
+from benches import paper_case
+from mode_coupling import mode_coupling
+
+pytestmark = pytest.mark.bad_input
+CASE = mode_coupling(0.02, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: st.onsets(CASE, (0, 1, 2)), "friction_range: [0, 1, 2] – two finite numbers 0 ≤ low < high"),
+        (lambda: st.onsets(CASE, (0.0, float("inf"))), "friction_range: [0.0, inf] – two finite numbers 0 ≤ low < high"),
+        (lambda: st.onsets(CASE, (-0.1, 1.0)), "friction_range: [-0.1, 1.0] – two finite numbers 0 ≤ low < high"),
+        (lambda: st.onsets(CASE, (0.0, "a")), "friction_range: [0.0, 'a'] – two finite numbers 0 ≤ low < high"),  # type: ignore[arg-type]
+        (
+            lambda: st.onsets(CASE, (0, 1, 2), along="bodies.m.mass"),  # type: ignore[call-overload]
+            "friction_range: [0, 1, 2] – two finite numbers low < high",
+        ),
+        (lambda: st.ensemble(paper_case(), cores=-1), "cores: -1 – a whole number ≥ 1, or None for all"),
+        (lambda: st.ensemble(paper_case(), cores=0), "cores: 0 – a whole number ≥ 1, or None for all"),
+        (lambda: st.modes(CASE, 0.5, count=0), "count: 0 – a whole number ≥ 1"),
+        (lambda: st.modes(CASE, 0.5, count=-2), "count: -2 – a whole number ≥ 1"),
+        (lambda: st.cycles(CASE, 1.0, push=0.0), "push: 0.0 – finite speeds above or below 0 [m/s]"),
+        (lambda: st.cycles(CASE, 1.0, push=[0.1, 0.0]), "push: [0.1, 0.0] – finite speeds above or below 0 [m/s]"),
+        (lambda: st.rank_countermeasures(CASE, mu=1.2, verify=-1), "verify: -1 – a whole number ≥ 0"),
+        (lambda: st.rank_countermeasures(CASE, mu=1.2, chamfers=-1), "chamfers: -1 – a whole number ≥ 0"),
+    ],
+)
+def test_what_is_none_is_refused_by_its_name(call: Callable[[], Any], said: str) -> None:
+    with pytest.raises(st.CaseError) as raised:
+        call()
+    assert str(raised.value) == said
+
+
+def test_one_name_may_stand_without_a_list() -> None:
+    many = st.sensitivities(CASE, ["mu"], mu=1.2)
+    assert st.sensitivities(CASE, "mu", mu=1.2).to_json() == many.to_json()
+    with pytest.raises(st.CaseError, match=r"^nu: "):
+        st.sensitivities(CASE, "nu", mu=1.2)
+    found = st.rank_countermeasures(CASE, mu=1.2, numbers="springs.k1.stiffness", added_mass=False, verify=0)
+    assert {m.name for m in found.measures} <= {"springs.k1.stiffness"}
