@@ -12,7 +12,7 @@ from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError
 from ...sliding import friction_damping_matrix, full_motion, require_pressed, steady_nodes, steady_sliding_nodes
 from ...sliding.stick_slip import StickRows
-from ...sliding.surfaces import STILL
+from ...sliding.surfaces import STILL, SurfaceSliding
 from ...system import System
 from ...typing import Array, BoolArray, IntArray, Sparse
 from ..options import Options
