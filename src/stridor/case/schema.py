@@ -394,7 +394,7 @@ class Temporal(Table):
     contact: Literal["as given", "rigid"] = Field(
         default="as given", description='"as given" or "rigid", the stiffness of contacts in time'
     )
-    stepper: Literal["explicit", "exact", "auto"] = Field(
+    stepper: Literal["explicit", "exact", "implicit", "auto"] = Field(
         default="explicit",
         description='"explicit", "exact" or "auto": step by step, from one change of contact to the next, or by size',
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ..errors import CaseError
 from ..stages import passing, stage
 from ..system import System
@@ -18,6 +20,8 @@ from .schedule import PhaseSpec, Schedule, lay_out
 from .settings import Settings
 from .stepper import Disturbance, Stepper
 from .steppers.exact import exact_stepper, refuse, why_not_exact
+from .steppers.implicit import implicit_stepper, whole_steps
+from .steppers.implicit import refuse as refuse_implicit
 from .steppers.modal import choose_path, modal_stepper, refuses
 from .steppers.sparse import sparse_stepper, step_limit_assembled
 from .trajectory import Trajectory
@@ -69,10 +73,12 @@ def simulate(
         watch=settings.watch,
     )
     settings, why = _chosen(system, settings)
+    if settings.stepper == "implicit":
+        settings = replace(settings, step=whole_steps(settings, phases))
     stepper = stepper_for(system, settings, mu, why)
     motion = system.motion
     schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
-    if settings.stepper == "exact":
+    if settings.stepper in ("exact", "implicit"):
         _check_step(phases, schedule)
     if settings.initial == "steady-sliding":
         schedule = schedule.from_steady()
@@ -103,6 +109,10 @@ def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
     if settings.stepper == "exact":
         refuse(system)
         return "exact", exactly, step_limit(system, 0.5)
+    if settings.stepper == "implicit":
+        refuse_implicit(system, settings)
+        step = whole_steps(settings, ())
+        return "implicit", exactly, StepLimit(step, 2 * np.pi / step, "the highest frequency asked for", 1.0)
     if why := _why_sparse(system, settings):
         return "assembled", why, step_limit_assembled(system, settings.beta2)
     modes, reason = choose_path(system, settings)
@@ -112,7 +122,7 @@ def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
 def _chosen(system: System, settings: Settings) -> tuple[Settings, str]:
     """Settings with the stepper that "auto" comes to, and why it is the exact one, "" where it is not."""
     if settings.stepper != "auto":
-        return settings, "asked for" if settings.stepper == "exact" else ""
+        return settings, "asked for" if settings.stepper in ("exact", "implicit") else ""
     small = system.size <= SMALL and settings.path == "auto" and settings.beta2 == 0.5 and not why_not_exact(system)
     if small:
         return replace(settings, stepper="exact"), f"{system.size} freedoms, up to {SMALL} are few"
@@ -123,6 +133,8 @@ def stepper_for(system: System, settings: Settings, mu: float | None, why: str =
     """The method of time stepping that suits a system, or the one that the settings ask for; ``why`` the exact one."""
     if settings.stepper == "exact":
         return exact_stepper(system, settings, mu, why)
+    if settings.stepper == "implicit":
+        return implicit_stepper(system, settings, mu, why)
     if why := _why_sparse(system, settings):
         return sparse_stepper(system, settings, mu, why)
     return modal_stepper(system, settings, mu)

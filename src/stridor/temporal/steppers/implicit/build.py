@@ -1,0 +1,128 @@
+"""Arrays of the implicit loop from a system, its coordinates and a step."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+
+from ....contact.nodes import ContactNodes
+from ....laws.friction import friction_rows
+from ....system import System
+from ....typing import Array, Sparse
+from ...columns import STATISTICS
+from ...phase_results import fresh_statistics
+from ..exact.basis import Basis
+from ..sparse.node_table import sliding_directions
+from .arrays import COUNTERS, Nodes, State, Structure, Work
+from .warp import warped
+
+COUPLED = 1e-9  # of the damping: what beside the diagonal counts
+FOX_GOODWIN = 1.0 / 6.0  # of h: how late springs of contacts look at their gap, as the structure's do (`warp`)
+STABLE = 0.5  # of the mass that M̃ has: as much of it as late springs may take away
+
+
+def rows_of(nodes: ContactNodes) -> tuple[Sparse, Array]:
+    """Rows (m d, n) of the nodes, normal, then tangents of each, and their lift (m d, p)."""
+    m, t = nodes.count, nodes.directions
+    order = np.argsort(np.concatenate([np.arange(m) * (t + 1), (np.arange(m * t) // t) * (t + 1) + np.arange(m * t) % t + 1]))
+    rows = sp.csr_array(sp.vstack([sp.csr_array(nodes.normal), sp.csr_array(nodes.tangent)]))[order]
+    return sp.csr_array(rows), np.concatenate([nodes.normal_lift, nodes.tangent_lift])[order]
+
+
+def pushed_at(system: System, rows: Sparse) -> Sparse:
+    """Forces (n, k) that act on the structure: of contacts, loads and supports."""
+    motion = system.motion
+    loads = [sp.csr_array(np.reshape(load, (1, -1))) for load in system.loads.values()]
+    carried = [sp.csr_array(np.asarray(m).T) for m in (motion.mass, motion.damping)]
+    return sp.csc_array(sp.vstack([rows, *loads, *carried]).T)
+
+
+def structure_of(system: System, basis: Basis, step: float) -> Structure:
+    """Masses, damping and stiffness of the scheme, and what drives the structure."""
+    motion, r = system.motion, basis.size
+    found = warped(basis.stiffness, basis.damping, step)
+    diagonal = np.diag(found.damping).copy()
+    largest = float(np.abs(found.damping).max(initial=0.0))
+    coupled = bool(np.abs(found.damping - np.diag(diagonal)).max(initial=0.0) > COUPLED * largest)
+    effective = found.mass + 0.25 * step**2 * found.stiffness
+    solved = sl.inv(np.diag(effective) + 0.5 * step * found.damping) if coupled else np.zeros((0, 0))
+    loads = np.array(list(system.loads.values()), dtype=float).reshape(len(system.loads), system.size)
+    return Structure(
+        step=step,
+        mass=found.mass,
+        damping=diagonal,
+        stiffness=np.array(found.stiffness, dtype=float),
+        inverse=1.0 / (effective + 0.5 * step * diagonal),
+        coupled=np.ascontiguousarray(found.damping) if coupled else np.zeros((0, 0)),
+        solved=np.ascontiguousarray(solved),
+        loads=np.ascontiguousarray(loads @ basis.vectors),
+        inertia=np.ascontiguousarray(np.asarray(motion.mass, dtype=float).T @ basis.vectors).reshape(-1, r),
+        drag=np.ascontiguousarray(np.asarray(motion.damping, dtype=float).T @ basis.vectors).reshape(-1, r),
+        load_lift=np.ascontiguousarray(loads @ motion.lift),
+        mass_own=np.array(motion.mass_own, dtype=float),
+        damping_own=np.array(motion.damping_own, dtype=float),
+        stiffness_own=np.array(motion.stiffness_own, dtype=float),
+    )
+
+
+def nodes_of(
+    system: System, nodes: ContactNodes, rows: Sparse, lift: Array, basis: Basis, structure: Structure
+) -> Nodes:
+    """The contact nodes in coordinates, with the Delassus operator."""
+    h, d = structure.step, nodes.directions + 1
+    row = np.ascontiguousarray(rows @ basis.vectors)
+    answer = row * structure.inverse if not structure.solved.size else row @ structure.solved
+    spring = np.asarray(nodes.compliance, dtype=float) > 0.0
+    stiffness = np.divide(1.0, nodes.compliance, out=np.zeros(nodes.count), where=spring)
+    lag = _lag(row[::d], stiffness, structure)
+    near = np.where(spring, 1.0 / (0.25 - lag), 1.0)
+    return Nodes(
+        row=row,
+        answer=np.ascontiguousarray(answer),
+        delassus=np.ascontiguousarray(row @ answer.T),
+        lift=np.ascontiguousarray(lift, dtype=float),
+        gap=np.array(nodes.gap, dtype=float),
+        near=near,
+        memory=np.where(spring, (0.25 + lag) * near, 0.5),
+        layer=np.where(spring, near * nodes.compliance / h**2, 0.0),
+        spring=spring.astype(np.int64),
+        lag=lag,
+        owner=np.array(nodes.owner, dtype=np.int64),
+        friction=friction_rows(nodes.laws),
+        along=sliding_directions(nodes, system.motion.full),
+        weight=np.where(np.isnan(nodes.area), 1.0, nodes.area),
+        kept=nodes.kept.astype(np.int64),
+    )
+
+
+def _lag(normal: Array, stiffness: Array, structure: Structure) -> float:
+    """The part of h by which springs (m,) [N/m] of contacts look late at their gap: as M̃ = M − h²K/6 has it for those
+    of the structure, as far as that leaves masses positive."""
+    if not np.any(stiffness):
+        return 0.0
+    scaled = np.sqrt(stiffness)[:, None] * normal / np.sqrt(structure.mass)
+    square = scaled @ scaled.T if len(scaled) <= scaled.shape[1] else scaled.T @ scaled
+    highest = float(sl.eigh(square, eigvals_only=True, subset_by_index=[len(square) - 1] * 2)[0])
+    return min(FOX_GOODWIN, STABLE / (structure.step**2 * highest))
+
+
+def fresh_state(nodes: Nodes, structure: Structure, contacts: int) -> State:
+    """Nothing moves yet."""
+    m, total, r, p = len(nodes.gap), len(nodes.row), len(structure.mass), len(structure.inertia)
+    return State(
+        q=np.zeros(r), v=np.zeros(r), before=np.zeros(r), place=np.zeros(m), speed=np.zeros(total),
+        impulse=np.zeros(total), earlier=np.zeros(total), status=np.zeros(m, dtype=np.int64), works=np.zeros(5),
+        statistics=fresh_statistics(contacts, STATISTICS), counters=np.zeros(COUNTERS, dtype=np.int64),
+        motion=np.zeros((2, p)),
+    )  # fmt: skip
+
+
+def work_space(nodes: Nodes, structure: Structure, contacts: int, directions: int) -> Work:
+    """Room for one step."""
+    total, r, d = len(nodes.row), len(structure.mass), directions + 1
+    return Work(
+        change=np.zeros(r), force=np.zeros(r), free=np.zeros(total), total=np.zeros(total), slip=np.zeros(total),
+        impulse=np.zeros(total), status=np.zeros(len(nodes.gap), dtype=np.int64), sums=np.zeros((contacts, 6)),
+        local=np.zeros((4, d)), rate=np.zeros(len(structure.inertia)),
+    )  # fmt: skip

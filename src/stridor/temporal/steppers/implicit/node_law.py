@@ -1,0 +1,136 @@
+"""Impulses of one step over all contact nodes: projected block Gauss–Seidel on the Delassus operator, compiled.
+
+A node is solved exactly with the latest impulses of the others by the solvers of the explicit steps, which take
+velocities for increments and impulses for forces. Slip that goes on points along its mean over the step, so that the
+damping that turning friction gives is of second order; that it ends is decided by the velocity behind the step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ....contact import multipliers
+from ....kernels import njit
+from ....laws import packed
+from ....typing import Array
+from ..sparse.disc import solve_disc
+from .arrays import Nodes, State, Work
+
+_OPEN, _STICK, _SLIP = multipliers.OPEN, multipliers.STICK, multipliers.SLIP
+_KIND, _CONSTANT = packed.KIND, packed.CONSTANT
+_solve_contact = njit(cache=True)(multipliers.solve_contact)
+
+SWEEP_LIMIT = 500
+SWEEP_TOLERANCE = 1e-11
+
+
+@njit(cache=True)
+def _solve(
+    i: int, sign: float, tangent: Array, step: float, nodes: Nodes, stuck: bool, free: Array, new: Array
+) -> int:  # pragma: no cover - compiled
+    """Impulses of node i into new from free (d,), with tangent (d − 1,) added to its slip; its status. step: by what
+    its slip is divided to be a speed."""
+    d = len(new)
+    at, w, law = i * d, nodes.delassus, nodes.friction[nodes.owner[i]]
+    w_nn = w[at, at] + nodes.layer[i]
+    if d == 2:
+        new[0], new[1], status = _solve_contact(
+            sign * free[0], free[1] + tangent[0], w_nn, sign * w[at, at + 1], w[at + 1, at + 1], law, stuck, step
+        )
+    else:
+        block = (
+            w_nn, sign * w[at, at + 1], sign * w[at, at + 2], w[at + 1, at + 1], w[at + 1, at + 2], w[at + 2, at + 2]
+        )
+        new[0], new[1], new[2], status = solve_disc(
+            sign * free[0], free[1] + tangent[0], free[2] + tangent[1], block, law, stuck, step
+        )
+    if nodes.kept[i] and status == _OPEN:
+        new[0], status = (-sign * free[0] / w_nn if w_nn > 0.0 else 0.0), _SLIP
+    new[0] *= sign
+    return status
+
+
+@njit(cache=True)
+def _relax(i: int, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
+    """Impulses of node i with those of all others as they are into work.local[0]; its status."""
+    d = work.local.shape[1]
+    at, w = i * d, nodes.delassus
+    new, free, none, mean = work.local[0], work.local[1], work.local[2], work.local[3]
+    for j in range(d):
+        free[j] = work.total[at + j]
+        for k in range(d):
+            free[j] -= w[at + j, at + k] * work.impulse[at + k]
+    free[0] -= nodes.layer[i] * work.impulse[at]
+    sign = -1.0 if nodes.kept[i] and free[0] > 0.0 else 1.0
+    for j in range(d - 1):
+        none[j] = 0.0
+    status = _solve(i, sign, none, 1.0, nodes, state.status[i] == _STICK, free, new)
+    law = nodes.friction[nodes.owner[i]]
+    if status != _SLIP or state.status[i] == _STICK or (d == 2 and law[_KIND] == _CONSTANT):
+        return status
+    ahead = before = 0.0
+    for j in range(1, d):
+        behind = free[j]
+        for k in range(d):
+            behind += w[at + j, at + k] * new[k]
+        ahead += behind * work.slip[at + j]
+        before += work.slip[at + j] * work.slip[at + j]
+    if ahead <= 0.0 or before == 0.0:
+        return status
+    first, second, third = new[0], new[1], new[d - 1]
+    for j in range(d - 1):
+        mean[j] = work.slip[at + j + 1]
+    if _solve(i, sign, mean, 2.0, nodes, False, free, new) != _SLIP:
+        new[0], new[1], new[d - 1] = first, second, third
+    return status
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+def _add(total: Array, row: Array, factor: float) -> None:  # pragma: no cover - compiled
+    for k in range(len(total)):
+        total[k] += factor * row[k]
+
+
+@njit(cache=True)
+def total_of(nodes: Nodes, work: Work) -> None:  # pragma: no cover - compiled
+    """work.total from work.free and the impulses."""
+    d = work.local.shape[1]
+    for k in range(len(work.free)):
+        work.total[k] = work.free[k]
+    for k in range(len(work.free)):
+        if work.impulse[k] != 0.0:
+            _add(work.total, nodes.delassus[k], work.impulse[k])
+    for i in range(len(nodes.gap)):
+        work.total[i * d] += nodes.layer[i] * work.impulse[i * d]
+
+
+@njit(cache=True)
+def solve_nodes(limit: int, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
+    """Impulses into work.impulse, from those that are there; sweeps done, limit + 1 where they did not settle."""
+    d, m = work.local.shape[1], len(nodes.gap)
+    new = work.local[0]
+    total_of(nodes, work)
+    for sweep in range(1, limit + 1):
+        worst = largest = 0.0
+        touching = 0
+        for i in range(m):
+            at = i * d
+            if work.impulse[at] == 0.0 and work.total[at] >= 0.0 and not nodes.kept[i]:
+                work.status[i] = _OPEN
+                continue
+            touching += 1
+            work.status[i] = _relax(i, nodes, state, work)
+            size = 0.0
+            for j in range(d):
+                change = new[j] - work.impulse[at + j]
+                if change != 0.0:
+                    size += abs(change)
+                    work.impulse[at + j] = new[j]
+                    _add(work.total, nodes.delassus[at + j], change)
+                    if j == 0:
+                        work.total[at] += nodes.layer[i] * change
+            worst = max(worst, size)
+            largest = max(largest, abs(new[0]))
+        if worst <= SWEEP_TOLERANCE * largest or (m == 1 and sweep > 0) or math.isnan(worst):
+            return sweep
+    return limit + 1
