@@ -33,21 +33,16 @@ class Structure(NamedTuple):
 
 class Nodes(NamedTuple):
     """row (m d, r): normal, then tangents of each node; answer (m d, r): of M̂ to an impulse along them; delassus
-    (m d, m d) [1/kg] = row M̂⁻¹ rowᵀ; lift (m d, p), gap (m,) [m]. What has to be ≥ 0 where the normal impulse P is, and
-    0 where P is not: U⁺ + near g/h + memory U + layer P + what supports add; spring (m,) 1 where contact has a
-    stiffness, lag the part of h by which its gap is looked at late. owner (m,), friction (c, k) numbers of the laws,
-    along (m, d − 1) and weight (m,) as in `sparse.node_table`; kept (m,) 1 where a node is kept closed."""
+    (m d, m d) [1/kg] = row M̂⁻¹ rowᵀ; lift (m d, p), gap (m,) [m]; stiffness (m,) [N/m], 0 where contact is rigid. owner
+    (m,), friction (c, k) numbers of the laws, along (m, d − 1) and weight (m,) as in `sparse.node_table`; kept (m,) 1
+    where a node is kept closed."""
 
     row: Array
     answer: Array
     delassus: Array
     lift: Array
     gap: Array
-    near: Array
-    memory: Array
-    layer: Array
-    spring: IntArray
-    lag: float
+    stiffness: Array
     owner: IntArray
     friction: Array
     along: Array
@@ -77,14 +72,15 @@ class State(NamedTuple):
 
 class Work(NamedTuple):
     """Work space of a step: change (r,) of v without contact, force (r,); free (m d,): what the law of each node sees
-    without impulses; total (m d,): with them; slip (m d,): velocity at the start of the step; impulse (m d,); status
-    (m,); sums (c, 6); local (4, d) of one node; rate (p,)."""
+    without impulses (`node_law`); total (m d,): with them; slip (m d,): velocity at the start of the step; start (m,)
+    [m]: gap then; impulse (m d,); status (m,); sums (c, 6); local (5, d) of one node; rate (p,)."""
 
     change: Array
     force: Array
     free: Array
     total: Array
     slip: Array
+    start: Array
     impulse: Array
     status: IntArray
     sums: Array

@@ -18,8 +18,6 @@ from .arrays import COUNTERS, Nodes, State, Structure, Work
 from .warp import warped
 
 COUPLED = 1e-9  # of the damping: what beside the diagonal counts
-FOX_GOODWIN = 1.0 / 6.0  # of h: how late springs of contacts look at their gap, as the structure's do (`warp`)
-STABLE = 0.5  # of the mass that M̃ has: as much of it as late springs may take away
 
 
 def rows_of(nodes: ContactNodes) -> tuple[Sparse, Array]:
@@ -70,41 +68,21 @@ def nodes_of(
     system: System, nodes: ContactNodes, rows: Sparse, lift: Array, basis: Basis, structure: Structure
 ) -> Nodes:
     """The contact nodes in coordinates, with the Delassus operator."""
-    h, d = structure.step, nodes.directions + 1
     row = np.ascontiguousarray(rows @ basis.vectors)
     answer = row * structure.inverse if not structure.solved.size else row @ structure.solved
-    spring = np.asarray(nodes.compliance, dtype=float) > 0.0
-    stiffness = np.divide(1.0, nodes.compliance, out=np.zeros(nodes.count), where=spring)
-    lag = _lag(row[::d], stiffness, structure)
-    near = np.where(spring, 1.0 / (0.25 - lag), 1.0)
     return Nodes(
         row=row,
         answer=np.ascontiguousarray(answer),
         delassus=np.ascontiguousarray(row @ answer.T),
         lift=np.ascontiguousarray(lift, dtype=float),
         gap=np.array(nodes.gap, dtype=float),
-        near=near,
-        memory=np.where(spring, (0.25 + lag) * near, 0.5),
-        layer=np.where(spring, near * nodes.compliance / h**2, 0.0),
-        spring=spring.astype(np.int64),
-        lag=lag,
+        stiffness=np.divide(1.0, nodes.compliance, out=np.zeros(nodes.count), where=nodes.compliance > 0.0),
         owner=np.array(nodes.owner, dtype=np.int64),
         friction=friction_rows(nodes.laws),
         along=sliding_directions(nodes, system.motion.full),
         weight=np.where(np.isnan(nodes.area), 1.0, nodes.area),
         kept=nodes.kept.astype(np.int64),
     )
-
-
-def _lag(normal: Array, stiffness: Array, structure: Structure) -> float:
-    """The part of h by which springs (m,) [N/m] of contacts look late at their gap: as M̃ = M − h²K/6 has it for those
-    of the structure, as far as that leaves masses positive."""
-    if not np.any(stiffness):
-        return 0.0
-    scaled = np.sqrt(stiffness)[:, None] * normal / np.sqrt(structure.mass)
-    square = scaled @ scaled.T if len(scaled) <= scaled.shape[1] else scaled.T @ scaled
-    highest = float(sl.eigh(square, eigvals_only=True, subset_by_index=[len(square) - 1] * 2)[0])
-    return min(FOX_GOODWIN, STABLE / (structure.step**2 * highest))
 
 
 def fresh_state(nodes: Nodes, structure: Structure, contacts: int) -> State:
@@ -123,6 +101,6 @@ def work_space(nodes: Nodes, structure: Structure, contacts: int, directions: in
     total, r, d = len(nodes.row), len(structure.mass), directions + 1
     return Work(
         change=np.zeros(r), force=np.zeros(r), free=np.zeros(total), total=np.zeros(total), slip=np.zeros(total),
-        impulse=np.zeros(total), status=np.zeros(len(nodes.gap), dtype=np.int64), sums=np.zeros((contacts, 6)),
-        local=np.zeros((4, d)), rate=np.zeros(len(structure.inertia)),
+        start=np.zeros(len(nodes.gap)), impulse=np.zeros(total), status=np.zeros(len(nodes.gap), dtype=np.int64), sums=np.zeros((contacts, 6)),
+        local=np.zeros((5, d)), rate=np.zeros(len(structure.inertia)),
     )  # fmt: skip

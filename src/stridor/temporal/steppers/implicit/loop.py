@@ -103,15 +103,17 @@ def _seen(increment: Array, rate: Array, a: Structure, nodes: Nodes, state: Stat
                     now += nodes.lift[at + j, p] * rate[p]
                 before += nodes.lift[at + j, p] * state.motion[1, p]
             work.free[at + j], work.slip[at + j] = now, before
-        gap = nodes.near[i] * (state.place[i] + nodes.gap[i]) / h + nodes.memory[i] * state.speed[at]
+        gap = nodes.gap[i] + state.place[i]
+        work.start[i] = gap
+        gap += 0.5 * h * state.speed[at]
+        share = 2.0 if nodes.stiffness[i] > 0.0 else 1.0
         for p in range(len(rate)):
-            way = state.motion[0, p]
-            if nodes.spring[i]:
-                late = (way + 0.5 * increment[p]) / h - nodes.lag * (rate[p] - state.motion[1, p])
-                gap += nodes.near[i] * nodes.lift[at, p] * late
-            else:
-                gap += nodes.lift[at, p] * ((way + increment[p]) / h + 0.5 * rate[p])
-        work.free[at] += gap
+            way, lift = state.motion[0, p], nodes.lift[at, p]
+            work.start[i] += lift * way
+            gap += lift * (way + increment[p])
+            if nodes.stiffness[i] == 0.0:
+                gap += 0.5 * h * lift * rate[p]
+        work.free[at] += share * gap / h
 
 
 @njit(cache=True)
@@ -326,7 +328,7 @@ def run_steps(
                 state.counters[BY_NEWTON] += 1
             else:
                 work.impulse[:] = state.impulse
-                sweeps = solve_nodes(SWEEP_LIMIT, nodes, state, work)
+                sweeps = solve_nodes(SWEEP_LIMIT, a.step, nodes, state, work)
                 if sweeps > SWEEP_LIMIT:
                     return k, HARD
                 state.counters[MOST_SWEEPS] = max(state.counters[MOST_SWEEPS], sweeps)

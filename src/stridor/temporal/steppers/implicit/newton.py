@@ -13,20 +13,18 @@ from ....contact.multipliers import STICK
 from ....laws.packed import coefficient_at
 from ....typing import Array
 from .arrays import Nodes, State, Work
+from .node_law import spring_force
 
 ITERATIONS = 40
 CLOSE = 1e-12  # of the largest impulse
 
 
-def newton(nodes: Nodes, state: State, work: Work) -> None:
+def newton(step: float, nodes: Nodes, state: State, work: Work) -> None:
     """Impulses into work.impulse; those that leave the least residual, where it does not converge."""
-    d = work.local.shape[1]
-    size = len(work.free)
-    operator = nodes.delassus + np.diag(np.repeat(nodes.layer, d) * (np.arange(size) % d == 0))
     impulse = work.impulse.copy()
     best, least = impulse, np.inf
     for _ in range(ITERATIONS):
-        residual, slope = _linearised(nodes, state, operator, impulse, work.free + operator @ impulse, d)
+        residual, slope = _linearised(step, nodes, state, work, impulse)
         left = float(np.abs(residual).max(initial=0.0))
         if left < least:
             best, least = impulse, left
@@ -41,27 +39,35 @@ def newton(nodes: Nodes, state: State, work: Work) -> None:
     work.impulse[:] = best
 
 
-def _linearised(
-    nodes: Nodes, state: State, operator: Array, impulse: Array, total: Array, d: int
-) -> tuple[Array, Array]:
+def _linearised(step: float, nodes: Nodes, state: State, work: Work, impulse: Array) -> tuple[Array, Array]:
     """P less its projection (m d,), and the slope of that (m d, m d)."""
-    residual, slope = np.empty_like(impulse), np.eye(len(impulse))
+    d, operator = work.local.shape[1], nodes.delassus
+    total = work.free + operator @ impulse
+    residual, slope = np.array(impulse), np.eye(len(impulse))
     for i in range(len(nodes.gap)):
-        at = slice(i * d, i * d + d)
-        block = operator[at, at]
+        block = operator[i * d : i * d + d, i * d : i * d + d]
         rho = 1.0 / max(block[0, 0], 1e-300), (d - 1) / max(float(np.trace(block[1:, 1:])), 1e-300)
-        residual[at], here = impulse[at], np.zeros((d, len(impulse)))
-        pushed = impulse[at][0] - rho[0] * total[at][0]
-        if pushed <= 0.0 and not nodes.kept[i]:
+        if nodes.stiffness[i] > 0.0 and not nodes.kept[i]:
+            force, softening = spring_force(nodes.stiffness[i], work.start[i], 0.5 * step * total[i * d])
+            residual[i * d] -= step * force
+            slope[i * d] += 0.5 * step**2 * softening * operator[i * d]
+            if force <= 0.0:
+                continue
+        elif nodes.stiffness[i] > 0.0:
+            mean = 0.5 * (work.start[i] + 0.5 * step * total[i * d])
+            residual[i * d] += step * nodes.stiffness[i] * mean
+            slope[i * d] += 0.25 * step**2 * nodes.stiffness[i] * operator[i * d]
+        elif impulse[i * d] - rho[0] * total[i * d] <= 0.0 and not nodes.kept[i]:
             continue
-        # P_N − (P_N − ρ w_N), over ρ times the block so that it is an impulse.
-        residual[i * d], slope[i * d] = rho[0] * total[i * d], rho[0] * operator[i * d]
+        else:
+            # P_N − (P_N − ρ w_N)
+            residual[i * d], slope[i * d] = rho[0] * total[i * d], rho[0] * operator[i * d]
         law = nodes.friction[nodes.owner[i]]
-        trial = impulse[at][1:] - rho[1] * total[at][1:]
+        rows = slice(i * d + 1, i * d + d)
+        trial = impulse[rows] - rho[1] * total[rows]
         length, normal = float(np.linalg.norm(trial)), impulse[i * d]
         sticks = state.status[i] == STICK
         limit = law[1] if sticks else coefficient_at(law, 0.0)[0]
-        rows = slice(i * d + 1, i * d + d)
         if length <= limit * abs(normal):
             residual[rows], slope[rows] = rho[1] * total[rows], rho[1] * operator[rows]
             continue

@@ -1,8 +1,15 @@
 """Impulses of one step over all contact nodes: projected block Gauss–Seidel on the Delassus operator, compiled.
 
 A node is solved exactly with the latest impulses of the others by the solvers of the explicit steps, which take
-velocities for increments and impulses for forces. Slip that goes on points along its mean over the step, so that the
-damping that turning friction gives is of second order; that it ends is decided by the velocity behind the step.
+velocities for increments and impulses for forces. Rigid contact sees (g⁺ + h U⁺/2)/h, the gap half a step behind the
+end of the step: 0 where P > 0, so that a gap that closes is at rest two steps later, whatever it was. Contact with a
+stiffness k sees 2 g⁺/h, and its impulse is h times
+
+    F = (V(g) − V(g⁺)) / (g⁺ − g),      V(g) = k min(g, 0)²/2,
+
+the force whose work is what the spring loses, so that springs that open and close neither take energy nor give any.
+Slip that goes on points along its mean over the step, so that the damping that turning friction gives is of second
+order; that it ends is decided by the velocity behind the step.
 """
 
 from __future__ import annotations
@@ -21,18 +28,67 @@ _KIND, _CONSTANT = packed.KIND, packed.CONSTANT
 _solve_contact = njit(cache=True)(multipliers.solve_contact)
 
 SWEEP_LIMIT = 500
+NEWTON_STEPS = 60  # on the force of a spring that opens or closes
 SWEEP_TOLERANCE = 1e-11
 
 
 @njit(cache=True)
+def spring_force(stiffness: float, before: float, after: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """F [N] of a spring whose gap goes from ``before`` to ``after`` [m], and −dF/d after ≥ 0 [N/m]."""
+    if before <= 0.0:
+        if after <= 0.0:
+            return -0.5 * stiffness * (before + after), 0.5 * stiffness
+        way = after - before
+        force = 0.5 * stiffness * before * before / way if way > 0.0 else 0.0
+        return force, force / way if way > 0.0 else 0.0
+    if after >= 0.0:
+        return 0.0, 0.0
+    way = before - after
+    return 0.5 * stiffness * after * after / way, 0.5 * stiffness * after * (after - 2.0 * before) / (way * way)
+
+
+@njit(cache=True)
+def _solve_spring(
+    i: int, step: float, tangent: Array, slip_step: float, nodes: Nodes, stuck: bool, start: float, free: Array,
+    new: Array, met: Array,
+) -> int:  # pragma: no cover - compiled
+    """As `_solve`, of a node with a stiffness. Newton's method on F, which is convex: from no impulse on, tangents close
+    in from below. met (d,): work space."""
+    d, at, w = len(new), i * len(new), nodes.delassus
+    for j in range(d):
+        met[j] = free[j]
+    if nodes.kept[i]:
+        met[0] += 2.0 * start / step
+        sign = -1.0 if met[0] > 0.0 else 1.0
+        return _solve(i, sign, tangent, slip_step, 4.0 / (step * step * nodes.stiffness[i]), nodes, stuck, met, new)
+    after, before, status = 0.5 * step * free[0], 0.0, _OPEN
+    for j in range(d):
+        new[j] = 0.0
+    for _ in range(NEWTON_STEPS):
+        force, tangential = spring_force(nodes.stiffness[i], start, after)
+        if tangential == 0.0:
+            break
+        met[0] = free[0] - 2.0 * (after + force / tangential) / step
+        status = _solve(i, 1.0, tangent, slip_step, 2.0 / (step * step * tangential), nodes, stuck, met, new)
+        if abs(new[0] - before) <= 1e-14 * new[0]:
+            break
+        before, seen = new[0], free[0]
+        for k in range(d):
+            seen += w[at, at + k] * new[k]
+        after = 0.5 * step * seen
+    return status
+
+
+@njit(cache=True)
 def _solve(
-    i: int, sign: float, tangent: Array, step: float, nodes: Nodes, stuck: bool, free: Array, new: Array
+    i: int, sign: float, tangent: Array, step: float, layer: float, nodes: Nodes, stuck: bool, free: Array, new: Array
 ) -> int:  # pragma: no cover - compiled
     """Impulses of node i into new from free (d,), with tangent (d − 1,) added to its slip; its status. step: by what
-    its slip is divided to be a speed."""
+    its slip is divided to be a speed; layer [1/kg]: what the normal impulse adds to free beside the node's own part of
+    the Delassus operator."""
     d = len(new)
     at, w, law = i * d, nodes.delassus, nodes.friction[nodes.owner[i]]
-    w_nn = w[at, at] + nodes.layer[i]
+    w_nn = w[at, at] + layer
     if d == 2:
         new[0], new[1], status = _solve_contact(
             sign * free[0], free[1] + tangent[0], w_nn, sign * w[at, at + 1], w[at + 1, at + 1], law, stuck, step
@@ -51,7 +107,7 @@ def _solve(
 
 
 @njit(cache=True)
-def _relax(i: int, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
+def _relax(i: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
     """Impulses of node i with those of all others as they are into work.local[0]; its status."""
     d = work.local.shape[1]
     at, w = i * d, nodes.delassus
@@ -60,11 +116,14 @@ def _relax(i: int, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no
         free[j] = work.total[at + j]
         for k in range(d):
             free[j] -= w[at + j, at + k] * work.impulse[at + k]
-    free[0] -= nodes.layer[i] * work.impulse[at]
-    sign = -1.0 if nodes.kept[i] and free[0] > 0.0 else 1.0
+    spring, sign = nodes.stiffness[i] > 0.0, -1.0 if nodes.kept[i] and free[0] > 0.0 else 1.0
     for j in range(d - 1):
         none[j] = 0.0
-    status = _solve(i, sign, none, 1.0, nodes, state.status[i] == _STICK, free, new)
+    stuck = state.status[i] == _STICK
+    if spring:
+        status = _solve_spring(i, h, none, 1.0, nodes, stuck, work.start[i], free, new, work.local[4])
+    else:
+        status = _solve(i, sign, none, 1.0, 0.0, nodes, stuck, free, new)
     law = nodes.friction[nodes.owner[i]]
     if status != _SLIP or state.status[i] == _STICK or (d == 2 and law[_KIND] == _CONSTANT):
         return status
@@ -80,7 +139,11 @@ def _relax(i: int, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no
     first, second, third = new[0], new[1], new[d - 1]
     for j in range(d - 1):
         mean[j] = work.slip[at + j + 1]
-    if _solve(i, sign, mean, 2.0, nodes, False, free, new) != _SLIP:
+    if spring:
+        again = _solve_spring(i, h, mean, 2.0, nodes, False, work.start[i], free, new, work.local[4])
+    else:
+        again = _solve(i, sign, mean, 2.0, 0.0, nodes, False, free, new)
+    if again != _SLIP:
         new[0], new[1], new[d - 1] = first, second, third
     return status
 
@@ -94,18 +157,15 @@ def _add(total: Array, row: Array, factor: float) -> None:  # pragma: no cover -
 @njit(cache=True)
 def total_of(nodes: Nodes, work: Work) -> None:  # pragma: no cover - compiled
     """work.total from work.free and the impulses."""
-    d = work.local.shape[1]
     for k in range(len(work.free)):
         work.total[k] = work.free[k]
     for k in range(len(work.free)):
         if work.impulse[k] != 0.0:
             _add(work.total, nodes.delassus[k], work.impulse[k])
-    for i in range(len(nodes.gap)):
-        work.total[i * d] += nodes.layer[i] * work.impulse[i * d]
 
 
 @njit(cache=True)
-def solve_nodes(limit: int, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
+def solve_nodes(limit: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
     """Impulses into work.impulse, from those that are there; sweeps done, limit + 1 where they did not settle."""
     d, m = work.local.shape[1], len(nodes.gap)
     new = work.local[0]
@@ -115,11 +175,12 @@ def solve_nodes(limit: int, nodes: Nodes, state: State, work: Work) -> int:  # p
         touching = 0
         for i in range(m):
             at = i * d
-            if work.impulse[at] == 0.0 and work.total[at] >= 0.0 and not nodes.kept[i]:
+            opened = work.total[at] >= 0.0 and (nodes.stiffness[i] == 0.0 or work.start[i] >= 0.0)
+            if work.impulse[at] == 0.0 and opened and not nodes.kept[i]:
                 work.status[i] = _OPEN
                 continue
             touching += 1
-            work.status[i] = _relax(i, nodes, state, work)
+            work.status[i] = _relax(i, h, nodes, state, work)
             size = 0.0
             for j in range(d):
                 change = new[j] - work.impulse[at + j]
@@ -127,8 +188,6 @@ def solve_nodes(limit: int, nodes: Nodes, state: State, work: Work) -> int:  # p
                     size += abs(change)
                     work.impulse[at + j] = new[j]
                     _add(work.total, nodes.delassus[at + j], change)
-                    if j == 0:
-                        work.total[at] += nodes.layer[i] * change
             worst = max(worst, size)
             largest = max(largest, abs(new[0]))
         if worst <= SWEEP_TOLERANCE * largest or (m == 1 and sweep > 0) or math.isnan(worst):

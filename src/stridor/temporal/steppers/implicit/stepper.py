@@ -32,7 +32,7 @@ from .newton import newton
 from .node_law import SWEEP_LIMIT, solve_nodes
 
 STEPS_PER_PERIOD = 30  # of the highest frequency asked for, where no step is given
-BEYOND = 3.0  # times that frequency: the modes of the structure that a large model is reduced to
+BEYOND = 2.0  # times that frequency: the modes of the structure that a large model is reduced to
 MOST_ROWS = 4000  # of contact: normal and tangents of each node
 NODE_HISTORY_BYTES = 500e6
 CONTACT_COLUMNS = 5
@@ -278,9 +278,9 @@ class ImplicitStepper:
             code = self._march(last - self.done, schedule, given=given)
             given = code == HARD
             if given:
-                newton(self.nodes, self.moving, self.work)
-                settled = solve_nodes(SWEEP_LIMIT, self.nodes, self.moving, self.work) <= SWEEP_LIMIT
-                self.moving.counters[UNCONVERGED] += not settled
+                newton(self.scheme.step, self.nodes, self.moving, self.work)
+                sweeps = solve_nodes(SWEEP_LIMIT, self.scheme.step, self.nodes, self.moving, self.work)
+                self.moving.counters[UNCONVERGED] += sweeps > SWEEP_LIMIT
             if code == NOT_FINITE:
                 raise AnalysisError(not_finite(self.done * self.scheme.step, phase, self.scheme.step))
 
