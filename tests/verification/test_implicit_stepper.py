@@ -12,6 +12,7 @@ import pytest
 import stridor as st
 from marching import belt_motion, block_on_belt, in_chunks, points_of, run, touch
 from mode_coupling import mode_coupling
+from random_contacts import random_system
 from solid_cases import DOYEN, WALL
 from stridor.agreement.perturbation import modes_as_in_time, perturb
 from stridor.case import loads, template_text
@@ -21,10 +22,9 @@ from stridor.system import System
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.simulate import Settings, plan, simulate
-from stridor.temporal.steppers.implicit import basis, loop, node_law
+from stridor.temporal.steppers.implicit import basis, loop, node_law, stepper
 from stridor.temporal.steppers.implicit.node_law import spring_force
 from stridor.temporal.steppers.implicit.warp import warped
-from test_exact_stepper import random_system
 
 pytestmark = pytest.mark.verification
 
@@ -59,21 +59,23 @@ def test_mass_on_a_belt():
 
 
 def test_coulomb_oscillator():
-    """SDND100: extrema −0.65, 0.45, −0.25, 0.05 (×1e-3) at nπ/100, then stuck."""
-    off = []
-    for parts in (20, 80, 320):
+    """SDND100: extrema −0.65, 0.45, −0.25, 0.05 (×1e-3) at nπ/100, then stuck: to rounding where these are ends of
+    steps, else of second order."""
+    turns = [-0.65e-3, 0.45e-3, -0.25e-3, 0.05e-3]
+    system, off = block_on_belt(stiffness=1e4, law=Coulomb(0.1), press=10.0), []
+    for parts in (20, 20.4, 40.4, 80.4):
         step = math.pi / 100 / parts
-        system = block_on_belt(stiffness=1e4, law=Coulomb(0.1), press=10.0)
-        result = implicit(system, 6 * math.pi / 100, step=step, start=([0.85e-3, 0.0], 0.0, 0.0), watch=("block",))
+        asked = {"step": step, "start": ([0.85e-3, 0.0], 0.0, 0.0), "watch": ("block",)}
+        result = implicit(system, round(6 * parts) * step, **asked)
         u = result.displacement[:, 0, 0]
-        found = u[parts * np.arange(1, 5)]
-        off.append(np.abs(found - [-0.65e-3, 0.45e-3, -0.25e-3, 0.05e-3]).max())
-        assert np.all(result.status[4 * parts + 2 :, 0] == STICK)
-        assert np.ptp(u[4 * parts + 3 :]) < 1e-12
+        off.append(np.abs(u[np.rint(parts * np.arange(1, 5)).astype(int)] - turns).max())
+        assert np.all(result.status[math.ceil(4 * parts) + 2 :, 0] == STICK)
+        assert np.ptp(u[math.ceil(4 * parts) + 3 :]) < 1e-12
         assert result.normal_force == pytest.approx(10.0, rel=1e-12)
         assert energy_balance(result).error < CLOSED
-    assert off[0] < 1e-5
-    assert off[2] < 0.1 * off[0]
+    assert off[0] < 1e-15
+    assert off[1] < 1e-5
+    assert off[3] < 0.2 * off[1]
 
 
 def test_friction_oscillator():
@@ -85,7 +87,7 @@ def test_friction_oscillator():
         result = implicit(system, 24.0, step=step, start=([12.0, 0.0], [6.0, 0.0], 0.0), watch=("block",))
         u = result.displacement[:, 0, 0]
         assert u.max() == pytest.approx(13.317821, abs=step**2)
-        assert u.min() == pytest.approx(-11.317821, abs=step**2)
+        assert u.min() == pytest.approx(-11.317821, abs=2 * step**2)
         stops = result.time[np.flatnonzero(result.status[:, 0] == SLIP)[-1]]
         assert stops == pytest.approx(22.423556, abs=2 * step)
         off.append(abs(u[-1] - 0.682179))
@@ -123,21 +125,18 @@ def test_a_block_falls_and_slides():
         np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), (contact,), {"weight": np.array([0.0, -10.0])},
         points=points_of(2, along=0, across=1),
     )  # fmt: skip
-    off = []
-    for step in (1e-2, 2.5e-3, 6.25e-4):
+    for step in (1e-2, 1e-3):  # steps of constant forces are right, wherever in one the impact falls
         result = implicit(system, 1.0, step=step, start=(0.0, [2.0, 0.0], 0.0), watch=("along", "across"))
         x, y, time = result.displacement[:, 0, 0], result.displacement[:, 1, 0], result.time
         struck = math.sqrt(2 * 0.1 / 10.0)
         before, after = time < struck - 2 * step, time > struck + 3 * step
         assert y[before] == pytest.approx(-5 * time[before] ** 2, abs=1e-14)
-        assert y[after] == pytest.approx(-0.1, abs=1e-14)  # whatever the gap was at the end of the step
-        left = 2.0 - 0.2 * 10.0 * struck
+        assert y[after] == pytest.approx(-0.1, abs=1e-11)  # whatever the gap was at the end of the step
+        left = 2.0 - 0.2 * 10.0 * struck  # friction acts in the impact, too
         slides = np.minimum(time[after] - struck, left / 2.0)
-        off.append(np.abs(x[after] - 2.0 * struck - left * slides + slides**2).max())
-        assert result.works["contact"][-1] == pytest.approx(1.0, rel=3 * step)
+        assert x[after] == pytest.approx(2.0 * struck + left * slides - slides**2, abs=1e-11)
+        assert result.works["contact"][-1] == pytest.approx(1.0, rel=1e-11)  # m g h
         assert energy_balance(result).error < CLOSED
-    assert off[0] < 1e-2
-    assert off[2] < 0.15 * off[0]
 
 
 @pytest.mark.parametrize("contact", ["rigid", 1e3])
@@ -383,8 +382,6 @@ def test_newtons_method_and_sweeps_find_the_same_impulses(contact: str, monkeypa
         sweeps.append(plain(limit, *args))
         return sweeps[-1]
 
-    from stridor.temporal.steppers.implicit import stepper
-
     march = stepper.ImplicitStepper._march
 
     def one_step_each(self: Any, steps: int, schedule: Any, *, given: bool) -> int:
@@ -423,7 +420,7 @@ def test_laws_hold_at_every_node(monkeypatch: pytest.MonkeyPatch):
     assert np.all(force <= 0.5 * nodes.normal_force + 1e-9 * size)
     slides = (nodes.status[1:-1] == SLIP) & (nodes.status[:-2] == SLIP) & (nodes.status[2:] == SLIP)
     power = np.einsum("rmt,rmt->rm", nodes.tangential_force, nodes.slip_velocity)[1:-1]
-    assert np.mean(power[slides] < 0.0) > 0.999
+    assert np.mean(power[slides] < 0.0) > 0.99
 
 
 def test_friction_that_falls_with_speed_feeds_a_motion():

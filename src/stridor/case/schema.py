@@ -396,7 +396,8 @@ class Temporal(Table):
     )
     stepper: Literal["explicit", "exact", "implicit", "auto"] = Field(
         default="explicit",
-        description='"explicit", "exact" or "auto": step by step, from one change of contact to the next, or by size',
+        description='"explicit", "exact", "implicit" or "auto": step by step, from one change of contact to the next, '
+        "by parts of the shortest period of interest, or by size",
     )
     watch: tuple[str, ...] = Field(default=(), description=f"a list of points, each {POINT[8:]}")
 

@@ -15,18 +15,19 @@ DENSE = 400
 
 
 def modes_below(
-    stiffness: Sparse, mass: Sparse, solve: Callable[[Any], Any], shift: float, frequency: float, most: int
-) -> Array:
-    """Modes (n, k) of (K, M) up to a frequency [1/s]; solve: by K + shift M, shift [1/s²] ≥ 0. Raises AnalysisError for
-    more than ``most``."""
+    stiffness: Sparse, mass: Sparse, solve: Callable[[Any], Any], shift: float, frequency: float, most: int,
+    *, expected: int = 40, tolerance: float = 0.0,
+) -> Array:  # fmt: skip
+    """Modes (n, k) of (K, M) up to a frequency [1/s]; solve: by K + shift M, shift [1/s²] ≥ 0; expected: how many they
+    may be, tolerance: of their squares, relative, 0 for rounding. Raises AnalysisError for more than ``most``."""
     n = stiffness.shape[0]
     if n <= DENSE:
         squares, shapes = sl.eigh(stiffness.toarray(), mass.toarray())
         return shapes[:, squares <= frequency**2]
     inverse = ssl.LinearOperator((n, n), matvec=solve, dtype=float)  # type: ignore[arg-type]
-    count = 40
+    count = expected
     while True:
-        squares, shapes = ssl.eigsh(stiffness, k=min(count, n - 2), M=mass, sigma=-shift, OPinv=inverse)
+        squares, shapes = ssl.eigsh(stiffness, k=min(count, n - 2), M=mass, sigma=-shift, OPinv=inverse, tol=tolerance)
         if squares.max() > frequency**2 or count >= n - 2:
             return shapes[:, squares <= frequency**2]
         if count >= most:

@@ -20,7 +20,7 @@ from .schedule import PhaseSpec, Schedule, lay_out
 from .settings import Settings
 from .stepper import Disturbance, Stepper
 from .steppers.exact import exact_stepper, refuse, why_not_exact
-from .steppers.implicit import implicit_stepper, whole_steps
+from .steppers.implicit import implicit_stepper, whole_steps, why_not_implicit
 from .steppers.implicit import refuse as refuse_implicit
 from .steppers.modal import choose_path, modal_stepper, refuses
 from .steppers.sparse import sparse_stepper, step_limit_assembled
@@ -28,6 +28,7 @@ from .trajectory import Trajectory
 
 ROUNDED = 1e-3  # of a phase: as far as whole steps may end beside it
 SMALL = 40  # freedoms up to which "auto" goes from event to event: there that is faster than steps, and exact
+MANY = 8  # contact nodes from which on it takes implicit steps
 
 __all__ = ["Checkpoint", "Progress", "Settings", "plan", "simulate"]
 
@@ -120,17 +121,22 @@ def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
 
 
 def _chosen(system: System, settings: Settings) -> tuple[Settings, str]:
-    """Settings with the stepper that "auto" comes to, and why it is the exact one, "" where it is not."""
+    """Settings with the stepper that "auto" comes to, and why it is not the explicit one, "" where it is."""
     if settings.stepper != "auto":
         return settings, "asked for" if settings.stepper in ("exact", "implicit") else ""
-    small = system.size <= SMALL and settings.path == "auto" and settings.beta2 == 0.5 and not why_not_exact(system)
-    if small:
+    usual = settings.path == "auto" and settings.beta2 == 0.5
+    if usual and system.size <= SMALL and not why_not_exact(system):
         return replace(settings, stepper="exact"), f"{system.size} freedoms, up to {SMALL} are few"
+    count, resolved = system.contact_nodes().count, settings.max_frequency_hz is not None and settings.step is None
+    if usual and resolved and count >= MANY and not why_not_implicit(system, settings):
+        why = f"{count} contact nodes, from {MANY} on steps that resolve {settings.max_frequency_hz:g} Hz are cheaper"
+        return replace(settings, stepper="implicit"), why
     return replace(settings, stepper="explicit"), ""
 
 
 def stepper_for(system: System, settings: Settings, mu: float | None, why: str = "asked for") -> Stepper:
-    """The method of time stepping that suits a system, or the one that the settings ask for; ``why`` the exact one."""
+    """The method of time stepping that suits a system, or the one that the settings ask for; ``why`` it is not the
+    explicit one."""
     if settings.stepper == "exact":
         return exact_stepper(system, settings, mu, why)
     if settings.stepper == "implicit":

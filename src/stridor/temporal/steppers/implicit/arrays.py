@@ -1,4 +1,5 @@
-"""What the compiled loop of the implicit stepper works on. r coordinates, m nodes of d directions, p motions, l loads."""
+"""What the compiled loop of the implicit stepper works on: r coordinates, m nodes of d directions, p motions, l
+loads."""
 
 from __future__ import annotations
 
@@ -12,8 +13,9 @@ COUNTERS = 6
 
 class Structure(NamedTuple):
     """mass, damping, stiffness, inverse (r,) of M̃, C̃, K and M̂ = M̃ + hC̃/2 + h²K/4; where damping couples coordinates,
-    coupled and solved (r, r) are C̃ and M̂⁻¹ and damping is not looked at. loads (l, r), inertia and drag (p, r): forces of
-    loads at factor one and of supports' acceleration and velocity; load_lift (l, p); own parts (p, p) of the supports."""
+    coupled and solved (r, r) are C̃ and M̂⁻¹ and damping is not looked at. loads (l, r), inertia and drag (p, r): forces
+    of loads at factor one and of supports' acceleration and velocity; load_lift (l, p); own parts (p, p) of the
+    supports."""
 
     step: float
     mass: Array
@@ -73,7 +75,10 @@ class State(NamedTuple):
 class Work(NamedTuple):
     """Work space of a step: change (r,) of v without contact, force (r,); free (m d,): what the law of each node sees
     without impulses (`node_law`); total (m d,): with them; slip (m d,): velocity at the start of the step; start (m,)
-    [m]: gap then; impulse (m d,); status (m,); sums (c, 6); local (5, d) of one node; rate (p,)."""
+    [m]: gap then; apart (m d,): what free has beside the velocity of the structure behind the step; impulse (m d,);
+    status (m,); sums (c, 6); local (5, d) of one node; rate (p,). Of the nodes that are swept: chosen (m,), marked
+    (m,), near (m d,) their totals, packed (m d, m d) their part of the Delassus operator, kept_chosen (m,) and
+    kept_count (1,) whose it is."""
 
     change: Array
     force: Array
@@ -81,11 +86,18 @@ class Work(NamedTuple):
     total: Array
     slip: Array
     start: Array
+    apart: Array
     impulse: Array
     status: IntArray
     sums: Array
     local: Array
     rate: Array
+    chosen: IntArray
+    marked: IntArray
+    near: Array
+    packed: Array
+    kept_chosen: IntArray
+    kept_count: IntArray
 
 
 class Record(NamedTuple):

@@ -23,7 +23,8 @@ COUPLED = 1e-9  # of the damping: what beside the diagonal counts
 def rows_of(nodes: ContactNodes) -> tuple[Sparse, Array]:
     """Rows (m d, n) of the nodes, normal, then tangents of each, and their lift (m d, p)."""
     m, t = nodes.count, nodes.directions
-    order = np.argsort(np.concatenate([np.arange(m) * (t + 1), (np.arange(m * t) // t) * (t + 1) + np.arange(m * t) % t + 1]))
+    each = np.arange(m * t)
+    order = np.argsort(np.concatenate([np.arange(m) * (t + 1), each // t * (t + 1) + each % t + 1]))
     rows = sp.csr_array(sp.vstack([sp.csr_array(nodes.normal), sp.csr_array(nodes.tangent)]))[order]
     return sp.csr_array(rows), np.concatenate([nodes.normal_lift, nodes.tangent_lift])[order]
 
@@ -98,9 +99,12 @@ def fresh_state(nodes: Nodes, structure: Structure, contacts: int) -> State:
 
 def work_space(nodes: Nodes, structure: Structure, contacts: int, directions: int) -> Work:
     """Room for one step."""
-    total, r, d = len(nodes.row), len(structure.mass), directions + 1
+    total, r, m = len(nodes.row), len(structure.mass), len(nodes.gap)
     return Work(
         change=np.zeros(r), force=np.zeros(r), free=np.zeros(total), total=np.zeros(total), slip=np.zeros(total),
-        start=np.zeros(len(nodes.gap)), impulse=np.zeros(total), status=np.zeros(len(nodes.gap), dtype=np.int64), sums=np.zeros((contacts, 6)),
-        local=np.zeros((5, d)), rate=np.zeros(len(structure.inertia)),
+        start=np.zeros(m), apart=np.zeros(total), impulse=np.zeros(total), status=np.zeros(m, dtype=np.int64),
+        sums=np.zeros((contacts, 6)), local=np.zeros((5, directions + 1)), rate=np.zeros(len(structure.inertia)),
+        chosen=np.zeros(m, dtype=np.int64), marked=np.zeros(m, dtype=np.int64), near=np.zeros(total),
+        packed=np.zeros((total, total)), kept_chosen=np.zeros(m, dtype=np.int64),
+        kept_count=np.zeros(1, dtype=np.int64),
     )  # fmt: skip

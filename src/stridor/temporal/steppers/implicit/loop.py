@@ -35,7 +35,7 @@ from ...columns import (
     STICK_STEPS,
     SUPPORT,
 )
-from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED, Nodes, Record, State, Structure, Work
+from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, Nodes, Record, State, Structure, Work
 from .node_law import SWEEP_LIMIT, solve_nodes, total_of
 
 FINISHED, NOT_FINITE, HARD = 0, 1, 2
@@ -96,13 +96,12 @@ def _seen(increment: Array, rate: Array, a: Structure, nodes: Nodes, state: Stat
     for i in range(len(nodes.gap)):
         at = i * d
         for j in range(d):
-            now = state.speed[at + j] + _dot(nodes.row[at + j], work.change)
-            before = state.speed[at + j]
+            work.free[at + j] = state.speed[at + j] + _dot(nodes.row[at + j], work.change)
+            work.slip[at + j], work.apart[at + j] = state.speed[at + j], 0.0
             for p in range(len(rate)):
                 if j:
-                    now += nodes.lift[at + j, p] * rate[p]
-                before += nodes.lift[at + j, p] * state.motion[1, p]
-            work.free[at + j], work.slip[at + j] = now, before
+                    work.apart[at + j] += nodes.lift[at + j, p] * rate[p]
+                work.slip[at + j] += nodes.lift[at + j, p] * state.motion[1, p]
         gap = nodes.gap[i] + state.place[i]
         work.start[i] = gap
         gap += 0.5 * h * state.speed[at]
@@ -113,7 +112,19 @@ def _seen(increment: Array, rate: Array, a: Structure, nodes: Nodes, state: Stat
             gap += lift * (way + increment[p])
             if nodes.stiffness[i] == 0.0:
                 gap += 0.5 * h * lift * rate[p]
-        work.free[at] += share * gap / h
+        work.apart[at] = share * gap / h
+        for j in range(d):
+            work.free[at + j] += work.apart[at + j]
+
+
+@njit(cache=True)
+def free_of_contact(
+    loads: Array, increment: Array, rate: Array, a: Structure, nodes: Nodes, state: State, work: Work
+) -> None:  # pragma: no cover - compiled
+    """The step from here without contact: work.change of v, and what the nodes see of it."""
+    _free(loads, rate, a, state, work)
+    if len(nodes.gap):
+        _seen(increment, rate, a, nodes, state, work)
 
 
 @njit(cache=True)
@@ -298,7 +309,7 @@ def _move_nodes(rate: Array, a: Structure, nodes: Nodes, state: State, work: Wor
     for i in range(len(nodes.gap)):
         at = i * d
         for j in range(d):
-            speed = state.speed[at + j] + _dot(nodes.row[at + j], work.change)
+            speed = work.total[at + j] - work.apart[at + j]
             if j == 0:
                 state.place[i] += 0.5 * a.step * (state.speed[at] + speed)
             state.speed[at + j] = speed
@@ -319,9 +330,8 @@ def run_steps(
         rate = rates[k]
         if not math.isfinite(_dot(state.v, state.v) + _dot(state.q, state.q)):
             return k, NOT_FINITE
-        _free(loads[k], rate, a, state, work)
+        free_of_contact(loads[k], increments[k], rate, a, nodes, state, work)
         if m:
-            _seen(increments[k], rate, a, nodes, state, work)
             if given:
                 given = False
                 total_of(nodes, work)

@@ -1,7 +1,7 @@
 """Impulses of a step whose Gauss–Seidel sweeps do not settle: Newton's method on the projections of Alart and Curnier.
 
-With w = free + W P the laws say P_N = max(0, P_N − ρ w_N) and P_T = proj(P_T − ρ w_T) on the disc of radius μ P_N, which
-is semismooth: each step solves the linear problem of the statuses that the projections tell (Alart and Curnier 1991).
+With w = free + W P the laws say P_N = max(0, P_N − ρ w_N) and P_T = proj(P_T − ρ w_T) on the disc of radius μ P_N,
+which is semismooth: each step solves the linear problem of the statuses that the projections tell (Alart and Curnier 1991).
 What it finds is where the sweeps go on from; they have the last word.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....contact.multipliers import STICK
+from ....contact.multipliers import SLIP, STICK
 from ....laws.packed import coefficient_at
 from ....typing import Array
 from .arrays import Nodes, State, Work
@@ -71,11 +71,18 @@ def _linearised(step: float, nodes: Nodes, state: State, work: Work, impulse: Ar
         if length <= limit * abs(normal):
             residual[rows], slope[rows] = rho[1] * total[rows], rho[1] * operator[rows]
             continue
-        mu = coefficient_at(law, float(np.linalg.norm(total[rows])))[0]
-        along = trial / length
+        slid = work.slip[rows]
+        if state.status[i] == SLIP and float(total[rows] @ slid) > 0.0:
+            # Slip that goes on: along its mean over the step.
+            mean = total[rows] + slid
+            speed, by, part = 0.5 * float(np.linalg.norm(mean)), -mean, -operator[rows]
+        else:
+            speed, by = float(np.linalg.norm(total[rows])), trial
+            part = np.eye(len(impulse))[rows] - rho[1] * operator[rows]
+        mu, size = coefficient_at(law, speed)[0], float(np.linalg.norm(by))
+        along = by / size
         residual[rows] = impulse[rows] - mu * abs(normal) * along
-        turning = mu * abs(normal) / length * (np.eye(d - 1) - np.outer(along, along))
-        here = -turning @ (np.eye(len(impulse))[rows] - rho[1] * operator[rows])
-        here[:, i * d] -= mu * np.sign(normal) * along
-        slope[rows] = np.eye(len(impulse))[rows] + here
+        turning = mu * abs(normal) / size * (np.eye(d - 1) - np.outer(along, along))
+        slope[rows] = np.eye(len(impulse))[rows] - turning @ part
+        slope[rows, i * d] -= mu * np.sign(normal) * along
     return residual, slope

@@ -27,6 +27,8 @@ _OPEN, _STICK, _SLIP = multipliers.OPEN, multipliers.STICK, multipliers.SLIP
 _KIND, _CONSTANT = packed.KIND, packed.CONSTANT
 _solve_contact = njit(cache=True)(multipliers.solve_contact)
 
+GOES_ON = 0.5  # of its speed that a slip must keep to be taken as one that goes on without further ado
+FIRST = 4  # sweeps before those that their impulses close join in
 SWEEP_LIMIT = 500
 NEWTON_STEPS = 60  # on the force of a spring that opens or closes
 SWEEP_TOLERANCE = 1e-11
@@ -52,8 +54,8 @@ def _solve_spring(
     i: int, step: float, tangent: Array, slip_step: float, nodes: Nodes, stuck: bool, start: float, free: Array,
     new: Array, met: Array,
 ) -> int:  # pragma: no cover - compiled
-    """As `_solve`, of a node with a stiffness. Newton's method on F, which is convex: from no impulse on, tangents close
-    in from below. met (d,): work space."""
+    """As `_solve`, of a node with a stiffness. Newton's method on F, which is convex: from no impulse on, tangents
+    close in from below. met (d,): work space."""
     d, at, w = len(new), i * len(new), nodes.delassus
     for j in range(d):
         met[j] = free[j]
@@ -72,10 +74,12 @@ def _solve_spring(
         status = _solve(i, 1.0, tangent, slip_step, 2.0 / (step * step * tangential), nodes, stuck, met, new)
         if abs(new[0] - before) <= 1e-14 * new[0]:
             break
-        before, seen = new[0], free[0]
+        before, seen, line = new[0], free[0], start <= 0.0 and after <= 0.0
         for k in range(d):
             seen += w[at, at + k] * new[k]
         after = 0.5 * step * seen
+        if line and after <= 0.0:  # F was a straight line
+            break
     return status
 
 
@@ -116,36 +120,46 @@ def _relax(i: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # 
         free[j] = work.total[at + j]
         for k in range(d):
             free[j] -= w[at + j, at + k] * work.impulse[at + k]
-    spring, sign = nodes.stiffness[i] > 0.0, -1.0 if nodes.kept[i] and free[0] > 0.0 else 1.0
     for j in range(d - 1):
-        none[j] = 0.0
-    stuck = state.status[i] == _STICK
-    if spring:
-        status = _solve_spring(i, h, none, 1.0, nodes, stuck, work.start[i], free, new, work.local[4])
-    else:
-        status = _solve(i, sign, none, 1.0, 0.0, nodes, stuck, free, new)
-    law = nodes.friction[nodes.owner[i]]
-    if status != _SLIP or state.status[i] == _STICK or (d == 2 and law[_KIND] == _CONSTANT):
-        return status
+        none[j], mean[j] = 0.0, work.slip[at + j + 1]
+    law, stuck = nodes.friction[nodes.owner[i]], state.status[i] == _STICK
+    turns = state.status[i] == _SLIP and (d == 3 or law[_KIND] != _CONSTANT)
+    # Slip that goes on: along its mean over the step.
+    if turns and _by_kind(i, h, mean, 2.0, nodes, False, work, free, new) == _SLIP:
+        if _ahead(at, w, work, new) > GOES_ON:
+            return _SLIP
+    status = _by_kind(i, h, none, 1.0, nodes, stuck, work, free, new)
+    if turns and status == _SLIP and _ahead(at, w, work, new) > 0.0:
+        first, second, third = new[0], new[1], new[d - 1]
+        if _by_kind(i, h, mean, 2.0, nodes, False, work, free, new) != _SLIP:
+            new[0], new[1], new[d - 1] = first, second, third
+    return status
+
+
+@njit(cache=True)
+def _by_kind(
+    i: int, h: float, tangent: Array, slip_step: float, nodes: Nodes, stuck: bool, work: Work, free: Array, new: Array
+) -> int:  # pragma: no cover - compiled
+    """`_solve` or `_solve_spring`."""
+    if nodes.stiffness[i] > 0.0:
+        start, met = work.start[i], work.local[4]
+        return _solve_spring(i, h, tangent, slip_step, nodes, stuck, start, free, new, met)
+    sign = -1.0 if nodes.kept[i] and free[0] > 0.0 else 1.0
+    return _solve(i, sign, tangent, slip_step, 0.0, nodes, stuck, free, new)
+
+
+@njit(cache=True)
+def _ahead(at: int, w: Array, work: Work, new: Array) -> float:  # pragma: no cover - compiled
+    """Slip velocity behind the step along that before it, over the square of that."""
+    d, free = len(new), work.local[1]
     ahead = before = 0.0
     for j in range(1, d):
         behind = free[j]
         for k in range(d):
             behind += w[at + j, at + k] * new[k]
         ahead += behind * work.slip[at + j]
-        before += work.slip[at + j] * work.slip[at + j]
-    if ahead <= 0.0 or before == 0.0:
-        return status
-    first, second, third = new[0], new[1], new[d - 1]
-    for j in range(d - 1):
-        mean[j] = work.slip[at + j + 1]
-    if spring:
-        again = _solve_spring(i, h, mean, 2.0, nodes, False, work.start[i], free, new, work.local[4])
-    else:
-        again = _solve(i, sign, mean, 2.0, 0.0, nodes, False, free, new)
-    if again != _SLIP:
-        new[0], new[1], new[d - 1] = first, second, third
-    return status
+        before += work.slip[at + j] ** 2
+    return ahead / before if before > 0.0 else 0.0
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
@@ -165,21 +179,53 @@ def total_of(nodes: Nodes, work: Work) -> None:  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def solve_nodes(limit: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
-    """Impulses into work.impulse, from those that are there; sweeps done, limit + 1 where they did not settle."""
-    d, m = work.local.shape[1], len(nodes.gap)
-    new = work.local[0]
-    total_of(nodes, work)
-    for sweep in range(1, limit + 1):
+def _stays_open(i: int, d: int, nodes: Nodes, work: Work) -> bool:  # pragma: no cover - compiled
+    """Whether a node without an impulse needs none."""
+    if work.impulse[i * d] != 0.0 or nodes.kept[i] or work.total[i * d] < 0.0:
+        return False
+    return nodes.stiffness[i] == 0.0 or work.start[i] >= 0.0
+
+
+@njit(cache=True)
+def _pack(count: int, d: int, nodes: Nodes, work: Work) -> None:  # pragma: no cover - compiled
+    """The Delassus operator of the chosen nodes alone into work.packed, where it is not there from the step before."""
+    same = work.kept_count[0] == count
+    for a in range(count):
+        same = same and work.kept_chosen[a] == work.chosen[a]
+    if same:
+        return
+    work.kept_count[0] = count
+    for a in range(count):
+        work.kept_chosen[a] = work.chosen[a]
+        for j in range(d):
+            row, out = nodes.delassus[work.chosen[a] * d + j], work.packed[a * d + j]
+            for b in range(count):
+                for k in range(d):
+                    out[b * d + k] = row[work.chosen[b] * d + k]
+
+
+@njit(cache=True)
+def _sweeps(
+    count: int, limit: int, h: float, nodes: Nodes, state: State, work: Work
+) -> tuple[bool, int]:  # pragma: no cover - compiled
+    """Up to so many sweeps over the chosen nodes: whether they settled, and how many were done."""
+    d, new = work.local.shape[1], work.local[0]
+    near = work.near[: count * d]
+    for a in range(count):
+        for j in range(d):
+            near[a * d + j] = work.total[work.chosen[a] * d + j]
+    sweep, settled = 0, False
+    while sweep < limit and not settled:
+        sweep += 1
         worst = largest = 0.0
-        touching = 0
-        for i in range(m):
+        for a in range(count):
+            i = work.chosen[a]
             at = i * d
-            opened = work.total[at] >= 0.0 and (nodes.stiffness[i] == 0.0 or work.start[i] >= 0.0)
-            if work.impulse[at] == 0.0 and opened and not nodes.kept[i]:
+            for j in range(d):
+                work.total[at + j] = near[a * d + j]
+            if _stays_open(i, d, nodes, work):
                 work.status[i] = _OPEN
                 continue
-            touching += 1
             work.status[i] = _relax(i, h, nodes, state, work)
             size = 0.0
             for j in range(d):
@@ -187,9 +233,43 @@ def solve_nodes(limit: int, h: float, nodes: Nodes, state: State, work: Work) ->
                 if change != 0.0:
                     size += abs(change)
                     work.impulse[at + j] = new[j]
-                    _add(work.total, nodes.delassus[at + j], change)
+                    _add(near, work.packed[a * d + j, : count * d], change)
             worst = max(worst, size)
             largest = max(largest, abs(new[0]))
-        if worst <= SWEEP_TOLERANCE * largest or (m == 1 and sweep > 0) or math.isnan(worst):
-            return sweep
-    return limit + 1
+        settled = worst <= SWEEP_TOLERANCE * largest or count == 1 or math.isnan(worst)
+    for a in range(count):
+        for j in range(d):
+            work.total[work.chosen[a] * d + j] = near[a * d + j]
+    return settled, sweep
+
+
+@njit(cache=True)
+def solve_nodes(limit: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
+    """Impulses into work.impulse, from those that are there; sweeps done, limit + 1 where they did not settle.
+
+    Nodes that touch or would are swept alone; those that their impulses close join in.
+    """
+    d, m = work.local.shape[1], len(nodes.gap)
+    count, done, settled = 0, 0, True
+    total_of(nodes, work)
+    for i in range(m):
+        work.marked[i], work.status[i] = 0, _OPEN
+    while True:
+        before = count
+        for i in range(m):
+            if work.marked[i] == 0 and not _stays_open(i, d, nodes, work):
+                work.chosen[count], work.marked[i] = i, 1
+                count += 1
+        if count == before and settled:
+            return max(done, 1)
+        _pack(count, d, nodes, work)
+        # First a few sweeps, in which most of those that join in show.
+        few = FIRST if done == 0 and count < m else limit - done
+        settled, swept = _sweeps(count, few, h, nodes, state, work)
+        done += swept
+        if done >= limit and not settled:
+            total_of(nodes, work)
+            return limit + 1
+        if count == m:
+            return done
+        total_of(nodes, work)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -93,7 +92,8 @@ class ImplicitStepper:
     def __init__(self, system: System, nodes: ContactNodes, settings: Settings, why: str) -> None:
         assert settings.step is not None, "the step was found before (`whole_steps`)"
         self._system, self._why, self.contact_nodes = system, why, nodes
-        self.limit = StepLimit(np.inf, 0.0, "the highest frequency asked for", 1.0)
+        self._highest_hz, self._sampling = settings.max_frequency_hz, settings.record_every * settings.step
+        self.limit = StepLimit(np.inf, 0.0, "nothing", 1.0)
         self.scheme = scheme(settings.step, 0.5)
         rows, lift = rows_of(nodes)
         highest = None if settings.max_frequency_hz is None else BEYOND * settings.max_frequency_hz
@@ -122,6 +122,8 @@ class ImplicitStepper:
         said = f"{self._why}: implicit steps in {self.coordinates.words}"
         if solved := int(self.moving.counters[BY_NEWTON]):
             said += f"; contacts of {solved} steps were solved by Newton's method"
+        if self._highest_hz is not None and self._sampling * self._highest_hz > 0.5:
+            said += f"; records every {self._sampling:.3g} s do not resolve {self._highest_hz:g} Hz"
         return said
 
     @property
@@ -206,7 +208,7 @@ class ImplicitStepper:
     def state(self) -> dict[str, Array]:
         """What moves on from step to step, and displacement and velocity of the freedoms."""
         vectors, state = self.coordinates.basis.vectors, self.moving
-        held = {f"implicit_{name}": values for name, values in state._asdict().items()}
+        held: dict[str, Array] = {f"implicit_{name}": values for name, values in state._asdict().items()}
         return held | {"implicit_displacement": vectors @ state.q, "implicit_velocity": vectors @ state.v}
 
     def bounds(self) -> Bounds:

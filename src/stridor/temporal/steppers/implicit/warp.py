@@ -33,7 +33,7 @@ class Warped:
 
 
 def warped(stiffness: Array, damping: Array, step: float) -> Warped:
-    """Modes of unit mass with stiffness (k,) ω² [rad²/s²], negative ones too, and damping (k, k) [1/s], for steps [s]."""
+    """Modes of unit mass with stiffness (k,) ω² [rad²/s²], negative too, and damping (k, k) [1/s], for steps [s]."""
     x = np.minimum(0.5 * step * np.sqrt(np.abs(stiffness)), LAST)
     safe = np.where(x > 1e-4, x, 1.0)
     grows = stiffness < 0.0
