@@ -22,7 +22,7 @@ from stridor.system import System
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.simulate import Settings, plan, simulate
-from stridor.temporal.steppers.implicit import basis, loop, node_law, stepper
+from stridor.temporal.steppers.implicit import basis, loop, node_law, stepper, warp
 from stridor.temporal.steppers.implicit.node_law import spring_force
 from stridor.temporal.steppers.implicit.warp import warped
 
@@ -236,6 +236,18 @@ def test_a_small_motion_grows_as_the_modes_say(contact: str):
     assert off[2, 0] < 1e-3
     assert off[2, 1] < 1e-5
     assert off[1, 0] < 0.15 * off[0, 0]
+
+
+@pytest.mark.parametrize("part", [20, 30])
+def test_the_plain_midpoint_rule_loses_what_it_is_said_to(part: int, monkeypatch: pytest.MonkeyPatch):
+    """Without the warp growth falls by (ωh)²/4 of itself and the frequency by (ωh)²/12."""
+    monkeypatch.setattr(warp, "LAST", 1e-9)
+    case = st.loads(template_text("two-beams")).with_(
+        {"bodies.beam1.elements": 10, "bodies.beam2.elements": 20, "temporal.contact": "rigid"}
+    )
+    (growth, frequency), square = off_modes(case, 0.1, 10.4e3, [part])[0], (2 * np.pi / part) ** 2
+    assert growth == pytest.approx(square / 4, rel=0.1)
+    assert frequency == pytest.approx(square / 12, rel=0.1)
 
 
 COARSE = {

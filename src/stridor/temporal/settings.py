@@ -19,8 +19,8 @@ class Settings:
     "rigid" takes contact stiffness out of the time loop, as the paper has it; "as given" leaves it in. stepper
     "explicit" is the scheme of the paper; "exact" goes from one change of contact to the next, and its step is that of
     the records alone; "implicit" takes steps of a part of the shortest period asked for, that of max_frequency_hz,
-    which nothing else here looks at; "auto" takes "exact" for systems as small as `simulate.SMALL`, and "implicit" where
-    contact over nodes and a frequency are given."""
+    which nothing else here looks at; "auto" takes "exact" for systems as small as `simulate.SMALL`, and "implicit"
+    for `simulate.MANY` contact nodes where a frequency is given and a step is not."""
 
     step: float | None = None
     beta2: float = 0.5

@@ -59,9 +59,9 @@ def coordinates(system: System, pushed: Sparse, highest_hz: float | None) -> Coo
     modes = modes / np.sqrt(np.einsum("ij,ij->j", modes, mass @ modes))
     for _ in range(2):
         static -= modes @ ((mass @ modes).T @ static)
-    static = _independent(static, mass)
+    static = _independent(static, mass)  # of unit mass, and orthogonal to the modes
     vectors = np.hstack([modes, static])
-    squares, turn = sl.eigh(vectors.T @ (stiffness @ vectors), vectors.T @ (mass @ vectors))
+    squares, turn = sl.eigh(vectors.T @ (stiffness @ vectors))
     vectors = vectors @ turn
     rounding = 1e-12 * float(squares.max(initial=0.0))
     squares = np.where(np.abs(squares) < min(rounding, 1e-8 * omega**2), 0.0, squares)

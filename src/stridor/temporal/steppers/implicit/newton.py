@@ -1,8 +1,8 @@
 """Impulses of a step whose Gauss–Seidel sweeps do not settle: Newton's method on the projections of Alart and Curnier.
 
 With w = free + W P the laws say P_N = max(0, P_N − ρ w_N) and P_T = proj(P_T − ρ w_T) on the disc of radius μ P_N,
-which is semismooth: each step solves the linear problem of the statuses that the projections tell (Alart and Curnier 1991).
-What it finds is where the sweeps go on from; they have the last word.
+which is semismooth: each step solves the linear problem of the statuses that the projections tell (Alart and Curnier
+1991). What it finds is where the sweeps go on from; they have the last word.
 """
 
 from __future__ import annotations

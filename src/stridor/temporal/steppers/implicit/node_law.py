@@ -125,9 +125,9 @@ def _relax(i: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # 
     law, stuck = nodes.friction[nodes.owner[i]], state.status[i] == _STICK
     turns = state.status[i] == _SLIP and (d == 3 or law[_KIND] != _CONSTANT)
     # Slip that goes on: along its mean over the step.
-    if turns and _by_kind(i, h, mean, 2.0, nodes, False, work, free, new) == _SLIP:
-        if _ahead(at, w, work, new) > GOES_ON:
-            return _SLIP
+    goes_on = turns and _by_kind(i, h, mean, 2.0, nodes, False, work, free, new) == _SLIP
+    if goes_on and _ahead(at, w, work, new) > GOES_ON:
+        return _SLIP
     status = _by_kind(i, h, none, 1.0, nodes, stuck, work, free, new)
     if turns and status == _SLIP and _ahead(at, w, work, new) > 0.0:
         first, second, third = new[0], new[1], new[d - 1]
