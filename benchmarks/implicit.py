@@ -2,8 +2,8 @@
 
 python benchmarks/implicit.py [--short]   (--short: a coarse mesh, for CI)
 
-Both are made ready, marched a few steps each from steady sliding with a push, and what 0.1 s would take follows from the
-seconds of a step: while all nodes touch, and as far as the run comes after that.
+Both are made ready, marched a few steps each from steady sliding with a push, and what 0.1 s would take follows from
+the seconds of a step: while all nodes touch, and as far as the run comes after that.
 """
 
 from __future__ import annotations

@@ -29,6 +29,7 @@ from .trajectory import Trajectory
 ROUNDED = 1e-3  # of a phase: as far as whole steps may end beside it
 SMALL = 40  # freedoms up to which "auto" goes from event to event: there that is faster than steps, and exact
 MANY = 8  # contact nodes from which on it takes implicit steps
+COARSE = 0.01  # of the shortest period asked for: a step that is given and smaller is taken to be one of explicit steps
 
 __all__ = ["Checkpoint", "Progress", "Settings", "plan", "simulate"]
 
@@ -127,7 +128,8 @@ def _chosen(system: System, settings: Settings) -> tuple[Settings, str]:
     usual = settings.path == "auto" and settings.beta2 == 0.5
     if usual and system.size <= SMALL and not why_not_exact(system):
         return replace(settings, stepper="exact"), f"{system.size} freedoms, up to {SMALL} are few"
-    count, resolved = system.contact_nodes().count, settings.max_frequency_hz is not None and settings.step is None
+    count, highest = system.contact_nodes().count, settings.max_frequency_hz
+    resolved = highest is not None and (settings.step is None or settings.step * highest > COARSE)
     if usual and resolved and count >= MANY and not why_not_implicit(system, settings):
         why = f"{count} contact nodes, from {MANY} on steps that resolve {settings.max_frequency_hz:g} Hz are cheaper"
         return replace(settings, stepper="implicit"), why

@@ -35,6 +35,7 @@ BEYOND = 2.0  # times that frequency: the modes of the structure that a large mo
 MOST_ROWS = 4000  # of contact: normal and tangents of each node
 NODE_HISTORY_BYTES = 500e6
 CONTACT_COLUMNS = 5
+OVERLAP = 1e-6  # of its terms: what of a closed gap is rounding
 
 
 def why_not_implicit(system: System, settings: Settings) -> str:
@@ -166,6 +167,7 @@ class ImplicitStepper:
             u, v = u + disturbance[0], v + disturbance[1]
         state.q[:], state.v[:] = self._in_coordinates(u), self._in_coordinates(v) + extra
         self._place_nodes()
+        self._refuse_overlap()
 
     def _steady(self, schedule: Schedule, mu: float | None) -> Array:
         """Displacement (n,) of steady sliding; forces, status and motion of the supports into the state."""
@@ -204,6 +206,20 @@ class ImplicitStepper:
         state, d = self.moving, self.contact_nodes.directions + 1
         state.place[:] = self.nodes.row[::d] @ state.q
         state.speed[:] = self.nodes.row @ state.v
+
+    def _refuse_overlap(self) -> None:
+        """Raise CaseError for a rigid contact that starts closed by more than rounding: steps would throw it apart."""
+        nodes, state, d = self.nodes, self.moving, self.contact_nodes.directions + 1
+        ways = nodes.lift[::d] @ state.motion[0]
+        gap = nodes.gap + state.place + ways
+        size = np.abs(nodes.gap) + np.abs(nodes.row[::d]) @ np.abs(state.q) + np.abs(ways)
+        for i in np.flatnonzero((nodes.stiffness == 0.0) & (nodes.kept == 0) & (gap < -OVERLAP * size))[:1]:
+            raise CaseError(
+                f"contacts.{self.contact_names[nodes.owner[i]]}",
+                f"a gap of {gap[i]:.4g} m at t = 0 s",
+                "a gap >= 0 where contact is rigid; start from steady sliding, press with a ramp, or take "
+                'stepper = "explicit"',
+            )
 
     def state(self) -> dict[str, Array]:
         """What moves on from step to step, and displacement and velocity of the freedoms."""
