@@ -130,6 +130,10 @@ def test_simulate_from_event_to_event(folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "exact path" in done.stdout
     assert st.open(folder / "exact" / "simulate.nc").path == "exact"
+    done = stridor("simulate", "two-beams.toml", "--stepper", "implicit", *short, "--out", "parts", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "implicit path" in done.stdout
+    assert st.open(folder / "parts" / "simulate.nc").path == "implicit"
     refused = stridor("simulate", "two-beams.toml", "--stepper", "exakt", "--out", "exact", cwd=folder)
     assert refused.returncode == 2
     assert "did you mean 'exact'?" in refused.stderr

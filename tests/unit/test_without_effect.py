@@ -104,9 +104,10 @@ def test_what_changes_no_motion_is_told(change: dict[str, Any], verbs: set[str])
     assert bool(told) is bool(same)
 
 
+@pytest.mark.parametrize("stepper", ["exact", "implicit"])
 @pytest.mark.parametrize("change", [{"temporal.beta2": 0.6}, {"temporal.path": "nodal"}])
-def test_what_steps_need_has_no_effect_without_steps(change: dict[str, Any]) -> None:
-    case = beams().with_({"temporal.stepper": "exact"})
+def test_what_explicit_steps_need_has_no_effect_on_others(change: dict[str, Any], stepper: str) -> None:
+    case = beams().with_({"temporal.stepper": stepper})
     one, two = st.simulate(case), st.simulate(case.with_(change))
     assert np.array_equal(one.normal_force, two.normal_force)
     (setting,) = change

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_exact_stepper import random_system
 
 import stridor as st
 from marching import block_on_belt
 from mode_coupling import mode_coupling
+from random_contacts import random_system
 from stridor.case import template_text
 from stridor.laws import Coulomb, StaticKinetic
 from stridor.periodic import (

@@ -33,7 +33,7 @@ def show_run(summary: dict[str, Any]) -> None:
     stdout.print(
         f"{summary['steps']} steps of {summary['dt']:.4g} s in {summary['wall_seconds']:.1f} s, {summary['path']} path"
     )
-    if summary["path"] == "exact":
+    if summary["path"] in ("exact", "implicit"):
         for said in summary["path_reason"].split("; ")[1:]:
             stdout.print(said)
 

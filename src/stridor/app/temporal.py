@@ -54,8 +54,8 @@ def simulate(
         typer.Option(
             "--stepper",
             metavar="NAME",
-            help="explicit: by steps; exact: from one change of contact to the next; auto: by size "
-            "[default: temporal.stepper].",
+            help="explicit: by steps below the stability limit; exact: from one change of contact to the next; "
+            "implicit: by parts of the shortest period of interest; auto: by size [default: temporal.stepper].",
         ),
     ] = None,
     copies: Annotated[

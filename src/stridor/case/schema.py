@@ -394,9 +394,10 @@ class Temporal(Table):
     contact: Literal["as given", "rigid"] = Field(
         default="as given", description='"as given" or "rigid", the stiffness of contacts in time'
     )
-    stepper: Literal["explicit", "exact", "auto"] = Field(
+    stepper: Literal["explicit", "exact", "implicit", "auto"] = Field(
         default="explicit",
-        description='"explicit", "exact" or "auto": step by step, from one change of contact to the next, or by size',
+        description='"explicit", "exact", "implicit" or "auto": step by step, from one change of contact to the next, '
+        "by parts of the shortest period of interest, or by size",
     )
     watch: tuple[str, ...] = Field(default=(), description=f"a list of points, each {POINT[8:]}")
 

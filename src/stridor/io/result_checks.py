@@ -173,7 +173,7 @@ _RULES: dict[str, dict[str, _Rule]] = {
 }  # fmt: skip
 _COUNTS = ("record_every", "steps", "planned_steps", "most_sweeps", "unconverged_steps")
 _NUMBERS = ("step", "beta2", "step_limit", "wall_seconds")
-_PATHS = ("modal", "nodal", "assembled", "exact")
+_PATHS = ("modal", "nodal", "assembled", "exact", "implicit")
 _SETTINGS = "restart_settings"
 
 

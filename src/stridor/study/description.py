@@ -196,6 +196,8 @@ def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     share = f"{100 * step / limit.step:.0f} % of the stability limit {limit.step:.4g} s (set by {limit.body})"
     if path == "exact":
         share = "which is that of the records alone"
+    elif path == "implicit":
+        share = f"{1.0 / (step * case.modal.max_frequency_hz):.3g} to the period of modal.max_frequency_hz"
     return [
         f"time step {step:.4g} s, {share}; {steps} steps",
         f"time loop: {path} path ({reason})",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from ..case.schema import Phase, Temporal
+from ..case.schema import Modal, Phase, Temporal
 from ..temporal.schedule import PhaseSpec
 from ..temporal.settings import Settings
 
@@ -22,6 +22,11 @@ class Marches(Protocol):
         """The table."""
         ...
 
+    @property
+    def modal(self) -> Modal:
+        """The table [modal], whose highest frequency is what implicit steps resolve."""
+        ...
+
 
 def phases_of(case: Marches) -> list[PhaseSpec]:
     """The load phases as the temporal approach takes them."""
@@ -33,5 +38,6 @@ def settings_of(case: Marches) -> Settings:
     t = case.temporal
     watch = tuple(t.watch)
     return Settings(
-        t.step, t.beta2, t.record_every, t.path, t.initial, t.perturbation, watch, t.contact, t.stepper
+        t.step, t.beta2, t.record_every, t.path, t.initial, t.perturbation, watch, t.contact, t.stepper,
+        case.modal.max_frequency_hz,
     )  # fmt: skip

@@ -5,7 +5,7 @@
 - modal.friction_damping: but for contact over nodes in space; `compare`, which has it as the time loop has
 - modal.prestress: but for assembled matrices with meshed solids; `compare`, `simulate`
 - modal.damped = false: `simulate`, `compare`
-- temporal.path: assembled matrices in time; with temporal.beta2: stepper = "exact"
+- temporal.path: assembled matrices in time; with temporal.beta2: stepper = "exact" or "implicit"
 - comparison.bracket, comparison.tolerance: without critical friction
 - bodies.NAME.initial_velocity, initial_displacement: from steady sliding
 - temporal.contact = "rigid": where every contact is rigid; where it acts, contacts.NAME.stiffness on `simulate`
@@ -124,10 +124,11 @@ def _of_modes(case: Case, verb: str, solver: str | None, *, few: bool) -> Iterat
 def _of_time(case: Case, verb: str, *, few: bool) -> Iterator[str]:
     if verb not in IN_TIME:
         return
-    if case.temporal.stepper == "exact":
+    if case.temporal.stepper in ("exact", "implicit"):
+        why = "takes no steps" if case.temporal.stepper == "exact" else "has a scheme of its own"
         for key, usual in (("path", "auto"), ("beta2", 0.5)):
             if getattr(case.temporal, key) != usual:
-                yield f'temporal.{key} has no effect: temporal.stepper = "exact" takes no steps'
+                yield f'temporal.{key} has no effect: temporal.stepper = "{case.temporal.stepper}" {why}'
     elif not few and case.temporal.path not in ("auto", "assembled"):
         yield f"temporal.path = {case.temporal.path!r} has no effect: assembled matrices have one path"
     if case.temporal.contact == "rigid":

@@ -63,12 +63,12 @@ class Schedule:
                 return stretch
         return self.stretches[-1]
 
-    def load_factors(self, first: int, count: int) -> Array:
-        """Factors (count, l) at t = first·Δt, …"""
+    def load_factors(self, first: int, count: int, within: float = 0.0) -> Array:
+        """Factors (count, l) at t = (first + within)·Δt, …, with ``within`` < 1 of a step."""
         out = np.empty((count, len(self.stretches[0].loads_after)))
         for rows, stretch, steps in self._pieces(first, count):
             if stretch.ramp_steps > 0:
-                x = np.clip((steps - stretch.first) / stretch.ramp_steps, 0.0, 1.0)
+                x = np.clip((steps + within - stretch.first) / stretch.ramp_steps, 0.0, 1.0)
                 blend = (x**3 * (10 - 15 * x + 6 * x**2))[:, None]
                 out[rows] = stretch.loads_before * (1 - blend) + stretch.loads_after * blend
             else:
@@ -97,6 +97,21 @@ class Schedule:
                 x = np.clip(x / stretch.ramp_steps, 0.0, 1.0) if stretch.ramp_steps > 0 else np.minimum(x, 1.0)
                 done = x**3 * (10 - 15 * x + 6 * x**2)
                 out[rows] += travel * (done[1] - done[0])[:, None]
+        return out
+
+    def motion_rates(self, first: int, count: int) -> Array:
+        """Rates (count, p) [1/s of a distance, 1 of a velocity] of the moving supports at the ends of the steps first,
+        …, before what changes there at once."""
+        out = np.empty((count, len(self.stretches[0].velocities_after)))
+        for rows, stretch, steps in self._pieces(first, count):
+            out[rows] = stretch.velocities_after
+            if stretch.ramp_steps > 0:
+                x = np.clip((steps + 1.0 - stretch.first) / stretch.ramp_steps, 0.0, 1.0)[:, None]
+                blend = x**3 * (10 - 15 * x + 6 * x**2)
+                ramping = stretch.velocities_before * (1 - blend) + stretch.velocities_after * blend
+                out[rows] = np.where(x < 1.0, ramping, out[rows])
+                travel = stretch.distances_after - stretch.distances_before
+                out[rows] += travel * 30 * (x * (1 - x)) ** 2 / (stretch.ramp_steps * self.step)
         return out
 
     def _pieces(self, first: int, count: int) -> Iterator[tuple[slice, Stretch, Array]]:

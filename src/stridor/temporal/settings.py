@@ -18,7 +18,9 @@ class Settings:
     records, path, initial state, perturbation [m/s] of the slip speed (steady sliding only), watched points. contact
     "rigid" takes contact stiffness out of the time loop, as the paper has it; "as given" leaves it in. stepper
     "explicit" is the scheme of the paper; "exact" goes from one change of contact to the next, and its step is that of
-    the records alone; "auto" takes it for systems as small as `simulate.SMALL`."""
+    the records alone; "implicit" takes steps of a part of the shortest period asked for, that of max_frequency_hz,
+    which nothing else here looks at; "auto" takes "exact" for systems as small as `simulate.SMALL`, and "implicit"
+    for `simulate.MANY` contact nodes where a frequency is given and a step is not."""
 
     step: float | None = None
     beta2: float = 0.5
@@ -28,7 +30,8 @@ class Settings:
     perturbation: float = 0.0
     watch: tuple[str, ...] = ()
     contact: Literal["as given", "rigid"] = "as given"
-    stepper: Literal["explicit", "exact", "auto"] = "explicit"
+    stepper: Literal["explicit", "exact", "implicit", "auto"] = "explicit"
+    max_frequency_hz: float | None = None
 
     def system(self, system: System) -> System:
         """The system that the time loop takes."""
@@ -49,7 +52,7 @@ def choose_step(limit: StepLimit, settings: Settings) -> float:
         if not np.isfinite(limit.step):
             raise CaseError("temporal.step", None, "nothing in the system oscillates, so no step follows; give one")
         return limit.share * limit.step
-    if settings.stepper != "exact" and settings.step > limit.step:
+    if settings.stepper not in ("exact", "implicit") and settings.step > limit.step:
         raise CaseError(
             "temporal.step",
             settings.step,

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ..errors import CaseError
 from ..stages import passing, stage
 from ..system import System
@@ -18,12 +20,16 @@ from .schedule import PhaseSpec, Schedule, lay_out
 from .settings import Settings
 from .stepper import Disturbance, Stepper
 from .steppers.exact import exact_stepper, refuse, why_not_exact
+from .steppers.implicit import implicit_stepper, whole_steps, why_not_implicit
+from .steppers.implicit import refuse as refuse_implicit
 from .steppers.modal import choose_path, modal_stepper, refuses
 from .steppers.sparse import sparse_stepper, step_limit_assembled
 from .trajectory import Trajectory
 
 ROUNDED = 1e-3  # of a phase: as far as whole steps may end beside it
 SMALL = 40  # freedoms up to which "auto" goes from event to event: there that is faster than steps, and exact
+MANY = 8  # contact nodes from which on it takes implicit steps
+COARSE = 0.01  # of the shortest period asked for: a step that is given and smaller is taken to be one of explicit steps
 
 __all__ = ["Checkpoint", "Progress", "Settings", "plan", "simulate"]
 
@@ -69,10 +75,12 @@ def simulate(
         watch=settings.watch,
     )
     settings, why = _chosen(system, settings)
+    if settings.stepper == "implicit":
+        settings = replace(settings, step=whole_steps(settings, phases))
     stepper = stepper_for(system, settings, mu, why)
     motion = system.motion
     schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
-    if settings.stepper == "exact":
+    if settings.stepper in ("exact", "implicit"):
         _check_step(phases, schedule)
     if settings.initial == "steady-sliding":
         schedule = schedule.from_steady()
@@ -103,6 +111,10 @@ def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
     if settings.stepper == "exact":
         refuse(system)
         return "exact", exactly, step_limit(system, 0.5)
+    if settings.stepper == "implicit":
+        refuse_implicit(system, settings)
+        step = whole_steps(settings, ())
+        return "implicit", exactly, StepLimit(step, 2 * np.pi / step, "the highest frequency asked for", 1.0)
     if why := _why_sparse(system, settings):
         return "assembled", why, step_limit_assembled(system, settings.beta2)
     modes, reason = choose_path(system, settings)
@@ -110,19 +122,27 @@ def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
 
 
 def _chosen(system: System, settings: Settings) -> tuple[Settings, str]:
-    """Settings with the stepper that "auto" comes to, and why it is the exact one, "" where it is not."""
+    """Settings with the stepper that "auto" comes to, and why it is not the explicit one, "" where it is."""
     if settings.stepper != "auto":
-        return settings, "asked for" if settings.stepper == "exact" else ""
-    small = system.size <= SMALL and settings.path == "auto" and settings.beta2 == 0.5 and not why_not_exact(system)
-    if small:
+        return settings, "asked for" if settings.stepper in ("exact", "implicit") else ""
+    usual = settings.path == "auto" and settings.beta2 == 0.5
+    if usual and system.size <= SMALL and not why_not_exact(system):
         return replace(settings, stepper="exact"), f"{system.size} freedoms, up to {SMALL} are few"
+    count, highest = system.contact_nodes().count, settings.max_frequency_hz
+    resolved = highest is not None and (settings.step is None or settings.step * highest > COARSE)
+    if usual and resolved and count >= MANY and not why_not_implicit(system, settings):
+        why = f"{count} contact nodes, from {MANY} on steps that resolve {settings.max_frequency_hz:g} Hz are cheaper"
+        return replace(settings, stepper="implicit"), why
     return replace(settings, stepper="explicit"), ""
 
 
 def stepper_for(system: System, settings: Settings, mu: float | None, why: str = "asked for") -> Stepper:
-    """The method of time stepping that suits a system, or the one that the settings ask for; ``why`` the exact one."""
+    """The method of time stepping that suits a system, or the one that the settings ask for; ``why`` it is not the
+    explicit one."""
     if settings.stepper == "exact":
         return exact_stepper(system, settings, mu, why)
+    if settings.stepper == "implicit":
+        return implicit_stepper(system, settings, mu, why)
     if why := _why_sparse(system, settings):
         return sparse_stepper(system, settings, mu, why)
     return modal_stepper(system, settings, mu)

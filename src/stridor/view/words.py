@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -316,9 +317,10 @@ def simulation_table(inputs: ReportInputs) -> Table:
         lines.append(("friction coefficient μ", f"{inputs.mu:g}"))
     if run is not None:
         limit = f"stability limit of {'explicit steps' if run.path == 'exact' else 'the time step'}"
+        bound = f"{significant(run.step_limit)} s, set by {run.limiting_body}"
         lines += [
             ("time step Δt", f"{significant(run.step)} s"),
-            (limit, f"{significant(run.step_limit)} s, set by {run.limiting_body}"),
+            (limit, bound if math.isfinite(run.step_limit) else "none"),
             ("numerical damping β₂", f"{run.beta2:g}"),
             ("steps", f"{run.steps} of {run.planned_steps}" if run.interrupted else str(run.steps)),
             ("recorded", f"every {run.record_every} steps, {significant(run.sampling)} s"),

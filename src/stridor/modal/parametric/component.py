@@ -10,14 +10,13 @@ from __future__ import annotations
 import time
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
-import scipy.sparse.linalg as ssl
 
 from ...direct import Factor, factorise
-from ...errors import AnalysisError, CaseError
+from ...direct.lowest import modes_below
+from ...errors import CaseError
 from ...threads import one_thread
-from ...typing import Array, IntArray, Sparse
+from ...typing import IntArray
 from .basis import Basis, expanded, residual
 from .dense import assembled, dense_modes
 from .greedy import SAFETY, random_points
@@ -63,7 +62,7 @@ def craig_bampton(
         static[edge, np.arange(len(edge))] = 1.0
         coupling = sp.csr_array(stiffness[inner][:, edge])
         static[inner] = -factor.solve(coupling.toarray(), refine=False)
-        held = _inner_modes(inside, moving, factor.solve, shift, beyond * frequency)
+        held = modes_below(inside, moving, factor.solve, shift, beyond * frequency, MOST_MODES)
     shapes = np.zeros((problem.size, held.shape[1]))
     shapes[inner] = held
     metric = sp.csr_array(stiffness + (SHIFT * frequency) ** 2 * mass)
@@ -109,20 +108,3 @@ def _interface(problem: ParametricProblem) -> IntArray:
         if term.role == "stiffness" and (not term.symmetric or len(touched) < 0.5 * problem.size):
             found.append(touched)
     return np.unique(np.concatenate(found)) if found else np.zeros(0, dtype=np.int64)
-
-
-def _inner_modes(inside: Sparse, moving: Sparse, solve: object, shift: float, frequency: float) -> Array:
-    """Modes (i, k) of the inner part up to a frequency [1/s]."""
-    n = inside.shape[0]
-    if n <= 400:
-        squares, shapes = sl.eigh(inside.toarray(), moving.toarray())
-        return shapes[:, squares <= frequency**2]
-    inverse = ssl.LinearOperator((n, n), matvec=solve, dtype=float)  # type: ignore[arg-type]
-    count = 40
-    while True:
-        squares, shapes = ssl.eigsh(inside, k=min(count, n - 2), M=moving, sigma=-shift, OPinv=inverse)
-        if squares.max() > frequency**2 or count >= n - 2:
-            return shapes[:, squares <= frequency**2]
-        if count >= MOST_MODES:
-            raise AnalysisError(f"more than {MOST_MODES} fixed-interface modes; take a lower frequency or ``beyond``")
-        count *= 2
