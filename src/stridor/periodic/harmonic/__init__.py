@@ -1,0 +1,1 @@
+"""Limit cycles by harmonic balance, condensed to the contact nodes."""
