@@ -11,6 +11,7 @@ import numpy as np
 from ...errors import AnalysisError
 from ...typing import Array
 from .balance import Evaluated, Scales, evaluated, scales
+from .fourier import fourier
 from .problem import HarmonicFamily
 
 CLOSED = 1e-10  # of the amplitude: balanced
@@ -66,16 +67,9 @@ class Balanced:
 
     def with_harmonics(self, harmonics: int) -> Balanced:
         """The same series with more harmonics, or cut: not balanced any more."""
-        from_base = self.at.base
-        z = from_base.taken_to(self.at.z, _base(harmonics))
+        z = self.at.base.taken_to(self.at.z, fourier(harmonics))
         scale = scales(self.family, self.at.omega, self.mu, harmonics)
         return Balanced(evaluated(self.family, z, self.at.omega, self.mu, scale))
-
-
-def _base(harmonics: int):  # noqa: ANN202
-    from .fourier import fourier
-
-    return fourier(harmonics)
 
 
 def defect(cycle: Balanced) -> float:
@@ -168,7 +162,7 @@ def guessed(
     )
     spectrum = 2.0 * np.fft.rfft(z, axis=1).T / len(normal)
     spectrum[0] *= 0.5
-    base = _base(harmonics)
+    base = fourier(harmonics)
     amplitudes = np.zeros((harmonics + 1, len(z)), dtype=complex)
     least = min(harmonics + 1, len(spectrum))
     amplitudes[:least] = spectrum[:least]

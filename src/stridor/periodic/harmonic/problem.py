@@ -96,7 +96,7 @@ class HarmonicFamily:
             friction_rows(laws), constant[nodes.owner], np.zeros(0) if cubic is None else cubic.coefficient,
             np.zeros(0) if cubic is None else np.zeros(self.springs) + cubic.stretch,
         )  # fmt: skip
-        self.smooth = bool(np.all(constant) and not np.any(nodes.cubic) and not self.springs)
+        self.piecewise_linear = bool(np.all(constant) and not np.any(nodes.cubic) and not self.springs and d == 1)
         self._steady: dict[float, Steady] = {}
 
     def _along_normals(self, stiffness: Array) -> Array:
