@@ -23,7 +23,8 @@ class Applied:
 
     normal (m, n) with by_force, by_gap (m, n) of p_N and g; tangential (m, d, n) with by_pull (m, d, d, n) of q_T,
     by_normal (m, d, n) of the normal force and by_mu (m, d, n); springs (q, n) with by_stretch (q, n). status (m, n):
-    open, stick or slip. margin: least of what keeps the answer unique, above 0.
+    open, stick or slip. margin: least of what keeps the answer unique, above 0. touch, beyond (m, n): numbers that
+    change sign where a node parts and where it begins to slip.
     """
 
     normal: Array
@@ -37,6 +38,8 @@ class Applied:
     by_stretch: Array
     status: IntArray
     margin: float
+    touch: Array
+    beyond: Array
 
 
 @dataclass(frozen=True)
@@ -59,29 +62,31 @@ class ContactLaw:
     ) -> Applied:
         """The law at normal forces p_N and gaps g (m, n), q_T = p_T − ρ v (m, d, n) and elongations (q, n); push ε, rub
         ρ (m,)."""
-        normal, by_force, by_gap = self._normal(force, gap, push)
-        tangential, by_pull, by_normal, by_mu, sticks, margin = self._friction(mu, np.abs(normal), pull, rub)
+        normal, by_force, by_gap, touch = self._normal(force, gap, push)
+        tangential, by_pull, by_normal, by_mu, beyond, margin = self._friction(mu, np.abs(normal), pull, rub)
         by_normal = by_normal * np.where(normal < 0.0, -1.0, 1.0)[:, None]
         touching = (normal != 0.0) if not np.any(self.kept) else (normal > 0.0) | self.kept[:, None]
-        status = np.where(touching, np.where(sticks, STICK, SLIP), OPEN)
+        status = np.where(touching, np.where(beyond <= 0.0, STICK, SLIP), OPEN)
         stretched = elongation + self.stretch[:, None]
         return Applied(
             normal, by_force, by_gap, tangential, by_pull, by_normal, by_mu, -self.spring[:, None] * stretched**3,
-            -3.0 * self.spring[:, None] * stretched**2, status, margin,
+            -3.0 * self.spring[:, None] * stretched**2, status, margin, touch, beyond,
         )  # fmt: skip
 
-    def _normal(self, force: Array, gap: Array, push: Array) -> tuple[Array, Array, Array]:
+    def _normal(self, force: Array, gap: Array, push: Array) -> tuple[Array, Array, Array, Array]:
         rigid, kept = np.isinf(self.stiffness)[:, None], self.kept[:, None]
         held = force - push[:, None] * gap
-        closed = kept | np.where(rigid, held > 0.0, gap < 0.0)
+        touch = np.where(rigid, held, -gap)
+        closed = kept | (touch > 0.0)
         stiffness = np.where(rigid, 0.0, self.stiffness[:, None])
         given = np.where(rigid, held, -(stiffness * gap + self.cubic[:, None] * gap**3))
         by_gap = np.where(rigid, -push[:, None], -(stiffness + 3.0 * self.cubic[:, None] * gap**2))
-        return np.where(closed, given, 0.0), np.where(closed & rigid, 1.0, 0.0), np.where(closed, by_gap, 0.0)
+        by_force = np.where(closed & rigid, 1.0, 0.0)
+        return np.where(closed, given, 0.0), by_force, np.where(closed, by_gap, 0.0), np.where(kept, 1.0, touch)
 
     def _friction(
         self, mu: float, normal: Array, pull: Array, rub: Array
-    ) -> tuple[Array, Array, Array, Array, BoolArray, float]:
+    ) -> tuple[Array, Array, Array, Array, Array, float]:
         m, d, n = pull.shape
         size = np.sqrt(np.einsum("mdn,mdn->mn", pull, pull))
         found = np.empty((m, n, 3))
@@ -101,4 +106,4 @@ class ContactLaw:
         by_pull = (by_size - share)[:, None, None] * along + share[:, None, None] * np.eye(d)[None, :, :, None]
         slipping = ~sticks
         margin = float((firm / rub[:, None])[slipping].min(initial=1.0))
-        return share[:, None] * pull, by_pull, by_normal[:, None] * way, by_mu[:, None] * way, sticks, margin
+        return share[:, None] * pull, by_pull, by_normal[:, None] * way, by_mu[:, None] * way, size - limit, margin
