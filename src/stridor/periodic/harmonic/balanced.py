@@ -151,6 +151,33 @@ def _shortened(at: Evaluated, move: Array, first: float) -> Evaluated | None:
     return best if best is not None and float(np.linalg.norm(best.left)) < before else None
 
 
+@dataclass(frozen=True)
+class Kept:
+    """A cycle without what can be found again."""
+
+    family: HarmonicFamily
+    z: Array
+    omega: float
+    mu: float
+    scales: Scales
+    amplitude: float
+
+    @property
+    def period(self) -> float:
+        """2π/ω [s]."""
+        return 2 * np.pi / self.omega
+
+    def at(self, mu: float) -> Balanced:
+        """The cycle near at another μ. Raises AnalysisError where there is none."""
+        return balanced(Balanced(evaluated(self.family, self.z, self.omega, mu, self.scales)))
+
+
+def kept(cycle: Balanced) -> Kept:
+    """The same, lighter."""
+    at = cycle.at
+    return Kept(at.family, at.z, at.omega, at.mu, at.scales, at.amplitude)
+
+
 def guessed(
     family: HarmonicFamily, mu: float, harmonics: int, period: float, normal: Array, tangential: Array, gap: Array,
     scale: Scales | None = None,
