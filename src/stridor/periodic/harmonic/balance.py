@@ -45,7 +45,8 @@ def scales(family: HarmonicFamily, omega: float, mu: float, harmonics: int) -> S
         laws = family.laws(mu)
         speeds = np.linspace(0.0, 4.0, 41)
         for i, k in enumerate(family.nodes.owner):
-            slopes[i] = max(abs(laws[k].slope(float(share * family.speed[i]))) for share in speeds)
+            # Only falling friction asks for more.
+            slopes[i] = max(-laws[k].slope(float(share * family.speed[i])) for share in speeds)
         rub = np.maximum(rub, 4.0 * slopes * np.abs(steady.normal))
     return Scales(1.0 / normal, rub)
 
@@ -167,13 +168,15 @@ class Evaluated:
 
 
 def evaluated(
-    family: HarmonicFamily, z: Array, omega: float, mu: float, scale: Scales
+    family: HarmonicFamily, z: Array, omega: float, mu: float, scale: Scales, drive: ComplexArray | None = None
 ) -> Evaluated:
-    """The balance at z (r, l), ω [rad/s] and μ."""
+    """The balance at z (r, l), ω [rad/s] and μ; drive (r,): what moves with the first harmonic without contact forces."""
     base = fourier(z.shape[1] // 2)
     value, slope = family.condensed(1j * omega * np.arange(base.harmonics + 1))
     moved = np.einsum("kij,kj->ki", value, base.complex_of(z))
     moved[0] += family.still
+    if drive is not None:
+        moved[1] += drive
     motion = base.real_of(moved)
     applied = applied_at(family, base.series, z, motion, motion @ base.turn.T * omega, mu, scale)
     given = family.joined(applied.normal, applied.tangential, applied.springs) @ base.means.T

@@ -59,6 +59,12 @@ class Condensed:
         rates = 2.0 * s[:, None, None] * answers + self.damping @ answers
         return self.rows @ answers, -answers.transpose(0, 2, 1) @ rates
 
+    def driven(self, s: complex, force: ComplexArray) -> ComplexArray:
+        """Coordinates (k,) that a force (k,) on them moves at s."""
+        dynamic = s * self.damping.astype(complex)
+        dynamic[np.diag_indices(self.size)] += s**2 + self.squares
+        return np.linalg.solve(dynamic, force)
+
     def answers(self, s: ComplexArray) -> ComplexArray:
         """Coordinates (f, k, r) that unit forces along the rows move."""
         if self.proportional:

@@ -64,11 +64,13 @@ class HarmonicFamily:
     """The balance of one system at any μ, with receptances that hold to ``highest_hz``.
 
     m nodes, d tangents: rows (r,) are m normals, m d tangents node by node, then cubic springs. spring (m,): κ; slip
-    (m, d) [m/s]: in steady sliding; gap (m,) [m]: reference. Raises CaseError for what it does not take.
+    (m, d) [m/s]: in steady sliding; gap (m,) [m]: reference. own: whether μ is a factor of the laws' own coefficients,
+    and not the coefficient of all at their slip speeds. Raises CaseError for what it does not take.
     """
 
-    def __init__(self, system: System, highest_hz: float) -> None:
-        if why := why_not_harmonic(system):
+    def __init__(self, system: System, highest_hz: float, *, own: bool = False) -> None:
+        self.own = own
+        if not own and (why := why_not_harmonic(system)):
             raise CaseError("case", "no cycles can be balanced of it", f"what harmonic balance takes; {why}")
         self.system, self.highest_hz = system, highest_hz
         self.placed = system.in_place()
@@ -89,14 +91,14 @@ class HarmonicFamily:
         press = sp.csr_array(nodes.normal.T @ sp.diags_array(self.spring) @ nodes.normal)
         self.condensed: Condensed = condensed(self.placed, rows, press, force, 2 * np.pi * WIDE * highest_hz)
         self.still = self.condensed.still
-        laws = [law.scaled(1.0, float(self.speed[nodes.owner == k].mean())) for k, law in enumerate(nodes.laws)]
+        laws = self.laws(1.0)
         constant = np.array([law.constant for law in laws], dtype=bool)
         self.law = ContactLaw(
             stiffness, np.where(np.isinf(stiffness), 0.0, nodes.cubic), nodes.kept, nodes.owner.astype(np.int64),
             friction_rows(laws), constant[nodes.owner], np.zeros(0) if cubic is None else cubic.coefficient,
             np.zeros(0) if cubic is None else np.zeros(self.springs) + cubic.stretch,
         )  # fmt: skip
-        self.piecewise_linear = bool(np.all(constant) and not np.any(nodes.cubic) and not self.springs and d == 1)
+        self.piecewise_linear = bool(np.all(constant) and not np.any(nodes.cubic) and not self.springs)
         self._steady: dict[float, Steady] = {}
 
     def _along_normals(self, stiffness: Array) -> Array:
@@ -150,4 +152,6 @@ class HarmonicFamily:
     def laws(self, mu: float) -> list[FrictionLaw]:
         """The laws at a coefficient."""
         nodes = self.nodes
+        if self.own:
+            return [law.scaled(mu * law.sliding(1.0), 1.0) for law in nodes.laws]
         return [law.scaled(mu, float(self.speed[nodes.owner == k].mean())) for k, law in enumerate(nodes.laws)]
