@@ -72,7 +72,8 @@ def cycles(
     chosen: Any = method
     between = work.modal.friction_range if friction_range is not None else None
     result = solve(
-        work, values, between=between, method=chosen, harmonics=harmonics, push=pushes, points=points, seconds=seconds, progress=_told(call),
+        work, values, between=between, method=chosen, harmonics=harmonics, push=pushes, points=points,
+        seconds=seconds, progress=_told(call),
         keep=_kept(call),
     )  # fmt: skip
     call.keep(result, "cycles.nc")
@@ -144,7 +145,8 @@ def _show(result: Cycles) -> None:
         if branch is None or k in _worth_a_row(result, branch):
             stable = {True: "yes", False: "no", None: "undecided" if c.multiplied else "unknown"}[c.stable]
             force = float(c.force_range[:, 1].max())
-            cells = [f"{c.mu:.6g}", f"{c.frequency_hz:.6g}", stable, f"{c.largest_multiplier:.5g}" if c.multiplied else ""]
+            largest = f"{c.largest_multiplier:.5g}" if c.multiplied else ""
+            cells = [f"{c.mu:.6g}", f"{c.frequency_hz:.6g}", stable, largest]
             rows.append(["" if branch is None else f"{branch + 1}", *cells, f"{c.slip_amplitude:.4g}", f"{force:.4g}",
                          ", ".join(c.kinds)])  # fmt: skip
     if rows:

@@ -43,8 +43,8 @@ class Cycle(Shown):
     too large for them. changes: of contact, in their order.
 
     time (t,) [s] over one period, both ends included: normal_force, tangential_force (t, m) [N], slip_velocity (t, m)
-    [m/s], gap (t, m) [m], status (t, m): 0 open, 1 stick, 2 slip; displacement [m], velocity, acceleration (t, w, 2), (t,
-    w, 3) in space, where slip and friction are those along the slip of steady sliding.
+    [m/s], gap (t, m) [m], status (t, m): 0 open, 1 stick, 2 slip; displacement [m], velocity, acceleration (t, w, 2),
+    in space (t, w, 3). In space slip and friction are those along the slip of steady sliding.
     shares (m, 3): of the period that a contact is open, sticks and slips. slip_range (m, 2), force_range (m, 2): least
     and largest slip velocity and normal force, at those times and at the changes.
 

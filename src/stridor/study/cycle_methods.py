@@ -65,7 +65,9 @@ class Method(Protocol[P, L]):
         """The first cycle behind an onset, and the heading away from it. Raises AnalysisError where there is none."""
         ...
 
-    def reached(self, mu: float, push: Sequence[float] | None, seconds: float, say: Say) -> Iterator[tuple[str, P | Unreached]]:
+    def reached(
+        self, mu: float, push: Sequence[float] | None, seconds: float, say: Say
+    ) -> Iterator[tuple[str, P | Unreached]]:
         """Cycles at a μ, with what they were reached from, and what led to none."""
         ...
 

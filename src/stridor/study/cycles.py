@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import interrupts
-from ..errors import AnalysisError, CaseError
+from ..errors import CaseError
 from ..periodic import Cycle, CycleOnset, Cycles, Family, why_not_shooting
 from ..periodic.harmonic import HarmonicFamily, why_not_harmonic
 from ..system import System
@@ -43,15 +43,15 @@ def cycles(
 
     method: "shooting" on the exact motion, for up to 4 contacts of one node in the plane; "harmonic" for harmonic
     balance at the contact nodes, up to hundreds of them, in the plane and in space, with friction that varies with the
-    slip speed and cubic springs; "auto": shooting where it takes the system. harmonics: of harmonic balance (default: as
-    many as its defect asks for).
+    slip speed and cubic springs; "auto": shooting where it takes the system. harmonics: of harmonic balance (default:
+    as many as its defect asks for).
 
     mu: at each of these, by shooting the cycles that motions run into which begin in every growing mode and in steady
     sliding that is pushed; by harmonic balance those of the branches that begin at the onsets in modal.friction_range.
     between (low, high) (default, without mu: modal.friction_range): the branches that begin at the onsets of steady
     sliding, through folds, and by shooting those of cycles that motions run into just below the lowest onset, at the
-    upper end, and at ``mu``. push [m/s]: by how much the slip velocities are pushed off steady sliding (default: one and
-    three times the slip speed). points: most cycles of a branch, each way; seconds: of computing, for a motion that
+    upper end, and at ``mu``. push [m/s]: by how much the slip velocities are pushed off steady sliding (default: one
+    and three times the slip speed). points: most cycles of a branch, each way; seconds: of computing, for a motion that
     comes back to nowhere. progress: called with the number of cycles so far and what is done; keep: with what was
     found so far, behind each cycle. Ctrl-C ends the search and gives what was found.
 
@@ -115,7 +115,8 @@ class _Search:
 
     def __init__(
         self, work: Workspace, between: tuple[float, float] | None, chosen: str, harmonics: int | None,
-        pushes: list[float] | None, points: int, seconds: float, progress: Callable[[int, str], None] | None, keep: Callable[[Cycles], None] | None,
+        pushes: list[float] | None, points: int, seconds: float, progress: Callable[[int, str], None] | None,
+        keep: Callable[[Cycles], None] | None,
         started: float,
     ) -> None:  # fmt: skip
         self.work, self.between, self.pushes, self.seconds = work, between, pushes, seconds
@@ -147,7 +148,8 @@ class _Search:
         looked = list(values)
         if self.method.name == "harmonic":
             self.notes.append(
-                "harmonic balance follows branches from the onsets: cycles that no such branch leads to are not looked for"
+                "harmonic balance follows branches from the onsets: cycles that no such branch leads to are not looked "
+                "for"
             )
         if self.between is not None:
             self.onsets = self._onsets(self.between)

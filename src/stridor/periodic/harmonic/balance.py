@@ -53,8 +53,8 @@ def scales(family: HarmonicFamily, omega: float, mu: float, harmonics: int) -> S
 
 @dataclass(frozen=True)
 class Evaluated:
-    """The balance at z (r, l), ω and μ: motion r (r, l) in rows, what the law makes of it at the times, and what is left
-    (r, l) [N]."""
+    """The balance at z (r, l), ω and μ: motion r (r, l) in rows, what the law makes of it at the times, and what is
+    left (r, l) [N]."""
 
     family: HarmonicFamily
     base: Fourier
@@ -170,7 +170,7 @@ class Evaluated:
 def evaluated(
     family: HarmonicFamily, z: Array, omega: float, mu: float, scale: Scales, drive: ComplexArray | None = None
 ) -> Evaluated:
-    """The balance at z (r, l), ω [rad/s] and μ; drive (r,): what moves with the first harmonic without contact forces."""
+    """The balance at z (r, l), ω [rad/s] and μ; drive (r,): what moves with the first harmonic whatever contacts do."""
     base = fourier(z.shape[1] // 2)
     value, slope = family.condensed(1j * omega * np.arange(base.harmonics + 1))
     moved = np.einsum("kij,kj->ki", value, base.complex_of(z))

@@ -185,8 +185,9 @@ def guessed(
     """A guess from forces over one period of a run or another cycle: normal (t, m), tangential (t, m, d) and gap (t, m)
     at equal times, the last before the period's end."""
     z = family.joined(
-        normal.T + family.spring[:, None] * gap.T, np.moveaxis(tangential, 0, 2), np.zeros((family.springs, len(normal)))
-    )
+        normal.T + family.spring[:, None] * gap.T, np.moveaxis(tangential, 0, 2),
+        np.zeros((family.springs, len(normal))),
+    )  # fmt: skip
     spectrum = 2.0 * np.fft.rfft(z, axis=1).T / len(normal)
     spectrum[0] *= 0.5
     base = fourier(harmonics)

@@ -13,7 +13,8 @@ from .fourier import fourier
 from .law import Applied
 from .problem import HarmonicFamily
 
-LARGER = (1.02, 1.05, 1.1, 1.2, 1.3, 1.5)  # of the size at which contacts first change, where the law is linear up to there
+LARGER = (1.02, 1.05, 1.1, 1.2, 1.3, 1.5)  # of the size at which contacts first change, where all is linear until then
+STEPS = 30  # of Newton's method, for cubic springs
 SMOOTH = (0.1, 0.2, 0.05, 0.4)  # the same, where it is not
 ALONE = 0.05  # of the next singular value: a mode at the onset
 
@@ -23,16 +24,26 @@ def still(family: HarmonicFamily, mu: float, scale: Scales) -> tuple[Array, Appl
     steady = family.steady(mu)
     z = family.joined(steady.normal + family.spring * steady.gap, steady.friction, np.zeros(family.springs))
     at = family.condensed(np.zeros(1, dtype=complex))[0][0].real
-    for _ in range(30):  # cubic springs alone need more than one
+
+    def applied_to(z: Array) -> Applied:
         motion = (at @ z + family.still)[:, None]
-        applied = applied_at(family, np.ones((1, 1)), z[:, None], motion, np.zeros_like(motion), mu, scale)
-        if not family.springs or np.allclose(applied.springs[:, 0], z[-family.springs :], rtol=1e-13, atol=0.0):
-            break
-        z[-family.springs :] = applied.springs[:, 0]
+        return applied_at(family, np.ones((1, 1)), z[:, None], motion, np.zeros_like(motion), mu, scale)
+
+    applied = applied_to(z)
+    if family.springs:
+        for _ in range(STEPS):
+            q = slice(-family.springs, None)
+            left = z[q] - applied.springs[:, 0]
+            if np.linalg.norm(left) <= 1e-13 * np.linalg.norm(z[q]):
+                break
+            z[q] -= np.linalg.solve(np.eye(family.springs) - applied.by_stretch * at[q, q], left)
+            applied = applied_to(z)
     return z, applied
 
 
-def small_motion(family: HarmonicFamily, applied: Applied, scale: Scales, s: complex) -> tuple[ComplexArray, ComplexArray]:
+def small_motion(
+    family: HarmonicFamily, applied: Applied, scale: Scales, s: complex
+) -> tuple[ComplexArray, ComplexArray]:
     """The balance (r, r) of small motions exp(st), and the receptance (r, r)."""
     m, d, rows = family.count, family.directions, len(family.still)
     of_force, of_motion, of_speed = (np.zeros((rows, rows)) for _ in range(3))
@@ -85,7 +96,9 @@ def born(
     matrix, value = small_motion(family, applied, scale, 1j * omega)
     _, sizes, right = np.linalg.svd(matrix / np.maximum(np.linalg.norm(matrix, axis=1), 1e-300)[:, None])
     if len(sizes) > 1 and sizes[-1] > ALONE * sizes[-2]:
-        raise AnalysisError("steady sliding has no mode of its own there: two meet in one, or the condensed model has it elsewhere")
+        raise AnalysisError(
+            "steady sliding has no mode of its own there: two meet in one, or the condensed model has it elsewhere"
+        )
     mode = right[-1].conj()
     size = first_changes(family, mu, applied, mode, value @ mode, 1j * omega)
     if not np.isfinite(size):

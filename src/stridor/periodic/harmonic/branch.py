@@ -53,7 +53,7 @@ class HarmonicBranch:
             factors = self._factorised(here, scale, phase, heading)
             x = _vector(here) / scale
             aside = float(phase @ (here.z - at.z).ravel())
-            rest = np.concatenate([here.left.ravel(), [aside, heading @ (x - origin)]])
+            rest = np.append(here.left.ravel(), [aside, float(heading @ (x - origin))])
             step = sl.lu_solve(factors, -rest)
             size = float(np.linalg.norm(step))
             if not np.isfinite(size):
@@ -71,7 +71,8 @@ class HarmonicBranch:
 
     def _moved(self, here: Evaluated, x: Array, step: Array, scale: Array) -> Evaluated | None:
         """The balance behind a step, so short that it comes closer; None where it ends."""
-        before, best = float(np.linalg.norm(here.left)), None
+        before = float(np.linalg.norm(here.left))
+        tries: list[Evaluated] = []
         for share in (1.0, 0.5, 0.25, 0.1):
             there = (x + share * step) * scale
             omega, mu = float(there[-2]), float(there[-1])
@@ -82,12 +83,11 @@ class HarmonicBranch:
             left = float(np.linalg.norm(tried.left))
             if left < before:
                 return tried
-            if best is None:
-                best = tried
-        if best is None:
+            tries.append(tried)
+        if not tries:
             raise AnalysisError("Newton's method leaves the range")
         # Where rounding is all that is left, nothing comes closer.
-        return best if here.residual > ENOUGH else None
+        return tries[0] if here.residual > ENOUGH else None
 
     def heading(self, point: Balanced, along: Array) -> Array:
         """The direction of the branch at a cycle, forwards as ``along`` (r l + 2,) says."""
@@ -162,7 +162,7 @@ class HarmonicBranch:
 
 
 def _vector(at: Evaluated) -> Array:
-    return np.concatenate([at.z.ravel(), [at.omega, at.mu]])
+    return np.append(at.z.ravel(), [at.omega, at.mu])
 
 
 def _phase(at: Evaluated) -> Array:

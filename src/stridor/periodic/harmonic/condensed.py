@@ -26,8 +26,8 @@ PROPORTIONAL = 1e-9
 
 @dataclass(frozen=True)
 class Condensed:
-    """k coordinates of unit mass: vectors (n, k), squares Ω² (k,) and damping C (k, k) with the springs κ, rows G (r, k),
-    load (k,) of what is constant. complete: whether it is the whole system; proportional: whether C is diagonal."""
+    """k coordinates of unit mass: vectors (n, k), squares Ω² (k,) and damping C (k, k) with the springs κ, rows G (r,
+    k), load (k,) of what is constant. complete: whether it is the whole system; proportional: whether C is diagonal."""
 
     vectors: Array
     squares: Array

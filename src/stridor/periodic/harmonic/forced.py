@@ -54,7 +54,8 @@ def forced(
             break
         at = tried
     if not np.linalg.norm(at.left) <= ENOUGH * size:
-        raise AnalysisError(f"the forced balance ends {np.linalg.norm(at.left) / size:.2g} off; begin from another answer")
+        off = np.linalg.norm(at.left) / size
+        raise AnalysisError(f"the forced balance ends {off:.2g} off; begin from another answer")
     s = 1j * omega * np.arange(harmonics + 1)
     found = np.einsum("kij,kj->ki", modes.answers(s), at.base.complex_of(at.z))
     found[0] += modes.load / modes.squares

@@ -46,7 +46,8 @@ def hill(cycle: Balanced) -> ComplexArray:
     from_u, from_v = -inverse @ drag, -inverse  # (l, k, k): displacement that they leave without contact forces
     value = rows @ inverse @ rows.T
     r = len(rows)
-    matrix = np.eye(r * length, dtype=complex) - of_force - _times(of_motion, value) - _times(of_speed, s[:, None, None] * value)
+    matrix = np.eye(r * length, dtype=complex) - of_force - _times(of_motion, value)
+    matrix -= _times(of_speed, s[:, None, None] * value)
     at_u, at_v = rows @ from_u, rows @ from_v
     pulled_u = _times(of_motion, at_u) + _times(of_speed, s[:, None, None] * at_u + rows)
     pulled_v = _times(of_motion, at_v) + _times(of_speed, s[:, None, None] * at_v)
@@ -58,7 +59,8 @@ def hill(cycle: Balanced) -> ComplexArray:
     speeds[:, : k * length] += np.eye(k * length)
     roots, vectors = np.linalg.eig(np.vstack([moved, speeds]))
     kept = np.abs(roots) > 1e-12 / at.omega
-    exponents, vectors = shift + 1.0 / roots[kept], vectors[:, kept]
+    exponents: ComplexArray = (shift + 1.0 / roots[kept]).astype(complex)
+    vectors = vectors[:, kept]
     sizes = np.abs(vectors[: k * length].reshape(length, k, -1)) ** 2
     weights = np.maximum(sizes.sum(axis=1), 1e-300)
     centres = (np.arange(-h, h + 1)[:, None] * weights).sum(axis=0) / weights.sum(axis=0)

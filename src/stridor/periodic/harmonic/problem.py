@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +17,7 @@ from .condensed import Condensed, condensed
 from .law import ContactLaw
 
 WIDE = 8.0  # times the highest frequency asked for: modes of larger systems
+BETWEEN = 3.5  # times that: where a free mass swings on a spring κ
 MOST_ROWS = 600
 
 
@@ -44,8 +46,8 @@ def why_not_harmonic(system: System) -> str:
         one = law.scaled(1.0, float(speeds[mine].mean()) if np.any(mine) else 0.0)
         if one.sticking > (1.0 + 1e-12) * one.sliding(0.0):
             return (
-                f"contact {name} sticks up to a larger coefficient than it slides with at rest, so that its force jumps "
-                "as it lets go, which no series follows"
+                f"contact {name} sticks up to a larger coefficient than it slides with at rest, so that its force "
+                "jumps as it lets go, which no series follows"
             )
     return ""
 
@@ -102,13 +104,14 @@ class HarmonicFamily:
         self._steady: dict[float, Steady] = {}
 
     def _along_normals(self, stiffness: Array) -> Array:
-        """κ (m,): that of the contact, of a rigid one that of the structure at the node."""
+        """κ (m,): that of the contact, of a rigid one that of the structure at the node; what only contact holds would
+        swing with it between two harmonics."""
         nodes, system = self.nodes, self.placed
         normal = nodes.normal
         squares = np.asarray((normal * normal).sum(axis=1)).ravel()
         own = np.asarray((normal * (normal @ system.stiffness)).sum(axis=1)).ravel()
         inert = np.asarray((normal * (normal @ system.mass)).sum(axis=1)).ravel()
-        local = np.maximum(own, (2 * np.pi * self.highest_hz) ** 2 * inert) / np.maximum(squares, 1e-300) ** 2
+        local = np.maximum(own, (BETWEEN * 2 * np.pi * self.highest_hz) ** 2 * inert) / np.maximum(squares, 1e-300) ** 2
         return np.where(np.isinf(stiffness), local, stiffness)
 
     def steady(self, mu: float) -> Steady:
@@ -122,7 +125,7 @@ class HarmonicFamily:
             self._steady[mu] = Steady(mu, found.normal_force, found.friction_force, found.gap)
         return self._steady[mu]
 
-    def split(self, rows: Array) -> tuple[Array, Array, Array]:
+    def split(self, rows: Any) -> tuple[Any, Any, Any]:
         """Rows (r, …) as those of normals (m, …), tangents (m, d, …) and cubic springs (q, …)."""
         m, d = self.count, self.directions
         return rows[:m], rows[m : m * (1 + d)].reshape(m, d, *rows.shape[1:]), rows[m * (1 + d) :]

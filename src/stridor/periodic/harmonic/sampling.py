@@ -16,10 +16,10 @@ ALONG, AGAINST = 2, 3  # slip, as a change tells it
 
 
 def sampled_series(cycle: Balanced, reached_from: str) -> Cycle:
-    """The cycle as data. Forces are those of the laws of contact and friction at the cycle's motion; a stick shorter
-    than the period of the last harmonic is not told from slip that turns, and counts as slip."""
+    """The cycle as data. Forces are those of the laws of contact and friction at the cycle's motion; what lasts
+    less than the period of the last harmonic is not told: a stick so short counts as slip that turns, slip so short
+    beside stick as stick."""
     at, family = cycle.at, cycle.family
-    m = family.count
     times = np.linspace(0.0, cycle.period, SAMPLES)
     phases = 2 * np.pi * np.arange(at.base.samples) / at.base.samples
     ways = _ways(cycle)
@@ -37,12 +37,12 @@ def sampled_series(cycle: Balanced, reached_from: str) -> Cycle:
         displacement, velocity, acceleration, np.column_stack([shares, 1.0 - shares.sum(axis=1)]),
         np.stack([fine[2].min(axis=1), fine[2].max(axis=1)], axis=1),
         np.stack([fine[0].min(axis=1), fine[0].max(axis=1)], axis=1), np.nan, 0, reached_from, "harmonic",
-        at.base.harmonics, defect(cycle), m > 0 and hill_size(cycle) <= MOST,
+        at.base.harmonics, defect(cycle), hill_size(cycle) <= MOST,
     )  # fmt: skip
 
 
 def _ways(cycle: Balanced) -> Array:
-    """Directions (m, d) along which slip and friction are told: the tangent of a point, the steady slip of a surface."""
+    """Directions (m, d) along which slip and friction are told: a point's tangent, a surface's steady slip."""
     family = cycle.family
     points = len(family.system.contacts)
     ways = np.where(family.speed[:, None] > 0.0, family.slip / np.maximum(family.speed, 1e-300)[:, None], 0.0)
@@ -67,25 +67,33 @@ def _at(cycle: Balanced, phases: Array, ways: Array) -> tuple[Array, Array, Arra
 
 
 def _settled(codes: IntArray, harmonics: int) -> IntArray:
-    """Without sticks too short to be told from slip that turns: these go half to what is before and half to behind."""
-    edges = np.flatnonzero(codes != np.roll(codes, 1))
-    if len(edges) < 2:
-        return codes
+    """Without what is too short to be told by so many harmonics: slip beside stick is stick, and a stick goes half to
+    what is before and half to behind."""
     found = codes.copy()
     n = len(codes)
-    for first, last in zip(edges, np.roll(edges, -1), strict=True):
-        length = (last - first) % n
-        if codes[first] == STICK and length * harmonics < n:
-            here = (first + np.arange(length)) % n
-            before, behind = codes[first - 1], codes[last % n]
-            if OPEN in (before, behind):
+    for short_of in ((ALONG, AGAINST), (STICK,)):
+        edges = np.flatnonzero(found != np.roll(found, 1))
+        if len(edges) < 2:
+            return found
+        told = found.copy()
+        for first, last in zip(edges, np.roll(edges, -1), strict=True):
+            length = (last - first) % n
+            if told[first] not in short_of or length * harmonics >= n:
+                continue
+            before, behind = told[first - 1], told[last]
+            if short_of != (STICK,):
+                if STICK not in (before, behind):
+                    continue
+                before = behind = STICK
+            elif OPEN in (before, behind):
                 before = behind = max(before, behind)
+            here = (first + np.arange(length)) % n
             found[here[: length // 2]], found[here[length // 2 :]] = before, behind
     return found
 
 
 def _changes(codes: IntArray, names: tuple[str, ...], period: float) -> tuple[Change, ...]:
-    m, n = codes.shape
+    n = codes.shape[1]
     before = np.roll(codes, 1, axis=1)
     found: list[Change] = []
     for t, c in zip(*np.nonzero((codes != before).T), strict=True):
