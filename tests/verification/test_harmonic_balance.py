@@ -381,6 +381,29 @@ def test_a_pad_on_a_disc():
         st.cycles(work, 0.2, method="shooting")
 
 
+def test_a_block_on_a_slider_swings_as_in_an_explicit_run():
+    """11 nodes in the plane, far from the onset; contacts part and come back."""
+    damping = {"mass": 20.0, "stiffness": 2e-7}
+    block = case(slider(space=False, stiffness=1e13)).with_({
+        "bodies.block.damping": damping, "bodies.slider.damping": damping, "bodies.block.mass": "lumped",
+        "bodies.slider.mass": "lumped", "modal.max_frequency_hz": 25000.0, "modal.friction_range": [0.05, 0.2],
+        "phases": [{"name": "slide", "duration": 0.012}], "temporal.initial": "steady-sliding",
+        "temporal.perturbation": 0.01, "temporal.record_every": 4, "temporal.watch": ["block.near"],
+    })  # fmt: skip
+    work = st.Workspace(block)
+    (cycle,) = st.cycles(work, 0.1, method="harmonic", harmonics=16).cycles
+    assert cycle.kinds == ("slip", "separation")
+    assert cycle.defect < 0.02
+    assert cycle.stable is None  # too large for Hill
+    run = st.simulate(work, mu=0.1)
+    last = run.time > 0.75 * run.time[-1]
+    speed, time = run.velocity[last, 0, 1], run.time[last]
+    up = np.flatnonzero((speed[:-1] < 0.0) & (speed[1:] >= 0.0))
+    passed = time[up] - speed[up] / (speed[up + 1] - speed[up]) * (time[1] - time[0])
+    assert (len(passed) - 1) / (passed[-1] - passed[0]) == pytest.approx(cycle.frequency_hz, rel=1e-3)
+    assert 0.5 * np.ptp(speed) == pytest.approx(cycle.amplitude("velocity")["block.near"][1], rel=0.05)
+
+
 def test_bad_input_and_files(slow_belt: Cycles, tmp_path: Path):
     problem = mode_coupling(DAMPED, 0.1)
     for given, said in (

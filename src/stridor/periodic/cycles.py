@@ -90,8 +90,8 @@ class Cycles(Tabular):
             )
         if unknown := sum(not c.multiplied for c in self.cycles):
             said.append(
-                f"whether {counted(unknown, 'cycle')} are stable is not known: the system is too large for Floquet's "
-                "multipliers; a run in time tells"
+                f"of {counted(unknown, 'cycle')} it is not known whether they are stable: the system is too large for "
+                "Floquet's multipliers; a run in time tells"
             )
         off = [c for c in self.cycles if c.defect > POOR]
         if off:

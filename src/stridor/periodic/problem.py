@@ -141,5 +141,3 @@ def refuse_cycles(system: System) -> None:
     """Raise CaseError for a system whose cycles cannot be sought."""
     if why := why_not_shooting(system):
         raise CaseError("case", "no cycles can be sought of it", f"what the exact stepper takes; {why}")
-
-

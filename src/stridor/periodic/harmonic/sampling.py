@@ -67,28 +67,29 @@ def _at(cycle: Balanced, phases: Array, ways: Array) -> tuple[Array, Array, Arra
 
 
 def _settled(codes: IntArray, harmonics: int) -> IntArray:
-    """Without what is too short to be told by so many harmonics: slip beside stick is stick, and a stick goes half to
-    what is before and half to behind."""
+    """Without what is too short to be told by so many harmonics: slip beside a stick that is long enough is stick, and a
+    stick goes half to what is before and half to behind."""
     found = codes.copy()
     n = len(codes)
-    for short_of in ((ALONG, AGAINST), (STICK,)):
+    for slips in (True, False):
         edges = np.flatnonzero(found != np.roll(found, 1))
         if len(edges) < 2:
             return found
-        told = found.copy()
-        for first, last in zip(edges, np.roll(edges, -1), strict=True):
-            length = (last - first) % n
-            if told[first] not in short_of or length * harmonics >= n:
+        told, lengths = found.copy(), (np.roll(edges, -1) - edges) % n
+        for k, first in enumerate(edges):
+            length, after = int(lengths[k]), (k + 1) % len(edges)
+            here, before, behind = told[first], told[first - 1], told[edges[after]]
+            if length * harmonics >= n or here == OPEN or (here == STICK) == slips:
                 continue
-            before, behind = told[first - 1], told[last]
-            if short_of != (STICK,):
-                if STICK not in (before, behind):
+            if slips:
+                beside = ((before, lengths[k - 1]), (behind, lengths[after]))
+                if not any(kind == STICK and lasting * harmonics >= n for kind, lasting in beside):
                     continue
                 before = behind = STICK
             elif OPEN in (before, behind):
                 before = behind = max(before, behind)
-            here = (first + np.arange(length)) % n
-            found[here[: length // 2]], found[here[length // 2 :]] = before, behind
+            places = (first + np.arange(length)) % n
+            found[places[: length // 2]], found[places[length // 2 :]] = before, behind
     return found
 
 
