@@ -32,6 +32,7 @@ from stridor.periodic import (
 from stridor.periodic.chart import Chart
 from stridor.periodic.shooting import shoot, started
 from stridor.study.cycle_branches import Tracer
+from stridor.study.cycle_methods import Shooting
 
 DAMPED = 0.02
 
@@ -193,7 +194,7 @@ def test_an_unstable_cycle_lies_between_two_that_are_reached(fast_belt: Cycles):
     assert sum(abs(complex(m)) > 1.0 for m in unstable.multipliers) == 1
     assert fast_belt.branch_of(fast_belt.cycles.index(unstable)) is not None
     family = Family(st.Workspace(mode_coupling(DAMPED, 1.0)).system())
-    tracer = Tracer(family, (unstable.mu, 1.8), 60, lambda: True)
+    tracer = Tracer(Shooting(family), (unstable.mu, 1.8), 60, lambda: True)
     loud = cycles_reached(family.at(1.8), pushed(family.at(1.8), 3.0))
     for closed in loud:
         tracer.from_cycle(closed, "", ())

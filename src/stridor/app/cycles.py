@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -26,6 +26,19 @@ def cycles(
     call: Call,
     mu: Mu = None,
     friction_range: Range = None,
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="shooting on the exact motion, for few contacts; harmonic for harmonic balance, also over surfaces; "
+            "auto: shooting where it takes the case.",
+        ),
+    ] = "auto",
+    harmonics: Annotated[
+        int | None,
+        typer.Option("--harmonics", min=1, help="Of harmonic balance [default: as many as its defect asks for]."),
+    ] = None,
     push: Annotated[
         str | None,
         typer.Option(
@@ -56,9 +69,11 @@ def cycles(
     from ..view.cycle_plots import cycle_branches, cycle_period
     from .output import stdout
 
+    chosen: Any = method
     between = work.modal.friction_range if friction_range is not None else None
     result = solve(
-        work, values, between=between, push=pushes, points=points, seconds=seconds, progress=_told(call),
+        work, values, between=between, method=chosen, harmonics=harmonics, push=pushes, points=points,
+        seconds=seconds, progress=_told(call),
         keep=_kept(call),
     )  # fmt: skip
     call.keep(result, "cycles.nc")
@@ -128,9 +143,10 @@ def _show(result: Cycles) -> None:
     for k, c in enumerate(result.cycles):
         branch = result.branch_of(k)
         if branch is None or k in _worth_a_row(result, branch):
-            stable = {True: "yes", False: "no", None: "undecided"}[c.stable]
+            stable = {True: "yes", False: "no", None: "undecided" if c.multiplied else "unknown"}[c.stable]
             force = float(c.force_range[:, 1].max())
-            cells = [f"{c.mu:.6g}", f"{c.frequency_hz:.6g}", stable, f"{c.largest_multiplier:.5g}"]
+            largest = f"{c.largest_multiplier:.5g}" if c.multiplied else ""
+            cells = [f"{c.mu:.6g}", f"{c.frequency_hz:.6g}", stable, largest]
             rows.append(["" if branch is None else f"{branch + 1}", *cells, f"{c.slip_amplitude:.4g}", f"{force:.4g}",
                          ", ".join(c.kinds)])  # fmt: skip
     if rows:
@@ -153,7 +169,8 @@ def _conclusion(result: Cycles) -> Conclusion:
     if not result.cycles:
         return Conclusion(result.sentence, "simulate")
     loudest = _loudest(result)
-    return Conclusion(result.sentence, "simulate", ("--stepper", "exact", "--mu", f"{loudest.mu:.6g}"))
+    stepper = ("--stepper", "exact") if loudest.method == "shooting" else ()
+    return Conclusion(result.sentence, "simulate", (*stepper, "--mu", f"{loudest.mu:.6g}"))
 
 
 VERBS = {"cycles": cycles}

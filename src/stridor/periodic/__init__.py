@@ -1,14 +1,15 @@
-"""Limit cycles: found by shooting on the exact motion, followed over friction, as data."""
+"""Limit cycles: found by shooting on the exact motion or by harmonic balance, followed over friction, as data."""
 
 from .birth import born
 from .branch import Bifurcation, CycleBranch, bifurcations
-from .continuation import Branch, follow
+from .continuation import Followed, follow
 from .cycle import Cycle
 from .cycles import CycleOnset, Cycles
-from .problem import Family, SlidingProblem, refuse_cycles
+from .problem import Family, SlidingProblem, refuse_cycles, why_not_shooting
 from .returns import NoReturn, cycles_reached, growing, pushed, same
 from .sampling import sampled
 from .shooting import Closed, close, multipliers
+from .shooting_branch import Branch
 
 __all__ = [
     "Bifurcation",
@@ -19,6 +20,7 @@ __all__ = [
     "CycleOnset",
     "Cycles",
     "Family",
+    "Followed",
     "NoReturn",
     "SlidingProblem",
     "bifurcations",
@@ -32,4 +34,5 @@ __all__ = [
     "refuse_cycles",
     "same",
     "sampled",
+    "why_not_shooting",
 ]

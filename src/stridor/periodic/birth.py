@@ -8,10 +8,10 @@ from ..errors import AnalysisError
 from ..temporal.steppers.exact.statuses import STICK
 from ..typing import Array
 from .chart import Chart
-from .continuation import Branch
 from .problem import SlidingProblem
 from .returns import excited
 from .shooting import Closed, shoot
+from .shooting_branch import Branch
 
 LARGER = (0.02, 0.05, 0.1, 0.2, 0.3)  # of that size: by how much the first cycle is larger
 NEAR = 1e-3  # of a frequency: whether a mode is that of the onset

@@ -89,7 +89,8 @@ def _between(one: Cycle, other: Cycle, *, fold: bool) -> list[Kind]:
     for kind, word in WORDS.items():
         if (kind in one.kinds) != (kind in other.kinds):
             found.append(f"{word} {'begins' if kind in other.kinds else 'ends'}")  # type: ignore[arg-type]
-    alike = same_word(one, other)
+    # Series of harmonics tell when a contact changes only to a share of the period: the order is no news.
+    alike = same_word(one, other) or "harmonic" in (one.method, other.method)
     if not found and not alike:
         found.append("contacts change in another order")
     if one.stable is None or other.stable is None or one.stable == other.stable or fold:

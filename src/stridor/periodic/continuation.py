@@ -1,190 +1,94 @@
 """Branches of cycles over μ by pseudo-arclength, through folds (H. B. Keller 1977; R. Seydel 2010, ch. 4 and 7).
 
-Unknown are X = (ξ/A, T/T₀, μ/W), with A the amplitude and T₀ the period where a step begins, W the width of the range:
-
-    φ(ξ, T; μ) − ξ = 0,      ẋ₀ᵀ(ξ − ξ₀) = 0,      tᵀ(X − X₀) = 0,
-
-t being the direction of the branch. The derivative by μ is a difference of two motions, kept as long as Newton's method
-does well with it.
+What a cycle is made of (a start and a period, or harmonics and a frequency) its branch knows; here it is a point with
+a μ, and the direction in which the branch goes on there, whose last number is that of μ.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from ..errors import AnalysisError
-from ..temporal.steppers.exact.statuses import STICK
 from ..typing import Array
-from .chart import Chart
-from .problem import Family
-from .shooting import ENOUGH, Closed, Shot, close, shoot, started
 
 LARGEST, SMALLEST = 0.05, 1e-5  # steps along the branch, in shares of amplitude, period and range
 FIRST = 0.02
 MOST = 400  # points
-BESIDE = 1e-6  # of the range: for differences by μ
-GOOD = 1e-9  # of the amplitude: a corrected point
-SLOW = 0.2  # what a step of Newton's method leaves, above which the derivative by μ is found anew
-EDGE = 0.2  # of the time between two changes: a cycle that begins nearer to one is begun elsewhere
-CORRECTIONS = 9
 TURN = 0.6  # cosine between two headings
 FLAT = 1e-4  # of a heading: a fold
 STOPPED = "it was stopped"
 
 
-@dataclass(frozen=True)
-class Spot:
-    """A point of a branch: a closed cycle and the direction (s + 2,) in which the branch goes on, in X."""
+class Point(Protocol):
+    """A cycle of a branch."""
 
-    closed: Closed
+    @property
+    def mu(self) -> float:
+        """Its friction coefficient."""
+        ...
+
+
+P = TypeVar("P", bound=Point)
+Told = TypeVar("Told", contravariant=True)
+
+
+@dataclass(frozen=True)
+class Spot(Generic[P]):
+    """A point of a branch, and the direction in which the branch goes on there."""
+
+    point: P
     heading: Array
 
     @property
     def mu(self) -> float:
         """The friction coefficient."""
-        return self.closed.problem.value
+        return self.point.mu
 
 
-class Branch:
-    """A branch that is followed within a range (low, high) of μ."""
+class Followed(Protocol[P]):
+    """A branch that can be followed within a range (low, high) of μ."""
 
-    def __init__(self, family: Family, between: tuple[float, float]) -> None:
-        self.family, self.between = family, between
-        self.width = between[1] - between[0]
-        self._slope: tuple[Chart, Array] | None = None
+    between: tuple[float, float]
 
-    def corrected(self, guess: Closed, heading: Array) -> Closed:
-        """The cycle of the branch in the plane through a guess across a heading (s + 2,). Raises AnalysisError where
-        Newton's method finds none."""
-        chart, xi, period, mu = guess.chart, guess.xi, guess.period, guess.problem.value
-        scale = self._scale(guess)
-        s, fresh = chart.size, False
-        shot = shoot(guess.problem, chart, xi, period)
-        normal = shot.start_rate / max(float(np.linalg.norm(shot.start_rate)), 1e-300)
-        origin, start = np.concatenate([xi, [period, mu]]) / scale, xi
-        off = before = np.inf
-        for _ in range(CORRECTIONS):
-            problem = self.family.at(mu)
-            miss = np.concatenate([shot.end - xi, [normal @ (xi - start)]])
-            before, off = off, float(np.linalg.norm(miss)) / max(shot.amplitude, 1e-300)
-            if off <= GOOD or (off < ENOUGH and off > 0.5 * before):
-                break
-            if off > SLOW * before and not fresh:
-                self._slope, fresh = None, True
-            matrix = np.zeros((s + 2, s + 2))
-            matrix[:s, :s] = (shot.matrix - np.eye(s)) * scale[:s]
-            matrix[:s, s] = shot.end_rate * scale[s]
-            matrix[:s, s + 1] = self._by_mu(chart, xi, period, mu, shot) * scale[s + 1]
-            matrix[s, :s] = normal * scale[:s]
-            matrix[s + 1] = heading
-            here = np.concatenate([xi, [period, mu]]) / scale
-            rest = np.append(miss, heading @ (here - origin))
-            step = np.linalg.solve(matrix, -rest)
-            size = float(np.linalg.norm(step))
-            if not np.isfinite(size):
-                raise AnalysisError("Newton's method has no direction")
-            step = step * min(1.0, 0.3 / max(size, 1e-300))
-            there = (here + step) * scale
-            xi, period, mu = there[:s], float(there[s]), float(there[s + 1])
-            if period <= 0.2 * guess.period or not self.between[0] - self.width <= mu <= self.between[1] + self.width:
-                raise AnalysisError("Newton's method leaves the range")
-            shot = shoot(self.family.at(mu), chart, xi, period)
-        problem = self.family.at(mu)
-        residual = float(np.linalg.norm(shot.end - xi)) / max(shot.amplitude, 1e-300)
-        if residual > ENOUGH or shot.status != chart.status:
-            raise AnalysisError(f"Newton's method ends {residual:.2g} of the amplitude off a cycle")
-        return Closed(problem, chart, xi, period, shot, residual)
-
-    def heading(self, closed: Closed, along: Array) -> Array:
-        """The direction of the branch at a cycle, forwards as ``along`` (s + 2,) says."""
-        chart, s, scale = closed.chart, closed.chart.size, self._scale(closed)
-        shot = closed.shot
-        matrix = np.zeros((s + 2, s + 2))
-        matrix[:s, :s] = (shot.matrix - np.eye(s)) * scale[:s]
-        matrix[:s, s] = shot.end_rate * scale[s]
-        slope = self._by_mu(chart, closed.xi, closed.period, closed.problem.value, shot)
-        matrix[:s, s + 1] = slope * scale[s + 1]
-        matrix[s, :s] = shot.start_rate / max(float(np.linalg.norm(shot.start_rate)), 1e-300) * scale[:s]
-        matrix[s + 1] = along
-        found = np.linalg.solve(matrix, np.append(np.zeros(s + 1), 1.0))
-        return found / np.linalg.norm(found)
-
-    def towards(self, closed: Closed, sense: float) -> Array:
-        """A heading to larger (1) or smaller μ (−1)."""
-        along = np.zeros(closed.chart.size + 2)
-        along[-1] = sense
-        self._slope = None
-        return self.heading(closed, along)
-
-    def ahead(self, spot: Spot, length: float) -> Closed:
+    def ahead(self, spot: Spot[P], length: float) -> P:
         """A guess, a length along the branch."""
-        closed, s = spot.closed, spot.closed.chart.size
-        scale = self._scale(closed)
-        there = np.concatenate([closed.xi, [closed.period, spot.mu]]) + length * spot.heading * scale
-        return replace(closed, problem=self.family.at(float(there[-1])), xi=there[:s], period=float(there[s]))
+        ...
+
+    def corrected(self, guess: P, heading: Array) -> P:
+        """The cycle in the plane through a guess across a heading. Raises AnalysisError where there is none near."""
+        ...
+
+    def heading(self, point: P, along: Array, /) -> Array:
+        """The direction of the branch at a cycle, forwards as ``along`` says."""
+        ...
+
+    def settled(self, point: P, heading: Array, /) -> tuple[P, Array]:
+        """The cycle and its heading as the next step begins with them."""
+        ...
+
+    def at(self, mu: float, one: P, other: P) -> P:
+        """The cycle at a μ between two neighbours. Raises AnalysisError where none is near."""
+        ...
+
+    def vanished(self, point: P, /) -> bool:
+        """Whether the branch has come to steady sliding."""
+        ...
 
     def forget(self) -> None:
-        """The derivative by μ, which is found anew then."""
-        self._slope = None
-
-    def _scale(self, closed: Closed) -> Array:
-        s = closed.chart.size
-        scale = np.full(s + 2, closed.shot.amplitude)
-        scale[s], scale[s + 1] = closed.period, self.width
-        return scale
-
-    def _by_mu(self, chart: Chart, xi: Array, period: float, mu: float, shot: Shot) -> Array:
-        """How the end of the motion (s,) changes with μ."""
-        if self._slope is None or self._slope[0] is not chart:
-            step = BESIDE * self.width
-            beside = shoot(self.family.at(mu + step), chart, xi, period, varied=False)
-            self._slope = chart, (beside.end - shot.end) / step
-        return self._slope[1]
-
-    def carried_over(self, begun: Closed, heading: Array) -> Array:
-        """The heading at a cycle that was begun elsewhere: period and μ change as they did."""
-        along = np.zeros(begun.chart.size + 2)
-        along[-2:] = heading[-2:] / max(float(np.linalg.norm(heading[-2:])), 1e-300)
-        self._slope = None
-        return self.heading(begun, along)
-
-    def begun_elsewhere(self, closed: Closed) -> Closed:
-        """The cycle, begun amid the longest time without stick if it begins too near to a change."""
-        times = [w[0] for w in closed.shot.words]
-        if not times:
-            return closed
-        statuses = [w[3] for w in closed.shot.words]
-        parts = [(times[k], times[k + 1] - times[k], statuses[k]) for k in range(len(times) - 1)]
-        around = times[0] + closed.period - times[-1]
-        parts.append((times[-1], around, statuses[-1]))
-        begun, lasting, status = max(parts, key=lambda part: part[1] * (1e-3 if STICK in part[2] else 1.0))
-        share = (closed.period - times[-1]) / around
-        own = around * (1e-3 if STICK in closed.chart.status else 1.0)
-        if EDGE < share < 1 - EDGE and own > 0.4 * lasting * (1e-3 if STICK in status else 1.0):
-            return closed
-        problem = closed.problem
-        motion = started(problem, closed.chart, closed.xi, varied=False)
-        end = (begun + 0.5 * lasting) % closed.period
-        while motion.reach(end) < end:
-            motion.passed()
-        assert motion.anchor is not None
-        chart = Chart.of(problem, motion.status)
-        xi = chart.numbers(*motion.anchor.state(end))
-        shot = shoot(problem, chart, xi, closed.period)
-        residual = float(np.linalg.norm(shot.end - xi)) / max(shot.amplitude, 1e-300)
-        return Closed(problem, chart, xi, closed.period, shot, residual)
+        """What is kept from one cycle to the next."""
+        ...
 
 
-class Seen(Protocol):
+class Seen(Protocol[Told]):
     """Is told every cycle of a branch, and whether it is a fold; says whether to go on."""
 
-    def __call__(self, closed: Closed, *, fold: bool) -> bool: ...
+    def __call__(self, closed: Told, /, *, fold: bool) -> bool: ...
 
 
-def follow(branch: Branch, first: Closed, heading: Array, seen: Seen, most: int = MOST) -> str:
+def follow(branch: Followed[P], first: P, heading: Array, seen: Seen[P], most: int = MOST) -> str:
     """Follow a branch from a cycle until it leaves the range; why it ended, STOPPED where ``seen`` said so."""
     low, high = branch.between
     spot, length = Spot(first, heading), FIRST
@@ -197,23 +101,22 @@ def follow(branch: Branch, first: Closed, heading: Array, seen: Seen, most: int 
             if length < SMALLEST:
                 return f"it could not be followed beyond μ = {spot.mu:.6g}: {error}"
             continue
-        if not low <= closed.problem.value <= high:
+        if not low <= closed.mu <= high:
             return _to_the_edge(branch, spot, closed, seen)
-        if not closed.shot.words:
-            return f"it comes to steady sliding at μ = {closed.problem.value:.6g}"
+        if branch.vanished(closed):
+            return f"it comes to steady sliding at μ = {closed.mu:.6g}"
         if spot.heading[-1] * turned[-1] < 0.0:
             fold = _fold(branch, spot, length, turned)
             if fold is not None and not seen(fold, fold=True):
                 return STOPPED
         if not seen(closed, fold=False):
             return STOPPED
-        begun = branch.begun_elsewhere(closed)
-        spot = Spot(closed, turned) if begun is closed else Spot(begun, branch.carried_over(begun, turned))
+        spot = Spot(*branch.settled(closed, turned))
         length = min(length * 1.5, LARGEST)
     return f"{most} points were made"
 
 
-def _turned(branch: Branch, spot: Spot, closed: Closed) -> Array:
+def _turned(branch: Followed[P], spot: Spot[P], closed: P) -> Array:
     """The heading at the next cycle. Raises AnalysisError where the branch turned so much that another may be meant."""
     found = branch.heading(closed, spot.heading)
     if float(found @ spot.heading) < TURN:
@@ -221,7 +124,7 @@ def _turned(branch: Branch, spot: Spot, closed: Closed) -> Array:
     return found
 
 
-def _fold(branch: Branch, spot: Spot, length: float, turned: Array) -> Closed | None:
+def _fold(branch: Followed[P], spot: Spot[P], length: float, turned: Array) -> P | None:
     """The cycle between two at which μ turns back, by regula falsi on the heading; None where that fails."""
     low, high = (0.0, float(spot.heading[-1])), (length, float(turned[-1]))
     found = None
@@ -242,16 +145,11 @@ def _fold(branch: Branch, spot: Spot, length: float, turned: Array) -> Closed | 
     return found
 
 
-def _to_the_edge(branch: Branch, spot: Spot, beyond: Closed, seen: Seen) -> str:
+def _to_the_edge(branch: Followed[P], spot: Spot[P], beyond: P, seen: Seen[P]) -> str:
     """The cycle at the edge of the range, between the last one and one beyond."""
-    edge = branch.between[0] if beyond.problem.value < branch.between[0] else branch.between[1]
-    share = (edge - spot.mu) / (beyond.problem.value - spot.mu)
-    last = spot.closed
+    edge = branch.between[0] if beyond.mu < branch.between[0] else branch.between[1]
     try:
-        closed = close(
-            branch.family.at(edge), last.chart, last.xi + share * (beyond.xi - last.xi),
-            last.period + share * (beyond.period - last.period),
-        )  # fmt: skip
+        closed = branch.at(edge, spot.point, beyond)
     except AnalysisError:
         return f"it leaves the range beyond μ = {spot.mu:.6g}"
     seen(closed, fold=False)

@@ -12,7 +12,7 @@ from ..digits import hertz
 from ..notebook import Shown
 from ..typing import Array, ComplexArray, IntArray
 
-NEUTRAL = 1e-6  # a largest multiplier as close to one as this decides nothing
+NEUTRAL = {"shooting": 1e-6, "harmonic": 1e-2}  # a largest multiplier as close to one as this decides nothing
 OPEN, STICK, SLIP = 0, 1, 2  # as in histories of runs
 
 WORDS = {
@@ -35,11 +35,16 @@ class Change(NamedTuple):
 class Cycle(Shown):
     """A periodic motion at the friction coefficient ``mu``, of m contacts and w watched points.
 
-    period [s]; residual: how far from closing it is after one, in shares of its amplitude (root of energy).
-    multipliers: Floquet's, largest first, without the one of the motion itself. changes: of contact, in their order.
+    method: "shooting", or "harmonic" for harmonic balance with so many ``harmonics``. period [s]; residual: by shooting
+    how far from closing it is after one, in shares of its amplitude (root of energy); by harmonic balance what is left
+    of the balance, in shares of the contact forces. defect: of harmonic balance, how far its motion is from the
+    equations of motion in time (`periodic.harmonic.balanced.defect`); NaN by shooting, which solves them. multipliers:
+    Floquet's, largest first, without the one of the motion itself; none where ``multiplied`` is False, as the system is
+    too large for them. changes: of contact, in their order.
 
     time (t,) [s] over one period, both ends included: normal_force, tangential_force (t, m) [N], slip_velocity (t, m)
-    [m/s], gap (t, m) [m], status (t, m): 0 open, 1 stick, 2 slip; displacement [m], velocity, acceleration (t, w, 2).
+    [m/s], gap (t, m) [m], status (t, m): 0 open, 1 stick, 2 slip; displacement [m], velocity, acceleration (t, w, 2),
+    in space (t, w, 3). In space slip and friction are those along the slip of steady sliding.
     shares (m, 3): of the period that a contact is open, sticks and slips. slip_range (m, 2), force_range (m, 2): least
     and largest slip velocity and normal force, at those times and at the changes.
 
@@ -70,6 +75,10 @@ class Cycle(Shown):
     grazed: float
     landed: int
     reached_from: str
+    method: str = "shooting"
+    harmonics: int = 0
+    defect: float = float("nan")
+    multiplied: bool = True
 
     @property
     def frequency_hz(self) -> float:
@@ -83,20 +92,21 @@ class Cycle(Shown):
 
     @property
     def stable(self) -> bool | None:
-        """Whether disturbances die out; None where the largest multiplier is one within 1e-6."""
+        """Whether disturbances die out; None where the largest multiplier is one within 1e-6 (by harmonic balance:
+        0.01), or is not known."""
         size = self.largest_multiplier
-        return None if abs(size - 1.0) <= NEUTRAL else size < 1.0
+        return None if not self.multiplied or abs(size - 1.0) <= NEUTRAL[self.method] else size < 1.0
 
     @property
     def slip_amplitude(self) -> float:
         """Half the range of the slip velocity [m/s], of the contact where it is largest."""
         return 0.5 * float((self.slip_range[:, 1] - self.slip_range[:, 0]).max())
 
-    def amplitude(self, quantity: str = "acceleration") -> dict[str, tuple[float, float]]:
-        """Half the range of each watched point's x and y, of "displacement", "velocity" or "acceleration"."""
+    def amplitude(self, quantity: str = "acceleration") -> dict[str, tuple[float, ...]]:
+        """Half the range of each watched point's x, y (and z), of "displacement", "velocity" or "acceleration"."""
         values = getattr(self, quantity)
         ranges = 0.5 * np.ptp(values, axis=0)
-        return {name: (float(x), float(y)) for name, (x, y) in zip(self.watch_names, ranges, strict=True)}
+        return {name: tuple(map(float, row)) for name, row in zip(self.watch_names, ranges, strict=True)}
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -121,7 +131,8 @@ class Cycle(Shown):
 
     @property
     def _line(self) -> str:
-        said = {True: "stable", False: "unstable", None: "on the edge of stability"}[self.stable]
+        edge = "on the edge of stability" if self.multiplied else "of unknown stability"
+        said = {True: "stable", False: "unstable", None: edge}[self.stable]
         return f"μ = {self.mu:.6g}, {hertz(self.frequency_hz)}, {said}, with {', '.join(self.kinds)}"
 
     def to_json(self) -> dict[str, Any]:
@@ -131,7 +142,7 @@ class Cycle(Shown):
             "frequency_hz": self.frequency_hz,
             "period_s": self.period,
             "stable": self.stable,
-            "largest_multiplier": self.largest_multiplier,
+            "largest_multiplier": self.largest_multiplier if self.multiplied else None,
             "multipliers": [[float(z.real), float(z.imag)] for z in self.multipliers],
             "residual": self.residual,
             "kinds": list(self.kinds),
@@ -148,6 +159,9 @@ class Cycle(Shown):
             "grazed": self.grazed if np.isfinite(self.grazed) else None,
             "landed": self.landed,
             "reached_from": self.reached_from,
+            "method": self.method,
+            "harmonics": self.harmonics or None,
+            "defect": self.defect if np.isfinite(self.defect) else None,
         }
 
     def _contacts(self) -> Iterator[dict[str, Any]]:

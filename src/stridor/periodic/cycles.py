@@ -12,7 +12,7 @@ from ..digits import hertz
 from ..notebook import counted, html_table
 from ..tabular import Cell, Rows, Tabular, dataset
 from .branch import Bifurcation, CycleBranch
-from .cycle import Change, Cycle
+from .cycle import NEUTRAL, Change, Cycle
 
 SCHEMA = "stridor.cycles/1"
 HISTORIES = {
@@ -27,7 +27,8 @@ UNITS = {
     "normal_force": "N", "tangential_force": "N", "slip_velocity": "m/s", "gap": "m", "displacement": "m",
     "velocity": "m/s", "acceleration": "m/s²", "slip_range": "m/s", "force_range": "N", "period": "s",
 }  # fmt: skip
-NUMBERS = ("mu", "period", "residual", "grazed")
+POOR = 1e-2  # a defect that is said
+NUMBERS = ("mu", "period", "residual", "grazed", "defect")
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,17 @@ class Cycles(Tabular):
                 f"in {counted(rested, 'cycle')} contacts throw one another off without end and were brought to rest, "
                 "which is not exact"
             )
+        if unknown := sum(not c.multiplied for c in self.cycles):
+            said.append(
+                f"of {counted(unknown, 'cycle')} it is not known whether they are stable: the system is too large for "
+                "Floquet's multipliers; a run in time tells"
+            )
+        off = [c for c in self.cycles if c.defect > POOR]
+        if off:
+            said.append(
+                f"{counted(len(off), 'cycle')} by harmonic balance are off the equations of motion by up to "
+                f"{max(c.defect for c in off):.2g} of their motion (defect); more harmonics come closer"
+            )
         return tuple(said)
 
     @property
@@ -106,7 +118,7 @@ class Cycles(Tabular):
         heads = (
             "cycle", "branch", "mu", "frequency_hz", "period_s", "stable", "largest_multiplier", "residual", "with",
             "slip_amplitude", "contact", "open", "stick", "slip", "slip_min", "slip_max", "normal_force_min",
-            "normal_force_max", "reached_from",
+            "normal_force_max", "reached_from", "method", "harmonics", "defect",
         )  # fmt: skip
         rows: list[tuple[Cell, ...]] = []
         for number, c in enumerate(self.cycles):
@@ -114,8 +126,10 @@ class Cycles(Tabular):
             for k, name in enumerate(c.contact_names):
                 rows.append((
                     number + 1, None if branch is None else branch + 1, c.mu, c.frequency_hz, c.period,
-                    _told(c.stable), c.largest_multiplier, c.residual, " ".join(c.kinds), c.slip_amplitude, name,
-                    *c.shares[k].tolist(), *c.slip_range[k].tolist(), *c.force_range[k].tolist(), c.reached_from,
+                    _told(c.stable), c.largest_multiplier if c.multiplied else None, c.residual, " ".join(c.kinds),
+                    c.slip_amplitude, name, *c.shares[k].tolist(), *c.slip_range[k].tolist(),
+                    *c.force_range[k].tolist(), c.reached_from, c.method, c.harmonics or None,
+                    c.defect if np.isfinite(c.defect) else None,
                 ))  # fmt: skip
         return heads, rows
 
@@ -148,7 +162,8 @@ class Cycles(Tabular):
         }
         variables["time"] = ("cycle", "sample"), _stacked([c.time for c in cycles], 2), {"units": "s"}
         variables["multiplier"] = ("cycle", "multiplier_number", "part"), multipliers, {}
-        sizes = {"contact": len(names), "point": len(points), "direction": 2, "kind": 3, "end": 2, "sample": 0}
+        axes = ["x", "y", "z"][: cycles[0].displacement.shape[2] if cycles else 2]
+        sizes = {"contact": len(names), "point": len(points), "direction": len(axes), "kind": 3, "end": 2, "sample": 0}
         for name, dims in HISTORIES.items():
             empty = tuple(sizes[d] for d in dims[1:])
             values = np.array([getattr(c, name) for c in cycles]) if cycles else np.zeros((0, *empty))
@@ -156,13 +171,14 @@ class Cycles(Tabular):
         coords = {
             "contact": ("contact", np.array(names, dtype=object)),
             "point": ("point", np.array(points, dtype=object)),
-            "direction": ("direction", np.array(["x", "y"], dtype=object)),
+            "direction": ("direction", np.array(axes, dtype=object)),
             "kind": ("kind", np.array(["open", "stick", "slip"], dtype=object)),
             "end": ("end", np.array(["least", "largest"], dtype=object)),
         }
         data = dataset("cycles", variables, coords, self.provenance)
         own = [
-            {"changes": [list(c) for c in one.changes], "landed": one.landed, "reached_from": one.reached_from}
+            {"changes": [list(c) for c in one.changes], "landed": one.landed, "reached_from": one.reached_from,
+             "method": one.method, "harmonics": one.harmonics, "multiplied": one.multiplied}
             for one in cycles
         ]
         document = self.to_json()
@@ -202,12 +218,21 @@ def _read(data: Any, k: int, told: Any, names: tuple[str, ...], points: tuple[st
     )
     if any(c.contact not in names or len(c.behind) != len(names) for c in changes):
         raise ValueError("changes of contacts that there are not")
-    numbers = {name: float(data[name].values[k]) for name in NUMBERS}
+    numbers = {name: float(data[name].values[k]) for name in NUMBERS if name in data}
     return Cycle(
         **numbers, time=data["time"].values[k], **{name: data[name].values[k] for name in HISTORIES},
         multipliers=parts[:, 0] + 1j * parts[:, 1], changes=changes, contact_names=names, watch_names=points,
-        landed=int(told["landed"]), reached_from=str(told["reached_from"]),
+        landed=int(told["landed"]), reached_from=str(told["reached_from"]), method=_method(told),
+        harmonics=int(told.get("harmonics", 0)), multiplied=bool(told.get("multiplied", True)),
     )  # fmt: skip
+
+
+def _method(told: Any) -> str:
+    """Files of before there were two have none."""
+    method = str(told.get("method", "shooting"))
+    if method not in NEUTRAL:
+        raise ValueError(f"cycles by {method[:40]!r}, which is no method")
+    return method
 
 
 def _branch(told: Any, count: int, onsets: int) -> CycleBranch:

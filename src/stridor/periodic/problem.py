@@ -127,14 +127,17 @@ def slip_of(system: System) -> Array:
     return np.asarray(system.contact_nodes().tangent_lift @ full_motion(system), dtype=float).ravel()
 
 
-def refuse_cycles(system: System) -> None:
-    """Raise CaseError for a system whose cycles cannot be sought."""
+def why_not_shooting(system: System) -> str:
+    """Why cycles of a system cannot be shot at; "" where they can."""
     why = why_not_exact(system)
     if not why and system.load_steps:
         why = "it has load steps, so that what drives it does not stay the same"
     if not why and not np.any(full_motion(system)):
         why = "nothing slides: no support has a velocity"
-    if why:
+    return why
+
+
+def refuse_cycles(system: System) -> None:
+    """Raise CaseError for a system whose cycles cannot be sought."""
+    if why := why_not_shooting(system):
         raise CaseError("case", "no cycles can be sought of it", f"what the exact stepper takes; {why}")
-
-

@@ -56,6 +56,11 @@ class Closed:
     residual: float
 
     @property
+    def mu(self) -> float:
+        """The friction coefficient."""
+        return self.problem.value
+
+    @property
     def word(self) -> tuple[tuple[str, int, Status], ...]:
         """The changes of contact of a period, without their times."""
         return tuple((meaning, c, status) for _, meaning, c, status in self.shot.words)

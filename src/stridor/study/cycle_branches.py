@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from ..errors import AnalysisError
-from ..periodic import (
-    Branch,
-    Closed,
-    Cycle,
-    CycleBranch,
-    CycleOnset,
-    Family,
-    bifurcations,
-    born,
-    close,
-    follow,
-    same,
-    sampled,
-)
+from ..periodic import Cycle, CycleBranch, CycleOnset, bifurcations, follow
+from .cycle_methods import Method
 
 Kept = Callable[[], bool]
 
@@ -30,18 +19,18 @@ Kept = Callable[[], bool]
 class Traced:
     """A branch while it is followed: its cycles, closed and as data, which of them are folds, and how it ends."""
 
-    closed: list[Closed] = field(default_factory=list[Closed])
+    method: Method[Any, Any]
+    closed: list[Any] = field(default_factory=list[Any])
     cycles: list[Cycle] = field(default_factory=list[Cycle])
     folds: list[bool] = field(default_factory=list[bool])
     begins: str = ""
     ends: str = "it was stopped"
     onset: int | None = None
 
-    def add(self, closed: Closed, said: str, *, fold: bool) -> None:
+    def add(self, closed: Any, said: str, *, fold: bool) -> None:
         """Another cycle behind the last."""
-        self.cycles.append(sampled(closed, said))
-        # The matrix is large, and what is asked of it is known now.
-        self.closed.append(replace(closed, shot=replace(closed.shot, matrix=np.zeros((0, 0)))))
+        self.cycles.append(self.method.sampled(closed, said))
+        self.closed.append(self.method.lighter(closed))
         self.folds.append(fold)
 
     def reverse(self) -> None:
@@ -50,19 +39,19 @@ class Traced:
             row.reverse()
         self.begins, self.ends = self.ends, self.begins
 
-    def has(self, closed: Closed) -> bool:
+    def has(self, closed: Any) -> bool:
         """Whether a cycle lies on it: one of the branch, closed at its μ, is the same."""
-        mu = closed.problem.value
+        mu = closed.mu
         for k in range(len(self.closed) - 1):
             one, other = self.closed[k], self.closed[k + 1]
-            if not min(one.problem.value, other.problem.value) <= mu <= max(one.problem.value, other.problem.value):
+            if not min(one.mu, other.mu) <= mu <= max(one.mu, other.mu):
                 continue
             shortest, longest = sorted((one.period, other.period))
             if not shortest * (1 - APART) < closed.period < longest * (1 + APART):
                 continue
             for start in (one, other):
                 try:
-                    if same(close(closed.problem, start.chart, start.xi, start.period), closed):
+                    if self.method.same(self.method.again(start, mu), closed):
                         return True
                 except (AnalysisError, np.linalg.LinAlgError):
                     continue
@@ -84,37 +73,37 @@ class Tracer:
     """Follows branches within a range (low, high) of μ, of up to ``points`` cycles each; ``kept`` is called behind each
     cycle, and says whether to go on."""
 
-    def __init__(self, family: Family, between: tuple[float, float], points: int, kept: Kept) -> None:
-        self.family, self.between, self.points, self.kept = family, between, points, kept
+    def __init__(self, method: Method[Any, Any], between: tuple[float, float], points: int, kept: Kept) -> None:
+        self.method, self.between, self.points, self.kept = method, between, points, kept
         self.traced: list[Traced] = []
 
     def from_onset(self, number: int, onset: CycleOnset, others: tuple[CycleOnset, ...]) -> str:
         """The branch that begins at an onset; why there is none, "" where there is one."""
-        branch = Branch(self.family, self.between)
+        branch = self.method.branch(self.between)
         try:
-            first, heading = born(branch, onset.mu, onset.frequency_hz)
+            first, heading = self.method.born(branch, onset)
         except AnalysisError as error:
             return f"no branch was found from the onset at μ = {onset.mu:.6g} ({onset.frequency_hz:.6g} Hz): {error}"
         low, high = self.between
-        if not low <= first.problem.value <= high:
+        if not low <= first.mu <= high:
             return f"the branch from the onset at μ = {onset.mu:.6g} leaves the range at once"
         if any(t.has(first) for t in self.traced):
             return ""
-        traced = Traced(begins=f"it begins at the onset at μ = {onset.mu:.6g}", onset=number)
+        traced = Traced(self.method, begins=f"it begins at the onset at μ = {onset.mu:.6g}", onset=number)
         self.traced.append(traced)
         self._follow(branch, traced, first, heading, traced.begins.removeprefix("it "), include=True, others=others)
         return ""
 
-    def from_cycle(self, closed: Closed, said: str, others: tuple[CycleOnset, ...]) -> None:
+    def from_cycle(self, closed: Any, said: str, others: tuple[CycleOnset, ...]) -> None:
         """The branch that a cycle lies on, both ways."""
-        traced = Traced()
+        traced = Traced(self.method)
         self.traced.append(traced)
         for sense in (-1.0, 1.0):
-            branch = Branch(self.family, self.between)
+            branch = self.method.branch(self.between)
             try:
                 heading = branch.towards(closed, sense)
             except (AnalysisError, np.linalg.LinAlgError) as error:
-                traced.ends = f"it could not be followed beyond μ = {closed.problem.value:.6g}: {error}"
+                traced.ends = f"it could not be followed beyond μ = {closed.mu:.6g}: {error}"
                 heading = None
             if sense < 0.0:
                 traced.add(closed, said, fold=False)
@@ -129,10 +118,10 @@ class Tracer:
                         traced.onset = number
 
     def _follow(
-        self, branch: Branch, traced: Traced, first: Closed, heading: np.ndarray, said: str, *, include: bool,
+        self, branch: Any, traced: Traced, first: Any, heading: np.ndarray, said: str, *, include: bool,
         others: tuple[CycleOnset, ...],
     ) -> None:  # fmt: skip
-        def seen(closed: Closed, *, fold: bool) -> bool:
+        def seen(closed: Any, /, *, fold: bool) -> bool:
             traced.add(closed, said, fold=fold)
             return self.kept()
 

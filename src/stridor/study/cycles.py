@@ -4,34 +4,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from .. import interrupts
-from ..errors import AnalysisError, CaseError
-from ..periodic import (
-    Closed,
-    Cycle,
-    CycleOnset,
-    Cycles,
-    Family,
-    NoReturn,
-    cycles_reached,
-    growing,
-    pushed,
-    refuse_cycles,
-    same,
-    sampled,
-)
-from ..temporal.steppers.exact.varied import VariedMotion
+from ..errors import CaseError
+from ..periodic import Cycle, CycleOnset, Cycles, Family, why_not_shooting
+from ..periodic.harmonic import HarmonicFamily, why_not_harmonic
+from ..system import System
 from ..typing import Array
 from .analyses import onsets
 from .asked import require_friction
 from .cycle_branches import Tracer
+from .cycle_methods import Harmonic, Method, MethodName, Shooting, Unreached
 from .provenance import provenance
 from .workspace import Problem, Workspace
 
-PUSHES = (1.0, 3.0)  # of the slip speed
+MOST_ASKED = 1000  # harmonics
+METHODS = ("auto", "shooting", "harmonic")
 BELOW = 0.05  # of the range: how far below its lowest onset cycles are looked for as well
 
 
@@ -40,25 +31,32 @@ def cycles(
     mu: float | Sequence[float] | Array | None = None,
     *,
     between: tuple[float, float] | None = None,
+    method: MethodName = "auto",
+    harmonics: int | None = None,
     push: float | Sequence[float] | None = None,
     points: int = 120,
     seconds: float = 60.0,
     progress: Callable[[int, str], None] | None = None,
     keep: Callable[[Cycles], None] | None = None,
 ) -> Cycles:
-    """Limit cycles by shooting on the exact motion: at single friction coefficients, or followed over a range of them.
+    """Limit cycles: at single friction coefficients, or followed over a range of them.
 
-    mu: at each of these, the cycles that motions run into which begin in every growing mode and in steady sliding that
-    is pushed. between (low, high) (default, without mu: modal.friction_range): the branches that begin at the onsets of
-    steady sliding, through folds, and those of cycles that motions run into just below the lowest onset, at the upper
-    end, and at ``mu``. push [m/s]: by how much the slip velocities are pushed off steady sliding (default: one and
-    three times the slip speed). points: most cycles of a branch, each way; seconds: of computing, for a motion that
+    method: "shooting" on the exact motion, for up to 4 contacts of one node in the plane; "harmonic" for harmonic
+    balance at the contact nodes, up to hundreds of them, in the plane and in space, with friction that varies with the
+    slip speed and cubic springs; "auto": shooting where it takes the system. harmonics: of harmonic balance (default:
+    as many as its defect asks for).
+
+    mu: at each of these, by shooting the cycles that motions run into which begin in every growing mode and in steady
+    sliding that is pushed; by harmonic balance those of the branches that begin at the onsets in modal.friction_range.
+    between (low, high) (default, without mu: modal.friction_range): the branches that begin at the onsets of steady
+    sliding, through folds, and by shooting those of cycles that motions run into just below the lowest onset, at the
+    upper end, and at ``mu``. push [m/s]: by how much the slip velocities are pushed off steady sliding (default: one
+    and three times the slip speed). points: most cycles of a branch, each way; seconds: of computing, for a motion that
     comes back to nowhere. progress: called with the number of cycles so far and what is done; keep: with what was
     found so far, behind each cycle. Ctrl-C ends the search and gives what was found.
 
-    Cycles to which no motion and no branch leads are not found. Raises CaseError for what the exact stepper does not
-    take (up to 4 contacts of one node in the plane, friction that knows no speed) and where nothing slides,
-    AnalysisError where steady sliding does not exist.
+    Cycles to which no motion and no branch leads are not found. Raises CaseError for what the method does not take and
+    where nothing slides, AnalysisError where steady sliding does not exist.
     """
     started = time.perf_counter()
     work = Workspace.of(problem)
@@ -74,8 +72,11 @@ def cycles(
         raise CaseError("seconds", seconds, "a time > 0 [s]")
     if work.varies:
         raise CaseError("case", "matrices that depend on mu", "cycles of a system whose matrices do not")
-    system = work.system()
-    refuse_cycles(system)
+    if harmonics is not None and not 1 <= harmonics <= MOST_ASKED:
+        raise CaseError("harmonics", harmonics, f"1 to {MOST_ASKED} harmonics")
+    chosen = _chosen(work.system(), method)
+    if harmonics is not None and chosen != "harmonic":
+        raise CaseError("harmonics", harmonics, 'harmonics of method "harmonic"; shooting has none')
     if between is None and not values:
         between = work.modal.friction_range
     if between is not None:
@@ -83,7 +84,7 @@ def cycles(
         if not (np.isfinite(low) and np.isfinite(high) and 0.0 <= low < high):
             raise CaseError("between", between, "two finite friction coefficients 0 ≤ low < high")
         between = low, high
-    search = _Search(work, between, pushes, points, seconds, progress, keep, started)
+    search = _Search(work, between, chosen, harmonics, pushes, points, seconds, progress, keep, started)
     try:
         search.run(values)
     except KeyboardInterrupt:
@@ -92,37 +93,72 @@ def cycles(
     return search.result()
 
 
+def _chosen(system: System, method: str) -> str:
+    """The method by which cycles are sought. Raises CaseError where it does not take the system."""
+    if method not in METHODS:
+        raise CaseError("method", method, ", ".join(METHODS))
+    shooting, harmonic = why_not_shooting(system), why_not_harmonic(system)
+    if method == "auto":
+        method = "harmonic" if shooting and not harmonic else "shooting"
+    why, other, instead = (
+        (shooting, "harmonic", not harmonic) if method == "shooting" else (harmonic, "shooting", not shooting)
+    )
+    if why:
+        takes = "the exact stepper" if method == "shooting" else "harmonic balance"
+        remedy = f'; method = "{other}" takes it' if instead else ""
+        raise CaseError("case", "no cycles can be sought of it", f"what {takes} takes; {why}{remedy}")
+    return method
+
+
 class _Search:
     """What was found so far."""
 
     def __init__(
-        self, work: Workspace, between: tuple[float, float] | None, pushes: list[float] | None, points: int,
-        seconds: float, progress: Callable[[int, str], None] | None, keep: Callable[[Cycles], None] | None,
+        self, work: Workspace, between: tuple[float, float] | None, chosen: str, harmonics: int | None,
+        pushes: list[float] | None, points: int, seconds: float, progress: Callable[[int, str], None] | None,
+        keep: Callable[[Cycles], None] | None,
         started: float,
     ) -> None:  # fmt: skip
         self.work, self.between, self.pushes, self.seconds = work, between, pushes, seconds
         self.progress, self.keep, self.started, self.points = progress, keep, started, points
-        self.family = Family(work.system())
-        self.tracer = Tracer(self.family, between or (0.0, 1.0), points, self._kept)
+        self.harmonics = harmonics
+        self.method: Method[Any, Any] = self._method(chosen)
+        self.tracer = Tracer(self.method, between or (0.0, 1.0), points, self._kept)
         self.onsets: tuple[CycleOnset, ...] = ()
-        self.single: list[tuple[Closed, Cycle]] = []
+        self.single: list[Cycle] = []
         self.missing: list[str] = []
         self.notes: list[str] = []
         self.interrupted = False
         self.doing = ""
 
+    def _method(self, chosen: str) -> Method[Any, Any]:
+        system = self.work.system()
+        if chosen == "shooting":
+            return Shooting(Family(system))
+        known = self._onsets(self.between or self.work.modal.friction_range)
+        highest = max((o.frequency_hz for o in known), default=0.0) or self.work.modal.max_frequency_hz
+        return Harmonic(HarmonicFamily(system, highest), known, self.harmonics)
+
+    def _onsets(self, between: tuple[float, float]) -> tuple[CycleOnset, ...]:
+        found = onsets(self.work, between)
+        return tuple(CycleOnset(o.mu, o.frequency_hz, o.stabilising) for o in found.onsets)
+
     def run(self, values: list[float]) -> None:
         """Everything that was asked for."""
         looked = list(values)
+        if self.method.name == "harmonic":
+            self.notes.append(
+                "harmonic balance follows branches from the onsets: cycles that no such branch leads to are not looked "
+                "for"
+            )
         if self.between is not None:
-            found = onsets(self.work, self.between)
-            self.onsets = tuple(CycleOnset(o.mu, o.frequency_hz, o.stabilising) for o in found.onsets)
+            self.onsets = self._onsets(self.between)
             self.notes += [] if self.onsets else [f"no onset for μ from {self.between[0]:g} to {self.between[1]:g}"]
             for number, onset in enumerate(self.onsets):
                 self._say(f"branch from the onset at μ = {onset.mu:.6g}")
                 if missing := self.tracer.from_onset(number, onset, self.onsets):
                     self.missing.append(missing)
-            looked += self._more(values)
+            looked += self._more(values) if self.method.name == "shooting" else []
         for mu in looked:
             self._at(mu)
 
@@ -135,46 +171,26 @@ class _Search:
         return [mu for mu in dict.fromkeys((below, high)) if mu not in values]
 
     def _at(self, mu: float) -> None:
-        """The cycles that motions run into at a friction coefficient."""
+        """The cycles at a friction coefficient that the method leads to."""
         self._say(f"motions at μ = {mu:.6g}")
-        problem = self.family.at(mu)
-        begun: list[tuple[str, VariedMotion]] = []
-        try:
-            begun += [(f"the mode at {frequency:.6g} Hz", motion) for frequency, motion in growing(problem)]
-        except AnalysisError as error:
-            self.missing.append(f"μ = {mu:.6g}, from the growing modes: {error}")
-        speeds = [share * problem.sliding_speed for share in PUSHES] if self.pushes is None else self.pushes
-        for speed in speeds:
-            try:
-                begun.append((f"a push of {speed:.4g} m/s", pushed(problem, speed)))
-            except AnalysisError as error:
-                self.missing.append(f"μ = {mu:.6g}, from a push of {speed:.4g} m/s: {error}")
-        here: list[Closed] = []
-        for number, (said, motion) in enumerate(begun, start=1):
-            self._say(f"motion {number} of {len(begun)} at μ = {mu:.6g}, from {said}")
-            try:
-                reached = cycles_reached(problem, motion, self.seconds)
-            except NoReturn as none:
-                (self.notes if none.steady else self.missing).append(f"μ = {mu:.6g}, from {said}: {none}")
-                continue
-            except AnalysisError as error:
-                self.missing.append(f"μ = {mu:.6g}, from {said}: {error}")
-                continue
-            for closed in reached:
-                if not any(same(closed, other) for other in here):
-                    here.append(closed)
-                    self._add(closed, said)
+        here: list[Any] = []
+        for said, found in self.method.reached(mu, self.pushes, self.seconds, self._say):
+            if isinstance(found, Unreached):
+                (self.notes if found.steady else self.missing).append(found.words)
+            elif not any(self.method.same(found, other) for other in here):
+                here.append(found)
+                self._add(found, said)
 
-    def _add(self, closed: Closed, said: str) -> None:
+    def _add(self, closed: Any, said: str) -> None:
         """A cycle, with its branch where a range is asked for that holds it."""
-        within = self.between is not None and self.between[0] <= closed.problem.value <= self.between[1]
+        within = self.between is not None and self.between[0] <= closed.mu <= self.between[1]
         if within and any(traced.has(closed) for traced in self.tracer.traced):
             return
         if within:
-            self._say(f"branch of the cycle at μ = {closed.problem.value:.6g}")
+            self._say(f"branch of the cycle at μ = {closed.mu:.6g}")
             self.tracer.from_cycle(closed, said, self.onsets)
         else:
-            self.single.append((closed, sampled(closed, said)))
+            self.single.append(self.method.sampled(closed, said))
             self._kept()
 
     def _say(self, doing: str) -> None:
@@ -193,7 +209,7 @@ class _Search:
 
     def result(self) -> Cycles:
         """All of it: single cycles by μ, then branch after branch."""
-        found = [cycle for _, cycle in sorted(self.single, key=lambda one: one[1].mu)]
+        found = sorted(self.single, key=lambda one: one.mu)
         branches = []
         for traced in self.tracer.traced:
             if traced.cycles:
@@ -206,7 +222,7 @@ class _Search:
         made = provenance(
             self.work, "cycles", time.perf_counter() - self.started,
             between=None if self.between is None else list(self.between), push=self.pushes,
-            points=self.points,
+            points=self.points, method=self.method.name, harmonics=self.harmonics,
         )  # fmt: skip
         return Cycles(
             tuple(found), tuple(branches), self.onsets, self.between, (*self.missing, *lost), tuple(self.notes),

@@ -1,0 +1,172 @@
+"""Floquet's multipliers of a cycle in harmonics, by Hill's determinant.
+
+A motion beside the cycle is exp(σt) times a series of the cycle's period; with it the derivative of the balance, at
+s = σ + jkω in place of jkω, is singular. With displacements and velocities of the modes as unknowns that is linear in
+σ; of its roots, of which there are 2h + 1 for each exponent, each displaced by a multiple of jω, those count whose
+series are centred at k = 0 (Lazarus and Thomas 2010; Bayer, Leine, Thomas and Grolet 2024).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...typing import Array, ComplexArray, IntArray
+from .balance import applied_at
+from .balanced import Balanced
+
+MOST = 700  # size of the eigenproblem: 2 k (2h + 1)
+SHIFT = 0.05  # of ω: where the roots are sought about
+FINER = 4  # times as many times as the balance has
+APART = 0.5  # between the centres of two roots of one exponent
+ALIKE = 0.02  # of a multiplier
+CENTRAL = 0.9  # of series: how far from k = 0
+EDGE = 0.15  # of half ω: how far beyond it roots are looked at
+
+
+def hill_size(cycle: Balanced) -> int:
+    """Size of the eigenproblem."""
+    return 2 * cycle.family.condensed.size * cycle.at.base.length
+
+
+def hill(cycle: Balanced) -> ComplexArray:
+    """Multipliers (2k − 1,), largest first, without the one of the motion itself, of a system of k modes."""
+    at, family = cycle.at, cycle.family
+    modes, h = family.condensed, at.base.harmonics
+    k, length = modes.size, 2 * h + 1
+    shift = SHIFT * at.omega
+    s = shift + 1j * at.omega * np.arange(-h, h + 1)
+    of_force, of_motion, of_speed = _toeplitz(cycle)
+    rows = modes.rows
+    # D(s)⁻¹ at each harmonic, and what it makes of displacements and velocities on the right.
+    dynamic = s[:, None, None] * modes.damping.astype(complex)
+    index = np.arange(k)
+    dynamic[:, index, index] += s[:, None] ** 2 + modes.squares
+    inverse = np.linalg.inv(dynamic)
+    drag = modes.damping + s[:, None, None] * np.eye(k)
+    from_u, from_v = -inverse @ drag, -inverse  # (l, k, k): displacement that they leave without contact forces
+    value = rows @ inverse @ rows.T
+    r = len(rows)
+    matrix = np.eye(r * length, dtype=complex) - of_force - _times(of_motion, value)
+    matrix -= _times(of_speed, s[:, None, None] * value)
+    at_u, at_v = rows @ from_u, rows @ from_v
+    pulled_u = _times(of_motion, at_u) + _times(of_speed, s[:, None, None] * at_u + rows)
+    pulled_v = _times(of_motion, at_v) + _times(of_speed, s[:, None, None] * at_v)
+    forces = np.linalg.solve(matrix, np.hstack([pulled_u, pulled_v]))
+    moved = _blocks(inverse @ rows.T) @ forces
+    moved[:, : k * length] += _blocks(from_u)
+    moved[:, k * length :] += _blocks(from_v)
+    speeds = np.repeat(s, k)[:, None] * moved
+    speeds[:, : k * length] += np.eye(k * length)
+    roots, vectors = np.linalg.eig(np.vstack([moved, speeds]))
+    kept = np.abs(roots) > 1e-12 / at.omega
+    exponents: ComplexArray = (shift + 1.0 / roots[kept]).astype(complex)
+    vectors = vectors[:, kept]
+    sizes = np.abs(vectors[: k * length].reshape(length, k, -1)) ** 2
+    weights = np.maximum(sizes.sum(axis=1), 1e-300)
+    centres = (np.arange(-h, h + 1)[:, None] * weights).sum(axis=0) / weights.sum(axis=0)
+    return _without_own(_chosen(exponents, centres, 2 * np.pi / at.omega, 2 * k))
+
+
+def _chosen(exponents: ComplexArray, centres: Array, period: float, count: int) -> ComplexArray:
+    """The ``count`` largest multipliers of roots with central series, each exponent once. What has no such root has
+    died out within a period: sticking takes a motion beside the cycle away."""
+    angles = exponents.imag * period
+    multipliers = np.exp(np.minimum(exponents.real * period, 300.0) + 1j * angles)
+    central = np.flatnonzero((np.abs(centres) < CENTRAL) & (np.abs(angles) <= (1.0 + EDGE) * np.pi))
+    central = central[np.argsort(-np.abs(multipliers[central]), kind="stable")]
+
+    def copies(j: int, of: complex, among: list[int] | IntArray) -> bool:
+        """Whether one of a root's copies, displaced by jω, is among some."""
+        return any(
+            abs(of - multipliers[k]) <= ALIKE * abs(of) and APART < abs(centres[j] - centres[k]) < 2.0 - APART
+            for k in among if k != j
+        )  # fmt: skip
+
+    found: list[int] = []
+    values: list[complex] = []
+    for j in central:
+        here = complex(multipliers[j])
+        # A negative multiplier has its two copies at ±jω/2, which need not be displaced by all of jω then.
+        halved = abs(angles[j]) > (1.0 - EDGE) * np.pi and not copies(j, here, central) and (
+            copies(j, here.conjugate(), central)
+        )
+        if copies(j, here, found) or (halved and copies(j, here.conjugate(), found)):
+            continue
+        found.append(int(j))
+        values.append(-abs(here) if halved else here)
+    values = values[:count]
+    return np.array(values + [0.0] * (count - len(values)), dtype=complex)
+
+
+def _without_own(found: ComplexArray) -> ComplexArray:
+    rest = np.delete(found, int(np.argmin(np.abs(found - 1.0))))
+    return rest[np.argsort(-np.abs(rest), kind="stable")]
+
+
+def _toeplitz(cycle: Balanced) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """How forces change with z, r and ṙ (l r, l r), harmonic by harmonic."""
+    at, family = cycle.at, cycle.family
+    m, d, r = family.count, family.directions, len(at.z)
+    length = at.base.length
+    of_force, of_motion, of_speed = (np.zeros((length, r, length, r), dtype=complex) for _ in range(3))
+    phases = 2 * np.pi * np.arange(FINER * at.base.samples) / (FINER * at.base.samples)
+    speed = at.omega * at.motion @ at.base.turn.T
+    applied = applied_at(family, at.base.at(phases), at.z, at.motion, speed, at.mu, at.scales)
+    gap = applied.by_gap - family.spring[:, None] * applied.by_force
+    for i in range(m):
+        edges = _edges(applied.touch[i], applied.beyond[i])
+
+        def spread(values: Array, edges: tuple[IntArray, Array] = edges) -> ComplexArray:
+            return _spread(values, edges, length)
+
+        of_force[:, i, :, i], of_motion[:, i, :, i] = spread(applied.by_force[i]), spread(gap[i] + family.spring[i])
+        for a in range(d):
+            row = m + i * d + a
+            of_force[:, row, :, i] = spread(applied.by_normal[i, a] * applied.by_force[i])
+            of_motion[:, row, :, i] = spread(applied.by_normal[i, a] * gap[i])
+            for b in range(d):
+                pull = spread(applied.by_pull[i, a, b])
+                of_force[:, row, :, m + i * d + b] = pull
+                of_speed[:, row, :, m + i * d + b] = -at.scales.rub[i] * pull
+    for q in range(family.springs):
+        row = m * (1 + d) + q
+        of_motion[:, row, :, row] = _spread(applied.by_stretch[q], (np.zeros(0, dtype=np.int64), np.zeros(0)), length)
+    return tuple(a.reshape(length * r, length * r) for a in (of_force, of_motion, of_speed))  # type: ignore[return-value]
+
+
+def _edges(touch: Array, beyond: Array) -> tuple[IntArray, Array]:
+    """Between which times (e,) and the next a number changes sign, and at which share (e,) of the time between."""
+    found: dict[int, float] = {}
+    for number in (beyond, touch):
+        following = np.roll(number, -1)
+        for n in np.flatnonzero((number > 0.0) != (following > 0.0)):
+            found[int(n)] = float(number[n] / (number[n] - following[n]))
+    return np.array(list(found), dtype=np.int64), np.array(list(found.values()))
+
+
+def _spread(values: Array, edges: tuple[IntArray, Array], length: int) -> ComplexArray:
+    """Toeplitz' matrix (l, l) of what multiplies in time, and jumps at the edges."""
+    at, share = edges
+    following = (at + 1) % len(values)
+    more = 0.5 * (share - 0.5) * (values[at] - values[following])
+    held = values.astype(float)
+    np.add.at(held, at, more)
+    np.add.at(held, following, more)
+    spectrum = np.fft.fft(held) / len(held)
+    return spectrum[np.subtract.outer(np.arange(length), np.arange(length))]
+
+
+def _blocks(parts: ComplexArray) -> ComplexArray:
+    """Block diagonal (l a, l b) of (l, a, b)."""
+    length, a, b = parts.shape
+    found = np.zeros((length, a, length, b), dtype=complex)
+    index = np.arange(length)
+    found[index, :, index, :] = parts
+    return found.reshape(length * a, length * b)
+
+
+def _times(matrix: ComplexArray, parts: ComplexArray) -> ComplexArray:
+    """(l r, l r) times the block diagonal of (l, r, b)."""
+    length, r, b = parts.shape
+    product = np.einsum("xma,mab->xmb", matrix.reshape(-1, length, r), parts)
+    return product.reshape(-1, length * b)

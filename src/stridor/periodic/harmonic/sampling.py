@@ -1,0 +1,138 @@
+"""What a cycle in harmonics looks like over one period."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...typing import Array, ComplexArray, IntArray
+from ..cycle import OPEN, SLIP, STICK, Change, Cycle
+from .balance import applied_at
+from .balanced import Balanced, defect
+from .hill import MOST, hill, hill_size
+
+SAMPLES = 512
+KEPT = 16  # of the multipliers
+ALONG, AGAINST = 2, 3  # slip, as a change tells it
+
+
+def sampled_series(cycle: Balanced, reached_from: str) -> Cycle:
+    """The cycle as data. Forces are those of the laws of contact and friction at the cycle's motion; what lasts
+    less than the period of the last harmonic is not told: a stick so short counts as slip that turns, slip so short
+    beside stick as stick."""
+    at, family = cycle.at, cycle.family
+    times = np.linspace(0.0, cycle.period, SAMPLES)
+    phases = 2 * np.pi * np.arange(at.base.samples) / at.base.samples
+    ways = _ways(cycle)
+    normal, friction, slip, gap, _ = _at(cycle, 2 * np.pi * times / cycle.period, ways)
+    fine = _at(cycle, phases, ways)
+    codes = np.stack([_settled(row, at.base.harmonics) for row in fine[4]])
+    shares = np.stack([np.mean(codes == kind, axis=1) for kind in (OPEN, STICK)], axis=1)
+    index = np.minimum((times / cycle.period * at.base.samples).astype(int), at.base.samples - 1)
+    status = np.where(codes >= ALONG, SLIP, codes)[:, index]
+    multipliers = hill(cycle)[:KEPT] if hill_size(cycle) <= MOST else np.zeros(0, dtype=complex)
+    displacement, velocity, acceleration = _watched(cycle, times)
+    return Cycle(
+        cycle.mu, cycle.period, cycle.residual, multipliers, _changes(codes, family.names, cycle.period), family.names,
+        tuple(family.system.points), times, normal.T, friction.T, slip.T, gap.T, status.T.astype(np.int64),
+        displacement, velocity, acceleration, np.column_stack([shares, 1.0 - shares.sum(axis=1)]),
+        np.stack([fine[2].min(axis=1), fine[2].max(axis=1)], axis=1),
+        np.stack([fine[0].min(axis=1), fine[0].max(axis=1)], axis=1), np.nan, 0, reached_from, "harmonic",
+        at.base.harmonics, defect(cycle), hill_size(cycle) <= MOST,
+    )  # fmt: skip
+
+
+def _ways(cycle: Balanced) -> Array:
+    """Directions (m, d) along which slip and friction are told: a point's tangent, a surface's steady slip."""
+    family = cycle.family
+    points = len(family.system.contacts)
+    ways = np.where(family.speed[:, None] > 0.0, family.slip / np.maximum(family.speed, 1e-300)[:, None], 0.0)
+    still = family.speed == 0.0
+    ways[still, 0] = 1.0
+    ways[:points] = 1.0
+    return ways
+
+
+def _at(cycle: Balanced, phases: Array, ways: Array) -> tuple[Array, Array, Array, Array, IntArray]:
+    """Normal force, friction, slip velocity, gap (m, n) and what each node does, 0 open, 1 stick, 2 slip along, 3
+    against."""
+    at, family = cycle.at, cycle.family
+    series, speed = at.base.at(phases), at.omega * at.motion @ at.base.turn.T
+    applied = applied_at(family, series, at.z, at.motion, speed, at.mu, at.scales)
+    gap, _, _ = family.split(at.motion @ series.T)
+    _, moving, _ = family.split(speed @ series.T)
+    slip = np.einsum("mdn,md->mn", moving + family.slip[:, :, None], ways)
+    friction = np.einsum("mdn,md->mn", applied.tangential, ways)
+    codes = np.where(applied.status == SLIP, np.where(slip >= 0.0, ALONG, AGAINST), applied.status)
+    return applied.normal, friction, slip, gap + family.nodes.gap[:, None], codes.astype(np.int64)
+
+
+def _settled(codes: IntArray, harmonics: int) -> IntArray:
+    """Without what is too short to be told by so many harmonics: slip beside a stick that is long enough is stick, and a
+    stick goes half to what is before and half to behind."""
+    found = codes.copy()
+    n = len(codes)
+    for slips in (True, False):
+        edges = np.flatnonzero(found != np.roll(found, 1))
+        if len(edges) < 2:
+            return found
+        told, lengths = found.copy(), (np.roll(edges, -1) - edges) % n
+        for k, first in enumerate(edges):
+            length, after = int(lengths[k]), (k + 1) % len(edges)
+            here, before, behind = told[first], told[first - 1], told[edges[after]]
+            if length * harmonics >= n or here == OPEN or (here == STICK) == slips:
+                continue
+            if slips:
+                beside = ((before, lengths[k - 1]), (behind, lengths[after]))
+                if not any(kind == STICK and lasting * harmonics >= n for kind, lasting in beside):
+                    continue
+                before = behind = STICK
+            elif OPEN in (before, behind):
+                before = behind = max(before, behind)
+            places = (first + np.arange(length)) % n
+            found[places[: length // 2]], found[places[length // 2 :]] = before, behind
+    return found
+
+
+def _changes(codes: IntArray, names: tuple[str, ...], period: float) -> tuple[Change, ...]:
+    n = codes.shape[1]
+    before = np.roll(codes, 1, axis=1)
+    found: list[Change] = []
+    for t, c in zip(*np.nonzero((codes != before).T), strict=True):
+        one, other = int(before[c, t]), int(codes[c, t])
+        what = "closes" if one == OPEN else {
+            OPEN: "opens", STICK: "stops", ALONG: "slips forward", AGAINST: "slips backward"
+        }[other]  # fmt: skip
+        found.append(Change(float(t) / n * period, names[c], what, tuple(int(b) for b in codes[:, t])))
+    return tuple(found)
+
+
+def coordinates(cycle: Balanced) -> ComplexArray:
+    """Amplitudes (h + 1, k) of the modes' coordinates."""
+    at, modes = cycle.at, cycle.family.condensed
+    s = 1j * at.omega * np.arange(at.base.harmonics + 1)
+    found = np.einsum("kij,kj->ki", modes.answers(s), at.base.complex_of(at.z))
+    found[0] += modes.load / modes.squares
+    return found
+
+
+def _watched(cycle: Balanced, times: Array) -> tuple[Array, Array, Array]:
+    """Displacement, velocity and acceleration (t, w, d) of the watched points."""
+    at, family, system = cycle.at, cycle.family, cycle.family.system
+    names, d = tuple(system.points), system.dimension
+    free = np.concatenate(
+        [np.zeros((0, family.condensed.size))]
+        + [np.asarray(system.points[name].free[:d] @ family.condensed.vectors) for name in names]
+    )
+    lift = np.concatenate([np.zeros((0, len(system.motion.names)))] + [system.points[n].lift[:d] for n in names])
+    amplitudes = coordinates(cycle) @ free.T
+    away = system.motion.full_distance
+    still = np.concatenate([np.zeros(0)] + [system.points[n].free[:d] @ (system.motion.lift @ away) for n in names])
+    rows, series = at.base.real_of(amplitudes), at.base.at(2 * np.pi * times / cycle.period)
+    first = at.omega * rows @ at.base.turn.T
+    moved, speed = lift @ away - still, lift @ family.motion
+    values = (
+        series @ rows.T + moved + np.outer(times, speed), series @ first.T + speed,
+        series @ (at.omega * first @ at.base.turn.T).T,
+    )  # fmt: skip
+    shape = (len(times), len(names), d)
+    return values[0].reshape(shape), values[1].reshape(shape), values[2].reshape(shape)
