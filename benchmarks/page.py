@@ -1,6 +1,8 @@
 """From a slider to the picture, in a real browser: how long until the branches of the moved case are on the screen.
 
-python benchmarks/page.py [--short] [--lever PATH …] [CASE.toml]
+python benchmarks/page.py [--short] [--process] [--lever PATH …] [CASE.toml]
+With --process no browser: the processor time that a move takes in the process that computes for the page, which says
+more where other programs run beside it.
 Of a large model, which has a reduced one over μ and the contact stiffness, --lever mu: others make that anew.
 Needs the extra app, playwright, and Chromium at /usr/bin/chromium; without them it says so and leaves.
 """
@@ -12,6 +14,7 @@ import statistics
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -32,9 +35,13 @@ MOVE = """([path, share]) => new Promise((done) => {
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--short", action="store_true", help="fewer moves")
+    parser.add_argument("--process", action="store_true", help="processor time in the page's process, no browser")
     parser.add_argument("--lever", action="append", default=[], help="its path (default: the first four)")
     parser.add_argument("case", nargs="*", help="a case file (default: the two beams)")
     args = parser.parse_args()
+    if args.process:
+        compute(args.case, 12 if args.short else 60, args.lever)
+        return
     if find_spec("nicegui") is None or find_spec("playwright") is None or not CHROMIUM.exists():
         print("no measurement: needs nicegui, playwright and /usr/bin/chromium")
         return
@@ -62,11 +69,53 @@ def measure(address: str, moves: int, levers: list[str]) -> None:
         paths: list[str] = page.evaluate("stridor.state.levers.map((lever) => lever.path)")
         for path in levers or paths[:4]:
             each = [moved(page, path, k / moves) for k in range(1, moves)]
-            ordered = sorted(each)
-            p95 = ordered[min(len(ordered) - 1, int(0.95 * len(ordered)))]
-            middle = statistics.median(each)
-            print(f"{path}: slider to picture, median {middle:.0f} ms, p95 {p95:.0f} ms ({len(each)} moves)")
+            print(f"{path}: slider to picture, {spread(each)}")
         browser.close()
+
+
+def spread(each: list[float]) -> str:
+    """Median and 95th percentile of times [ms]."""
+    ordered = sorted(each)
+    p95 = ordered[min(len(ordered) - 1, int(0.95 * len(ordered)))]
+    return f"median {statistics.median(each):.0f} ms, p95 {p95:.0f} ms ({len(each)} moves)"
+
+
+class Enough(BaseException):
+    """The picture is there; what comes then is for when nothing moves."""
+
+
+def compute(case: list[str], moves: int, levers: list[str]) -> None:
+    """The same moves, asked of what the page's process runs."""
+    from stridor.app.page import source_of
+    from stridor.app.page.bench import bench
+    from stridor.app.page.levers import levers as levers_of
+    from stridor.app.page.state import State, checked, first_state
+    from stridor.app.page.worker import IDLE
+
+    def send(part: str, _: object) -> None:
+        if part == IDLE:
+            raise Enough
+
+    answer = bench()
+
+    def asked(state: State) -> float:
+        began = time.process_time()
+        with suppress(Enough):
+            answer(state, send)
+        return 1e3 * (time.process_time() - began)
+
+    first = first_state(source_of(case[0] if case else None))
+    known = {lever.path: lever for lever in levers_of(checked(first.source))}
+    asked(first)
+    for path in levers or list(known)[:3]:
+        lever = known[path]
+        each: list[float] = []
+        for k in range(moves):
+            share = 0.4 + 0.2 * k / moves
+            low, high = lever.low, lever.high
+            value = low * (high / low) ** share if lever.scale == "log" else low + (high - low) * share
+            each.append(asked(first.with_change(path, value)))
+        print(f"{path}: processor time of a move, {spread(each[1:])}")
 
 
 def moved(page: Any, path: str, turn: float) -> float:

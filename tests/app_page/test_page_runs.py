@@ -83,6 +83,19 @@ def gone(process: Any) -> bool:
     return not process.is_alive()
 
 
+
+def test_what_has_not_begun_to_listen_is_stopped_at_once(start: Callable[..., tuple[Run, Told]]) -> None:
+    """A process that is being made takes seconds, on a busy computer many."""
+    run, told = start(ENDLESS)
+    told.wait("begun")
+    asked = time.monotonic()
+    run.stop()
+    assert told.wait("stopped") == {"sentence": "stopped before anything was computed", "file": None}
+    assert time.monotonic() - asked < 0.5
+    assert run.over
+    assert gone(run.process)
+    assert told.names == ["begun", "stopped"]
+
 def test_a_run_from_its_wish_to_its_end(start) -> None:
     run, told = start(SHORT)
     end = told.wait("done")

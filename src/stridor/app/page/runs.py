@@ -98,7 +98,7 @@ class Run:
         self._process: Any = None
         self._pipe: Any = None
         self._lock, self._end = threading.Lock(), threading.Lock()
-        self.over = False
+        self._spoken = self.over = False
         self._queue.add(self)
 
     @property
@@ -130,6 +130,10 @@ class Run:
         if self._process is None:
             self.told("stopped", {"sentence": "stopped before its turn", "file": None})
             self._ended()
+        elif not self._spoken:  # a process that is being made hears nothing, on a busy computer for many seconds
+            self.told("stopped", {"sentence": "stopped before anything was computed", "file": None})
+            self.close()
+            threading.Thread(target=self.end, name="stridor-run-end").start()
         else:
             self._ask(("stop", None))
 
@@ -165,6 +169,7 @@ class Run:
                 last, content = pipe.recv()
             except (EOFError, OSError, TypeError):  # TypeError: closed while it was being read
                 break
+            self._spoken = True
             self.told(last, content)
             if last in ENDS:
                 self._ended()  # the next may begin: what is left of the process is its own end

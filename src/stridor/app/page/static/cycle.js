@@ -2,7 +2,7 @@
 // Limit cycles at one friction coefficient: a row for each as it is found, and one period of the chosen one.
 const stridorCycle = (() => {
   const $ = (id) => document.getElementById(id);
-  const { text, clear, shown, axes, round, title, strips, length } = stridorRun.tools;
+  const { text, clear, shown, axes, round, title, legend, strips, length } = stridorRun.tools;
   const page = { charts: {}, colours: {}, mu: null, cycles: [], chosen: 0, contact: 0 };
   const chartOf = (name) => getElement(page.charts[name])?.chart;
   const element = (name, attributes = {}, ...content) => {
@@ -63,7 +63,6 @@ const stridorCycle = (() => {
       return { type: "rect", shape: { x: a, y: box.y, width: b - a, height: box.height }, style: { fill: strips()[kind] } };
     },
   }));
-  const legend = (data) => ({ right: 12, top: 0, icon: "rect", itemWidth: 10, itemHeight: 10, data, selectedMode: false, textStyle: { color: text(), fontSize: 10 } });
   const ends = (...histories) => { const all = histories.flat(); return { min: Math.min(0, ...all), max: Math.max(0, ...all) }; };
   function draw() {
     const c = page.cycles[page.chosen];

@@ -157,10 +157,10 @@ const stridor = (() => {
       ];
       chart.setOption({
         animation: false, backgroundColor: "transparent",
-        grid: { left: 72, right: 16, top: 10, bottom: 36, outerBoundsMode: "none" },
+        grid: { left: 80, right: 16, top: 10, bottom: 36, outerBoundsMode: "none" },
         xAxis: { type: "value", min: state.low, max: state.high, name: "friction coefficient μ", nameLocation: "middle", nameGap: 22, nameTextStyle: { color: p.text },
           axisLabel: { color: p.text }, axisLine: { lineStyle: { color: p.line } }, splitLine: { lineStyle: { color: p.grid } } },
-        yAxis: { type: "value", name: axis, nameLocation: "middle", nameGap: 52, min: name === "frequency" ? 0 : null, nameTextStyle: { color: p.text },
+        yAxis: { type: "value", name: axis, nameLocation: "middle", nameGap: 60, min: name === "frequency" ? 0 : null, nameTextStyle: { color: p.text },
           axisLabel: { color: p.text, formatter: (v) => shown(v) }, axisLine: { show: true, lineStyle: { color: p.line } }, splitLine: { lineStyle: { color: p.grid } } },
         series,
       });

@@ -45,6 +45,7 @@ const stridorRun = (() => {
     const interval = power * [1, 2, 2.5, 5, 10].find((k) => size / (k * power) <= 4);
     return { min: interval * Math.floor(r.min / interval), max: interval * Math.ceil(r.max / interval), interval, scale: false };
   }
+  const legend = (data) => ({ right: 12, top: 0, icon: "rect", itemWidth: 10, itemHeight: 10, data, selectedMode: false, textStyle: { color: text(), fontSize: 10 } });
   const title = (words) => ({ text: words, left: 58, top: 2, textStyle: { fontSize: 11, fontWeight: 600, color: text() } });
 
   function draw() {
@@ -59,7 +60,7 @@ const stridorRun = (() => {
     }
     if (p.normal_force.length) {
       const n = p.normal_force[0], t = p.tangential_force[0], o = axes(false, "N"), r = scale([n, t]);
-      put("force", { ...o, title: title(`contact ${n.label}: normal and tangential force`), yAxis: { ...o.yAxis, ...round(r) },
+      put("force", { ...o, title: title(`contact ${n.label}: forces`), legend: legend(["normal", "tangential"]), yAxis: { ...o.yAxis, ...round(r) },
         series: [{ ...band("n", "normal", n, clear(page.colours.normal, "#5CB3E6")), markLine: phases(p) }, band("t", "tangential", t, clear(page.colours.tangential, "#FF8A4C"))] },
         `Forces at contact ${n.label} ${until}: normal from ${shown(Math.min(...n.low))} to ${shown(Math.max(...n.high))} N, tangential from ${shown(Math.min(...t.low))} to ${shown(Math.max(...t.high))} N.`);
       status(p, n.label);
@@ -76,7 +77,7 @@ const stridorRun = (() => {
     const mean = names.map((_, k) => shares[k].reduce((a, b) => a + b, 0) / t.length);
     const colours = strips();
     put("status", { ...o, grid: { ...o.grid, top: 20, bottom: 30 }, title: title(`contact ${contact}`),
-      legend: { right: 12, top: 0, icon: "rect", itemWidth: 10, itemHeight: 10, data: names, selectedMode: false, textStyle: { color: text(), fontSize: 10 } },
+      legend: legend(names),
       yAxis: { ...o.yAxis, min: 0, max: 1, scale: false, show: false },
       series: names.map((name, k) => ({ id: name, name, type: "line", stack: "s", silent: true, showSymbol: false, lineStyle: { width: 0 }, itemStyle: { color: colours[name] }, areaStyle: { color: colours[name], opacity: 1 }, data: t.map((x, i) => [x, shares[k][i]]) })) },
       `Contact ${contact} over the run so far: ${names.map((n, k) => `${(100 * mean[k]).toFixed(0)} % ${n}`).join(", ")}.`);
@@ -204,6 +205,6 @@ const stridorRun = (() => {
   };
   setTimeout(hello, 0);
   // What the limit cycles below are drawn with, too.
-  const tools = { text, clear, shown, axes, round, title, strips, length };
+  const tools = { text, clear, shown, axes, round, title, legend, strips, length };
   return { page, start, show, begin, stale, tools };
 })();
