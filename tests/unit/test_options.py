@@ -187,6 +187,22 @@ def test_a_verb_goes_by_the_name_that_is_typed(folder: Path, monkeypatch: pytest
     assert seen == ["damping-map"]
 
 
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    "words", ["modes --mu abc", "modes --band 1:0", "shapes --band 1:0", "onsets --band 1:0", "onsets --range 1:0",
+              "sensitivities --mu 0:1:2", "countermeasures --branch 1 --branch 2", "steady --mu abc"]
+)  # fmt: skip
+def test_wrong_values_are_told_before_a_model_is_built(folder: Path, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def build(*_: object) -> None:
+        raise AssertionError("built a model before it looked at the options")
+
+    monkeypatch.setattr("stridor.study.workspace.build_system", build)
+    verb, *more = words.split()
+    # A setting of which the case alone does not say whether it has an effect.
+    done = stridor(verb, "two-beams.toml", *more, "--set", "modal.friction_damping=true", cwd=folder)
+    assert done.returncode == 2, done.stderr
+
+
 @pytest.mark.parametrize("verb", READING)
 def test_what_was_computed_before_has_no_case_to_change(verb: str) -> None:
     assert {"--set", "--solver"} & set(VERBS[verb]) == set()

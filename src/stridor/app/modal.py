@@ -45,7 +45,7 @@ def steady(call: Call, mu: Mu = None) -> None:
         return
     from .show import show_steady
 
-    call.warn(call.idle)
+    call.warn_of_idle()
     show_steady(document)
     call.suggest("modes", *(() if mu is None else ("--mu", mu)))
 
@@ -184,8 +184,9 @@ def onsets(
 
     said = "--range" if along is None else "--between"
     chosen = None if friction_range is None else call.range_of_friction(friction_range, said)
+    asked = band_of(band, loaded.modal.max_frequency_hz)
     call.warn(resolution_warnings(loaded))
-    result = analyses.onsets(work, chosen, band_hz=band_of(band, loaded.modal.max_frequency_hz))
+    result = analyses.onsets(work, chosen, band_hz=asked)
     call.keep(result, "onsets.nc")
     call.tabulate(result, "onsets.csv")
     if call.json:

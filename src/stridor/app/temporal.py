@@ -193,7 +193,7 @@ def compare(
     else:
         from .show import show_agreement
 
-        call.warn(call.idle)
+        call.warn_of_idle()
         show_agreement(result.to_json())
         if not result.interrupted:
             call.suggest("run")
@@ -270,7 +270,7 @@ def _told(call: Call, outcome: Outcome, work: Workspace) -> None:
                 call.say(f"note: {note}")
         if outcome.everything.unsaturated is not None:
             call.say("note: the full run is too short, its vibration still grows; the report says how to go on")
-        call.warn(call.idle)
+        call.warn_of_idle()
         if outcome.report is not None:
             stdout.print(f"report: {outcome.report}")
         stdout.print(outcome.verdict)
