@@ -159,6 +159,12 @@ def test_a_damaged_chunk_is_named(store: Path) -> None:
         st.open_study(store)
 
 
+def test_a_folder_without_a_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(CaseError, match=r"^\.: not the store of a study: give study.zarr, or the folder that it is in$"):
+        st.open_study(".")
+
+
 @pytest.mark.parametrize("content", ["", "{", '{"zarr_format": 3, "node_type": "group", "attributes": {}}'])
 def test_folders_that_are_no_store(tmp_path: Path, content: str) -> None:
     (tmp_path / "study.zarr").mkdir()

@@ -114,6 +114,12 @@ def test_a_band_goes_with_the_other_options_of_modes(folder: Path) -> None:
     assert "1 more unstable outside of it, up to 40000 Hz" in " ".join(said.split())
 
 
+def test_a_band_without_modes_is_told_as_one(folder: Path) -> None:
+    said = stridor("modes", "two-beams.toml", "--max-frequency", "3", cwd=folder).stdout
+    assert "no mode up to 3 Hz at μ = 0.1" in " ".join(said.split())
+    assert "0 modes" not in said.splitlines()[-2]
+
+
 def test_bands_of_onsets_shapes_and_sensitivities(folder: Path) -> None:
     found = run(folder, "onsets", "--band", "1000:9000", "--range", "0:0.9")
     assert [round(o["frequency_hz"]) for o in found["onsets"]] == [8635, 3620]

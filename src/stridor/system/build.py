@@ -13,7 +13,7 @@ from ..case.bodies import MassBody, SolidBody
 from ..case.points import BoundaryRef
 from ..case.schema import Load, SteadyStep
 from ..contact.interface import Rows
-from ..errors import CaseError
+from ..errors import CaseError, kind_of
 from ..fe.assembly import beside
 from ..fe.solid import stress_stiffness
 from ..mesh.boundary import require_boundary
@@ -44,7 +44,7 @@ def build_system(case: Case | str | PathLike[str], mu: float | None = None) -> S
         case = load(case)
     if not isinstance(case, Case):  # pyright: ignore[reportUnnecessaryIsInstance]
         accepted = "a case or the path of its file; the system of a workspace is work.system()"
-        raise CaseError("case", f"a {type(case).__name__}", accepted)
+        raise CaseError("case", kind_of(case), accepted)
     stage("matrices of the bodies")
     bodies = build_bodies(case, mu)
     total = sum(body.size for body in bodies.values())
