@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import inspect
 import json
+import re
 import typing
 from pathlib import Path
 
@@ -207,6 +208,18 @@ def test_wrong_values_are_told_before_a_model_is_built(folder: Path, words: str,
     # A setting of which the case alone does not say whether it has an effect.
     done = stridor(verb, "two-beams.toml", *more, "--set", "modal.friction_damping=true", cwd=folder)
     assert done.returncode == 2, done.stderr
+
+
+@pytest.mark.parametrize("verb", sorted(set(VERBS) - {"cycles", "app"}))
+def test_what_options_take_has_a_name(verb: str) -> None:
+    nameless = [n for n, (kind, told, _) in VERBS[verb].items() if "bool" not in str(kind) and not told.metavar]
+    assert nameless == []
+
+
+@pytest.mark.parametrize("name", ["--mu", "--out", "--x", "--y", "--method"])
+def test_help_speaks_of_no_verb_that_it_does_not_stand_with(name: str) -> None:
+    told = next(own[name][1].help for own in VERBS.values() if name in own)
+    assert not set(re.findall(r"[a-z-]+", told)) & set(VERBS)
 
 
 @pytest.mark.parametrize("verb", READING)

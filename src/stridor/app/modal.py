@@ -92,6 +92,7 @@ def modes(
         int | None,
         typer.Option(
             "--count",
+            metavar="N",
             min=1,
             help="How many branches; unstable ones come on top [default: modal.modes, with --band all of it].",
         ),
