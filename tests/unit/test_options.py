@@ -95,6 +95,7 @@ def test_a_band_of_modes_is_said_to_be_one_wherever_they_are_written(folder: Pat
     assert found["max_frequency_hz"] == 20e3
     rows = list(csv.DictReader((folder / "two-beams.out" / "modes.csv").open(encoding="utf-8")))
     assert [r["branch"] for r in rows] == ["7", "9", "10"]
+    assert (folder / "two-beams.out" / "modes.png").stat().st_size > 5000
     assert {(r["band_low_hz"], r["band_high_hz"]) for r in rows} == {("5000.0", "8641.05")}
     data = st.open(folder / "two-beams.out" / "modes.nc")
     assert data.attrs["band_hz"].tolist() == [5000.0, 8641.05]

@@ -110,6 +110,7 @@ def modes(
 
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
+    from ..view.modal_plots import frequency_branches, root_locus
     from .conclusions import of_modes
     from .output import counting
     from .show_modes import show_modes
@@ -124,6 +125,8 @@ def modes(
         result = analyses.modes(work, values, count=count, band_hz=chosen, progress=progress)
     call.keep(result, "modes.nc")
     call.tabulate(result, "modes.csv")
+    if len(result.branch):
+        call.draw(frequency_branches(result) if len(result.mu) > 1 else root_locus(result), "modes.png")
     if result.interrupted:
         call.say(f"interrupted: {len(result.mu)} of {result.planned} friction coefficients, which are kept")
     if call.json:
