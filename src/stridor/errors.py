@@ -82,6 +82,12 @@ class CaseError(StridorError):
         return CaseError.many, (self.problems,)
 
 
+def kind_of(value: object) -> str:
+    """What a value is, in words: "an int", "a list"."""
+    name = type(value).__name__
+    return f"{'an' if name[0] in 'aeiouAEIO' else 'a'} {name}"
+
+
 def shown(value: object) -> str:
     """The value as it reads in a case file, on one line, shortened to about 60 characters."""
     text = _written(value)

@@ -42,6 +42,14 @@ def test_what_is_none_is_refused_by_its_name(call: Callable[[], Any], said: str)
     assert str(raised.value) == said
 
 
+@pytest.mark.parametrize(
+    "draw", [st.plot.root_locus, st.plot.frequency_branches, st.plot.growth_branches, st.plot.damping_branches]
+)
+def test_figures_of_modes_take_nothing_else(draw: Callable[..., Any]) -> None:
+    with pytest.raises(st.CaseError, match=r"^modes: 'an Onsets' – complex modes, of st\.modes\(case, mu\)$"):
+        draw(st.onsets(CASE, (0.0, 1.0)))
+
+
 def test_one_name_may_stand_without_a_list() -> None:
     many = st.sensitivities(CASE, ["mu"], mu=1.2)
     assert st.sensitivities(CASE, "mu", mu=1.2).to_json() == many.to_json()

@@ -105,7 +105,8 @@ def test_parts_that_are_none(tmp_path: Path, case: st.Case, part: str) -> None:
     (tmp_path / "study.toml").write_text("", encoding="utf-8")
     done = stridor("study", "study.toml", "--part", part, cwd=tmp_path)
     assert done.returncode == 2
-    assert "NUMBER/COUNT" in done.stderr
+    assert ", such as 3/40" in done.stderr
+    assert "K/N" in done.stderr
 
 
 @pytest.fixture(scope="module")
@@ -157,6 +158,12 @@ def test_a_damaged_chunk_is_named(store: Path) -> None:
     chunk.write_bytes(bytes(content))
     with pytest.raises(CaseError, match="a chunk of growth_rate is damaged"):
         st.open_study(store)
+
+
+def test_a_folder_without_a_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(CaseError, match=r"^\.: not the store of a study: give study.zarr, or the folder that it is in$"):
+        st.open_study(".")
 
 
 @pytest.mark.parametrize("content", ["", "{", '{"zarr_format": 3, "node_type": "group", "attributes": {}}'])

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from stridor.errors import CaseError
 from stridor.mesh import shapes
-from stridor.mesh.files import read_mesh, require_boundary, require_nodes
+from stridor.mesh.files import read_mesh, require_boundary
 from stridor.mesh.quality import check_mesh
 
 # Two unit quadrilaterals side by side, the right one numbered clockwise as Gmsh does for a surface whose normal points
@@ -270,11 +270,8 @@ def test_unknown_boundaries_are_told_with_those_there_are(two_quads):
         "contacts.A.slave: 'tip' – a set of 1 nodes that holds no whole side of a cell on the surface; a contact or a "
         "pressure needs a boundary; two.msh has: bottom side, left, tip, middle"
     )
-    assert message(lambda: require_nodes(mesh, "xyz", "supports.a.at")) == (
-        "supports.a.at: 'xyz' – no such boundary or node set; two.msh has: bottom side, left, tip, middle"
-    )
-    assert require_nodes(mesh, "tip", "x").tolist() == mesh.node_sets["tip"].tolist()
-    assert require_nodes(mesh, "left", "x").tolist() == [0, 3]
+    assert mesh.boundary_nodes("tip").tolist() == mesh.node_sets["tip"].tolist()
+    assert mesh.boundary_nodes("left").tolist() == [0, 3]
 
 
 def test_files_that_are_not_there_or_not_files(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import inspect
 import json
+import re
 import typing
 from pathlib import Path
 
@@ -94,6 +95,7 @@ def test_a_band_of_modes_is_said_to_be_one_wherever_they_are_written(folder: Pat
     assert found["max_frequency_hz"] == 20e3
     rows = list(csv.DictReader((folder / "two-beams.out" / "modes.csv").open(encoding="utf-8")))
     assert [r["branch"] for r in rows] == ["7", "9", "10"]
+    assert (folder / "two-beams.out" / "modes.png").stat().st_size > 5000
     assert {(r["band_low_hz"], r["band_high_hz"]) for r in rows} == {("5000.0", "8641.05")}
     data = st.open(folder / "two-beams.out" / "modes.nc")
     assert data.attrs["band_hz"].tolist() == [5000.0, 8641.05]
@@ -112,6 +114,12 @@ def test_a_band_goes_with_the_other_options_of_modes(folder: Path) -> None:
     said = stridor("modes", "two-beams.toml", "--band", "100:5000", cwd=folder).stdout
     assert "all 6 modes from 100 to 5000 Hz listed; 0 unstable" in " ".join(said.split())
     assert "1 more unstable outside of it, up to 40000 Hz" in " ".join(said.split())
+
+
+def test_a_band_without_modes_is_told_as_one(folder: Path) -> None:
+    said = stridor("modes", "two-beams.toml", "--max-frequency", "3", cwd=folder).stdout
+    assert "no mode up to 3 Hz at μ = 0.1" in " ".join(said.split())
+    assert "0 modes" not in said.splitlines()[-2]
 
 
 def test_bands_of_onsets_shapes_and_sensitivities(folder: Path) -> None:
@@ -185,6 +193,34 @@ def test_a_verb_goes_by_the_name_that_is_typed(folder: Path, monkeypatch: pytest
     ranges = ("--x", "a", "--y", "b", "--x-range", "1:2", "--y-range", "1:2")
     assert stridor("damping-map", "none.toml", *ranges, cwd=folder).returncode == 2
     assert seen == ["damping-map"]
+
+
+@pytest.mark.bad_input
+@pytest.mark.parametrize(
+    "words", ["modes --mu abc", "modes --band 1:0", "shapes --band 1:0", "onsets --band 1:0", "onsets --range 1:0",
+              "sensitivities --mu 0:1:2", "countermeasures --branch 1 --branch 2", "steady --mu abc"]
+)  # fmt: skip
+def test_wrong_values_are_told_before_a_model_is_built(folder: Path, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def build(*_: object) -> None:
+        raise AssertionError("built a model before it looked at the options")
+
+    monkeypatch.setattr("stridor.study.workspace.build_system", build)
+    verb, *more = words.split()
+    # A setting of which the case alone does not say whether it has an effect.
+    done = stridor(verb, "two-beams.toml", *more, "--set", "modal.friction_damping=true", cwd=folder)
+    assert done.returncode == 2, done.stderr
+
+
+@pytest.mark.parametrize("verb", sorted(set(VERBS) - {"cycles", "app"}))
+def test_what_options_take_has_a_name(verb: str) -> None:
+    nameless = [n for n, (kind, told, _) in VERBS[verb].items() if "bool" not in str(kind) and not told.metavar]
+    assert nameless == []
+
+
+@pytest.mark.parametrize("name", ["--mu", "--out", "--x", "--y", "--method"])
+def test_help_speaks_of_no_verb_that_it_does_not_stand_with(name: str) -> None:
+    told = next(own[name][1].help for own in VERBS.values() if name in own)
+    assert not set(re.findall(r"[a-z-]+", told)) & set(VERBS)
 
 
 @pytest.mark.parametrize("verb", READING)

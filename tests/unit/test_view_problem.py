@@ -67,7 +67,7 @@ def test_what_is_no_mode_is_told() -> None:
     modes = st.modes(case, 0.1)
     for branch, said in (
         (modes[0], 'branch: the mode has no vector: ask for modes with vectors="right"'),
-        (8, "branch: 'a int' – a mode: an item of st.modes(…, vectors=\"right\"), such as modes[0]"),
+        (8, "branch: 'an int' – a mode: an item of st.modes(…, vectors=\"right\"), such as modes[0]"),
     ):
         with pytest.raises(st.CaseError) as told:
             st.plot.animate(case, branch)

@@ -71,7 +71,9 @@ def check(call: Call) -> None:
 @verb(CaseOrMatrix, writes=False)
 def matrices(
     call: Call,
-    name: Annotated[str | None, typer.Option("--name", help="Which matrix of a file that holds several.")] = None,
+    name: Annotated[
+        str | None, typer.Option("--name", metavar="NAME", help="Which matrix of a file that holds several.")
+    ] = None,
 ) -> None:
     """What imported matrices are like: symmetry, definiteness, units, friction terms that got lost.
 

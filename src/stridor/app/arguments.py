@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Concatenate, ParamSpec
 
@@ -42,7 +42,8 @@ class Call:
     """What every verb is called with: the file it is about, what is to be changed, where results go and who reads them.
 
     solver: the one for everything that the program factorises, whatever case and environment say. told: warnings so
-    far, each of which is said once; idle: settings without effect on what the verb computes, told with its results.
+    far, each of which is said once; idle: finds settings without effect on what the verb computes, which are told with
+    its results, for it may take the model.
     asked: options that stand for settings of the case, as they were given.
     """
 
@@ -54,7 +55,7 @@ class Call:
     quiet: bool
     told: list[str] = field(default_factory=list[str])
     verb: str = ""
-    idle: list[str] = field(default_factory=list[str])
+    idle: list[Callable[[], list[str]]] = field(default_factory=list[Callable[[], list[str]]])
     asked: list[tuple[str, ...]] = field(default_factory=list[tuple[str, ...]])
     writes: bool = True
     parts: tuple[str, ...] = ()
@@ -111,7 +112,7 @@ class Call:
         from ..study.workspace import Workspace
 
         work = Workspace(case)
-        self.idle[:] = self._without_effect(work)
+        self.idle[:] = [partial(self._without_effect, work)]
         self.claim()
         return work
 
@@ -132,11 +133,16 @@ class Call:
                 self.told.append(warning)
                 self.say(f"warning: {warning}")
 
+    def warn_of_idle(self) -> None:
+        """Say which settings had no effect."""
+        while self.idle:
+            self.warn(self.idle.pop()())
+
     def document(self, document: dict[str, Any]) -> None:
         """Print the JSON document of a verb, with a list ``warnings`` of all that was warned of."""
         from .output import print_json
 
-        self.warn(self.idle)
+        self.warn_of_idle()
         own = [w for w in document.get("warnings", ()) if w not in self.told]
         print_json({**document, "warnings": [*self.told, *own]})
 
@@ -182,7 +188,7 @@ class Call:
         """The last lines on stdout: the result in a sentence and, unless quiet, the command that comes next."""
         from .output import stdout
 
-        self.warn(self.idle)
+        self.warn_of_idle()
         if found.sentence:
             stdout.print(found.sentence)
         if found.verb:
@@ -334,7 +340,7 @@ def verb(
                     function(call, **given)  # type: ignore[call-arg]
                 except CaseError as error:
                     raise by_option(error, options, as_given) from error
-            call.warn(call.idle)
+            call.warn_of_idle()
             interrupts.check()
 
         order = (case.replace(annotation=file), *own, *common)

@@ -26,13 +26,18 @@ def boundary(
     x_range: XRange,
     y_range: YRange,
     method: Method = "auto",
-    lines: Annotated[int, typer.Option("--lines", help="Values of each number at which onsets are sought.")] = 5,
+    lines: Annotated[
+        int, typer.Option("--lines", metavar="N", help="Values of each number at which onsets are sought.")
+    ] = 5,
     tolerance: Annotated[
-        float, typer.Option("--tolerance", help="How far curves may be off between their points, of the ranges.")
+        float,
+        typer.Option(
+            "--tolerance", metavar="SHARE", help="How far curves may be off between their points, of the ranges."
+        ),
     ] = 1e-3,
     max_frequency: MaxFrequency = None,
 ) -> None:
-    """Where modes begin to grow over two numbers, traced without a grid."""
+    """Where modes begin to grow over two numbers, one of which may be mu, traced without a grid."""
     loaded = call.workspace(max_frequency=max_frequency)
 
     from ..study.boundary import stability_boundary as solve

@@ -27,6 +27,9 @@ def fastest(frequency_hz: float, growth: float) -> str:
 
 
 def _is_are(count: int, of: str) -> str:
+    """How many of so many modes are unstable; of: their number, and where."""
+    if of.startswith("0 modes"):
+        return f"no mode{of.removeprefix('0 modes')}"
     return f"{count or 'none'} of {of} {'are' if count > 1 else 'is'} unstable"
 
 

@@ -27,7 +27,7 @@ def damping_map(
     y: Y,
     x_range: XRange,
     y_range: YRange,
-    points: Annotated[int, typer.Option("--points", help="Points along each.")] = 9,
+    points: Annotated[int, typer.Option("--points", metavar="N", help="Points along each.")] = 9,
     method: Method = "auto",
     friction_range: Range = None,
     max_frequency: MaxFrequency = None,

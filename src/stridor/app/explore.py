@@ -58,7 +58,9 @@ def countermeasures(
     mu: Mu = None,
     branch: Branch = None,
     parameter: Parameter = None,
-    percent: Annotated[float, typer.Option("--percent", help="Size of the change that is predicted.")] = 5.0,
+    percent: Annotated[
+        float, typer.Option("--percent", metavar="PERCENT", help="Size of the change that is predicted.")
+    ] = 5.0,
     verify: Annotated[
         int, typer.Option("--verify", metavar="N", min=0, help="How many of the best are solved again.")
     ] = 3,
@@ -79,9 +81,7 @@ def countermeasures(
 
     target: Any = branch[0] if branch else "sum"
     friction = call.one_friction(mu)
-    result = rank_countermeasures(
-        work, mu=friction, target=target, numbers=parameter, percent=percent, verify=verify
-    )
+    result = rank_countermeasures(work, mu=friction, target=target, numbers=parameter, percent=percent, verify=verify)
     call.tabulate(result, "countermeasures.csv")
     if result.measures:
         call.draw(countermeasure_bars(result), "countermeasures.png")

@@ -45,7 +45,7 @@ def steady(call: Call, mu: Mu = None) -> None:
         return
     from .show import show_steady
 
-    call.warn(call.idle)
+    call.warn_of_idle()
     show_steady(document)
     call.suggest("modes", *(() if mu is None else ("--mu", mu)))
 
@@ -92,6 +92,7 @@ def modes(
         int | None,
         typer.Option(
             "--count",
+            metavar="N",
             min=1,
             help="How many branches; unstable ones come on top [default: modal.modes, with --band all of it].",
         ),
@@ -109,6 +110,7 @@ def modes(
 
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
+    from ..view.modal_plots import frequency_branches, root_locus
     from .conclusions import of_modes
     from .output import counting
     from .show_modes import show_modes
@@ -123,6 +125,8 @@ def modes(
         result = analyses.modes(work, values, count=count, band_hz=chosen, progress=progress)
     call.keep(result, "modes.nc")
     call.tabulate(result, "modes.csv")
+    if len(result.branch):
+        call.draw(frequency_branches(result) if len(result.mu) > 1 else root_locus(result), "modes.png")
     if result.interrupted:
         call.say(f"interrupted: {len(result.mu)} of {result.planned} friction coefficients, which are kept")
     if call.json:
@@ -184,8 +188,9 @@ def onsets(
 
     said = "--range" if along is None else "--between"
     chosen = None if friction_range is None else call.range_of_friction(friction_range, said)
+    asked = band_of(band, loaded.modal.max_frequency_hz)
     call.warn(resolution_warnings(loaded))
-    result = analyses.onsets(work, chosen, band_hz=band_of(band, loaded.modal.max_frequency_hz))
+    result = analyses.onsets(work, chosen, band_hz=asked)
     call.keep(result, "onsets.nc")
     call.tabulate(result, "onsets.csv")
     if call.json:

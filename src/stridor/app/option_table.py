@@ -54,8 +54,8 @@ Mu = Annotated[
     str | None,
     _option(
         "--mu",
-        "Friction coefficient of every contact; modes, compare and ensemble take several: a,b or start:stop:count, "
-        "and cycles a range low:high [default: the case's own, of compare comparison.mu].",
+        "Friction coefficient of every contact; where several are taken, a,b or start:stop:count, where a range is, "
+        "low:high [default: the case's own; of comparisons comparison.mu].",
         metavar="MU",
         on="steady shapes modes simulate cycles compare report sensitivities countermeasures export ensemble",
         lacks="onsets=sought run=--range damping-map=sought boundary=--set reduce=--at",
@@ -207,7 +207,7 @@ Out = Annotated[
     Path | None,
     _option(
         "--out",
-        "Folder for what is written [default: CASE.out; of new here].",
+        "Folder for what is written [default: CASE.out; where no case is read, beside what is read, or here].",
         metavar="DIR",
         on=" ".join(EVERY),
     ),

@@ -43,7 +43,7 @@ def reduce(
     at: At = None,
     max_frequency: MaxFrequency = None,
     bound: Annotated[
-        float | None, typer.Option("--bound", help="Relative error of eigenvalues [default: 1e-8].")
+        float | None, typer.Option("--bound", metavar="SHARE", help="Relative error of eigenvalues [default: 1e-8].")
     ] = None,
     save: Annotated[
         Path | None,
@@ -61,7 +61,11 @@ def reduce(
     corrections: Annotated[
         int,
         typer.Option(
-            "--corrections", min=0, max=10, help="Correction steps at most where an error is above the bound."
+            "--corrections",
+            metavar="N",
+            min=0,
+            max=10,
+            help="Correction steps at most where an error is above the bound.",
         ),
     ] = 3,
 ) -> None:

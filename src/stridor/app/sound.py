@@ -24,9 +24,11 @@ RunFile = Annotated[
 def sound(
     call: Call,
     observable: Observable = None,
-    slow: Annotated[float, typer.Option("--slow", help="How many times slower, and lower.")] = 1.0,
-    repeat: Annotated[int, typer.Option("--repeat", help="How many times it is heard.")] = 1,
-    phase: Annotated[str | None, typer.Option("--phase", help="Phase of the run [default: the last].")] = None,
+    slow: Annotated[float, typer.Option("--slow", metavar="TIMES", help="How many times slower, and lower.")] = 1.0,
+    repeat: Annotated[int, typer.Option("--repeat", metavar="N", help="How many times it is heard.")] = 1,
+    phase: Annotated[
+        str | None, typer.Option("--phase", metavar="NAME", help="Phase of the run [default: the last].")
+    ] = None,
 ) -> None:
     """What a run in time sounds like: a WAV file at its own pitch, or slowed down."""
     from ..io.atomic import replacing

@@ -24,8 +24,8 @@ Only = Annotated[
     typer.Option(
         "--only",
         metavar="PART,…",
-        help="Parts that alone are computed: of comparisons growth (small perturbations), run (the full run too), "
-        "critical; of run these, and modes, onsets, sensitivities, countermeasures, simulate, compare. Repeatable.",
+        help="Parts that alone are computed: growth (small perturbations), run (the full run too), critical; where "
+        "all is computed also modes, onsets, sensitivities, countermeasures, simulate, compare. Repeatable.",
     ),
 ]
 Skip = Annotated[
@@ -60,7 +60,9 @@ def simulate(
     ] = None,
     copies: Annotated[
         int,
-        typer.Option("--copies", min=0, help="Run this many copies, perturbed by 1e-12: how far results scatter."),
+        typer.Option(
+            "--copies", metavar="N", min=0, help="Run this many copies, perturbed by 1e-12: how far results scatter."
+        ),
     ] = 0,
 ) -> None:
     """The temporal approach: explicit dynamics with stick, slip and separation. Ctrl-C keeps what was computed."""
@@ -193,7 +195,7 @@ def compare(
     else:
         from .show import show_agreement
 
-        call.warn(call.idle)
+        call.warn_of_idle()
         show_agreement(result.to_json())
         if not result.interrupted:
             call.suggest("run")
@@ -270,7 +272,7 @@ def _told(call: Call, outcome: Outcome, work: Workspace) -> None:
                 call.say(f"note: {note}")
         if outcome.everything.unsaturated is not None:
             call.say("note: the full run is too short, its vibration still grows; the report says how to go on")
-        call.warn(call.idle)
+        call.warn_of_idle()
         if outcome.report is not None:
             stdout.print(f"report: {outcome.report}")
         stdout.print(outcome.verdict)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
-from ..errors import CaseError, Problem
+from ..errors import CaseError, Problem, kind_of
 from ..notebook import Shown, counted, html_table
 from .bodies import BeamBody, MatrixBody
 from .checks import Parts, problems_between, slave_side
@@ -80,7 +80,7 @@ class Case(Shown, Table):
     def __init__(self, /, *unnamed: object, **tables: Any) -> None:
         if unnamed:
             accepted = "tables are given by name, Case(bodies={…}, contacts={…}); stridor.load takes the path of a file"
-            raise CaseError("case", f"a {type(unnamed[0]).__name__}", accepted)
+            raise CaseError("case", kind_of(unnamed[0]), accepted)
         data = as_written(tables)
         try:
             super().__init__(**data)

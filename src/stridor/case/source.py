@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import CaseError
+from ..errors import CaseError, kind_of
 from ..reading import irregular
 from .outsized import deep_line
 
@@ -26,7 +26,7 @@ _KEYS = re.compile(r"\('[^)]*',?\)")  # how tomllib names a table
 def load(path: str | PathLike[str], overrides: Sequence[str] = ()) -> Case:
     """The case in a TOML file, with overrides such as "phases.1.duration=0.01" applied. Raises CaseError."""
     if not isinstance(path, str | PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise CaseError("path", f"a {type(path).__name__}", "the path of a case file")
+        raise CaseError("path", kind_of(path), "the path of a case file")
     source = os.fspath(path)
     try:
         if reason := irregular(Path(path), LARGEST):

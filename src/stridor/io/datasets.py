@@ -9,7 +9,7 @@ from typing import Any
 
 from ..agreement import Agreement
 from ..case import Case
-from ..errors import CaseError
+from ..errors import CaseError, kind_of
 from ..modal.complex_modes import ComplexModes
 from ..modal.full import ParametricOnsets
 from ..modal.onsets import Onsets
@@ -50,7 +50,7 @@ def to_dataset(result: Result) -> Any:
         "complex modes, onsets, sensitivities, a trajectory, an ensemble, an agreement, a stability "
         "boundary, a damping map or limit cycles; reduced models are no datasets, but can be saved"
     )
-    raise CaseError("result", f"a {type(result).__name__}", accepted)
+    raise CaseError("result", kind_of(result), accepted)
 
 
 def save(

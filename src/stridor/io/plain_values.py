@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from ..errors import kind_of
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..study.body_modes import BodyModes
@@ -41,7 +42,7 @@ def to_plain(value: Any) -> Any:
         return {"tuple": [to_plain(v) for v in cast("tuple[Any, ...]", value)]}
     if isinstance(value, list):
         return [to_plain(v) for v in cast("list[Any]", value)]
-    raise TypeError(f"a {type(value).__name__} is no result")
+    raise TypeError(f"{kind_of(value)} is no result")
 
 
 def of_plain(value: Any) -> Any:

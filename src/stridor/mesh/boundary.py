@@ -130,13 +130,6 @@ def require_boundary(mesh: Mesh, name: str, where: str) -> Blocks:
     return facets
 
 
-def require_nodes(mesh: Mesh, name: str, where: str) -> IntArray:
-    """Nodes (b,) of the boundary or node set of that name, sorted. Raises CaseError with the names there are."""
-    if name not in mesh.boundaries and name not in mesh.node_sets:
-        raise CaseError(where, name, f"no such boundary or node set; {_names(mesh, name)}")
-    return mesh.boundary_nodes(name)
-
-
 def listed(names: Iterable[str]) -> str:
     """Names as a list in a message, the first dozen of them."""
     held = list(names)

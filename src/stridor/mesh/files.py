@@ -22,7 +22,6 @@ from ..reading import bounded
 from ..typing import IntArray
 from .abaqus import read_abaqus
 from .boundary import require_boundary as require_boundary
-from .boundary import require_nodes as require_nodes
 from .claims import check_claims
 from .gather import Contents, gather
 from .gmsh_numbers import check_numbers

@@ -86,7 +86,7 @@ def modes_by_receptance(
     residual = np.zeros((len(values), len(columns)))
     shapes = np.zeros((2, len(values), len(columns), system.size if vectors else 0), dtype=complex)
     constant = fixed_vectors(spectrum)[:, columns[still] - len(start)].astype(complex)
-    residual[:, still] = _judge_fixed(judge, spectrum, eigenvalues[0, still], constant, values)
+    residual[:, still] = _judge_fixed(judge, eigenvalues[0, still], constant, values)
     if vectors:
         shapes[0][:, still] = constant.T
         for row, m in enumerate(values):
@@ -128,9 +128,7 @@ def _followed(
     return values[done], followed[done], asked
 
 
-def _judge_fixed(
-    judge: BackwardError, spectrum: ReceptanceProblem, lam: ComplexArray, vectors: ComplexArray, mu: Array
-) -> Array:
+def _judge_fixed(judge: BackwardError, lam: ComplexArray, vectors: ComplexArray, mu: Array) -> Array:
     """Backward errors (k, b) of the modes that no contact sees: the same at every μ."""
     if not len(lam):
         return np.zeros((len(mu), 0))

@@ -78,7 +78,7 @@ def onsets_by_receptance(
 
     def watch(old: RootState, new: RootState) -> None:
         count = len(old.roots)
-        events.extend(_passages(spectrum, old, new, has_damping))
+        events.extend(_passages(old, new, has_damping))
         entries.watch((old.mu, new.mu), old.roots, new.roots[:count], new.branch[:count])
 
     tracker.watch = watch
@@ -159,7 +159,7 @@ def _numbering(spectrum: ReceptanceProblem, roots: ComplexArray) -> dict[int, in
     return {k: int(rank[k]) + 1 for k in range(len(roots))}
 
 
-def _passages(spectrum: ReceptanceProblem, old: RootState, new: RootState, has_damping: bool) -> list[_Event]:
+def _passages(old: RootState, new: RootState, has_damping: bool) -> list[_Event]:
     """Enclosed changes of stability between two neighbouring states."""
     step = new.mu - old.mu
     events: list[_Event] = []
@@ -278,7 +278,7 @@ def _narrowed(spectrum: ReceptanceProblem, event: _Event, has_damping: bool) -> 
     """The same passage between states a quarter as far apart or closer, None where it is gone."""
     inner: list[_Event] = []
     tracker = Tracker.resumed(spectrum, event.old)
-    tracker.watch = lambda old, new: inner.extend(_passages(spectrum, old, new, has_damping))
+    tracker.watch = lambda old, new: inner.extend(_passages(old, new, has_damping))
     width = event.new.mu - event.old.mu
     try:
         for part in (0.25, 0.5, 0.75, 1.0):

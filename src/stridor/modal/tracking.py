@@ -188,7 +188,7 @@ class Tracker:
             return None
         axis = ~implied & (np.abs(roots.imag) < 1e-9 * np.abs(roots))
         roots = np.where(axis, roots.real + 0j, roots)
-        if not self._accept(old, roots, implied, predicted, pairs, splits):
+        if not self._accept(roots, implied, predicted, pairs, splits):
             return None
         branch = np.concatenate([old.branch, np.array(origins, dtype=np.int64)])
         tangents = self._tangents(roots, mu)
@@ -259,7 +259,6 @@ class Tracker:
 
     def _accept(
         self,
-        old: RootState,
         roots: ComplexArray,
         implied: BoolArray,
         predicted: ComplexArray,

@@ -96,7 +96,7 @@ def steady_sliding(
                 "tangent; give a support a velocity"
             )
     sense = -np.sign(speeds)
-    force = _external_force(system, load_factors) - system.motion.damping @ factors
+    force = external_force(system, load_factors) - system.motion.damping @ factors
     return _active_set(system, force, coefficients, sense, speeds)
 
 
@@ -105,7 +105,8 @@ def steady_points(system: System, mu: float | None = None) -> SteadySliding:
     return system.once(("steady sliding of points", mu), lambda: steady_sliding(system, mu=mu))
 
 
-def _external_force(system: System, load_factors: Mapping[str, float] | None) -> Array:
+def external_force(system: System, load_factors: Mapping[str, float] | None) -> Array:
+    """The sum (n,) of all loads, each by its factor, by name (None: 1 for all)."""
     force = np.zeros(system.size)
     for name, vector in system.loads.items():
         force += vector * (1.0 if load_factors is None else load_factors.get(name, 1.0))

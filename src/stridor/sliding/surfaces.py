@@ -26,7 +26,7 @@ from ..typing import Array, BoolArray, IntArray, Sparse
 from .equilibrium import Equilibrium, NodeState, find_touching
 from .history import STILL, follow
 from .pattern import left_by_facets, unexplained_patterns
-from .points import full_motion, words_of_friction
+from .points import external_force, full_motion, words_of_friction
 from .redundant import closed, redundant
 from .resultants import Balance, Resultant, balance, resultants
 
@@ -134,7 +134,7 @@ def steady_sliding_nodes(
     slips = speed > STILL * float(speed.max(initial=0.0))
     _require_slip(nodes, slips, coefficient)
     sense = np.where(slips[:, None], -slip / np.where(slips, speed, 1.0)[:, None], 0.0)
-    force = _external_force(system, load_factors) - system.motion.damping @ factors
+    force = external_force(system, load_factors) - system.motion.damping @ factors
     rubs = bool(np.any(coefficient[:, None] * sense))
     symmetric = not rubs and system.symmetric_definite
     sign, iterations = np.ones(nodes.count), 0
@@ -303,13 +303,6 @@ def _slopes(nodes: ContactNodes, speed: Array, mu: Array) -> Array:
     for i in np.flatnonzero((mu != own) & (slopes != 0.0)):
         slopes[i] = nodes.laws[nodes.owner[i]].scaled(float(mu[i]), float(speed[i])).slope(float(speed[i]))
     return slopes
-
-
-def _external_force(system: System, load_factors: Mapping[str, float] | None) -> Array:
-    force = np.zeros(system.size)
-    for name, vector in system.loads.items():
-        force += vector * (1.0 if load_factors is None else load_factors.get(name, 1.0))
-    return force
 
 
 def _require_constant_gap(nodes: ContactNodes, factors: Array, speed: Array) -> None:

@@ -25,14 +25,14 @@ class Part:
 
     def __post_init__(self) -> None:
         if not 1 <= self.number <= self.count <= MOST:
-            raise CaseError("part", str(self), f"NUMBER/COUNT with 1 ≤ NUMBER ≤ COUNT ≤ {MOST}, such as 3/40")
+            raise CaseError("part", str(self), f"K/N with 1 ≤ K ≤ N ≤ {MOST}, such as 3/40")
 
     @staticmethod
     def read(text: str, where: str = "--part") -> Part:
         """From "3/40". Raises CaseError."""
         found = _WRITTEN.fullmatch(text.strip())
         if found is None:
-            raise CaseError(where, text, "NUMBER/COUNT, such as 3/40")
+            raise CaseError(where, text, "K/N, such as 3/40")
         return Part(int(found[1]), int(found[2]))
 
     def __str__(self) -> str:

@@ -24,6 +24,7 @@ from .rows import Row, Variable
 
 FORMAT = 1  # of the store; one with a larger number was written by a newer stridor
 KIND = "stridor study"
+MARKS = ("zarr.json", ".zgroup")  # of a folder that zarr has written, or an earlier one
 CHUNK = 512  # rows of a chunk at most
 PENDING, DONE, FAILED = 0, 1, 2
 _FILL: Mapping[str, Any] = {"f8": np.nan, "i8": 0, "i1": 0, "str": ""}
@@ -213,6 +214,8 @@ def _group(path: Path, mode: str) -> Any:
     """Raises CaseError for what is no store of a study, and for one of a newer stridor."""
     if not path.is_dir():
         raise CaseError(str(path), None, "is a file, not the store of a study" if path.exists() else "no such store")
+    if not any((path / mark).exists() for mark in MARKS):
+        raise CaseError(str(path), None, "not the store of a study: give study.zarr, or the folder that it is in")
     try:
         group = _zarr().open_group(path, mode=mode)
         kind, number = group.attrs.get("kind"), group.attrs.get("format")

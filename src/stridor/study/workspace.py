@@ -20,7 +20,7 @@ from ..case.fields import Table
 from ..case.matrix_checks import MU
 from ..case.messages import problems_of
 from ..case.schema import DEFAULT_PHASES, Comparison, Modal, Phase, Phases, Temporal
-from ..errors import AnalysisError, CaseError
+from ..errors import AnalysisError, CaseError, kind_of
 from ..modal.options import Options
 from ..notebook import Shown, counted
 from ..sliding import full_motion
@@ -58,7 +58,7 @@ class Workspace(Shown):
         if isinstance(problem, str | PathLike):
             problem = load(problem)
         if not isinstance(problem, Case | System):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise CaseError("problem", f"a {type(problem).__name__}", ACCEPTED)
+            raise CaseError("problem", kind_of(problem), ACCEPTED)
         self._case = problem if isinstance(problem, Case) else None
         if isinstance(problem, Case):
             for name in tables:

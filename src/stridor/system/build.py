@@ -13,7 +13,7 @@ from ..case.bodies import MassBody, SolidBody
 from ..case.points import BoundaryRef
 from ..case.schema import Load, SteadyStep
 from ..contact.interface import Rows
-from ..errors import CaseError
+from ..errors import CaseError, kind_of
 from ..fe.assembly import beside
 from ..fe.solid import stress_stiffness
 from ..mesh.boundary import require_boundary
@@ -46,7 +46,7 @@ def build_system(
         case = load(case)
     if not isinstance(case, Case):  # pyright: ignore[reportUnnecessaryIsInstance]
         accepted = "a case or the path of its file; the system of a workspace is work.system()"
-        raise CaseError("case", f"a {type(case).__name__}", accepted)
+        raise CaseError("case", kind_of(case), accepted)
     stage("matrices of the bodies")
     bodies = build_bodies(case, mu, known)
     total = sum(body.size for body in bodies.values())

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import io
-from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from ..errors import CaseError
 from ..system import System
 from ..typing import Array, ComplexArray
 from .depth_picture import sharp_edges
+from .page_files import template_text
 from .skin import Skin, at_largest, distinct, drawn_scale, facet_edges, mode_title, skin_of
 from .solid_plots import AMPLITUDES, EDGES_UP_TO, VIEW, body_colour, concentrated, draw_frame
 from .style import styled
@@ -73,8 +73,8 @@ def animation_shell() -> str:
 def _page(**content: Any) -> str:
     page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     ramp = [_hex(row) for row in _ramp()[:: (RAMP - 1) // 9]]
-    return page.from_string(_asset("mode.html.j2")).render(
-        ramp=", ".join(ramp), script=Markup(_asset("mode.js")), **content
+    return page.from_string(template_text("mode.html.j2")).render(
+        ramp=", ".join(ramp), script=Markup(template_text("mode.js")), **content
     )
 
 
@@ -196,7 +196,3 @@ def _bytes(colours: Array) -> list[list[int]]:
 
 def _hex(colour: Array) -> str:
     return "#" + "".join(f"{round(255 * float(v)):02x}" for v in colour)
-
-
-def _asset(name: str) -> str:
-    return (resources.files("stridor.view") / "templates" / name).read_text(encoding="utf-8")

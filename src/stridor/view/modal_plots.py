@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..digits import measured
+from ..errors import CaseError, kind_of
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..typing import Array, BoolArray
@@ -26,6 +27,7 @@ RANGE_OF_CURVE = (0.0, 1.0)
 @styled
 def root_locus(modes: ComplexModes, *, max_frequency_hz: float | None = None, ax: Axes | None = None) -> Figure:
     """Eigenvalues of a sweep in the plane of growth rate and frequency, coloured by friction."""
+    _require_modes(modes)
     figure, ax = panel(ax, 4.4)
     top = _top(modes, max_frequency_hz)
     scatter = None
@@ -61,6 +63,7 @@ def frequency_branches(
     ax: Axes | None = None,
 ) -> Figure:
     """Frequencies over friction, one line per branch; unstable stretches marked, onsets where given."""
+    _require_modes(modes)
     columns = _columns(modes, branches)
     figure, ax = panel(ax, 3.5 if len(columns) <= FEW else 5.2)
     scale, unit = (1.0, "Hz") if len(columns) <= FEW else (1e3, "kHz")
@@ -97,6 +100,7 @@ def growth_branches(
     imaginary_frequency draws Im ω/2π = −Re λ/2π [Hz] of motion written as exp(jωt) instead: negative
     where it grows.
     """
+    _require_modes(modes)
     columns = _columns(modes, branches)
     figure, ax = panel(ax, 3.5)
     few = len(columns) <= FEW
@@ -119,6 +123,7 @@ def growth_branches(
 @styled
 def damping_branches(modes: ComplexModes, branches: Sequence[int] | None = None, *, ax: Axes | None = None) -> Figure:
     """Damping ratios −Re λ/|λ| in per cent over friction; negative: unstable."""
+    _require_modes(modes)
     columns = _columns(modes, branches)
     figure, ax = panel(ax, 3.5)
     few = len(columns) <= FEW
@@ -187,6 +192,12 @@ def _columns(modes: ComplexModes, branches: Sequence[int] | None) -> list[int]:
     if missing:
         raise ValueError(f"branches {missing}: not among those followed, 1 to {len(modes.branch)}")
     return [where[number] for number in branches]
+
+
+def _require_modes(given: object) -> None:
+    """Raises CaseError for what is no modes."""
+    if not isinstance(given, ComplexModes):
+        raise CaseError("modes", kind_of(given), "complex modes, of st.modes(case, mu)")
 
 
 def _top(modes: ComplexModes, max_frequency_hz: float | None) -> float:

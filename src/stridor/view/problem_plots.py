@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..errors import CaseError
+from ..errors import CaseError, kind_of
 from ..modal.branch import Branch
 from ..notebook import Shown
 from ..study.workspace import Problem, Workspace
@@ -91,7 +91,7 @@ def _moving(problem: Problem, branch: Branch, mu: float | None) -> tuple[System,
     """The system, the vector (n,), frequency [Hz] and growth [1/s] of a mode at one μ."""
     if not isinstance(branch, Branch):  # pyright: ignore[reportUnnecessaryIsInstance]
         accepted = 'a mode: an item of st.modes(…, vectors="right"), such as modes[0]'
-        raise CaseError("branch", f"a {type(branch).__name__}", accepted)
+        raise CaseError("branch", kind_of(branch), accepted)
     if branch.right is None:
         raise CaseError("branch", None, 'the mode has no vector: ask for modes with vectors="right"')
     known = np.flatnonzero(np.isfinite(branch.eigenvalues))

@@ -9,7 +9,6 @@ import re
 import tempfile
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from pathlib import Path
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
@@ -21,6 +20,7 @@ from .change_parts import change_figures, change_tables, change_words, mechanism
 from .figures import ReportFigure, agreement_figures, modal_figures, model_figures, temporal_figures
 from .inputs import ReportInputs
 from .modal_tables import frequency_tables, modes_table, onset_tables
+from .page_files import template_text
 from .style import lay_out, styled
 from .surface_figures import contact_figures, shape_figures, surface_table
 from .tables import Row, Table, number
@@ -274,7 +274,7 @@ def _umask() -> int:
 @cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=FunctionLoader(_template),
+        loader=FunctionLoader(template_text),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -283,10 +283,6 @@ def _environment() -> Environment:
     environment.filters["tidy"] = tidy
     environment.globals["about_tables"] = about_tables  # pyright: ignore[reportArgumentType]
     return environment
-
-
-def _template(name: str) -> str:
-    return (resources.files("stridor.view") / "templates" / name).read_text(encoding="utf-8")
 
 
 def tidy(text: str) -> str:

@@ -201,10 +201,10 @@ class _Search:
         size = np.sum(rates**2, axis=0)
         with np.errstate(all="ignore"):
             steps = -1.3 * growth / size * rates
-        away = np.hypot(*steps)
+        distance = np.hypot(*steps)
         mesh = 1.0 / (self.number - 1)
-        near = np.flatnonzero(np.isfinite(away) & (away <= mesh))
-        for k in near[np.argsort(away[near])][:FORETOLD].tolist():
+        near = np.flatnonzero(np.isfinite(distance) & (distance <= mesh))
+        for k in near[np.argsort(distance[near])][:FORETOLD].tolist():
             p = np.clip(at.p + steps[:, k], EDGE, 1.0 - EDGE)
             if all(float(np.hypot(*(p - other.p))) > 0.05 * mesh for other in self.found.looked):
                 self._look(p)
