@@ -67,8 +67,8 @@ def _at(cycle: Balanced, phases: Array, ways: Array) -> tuple[Array, Array, Arra
 
 
 def _settled(codes: IntArray, harmonics: int) -> IntArray:
-    """Without what is too short to be told by so many harmonics: slip beside a stick that is long enough is stick, and a
-    stick goes half to what is before and half to behind."""
+    """Without what is too short to be told by so many harmonics: slip beside a stick that is long enough is stick, and
+    a stick goes half to what is before and half to behind."""
     found = codes.copy()
     n = len(codes)
     for slips in (True, False):
