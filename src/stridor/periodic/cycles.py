@@ -218,18 +218,20 @@ def _read(data: Any, k: int, told: Any, names: tuple[str, ...], points: tuple[st
     )
     if any(c.contact not in names or len(c.behind) != len(names) for c in changes):
         raise ValueError("changes of contacts that there are not")
-    numbers = {name: float(data[name].values[k]) for name in NUMBERS if name in data}
+    numbers = {name: float(data[name].values[k]) for name in NUMBERS}
+    series = _method(told) == "harmonic"
+    if np.isfinite(numbers["grazed"]) == series or np.isfinite(numbers["defect"]) != series:
+        raise ValueError("grazed is what shooting tells, defect harmonic balance")
     return Cycle(
         **numbers, time=data["time"].values[k], **{name: data[name].values[k] for name in HISTORIES},
         multipliers=parts[:, 0] + 1j * parts[:, 1], changes=changes, contact_names=names, watch_names=points,
         landed=int(told["landed"]), reached_from=str(told["reached_from"]), method=_method(told),
-        harmonics=int(told.get("harmonics", 0)), multiplied=bool(told.get("multiplied", True)),
+        harmonics=int(told["harmonics"]), multiplied=bool(told["multiplied"]),
     )  # fmt: skip
 
 
 def _method(told: Any) -> str:
-    """Files of before there were two have none."""
-    method = str(told.get("method", "shooting"))
+    method = str(told["method"])
     if method not in NEUTRAL:
         raise ValueError(f"cycles by {method[:40]!r}, which is no method")
     return method
