@@ -12,6 +12,7 @@ import pytest
 
 import stridor as st
 from stridor.case import template_text
+from stridor.errors import kind_of
 from stridor.notebook import MOST_LETTERS
 
 COARSE = {
@@ -126,7 +127,7 @@ def test_anything_else_is_refused(verb: str, wrong: object, tmp_path: Path) -> N
         call = VERBS[verb]
     with pytest.raises(st.CaseError) as told:
         call(wrong, tmp_path)
-    assert str(told.value) == f"problem: 'a {type(wrong).__name__}' – {ANY}"
+    assert str(told.value) == f"problem: '{kind_of(wrong)}' – {ANY}"
     assert not list(tmp_path.iterdir())
 
 
