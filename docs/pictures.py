@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,9 @@ from matplotlib import pyplot as plt
 from PIL import Image
 
 import stridor as st
+from stridor.agreement.perturbation import modes_as_in_time, perturb
+from stridor.study.settings import settings_of
+from stridor.temporal.steppers.implicit import warp
 
 STRIDOR = str(Path(sys.executable).parent / "stridor")
 IMAGES = Path(__file__).parent / "images"
@@ -157,10 +161,36 @@ def cycles() -> None:
     save(st.plot.cycle_branches(st.cycles(known["case"], between=(0.6, 1.8))), "cycles", (7, 4.4))
 
 
+def implicit_steps() -> None:
+    """Growth and frequency of a small motion of two beams over the steps to its period, with and without the warp."""
+    small = case.with_({"bodies.beam1.elements": 10, "bodies.beam2.elements": 20})
+    system, highest, parts = st.build_system(small), 10.4e3, np.array([12, 20, 30])
+    asked = settings_of(small)
+    modes = modes_as_in_time(asked.system(system), 0.1, highest)
+    wanted = modes.eigenvalues[0][np.argmax(modes.eigenvalues[0].real)]
+    figure, axes = plt.subplots(1, 2, layout="constrained")
+    for last, mark, name in ((1.0, "o-", "warped"), (1e-9, "s--", "plain midpoint rule")):
+        warp.LAST, off = last, []
+        for part in parts:
+            settings = replace(asked, stepper="implicit", step=2 * np.pi / wanted.imag / part, max_frequency_hz=highest)
+            seen = perturb(system, 0.1, settings=settings, max_frequency_hz=highest, modes=modes).components.eigenvalues
+            value = seen[np.argmin(np.abs(seen - wanted))]
+            off.append([abs(value.real / wanted.real - 1), abs(value.imag / wanted.imag - 1)])
+        for ax, column in zip(axes, np.transpose(off), strict=True):
+            ax.loglog(parts, column, mark, label=name)
+    warp.LAST = 1.0
+    for ax, label in zip(axes, ("growth off by", "frequency off by"), strict=True):
+        ax.set(xlabel="steps to the period", ylabel=label)
+        ax.set_xticks(parts, [str(part) for part in parts])
+        ax.minorticks_off()
+        ax.legend()
+    save(figure, "implicit", (8, 3.2))
+
+
 if __name__ == "__main__":
     save(st.plot.model(case), "two-beams", (8, 3.4))
     save(st.plot.model(pad), "pad-on-disc", (7, 4.4))
     listed = imported_branches, steady_pressure, factors, listing, ensemble, study, study_cost, boundary, exact_steps
-    listed += (cycles,)
+    listed += (cycles, implicit_steps)
     for draw in listed:
         draw()
