@@ -9,6 +9,7 @@ import pytest
 import stridor as st
 from stridor.case import template_text
 from stridor.case.overrides import number_at
+from stridor.errors import kind_of
 
 pytestmark = pytest.mark.bad_input
 
@@ -74,6 +75,6 @@ def test_keys_written_a_table_too_deep():
 @pytest.mark.parametrize("given", [1, {"bodies": {}}, "two-beams.toml"])
 def test_a_case_of_what_has_no_name(given: Any):
     assert told(lambda: st.Case(given)) == (
-        f"case: 'a {type(given).__name__}' – tables are given by name, Case(bodies={{…}}, contacts={{…}}); stridor.load "
+        f"case: '{kind_of(given)}' – tables are given by name, Case(bodies={{…}}, contacts={{…}}); stridor.load "
         "takes the path of a file"
     )
