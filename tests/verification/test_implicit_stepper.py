@@ -282,7 +282,7 @@ def off_exact(seed: int) -> tuple[list[float], int]:
     last, found = len(wanted.time), []
     for parts in (2, 8, 32, 128, 512):
         result = implicit(system, duration, step=grid / parts, **asked | {"record_every": parts})
-        assert energy_balance(result).error < CLOSED, seed
+        assert energy_balance(result).error < 1e-7, seed  # rounding, which grows as steps of 1e-3 of a period get smaller
         off = np.abs(result.displacement[:last] - wanted.displacement[:last]).max(axis=(1, 2))
         off /= np.abs(wanted.displacement).max()
         if not found:
