@@ -16,6 +16,7 @@ from stridor.modal.derivatives import by_release, pencil_of, solve_mode
 from stridor.study.analyses import modes
 from stridor.study.damping_map import damping_map
 from stridor.study.sensitivities import Linearised, number_at, sensitivities
+from stridor.study.workspace import Workspace
 from stridor.system import build_system
 
 pytestmark = pytest.mark.verification
@@ -323,15 +324,16 @@ def test_solving_for_a_mode_from_a_rough_guess():
 def test_systems_with_another_number_are_those_built_and_balanced_anew(monkeypatch):
     """What they have in common (bodies, meshes, factors of steady sliding) makes none of them another one."""
     monkeypatch.setattr(nearby, "LEAST", 0)
-    model = case(slider(space=True, stiffness=1e13)).with_(
+    model = case(slider(space=False, stiffness=1e13)).with_(
         {
             "materials.iron": {"young_modulus": 110e9, "density": 7100.0, "poisson_ratio": 0.27},
             "bodies.slider.material": "iron",
             "bodies.block.damping": {"mass": 100.0, "stiffness": 1e-8},
             "bodies.slider.damping": {"mass": 50.0, "stiffness": 3e-8},
+            "modal.prestress": True,  # so that steady sliding of each counts
         }
     )
-    linear = Linearised.of(model, 0.3, count=3)
+    linear = Linearised(Workspace(model), 0.3, complex_modes(build_system(model), 0.3, count=3), damped=True)
     tried = [
         ("materials.steel.young_modulus", 180e9), ("materials.iron.density", 7400.0), ("materials.steel.density", 7900.0),
         ("bodies.slider.damping.stiffness", 4e-8), ("contacts.rub.stiffness", 1.2e13),
@@ -346,4 +348,4 @@ def test_systems_with_another_number_are_those_built_and_balanced_anew(monkeypat
         for name in ("damping", "stiffness", "push"):
             difference = abs(getattr(one, name) - getattr(other, name)).max()
             assert difference <= 1e-13 * abs(getattr(other, name)).max(), (path, name)
-    assert linear._factors.factorisations == 1
+    assert 0 < linear._factors.factorisations < len(tried)
