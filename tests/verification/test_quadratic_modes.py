@@ -473,3 +473,57 @@ def test_fast_eigenvalues_are_not_taken_for_infinite_ones() -> None:
         damping = 10.0 ** rng.uniform(-4, 3) * np.diag(rng.uniform(0, 1, n))
         values, _, _ = dense.all_modes(quadratic(mass, damping, rows @ rows.T + 0.5 * rows + spring))
         assert len(values) == 2 * n, seed
+
+
+@pytest.mark.parametrize("left", [False, True])
+@pytest.mark.parametrize(("n", "seed"), [(160, 3), (200, 11), (250, 4)])
+def test_a_region_on_the_real_axis_is_searched_in_real_arithmetic(n, seed, left, monkeypatch):
+    problem = scattered(n, seed, singular=seed == 4)
+    region = Region.band(0.0, 8.0, above=-2.0)
+    kinds = []
+
+    def seen(matrix, **options):
+        kinds.append(matrix.dtype.kind)
+        return factorise(matrix, **options)
+
+    factorise = finding.factorise
+    monkeypatch.setattr(finding, "factorise", seen)
+    spectrum = find_modes(problem, region, left=left, count=False)
+    assert kinds == ["f"]
+    check(problem, spectrum, companion(problem), region)
+    assert len(spectrum.values) > 5
+    assert np.any(spectrum.values.imag > 0)
+    assert spectrum.completeness.later == 0
+    # The same by complex arithmetic, about the middle of the region.
+    monkeypatch.setattr(Region, "real_shift", lambda self: None)
+    other = find_modes(problem, region, left=left, count=False)
+    assert set(kinds[1:]) == {"c"}
+    assert other.values == pytest.approx(spectrum.values, rel=1e-9)
+
+
+def test_a_mode_that_the_first_real_block_lacks_is_brought_by_the_second_once():
+    """A block that is blind to one structure of two: the look from another sees it, as one mode and not with its
+    conjugate as two."""
+    n = 120
+    one = scattered(n, 3)
+    parts = [sp.block_diag([a, a], format="csr") for a in one.matrices()]
+    problem = quadratic(parts[0], parts[1], sp.block_diag([one.stiffness, 1.37 * one.stiffness], format="csr"))
+    region = Region.band(0.0, 4.0, above=-2.0)
+    reference = find_modes(problem, region, count=False)
+
+    class Blind(searching.Search):
+        def run(self, guess=None):
+            block = searching.start(problem.size, 3, 5)
+            block[n:] = 0.0
+            self._waiting = self.krylov.add(self.krylov.smooth(block))
+            self._grow(24)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(finding, "Search", Blind)
+        found = find_modes(problem, region, count=False)
+    assert found.values == pytest.approx(reference.values, rel=1e-9)
+    disc = found.completeness.discs[0]
+    lam = companion(quadratic(one.mass, one.damping, 1.37 * one.stiffness))
+    hidden = lam[(np.abs(lam - disc.centre) <= disc.radius) & (lam.imag >= 0)]
+    assert found.completeness.later == len(hidden) > 2
+    assert f"brought {len(hidden)} more and then no other" in found.completeness.sentence

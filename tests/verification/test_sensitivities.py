@@ -9,12 +9,14 @@ import scipy.linalg as sl
 from benches import paper_case
 from solid_cases import case, slider
 from stridor.case import Case, loads
+from stridor.direct import nearby
 from stridor.errors import CaseError
 from stridor.modal.complex_modes import complex_modes
-from stridor.modal.derivatives import by_release, solve_mode
+from stridor.modal.derivatives import by_release, pencil_of, solve_mode
 from stridor.study.analyses import modes
 from stridor.study.damping_map import damping_map
 from stridor.study.sensitivities import Linearised, number_at, sensitivities
+from stridor.study.workspace import Workspace
 from stridor.system import build_system
 
 pytestmark = pytest.mark.verification
@@ -317,3 +319,33 @@ def test_solving_for_a_mode_from_a_rough_guess():
     lam = complex(linear.eigenvalues[column])
     again = solve_mode(linear.pencil, lam * (1 + 1e-8), linear.gap(column))
     assert abs(again.eigenvalue - lam) < 1e-9 * abs(lam)
+
+
+def test_systems_with_another_number_are_those_built_and_balanced_anew(monkeypatch):
+    """What they have in common (bodies, meshes, factors of steady sliding) makes none of them another one."""
+    monkeypatch.setattr(nearby, "LEAST", 0)
+    model = case(slider(space=False, stiffness=1e13)).with_(
+        {
+            "materials.iron": {"young_modulus": 110e9, "density": 7100.0, "poisson_ratio": 0.27},
+            "bodies.slider.material": "iron",
+            "bodies.block.damping": {"mass": 100.0, "stiffness": 1e-8},
+            "bodies.slider.damping": {"mass": 50.0, "stiffness": 3e-8},
+            "modal.prestress": True,  # so that steady sliding of each counts
+        }
+    )
+    linear = Linearised(Workspace(model), 0.3, complex_modes(build_system(model), 0.3, count=3), damped=True)
+    tried = [
+        ("materials.steel.young_modulus", 180e9), ("materials.iron.density", 7400.0), ("materials.steel.density", 7900.0),
+        ("bodies.slider.damping.stiffness", 4e-8), ("contacts.rub.stiffness", 1.2e13),
+        ("materials.steel.young_modulus", 200e9), ("materials.iron.poisson_ratio", 0.31),
+    ]  # fmt: skip
+    for path, value in tried:
+        mine, fresh = linear.varied(path, value), build_system(model.with_({path: value}))
+        for name in ("mass", "damping", "stiffness"):
+            assert abs(getattr(mine, name) - getattr(fresh, name)).nnz == 0, (path, name)
+        assert mine.dof_names == fresh.dof_names
+        one, other = (pencil_of(s, 0.3, linear.held, linear.options) for s in (mine, fresh))
+        for name in ("damping", "stiffness", "push"):
+            difference = abs(getattr(one, name) - getattr(other, name)).max()
+            assert difference <= 1e-13 * abs(getattr(other, name)).max(), (path, name)
+    assert 0 < linear._factors.factorisations < len(tried)

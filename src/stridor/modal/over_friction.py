@@ -173,7 +173,7 @@ def onsets_of_band(
 def _solved_onsets(
     system: System, friction_range: tuple[float, float], max_frequency_hz: float, damped: bool, options: Options
 ) -> Onsets:
-    carried = Carried(highest=friction_range[1])
+    carried = Carried()
 
     def solved(held: System, between: tuple[float, float], before: Onsets | None = None) -> Onsets:
         # Behind a border branches have the names that they had before it.

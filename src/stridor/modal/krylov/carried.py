@@ -25,10 +25,8 @@ STIFFEST = 1e3  # times the structure's stiffness: forces of contact stiffer tha
 @dataclass
 class Carried:
     """Shapes that the last basis had, with forces of the nodes that ``touching`` names, frictionless modes first, of
-    which there are ``modes``, for a band up to ``frequency`` [1/s]; empty at first. highest: where the range ends of
-    which these are stretches, None where it ends with the stretch; steps over μ are those of the whole range."""
+    which there are ``modes``, for a band up to ``frequency`` [1/s]; empty at first."""
 
-    highest: float | None = None
     shapes: ForcedShapes | None = None
     touching: IntArray | None = None
     modes: int = 0

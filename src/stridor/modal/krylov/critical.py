@@ -41,7 +41,6 @@ FOLLOW = 1.1  # times the band: from where branches are followed
 MOST_ABOVE = 1.25  # times that: onsets above the band are solved for up to there
 SAMPLES = 9  # from no friction on
 FEWEST = 3
-STEPS = 30  # at least, in which branches are followed over the whole range
 ROUNDS = 6
 ONSET_TOLERANCE = 1e-12  # backward error at which an onset counts as found
 CLEARLY_ABOVE = 1.02
@@ -81,14 +80,10 @@ def krylov_onsets(
     top = searched(problem.pencil(high).condensed(), 2 * np.pi * max_frequency_hz)
     # Modes that start above the band may meet inside it.
     reduced = projected(problem, Band(1, top * follow), high, carried)
-    whole = high if carried is None or carried.highest is None else carried.highest
-    count = _count_of_samples(high - numbered_at, whole)
-    # What the stretch before hands on is right where this one begins, but for the nodes that touch.
-    rising = carried is not None and carried.shapes is not None
-    converge_over(reduced, numbered_at + samples(high - numbered_at, count), rising=rising)
+    converge_over(reduced, numbered_at + samples(high - numbered_at, _count_of_samples(numbered_at, high)))
     if carried is not None:
         carried.take(reduced, GUARD)
-    way = _way(reduced, (low, high), top, numbered_at, whole / STEPS)
+    way = _way(reduced, (low, high), top, numbered_at)
     changes: list[StabilityChange] = []
     for passage in way.passages:
         stage(f"onset {len(changes) + 1}, solved in the full problem")
@@ -115,9 +110,9 @@ def krylov_onsets(
     )
 
 
-def _count_of_samples(length: float, whole: float) -> int:
-    """Friction coefficients at which modes are made exact: in a small part of the whole range fewer do."""
-    return max(FEWEST, round(SAMPLES * length / whole))
+def _count_of_samples(low: float, high: float) -> int:
+    """Friction coefficients at which modes are made exact: in a small part of what friction may be fewer do."""
+    return max(FEWEST, round(SAMPLES * (1.0 - low / high)))
 
 
 def _numbered(state: State) -> tuple[IntArray, ComplexArray]:
@@ -154,9 +149,8 @@ class _Way:
     from_start: list[int]
 
 
-def _way(reduced: Reduced, between: tuple[float, float], top: float, numbered_at: float, longest: float) -> _Way:
-    """What following sees in the range, in steps up to ``longest``; from where they are numbered up to it branches are
-    only brought their names."""
+def _way(reduced: Reduced, between: tuple[float, float], top: float, numbered_at: float) -> _Way:
+    """What following sees in the range; from where they are numbered up to it branches are only brought their names."""
     passages: list[Passage] = []
     entries = Entries(top)
 
@@ -164,10 +158,10 @@ def _way(reduced: Reduced, between: tuple[float, float], top: float, numbered_at
         passages.extend(crossings(old, new) if reduced.damped else meetings(reduced, old, new))
         entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.index)))
 
-    follower = Follower(reduced, start=numbered_at, longest=max(between[0] / 4, longest))
+    follower = Follower(reduced, start=numbered_at, longest=max(between[0] / 4, between[1] / 30))
     start = follower.advance(between[0])
     first = np.flatnonzero(grows(start.values, top)).tolist()
-    follower.longest, follower.watch = longest, watch
+    follower.longest, follower.watch = between[1] / 30, watch
     return _Way(start, follower.advance(between[1]), passages, entries, first)
 
 

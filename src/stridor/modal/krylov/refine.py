@@ -165,14 +165,11 @@ def converge_at(
             reduced.compress()
 
 
-def converge_over(
-    reduced: Reduced, frictions: Array, *, between: float = GROWTH, left: bool = False, rising: bool = False
-) -> None:
+def converge_over(reduced: Reduced, frictions: Array, *, between: float = GROWTH, left: bool = False) -> None:
     """`converge_at` over a range: exact at its ends, up to a backward error ``between`` them; each μ in the middle of
-    those before, so that most find nothing left to do. rising: begin at the low end, where the basis is all but right
-    already."""
+    those before, so that most find nothing left to do."""
     values = np.unique(frictions)
-    converge_at(reduced, values[[0, -1]] if rising else values[[-1, 0]], left=left)
+    converge_at(reduced, values[[-1, 0]], left=left)
     parts = [(0, len(values) - 1)]
     for low, high in parts:
         if high - low > 1:

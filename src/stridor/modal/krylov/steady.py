@@ -10,7 +10,14 @@ import scipy.sparse as sp
 from ...contact.multipliers import SLIP, STICK
 from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError
-from ...sliding import friction_damping_matrix, full_motion, require_pressed, steady_nodes, steady_sliding_nodes
+from ...sliding import (
+    SurfaceSliding,
+    friction_damping_matrix,
+    full_motion,
+    require_pressed,
+    steady_nodes,
+    steady_sliding_nodes,
+)
 from ...sliding.stick_slip import StickRows
 from ...sliding.surfaces import STILL, SurfaceSliding
 from ...system import System

@@ -311,7 +311,7 @@ class _Run:
             return factor.solve(right, transpose=True, refine=False)
 
         n = self.problem.size
-        each = 1 if isinstance(shift, complex) else 2  # real vectors take half the room, conjugates are two
+        each = 1 if isinstance(shift, complex) else 2  # real vectors take half the room, and modes are two
         most = min(max(int(each * BASIS_BYTES / (16 * n)), each * FEWEST), each * LARGEST, 2 * n)
         searches: list[Search] = []
         sides = [(self.problem, forward)] + ([(self.problem.transposed, transposed)] if self.left else [])

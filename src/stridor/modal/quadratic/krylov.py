@@ -7,8 +7,8 @@ With λ = σ + ρ/θ, P(λ)x = 0 reads θ²x + θ ρP(σ)⁻¹(2σM + D)x + ρ²
 ρ is the radius of the disc looked at, so that the wanted θ are those of modulus one and more and both halves of their
 vectors are of one size. It plays the part of the scaling of Fan, Lin and Van Dooren (2004), about σ instead of zero,
 where their second factor cancels. Both halves of all Krylov vectors lie in one orthonormal basis Q (n, q) with q close
-to their number, which is all that is stored of length n. About a real σ all of it is real. An infinite eigenvalue is
-θ = 0 and does no harm.
+to their number, which is all that is stored of length n. About a real σ all of it is real, and modes come with their
+conjugates. An infinite eigenvalue is θ = 0 and does no harm.
 """
 
 from __future__ import annotations

@@ -78,6 +78,7 @@ class Search:
         excite is now the largest of what is left and shows within a few steps.
         """
         before, krylov = self.disc, self.krylov
+        number = self._number(before)
         self.looks += 1
         block = start(self.problem.size, self._width(width), self.seed + self.looks)
         fresh = krylov.add(krylov.smooth(block))
@@ -89,11 +90,14 @@ class Search:
         self.most = max(self.most, krylov.count + 8 * (width + BLOCK))
         self._grow(0)
         # The disc may have grown, where there was no room for more vectors; what that brings had not been missed.
-        new = max(int((np.abs(self._values - before.centre) <= before.radius).sum()) - before.count, 0)
-        if krylov.kind is float:
-            new -= new // 2  # of conjugates, which come together, one
+        new = max(self._number(before) - number, 0)
         self.later += new
         return new
+
+    def _number(self, disc: Disc) -> int:
+        """How many eigenvalues were found in a disc; of conjugates, which a real shift brings together, one."""
+        inside: BoolArray = np.abs(self._values - disc.centre) <= disc.radius
+        return int((inside & (self._values.imag >= 0) if self.krylov.kind is float else inside).sum())
 
     def release(self) -> None:
         """Forget the Krylov vectors; there is no looking again then."""
