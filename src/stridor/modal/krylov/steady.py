@@ -19,7 +19,7 @@ from ...sliding import (
     steady_sliding_nodes,
 )
 from ...sliding.stick_slip import StickRows
-from ...sliding.surfaces import STILL, SurfaceSliding
+from ...sliding.surfaces import STILL
 from ...system import System
 from ...typing import Array, BoolArray, IntArray, Sparse
 from ..options import Options
