@@ -204,7 +204,7 @@ def test_a_bench_with_contact_has_the_modes_of_the_default_solver(bench: Path, a
     assert_same(eigenvalues(done), alone, 1e-10)
     coarse, *written, solves = ours(done.stderr)  # nothing is said twice
     assert coarse.startswith("warning: bodies.block: 0.02 m in extent")
-    assert written == [f"written: {words.partition('.')[0]}.out/modes.{kind}" for kind in ("nc", "csv")]
+    assert written == [f"written: {words.partition('.')[0]}.out/modes.{kind}" for kind in ("nc", "csv", "png")]
     assert int(solves.removeprefix("solves of slepc: ")) > 5
 
 

@@ -342,8 +342,8 @@ if __name__ == "__main__":
     n = 48
     k = np.arange(1.0, n + 1.0)
     modal = ModalArrays(1e-6 / (1 + k), 0.01 * k / n, 1e-6 * np.sin(k), 0.1 * k, k * k, np.array([0, 16, 48]))
-    chosen, at = np.arange(3), np.array([0, 3, 3])
-    rows = ModalRows(np.cos(np.outer(np.arange(4.0) + 1.0, k)), chosen, at, np.tile(chosen, 2), np.array([0, 3, 6]))
+    met = np.tile(np.arange(3), 2)
+    rows = ModalRows(np.cos(np.outer(np.arange(4.0) + 1.0, k)), met, np.array([0, 3, 6]))
     fields = Fields(*(np.sin(k + j) for j in range(4)), np.zeros(0), np.zeros(n))
     arguments = (modal, scheme(1e-6, 0.5), rows, np.full(4, 0.3), fields, np.zeros(4))
     if sys.argv[1:] == ["callee"]:

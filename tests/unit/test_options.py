@@ -51,6 +51,8 @@ def test_an_option_of_one_name_is_the_same_on_every_verb(name: str) -> None:
     first, told, default = kinds[0]
     for kind, other, value in kinds[1:]:
         assert (kind, value) == (first, default)
+        if name == "--method":  # curves and cycles have ways of their own
+            continue
         assert (other.metavar, other.help, other.min) == (told.metavar, told.help, told.min)
 
 

@@ -410,6 +410,9 @@ def test_bad_input_and_files(slow_belt: Cycles, tmp_path: Path):
         ({"method": "collocation"}, "auto, shooting, harmonic"),
         ({"method": "harmonic", "harmonics": 0}, "1 to 1000 harmonics"),
         ({"method": "shooting", "harmonics": 5}, "shooting has none"),
+        ({"method": "harmonic", "harmonics": 7.5}, "1 to 1000 harmonics"),
+        ({"method": "harmonic", "push": 0.1}, "harmonic balance follows no motions"),
+        ({"points": 2.5}, "a whole number"),
     ):
         with pytest.raises(st.CaseError, match=said):
             st.cycles(problem, 1.0, **given)

@@ -22,7 +22,7 @@ from stridor.system import System
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.simulate import Settings, plan, simulate
-from stridor.temporal.steppers.implicit import basis, loop, node_law, stepper, warp
+from stridor.temporal.steppers.implicit import basis, loop, node_law, stepper, warp, whole_steps
 from stridor.temporal.steppers.implicit.node_law import spring_force
 from stridor.temporal.steppers.implicit.warp import warped
 
@@ -530,3 +530,59 @@ def test_a_contact_that_is_kept_closed_pulls():
     assert result.normal_force[2:, 0] == pytest.approx(-1.0, abs=1e-12)
     assert np.abs(result.displacement[:, 0, 0]).max() < 1e-12
     assert result.phases[0].contacts["A"].separation_fraction == 0.0
+
+
+def pressed_by_a_distance(stepper: str, step: float) -> st.Case:
+    """A mass on a belt, pressed through a spring by a point that is moved over ramps."""
+    return st.Case(
+        units="nondimensional",
+        bodies={
+            "m": {"type": "mass", "mass": 1.0, "position": (0, 0)}, "p": {"type": "mass", "mass": 0.5, "position": (0, 1)},
+            "belt": {
+                "type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (0, 1), "sliding": {"velocity": (-0.5, 0)}
+            },
+        },
+        springs={
+            "a": {"between": ("m", "ground"), "direction": (1, 0.3), "stiffness": 4.0},
+            "c": {"between": ("m", "p"), "direction": (0, 1), "stiffness": 5.0},
+        },
+        dashpots={"d": {"between": ("m", "p"), "direction": (0.3, 1.0), "damping": 0.3}},
+        supports={"hold": {"at": "p", "fixed": ("x", "y"), "displacement": {"y": -0.3}}},
+        contacts={
+            "A": {"slave": "m", "master": "belt", "stiffness": 30.0, "friction": {"law": "coulomb", "coefficient": 0.3}}
+        },
+        modal={"max_frequency_hz": 1.0},
+        phases=[
+            {"name": "s", "duration": 1.0, "ramp": 0.6},
+            {"name": "t", "duration": 2.0, "displacements": {"hold": 2.0}, "ramp": 0.5, "velocities": {"belt": 0.6}},
+        ],
+        temporal={"initial": "rest", "step": step, "record_every": 1, "watch": ["m", "p"], "stepper": stepper},
+    )  # fmt: skip
+
+
+def test_accelerations_where_supports_accelerate():
+    """Of the mass and of the point that is moved. Where a ramp begins or ends the acceleration jumps, and a record there
+    is a mean: the tenth of the records that is furthest off is left out."""
+    off = []
+    for step in (0.02, 0.005):
+        exact, found = (st.simulate(pressed_by_a_distance(s, step)).acceleration for s in ("exact", "implicit"))
+        apart = np.abs(found - exact).max(axis=2) / np.abs(exact).max()
+        off.append(np.quantile(apart, 0.9, axis=0))
+    assert np.all(off[0] < 0.01), off
+    assert np.all(off[1] < off[0] / 8 + 1e-9), off
+
+
+def test_a_step_too_coarse_for_what_is_asked_for_is_refused():
+    case = mode_coupling(0.02).with_({"temporal.stepper": "implicit", "modal.max_frequency_hz": 1.0, "temporal.perturbation": None})
+    with pytest.raises(st.CaseError, match=r"temporal\.step: 0\.4 – at most 0\.3183 s, a third of the shortest period"):
+        st.simulate(case.with_({"temporal.step": 0.4}))
+    assert "5 steps to the period of 1 Hz are few" in st.simulate(case.with_({"temporal.step": 0.2})).path_reason
+    assert "few" not in st.simulate(case.with_({"temporal.step": 0.05})).path_reason
+
+
+def test_a_step_of_which_all_phases_are_multiples():
+    settings = Settings(max_frequency_hz=1.0, stepper="implicit")
+    phases = [PhaseSpec("a", 0.1, {}, {}), PhaseSpec("b", 0.25, {}, {})]
+    step = whole_steps(settings, phases)
+    assert step == pytest.approx(0.025)
+    assert whole_steps(settings, phases[:1]) == pytest.approx(0.1 / 3)

@@ -463,6 +463,12 @@ def test_infinite_eigenvalues_of_rigid_contacts_are_told_from_fast_ones(seeds) -
         np.testing.assert_allclose(np.sort(np.abs(values)), np.sort(np.abs(truth)), rtol=1e-4, err_msg=str(seed))
 
 
+@pytest.mark.parametrize("coupling", [0.3, 1e-3, 0.0])
+def test_a_defective_eigenvalue_is_not_taken_for_an_infinite_one(coupling: float) -> None:
+    values, _, _ = dense.all_modes(quadratic(np.eye(2), np.zeros((2, 2)), np.array([[1.0, coupling], [0.0, 1.0]])))
+    assert np.sort_complex(values) == pytest.approx(np.array([-1j, -1j, 1j, 1j]), abs=1e-7)
+
+
 def test_fast_eigenvalues_are_not_taken_for_infinite_ones() -> None:
     """Masses over eight decades and springs over ten have all of theirs."""
     for seed in range(40):

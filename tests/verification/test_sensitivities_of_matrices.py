@@ -129,7 +129,7 @@ def test_the_program_on_imported_matrices(tmp_path: Path) -> None:
     done = stridor("sensitivities", "case.toml", "--quiet", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr == (
-        "stridor: mu: nothing depends on it: there are no contacts and no factor of a matrix has mu in it; give another "
+        "stridor: --mu: nothing depends on it: there are no contacts and no factor of a matrix has mu in it; give another "
         "number of the case, such as bodies.matrices.terms.0.factor (--parameter)\n"
     )
     done = stridor("modes", "case.toml", "--quiet", cwd=tmp_path)

@@ -13,6 +13,7 @@ from ..notebook import Shown
 from ..typing import Array, ComplexArray, IntArray
 
 NEUTRAL = {"shooting": 1e-6, "harmonic": 1e-2}  # a largest multiplier as close to one as this decides nothing
+TURNING = 0.15  # the same of harmonic balance where slip turns or sticks, whose multipliers converge slowly
 OPEN, STICK, SLIP = 0, 1, 2  # as in histories of runs
 
 WORDS = {
@@ -93,9 +94,11 @@ class Cycle(Shown):
     @property
     def stable(self) -> bool | None:
         """Whether disturbances die out; None where the largest multiplier is one within 1e-6 (by harmonic balance:
-        0.01), or is not known."""
-        size = self.largest_multiplier
-        return None if not self.multiplied or abs(size - 1.0) <= NEUTRAL[self.method] else size < 1.0
+        0.01, and 0.15 where slip turns or sticks), or is not known."""
+        size, neutral = self.largest_multiplier, NEUTRAL[self.method]
+        if self.method == "harmonic" and {"stick", "reversal"} & set(self.kinds):
+            neutral = TURNING
+        return None if not self.multiplied or abs(size - 1.0) <= neutral else size < 1.0
 
     @property
     def slip_amplitude(self) -> float:

@@ -178,10 +178,13 @@ class Harmonic:
             try:
                 end = self._through(onset, mu, met)
             except AnalysisError as error:
+                yield from ((said, found) for found in met)
                 yield said, Unreached(f"μ = {mu:.6g}, {said}: {error}")
                 continue
-            for found in met:
-                yield said, found
+            except KeyboardInterrupt:
+                yield from ((said, found) for found in met)
+                raise
+            yield from ((said, found) for found in met)
             if not met:
                 yield said, Unreached(f"μ = {mu:.6g}, {said}: it does not pass there; {end}")
 

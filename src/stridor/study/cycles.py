@@ -66,17 +66,19 @@ def cycles(
     pushes = None if push is None else [float(p) for p in np.ravel(np.asarray(push, dtype=float))]
     if pushes is not None and not (pushes and np.all(np.isfinite(pushes)) and np.all(pushes)):
         raise CaseError("push", push, "finite speeds above or below 0 [m/s]")
-    if points < 2:
-        raise CaseError("points", points, "at least 2 cycles of a branch")
+    if not (float(points).is_integer() and points >= 2):
+        raise CaseError("points", points, "a whole number, at least 2 cycles of a branch")
     if not seconds > 0.0:
         raise CaseError("seconds", seconds, "a time > 0 [s]")
     if work.varies:
         raise CaseError("case", "matrices that depend on mu", "cycles of a system whose matrices do not")
-    if harmonics is not None and not 1 <= harmonics <= MOST_ASKED:
+    if harmonics is not None and not (float(harmonics).is_integer() and 1 <= harmonics <= MOST_ASKED):
         raise CaseError("harmonics", harmonics, f"1 to {MOST_ASKED} harmonics")
     chosen = _chosen(work.system(), method)
     if harmonics is not None and chosen != "harmonic":
         raise CaseError("harmonics", harmonics, 'harmonics of method "harmonic"; shooting has none')
+    if pushes is not None and chosen == "harmonic":
+        raise CaseError("push", push, 'pushes of method "shooting"; harmonic balance follows no motions')
     if between is None and not values:
         between = work.modal.friction_range
     if between is not None:

@@ -20,7 +20,7 @@ from .schedule import PhaseSpec, Schedule, lay_out
 from .settings import Settings
 from .stepper import Disturbance, Stepper
 from .steppers.exact import exact_stepper, refuse, why_not_exact
-from .steppers.implicit import implicit_stepper, whole_steps, why_not_implicit
+from .steppers.implicit import COARSEST, implicit_stepper, whole_steps, why_not_implicit
 from .steppers.implicit import refuse as refuse_implicit
 from .steppers.modal import choose_path, modal_stepper, refuses
 from .steppers.sparse import sparse_stepper, step_limit_assembled
@@ -129,7 +129,7 @@ def _chosen(system: System, settings: Settings) -> tuple[Settings, str]:
     if usual and system.size <= SMALL and not why_not_exact(system):
         return replace(settings, stepper="exact"), f"{system.size} freedoms, up to {SMALL} are few"
     count, highest = system.contact_nodes().count, settings.max_frequency_hz
-    resolved = highest is not None and (settings.step is None or settings.step * highest > COARSE)
+    resolved = highest is not None and (settings.step is None or COARSE < settings.step * highest <= COARSEST)
     if usual and resolved and count >= MANY and not why_not_implicit(system, settings):
         why = f"{count} contact nodes, from {MANY} on steps that resolve {settings.max_frequency_hz:g} Hz are cheaper"
         return replace(settings, stepper="implicit"), why

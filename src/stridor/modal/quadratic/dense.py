@@ -14,6 +14,7 @@ ALONE = 1e-4  # of the way to the next eigenvalue: by how much one is corrected 
 LONG = 300  # unknowns from which it takes seconds
 SMALL = 1e-13  # of the matrices: α and β below it at once are those of a pencil that is singular for every λ
 ROUNDS = 8  # of balancing
+FAR = 1e-3  # of 1/λ, scaled: what may be infinite at most
 SAFE = 100.0  # times the rounding that QZ leaves in 1/λ: what is no larger may as well be zero, and λ infinite
 
 
@@ -73,7 +74,9 @@ def _uncertain(a: Array, b: Array, left: ComplexArray, right: ComplexArray) -> A
     size = np.hypot(np.linalg.norm(a, 2), np.linalg.norm(b, 2))
     projected = [np.abs(np.einsum("ij,ij->j", left.conj(), matrix @ right)) for matrix in (a, b)]
     length = np.linalg.norm(left, axis=0) * np.linalg.norm(right, axis=0)
-    return SAFE * np.finfo(float).eps * size * length / np.maximum(np.hypot(*projected), 1e-300)
+    found = SAFE * np.finfo(float).eps * size * length / np.maximum(np.hypot(*projected), 1e-300)
+    # Finite ones that are defective are as uncertain, and of the size of the others.
+    return np.minimum(found, FAR)
 
 
 def _tuned(problem: Quadratic, lam: ComplexArray, x: ComplexArray, y: ComplexArray) -> ComplexArray:

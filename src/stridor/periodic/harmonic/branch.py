@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sl
 
+from ...direct.dense import lu_factors
 from ...errors import AnalysisError
 from ...typing import Array
 from ..continuation import Spot
@@ -153,7 +154,7 @@ class HarmonicBranch:
         matrix[size, :size] = phase
         matrix[: size + 1] *= scale
         matrix[size + 1] = heading
-        return sl.lu_factor(matrix, overwrite_a=True, check_finite=False)
+        return lu_factors(matrix, check_finite=False)
 
     def _scale(self, at: Evaluated) -> Array:
         scale = np.full(at.z.size + 2, max(at.amplitude, self.small, 1e-300))

@@ -56,7 +56,7 @@ class State(NamedTuple):
     """What moves on. q, v (r,): displacement and velocity; before (r,): v a step before. place (m,) [m], speed (m d,)
     [m/s]: gap and velocities of the nodes by the structure; impulse, earlier (m d,) [N s]: of the last step and the one
     before it; status (m,). works (5,) [J], statistics (c, 8), counters (6,), motion (2, p): way and rate of the
-    supports."""
+    supports; rate_before (p,): the rate a step before."""
 
     q: Array
     v: Array
@@ -70,6 +70,7 @@ class State(NamedTuple):
     statistics: Array
     counters: IntArray
     motion: Array
+    rate_before: Array
 
 
 class Work(NamedTuple):

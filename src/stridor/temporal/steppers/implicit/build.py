@@ -93,7 +93,7 @@ def fresh_state(nodes: Nodes, structure: Structure, contacts: int) -> State:
         q=np.zeros(r), v=np.zeros(r), before=np.zeros(r), place=np.zeros(m), speed=np.zeros(total),
         impulse=np.zeros(total), earlier=np.zeros(total), status=np.zeros(m, dtype=np.int64), works=np.zeros(5),
         statistics=fresh_statistics(contacts, STATISTICS), counters=np.zeros(COUNTERS, dtype=np.int64),
-        motion=np.zeros((2, p)),
+        motion=np.zeros((2, p)), rate_before=np.zeros(p),
     )  # fmt: skip
 
 

@@ -242,7 +242,9 @@ def _record(rate: Array, a: Structure, nodes: Nodes, state: State, work: Work, r
             lift = record.watch_lift[r, p]
             out[0] += lift * state.motion[0, p]
             out[1] += lift * state.motion[1, p]
-            out[2] += lift * (rate[p] - state.motion[1, p]) / h
+            # Over the same steps as the part of the structure: the two nearly cancel where a support takes it along.
+            begun = state.motion[1, p] if first else state.rate_before[p]
+            out[2] += lift * (rate[p] - begun) / h * (1.0 if first else 0.5)
     if len(nodes.gap):
         _record_nodes(a, nodes, state, work, record)
     state.counters[KEPT] += 1
@@ -298,6 +300,7 @@ def _finish(
     works[DAMPING] += h * damped
     for p in range(motions):
         state.motion[0, p] += increment[p]
+        state.rate_before[p] = state.motion[1, p]
         state.motion[1, p] = rate[p]
 
 

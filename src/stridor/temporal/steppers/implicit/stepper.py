@@ -30,6 +30,9 @@ from .loop import HARD, NOT_FINITE, run_steps
 from .newton import newton
 from .node_law import SWEEP_LIMIT, solve_nodes
 
+COARSEST = 1 / np.pi  # of a period: up to there the warp holds its frequency
+ROUGH = 1 / 15  # of a period: above it that is said, as events are located to a step
+FITS = 1e-6  # of a phase: what a step that is chosen may leave of it
 STEPS_PER_PERIOD = 30  # of the highest frequency asked for, where no step is given
 BEYOND = 2.0  # times that frequency: the modes of the structure that a large model is reduced to
 MOST_ROWS = 4000  # of contact: normal and tangents of each node
@@ -64,13 +67,25 @@ def refuse(system: System, settings: Settings) -> None:
 def whole_steps(settings: Settings, phases: Sequence[PhaseSpec]) -> float:
     """The step [s]: the one that is given, else a part of the shortest period asked for of which the shortest phase is
     a multiple. Raises CaseError where neither a step nor a frequency is given."""
+    highest = settings.max_frequency_hz
     if settings.step is not None:
+        if highest is not None and settings.step * highest > COARSEST:
+            raise CaseError(
+                "temporal.step", settings.step,
+                f"at most {COARSEST / highest:.4g} s, a third of the shortest period of interest (modal.max_frequency_hz "
+                f"= {highest:g}), which a coarser one shows at another frequency",
+            )  # fmt: skip
         return settings.step
-    if settings.max_frequency_hz is None:
+    if highest is None:
         raise CaseError("temporal.step", None, "missing – a step [s], or modal.max_frequency_hz, from which it follows")
-    wanted = 1.0 / (STEPS_PER_PERIOD * settings.max_frequency_hz)
+    wanted = 1.0 / (STEPS_PER_PERIOD * highest)
     shortest = min((phase.duration for phase in phases), default=wanted)
-    return shortest / max(round(shortest / wanted), 1)
+    least = max(round(shortest / wanted), 1)
+    for count in range(least, 4 * least + 1):
+        steps = [phase.duration * count / shortest for phase in phases]
+        if all(abs(n - round(n)) <= FITS * n for n in steps):
+            return shortest / count
+    return shortest / least  # of which some phase is no multiple: refused with its name
 
 
 def implicit_stepper(system: System, settings: Settings, mu: float | None, why: str) -> ImplicitStepper:
@@ -123,6 +138,9 @@ class ImplicitStepper:
         said = f"{self._why}: implicit steps in {self.coordinates.words}"
         if solved := int(self.moving.counters[BY_NEWTON]):
             said += f"; contacts of {solved} steps were solved by Newton's method"
+        turned = self.scheme.step * (self._highest_hz or 0.0)
+        if turned > ROUGH:
+            said += f"; {1 / turned:.3g} steps to the period of {self._highest_hz:g} Hz are few"
         if self._highest_hz is not None and self._sampling * self._highest_hz > 0.5:
             said += f"; records every {self._sampling:.3g} s do not resolve {self._highest_hz:g} Hz"
         return said
@@ -254,7 +272,9 @@ class ImplicitStepper:
             state.before[:] += state.v - before
             self._place_nodes()
         if changed:
-            state.motion[:] /= motion_ratio(self.parts, restart, self._system.motion.names)
+            ratio = motion_ratio(self.parts, restart, self._system.motion.names)
+            state.motion[:] /= ratio
+            state.rate_before[:] /= ratio
 
     def make_room(self, schedule: Schedule, settings: Settings) -> None:
         """Room for all records from the present step on; loads the compiled loop."""
