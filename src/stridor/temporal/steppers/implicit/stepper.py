@@ -72,8 +72,8 @@ def whole_steps(settings: Settings, phases: Sequence[PhaseSpec]) -> float:
         if highest is not None and settings.step * highest > COARSEST:
             raise CaseError(
                 "temporal.step", settings.step,
-                f"at most {COARSEST / highest:.4g} s, a third of the shortest period of interest (modal.max_frequency_hz "
-                f"= {highest:g}), which a coarser one shows at another frequency",
+                f"at most {COARSEST / highest:.4g} s, a third of the shortest period of interest, which a coarser one "
+                f"shows at another frequency (modal.max_frequency_hz = {highest:g})",
             )  # fmt: skip
         return settings.step
     if highest is None:
