@@ -37,7 +37,10 @@ class _Page:
     def tell(self, part: str, content: Any) -> None:
         """Tell it, whole: what is half written into a pipe spoils it."""
         with self._whole:
-            self._pipe.send((part, content))
+            try:
+                self._pipe.send((part, content))
+            except OSError:
+                os._exit(0)  # nobody listens any more
 
     def interrupted(self, _: int, __: FrameType | None) -> None:
         """A signal: Ctrl-C goes to all processes of a terminal and means nothing here, the pipe will end."""
