@@ -84,3 +84,8 @@ def split(dims: tuple[str, ...], values: Any, attributes: Mapping[str, Any]) -> 
     """Complex values as real ones with a last dimension (re, im): netCDF has no complex numbers."""
     array: ComplexArray = np.asarray(values, dtype=complex)
     return (*dims, "part"), np.stack([np.real(array), np.imag(array)], axis=-1), dict(attributes)
+
+
+def joined(values: Any) -> ComplexArray:
+    """The complex values of what `split` has made."""
+    return np.asarray(values[..., 0] + 1j * values[..., 1], dtype=complex)

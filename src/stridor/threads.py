@@ -8,6 +8,7 @@ one; beside other work the clock said 155 s instead of 54. Whole machines are fi
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache, wraps
 from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
@@ -16,10 +17,11 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 OURS = ("numpy", "scipy")
+MANY = 150_000  # unknowns from which on the dense parts of a sparse factor are worth several threads
 
 
 def one_thread(call: Callable[P, R]) -> Callable[P, R]:
-    """Let an analysis use one BLAS thread. Sparse direct solvers that bring a BLAS of their own keep theirs."""
+    """Let an analysis use one BLAS thread. Sparse direct solvers that bring a BLAS of their own: `for_factor`."""
 
     @wraps(call)
     def calm(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -27,6 +29,20 @@ def one_thread(call: Callable[P, R]) -> Callable[P, R]:
             return call(*args, **kwargs)
 
     return calm
+
+
+def for_factor(unknowns: int) -> AbstractContextManager[Any]:
+    """What a direct solver that takes the BLAS of the machine may use while it eliminates or solves: one thread up to
+    `MANY` unknowns, then what the machine has or OPENBLAS_NUM_THREADS says."""
+    return nullcontext() if unknowns > MANY else _every_library().limit(limits=1, user_api="blas")
+
+
+@cache
+def _every_library() -> Any:
+    """As `_libraries`, with that of the solver, which is loaded by then."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 @cache

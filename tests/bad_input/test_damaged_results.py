@@ -26,6 +26,7 @@ from stridor.io.datasets import load_trajectory
 from stridor.io.reduced_models import load_reduced
 from stridor.io.result_files import accept, damage_told, open_results
 from stridor.io.seals import seal
+from stridor.modal.parametric import ModesAtPoints
 from stridor.study.boundary_result import Boundary, BoundaryCurve, CountedAt, SolvedAgain
 from stridor.study.damping_result import Confirmed, DampingMap
 from stridor.temporal.signals import Components
@@ -42,7 +43,7 @@ COARSE = {
 }
 # One damage in so many is enough to see a mechanism fail; all of them take minutes.
 SAMPLED = pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 13])
-KINDS = ("beams", "solids", "modes", "onsets", "compare", "boundary", "cycles", "along", "map")
+KINDS = ("beams", "solids", "modes", "onsets", "compare", "boundary", "cycles", "along", "map", "changes", "points")
 
 
 @functools.cache
@@ -79,6 +80,14 @@ def result(kind: str):
             "a", "b", values, values[:2] + 4, (0.0, 0.5), 9e3, found, 1e3 * found, found, -found, 1e-14 * found, 0.09,
             ("a warning",), {"case": ""}, "reduced", 1e-9 * found, made, ("a note",),
         )  # fmt: skip
+    if kind == "points":
+        two, grows = np.array([[100.0, 200.0], [110.0, np.nan]]), np.array([[True, False], [False, False]])
+        at, steps = np.array([[0.1, 0.5], [0.2, 0.5]]), np.array([0, 2])
+        return ModesAtPoints(
+            ("mu", "k"), at, two, two / 7, grows, two / 1e12, ~grows, two / 1e15, grows[:, 0], steps, {"case": ""}
+        )
+    if kind == "changes":
+        return st.rank_countermeasures(case("beams"), mu=0.3, verify=1)
     if kind == "cycles":
         return st.cycles(mode_coupling(0.02, 0.1), [0.9, 1.0, 1.1])
     if kind == "compare":
@@ -299,7 +308,7 @@ def test_changes_through_hdf5_are_told(kind, files, tmp_path):
     for change in ("deleted", "grouped", "linked", "outside", "huge", "elsewhere", "virtual"):
         shutil.copyfile(files[kind], path)
         with h5py.File(path, "r+") as file:
-            name = next(known for known in ("time", "mu", "x", "value") if known in file)
+            name = next(known for known in ("time", "mu", "x", "value", "percent") if known in file)
             del file[name]
             if change == "grouped":
                 file.create_group(name)

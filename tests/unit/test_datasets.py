@@ -74,6 +74,18 @@ def test_onsets_along_a_number_come_back_as_they_were(case: st.Case, tmp_path: P
     assert (len(none), st.open(st.save(none, tmp_path / "none.nc")).to_json()) == (0, none.to_json())
 
 
+@pytest.mark.parametrize("mu", [0.01, 0.3])  # without and with an unstable mode
+def test_countermeasures_come_back_as_they_were(case: st.Case, tmp_path: Path, mu: float) -> None:
+    found = st.rank_countermeasures(case, mu=mu, verify=2)
+    assert (found.solved_again > 0) == (len(found.measures) > 0) == (mu == 0.3)
+    back = st.open(st.save(found, tmp_path / "countermeasures.nc"))
+    assert (back.to_json(), back.table()) == (found.to_json(), found.table())
+    assert np.array_equal(back.eigenvalues, found.eigenvalues)
+    for ours, theirs in zip(back.measures, found.measures, strict=True):
+        assert np.array_equal(ours.predicted, theirs.predicted)
+    assert st.loads(back.provenance["case"]) == case
+
+
 def test_a_damping_map_comes_back_as_it_was(case: st.Case, tmp_path: Path) -> None:
     names = ("bodies.beam1.damping.mass", "bodies.beam2.damping.mass")
     found = st.damping_map(case, *names, x_range=(1.0, 50.0), y_range=(1.0, 50.0), grid=(2, 3), max_frequency_hz=9e3)

@@ -477,8 +477,12 @@ def test_from_the_command_line_and_back(case, tmp_path):
     assert read.returncode == 0, read.stderr
     assert case.title in " ".join(read.stderr.split())
     first, second = json.loads(made.stdout), json.loads(read.stdout)
-    assert first.pop("files") == ["model.npz", "made/reduced.csv", "made/reduced-onsets.csv"]
-    assert second.pop("files") == ["read/reduced.csv", "read/reduced-onsets.csv"]
+    written = [f"{name}.{ending}" for name in ("reduced", "reduced-onsets") for ending in ("nc", "csv", "png")]
+    assert first.pop("files") == ["model.npz", *(f"made/{name}" for name in written)]
+    assert second.pop("files") == [f"read/{name}" for name in written]
+    modes = st.open(tmp_path / "read" / "reduced.nc")
+    assert modes["frequency_hz"].values[0].tolist() == first["modes"][0]["frequency_hz"]
+    assert [o.value for o in st.open(tmp_path / "read" / "reduced-onsets.nc")] == [o["value"] for o in first["onsets"]]
     assert first == second
     assert {"freedoms", "size", "max_frequency_hz", "bound", "parameters", "seconds", "solves"} <= set(first)
     assert [p["point"] for p in first["modes"]] == [{"mu": m, "contact_stiffness": 0.8} for m in (0.05, 0.1, 0.15)]

@@ -227,7 +227,7 @@ class Call:
         self.say(f"written: {path}")
         return path
 
-    def keep(self, result: Result, name: str) -> None:
+    def keep(self, result: Result, name: str) -> Path:
         """Save a result as a dataset in the folder, and say so."""
         from ..io.datasets import save
 
@@ -237,6 +237,7 @@ class Call:
             path = self._elsewhere(result, name, error)
             raise AnalysisError(f"{error}; the result is in {path}") from None
         self.say(f"written: {path}")
+        return path
 
     def _elsewhere(self, result: Result, name: str, error: AnalysisError) -> Path:
         """Save what was computed where there is room for it. Raises the error that there was where there is none."""

@@ -82,6 +82,7 @@ def countermeasures(
     target: Any = branch[0] if branch else "sum"
     friction = call.one_friction(mu)
     result = rank_countermeasures(work, mu=friction, target=target, numbers=parameter, percent=percent, verify=verify)
+    call.keep(result, "countermeasures.nc")
     call.tabulate(result, "countermeasures.csv")
     if result.measures:
         call.draw(countermeasure_bars(result), "countermeasures.png")

@@ -183,6 +183,7 @@ def onsets(
 
     from ..study import analyses
     from ..study.unit_warnings import resolution_warnings
+    from ..view.onset_plots import onset_chart
     from .conclusions import of_onsets
     from .show_modes import show_onsets
 
@@ -193,6 +194,7 @@ def onsets(
     result = analyses.onsets(work, chosen, band_hz=asked)
     call.keep(result, "onsets.nc")
     call.tabulate(result, "onsets.csv")
+    call.draw(onset_chart(result), "onsets.png")
     if call.json:
         call.document(result.to_json())
     else:
@@ -206,6 +208,7 @@ def _onsets_along(call: Call, case: Case, name: str, between: tuple[float, float
     """Onsets along a number of the case: sought on a model reduced over its range, each solved in the full problem."""
     from ..study.along import onsets_along
     from ..study.unit_warnings import resolution_warnings
+    from ..view.onset_plots import onset_chart
     from .conclusions import of_onsets_along
 
     call.warn(resolution_warnings(case))
@@ -214,6 +217,7 @@ def _onsets_along(call: Call, case: Case, name: str, between: tuple[float, float
     call.warn(found.warnings)
     call.keep(found, "onsets-along.nc")
     call.tabulate(found, "onsets-along.csv")
+    call.draw(onset_chart(found), "onsets-along.png")
     if call.json:
         call.document(found.to_json())
     else:

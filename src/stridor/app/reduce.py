@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -21,8 +20,7 @@ from .values import INFINITY, numbers, range_of
 if TYPE_CHECKING:
     from ..case import Case
     from ..modal.full import ParametricOnsets
-    from ..modal.parametric import CorrectedModes, ReducedModel, ReducedModes
-    from ..typing import Array
+    from ..modal.parametric import ReducedModel
 
 BOUND = 1e-8
 CONTACTS = ("mu", "contact_stiffness")  # parameters without a unit; others have that of the number in the case
@@ -88,6 +86,8 @@ def reduce(
 
     from ..io.left_out import kept_in
     from ..modal.full import onsets_along
+    from ..modal.parametric import ModesAtPoints
+    from ..view.onset_plots import modes_at_points, onset_chart
     from .conclusions import of_reduced
 
     for note in getattr(model.problem, "notes", ()):
@@ -95,17 +95,25 @@ def reduce(
     call.warn(model.problem.idle_words)
     files = [] if save is None else [_saved(model, save, origin, keep)]
     chosen = None if call.solver in (None, "auto") else call.solver
-    points = _points(model, asked, corrections if kept_in(model) == "all" else 0, chosen)
-    if asked:
-        files.append(_write(call.folder / "reduced.csv", model, points))
     for path in files:
         call.say(f"written: {path}")
+    points: list[dict[str, Any]] = []
+    if asked:
+        found = ModesAtPoints.of(
+            model, asked, corrections=corrections if kept_in(model) == "all" else 0, solver=chosen,
+            provenance=_source(origin),
+        )  # fmt: skip
+        points = found.to_json()
+        files += [call.keep(found, "reduced.nc"), call.tabulate(found, "reduced.csv")]
+        files.append(call.draw(modes_at_points(found), "reduced.png"))
     confirm = kept_in(model) == "all"
     onsets: ParametricOnsets | None = None
     if along is not None:
         fixed = {name: values[0] for name, values in asked.items() if name != along}
         onsets = onsets_along(model, along, fixed, confirm=confirm, solver=chosen)
-        files.append(call.tabulate(onsets, "reduced-onsets.csv"))
+        onsets.provenance = _source(origin)
+        files += [call.keep(onsets, "reduced-onsets.nc"), call.tabulate(onsets, "reduced-onsets.csv")]
+        files.append(call.draw(onset_chart(onsets), "reduced-onsets.png"))
     if call.json:
         document = _about(model) | {"modes": points, "onsets": [onset_document(o) for o in onsets or ()]}
         if onsets is not None:
@@ -211,43 +219,13 @@ def _named(text: str, option: str) -> tuple[str, str]:
     return name.strip(), rest
 
 
-def _points(
-    model: ReducedModel, at: dict[str, list[float]], corrections: int, solver: str | None
-) -> list[dict[str, Any]]:
-    """The modes at all combinations of values, one document for each point; corrected where they do not pass."""
-    from ..modal.parametric import Corrector
+def _source(origin: Case | dict[str, Any]) -> dict[str, Any]:
+    """What a result file says of the case, or of the case of the file that the model was read from."""
+    if not isinstance(origin, dict):
+        from ..study.provenance import provenance
 
-    if not at:
-        return []
-    values = {p.name: at.get(p.name, [p.value]) for p in model.problem.parameters}
-    corrector: Corrector | None = None
-    found: list[dict[str, Any]] = []
-    for combination in product(*values.values()):
-        point = dict(zip(values, combination, strict=True))
-        reduced = model.modes(point)
-        if corrections and not reduced.passed.all():
-            corrector = corrector or Corrector(model, solver=solver)
-            corrected = corrector.modes(point, steps=corrections)
-            found.append(_point(corrected, corrected.scaled_residual, corrected.steps))
-        else:
-            found.append(_point(reduced, reduced.residual, 0))
-    if corrector is not None:
-        corrector.free()
-    return found
-
-
-def _point(modes: ReducedModes | CorrectedModes, residual: Array, steps: int) -> dict[str, Any]:
-    return {
-        "point": dict(modes.point),
-        "inside": bool(modes.inside),
-        "corrections": steps,
-        "frequency_hz": modes.frequency_hz.tolist(),
-        "growth_rate": modes.growth_rate.tolist(),
-        "unstable": modes.unstable.tolist(),
-        "error": modes.error.tolist(),
-        "passed": modes.passed.tolist(),
-        "residual": residual.tolist(),
-    }
+        return provenance(origin, "reduce", 0.0)
+    return origin | {"case": origin["case"] or ""}
 
 
 def _about(model: ReducedModel) -> dict[str, Any]:
@@ -263,24 +241,6 @@ def _about(model: ReducedModel) -> dict[str, Any]:
         "seconds": dict(model.seconds),
         "solves": model.solves,
     }
-
-
-def _write(path: Path, model: ReducedModel, document: list[dict[str, Any]]) -> Path:
-    """One line for each mode of each point, columns of the model's parameters first."""
-    from ..io.csv_files import write_rows
-    from ..tabular import MODE, mode_cells
-
-    heads = (*(p.name for p in model.problem.parameters), *MODE, "error", "residual", "inside", "corrections")
-    rows = (
-        (
-            *point["point"].values(),
-            *mode_cells(mode["frequency_hz"], mode["growth_rate"], unstable=mode["unstable"]),
-            mode["error"], mode["residual"], point["inside"], point["corrections"],
-        )
-        for point in document
-        for mode in _modes(point)
-    )  # fmt: skip
-    return write_rows(path, heads, rows)
 
 
 def _modes(point: Mapping[str, Any]) -> list[dict[str, Any]]:

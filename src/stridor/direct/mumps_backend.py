@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import AnalysisError
+from ..threads import for_factor
 from ..typing import Sparse
 from .interface import Breakdown
 
@@ -25,7 +26,8 @@ class MumpsFactor:
         # MUMPS counts its entries from the coordinates: handing the upper triangle saves it half the work.
         self._context.set_matrix(sp.triu(matrix, format="coo") if symmetric else matrix, symmetric=symmetric)
         try:
-            self._context.factor()
+            with for_factor(matrix.shape[0]):
+                self._context.factor()
         except mumps.MUMPSError as error:
             if error.error in SINGULAR:
                 raise Breakdown(str(error)) from error
@@ -44,7 +46,8 @@ class MumpsFactor:
         self._instance.icntl[9] = 0 if transpose else 1
         # One column goes as a vector: python-mumps refuses a block of one row and one column.
         block = right[:, 0].copy() if right.shape[1] == 1 else np.asfortranarray(right)
-        answer = self._context.solve(block, overwrite_b=True)
+        with for_factor(len(right)):
+            answer = self._context.solve(block, overwrite_b=True)
         return answer.reshape(right.shape)
 
     def free(self) -> None:

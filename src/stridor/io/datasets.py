@@ -14,12 +14,13 @@ from ..errors import CaseError, kind_of
 from ..modal.complex_modes import ComplexModes
 from ..modal.full import ParametricOnsets
 from ..modal.onsets import Onsets
-from ..modal.parametric import ReducedModel
+from ..modal.parametric import ModesAtPoints, ReducedModel
 from ..periodic import Cycles
 from ..reading import is_reduced_file, starts_with
 from ..study.boundary_result import Boundary
 from ..study.damping_result import DampingMap
 from ..study.ensemble_result import Ensemble
+from ..study.measures import Countermeasures
 from ..study.sensitivity_result import Sensitivities
 from ..temporal.node_history import NODE_FIELDS, NodeHistory
 from ..temporal.trajectory import HISTORIES, ContactStatistics, PhaseResult, Trajectory
@@ -32,13 +33,13 @@ from .streams import NotedErrors
 
 Result = (
     ComplexModes | Onsets | ParametricOnsets | Sensitivities | Trajectory | Agreement | Ensemble | Boundary | DampingMap
-    | Cycles
+    | Cycles | Countermeasures | ModesAtPoints
 )  # fmt: skip
 STORE = ("zarr.json", ".zgroup", "study.zarr")  # in the folder of a store, and in the folder that a study writes to
 # Of the results that a file gives back as they were, by the analysis that it names.
 WHOLE: Mapping[str, Callable[[Any], Any]] = {
     "boundary": Boundary.from_xarray, "cycles": Cycles.from_xarray, "onsets along": ParametricOnsets.from_xarray,
-    "damping map": DampingMap.from_xarray,
+    "damping map": DampingMap.from_xarray, "countermeasures": Countermeasures.from_xarray,
 }  # fmt: skip
 
 
@@ -48,8 +49,9 @@ def to_dataset(result: Result) -> Any:
     if isinstance(result, Result):  # pyright: ignore[reportUnnecessaryIsInstance]
         return result.to_xarray()
     accepted = (
-        "complex modes, onsets, sensitivities, a trajectory, an ensemble, an agreement, a stability "
-        "boundary, a damping map or limit cycles; reduced models are no datasets, but can be saved"
+        "complex modes, onsets, sensitivities, a trajectory, an ensemble, an agreement, a stability boundary, a "
+        "damping map, counter-measures, modes of a reduced model or limit cycles; reduced models are no datasets, but "
+        "can be saved"
     )
     raise CaseError("result", kind_of(result), accepted)
 
@@ -92,8 +94,8 @@ def save(
 
 def open(path: str | Path) -> Any:
     """What is in a file that `save` or a command wrote, by its content: a Trajectory with the state that a restart
-    needs, a ReducedModel whose modes are the same to the last bit, a Boundary, a DampingMap, Cycles, ParametricOnsets,
-    or of other results the dataset of `to_dataset`.
+    needs, a ReducedModel whose modes are the same to the last bit, a Boundary, a DampingMap, Countermeasures, Cycles,
+    ParametricOnsets, or of other results the dataset of `to_dataset`.
 
     Raises CaseError for files that are none, damaged, changed since, or of a newer format.
     """

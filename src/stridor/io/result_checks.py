@@ -149,6 +149,29 @@ _MAP = {
     **{name: _Rule(("x", "y"), missing=True) for name in ("slope_x", "slope_y")},
     "error": _Rule(("x", "y"), low=0.0, missing=True, needed=False),
 }
+_CHANGES = {
+    "part": _PART,
+    "branch": _Rule(("branch",), "i"),
+    **dict.fromkeys(("kind", "name"), _Rule(("change",), "O")),
+    "direction": _Rule(("change",), low=-1.0, high=1.0),
+    **dict.fromkeys(("percent", "removed_per_percent", "removed_sum_per_percent", "removed"), _Rule(("change",))),
+    "mass": _Rule(("change",), low=0.0, missing=True),
+    **{
+        f"verified_{name}": _Rule(("change",), missing=True)
+        for name in ("growth_rate", "frequency_hz", "removed", "removed_sum")
+    },
+    "eigenvalue": _Rule(("branch", "part")),
+    "predicted": _Rule(("change", "branch", "part")),
+}
+_AT_POINTS = {
+    "number": _Rule(("number",), "O"),
+    "value": _Rule(("point", "number")),
+    **{name: _Rule(("point", "mode"), missing=True) for name in ("frequency_hz", "growth_rate")},
+    **{name: _Rule(("point", "mode"), low=0.0, missing=True) for name in ("error", "residual")},
+    **{name: _Rule(("point", "mode"), "i", 0, 1) for name in ("unstable", "passed")},
+    "inside": _Rule(("point",), "i", 0, 1),
+    "corrections": _Rule(("point",), "i", 0),
+}
 _CYCLE, _CYCLE_CONTACT = ("cycle", "sample"), ("cycle", "sample", "contact")
 _CYCLES = {
     "part": _PART,
@@ -170,7 +193,7 @@ _CYCLES = {
 _RULES: dict[str, dict[str, _Rule]] = {
     "modes": _MODES, "onsets": _ONSETS, "sensitivities": _SENSITIVITIES, "compare": _AGREEMENT, "simulate": _RUN,
     "ensemble": _ensemble(_GRID), "boundary": _BOUNDARY, "cycles": _CYCLES, "onsets along": _ALONG,
-    "damping map": _MAP,
+    "damping map": _MAP, "countermeasures": _CHANGES, "reduced modes": _AT_POINTS,
 }  # fmt: skip
 _COUNTS = ("record_every", "steps", "planned_steps", "most_sweeps", "unconverged_steps")
 _NUMBERS = ("step", "beta2", "step_limit", "wall_seconds")

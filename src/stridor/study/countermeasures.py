@@ -71,7 +71,8 @@ def rank_countermeasures(
     if not unstable:
         told = (*linear.warnings, f"no mode is unstable at μ = {linear.mu:g}: there is nothing to remove")
         empty = np.zeros(0)
-        return Countermeasures(linear.mu, target, empty.astype(np.int64), empty + 0j, (), margin, told)
+        source = provenance(work, "countermeasures", time.perf_counter() - started, mu=linear.mu)
+        return Countermeasures(linear.mu, target, empty.astype(np.int64), empty + 0j, (), margin, told, source)
     if target != "sum" and target not in linear.modes.branch[unstable]:
         accepted = f'"sum", or an unstable branch: {", ".join(str(b) for b in linear.modes.branch[unstable])}'
         raise CaseError("target", target, accepted)

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from ..digits import readable
 from ..modal.complex_modes import UNSTABLE_RELATIVE
 from ..notebook import Shown, counted, html_table
-from ..tabular import Cell, Rows, Tabular
+from ..tabular import Cell, Rows, Tabular, dataset, joined, split
 from ..typing import BoolArray, ComplexArray, IntArray
 
 Kind = Literal["number", "added mass", "chamfer"]
 Target = int | Literal["sum"]
+SAID = ("kind", "name")  # of a change, as its dataset has it: texts
+SIZES = ("direction", "percent", "removed_per_percent", "removed_sum_per_percent", "removed")
+SOLVED = ("growth_rate", "frequency_hz", "removed", "removed_sum")  # of one solved again
 
 
 @dataclass(frozen=True)
@@ -165,6 +169,77 @@ class Countermeasures(Tabular):
             ],
             "warnings": list(self.warnings),
         }
+
+    def to_xarray(self) -> Any:
+        """xarray.Dataset with dimensions change (best first) and branch, as `st.save` writes it; lists of branches,
+        places of masses and what is unstable after a change are JSON in the attribute ``countermeasures``."""
+        again = [m.verified for m in self.measures]
+        shape = len(self.measures), len(self.branch)
+        predicted = np.array([m.predicted for m in self.measures], complex).reshape(shape)
+        units = {"percent": "size of the change [%]", "direction": "+1 raise, -1 lower"}
+        variables: dict[str, Any] = {
+            **{n: ("change", np.array([getattr(m, n) for m in self.measures], dtype=object)) for n in SAID},
+            **{n: ("change", [float(getattr(m, n)) for m in self.measures], {"long_name": units.get(n, f"{n} [1/s]")})
+               for n in SIZES},
+            "mass": ("change", [np.nan if m.mass is None else m.mass for m in self.measures], {"units": "kg"}),
+            **{f"verified_{n}": ("change", [np.nan if v is None else float(getattr(v, n)) for v in again])
+               for n in SOLVED},
+            "eigenvalue": split(("branch",), self.eigenvalues, {"units": "1/s"}),
+            "predicted": split(("change", "branch"), predicted, {"units": "1/s", "long_name": "after the change"}),
+        }  # fmt: skip
+        lists = [
+            {
+                "makes_unstable": list(m.makes_unstable), "brings_close": list(m.brings_close),
+                "position": None if m.position is None else list(m.position),
+                "unstable_hz": None if m.verified is None else list(m.verified.unstable_hz),
+                "doubt": None if m.verified is None else m.verified.doubt,
+            }
+            for m in self.measures
+        ]  # fmt: skip
+        told = {"mu": self.mu, "target": self.target, "margin": self.margin, "changes": lists}
+        data = dataset("countermeasures", variables, {"branch": ("branch", self.branch)}, self.provenance)
+        return data.assign_attrs(countermeasures=json.dumps(told | {"warnings": list(self.warnings)}))
+
+    @classmethod
+    def from_xarray(cls, data: Any) -> Countermeasures:
+        """The changes whose `to_xarray` that is. Raises KeyError, TypeError or ValueError where it is none's."""
+        told = json.loads(data.attrs["countermeasures"])
+        mu, target, margin = float(told["mu"]), told["target"], float(told["margin"])
+        branch, predicted = data["branch"].values, joined(data["predicted"].values)
+        known = target == "sum" or (type(target) is int and target in branch)
+        if not (known and mu >= 0 and all(isinstance(text, str) for text in told["warnings"])):
+            raise ValueError("its friction coefficient, target or texts are none")
+        columns = {name: data[name].values for name in (*SAID, *SIZES, "mass", *(f"verified_{n}" for n in SOLVED))}
+        measures: list[Measure] = []
+        for k, lists in zip(range(len(predicted)), told["changes"], strict=True):
+            row = {name: values[k] for name, values in columns.items()}
+            if row["kind"] not in get_args(Kind) or abs(row["direction"]) != 1:
+                raise ValueError(f"a change of kind {str(row['kind'])[:40]!r}")
+            solved = None
+            if lists["unstable_hz"] is not None:
+                unstable = tuple(float(v) for v in lists["unstable_hz"])
+                again: Any = {name: float(row[f"verified_{name}"]) for name in SOLVED}
+                solved = Verified(**again, unstable_hz=unstable, doubt=str(lists["doubt"]))
+            position = lists["position"]
+            sizes: Any = {name: float(row[name]) for name in SIZES[1:]}
+            measures.append(
+                Measure(
+                    kind=row["kind"],
+                    name=str(row["name"]),
+                    direction=int(row["direction"]),
+                    **sizes,
+                    predicted=predicted[k],
+                    makes_unstable=tuple(map(int, lists["makes_unstable"])),
+                    brings_close=tuple(map(int, lists["brings_close"])),
+                    position=None if position is None else tuple(map(float, position)),
+                    mass=None if np.isnan(row["mass"]) else float(row["mass"]),
+                    verified=solved,
+                )
+            )
+        return cls(
+            mu, target, branch, joined(data["eigenvalue"].values), tuple(measures), margin, tuple(told["warnings"]),
+            json.loads(data.attrs["provenance"]),
+        )  # fmt: skip
 
 
 def growing(lam: ComplexArray) -> BoolArray:

@@ -6,12 +6,14 @@ from .correct import CorrectedModes, Corrector
 from .full import FullModes, verified
 from .model import ReducedModel, ReducedModes
 from .offline import reduce
+from .points import ModesAtPoints
 from .problem import Parameter, ParametricProblem, Term
 
 __all__ = [
     "CorrectedModes",
     "Corrector",
     "FullModes",
+    "ModesAtPoints",
     "Parameter",
     "ParametricProblem",
     "ReducedModel",

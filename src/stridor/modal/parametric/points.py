@@ -1,0 +1,139 @@
+"""Modes of a reduced model at many points of its box, as one result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ...notebook import Shown, counted, html_table
+from ...tabular import MODE, Rows, Tabular, dataset, mode_cells
+from ...typing import Array, BoolArray, IntArray
+from .correct import CorrectedModes, Corrector
+from .model import ReducedModel, ReducedModes
+
+OF_MODES = ("frequency_hz", "growth_rate", "unstable", "error", "passed", "residual")
+
+
+@dataclass(frozen=True, repr=False)
+class ModesAtPoints(Tabular, Shown):
+    """Modes at points (p,): parameters, their names, and values (p, n) there. frequency_hz [Hz], growth_rate [1/s],
+    error (relative, estimated) and residual (p, m), NaN where a point has fewer modes than others; unstable, passed
+    (error below the model's bound) (p, m). inside (p,): whether in the model's box; corrections (p,): steps taken."""
+
+    parameters: tuple[str, ...]
+    values: Array
+    frequency_hz: Array
+    growth_rate: Array
+    unstable: BoolArray
+    error: Array
+    passed: BoolArray
+    residual: Array
+    inside: BoolArray
+    corrections: IntArray
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        model: ReducedModel,
+        at: Mapping[str, Sequence[float]],
+        *,
+        corrections: int = 0,
+        solver: str | None = None,
+        provenance: Mapping[str, Any] | None = None,
+    ) -> ModesAtPoints:
+        """The modes at all combinations of values, of the model's own where a parameter is not named; corrected in the
+        full problem by up to so many steps where they do not pass."""
+        names = tuple(p.name for p in model.problem.parameters)
+        combinations = list(product(*(at.get(p.name, [p.value]) for p in model.problem.parameters)))
+        found: list[ReducedModes | CorrectedModes] = []
+        corrector: Corrector | None = None
+        try:
+            for combination in combinations:
+                modes: ReducedModes | CorrectedModes = model.modes(dict(zip(names, combination, strict=True)))
+                if corrections and not modes.passed.all():
+                    corrector = corrector or Corrector(model, solver=solver)
+                    modes = corrector.modes(modes.point, steps=corrections)
+                found.append(modes)
+        finally:
+            if corrector is not None:
+                corrector.free()
+        shape = len(found), max((len(modes.values) for modes in found), default=0)
+        numbers: dict[str, Any] = {name: np.full(shape, np.nan) for name in OF_MODES}
+        for k, modes in enumerate(found):
+            own = {"residual": modes.scaled_residual} if isinstance(modes, CorrectedModes) else {}
+            for name, values in numbers.items():
+                values[k, : len(modes.values)] = own.get(name, getattr(modes, name))
+        flags: dict[str, Any] = {name: np.nan_to_num(numbers.pop(name)) > 0 for name in ("unstable", "passed")}
+        return cls(
+            parameters=names,
+            values=np.array(combinations, dtype=float).reshape(len(found), len(names)),
+            **numbers,
+            **flags,
+            inside=np.array([bool(modes.inside) for modes in found], dtype=bool),
+            corrections=np.array([m.steps if isinstance(m, CorrectedModes) else 0 for m in found], dtype=np.int64),
+            provenance=dict(provenance or {}),
+        )
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def counts(self) -> list[int]:
+        """How many modes each point has."""
+        return np.isfinite(self.frequency_hz).sum(axis=1).tolist()
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """A document for each point, as `stridor reduce --json` prints them."""
+        return [
+            {
+                "point": dict(zip(self.parameters, self.values[k].tolist(), strict=True)),
+                "inside": bool(self.inside[k]),
+                "corrections": int(self.corrections[k]),
+                **{name: getattr(self, name)[k, :count].tolist() for name in OF_MODES},
+            }
+            for k, count in enumerate(self.counts())
+        ]
+
+    def table(self) -> Rows:
+        """Heads and rows, as reduced.csv has them: one for each mode of each point, columns of the parameters first."""
+        heads = (*self.parameters, *MODE, "error", "residual", "inside", "corrections")
+        return heads, [
+            (
+                *self.values[k].tolist(),
+                *mode_cells(
+                    float(self.frequency_hz[k, m]), float(self.growth_rate[k, m]), unstable=bool(self.unstable[k, m])
+                ),
+                float(self.error[k, m]), float(self.residual[k, m]), bool(self.inside[k]), int(self.corrections[k]),
+            )
+            for k, count in enumerate(self.counts())
+            for m in range(count)
+        ]  # fmt: skip
+
+    @property
+    def _line(self) -> str:
+        some = int(np.any(self.unstable, axis=1).sum())
+        return f"modes at {counted(len(self), 'point')}, unstable ones at {some or 'none'}"
+
+    def _repr_html_(self) -> str:
+        heads, rows = self.table()
+        shown = [[f"{cell:.6g}" if isinstance(cell, float) else str(cell) for cell in row] for row in rows]
+        return html_table(f"Reduced {self._line}", heads, shown)
+
+    def to_xarray(self) -> Any:
+        """xarray.Dataset with dimensions point, mode and number (the parameters), as `st.save` writes it."""
+        variables: dict[str, Any] = {
+            "value": (("point", "number"), self.values),
+            "frequency_hz": (("point", "mode"), self.frequency_hz, {"units": "Hz"}),
+            "growth_rate": (("point", "mode"), self.growth_rate, {"units": "1/s"}),
+            "error": (("point", "mode"), self.error, {"long_name": "estimated relative error of the eigenvalue"}),
+            "residual": (("point", "mode"), self.residual),
+            **{name: (("point", "mode"), getattr(self, name).astype(np.int8)) for name in ("unstable", "passed")},
+            "inside": (("point",), self.inside.astype(np.int8)),
+            "corrections": (("point",), self.corrections),
+        }
+        names = {"number": ("number", np.array(self.parameters, dtype=object))}
+        return dataset("reduced modes", variables, names, self.provenance)

@@ -1,0 +1,77 @@
+"""Onsets in the plane of the number they lie along and their frequency; modes of a reduced model at points."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..digits import measured
+from ..modal.full import ParametricOnsets
+from ..modal.onsets import Onsets
+from ..modal.parametric import ModesAtPoints
+from .modal_plots import MU
+from .style import BLUE, GREY, INK, VERMILION, legend_above, panel, stacked, styled, zero_line
+
+MOST_NAMED = 12  # onsets with their value beside them
+
+
+@styled
+def onset_chart(onsets: Onsets | ParametricOnsets, *, ax: Axes | None = None) -> Figure:
+    """Each onset at its value and frequency over the range searched: filled where growth begins, open where it ends.
+    Triangles at the sides: modes that grow at that end of the range, of onsets over μ."""
+    figure, ax = panel(ax, 3.8)
+    if isinstance(onsets, Onsets):
+        (low, high), name, at = onsets.friction_range, MU, [o.mu for o in onsets]
+        ends = ((low, ">", onsets.at_start), (high, "<", onsets.at_end))
+    else:
+        (low, high), name, at = onsets.between, onsets.parameter, [o.value for o in onsets]
+        ends = ()
+    for words, ending, colour in (("growth begins", False, VERMILION), ("growth ends", True, "white")):
+        chosen = [(x, o.frequency_hz / 1e3) for x, o in zip(at, onsets, strict=True) if o.stabilising is ending]
+        if chosen:
+            ax.plot(*zip(*chosen, strict=True), "D", color=colour, mec=VERMILION, ms=6, label=words, clip_on=False)
+    for place, marker, values in ends:
+        if values:
+            side = "start" if place == low else "end"
+            label = f"grows at the {side} of the range"
+            kilohertz = [abs(v.imag) / (2e3 * np.pi) for v in values]
+            ax.plot([place] * len(values), kilohertz, marker, color=INK, ms=6, ls="none", label=label, clip_on=False)
+    for x, o in list(zip(at, onsets, strict=True))[:MOST_NAMED]:
+        right = x < (low + high) / 2
+        ax.annotate(
+            measured(x, 4), (x, o.frequency_hz / 1e3), xytext=(7 if right else -7, 0), textcoords="offset points",
+            ha="left" if right else "right", va="center", fontsize=8,
+        )  # fmt: skip
+    ax.set(xlim=(low, high), ylim=(0, onsets.max_frequency_hz / 1e3), xlabel=name, ylabel="frequency [kHz]")
+    if not len(onsets):
+        ax.text(0.5, 0.5, "no onset found", transform=ax.transAxes, ha="center", va="center", color=GREY)
+    legend_above(ax)
+    return figure
+
+
+@styled
+def modes_at_points(found: ModesAtPoints) -> Figure:
+    """Frequency and growth rate of the modes at each point over the number that has most values, unstable ones filled.
+    Of several numbers the points of all others lie above each other."""
+    figure, (upper, lower) = stacked(None, 2, 5.4)
+    varied = max(range(len(found.parameters)), key=lambda k: len(np.unique(found.values[:, k])))
+    x = np.broadcast_to(found.values[:, [varied]], found.frequency_hz.shape)
+    for ax, values, words in (
+        (upper, found.frequency_hz / 1e3, "frequency [kHz]"), (lower, found.growth_rate, "growth rate [1/s]")
+    ):  # fmt: skip
+        for chosen, fill, colour, label in (
+            (~found.unstable, "none", BLUE, "decays"), (found.unstable, VERMILION, VERMILION, "unstable")
+        ):  # fmt: skip
+            shown = chosen & np.isfinite(values)
+            if shown.any():
+                ax.plot(x[shown], values[shown], "o", ms=4, mfc=fill, mec=colour, label=label)
+        ax.set_ylabel(words)
+    zero_line(lower)
+    reach = float(np.abs(found.growth_rate[np.isfinite(found.growth_rate)]).max(initial=0.0))
+    if reach > 0:
+        lower.set_yscale("symlog", linthresh=10.0 ** np.floor(np.log10(reach / 30)))
+        lower.set_ylim(-2 * reach, 2 * reach)
+    lower.set_xlabel(found.parameters[varied])
+    legend_above(upper)
+    return figure
