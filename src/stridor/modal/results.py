@@ -257,6 +257,11 @@ def grows(values: ComplexArray, top: float) -> BoolArray:
         return values.real > UNSTABLE_RELATIVE * np.maximum(np.abs(values), LEAST * top)
 
 
+def off_rounding(values: ComplexArray, rounding: float) -> ComplexArray:
+    """Eigenvalues (k,) whose real part may be rounding, a share of |λ|, put on the imaginary axis."""
+    return np.where(np.abs(values.real) <= rounding * np.abs(values), 1j * values.imag, values)
+
+
 def require_memory(rows: int, columns: int, freedoms: int = 0) -> None:
     """Raise CaseError where modes at that many μ, with vectors of so many freedoms, take more memory than there is to
     be had."""

@@ -19,9 +19,9 @@ from ..parametric import ReducedModel, reduce
 from ..parametric.basis import expanded
 from ..quadratic import Quadratic, Region, find_modes
 from ..quadratic.problem import times
+from ..results import off_rounding
 from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .family import MU, ROLES, Family, Smooth
-from .growth import off_rounding
 
 DENSE = 60  # unknowns up to which the matrices are their own reduced model
 WHOLE = 6000  # and up to which branches are followed by full solves where there is none

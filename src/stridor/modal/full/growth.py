@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...typing import BoolArray, ComplexArray
+from ..results import off_rounding
 from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .family import Family
 
@@ -14,11 +15,6 @@ def unstable(family: Family, values: ComplexArray, top: float, still: float = AT
     count."""
     rounding = SPLIT_RELATIVE if family.reversible else UNSTABLE_RELATIVE
     return (values.real > rounding * np.abs(values)) & (np.abs(values) > still * top)
-
-
-def off_rounding(values: ComplexArray, rounding: float) -> ComplexArray:
-    """Eigenvalues (k,) whose real part may be rounding, a share of |λ|, put on the imaginary axis."""
-    return np.where(np.abs(values.real) <= rounding * np.abs(values), 1j * values.imag, values)
 
 
 def without_rounding(family: Family, values: ComplexArray) -> ComplexArray:

@@ -26,8 +26,8 @@ from ..newton import exceptional
 from ..onset import Onset, Onsets
 from ..options import Options
 from ..quadratic.reach import searched
-from ..results import grows
-from ..tolerances import BELIEVED, UNSTABLE_RELATIVE
+from ..results import grows, off_rounding
+from ..tolerances import BELIEVED, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .carried import Carried
 from .follow import Follower, State, halves
 from .modes import samples
@@ -101,11 +101,11 @@ def krylov_onsets(
         max_frequency_hz,
         problem.damped,
         problem.open_contacts,
-        at_start=tuple(way.start.values[_inside(way.start, top)].tolist()),
-        at_end=tuple(way.end.values[_inside(way.end, top)].tolist()),
+        at_start=tuple(way.start.values[_inside(reduced, way.start, top)].tolist()),
+        at_end=tuple(way.end.values[_inside(reduced, way.end, top)].tolist()),
         entering=_entering(way, changes, low),
         contact_state=problem.contact_state,
-        unexplained=unexplained(np.flatnonzero(_inside(way.end, top)), way.from_start, changes),
+        unexplained=unexplained(np.flatnonzero(_inside(reduced, way.end, top)), way.from_start, changes),
         followed=(_numbered(way.start), _numbered(way.end)),
     )
 
@@ -132,9 +132,15 @@ def _entering(way: _Way, changes: list[StabilityChange], low: float) -> tuple[tu
     return tuple(found)
 
 
-def _inside(state: State, top: float) -> BoolArray:
+def _growing(reduced: Reduced, state: State, top: float) -> BoolArray:
+    """Which branches (b,) grow beyond rounding."""
+    values = state.values if reduced.damped else off_rounding(state.values, SPLIT_RELATIVE)
+    return grows(values, top)
+
+
+def _inside(reduced: Reduced, state: State, top: float) -> BoolArray:
     """Which branches (b,) grow in the band."""
-    return grows(state.values, top) & (state.values.imag <= top)
+    return _growing(reduced, state, top) & (state.values.imag <= top)
 
 
 @dataclass(frozen=True)
@@ -160,7 +166,7 @@ def _way(reduced: Reduced, between: tuple[float, float], top: float, numbered_at
 
     follower = Follower(reduced, start=numbered_at, longest=max(between[0] / 4, between[1] / 30))
     start = follower.advance(between[0])
-    first = np.flatnonzero(grows(start.values, top)).tolist()
+    first = np.flatnonzero(_growing(reduced, start, top)).tolist()
     follower.longest, follower.watch = between[1] / 30, watch
     return _Way(start, follower.advance(between[1]), passages, entries, first)
 

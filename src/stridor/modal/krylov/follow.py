@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from ...errors import FollowingError
 from ...stages import passing, stage
 from ...typing import Array, BoolArray, ComplexArray, IntArray
 from ..dense_problem import Eigenpairs, OverNumber
@@ -24,6 +25,7 @@ STRAIGHT = 0.1  # of the difference of two values: how far off a straight line t
 COINCIDENT = 1e-6  # of an eigenvalue: as near as modes are when rounding may exchange them
 ASIDE = 0.83  # of a step that ends where modes coincide
 SMALLEST_STEP = 1e-9
+MOST_TRIED = 600  # steps tried within one of the longest: ten places where modes meet take some 400
 NARROW = 1e-5  # step over μ below which two values that pass each other beside zero count as having met
 ROUNDING = 1e-9
 FOLLOWED = 1.25  # branches are followed up to this much above the band
@@ -93,9 +95,16 @@ class Follower:
 
     @passing()
     def advance(self, mu: float) -> State:
-        """Follow to ``mu``, not below the present one."""
+        """Follow to ``mu``, not below the present one. Raises FollowingError where it gets nowhere."""
+        tried, since = 0, self.state.mu
         while self.state.mu < mu:
             left = mu - self.state.mu
+            if self.state.mu - since >= self.longest:
+                tried, since = 0, self.state.mu
+            tried += 1
+            if tried > MOST_TRIED:
+                at = f"{self.state.mu:.6g}"
+                raise FollowingError(f"branches cannot be told apart near μ = {at}: modes go on as one over a range")
             step = min(self._step, self.longest)
             # No sliver is left over for rounding to make.
             step = left if left <= 1.01 * step else step
@@ -222,7 +231,17 @@ def _clear(old: State, found: Eigenpairs, index: IntArray, distance: Array) -> B
     alike = common / np.maximum(np.sum(np.abs(before) ** 2, axis=0) * np.sum(np.abs(after) ** 2, axis=0), 1e-300)
     rounding = 1e-9 * np.abs(found.coordinate[index])
     same = others.min(axis=1, initial=np.inf) <= rounding  # identical eigenvalues: either will do
-    return ((mine <= CLEAR * others.min(axis=1, initial=np.inf)) & (alike >= ALIKE)) | (same & (mine <= rounding))
+    clear = (mine <= CLEAR * others.min(axis=1, initial=np.inf)) & (alike >= ALIKE)
+    return clear | (same & (mine <= rounding)) | _double(old.coordinate, found.coordinate[index])
+
+
+def _double(before: ComplexArray, after: ComplexArray) -> BoolArray:
+    """Which branches (b,) are one of two that are a double eigenvalue at both ends of a step, as those of a mass on a
+    belt whose spring is as stiff as its contact: rounding alone tells the two apart, so either will do."""
+    one = np.eye(len(before), dtype=bool)
+    near = [np.abs(x[:, None] - x) <= COINCIDENT * np.abs(x)[:, None] for x in (before, after)]
+    moved: Array = np.abs(after - before)
+    return np.any(near[0] & near[1] & ~one, axis=1) & (moved <= STRAIGHT * np.abs(before))
 
 
 def _as_pair(old: State, found: Eigenpairs, i: int, index: IntArray, clear: BoolArray) -> tuple[int, int, int] | None:

@@ -14,8 +14,8 @@ from ...threads import one_thread
 from ...typing import Array, BoolArray
 from ..options import Options
 from ..quadratic.reach import searched
-from ..results import ComplexModes, Progress, require_memory
-from ..tolerances import BELIEVED
+from ..results import ComplexModes, Progress, off_rounding, require_memory
+from ..tolerances import BELIEVED, SPLIT_RELATIVE
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
@@ -108,7 +108,8 @@ def _followed(
             state = follower.advance(mu)
             lam, index = state.values[branches], state.index[branches]
             u, p = reduced.expand(state.found.right[:, index])
-            eigenvalues[k], residual[k] = lam, problem.pencil(mu).backward_error(lam, u, p)
+            residual[k] = problem.pencil(mu).backward_error(lam, u, p)
+            eigenvalues[k] = lam if reduced.damped else off_rounding(lam, SPLIT_RELATIVE)
             if vectors:
                 right[k] = u.T
             if vectors is True:

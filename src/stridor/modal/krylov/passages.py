@@ -9,8 +9,10 @@ from typing import Literal
 
 import numpy as np
 
+from ...typing import Array, ComplexArray
 from ..dense_problem import OverNumber
-from .follow import State, halves
+from ..tolerances import SPLIT_RELATIVE
+from .follow import COINCIDENT, State, halves
 
 COMPLEX = 1e-9  # imaginary part of λ² over the band's that is more than rounding
 TOUCHING = 0.05  # squared half differences that come down to this part of their ends are looked at closely
@@ -101,13 +103,13 @@ def meetings(source: OverNumber, old: State, new: State) -> list[Passage]:
     """Undamped modes that meet or part, or diverge, between two states."""
     floor = COMPLEX * source.frequency**2
     found: list[Passage] = []
-    was, now = np.abs(old.coordinate.imag) > floor, np.abs(new.coordinate.imag) > floor
+    was, now = (np.abs(state.coordinate.imag) > _rounding(source, state.coordinate) for state in (old, new))
     for i in np.flatnonzero(was != now):
         split = new if now[i] else old
         distance = np.abs(split.coordinate - split.coordinate[i].conj())
         distance[i] = np.inf
         j = int(np.argmin(distance))
-        if i < j or was[j] == now[j]:
+        if (i < j or was[j] == now[j]) and not _one(old, new, int(i), j):
             means = halves(old.coordinate[i], old.coordinate[j])[0], halves(new.coordinate[i], new.coordinate[j])[0]
             found.append(Passage("meeting", old.mu, new.mu, int(i), j, bool(was[i]), means, old))
     real = ~was & ~now
@@ -115,6 +117,17 @@ def meetings(source: OverNumber, old: State, new: State) -> list[Passage]:
     for i in np.flatnonzero(real & (beyond_old != beyond_new)):
         found.append(Passage("divergence", old.mu, new.mu, int(i), int(i), bool(beyond_old[i]), (0j, 0j), old))
     return found + _bubbles(source, old, new, np.flatnonzero(real).tolist())
+
+
+def _rounding(source: OverNumber, coordinate: ComplexArray) -> Array:
+    """Im λ² (k,) that may be rounding: of modes that are one at every μ it is the root of it (`SPLIT_RELATIVE`)."""
+    return np.maximum(COMPLEX * source.frequency**2, 2 * SPLIT_RELATIVE * np.abs(coordinate))
+
+
+def _one(old: State, new: State, i: int, j: int) -> bool:
+    """Whether two modes are one at both ends of a step: rounding alone parts them, now real, now complex."""
+    pairs = [state.coordinate[[i, j]] for state in (old, new)]
+    return all(bool(abs(x[0] - x[1]) <= COINCIDENT * abs(x[0])) for x in pairs)
 
 
 def _bubbles(source: OverNumber, old: State, new: State, real: list[int]) -> list[Passage]:
@@ -127,6 +140,8 @@ def _bubbles(source: OverNumber, old: State, new: State, real: list[int]) -> lis
     known = {frozenset(pair) for pair in neighbours}
     neighbours += [pair for pair in pairwise(later) if frozenset(pair) not in known]
     for i, j in neighbours:
+        if _one(old, new, i, j):
+            continue
         lowest = _lowest(source, old, new, i, j)
         if lowest is not None:
             mu, mean = lowest
@@ -153,7 +168,7 @@ def _lowest(source: OverNumber, old: State, new: State, i: int, j: int) -> tuple
         guess = (1 - at) * low[0] + at * high[0]
         near = np.argsort(np.abs(found.coordinate - guess))[:2]
         mean, square = halves(*found.coordinate[near])
-        if square.real < -((COMPLEX * source.frequency**2) ** 2):
+        if square.real < -(float(_rounding(source, np.array([mean]))[0]) ** 2):
             return mu, mean
         slopes = found.tangents[near]
         change = float(((found.coordinate[near[0]] - found.coordinate[near[1]]) * (slopes[0] - slopes[1]) / 2).real)
