@@ -25,10 +25,15 @@ def one_thread(call: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(call)
     def calm(*args: P.args, **kwargs: P.kwargs) -> R:
-        with _libraries().limit(limits=1, user_api="blas"):
+        with limited():
             return call(*args, **kwargs)
 
     return calm
+
+
+def limited() -> AbstractContextManager[Any]:
+    """As long as it is open what `one_thread` does: for a whole command."""
+    return _libraries().limit(limits=1, user_api="blas")
 
 
 def for_factor(unknowns: int) -> AbstractContextManager[Any]:

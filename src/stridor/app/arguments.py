@@ -110,10 +110,12 @@ class Call:
             os.environ["STRIDOR_SOLVER"] = self.solver
         self.warn(case.warnings)
         from ..study.workspace import Workspace
+        from ..threads import limited
 
         work = Workspace(case)
         self.idle[:] = [partial(self._without_effect, work)]
         self.claim()
+        self.stack.enter_context(limited())
         return work
 
     def _without_effect(self, work: Workspace) -> list[str]:
