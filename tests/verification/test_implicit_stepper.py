@@ -19,6 +19,7 @@ from stridor.case import loads, template_text
 from stridor.laws import Coulomb, StaticKinetic, Weakening
 from stridor.study.settings import phases_of, settings_of
 from stridor.system import System
+from stridor.temporal import simulate as simulate_module
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.simulate import Settings, plan, simulate
@@ -494,6 +495,34 @@ def test_auto_takes_it_for_contact_over_many_nodes_and_says_why():
     assert np.array_equal(again.displacement, result.displacement)  # with the step that it came to
     for other in ({"temporal.beta2": 0.6}, {"temporal.step": 1e-7}, {"temporal.path": "assembled"}):
         assert plan(system, settings_of(case.with_(other)))[0] == "assembled"
+
+
+@pytest.mark.parametrize("why", ["overlap", "jump", "nothing"])
+def test_auto_leaves_to_others_what_implicit_steps_refuse_at_the_start(why: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(simulate_module, "SMALL", 0)
+    monkeypatch.setattr(simulate_module, "MANY", 1)
+    if why == "jump":
+        case = pressed_by_a_distance("auto", 0.02).with_({"phases.1.ramp": 0.0, "contacts.A.stiffness": "rigid"})
+        system, phases = st.build_system(case), phases_of(case)
+    else:
+        system = block_on_belt(speed=0.2)
+        system = replace(system, contacts=(replace(system.contacts[0], gap=-0.1 if why == "overlap" else 0.0),))
+        phases = [PhaseSpec("slide", 1.0, {"press": 1.0}, {"belt": 1.0})]
+    result = simulate(system, phases, Settings(stepper="auto", record_every=1, max_frequency_hz=5.0))
+    assert (result.path == "implicit") == (why == "nothing")
+
+
+def test_what_of_a_start_the_coordinates_do_not_have_is_said():
+    case = pad(**{"phases.slide.duration": 2e-5, "temporal.initial": "rest", "temporal.perturbation": 0.0})
+    system = st.build_system(case)
+    assert "has no place in them" not in simulate(system, phases_of(case), settings_of(case)).path_reason
+    # Every other freedom moved one way, all others the other: nothing that vibrates below 6 kHz.
+    rough = np.where(np.arange(system.size) % 2, 1.0, -1.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(basis, "COMPLETE", 10)
+        result = simulate(replace(system, initial_velocity=1e-3 * rough), phases_of(case), settings_of(case))
+    share = float(result.path_reason.split("; ")[1].split(" %")[0])
+    assert 80 < share < 100
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from .schedule import PhaseSpec, Schedule, lay_out
 from .settings import Settings
 from .stepper import Disturbance, Stepper
 from .steppers.exact import exact_stepper, refuse, why_not_exact
-from .steppers.implicit import COARSEST, implicit_stepper, whole_steps, why_not_implicit
+from .steppers.implicit import COARSEST, implicit_stepper, whole_steps, why_not_begun, why_not_implicit
 from .steppers.implicit import refuse as refuse_implicit
 from .steppers.modal import choose_path, modal_stepper, refuses
 from .steppers.sparse import sparse_stepper, step_limit_assembled
@@ -74,9 +74,12 @@ def simulate(
         record_every=settings.record_every,
         watch=settings.watch,
     )
+    asked = settings
     settings, why = _chosen(system, settings)
     if settings.stepper == "implicit":
         settings = replace(settings, step=whole_steps(settings, phases))
+        if asked.stepper == "auto" and restart is None and why_not_begun(system, settings, phases):
+            settings, why = replace(asked, stepper="explicit"), ""
     stepper = stepper_for(system, settings, mu, why)
     motion = system.motion
     schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)

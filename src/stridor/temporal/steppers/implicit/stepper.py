@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,7 +18,7 @@ from ...columns import ENERGY_RECORD, WORK_COLUMNS
 from ...node_history import NodeHistory
 from ...restart import motion_ratio
 from ...saved import INFINITY, STATUS_RANGE, Bounds
-from ...schedule import PhaseSpec, Schedule
+from ...schedule import PhaseSpec, Schedule, lay_out
 from ...settings import Settings, not_finite
 from ...sketch import sketch
 from ...stepper import Disturbance
@@ -38,6 +39,7 @@ BEYOND = 2.0  # times that frequency: the modes of the structure that a large mo
 MOST_ROWS = 4000  # of contact: normal and tangents of each node
 NODE_HISTORY_BYTES = 500e6
 CONTACT_COLUMNS = 5
+TOLD_FROM = 1e-3  # of the initial state: what is left out of it is said from there on
 OVERLAP = 1e-6  # of its terms: what of a closed gap is rounding
 
 
@@ -62,6 +64,21 @@ def refuse(system: System, settings: Settings) -> None:
     """Raise CaseError for a system that it does not take."""
     if why := why_not_implicit(system, settings):
         raise CaseError("temporal.stepper", "implicit", f'no such system: {why}; take "explicit"')
+
+
+def why_not_begun(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> str:
+    """Why it does not take phases from their start on; "" where it does. settings: with a step."""
+    assert settings.step is not None, "the step was found before (`whole_steps`)"
+    motion, nodes = system.motion, system.contact_nodes()
+    schedule = lay_out(phases, settings.step, list(system.loads), list(motion.names), motion.full_distance)
+    if found := _jump(schedule):
+        return found
+    if settings.initial == "steady-sliding" or not nodes.count:
+        return ""
+    u = np.zeros(system.size) if system.initial_displacement is None else system.initial_displacement
+    gap, size = nodes.gap + nodes.normal @ u, np.abs(nodes.gap) + np.abs(nodes.normal) @ np.abs(u)
+    overlaps = (nodes.compliance == 0.0) & ~nodes.kept & (gap < -OVERLAP * size)
+    return "a rigid contact starts with overlap" if overlaps.any() else ""
 
 
 def whole_steps(settings: Settings, phases: Sequence[PhaseSpec]) -> float:
@@ -117,6 +134,7 @@ class ImplicitStepper:
         basis = self.coordinates.basis
         self.structure: Structure = structure_of(system, basis, settings.step)
         self.nodes: Nodes = nodes_of(system, nodes, rows, lift, basis, self.structure)
+        self.left_out = 0.0  # of the initial displacement or velocity, by mass
         self.contact_names, self.closed = nodes.names, nodes.closed
         self.parts = sketch(system, nodes)
         self.moving: State = fresh_state(self.nodes, self.structure, len(nodes.names))
@@ -138,6 +156,8 @@ class ImplicitStepper:
         said = f"{self._why}: implicit steps in {self.coordinates.words}"
         if solved := int(self.moving.counters[BY_NEWTON]):
             said += f"; contacts of {solved} steps were solved by Newton's method"
+        if self.left_out > TOLD_FROM:
+            said += f"; {100 * self.left_out:.2g} % of the initial state, by its mass, has no place in them"
         turned = self.scheme.step * (self._highest_hz or 0.0)
         if turned > ROUGH:
             said += f"; {1 / turned:.3g} steps to the period of {self._highest_hz:g} Hz are few"
@@ -184,6 +204,7 @@ class ImplicitStepper:
         if disturbance is not None:
             u, v = u + disturbance[0], v + disturbance[1]
         state.q[:], state.v[:] = self._in_coordinates(u), self._in_coordinates(v) + extra
+        self.left_out = max(self._share_left_out(u, state.q), self._share_left_out(v, state.v - extra))
         self._place_nodes()
         self._refuse_overlap()
 
@@ -215,6 +236,11 @@ class ImplicitStepper:
         answer = along.sum(axis=0)
         mean = float(np.mean(along @ answer)) if len(along) else 0.0
         return answer / mean if mean > 0.0 else answer
+
+    def _share_left_out(self, u: Array, q: Array) -> float:
+        """The part of a start (n,), by its mass, that its coordinates (r,) do not have."""
+        whole = float(u @ (self._system.mass @ u))
+        return math.sqrt(max(1.0 - float(q @ q) / whole, 0.0)) if whole > 0.0 else 0.0
 
     def _in_coordinates(self, u: Array) -> Array:
         return self.coordinates.basis.vectors.T @ (self._system.mass @ np.asarray(u, dtype=float))
@@ -343,11 +369,15 @@ class ImplicitStepper:
         )  # fmt: skip
 
 
-def _refuse_jumps(schedule: Schedule) -> None:
+def _jump(schedule: Schedule) -> str:
+    """What changes at once, "" where nothing does."""
     for stretch in schedule.stretches:
         if stretch.ramp_steps == 0 and np.any(stretch.distances_after != stretch.distances_before):
-            raise CaseError(
-                "phases",
-                f"a distance that changes at once in phase {stretch.name}",
-                'a ramp [s] > 0 where supports are pressed away, or stepper = "explicit"',
-            )
+            return f"a distance that changes at once in phase {stretch.name}"
+    return ""
+
+
+def _refuse_jumps(schedule: Schedule) -> None:
+    if found := _jump(schedule):
+        accepted = 'a ramp [s] > 0 where supports are pressed away, or stepper = "explicit"'
+        raise CaseError("phases", found, accepted)
