@@ -50,8 +50,13 @@ def cycles(
     ] = None,
     points: Annotated[int, typer.Option("--most", min=2, help="Most cycles of a branch, each way.")] = 120,
     seconds: Annotated[
-        float, typer.Option("--seconds", help="Processor time for a motion that comes back to nowhere.")
-    ] = 60.0,
+        float | None,
+        typer.Option(
+            "--seconds",
+            help="Processor time: by shooting for a motion that comes back to nowhere [default: 60], by harmonic "
+            "balance for a branch [default: no limit].",
+        ),
+    ] = None,
     max_frequency: MaxFrequency = None,
     source: Source = None,
 ) -> None:
