@@ -19,6 +19,7 @@ from .analyses import onsets
 from .asked import require_friction
 from .cycle_branches import Tracer
 from .cycle_methods import SECONDS, Harmonic, Method, MethodName, Shooting, Unreached
+from .fingerprint import fingerprint
 from .provenance import provenance
 from .workspace import Problem, Workspace
 
@@ -232,6 +233,8 @@ class _Search:
             between=None if self.between is None else list(self.between), push=self.pushes,
             points=self.points, method=self.method.name, harmonics=self.harmonics,
         )  # fmt: skip
+        if self.work.given is not None:
+            made["fingerprint"] = fingerprint(self.work.given, None)
         return Cycles(
             tuple(found), tuple(branches), self.onsets, self.between, (*self.missing, *lost), tuple(self.notes),
             self.interrupted, made,
