@@ -262,6 +262,8 @@ def test_static_friction_above_kinetic_is_refused():
         st.cycles(system, 0.3, method="harmonic")
     (cycle,) = st.cycles(system, 0.3, push=0.3).cycles  # auto
     assert cycle.method == "shooting"
+    # Nor is there an onset from which a branch could lead to it.
+    assert not st.onsets(system, (0.0, 1.0)).onsets
 
 
 def beam_with_joint() -> tuple[System, int, float]:
