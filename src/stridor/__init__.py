@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from .studies.schema import Study
     from .study.analyses import (
         body_modes,
-        compare,
         describe,
         friction_curve,
         modes,
@@ -44,6 +43,7 @@ if TYPE_CHECKING:
         summarise,
     )
     from .study.boundary import stability_boundary
+    from .study.comparison import compare
     from .study.copies import perturbed_copies
     from .study.countermeasures import rank_countermeasures
     from .study.cycles import cycles
@@ -64,7 +64,7 @@ _HOMES = {
     "app": ".app",
     "body_modes": ".study.analyses",
     "build_system": ".system",
-    "compare": ".study.analyses",
+    "compare": ".study.comparison",
     "cycles": ".study.cycles",
     "damping_map": ".study.damping_map",
     "describe": ".study.analyses",

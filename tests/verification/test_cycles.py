@@ -28,6 +28,7 @@ from stridor.periodic import (
     growing,
     multipliers,
     pushed,
+    returns,
 )
 from stridor.periodic.chart import Chart
 from stridor.periodic.shooting import shoot, started
@@ -157,7 +158,7 @@ def test_a_branch_begins_at_the_onset(slow_belt: Cycles):
     first = slow_belt.cycles[branch.cycles[0]]
     assert branch.onset == 0
     assert branch.begins == "it begins at the onset at μ = 0.7506"
-    assert branch.ends == "it leaves the range at μ = 1.8"
+    assert branch.ends == "it leaves the range at μ = 1.8; a fold beyond it is not looked for"
     assert 0.0 < first.mu - onset.mu < 2e-3
     assert first.frequency_hz == pytest.approx(onset.frequency_hz, rel=1e-3)
     assert first.kinds == ("slip", "separation")
@@ -241,6 +242,42 @@ def test_what_was_found_is_kept_when_the_search_is_stopped():
     assert len(found.cycles) == len(seen) == 4
     assert found.branches[0].ends == "it was stopped"
     assert "stopped early: 4 limit cycles at μ = 0.751901 to " in found.warnings[0]
+
+
+def test_a_cycle_is_kept_when_the_motion_to_it_is_stopped(monkeypatch: pytest.MonkeyPatch):
+    """The motion goes on behind a cycle that is said to be unstable; stopped there, the cycle is not lost."""
+    closed, going_on = returns._closed, returns._next_change
+    met: list[Closed] = []
+
+    def noted(*given) -> Closed:
+        met.append(closed(*given))
+        return met[-1]
+
+    def stopped(*given) -> tuple[str, int] | None:
+        if met:
+            raise KeyboardInterrupt
+        return going_on(*given)
+
+    monkeypatch.setattr(returns, "_closed", noted)
+    monkeypatch.setattr(returns, "_next_change", stopped)
+    monkeypatch.setattr(returns, "SURE", 0.0)
+    monkeypatch.setattr(returns, "multipliers", lambda _: np.array([2.0]))
+    kept: list[Cycles] = []
+    found = st.cycles(mode_coupling(DAMPED, 0.1), 1.0, push=0.2, keep=kept.append)
+    assert found.interrupted
+    assert len(met) == len(kept) == 1
+    assert [c.period for c in found.cycles] == [met[0].period]
+
+
+def test_a_branch_whose_end_at_the_edge_is_lost_says_so(monkeypatch: pytest.MonkeyPatch):
+    def lost(*_: object) -> Closed:
+        raise st.AnalysisError("nothing is there")
+
+    monkeypatch.setattr(Branch, "at", lost)
+    found = st.cycles(mode_coupling(DAMPED, 0.1), between=(0.7, 0.78), push=0.2)
+    branch = found.branches[0]
+    assert branch.ends.endswith("its cycle at the edge, μ = 0.78, could not be closed: nothing is there")
+    assert f"branch 1: {branch.ends}" in found.missing
 
 
 def test_undamped_modes_that_meet_have_no_branch_of_their_own():

@@ -21,6 +21,7 @@ from stridor.fe.assembly import assemble_beam
 from stridor.fe.beam import BeamElement, BeamMesh
 from stridor.laws import Coulomb, Hyperbolic, StaticKinetic, Tabulated, Weakening
 from stridor.periodic import Closed, Cycle, Cycles, Family, cycles_reached, growing, pushed, sampled
+from stridor.periodic.cycle import OWN
 from stridor.periodic.harmonic import (
     Balanced,
     HarmonicBranch,
@@ -89,7 +90,8 @@ def test_without_reversal_it_converges_fast():
     assert np.all(np.log2(left[:-1] / left[1:]) > 2.0)
     assert left[0] < 0.01
     # Hill's multipliers, and Liouville's formula: their product is exp(−tr C T), with this model's 2 · 0.02.
-    multipliers = hill(found[1])
+    multipliers, own_off = hill(found[1])
+    assert own_off < 1e-4
     assert multipliers == pytest.approx(cycle.multipliers, abs=1e-4)
     assert abs(np.prod(multipliers)) == pytest.approx(np.exp(-2 * DAMPED * cycle.period), rel=1e-4)
 
@@ -97,7 +99,7 @@ def test_without_reversal_it_converges_fast():
 @pytest.mark.parametrize(("mu", "within"), [(0.9, 0.05), (1.0, 0.02), (1.7, 0.06)])
 def test_hill_is_floquet_where_slip_turns_and_sticks(mu: float, within: float):
     cycle, family = shot(0.1, mu)
-    found = hill(beside(cycle, family, 60))
+    found = hill(beside(cycle, family, 60)).multipliers
     assert np.sort(np.abs(found)) == pytest.approx(np.sort(np.abs(cycle.multipliers)), abs=within)
 
 
@@ -111,8 +113,18 @@ def test_a_branch_in_harmonics(slow_belt: Cycles):
     assert not slow_belt.missing
     (branch,) = slow_belt.branches
     assert branch.begins == "it begins at the onset at μ = 0.7506"
-    assert branch.ends == "it leaves the range at μ = 1.8"
+    assert branch.ends == "it leaves the range at μ = 1.8; a fold beyond it is not looked for"
     assert [b.kind for b in branch.bifurcations] == ["reversal of slip begins", "sticking begins"]
+    # Shorter sticks begin long before (by shooting at 1.0 at the latest): the sentence says which it tells.
+    reversal, stick = branch.bifurcations
+    assert stick.sentence == (
+        f"sticking of 1/{stick.harmonics} of the period, which {stick.harmonics} harmonics tell, begins between "
+        f"μ = {stick.mu_before:.6g} and {stick.mu_after:.6g}"
+    )
+    first = next(c for c in slow_belt.cycles if "stick" in c.kinds)
+    assert first.harmonics == stick.harmonics
+    assert first.shares[0, 1] >= 1 / first.harmonics
+    assert reversal.sentence.startswith("reversal of slip begins between")
     cycles = [slow_belt.cycles[k] for k in branch.cycles]
     assert all(c.method == "harmonic" and c.largest_multiplier < 1.0 for c in cycles)
     # Where slip turns or sticks, multipliers are not right enough to say so of one near one.
@@ -151,6 +163,46 @@ def test_a_cycle_of_another_friction_is_seen():
     assert at.residual < 1e-7
     assert evaluated(family, at.z, at.omega, 1.05, at.scales).residual > 1e-3
     assert evaluated(family, at.z, 1.01 * at.omega, 1.0, at.scales).residual > 1e-3
+
+
+def test_multipliers_count_only_where_the_motions_own_is_one(slow_belt: Cycles):
+    """It comes out as one within 1e-3 wherever the balance is; of a motion that is no cycle it does not, and nothing is
+    said of stability then."""
+    assert all(c.own_off < 2e-3 and not c.own_lost for c in slow_belt.cycles)
+    cycle, family = shot(0.1, 1.4)
+    at = beside(cycle, family, 20).at
+    other = sampled_series(Balanced(evaluated(family, 1.2 * at.z, at.omega, 1.4, at.scales)), "")
+    assert other.own_off > OWN
+    assert other.stable is None
+    said = replace(slow_belt, cycles=(*slow_belt.cycles, other)).warnings
+    assert any(w.startswith("stability of 1 cycle is left undecided: the multiplier of the motion itself") for w in said)
+    assert not any(w.startswith("stability of") for w in slow_belt.warnings)
+
+
+def test_seconds_end_a_branch():
+    """And that is said as what is missing, over a range and at a μ."""
+    problem = mode_coupling(DAMPED, 0.1)
+    over = st.cycles(problem, between=(0.1, 1.8), method="harmonic", harmonics=5, seconds=1e-9)
+    assert len(over.cycles) == 1
+    assert over.missing == (f"branch 1: its 1e-09 s of computing were over at μ = {over.cycles[0].mu:.6g}",)
+    at = st.cycles(problem, 1.0, method="harmonic", harmonics=5, seconds=1e-9)
+    assert not at.cycles
+    assert "it does not pass there; its 1e-09 s of computing were over" in at.missing[0]
+    whole = st.cycles(problem, 1.0, method="harmonic", harmonics=5, seconds=300.0)
+    assert len(whole.cycles) == 1
+    assert not whole.missing
+
+
+def test_a_fold_beyond_the_friction_asked_for_is_looked_for():
+    """The two beams' branch turns back right behind its onset, so that both of its sides pass between."""
+    case = st.loads(template_text("two-beams")).with_(
+        {"bodies.beam1.elements": 20, "bodies.beam2.elements": 18, "modal.friction_range": [0.06, 0.1]}
+    )
+    found = st.cycles(case, 0.0768945, method="harmonic", harmonics=5, seconds=60.0)
+    amplitudes = sorted(c.slip_amplitude for c in found.cycles)
+    assert len(amplitudes) >= 2
+    assert amplitudes[0] < amplitudes[1] < 1.01 * amplitudes[0]
+    assert "a fold beyond it is not looked for" in found.notes[-1]
 
 
 def falling(speed: float = 1.0) -> System:
@@ -210,6 +262,8 @@ def test_static_friction_above_kinetic_is_refused():
         st.cycles(system, 0.3, method="harmonic")
     (cycle,) = st.cycles(system, 0.3, push=0.3).cycles  # auto
     assert cycle.method == "shooting"
+    # Nor is there an onset from which a branch could lead to it.
+    assert not st.onsets(system, (0.0, 1.0)).onsets
 
 
 def beam_with_joint() -> tuple[System, int, float]:
@@ -245,9 +299,16 @@ def test_forced_beam_with_a_friction_joint(omega: float, wanted: float):
     family = HarmonicFamily(system, 100.0, own=True)
     force = 0.2 * np.eye(system.size)[tip]
     found = forced(family, force, omega, 15, scale=Scales(np.ones(1), np.array([1e5])))
-    assert 1e8 * found.rows(np.eye(system.size)[tip : tip + 1])[0] == pytest.approx(wanted, rel=0.003)
-    alone = forced(family, 0.0001 * force, omega, 15, scale=Scales(np.ones(1), np.array([1e5])))
-    assert np.abs(found.rows(np.eye(system.size)[tip : tip + 1]) / 1e4 - alone.rows(np.eye(system.size)[tip : tip + 1])) > 0
+    at_tip = np.eye(system.size)[tip : tip + 1]
+    assert 1e8 * found.rows(at_tip)[0] == pytest.approx(wanted, rel=0.003)
+    # Under a force so small that tanh is its argument, the joint is a dashpot.
+    small = 1e-4 * force
+    alone = forced(family, small, omega, 15, scale=Scales(np.ones(1), np.array([1e5])))
+    joint = system.contacts[0].tangent_row
+    dynamic = (system.stiffness + 1j * omega * system.damping - omega**2 * system.mass).toarray()
+    dynamic += 1j * omega * 1.5 / 6e-7 * np.outer(joint, joint)
+    linear = np.abs(np.linalg.solve(dynamic, small)[tip]) / np.sqrt(2.0)
+    assert alone.rows(at_tip)[0] == pytest.approx(linear, rel=1e-3)
 
 
 def varied(seed: int) -> HarmonicFamily:

@@ -2,13 +2,16 @@
 
 from .comparison import PARTS, compare, dominant_response
 from .critical import critical_friction
+from .four_answers import GOOD_AMPLITUDE, CycleSeen, FourAnswers
 from .kept import Store
 from .perturbation import perturb
 from .result import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, Agreement, Comparison
+from .settled import Settled
 from .shapes import modal_assurance, mode_shape
 from .small_motion import LINEAR, PERTURBATION, Perturbation, linear_part
 
 __all__ = [
+    "GOOD_AMPLITUDE",
     "GOOD_CRITICAL",
     "GOOD_FREQUENCY",
     "GOOD_GROWTH",
@@ -18,7 +21,10 @@ __all__ = [
     "PERTURBATION",
     "Agreement",
     "Comparison",
+    "CycleSeen",
+    "FourAnswers",
     "Perturbation",
+    "Settled",
     "Store",
     "compare",
     "critical_friction",

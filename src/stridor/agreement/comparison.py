@@ -29,6 +29,7 @@ from .critical import compare_critical
 from .kept import Plain, Store, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
 from .perturbation import modes_as_in_time, perturb
 from .result import Agreement, Comparison, Critical, judge, likeness, overall
+from .settled import Settled, settled, settled_of
 from .shapes import by_body, modal_assurance, mode_shape
 from .small_motion import Perturbation, whole
 
@@ -190,6 +191,8 @@ class _At:
             mac=answered.mac,
             responding=answered.responding,
             verdict=verdict,
+            settled=answered.settled,
+            unsettled=answered.unsettled,
         )
 
     def _modes(self, mu: float) -> ComplexModes:
@@ -238,16 +241,17 @@ class _At:
 
     def _answer(self, mu: float, run: Trajectory, modes: ComplexModes) -> _Answer:
         dominant, fitted = dominant_response(run, self.limit)
+        found, why = settled(run, dominant, fitted, float(modes.growth_rate[0].max(initial=0.0)))
         unstable = _unstable(modes, self.limit)
         responding = _responding(modes, unstable, dominant) if dominant else None
         if dominant is None or responding is None:
             # Without a mode that responds there is nothing to hold the shape against.
-            return _Answer(dominant, fitted, responding, None)
+            return _Answer(dominant, fitted, responding, None, found, why)
         assert modes.right is not None, "asked for with vectors"
         shape = operating_shape(self.system, self.phases, self.settings, run, dominant, mu=mu)
         expected = mode_shape(self.system, modes.right[0, int(unstable[responding])])
         mac = modal_assurance(by_body(shape), by_body({name: expected[name] for name in shape}))
-        return _Answer(dominant, fitted, responding, mac)
+        return _Answer(dominant, fitted, responding, mac, found, why)
 
     def _recall(self, part: str, mu: float, read: Callable[[float, Plain], T]) -> T | None:
         data = None if self.kept is None else self.kept.get(part, mu)
@@ -268,12 +272,15 @@ class _At:
 
 @dataclass(frozen=True)
 class _Answer:
-    """What the full run answers with: dominant frequency [Hz], fit of its growth, the unstable mode, its likeness."""
+    """What the full run answers with: dominant frequency [Hz], fit of its growth, the unstable mode, its likeness; what
+    it has settled to, else why not."""
 
     dominant: float | None
     fitted: Growth | None
     responding: int | None
     mac: float | None
+    settled: Settled | None
+    unsettled: str
 
 
 def _unstable(modes: ComplexModes, limit: float) -> IntArray:
@@ -313,6 +320,8 @@ def _run_data(a: _Answer) -> Plain:
         "growth": growth_data(a.fitted),
         "responding": a.responding,
         "mac": a.mac,
+        "settled": None if a.settled is None else a.settled.data,
+        "unsettled": a.unsettled,
     }
 
 
@@ -324,6 +333,8 @@ def _run_of(mu: float, data: Plain) -> _Answer:
         growth_of(data["growth"]),
         None if responding is None else int(responding),
         float_of(data, "mac"),
+        settled_of(data["settled"]),
+        str(data["unsettled"]),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,11 @@ from ..modal.onset import refuted
 from ..notebook import Shown, html_table
 from ..tabular import Cell, Rows, Tabular, dataset, split
 from ..temporal.signals import Growth
+from .settled import Settled
 from .small_motion import Perturbation
+
+if TYPE_CHECKING:
+    from .four_answers import FourAnswers
 
 GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
 AGREE, DISAGREE, UNDECIDED = "agree: ", "disagree: ", "not decided: "
@@ -29,7 +33,8 @@ class Comparison(Shown):
     responding: position in that list of the mode that the full run answers with, None if none. growth_mac: between the
     shape of the fastest component of the small perturbation and that mode, None where it was not taken.
     agrees: None where the signal in time tells nothing to hold the modes against, and where the modes are not borne out
-    by the search of the full problem; completeness says what that came to.
+    by the search of the full problem; completeness says what that came to. settled: what the full run has come to, None
+    where it has not or where there is none, and unsettled says why.
     """
 
     mu: float
@@ -47,6 +52,8 @@ class Comparison(Shown):
     verdict: str
     growth_mac: float | None = None
     completeness: str = ""
+    settled: Settled | None = None
+    unsettled: str = ""
 
     @property
     def _line(self) -> str:
@@ -86,7 +93,8 @@ class Agreement(Tabular):
 
     critical_mu_temporal is the middle of the last bracket of the bisection, bracket its ends and
     tolerance its width; None where it was not asked for or not found, with the reason in notes.
-    interrupted: Ctrl-C came before all was computed that was asked for; what is here is whole.
+    interrupted: Ctrl-C came before all was computed that was asked for; what is here is whole. answers: onset, growth,
+    cycle and run at each μ, where cycles were asked for.
     """
 
     comparisons: tuple[Comparison, ...]
@@ -97,6 +105,7 @@ class Agreement(Tabular):
     notes: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
     interrupted: bool = False
+    answers: tuple[FourAnswers, ...] = ()
 
     @property
     def agree(self) -> bool | None:
@@ -118,6 +127,9 @@ class Agreement(Tabular):
             ends = [(lam.imag / (2 * np.pi), lam.real) for lam in (c.modal_eigenvalue, c.perturbation.eigenvalue)]
             errors = c.frequency_error, c.growth_rate_error, c.growth_mac, c.dominant_frequency_hz, c.mac
             rows.append((c.mu, *ends[0], *ends[1], *errors, c.agrees, c.verdict))
+        if self.answers:
+            heads = (*heads, *self.answers[0].heads)
+            rows = [(*row, *answer.cells()) for row, answer in zip(rows, self.answers, strict=True)]
         return heads, rows
 
     def to_xarray(self) -> Any:
@@ -172,7 +184,7 @@ class Agreement(Tabular):
             "interrupted": self.interrupted,
             "comparisons": [c.to_json() for c in self.comparisons],
             "notes": list(self.notes),
-        }
+        } | ({"answers": [a.to_json() for a in self.answers]} if self.answers else {})
 
 
 @dataclass(frozen=True)

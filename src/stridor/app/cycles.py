@@ -15,7 +15,7 @@ from .option_table import MaxFrequency, Mu, Range, Source
 from .values import numbers
 
 if TYPE_CHECKING:
-    from ..periodic import Cycle, Cycles
+    from ..periodic import Cycles
 
 SAVED_SECONDS = 5.0  # between two savings of what was found so far
 SHOWN = 24  # rows on a screen
@@ -50,8 +50,13 @@ def cycles(
     ] = None,
     points: Annotated[int, typer.Option("--most", min=2, help="Most cycles of a branch, each way.")] = 120,
     seconds: Annotated[
-        float, typer.Option("--seconds", help="Processor time for a motion that comes back to nowhere.")
-    ] = 60.0,
+        float | None,
+        typer.Option(
+            "--seconds",
+            help="Processor time: by shooting for a motion that comes back to nowhere [default: 60], by harmonic "
+            "balance for a branch [default: no limit].",
+        ),
+    ] = None,
     max_frequency: MaxFrequency = None,
     source: Source = None,
 ) -> None:
@@ -66,6 +71,7 @@ def cycles(
     call.check_friction(values)
 
     from ..study.cycles import cycles as solve
+    from ..view.cycle_parts import loudest
     from ..view.cycle_plots import cycle_branches, cycle_period
     from .output import stdout
 
@@ -81,7 +87,7 @@ def cycles(
     if result.cycles or result.onsets:
         files.append(call.draw(cycle_branches(result), "cycles.png"))
     if result.cycles:
-        files.append(call.draw(cycle_period(_loudest(result)), "cycle_period.png"))
+        files.append(call.draw(cycle_period(loudest(result)), "cycle_period.png"))
     call.warn(result.warnings)
     if call.json:
         call.document(result.to_json() | {"files": [str(f) for f in files]})
@@ -128,49 +134,39 @@ def _kept(call: Call) -> Callable[[Cycles], None]:
     return keep
 
 
-def _loudest(result: Cycles) -> Cycle:
-    stable = [c for c in result.cycles if c.stable] or list(result.cycles)
-    return max(stable, key=lambda c: c.slip_amplitude)
-
-
 def _show(result: Cycles) -> None:
     """A row for each single cycle; for each branch its ends, its folds and where something changes."""
+    from ..view.cycle_parts import branch_words, worth_a_row
     from .output import stdout
     from .tables import table
 
     heads = ["branch", "μ", "frequency [Hz]", "stable", "multiplier", "slip [m/s]", "N max [N]", "with"]
     rows: list[list[str]] = []
-    for k, c in enumerate(result.cycles):
-        branch = result.branch_of(k)
-        if branch is None or k in _worth_a_row(result, branch):
-            stable = {True: "yes", False: "no", None: "undecided" if c.multiplied else "unknown"}[c.stable]
-            force = float(c.force_range[:, 1].max())
-            largest = f"{c.largest_multiplier:.5g}" if c.multiplied else ""
-            cells = [f"{c.mu:.6g}", f"{c.frequency_hz:.6g}", stable, largest]
-            rows.append(["" if branch is None else f"{branch + 1}", *cells, f"{c.slip_amplitude:.4g}", f"{force:.4g}",
-                         ", ".join(c.kinds)])  # fmt: skip
+    for k in worth_a_row(result):
+        c, branch = result.cycles[k], result.branch_of(k)
+        stable = {True: "yes", False: "no", None: "undecided" if c.multiplied else "unknown"}[c.stable]
+        force = float(c.force_range[:, 1].max())
+        largest = f"{c.largest_multiplier:.5g}" if c.multiplied else ""
+        cells = [f"{c.mu:.6g}", f"{c.frequency_hz:.6g}", stable, largest]
+        rows.append(["" if branch is None else f"{branch + 1}", *cells, f"{c.slip_amplitude:.4g}", f"{force:.4g}",
+                     ", ".join(c.kinds)])  # fmt: skip
     if rows:
         table("Limit cycles", heads, rows[:SHOWN], drop=["N max [N]", "multiplier", "slip [m/s]"], words=["with"],
               kept_in="cycles.csv")  # fmt: skip
     if len(rows) > SHOWN:
         stdout.print(f"  {len(rows) - SHOWN} more in cycles.csv")
-    for k, branch in enumerate(result.branches, start=1):
-        said = [b.sentence for b in branch.bifurcations]
-        stdout.print(f"branch {k}, {len(branch.cycles)} cycles: {'; '.join((branch.begins, *said, branch.ends))}")
-
-
-def _worth_a_row(result: Cycles, branch: int) -> set[int]:
-    """The ends of a branch, its folds, and about six cycles between."""
-    own = result.branches[branch]
-    return {own.cycles[0], own.cycles[-1], *own.folds, *own.cycles[:: max(len(own.cycles) // 6, 1)]}
+    for line in branch_words(result):
+        stdout.print(line)
 
 
 def _conclusion(result: Cycles) -> Conclusion:
     if not result.cycles:
         return Conclusion(result.sentence, "simulate")
-    loudest = _loudest(result)
-    stepper = ("--stepper", "exact") if loudest.method == "shooting" else ()
-    return Conclusion(result.sentence, "simulate", (*stepper, "--mu", f"{loudest.mu:.6g}"))
+    from ..view.cycle_parts import loudest
+
+    cycle = loudest(result)
+    stepper = ("--stepper", "exact") if cycle.method == "shooting" else ()
+    return Conclusion(result.sentence, "simulate", (*stepper, "--mu", f"{cycle.mu:.6g}"))
 
 
 VERBS = {"cycles": cycles}

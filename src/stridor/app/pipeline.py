@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from os import PathLike
 from pathlib import Path
@@ -12,18 +12,22 @@ from typing import Any
 import numpy as np
 
 from ..agreement import Store, modal_assurance
+from ..case import Case
 from ..digits import measured
 from ..errors import CaseError, StridorError
 from ..io.atomic import write_text
 from ..io.csv_files import write_csv
 from ..io.datasets import load_trajectory, save
+from ..io.datasets import open as open_result
 from ..io.finished import FOLDER, FinishedParts
 from ..io.kept_parts import NAME, KeptParts
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
 from ..notebook import Shown, html_table
+from ..periodic import Cycles
 from ..study.asked import require_friction
 from ..study.everything import Everything, compute_everything
+from ..study.fingerprint import same_model
 from ..study.parts import OF_REPORT, Parts, chosen_parts
 from ..study.provenance import versions
 from ..study.workspace import Problem, Workspace
@@ -193,7 +197,23 @@ def _run(
         return Outcome(None, tuple(files), everything)
     if log is not None:
         log("report")
-    return Outcome(write_report(report_inputs(everything), target), tuple(files), everything)
+    inputs = _with_cycles(report_inputs(everything), case, None if fresh else target / "cycles.nc")
+    return Outcome(write_report(inputs, target), tuple(files), everything)
+
+
+def _with_cycles(inputs: ReportInputs, case: Case, path: Path | None) -> ReportInputs:
+    """The same with the limit cycles in a file, if they are of this very model; a note where they are not."""
+    if path is None or not path.is_file():
+        return inputs
+    try:
+        found = open_result(path)
+    except StridorError as error:
+        return replace(inputs, notes=(*inputs.notes, f"{path.name} cannot be read: {error}"))
+    if not isinstance(found, Cycles) or not same_model(case, found.provenance.get("fingerprint", {})):
+        return replace(
+            inputs, notes=(*inputs.notes, f"{path.name} is of another case: its limit cycles are not shown.")
+        )
+    return replace(inputs, cycles=found)
 
 
 def _before(work: Workspace, path: Path) -> Trajectory | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..digits import measured
+from ..digits import measured, readable
 from .output import stdout
 from .tables import table
 
@@ -144,6 +144,8 @@ def show_agreement(document: dict[str, Any]) -> None:
         red = [k for k, c in enumerate(document["comparisons"]) if (c["modal"]["growth_rate"] or 0.0) > 0.0]
         gone = ["MAC of run", "run answers [Hz]", "MAC"]
         table("modal against temporal", columns, rows, drop=gone, marked=red, kept_in="compare.nc")
+    if document.get("answers"):
+        _show_answers(document["answers"])
     if document["critical_mu_modal"] is not None:
         stdout.print(
             f"critical μ: {measured(document['critical_mu_modal'], 6)} modal, "
@@ -152,3 +154,34 @@ def show_agreement(document: dict[str, Any]) -> None:
     for note in document["notes"]:
         stdout.print(f"note: {note}")
     stdout.print(document["verdict"])
+
+
+def _show_answers(answers: list[dict[str, Any]]) -> None:
+    """Onset, growth, cycle and run, a row for each μ."""
+
+    def shown(part: dict[str, Any] | None, name: str, decimals: int = 4) -> str:
+        value = None if part is None else part[name]
+        return "–" if value is None else readable(value, decimals)
+
+    rows = [
+        [
+            f"{a['mu']:g}",
+            shown(a["onset"], "mu", 5),
+            shown(a["onset"], "frequency_hz", 5),
+            shown(a["growth"]["modal"], "growth_rate"),
+            shown(a["growth"]["temporal"], "growth_rate"),
+            shown(a["cycle"], "frequency_hz", 6),
+            shown(a["cycle"], "amplitude"),
+            "–" if a["cycle"] is None else a["cycle"]["method"],
+            "–" if a["cycle"] is None else {True: "yes", False: "no", None: "undecided"}[a["cycle"]["stable"]],
+            shown(a["run"], "frequency_hz", 6),
+            shown(a["run"], "amplitude"),
+        ]
+        for a in answers
+    ]
+    columns = [
+        "μ", "onset μ", "onset [Hz]", "growth modal", "growth in time", "cycle [Hz]", "cycle [m/s]", "method", "stable",
+        "run [Hz]", "run [m/s]",
+    ]  # fmt: skip
+    gone = ["method", "onset [Hz]", "growth in time", "onset μ"]
+    table("onset, growth, cycle, run", columns, rows, drop=gone, kept_in="compare.csv")

@@ -158,6 +158,9 @@ def compare(
             show_default=False,
         ),
     ] = None,
+    cycles: Annotated[
+        bool, typer.Option("--cycles", help="Limit cycles as well: onset, growth, cycle and run side by side.")
+    ] = False,
     only: Only = None,
     friction_range: Range = None,
     max_frequency: MaxFrequency = None,
@@ -169,7 +172,7 @@ def compare(
     """
     work = call.workspace(source, max_frequency, friction_range)
 
-    from ..study import analyses
+    from ..study.comparison import compare as solve
 
     values = None if mu is None else numbers(mu, "--mu")
     only = None if only is None else [name.strip() for text in only for name in text.split(",")]
@@ -177,9 +180,10 @@ def compare(
     if critical is not None and only and critical != ("critical" in only):
         word = "--critical" if critical else "--no-critical"
         raise CaseError("--only", ", ".join(only), f"says otherwise than {word}; give one of them")
-    result = analyses.compare(
+    result = solve(
         work,
         values,
+        cycles=cycles,
         critical=critical,
         progress=call.say,
         only=only,
@@ -188,6 +192,8 @@ def compare(
     )
     if result.comparisons or result.critical_mu_modal is not None:
         call.keep(result, "compare.nc")
+    if result.answers:
+        call.tabulate(result, "compare.csv")
     if result.interrupted:
         call.say("interrupted; what is finished is kept, and the same call goes on from there")
     if call.json:

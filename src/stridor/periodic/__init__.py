@@ -2,7 +2,7 @@
 
 from .birth import born
 from .branch import Bifurcation, CycleBranch, bifurcations
-from .continuation import Followed, follow
+from .continuation import Followed, follow, unfinished
 from .cycle import Cycle
 from .cycles import CycleOnset, Cycles
 from .problem import Family, SlidingProblem, refuse_cycles, why_not_shooting
@@ -34,5 +34,6 @@ __all__ = [
     "refuse_cycles",
     "same",
     "sampled",
+    "unfinished",
     "why_not_shooting",
 ]

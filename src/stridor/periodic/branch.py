@@ -25,20 +25,28 @@ class Bifurcation:
     kind: "fold" (μ turns back), "period doubling" (a multiplier leaves or enters at −1), "torus" (a pair of them),
     "branching" (one at 1 without a fold), "stability changes with the contacts" (where contacts change in another way
     behind, multipliers jump), or what begins or ends: "sticking", "reversal of slip", "separation";
-    "contacts change in another order" where none of these does.
+    "contacts change in another order" where none of these does. harmonics: of a sticking that begins or ends by
+    harmonic balance, those of the cycle that sticks: they tell no stick shorter than one over them of the period, so
+    that shorter sticks begin before and end behind; None elsewhere.
     """
 
     kind: Kind
     mu_before: float
     mu_after: float
     frequency_hz: float
+    harmonics: int | None = None
 
     @property
     def sentence(self) -> str:
         """In words."""
         if self.kind == "fold":
             return f"fold at μ = {self.mu_before:.6g}"
-        return f"{self.kind} between μ = {self.mu_before:.6g} and {self.mu_after:.6g}"
+        between = f"between μ = {self.mu_before:.6g} and {self.mu_after:.6g}"
+        if self.harmonics is not None:
+            what, happens = self.kind.split()
+            told = f"1/{self.harmonics} of the period, which {self.harmonics} harmonics tell"
+            return f"{what} of {told}, {happens} {between}"
+        return f"{self.kind} {between}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -78,10 +86,18 @@ def bifurcations(cycles: Sequence[Cycle], folds: Sequence[int]) -> tuple[Bifurca
             found.append(Bifurcation("fold", cycle.mu, cycle.mu, cycle.frequency_hz))
         if k + 1 < len(cycles):
             found += [
-                Bifurcation(kind, cycle.mu, cycles[k + 1].mu, cycle.frequency_hz)
+                Bifurcation(kind, cycle.mu, cycles[k + 1].mu, cycle.frequency_hz, _told(kind, cycle, cycles[k + 1]))
                 for kind in _between(cycle, cycles[k + 1], fold=k in folds or k + 1 in folds)
             ]
     return tuple(found)
+
+
+def _told(kind: Kind, one: Cycle, other: Cycle) -> int | None:
+    """The harmonics that decide when sticks are long enough to be told, None where all are."""
+    if not kind.startswith("sticking"):
+        return None
+    sticks = other if kind == "sticking begins" else one
+    return sticks.harmonics if sticks.method == "harmonic" else None
 
 
 def _between(one: Cycle, other: Cycle, *, fold: bool) -> list[Kind]:

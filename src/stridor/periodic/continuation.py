@@ -6,6 +6,8 @@ a μ, and the direction in which the branch goes on there, whose last number is 
 
 from __future__ import annotations
 
+import math
+import time as clock
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -20,6 +22,7 @@ MOST = 400  # points
 TURN = 0.6  # cosine between two headings
 FLAT = 1e-4  # of a heading: a fold
 STOPPED = "it was stopped"
+UNFINISHED = ("could not be followed", "could not be closed", "points were made", "of computing were over")
 
 
 class Point(Protocol):
@@ -88,11 +91,22 @@ class Seen(Protocol[Told]):
     def __call__(self, closed: Told, /, *, fold: bool) -> bool: ...
 
 
-def follow(branch: Followed[P], first: P, heading: Array, seen: Seen[P], most: int = MOST) -> str:
-    """Follow a branch from a cycle until it leaves the range; why it ended, STOPPED where ``seen`` said so."""
+def unfinished(end: str) -> bool:
+    """Whether a branch that ended for this reason (`follow`) goes on where it was to be followed."""
+    return any(said in end for said in UNFINISHED)
+
+
+def follow(
+    branch: Followed[P], first: P, heading: Array, seen: Seen[P], most: int = MOST, seconds: float = math.inf
+) -> str:
+    """Follow a branch from a cycle until it leaves the range; why it ended, STOPPED where ``seen`` said so. seconds: of
+    processor time, what ``seen`` takes included."""
     low, high = branch.between
     spot, length = Spot(first, heading), FIRST
+    until = clock.process_time() + seconds
     for _ in range(most):
+        if clock.process_time() >= until:
+            return f"its {seconds:g} s of computing were over at μ = {spot.mu:.6g}"
         try:
             closed = branch.corrected(branch.ahead(spot, length), spot.heading)
             turned = _turned(branch, spot, closed)
@@ -150,7 +164,10 @@ def _to_the_edge(branch: Followed[P], spot: Spot[P], beyond: P, seen: Seen[P]) -
     edge = branch.between[0] if beyond.mu < branch.between[0] else branch.between[1]
     try:
         closed = branch.at(edge, spot.point, beyond)
-    except AnalysisError:
-        return f"it leaves the range beyond μ = {spot.mu:.6g}"
+    except (AnalysisError, np.linalg.LinAlgError) as error:
+        return (
+            f"it leaves the range behind μ = {spot.mu:.6g}; its cycle at the edge, μ = {edge:.6g}, could not be "
+            f"closed: {error}"
+        )
     seen(closed, fold=False)
-    return f"it leaves the range at μ = {edge:.6g}"
+    return f"it leaves the range at μ = {edge:.6g}; a fold beyond it is not looked for"

@@ -13,6 +13,7 @@ from ..notebook import Shown
 from ..typing import Array, ComplexArray, IntArray
 
 NEUTRAL = {"shooting": 1e-6, "harmonic": 1e-2}  # a largest multiplier as close to one as this decides nothing
+OWN = 1e-2  # the motion's own multiplier, by harmonic balance further from one: the others tell nothing
 TURNING = 0.15  # the same of harmonic balance where slip turns or sticks, whose multipliers converge slowly
 OPEN, STICK, SLIP = 0, 1, 2  # as in histories of runs
 
@@ -41,7 +42,8 @@ class Cycle(Shown):
     of the balance, in shares of the contact forces. defect: of harmonic balance, how far its motion is from the
     equations of motion in time (`periodic.harmonic.balanced.defect`); NaN by shooting, which solves them. multipliers:
     Floquet's, largest first, without the one of the motion itself; none where ``multiplied`` is False, as the system is
-    too large for them. changes: of contact, in their order.
+    too large for them. own_off: by harmonic balance, how far the one of the motion itself, which is one, came out from
+    one; NaN by shooting. changes: of contact, in their order.
 
     time (t,) [s] over one period, both ends included: normal_force, tangential_force (t, m) [N], slip_velocity (t, m)
     [m/s], gap (t, m) [m], status (t, m): 0 open, 1 stick, 2 slip; displacement [m], velocity, acceleration (t, w, 2),
@@ -80,6 +82,7 @@ class Cycle(Shown):
     harmonics: int = 0
     defect: float = float("nan")
     multiplied: bool = True
+    own_off: float = float("nan")
 
     @property
     def frequency_hz(self) -> float:
@@ -94,11 +97,19 @@ class Cycle(Shown):
     @property
     def stable(self) -> bool | None:
         """Whether disturbances die out; None where the largest multiplier is one within 1e-6 (by harmonic balance:
-        0.01, and 0.15 where slip turns or sticks), or is not known."""
+        0.01, and 0.15 where slip turns or sticks), where the motion's own is further from one than 0.01, or where they
+        are not known."""
         size, neutral = self.largest_multiplier, NEUTRAL[self.method]
         if self.method == "harmonic" and {"stick", "reversal"} & set(self.kinds):
             neutral = TURNING
-        return None if not self.multiplied or abs(size - 1.0) <= neutral else size < 1.0
+        if not self.multiplied or self.own_lost:
+            return None
+        return None if abs(size - 1.0) <= neutral else size < 1.0
+
+    @property
+    def own_lost(self) -> bool:
+        """Whether the motion's own multiplier came out too far from one for the others to be believed."""
+        return self.own_off > OWN
 
     @property
     def slip_amplitude(self) -> float:
@@ -134,7 +145,7 @@ class Cycle(Shown):
 
     @property
     def _line(self) -> str:
-        edge = "on the edge of stability" if self.multiplied else "of unknown stability"
+        edge = "of undecided stability" if self.multiplied else "of unknown stability"
         said = {True: "stable", False: "unstable", None: edge}[self.stable]
         return f"μ = {self.mu:.6g}, {hertz(self.frequency_hz)}, {said}, with {', '.join(self.kinds)}"
 
@@ -165,6 +176,7 @@ class Cycle(Shown):
             "method": self.method,
             "harmonics": self.harmonics or None,
             "defect": self.defect if np.isfinite(self.defect) else None,
+            "own_multiplier_off": self.own_off if np.isfinite(self.own_off) else None,
         }
 
     def _contacts(self) -> Iterator[dict[str, Any]]:

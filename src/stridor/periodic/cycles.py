@@ -28,7 +28,7 @@ UNITS = {
     "velocity": "m/s", "acceleration": "m/s²", "slip_range": "m/s", "force_range": "N", "period": "s",
 }  # fmt: skip
 POOR = 1e-2  # a defect that is said
-NUMBERS = ("mu", "period", "residual", "grazed", "defect")
+NUMBERS = ("mu", "period", "residual", "grazed", "defect", "own_off")
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,11 @@ class Cycles(Tabular):
             said.append(
                 f"of {counted(unknown, 'cycle')} it is not known whether they are stable: the system is too large for "
                 "Floquet's multipliers; a run in time tells"
+            )
+        if lost := [c for c in self.cycles if c.own_lost]:
+            said.append(
+                f"stability of {counted(len(lost), 'cycle')} is left undecided: the multiplier of the motion itself, "
+                f"which is one, comes out up to {max(c.own_off for c in lost):.2g} off; more harmonics come closer"
             )
         off = [c for c in self.cycles if c.defect > POOR]
         if off:
@@ -222,6 +227,8 @@ def _read(data: Any, k: int, told: Any, names: tuple[str, ...], points: tuple[st
     series = _method(told) == "harmonic"
     if np.isfinite(numbers["grazed"]) == series or np.isfinite(numbers["defect"]) != series:
         raise ValueError("grazed is what shooting tells, defect harmonic balance")
+    if np.isfinite(numbers["own_off"]) != (series and bool(told["multiplied"])):
+        raise ValueError("harmonic balance tells how far the motion's own multiplier is off, where it has any")
     return Cycle(
         **numbers, time=data["time"].values[k], **{name: data[name].values[k] for name in HISTORIES},
         multipliers=parts[:, 0] + 1j * parts[:, 1], changes=changes, contact_names=names, watch_names=points,

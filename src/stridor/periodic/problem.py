@@ -52,10 +52,6 @@ class SlidingProblem:
             self._kept.append(made)
         return made
 
-    def lighter(self) -> None:
-        """Forget the modes."""
-        self._kept.clear()
-
     @property
     def sliding_speed(self) -> float:
         """The largest slip speed of steady sliding [m/s]."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,13 +98,16 @@ def _begun(problem: SlidingProblem, motion: VariedMotion, q: Array, v: Array) ->
     return motion
 
 
-def cycles_reached(problem: SlidingProblem, motion: VariedMotion, seconds: float = SECONDS) -> list[Closed]:
-    """The cycle that a motion runs into, behind the unstable ones that it passed near to.
+def cycles_reached(
+    problem: SlidingProblem, motion: VariedMotion, seconds: float = SECONDS, met: Callable[[Closed], None] | None = None
+) -> list[Closed]:
+    """The cycle that a motion runs into, behind the unstable ones that it passed near to; ``met`` is given each when it
+    is found.
 
     Raises NoReturn where it comes to rest, or within CHANGES changes of contact or ``seconds`` of processor time near
-    to no cycle at all.
+    to no cycle at all; what ``met`` takes does not count.
     """
-    met: list[_Met] = []
+    passed: list[_Met] = []
     found: list[Closed] = []
     tried, nearest = NEAR / CLOSER, np.inf
     scale = np.sqrt(np.abs(problem.basis.stiffness))
@@ -111,35 +115,40 @@ def cycles_reached(problem: SlidingProblem, motion: VariedMotion, seconds: float
     quiet = QUIET / float(moving.min(initial=1.0) if len(moving) else 1.0)
     until = clock.process_time() + seconds  # so that what is found does not hang on what runs beside
     amplitude, last = 0.0, ""
-    while len(met) < CHANGES and clock.process_time() < until:
-        change = _next_change(motion, (met[-1].time if met else 0.0) + quiet)
+    while len(passed) < CHANGES and clock.process_time() < until:
+        change = _next_change(motion, (passed[-1].time if passed else 0.0) + quiet)
         if change is None:
             if found:
                 return found
             raise _at_rest(problem, motion, amplitude)
-        met.append(_Met((*change, motion.status), motion.time, np.concatenate([scale * motion.q, motion.v])))
+        passed.append(_Met((*change, motion.status), motion.time, np.concatenate([scale * motion.q, motion.v])))
         amplitude = max(amplitude, distance(problem, motion.q, motion.v))
-        lag, off = _return(met, amplitude)
+        lag, off = _return(passed, amplitude)
         nearest = min(nearest, off)
         if not lag or off >= CLOSER * tried:
             continue
         tried = off
         try:
-            closed = _closed(problem, motion, met, lag)
+            closed = _closed(problem, motion, passed, lag)
         except AnalysisError as error:
             last = f"; {error}"
             continue
         if not any(same(closed, other) for other in found):
             found.append(closed)
+            if met is not None:
+                handed = clock.process_time()
+                met(closed)
+                until += clock.process_time() - handed
         if off < SURE or np.abs(multipliers(closed)).max(initial=0.0) < 1.0:
             return found
     if found:
         return found
     why = "the motion is quasi-periodic or chaotic, or takes longer to come to its cycle"
-    if len(met) < CHANGES:
+    if len(passed) < CHANGES:
         why = f"its {seconds:g} s of computing were over, which says nothing of whether there is a cycle"
     raise NoReturn(
-        f"no return within {len(met)} changes of contact, the nearest {nearest:.2g} of the amplitude off{last}: {why}"
+        f"no return within {len(passed)} changes of contact, the nearest {nearest:.2g} of the amplitude off{last}: "
+        f"{why}"
     )
 
 

@@ -127,7 +127,7 @@ class Tracer:
 
         if include and not seen(first, fold=False):
             return
-        traced.ends = follow(branch, first, heading, seen, self.points)
+        traced.ends = follow(branch, first, heading, seen, self.points, self.method.branch_seconds)
         if traced.ends.startswith("it comes to steady sliding"):
             last = traced.cycles[-1]
             for onset in others:

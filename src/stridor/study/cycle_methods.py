@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
@@ -24,6 +26,7 @@ from ..periodic import (
     pushed,
     same,
     sampled,
+    unfinished,
 )
 from ..periodic import harmonic as series
 from ..temporal.steppers.exact.varied import VariedMotion
@@ -34,17 +37,19 @@ HARMONICS = 7  # to begin with, where the defect is to decide
 MOST_HARMONICS = 48
 DEFECT = 1e-3  # beyond which there are more
 ALIKE = 1e-5  # of period and amplitude
-BEYOND = 1.3  # times the onset: how far a branch is followed for cycles at a μ
+BEYOND = 1.3  # times the onset or the μ: how far a branch is followed for cycles at a μ
+SECONDS = 60.0  # for a motion
 
 MethodName = Literal["auto", "shooting", "harmonic"]
 
 
 @dataclass(frozen=True)
 class Unreached:
-    """What was tried and led to no cycle, in words; steady: it came to steady sliding, as it should."""
+    """What was tried and led to no cycle, or not to all, in words; expected: as it should, to steady sliding or to the
+    end of the range."""
 
     words: str
-    steady: bool = False
+    expected: bool = False
 
 
 P = TypeVar("P")
@@ -56,6 +61,7 @@ class Method(Protocol[P, L]):
     """A way to cycles: what a cycle is while it is sought, P, and what is kept of it, L."""
 
     name: str
+    branch_seconds: float  # of processor time, for following a branch
 
     def branch(self, between: tuple[float, float]) -> Any:
         """A branch that can be followed within a range of μ (`periodic.continuation.Followed`), and begun both ways."""
@@ -66,9 +72,9 @@ class Method(Protocol[P, L]):
         ...
 
     def reached(
-        self, mu: float, push: Sequence[float] | None, seconds: float, say: Say
-    ) -> Iterator[tuple[str, P | Unreached]]:
-        """Cycles at a μ, with what they were reached from, and what led to none."""
+        self, mu: float, push: Sequence[float] | None, say: Say, told: Callable[[str, P | Unreached], None]
+    ) -> None:
+        """Tell the cycles at a μ, each when it is found, with what it was reached from, and what led to none."""
         ...
 
     def sampled(self, cycle: P, said: str) -> Cycle:
@@ -89,12 +95,14 @@ class Method(Protocol[P, L]):
 
 
 class Shooting:
-    """On the exact motion, from one change of contact to the next."""
+    """On the exact motion, from one change of contact to the next. seconds: of processor time for a motion that comes
+    back to nowhere."""
 
     name = "shooting"
+    branch_seconds = math.inf
 
-    def __init__(self, family: Family) -> None:
-        self.family = family
+    def __init__(self, family: Family, seconds: float = SECONDS) -> None:
+        self.family, self.seconds = family, seconds
 
     def branch(self, between: tuple[float, float]) -> Branch:
         """See `Method`."""
@@ -105,29 +113,28 @@ class Shooting:
         return born(branch, onset.mu, onset.frequency_hz)
 
     def reached(
-        self, mu: float, push: Sequence[float] | None, seconds: float, say: Say
-    ) -> Iterator[tuple[str, Closed | Unreached]]:
+        self, mu: float, push: Sequence[float] | None, say: Say, told: Callable[[str, Closed | Unreached], None]
+    ) -> None:
         """Where motions come to that begin in each growing mode, and in steady sliding that is pushed."""
         problem = self.family.at(mu)
         begun: list[tuple[str, VariedMotion]] = []
         try:
             begun += [(f"the mode at {frequency:.6g} Hz", motion) for frequency, motion in growing(problem)]
         except AnalysisError as error:
-            yield "", Unreached(f"μ = {mu:.6g}, from the growing modes: {error}")
+            told("", Unreached(f"μ = {mu:.6g}, from the growing modes: {error}"))
         for speed in [share * problem.sliding_speed for share in PUSHES] if push is None else push:
             try:
                 begun.append((f"a push of {speed:.4g} m/s", pushed(problem, speed)))
             except AnalysisError as error:
-                yield "", Unreached(f"μ = {mu:.6g}, from a push of {speed:.4g} m/s: {error}")
+                told("", Unreached(f"μ = {mu:.6g}, from a push of {speed:.4g} m/s: {error}"))
         for number, (said, motion) in enumerate(begun, start=1):
             say(f"motion {number} of {len(begun)} at μ = {mu:.6g}, from {said}")
             try:
-                for closed in cycles_reached(problem, motion, seconds):
-                    yield said, closed
+                cycles_reached(problem, motion, self.seconds, partial(told, said))
             except NoReturn as none:
-                yield said, Unreached(f"μ = {mu:.6g}, from {said}: {none}", none.steady)
+                told(said, Unreached(f"μ = {mu:.6g}, from {said}: {none}", none.steady))
             except AnalysisError as error:
-                yield said, Unreached(f"μ = {mu:.6g}, from {said}: {error}")
+                told(said, Unreached(f"μ = {mu:.6g}, from {said}: {error}"))
 
     def sampled(self, cycle: Closed, said: str) -> Cycle:
         """See `Method`."""
@@ -148,12 +155,15 @@ class Shooting:
 
 class Harmonic:
     """By harmonic balance at the contact nodes. harmonics: None for as many as the defect asks for. onsets: those that
-    cycles are looked for from."""
+    cycles are looked for from. seconds: of processor time for following a branch."""
 
     name = "harmonic"
 
-    def __init__(self, family: series.HarmonicFamily, onsets: Sequence[CycleOnset], harmonics: int | None) -> None:
-        self.family, self.onsets, self.harmonics = family, onsets, harmonics
+    def __init__(
+        self, family: series.HarmonicFamily, onsets: Sequence[CycleOnset], harmonics: int | None,
+        seconds: float = math.inf,
+    ) -> None:  # fmt: skip
+        self.family, self.onsets, self.harmonics, self.branch_seconds = family, onsets, harmonics, seconds
 
     def branch(self, between: tuple[float, float]) -> series.HarmonicBranch:
         """See `Method`."""
@@ -166,44 +176,41 @@ class Harmonic:
         return series.born(self.family, branch, onset.mu, onset.frequency_hz, self.harmonics or HARMONICS)
 
     def reached(
-        self, mu: float, push: Sequence[float] | None, seconds: float, say: Say
-    ) -> Iterator[tuple[str, series.Balanced | Unreached]]:
+        self, mu: float, push: Sequence[float] | None, say: Say,
+        told: Callable[[str, series.Balanced | Unreached], None],
+    ) -> None:  # fmt: skip
         """Cycles at a μ on the branches that begin at the onsets: no motions are followed."""
         if not self.onsets:
-            yield "", Unreached(f"μ = {mu:.6g}: no onset of steady sliding from which a branch could lead there")
+            told("", Unreached(f"μ = {mu:.6g}: no onset of steady sliding from which a branch could lead there"))
         for onset in self.onsets:
             say(f"branch from the onset at μ = {onset.mu:.6g} to μ = {mu:.6g}")
             said = f"along the branch of the onset at μ = {onset.mu:.6g}"
-            met: list[series.Balanced] = []
             try:
-                end = self._through(onset, mu, met)
-            except AnalysisError as error:
-                yield from ((said, found) for found in met)
-                yield said, Unreached(f"μ = {mu:.6g}, {said}: {error}")
+                met, end = self._through(onset, mu, partial(told, said))
+            except (AnalysisError, np.linalg.LinAlgError) as error:
+                told(said, Unreached(f"μ = {mu:.6g}, {said}: {error}"))
                 continue
-            except KeyboardInterrupt:
-                yield from ((said, found) for found in met)
-                raise
-            yield from ((said, found) for found in met)
             if not met:
-                yield said, Unreached(f"μ = {mu:.6g}, {said}: it does not pass there; {end}")
+                told(said, Unreached(f"μ = {mu:.6g}, {said}: it does not pass there; {end}"))
+            elif not end.startswith("it comes to steady sliding"):
+                told(said, Unreached(f"μ = {mu:.6g}, {said}: {end}", expected=not unfinished(end)))
 
-    def _through(self, onset: CycleOnset, mu: float, met: list[series.Balanced]) -> str:
-        """Put the cycles at a μ of the branch of an onset into a list; how the branch ends."""
-        branch = self.branch((0.0, max(mu, BEYOND * onset.mu) if mu <= onset.mu else mu))
+    def _through(self, onset: CycleOnset, mu: float, met: Callable[[series.Balanced], None]) -> tuple[int, str]:
+        """Hand on the cycles at a μ of the branch of an onset: how many there are, and how the branch ends."""
+        branch = self.branch((0.0, BEYOND * max(mu, onset.mu)))
         first, heading = self.born(branch, onset)
-        last = [first]
+        last, count = [first], [0]
 
         def seen(closed: series.Balanced, /, *, fold: bool) -> bool:
             before, after = last[0].mu, closed.mu
-            if closed.mu == mu:
-                met.append(closed)
-            elif (before - mu) * (after - mu) < 0.0:
-                met.append(branch.at(mu, last[0], closed))
+            if closed.mu == mu or (before - mu) * (after - mu) < 0.0:
+                met(closed if closed.mu == mu else branch.at(mu, last[0], closed))
+                count[0] += 1
             last[0] = closed
             return True
 
-        return follow(branch, first, heading, seen)
+        end = follow(branch, first, heading, seen, seconds=self.branch_seconds)
+        return count[0], end
 
     def sampled(self, cycle: series.Balanced, said: str) -> Cycle:
         """See `Method`."""

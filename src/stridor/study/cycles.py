@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -10,14 +11,15 @@ import numpy as np
 
 from .. import interrupts
 from ..errors import CaseError
-from ..periodic import Cycle, CycleOnset, Cycles, Family, why_not_shooting
+from ..periodic import Cycle, CycleOnset, Cycles, Family, unfinished, why_not_shooting
 from ..periodic.harmonic import HarmonicFamily, why_not_harmonic
 from ..system import System
 from ..typing import Array
 from .analyses import onsets
 from .asked import require_friction
 from .cycle_branches import Tracer
-from .cycle_methods import Harmonic, Method, MethodName, Shooting, Unreached
+from .cycle_methods import SECONDS, Harmonic, Method, MethodName, Shooting, Unreached
+from .fingerprint import fingerprint
 from .provenance import provenance
 from .workspace import Problem, Workspace
 
@@ -35,7 +37,7 @@ def cycles(
     harmonics: int | None = None,
     push: float | Sequence[float] | None = None,
     points: int = 120,
-    seconds: float = 60.0,
+    seconds: float | None = None,
     progress: Callable[[int, str], None] | None = None,
     keep: Callable[[Cycles], None] | None = None,
 ) -> Cycles:
@@ -51,9 +53,10 @@ def cycles(
     between (low, high) (default, without mu: modal.friction_range): the branches that begin at the onsets of steady
     sliding, through folds, and by shooting those of cycles that motions run into just below the lowest onset, at the
     upper end, and at ``mu``. push [m/s]: by how much the slip velocities are pushed off steady sliding (default: one
-    and three times the slip speed). points: most cycles of a branch, each way; seconds: of computing, for a motion that
-    comes back to nowhere. progress: called with the number of cycles so far and what is done; keep: with what was
-    found so far, behind each cycle. Ctrl-C ends the search and gives what was found.
+    and three times the slip speed). points: most cycles of a branch, each way; seconds: of processor time, by
+    shooting for a motion that comes back to nowhere (default: 60), by harmonic balance for following a branch (default:
+    no limit). progress: called with the number of cycles so far and what is done; keep: with what was found so far,
+    behind each cycle. Ctrl-C ends the search and gives what was found.
 
     Cycles to which no motion and no branch leads are not found. Raises CaseError for what the method does not take and
     where nothing slides, AnalysisError where steady sliding does not exist.
@@ -68,7 +71,7 @@ def cycles(
         raise CaseError("push", push, "finite speeds above or below 0 [m/s]")
     if not (float(points).is_integer() and points >= 2):
         raise CaseError("points", points, "a whole number, at least 2 cycles of a branch")
-    if not seconds > 0.0:
+    if seconds is not None and not seconds > 0.0:
         raise CaseError("seconds", seconds, "a time > 0 [s]")
     if work.varies:
         raise CaseError("case", "matrices that depend on mu", "cycles of a system whose matrices do not")
@@ -117,7 +120,7 @@ class _Search:
 
     def __init__(
         self, work: Workspace, between: tuple[float, float] | None, chosen: str, harmonics: int | None,
-        pushes: list[float] | None, points: int, seconds: float, progress: Callable[[int, str], None] | None,
+        pushes: list[float] | None, points: int, seconds: float | None, progress: Callable[[int, str], None] | None,
         keep: Callable[[Cycles], None] | None,
         started: float,
     ) -> None:  # fmt: skip
@@ -136,10 +139,11 @@ class _Search:
     def _method(self, chosen: str) -> Method[Any, Any]:
         system = self.work.system()
         if chosen == "shooting":
-            return Shooting(Family(system))
+            return Shooting(Family(system), SECONDS if self.seconds is None else self.seconds)
         known = self._onsets(self.between or self.work.modal.friction_range)
         highest = max((o.frequency_hz for o in known), default=0.0) or self.work.modal.max_frequency_hz
-        return Harmonic(HarmonicFamily(system, highest), known, self.harmonics)
+        limit = math.inf if self.seconds is None else self.seconds
+        return Harmonic(HarmonicFamily(system, highest), known, self.harmonics, limit)
 
     def _onsets(self, between: tuple[float, float]) -> tuple[CycleOnset, ...]:
         found = onsets(self.work, between)
@@ -176,12 +180,15 @@ class _Search:
         """The cycles at a friction coefficient that the method leads to."""
         self._say(f"motions at μ = {mu:.6g}")
         here: list[Any] = []
-        for said, found in self.method.reached(mu, self.pushes, self.seconds, self._say):
+
+        def told(said: str, found: Any) -> None:
             if isinstance(found, Unreached):
-                (self.notes if found.steady else self.missing).append(found.words)
+                (self.notes if found.expected else self.missing).append(found.words)
             elif not any(self.method.same(found, other) for other in here):
                 here.append(found)
                 self._add(found, said)
+
+        self.method.reached(mu, self.pushes, self._say, told)
 
     def _add(self, closed: Any, said: str) -> None:
         """A cycle, with its branch where a range is asked for that holds it."""
@@ -219,13 +226,15 @@ class _Search:
                 found += traced.cycles
         lost = [
             f"branch {k}: {end}" for k, branch in enumerate(branches, start=1) for end in (branch.begins, branch.ends)
-            if "could not" in end or "points were made" in end
+            if unfinished(end)
         ]  # fmt: skip
         made = provenance(
             self.work, "cycles", time.perf_counter() - self.started,
             between=None if self.between is None else list(self.between), push=self.pushes,
             points=self.points, method=self.method.name, harmonics=self.harmonics,
         )  # fmt: skip
+        if self.work.given is not None:
+            made["fingerprint"] = fingerprint(self.work.given, None)
         return Cycles(
             tuple(found), tuple(branches), self.onsets, self.between, (*self.missing, *lost), tuple(self.notes),
             self.interrupted, made,

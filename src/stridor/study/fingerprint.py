@@ -7,6 +7,7 @@ all of it input, so that it is the same on every machine.
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -22,6 +23,7 @@ from ..temporal.trajectory import Trajectory
 
 # Nothing of these reaches the time loop.
 ELSEWHERE = ("title", "modal", "comparison", "reference")
+IN_TIME = ("temporal", "phases")
 RECORDING = ("temporal.record_every", "temporal.watch")
 PHASE = "phases"
 _FILE = re.compile(r"^bodies\..*\.?(file|labels|mesh)$")
@@ -41,6 +43,20 @@ def fingerprint(case: Case, mu: float | None) -> dict[str, Any]:
     named = {path: value for path, value in values.items() if _FILE.match(path) and isinstance(value, str)}
     files = {path: contents(Path(value)) for path, value in named.items()}
     return {"values": {k: v for k, v in values.items() if k not in files}, "mu": mu, "files": files}
+
+
+def same_model(case: Case, before: Mapping[str, Any]) -> bool:
+    """Whether a fingerprint is that of the same bodies, contacts, loads and motions, and of files with the same
+    contents, whatever phases and time steps are."""
+
+    def of_model(told: Mapping[str, Any]) -> tuple[dict[str, Any], Any]:
+        kept = {path: value for path, value in told["values"].items() if path.split(".")[0] not in IN_TIME}
+        return kept, told["files"]
+
+    try:
+        return of_model(json.loads(json.dumps(fingerprint(case, None)))) == of_model(before)
+    except (KeyError, TypeError, AttributeError):
+        return False
 
 
 def differences(case: Case, mu: float | None, before: Trajectory) -> tuple[list[Difference], list[Difference]]:

@@ -24,7 +24,7 @@ def cycle_branches(
 ) -> Figure:
     """Slip amplitude and frequency of limit cycles over μ: stable ones drawn through, unstable ones dashed, folds as
     diamonds, onsets of steady sliding as triangles on the axis. runs: a μ with a run in time each, whose half range of
-    slip over its last phase is drawn as a cross."""
+    slip over the last quarter of its last phase, behind growth, is drawn as a cross."""
     figure, (upper, lower) = stacked(axes, 2, 5.4, (3, 2))
     for number, branch in enumerate(result.branches):
         cycles = [result.cycles[k] for k in branch.cycles]
@@ -44,8 +44,8 @@ def cycle_branches(
             upper.plot([cycle.mu], [cycle.slip_amplitude], "o", ms=5, color=BLUE, mfc=face)
             lower.plot([cycle.mu], [cycle.frequency_hz], "o", ms=5, color=BLUE, mfc=face)
     for mu, run in runs:
-        last = run.time >= run.phases[-1].start if run.phases else np.ones(len(run.time), dtype=bool)
-        slip = run.slip_speed[last]
+        part = run.phase_slice() if run.phases else slice(0, len(run.time))
+        slip = run.slip_speed[part.stop - max(1, (part.stop - part.start) // 4) : part.stop]
         upper.plot([mu], [0.5 * float(np.ptp(slip, axis=0).max())], "x", color=INK, ms=6)
     low, _ = upper.get_ylim()
     upper.set_ylim(min(low, 0.0), None)

@@ -9,6 +9,7 @@ from ..agreement import Agreement
 from ..case import Case
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
+from ..periodic import Cycles
 from ..sliding.surfaces import SurfaceSliding
 from ..study.measures import Countermeasures
 from ..study.saturation import Unsaturated
@@ -60,7 +61,7 @@ class ReportInputs:
     found, by the name of the figure or table here ("frequency-pair": "figure 3").
     steady: equilibrium of every contact node; shape_vector (n,): the mode that grows fastest, friction_energy (m,):
     what friction feeds into it at each slave node. sensitivities, measures: what changes of the case do;
-    unsaturated: that the run still grows. timings [s]
+    unsaturated: that the run still grows. cycles: limit cycles of this case that were found before. timings [s]
     by analysis; versions by program; case_text: the case file as written; created: date and time; warnings and notes in
     words.
     """
@@ -106,6 +107,7 @@ class ReportInputs:
     sensitivities: Sensitivities | None = None
     measures: Countermeasures | None = None
     unsaturated: Unsaturated | None = None
+    cycles: Cycles | None = None
 
     @property
     def max_frequency_hz(self) -> float:

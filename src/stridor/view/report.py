@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from ..stages import passing, stage
 from .body_words import bodies_table
 from .change_parts import change_figures, change_tables, change_words, mechanism_table
+from .cycle_parts import branch_words, cycle_figures, cycle_table, cycle_words
 from .figures import ReportFigure, agreement_figures, modal_figures, model_figures, temporal_figures
 from .inputs import ReportInputs
 from .modal_tables import frequency_tables, modes_table, onset_tables
@@ -127,6 +128,7 @@ def sections(inputs: ReportInputs) -> list[Section]:
         _modal(inputs),
         _changes(inputs),
         _temporal(inputs, window),
+        _cycles(inputs),
         _agreement(inputs),
         _reference(inputs, window),
     ]
@@ -199,6 +201,19 @@ def _temporal(inputs: ReportInputs, window: Window | None) -> Section:
             "slips or separates as it must.",
         )
     return Section("temporal", "Temporal approach", said, parts=tuple(parts))
+
+
+def _cycles(inputs: ReportInputs) -> Section:
+    """Limit cycles, where they were sought."""
+    result = inputs.cycles
+    if result is None:
+        return Section("limit-cycles", "Limit cycles")
+    table = cycle_table(result)
+    parts = (*cycle_figures(inputs), *(() if table is None else (table,)))
+    # Ends of branches are told with these.
+    missing = [line for line in result.missing if not line.startswith("branch ")]
+    lines = (*branch_words(result), *missing, *result.notes)
+    return Section("limit-cycles", "Limit cycles", cycle_words(result), lines, parts)
 
 
 def _agreement(inputs: ReportInputs) -> Section:

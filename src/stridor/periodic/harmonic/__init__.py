@@ -3,7 +3,7 @@
 from .balanced import Balanced, Kept, balanced, defect, guessed, kept
 from .birth import born
 from .branch import HarmonicBranch
-from .hill import hill
+from .hill import Hill, hill
 from .problem import HarmonicFamily, why_not_harmonic
 from .sampling import sampled_series
 
@@ -11,6 +11,7 @@ __all__ = [
     "Balanced",
     "HarmonicBranch",
     "HarmonicFamily",
+    "Hill",
     "Kept",
     "balanced",
     "born",

@@ -8,6 +8,8 @@ series are centred at k = 0 (Lazarus and Thomas 2010; Bayer, Leine, Thomas and G
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...typing import Array, ComplexArray, IntArray
@@ -28,8 +30,16 @@ def hill_size(cycle: Balanced) -> int:
     return 2 * cycle.family.condensed.size * cycle.at.base.length
 
 
-def hill(cycle: Balanced) -> ComplexArray:
-    """Multipliers (2k − 1,), largest first, without the one of the motion itself, of a system of k modes."""
+class Hill(NamedTuple):
+    """Multipliers (2k − 1,), largest first, without the one of the motion itself, and how far that one, the nearest to
+    one, came out from one: it has to be one, so that others are not much closer than it."""
+
+    multipliers: ComplexArray
+    own_off: float
+
+
+def hill(cycle: Balanced) -> Hill:
+    """Floquet's multipliers of a cycle of a system of k modes."""
     at, family = cycle.at, cycle.family
     modes, h = family.condensed, at.base.harmonics
     k, length = modes.size, 2 * h + 1
@@ -98,9 +108,11 @@ def _chosen(exponents: ComplexArray, centres: Array, period: float, count: int) 
     return np.array(values + [0.0] * (count - len(values)), dtype=complex)
 
 
-def _without_own(found: ComplexArray) -> ComplexArray:
-    rest = np.delete(found, int(np.argmin(np.abs(found - 1.0))))
-    return rest[np.argsort(-np.abs(rest), kind="stable")]
+def _without_own(found: ComplexArray) -> Hill:
+    off = np.abs(found - 1.0)
+    own = int(np.argmin(off))
+    rest = np.delete(found, own)
+    return Hill(rest[np.argsort(-np.abs(rest), kind="stable")], float(off[own]))
 
 
 def _toeplitz(cycle: Balanced) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -47,7 +47,8 @@ def why_not_harmonic(system: System) -> str:
         if one.sticking > (1.0 + 1e-12) * one.sliding(0.0):
             return (
                 f"contact {name} sticks up to a larger coefficient than it slides with at rest, so that its force "
-                "jumps as it lets go, which no series follows"
+                "jumps as it lets go, which no series follows, and sticks as soon as its slip stops, so that no branch "
+                "from an onset leads there"
             )
     return ""
 

@@ -28,7 +28,6 @@ class Impact:
 
     velocity: Array
     slips: Mapping[int, float]
-    open: frozenset[int]
     normal_work: float
     friction_work: float
     carried: float
@@ -68,9 +67,8 @@ def impact(pairs: Pairs, velocity: Array, speeds: tuple[Array, Array], met: Sequ
             lost_friction -= 0.5 * along[i] * (slip[c] + behind[1])
             carried += pushed[i] * speeds[0][c] + along[i] * speeds[1][c]
         slips = {c: sense(now) for c, now in zip(met, combination, strict=True) if now != GAP}
-        away = frozenset(c for c, now in zip(met, combination, strict=True) if now == GAP)
         held, pushing = _rows(pairs, combination, met)
-        return Impact(after, slips, away, lost_normal, lost_friction, carried, held, pushing)
+        return Impact(after, slips, lost_normal, lost_friction, carried, held, pushing)
     raise AnalysisError("friction jams the contacts in an impact: no impulses bring them to rest against one another")
 
 
@@ -91,7 +89,7 @@ def landing(
     slips = {c: 0.0 if c in stuck else float(pairs.tangent[c] @ after + speeds[1][c]) for c in rest}
     count = len(rest)
     return Impact(
-        after, slips, frozenset(), float(taken[:count].sum()), float(taken[count:].sum()), float(impulses @ added),
+        after, slips, float(taken[:count].sum()), float(taken[count:].sum()), float(impulses @ added),
         rows, rows,
     )  # fmt: skip
 
@@ -198,7 +196,7 @@ def choices(pairs: Pairs, c: int, slip: float, now: int) -> Touching:
     return Touching(slip, tuple(options))
 
 
-def settle(
+def consistent_status(
     count: int,
     touching: Mapping[int, Touching],
     driven: Callable[[Status], Driven],

@@ -11,7 +11,7 @@ from ....errors import AnalysisError
 from ....typing import Array, ComplexArray
 from ...columns import FRICTION, NORMAL, SUPPORT, WORKS
 from .basis import Basis
-from .decisions import CLOSE, Impact, State, Touching, choices, impact, landing, settle
+from .decisions import CLOSE, Impact, State, Touching, choices, consistent_status, impact, landing
 from .drive import Piece
 from .powers import Powers
 from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, parts_of
@@ -256,7 +256,7 @@ class Motion:
             back = BACKWARD if was[c] == FORWARD else FORWARD
             options = choices(pairs, c, 0.0, STICK).options
             touching[c] = Touching(0.0, tuple(o for o in (STICK, back, was[c]) if o in options))
-        self._take(settle(pairs.count, touching, self.driven, self._state()))
+        self._take(consistent_status(pairs.count, touching, self.driven, self._state()))
 
     def _touching(self) -> dict[int, Touching]:
         """Contacts that are closed now, and what they may do if something else changes."""
@@ -288,7 +288,7 @@ class Motion:
             touching[c] = choices(self.pairs, c, 0.0 if at_rest and now == STICK else slip, now)
         for c, slip in struck.slips.items():
             touching[c] = choices(self.pairs, c, slip, self.status[c])
-        self._take(settle(self.pairs.count, touching, self.driven, self._state()))
+        self._take(consistent_status(self.pairs.count, touching, self.driven, self._state()))
 
     def _take(self, status: Status) -> None:
         """Another status from here on."""
@@ -346,7 +346,7 @@ class Motion:
         closed = [c for c, now in enumerate(self.status) if now != GAP]
         if not np.any(jump):
             touching = {c: choices(self.pairs, c, sense(self.status[c]), self.status[c]) for c in closed}
-            self._take(settle(self.pairs.count, touching, self.driven, self._state()))
+            self._take(consistent_status(self.pairs.count, touching, self.driven, self._state()))
             return
         push = self.pairs.inertia.T @ jump
         self.v = self.v - push

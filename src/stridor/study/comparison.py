@@ -1,0 +1,104 @@
+"""Both approaches compared, and with them the limit cycles: onset, growth, cycle and run side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..agreement import Agreement, Comparison, Store
+from ..agreement.four_answers import four_answers, with_answers
+from ..errors import CaseError
+from ..periodic import Cycle, CycleOnset
+from ..temporal.trajectory import Trajectory
+from . import analyses
+from .cycles import cycles as find_cycles
+from .settings import phases_of, settings_of
+from .workspace import Problem, Workspace
+
+
+def compare(
+    problem: Problem,
+    mus: Sequence[float] | None = None,
+    *,
+    cycles: bool = False,
+    critical: bool | None = None,
+    runs: dict[float, Trajectory] | None = None,
+    progress: Callable[[str], None] | None = None,
+    only: Collection[str] | None = None,
+    kept: Store | None = None,
+    finished: Callable[[Comparison], None] | None = None,
+) -> Agreement:
+    """Both approaches at each μ (default comparison.mu, else the problem's own) and by their critical μ.
+
+    cycles: also the limit cycles at each μ, held against what the full run settles to (`Agreement.answers`).
+    critical False (default comparison.critical) solves neither critical μ; only: parts of "growth" (small
+    perturbations at each μ), "run" (the full run at each μ as well) and "critical" instead of all. kept: where finished
+    parts are put and sought (`io.kept_parts`); finished is called with each μ when it is done. Ctrl-C returns what is
+    finished. Raises CaseError for cycles without "run".
+    """
+    if cycles and only is not None and len(only) and "run" not in only:
+        raise CaseError("only", ", ".join(only), "with run among it: cycles are held against full runs")
+    work = Workspace.of(problem)
+    found = analyses.compare(
+        work, mus, critical=critical, runs=runs, progress=progress, only=only, kept=kept, finished=finished
+    )
+    if not cycles or found.interrupted:
+        return found
+    return _with_cycles(work, found, progress)
+
+
+def _with_cycles(work: Workspace, found: Agreement, progress: Callable[[str], None] | None) -> Agreement:
+    """The same with the cycles at its μ."""
+
+    def told(count: int, doing: str) -> None:
+        if progress is not None:
+            progress(f"cycles: {doing} ({count} so far)")
+
+    mus = [c.mu for c in found.comparisons]
+    cycles: tuple[Cycle, ...] = ()
+    notes: list[str] = []
+    stopped = False
+    why = _why_not(work)
+    if not why:
+        try:
+            result = find_cycles(work, mus, progress=told)
+        except CaseError as error:
+            if error.problems[0].where != "case":
+                raise
+            why = f"cycles were not sought: {error.problems[0].accepted}"
+        else:
+            cycles, stopped = result.cycles, result.interrupted
+            notes += [f"cycles: {line}" for line in (*result.missing, *result.warnings)]
+    noted = replace(found, notes=(*found.notes, *notes), interrupted=stopped)
+    if stopped:
+        return with_answers(noted, ())
+    onset = _onset(work)
+    return with_answers(
+        noted,
+        [
+            four_answers(c, onset, [one for one in cycles if one.mu == c.mu], work.modal.max_frequency_hz, why)
+            for c in found.comparisons
+        ],
+    )
+
+
+def _why_not(work: Workspace) -> str:
+    """Why no cycle can be held against the runs; "" where they can."""
+    compliance = work.structured("compare").contact_nodes().compliance
+    if settings_of(work).contact == "rigid" and np.any(compliance > 0.0):
+        return "cycles were not sought: contact in time is another than theirs (temporal.contact)"
+    factors: dict[str, float] = {}
+    for phase in phases_of(work):
+        factors |= {**phase.loads, **phase.velocities, **phase.displacements}
+    if off := [name for name, factor in factors.items() if factor != 1.0]:
+        return f"cycles were not sought: they go with full loads and speeds, and the run ends with others ({off[0]})"
+    return ""
+
+
+def _onset(work: Workspace) -> CycleOnset | None:
+    """The lowest onset of growth in modal.friction_range."""
+    growing = [o for o in analyses.onsets(work).onsets if not o.stabilising]
+    first = min(growing, key=lambda o: o.mu, default=None)
+    return None if first is None else CycleOnset(first.mu, first.frequency_hz, first.stabilising)

@@ -1,0 +1,113 @@
+"""The chapter of a report on limit cycles: branches over friction, one period of the loudest, a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..digits import hertz, readable
+from ..periodic import Cycle, Cycles
+from .cycle_plots import cycle_branches, cycle_period
+from .figures import ReportFigure
+from .inputs import ReportInputs
+from .tables import Row, Table
+
+STABLE = {True: "yes", False: "no", None: "undecided"}
+WORTH = 6  # cycles between the ends of a branch
+
+
+def loudest(result: Cycles) -> Cycle:
+    """The cycle with the largest slip amplitude, of those that are stable if there are any."""
+    stable = [c for c in result.cycles if c.stable] or list(result.cycles)
+    return max(stable, key=lambda c: c.slip_amplitude)
+
+
+def worth_a_row(result: Cycles) -> list[int]:
+    """Numbers of the cycles that a short table shows: single ones, and of a branch its ends, its folds and about six
+    between."""
+    followed = {k for branch in result.branches for k in branch.cycles}
+    found = set(range(len(result.cycles))) - followed
+    for own in result.branches:
+        found |= {own.cycles[0], own.cycles[-1], *own.folds, *own.cycles[:: max(len(own.cycles) // WORTH, 1)]}
+    return sorted(found)
+
+
+def branch_words(result: Cycles) -> list[str]:
+    """Each branch in a line: how many cycles, from where to where, what happens between."""
+    return [
+        f"branch {k}, {len(branch.cycles)} cycles: "
+        + "; ".join((branch.begins, *(b.sentence for b in branch.bifurcations), branch.ends))
+        for k, branch in enumerate(result.branches, start=1)
+    ]
+
+
+def cycle_words(result: Cycles) -> tuple[str, ...]:
+    """What was found and how, what it means, what a reader must know."""
+    methods = {c.method for c in result.cycles}
+    ways = {"shooting": "shooting on the exact motion", "harmonic": "harmonic balance"}
+    by = " and ".join(way for name, way in ways.items() if name in methods)
+    made = str(result.provenance.get("created", ""))[:10]
+    said = [
+        f"What it swings in beyond an onset{f', by {by}' if by else ''}{f', computed on {made}' if made else ''}: "
+        f"{result.sentence}. Motions end in stable cycles; an unstable one is the border between two states."
+    ]
+    return (*said, *(f"{line[0].upper()}{line[1:]}." for line in result.warnings))
+
+
+def cycle_table(result: Cycles) -> Table | None:
+    """A row for each cycle that `worth_a_row` names."""
+    rows: list[Row] = []
+    for k in worth_a_row(result):
+        c, branch = result.cycles[k], result.branch_of(k)
+        force, shares = float(c.force_range[:, 1].max()), c.shares.max(axis=0)
+        cells = (
+            "" if branch is None else f"{branch + 1}", f"{c.mu:.6g}", hertz(c.frequency_hz).removesuffix(" Hz"),
+            STABLE[c.stable] if c.multiplied else "unknown",
+            f"{c.largest_multiplier:.4g}" if c.multiplied else "", readable(c.slip_amplitude, 4), readable(force, 4),
+            f"{100 * shares[1]:.1f} %", f"{100 * shares[0]:.1f} %", ", ".join(c.kinds),
+        )  # fmt: skip
+        rows.append(Row(cells, "unstable" if c.stable is False else ""))
+    if not rows:
+        return None
+    heads = (
+        "branch", "μ", "frequency [Hz]", "stable", "largest multiplier", "slip amplitude [m/s]", "largest force [N]",
+        "stick", "open", "with",
+    )  # fmt: skip
+    left = len(result.cycles) - len(rows)
+    caption = (
+        "Largest Floquet multiplier: below one disturbances die out. Stick and open: the largest shares of the period "
+        f"of a contact.{f' {left} more cycles are in cycles.csv.' if left else ''}"
+    )
+    return Table("cycles", "Limit cycles", heads, tuple(rows), frozenset({3, 9}), caption)
+
+
+def cycle_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
+    """Branches with the run, where it has settled, and the loudest cycle over a period."""
+    result, run = inputs.cycles, inputs.trajectory
+    if result is None or not (result.cycles or result.onsets):
+        return
+    shown = run is not None and inputs.mu is not None and inputs.unsaturated is None and not run.interrupted
+    runs = [(inputs.mu, run)] if shown and inputs.mu is not None and run is not None and len(run.time) else []
+    yield ReportFigure(
+        "cycle-branches",
+        "Limit cycles over friction",
+        "Half the range of the slip velocity, of the contact where it is largest, and the frequency. Drawn through: "
+        "stable; dashed: unstable or undecided. Diamonds: folds. Triangles: onsets of growth of steady sliding."
+        + (" Cross: the run in time, over the last quarter of its last phase." if runs else ""),
+        "Slip amplitude and frequency of limit cycles over the friction coefficient.",
+        cycle_branches(result, runs),
+    )
+    if not result.cycles:
+        return
+    cycle = loudest(result)
+    contact = cycle.contact_names[int(np.argmax(np.ptp(cycle.slip_range, axis=1)))]
+    yield ReportFigure(
+        "cycle-period",
+        f"One period at μ = {cycle.mu:.6g}",
+        f"The loudest {'stable ' if cycle.stable else ''}cycle, {hertz(cycle.frequency_hz)}: forces and slip velocity "
+        f"of contact {contact}, on the colour of what it does.",
+        f"Normal and friction force and slip velocity of contact {contact} over one period, with stick, slip and "
+        "separation shaded.",
+        cycle_period(cycle, contact),
+    )
