@@ -96,8 +96,8 @@ def save(
 
 @contextlib.contextmanager
 def _no_cluster() -> Generator[None]:
-    """xarray asks whether it writes on a cluster of Dask, and imports all of ``distributed`` to find out: nearly a second
-    of every command, where it is installed. Where nobody has imported it yet there is no cluster."""
+    """xarray asks whether it writes on a cluster of Dask, and imports all of ``distributed`` to find out, which takes
+    the greater part of a second where it is installed. Where nobody has imported it yet there is no cluster."""
     modules: dict[str, Any] = sys.modules
     if CLUSTER in modules:
         yield
