@@ -26,9 +26,10 @@ demo: $(STAMP)  ## the two-beam bench, from case file to report, in demo/
 	@test -s demo/two-beams.out/report.html || { echo "make demo: no report was written" >&2; exit 1; }
 	@echo; echo "The report: $(CURDIR)/demo/two-beams.out/report.html"
 
-# One BLAS thread each: the workers already use the cores.
+# One BLAS thread each: the workers already use the cores. Each has its half of the tests in order and takes of the
+# other's at the end: tests dealt out by turns would make what a module's tests share once for every worker.
 test: $(STAMP)  ## all tests but the slow ones
-	OPENBLAS_NUM_THREADS=$${OPENBLAS_NUM_THREADS:-1} $(BIN)/python -m pytest -n $(JOBS) $(PYTEST_ARGS)
+	OPENBLAS_NUM_THREADS=$${OPENBLAS_NUM_THREADS:-1} $(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
 
 weekly: $(STAMP)  ## the slow tests, the full benchmarks and the tests of the tests
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)

@@ -132,7 +132,7 @@ def main() -> None:
     parser.add_argument("--cluster", action="store_true")
     parser.add_argument("--pad", action="store_true")
     args = parser.parse_args()
-    few, many = (60, 200) if args.short else (300, 10_000)
+    few, many = (16, 200) if args.short else (300, 10_000)
     print(f"studies of the two-beam bench ({machine()})")
     full = scatter(few, "full")
     one = line("full, 1 worker", 1, timed(full, 1))

@@ -64,17 +64,16 @@ def random_plane(seed: int) -> Plane:
 
 def eigenvalues(problem: Plane, places: np.ndarray) -> np.ndarray:
     """All of them (m, 2n) at places (m, 2) in shares of the ranges, from the terms by NumPy alone."""
-    n, states = len(problem.terms[0]), []
-    for p in np.atleast_2d(places):
-        values = problem.values(p)
-        total = {"mass": np.zeros((n, n)), "damping": np.zeros((n, n)), "stiffness": np.zeros((n, n))}
-        for term, matrix in zip(problem.problem.terms, problem.terms, strict=True):
-            total[term.role] += term.factor(values) * matrix
-        inverse = np.linalg.inv(total["mass"])
-        states.append(
-            np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ total["stiffness"], -inverse @ total["damping"]]])
-        )
-    return np.linalg.eigvals(np.array(states))
+    n, places = len(problem.terms[0]), np.atleast_2d(places)
+    values = [problem.values(p) for p in places]
+    total = {role: np.zeros((len(places), n, n)) for role in ("mass", "damping", "stiffness")}
+    for term, matrix in zip(problem.problem.terms, problem.terms, strict=True):
+        total[term.role] += np.array([term.factor(v) for v in values])[:, None, None] * matrix
+    inverse = np.linalg.inv(total["mass"])
+    states = np.zeros((len(places), 2 * n, 2 * n))
+    states[:, :n, n:] = np.eye(n)
+    states[:, n:, :n], states[:, n:, n:] = -inverse @ total["stiffness"], -inverse @ total["damping"]
+    return np.linalg.eigvals(states)
 
 
 def growing(values: np.ndarray, top: float) -> np.ndarray:
@@ -119,10 +118,8 @@ def off_the_curves(problem: Plane, found: Found, beside: float) -> list[np.ndarr
         middle = 0.5 * (points[1:] + points[:-1])
         normal = np.stack([-ways[:, 1], ways[:, 0]], axis=1) / np.maximum(np.hypot(*ways.T), 1e-300)[:, None]
         sides = [(m - 1.5 * beside * n, m + 1.5 * beside * n) for m, n in zip(middle, normal, strict=True)]
-        judged = [
-            k for k, (a, b) in enumerate(sides)
-            if min(*a, *b) >= 0 and max(*a, *b) <= 1 and distance(others, middle[k]) > 2 * beside
-        ]  # fmt: skip
+        alone = distance(others, middle) > 2 * beside
+        judged = [k for k, (a, b) in enumerate(sides) if min(*a, *b) >= 0 and max(*a, *b) <= 1 and alone[k]]
         if not judged:
             continue
         omega = curve.drawn.omega[:-1][judged, None]
@@ -139,11 +136,13 @@ def off_the_curves(problem: Plane, found: Found, beside: float) -> list[np.ndarr
     return wrong
 
 
-def distance(found: Found, p: np.ndarray) -> float:
-    """From a point (2,) to the nearest curve, in shares of the ranges."""
-    nearest = np.inf
+def distance(found: Found, places: np.ndarray) -> np.ndarray:
+    """From each place (m, 2) to the nearest curve (m,), in shares of the ranges."""
+    nearest = np.full(len(places), np.inf)
     for curve in found.drawn:
-        start, way = curve.points[:-1], np.diff(curve.points, axis=0)
-        share = np.clip(np.sum((p - start) * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-300), 0.0, 1.0)
-        nearest = min(nearest, float(np.hypot(*(start + share[:, None] * way - p).T).min()))
+        (x, y), (along, up) = curve.points[:-1].T, np.diff(curve.points, axis=0).T
+        right, above = places[:, :1] - x, places[:, 1:] - y
+        share = np.clip((right * along + above * up) / np.maximum(along**2 + up**2, 1e-300), 0.0, 1.0)
+        off = np.hypot(share * along - right, share * up - above)
+        nearest = np.minimum(nearest, off.min(axis=1, initial=np.inf))
     return nearest

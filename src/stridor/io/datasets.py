@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,7 @@ Result = (
     ComplexModes | Onsets | ParametricOnsets | Sensitivities | Trajectory | Agreement | Ensemble | Boundary | DampingMap
     | Cycles | Countermeasures | ModesAtPoints
 )  # fmt: skip
+CLUSTER = "distributed"
 STORE = ("zarr.json", ".zgroup", "study.zarr")  # in the folder of a store, and in the folder that a study writes to
 # Of the results that a file gives back as they were, by the analysis that it names.
 WHOLE: Mapping[str, Callable[[Any], Any]] = {
@@ -86,10 +89,27 @@ def save(
     with replacing(target) as temporary:
         stream = NotedErrors(temporary)
         try:
-            dataset.to_netcdf(stream, engine="h5netcdf")
+            with _no_cluster():
+                dataset.to_netcdf(stream, engine="h5netcdf")
         finally:
             stream.finish()
     return target
+
+
+@contextlib.contextmanager
+def _no_cluster() -> Generator[None]:
+    """xarray asks whether it writes on a cluster of Dask, and imports all of ``distributed`` to find out, which takes
+    the greater part of a second where it is installed. Where nobody has imported it yet there is no cluster."""
+    modules: dict[str, Any] = sys.modules
+    if CLUSTER in modules:
+        yield
+        return
+    modules[CLUSTER] = None  # importing it now raises ImportError, which is an answer
+    try:
+        yield
+    finally:
+        if modules.get(CLUSTER) is None:
+            modules.pop(CLUSTER, None)
 
 
 def open(path: str | Path) -> Any:

@@ -49,13 +49,19 @@ class PointCoupling:
         """d = N dμ/d|v| (m,) [N s/m] at steady sliding with coefficient ``mu``."""
         if not self.sloped or mu == 0.0:
             return np.zeros(self.contacts)
+        # Newton's method asks at one μ once for every root.
+        return self.system.once(("friction damping", mu), lambda: self._friction_damping(mu))
+
+    def _friction_damping(self, mu: float) -> Array:
         speeds = np.abs(self.slip_speed)
         steady = steady_sliding(self.system, mu=mu)
         slopes = [
             c.law.scaled(mu, float(v)).slope(float(v))
             for c, v in zip(self.system.contacts, speeds, strict=True)
         ]
-        return np.abs(steady.normal_force) * np.array(slopes)
+        found = np.abs(steady.normal_force) * np.array(slopes)
+        found.setflags(write=False)
+        return found
 
     def friction_damping_slope(self, mu: float) -> tuple[Array, Array]:
         """d and its derivative in μ (m,), the derivative by a central difference."""

@@ -14,7 +14,7 @@ from ...case.points import choice
 from ...errors import CaseError
 from ...typing import Array, Sparse
 from ..quadratic.problem import Quadratic
-from .factors import ParameterFactor
+from .factors import is_data
 
 Role = Literal["mass", "damping", "stiffness"]
 POWERS: Mapping[Role, int] = {"mass": 2, "damping": 1, "stiffness": 0}
@@ -116,7 +116,7 @@ class ParametricProblem:
         low, high = max(values[name] - step, own.low), min(values[name] + step, own.high)
 
         def slope(factor: Callable[[Mapping[str, float]], float]) -> float:
-            if isinstance(factor, ParameterFactor):
+            if is_data(factor):
                 return factor.slope(values, name)
             return (factor({**values, name: high}) - factor({**values, name: low})) / (high - low)
 
