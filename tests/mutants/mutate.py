@@ -66,7 +66,7 @@ if os.environ.get("STRIDOR_MUTANT"):
 # What is written in instructions of the machine has none as plain Python: stand-ins, in the copy, for the kernels around
 # it. Faults in it are tried with everything compiled afresh.
 STAND_INS = {
-    "temporal/steppers/modal/borrow.py": '''
+    "temporal/steppers/borrow.py": '''
 
 if __import__("os").environ.get("NUMBA_DISABLE_JIT"):
 

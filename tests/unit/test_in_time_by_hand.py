@@ -25,8 +25,7 @@ from stridor.temporal.schedule import PhaseSpec, lay_out
 from stridor.temporal.settings import Settings
 from stridor.temporal.sketch import Part
 from stridor.temporal.steppers.modal import ModalStepper, start
-from stridor.temporal.steppers.modal.operators import _band_factor, nodal_arrays
-from stridor.temporal.steppers.sparse import damping, limit, renewal, storage
+from stridor.temporal.steppers.sparse import damping, limit, renewal, step_matrix, storage
 from stridor.temporal.steppers.sparse import machine as assembled_machine
 from stridor.temporal.steppers.sparse.node_table import sliding_directions
 
@@ -174,44 +173,52 @@ def random_structure(rng, n: int, width: int) -> System:
     return System(band(1.0), 0.3 * band(0.5), 100 * band(0.0))
 
 
+def lower_of(factor: np.ndarray) -> np.ndarray:
+    n, width = factor.shape
+    return np.eye(n) + sum((np.diag(factor[: n - k, k], -k) for k in range(1, width)), np.zeros((n, n)))
+
+
 @pytest.mark.parametrize("n", [1, 5, 12])
 def test_the_band_factor_is_that_of_the_matrix(n: int) -> None:
     rng = np.random.default_rng(1)
     system = random_structure(rng, n, min(2, n - 1))
-    factor = _band_factor(sp.csr_array(system.mass))
-    lower = np.eye(n)
-    for k in range(1, len(factor)):
-        lower += np.diag(factor[k, : n - k], -k)
-    assert lower @ np.diag(1 / factor[0]) @ lower.T == pytest.approx(system.mass.toarray(), rel=1e-10, abs=1e-12)
-    assert len(factor) == 1 + max(abs(i - j) for i, j in zip(*np.nonzero(system.mass.toarray()), strict=True))
+    factor = step_matrix.band_factor(sp.csr_array(system.mass))
+    lower = lower_of(factor)
+    assert lower @ np.diag(1 / factor[:, 0]) @ lower.T == pytest.approx(system.mass.toarray(), rel=1e-10, abs=1e-12)
+    assert factor.shape[1] == 1 + max(abs(i - j) for i, j in zip(*np.nonzero(system.mass.toarray()), strict=True))
+    right = rng.normal(size=n)
+    solved = right.copy()
+    step_matrix.band_solve(factor, solved)
+    assert system.mass @ solved == pytest.approx(right, rel=1e-9, abs=1e-12)
     with pytest.raises(AnalysisError, match=r"^the mass matrix is not positive definite: a freedom has stiffness but no mass$"):
-        _band_factor(sp.csr_array(-system.mass))
+        step_matrix.band_factor(sp.csr_array(-system.mass))
 
 
 @pytest.mark.parametrize("b2", [0.5, 0.8])
-def test_arrays_of_the_nodal_path_are_those_of_the_scheme(b2: float) -> None:
+@pytest.mark.parametrize("damped", [False, True])
+def test_the_step_matrix_is_that_of_the_scheme(b2: float, damped: bool) -> None:
     rng = np.random.default_rng(2)
-    n = 7
+    n = 7  # of which blocks of two leave one entry without a freedom
     system = random_structure(rng, n, 2)
+    system = system if damped else System(system.mass, np.zeros((n, n)), system.stiffness)
     dt = 0.01
     given = scheme(dt, b2)
     assert given == (dt, b2, 1 + 2 * b2, (2 * b2 - 1) / (1 + 2 * b2), 2 / ((1 + 2 * b2) * dt))
-    arrays, order = nodal_arrays(system, given)
-    assert sorted(order) == list(range(n))
-    M, C, K = (m.toarray()[np.ix_(order, order)] for m in (system.mass, system.damping, system.stiffness))
-    gain = dt**2 * (1 + 2 * b2) / 2
-
-    def full(ptr, col, val) -> np.ndarray:
-        return sp.csr_array((val, col, ptr), shape=(n, n)).toarray()
-
-    assert arrays.load_gain == pytest.approx(gain)
-    assert full(*arrays[0:3]) == pytest.approx(gain * K)
-    assert full(*arrays[3:6]) == pytest.approx(dt * M - dt**2 / 2 * C)
-    assert full(*arrays[6:9]) == pytest.approx(C)
-    lower = np.eye(n)
-    for k in range(1, len(arrays.factor)):
-        lower += np.diag(arrays.factor[k, : n - k], -k)
-    assert lower @ np.diag(1 / arrays.factor[0]) @ lower.T == pytest.approx(M + b2 * dt * C)
+    layout = storage.lay_out_freedoms(system, width=2)
+    assert (layout.width, layout.size) == (2, 8)
+    matrix, answers = step_matrix.step_matrix(system, given, layout)
+    M, C = system.mass.toarray(), system.damping.toarray()
+    lower = lower_of(matrix.factor)
+    whole = lower @ np.diag(1 / matrix.factor[:, 0]) @ lower.T
+    assert whole[np.ix_(layout.index, layout.index)] == pytest.approx(M + b2 * dt * C)
+    assert len(matrix.drag) == (layout.size if damped else 0)
+    rows = rng.normal(size=(3, n))
+    moved = answers(layout.rows(sp.csr_array(rows))).toarray()
+    assert moved[:, layout.index] == pytest.approx(dt**2 * (1 + 2 * b2) / 2 * np.linalg.solve(M + b2 * dt * C, rows.T).T)
+    assert moved[:, np.setdiff1d(np.arange(8), layout.index)] == pytest.approx(0.0)
+    assert not step_matrix.is_diagonal(system.mass)
+    assert step_matrix.is_diagonal(sp.csr_array(np.diag([1.0, 2.0]) + 1e-15), 1e-14)
+    assert not step_matrix.is_diagonal(sp.csr_array(np.diag([1.0, 2.0]) + 1e-15))
 
 
 # -- limits of the step ------------------------------------------------------------------------------------------------

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from unittest import mock
 
@@ -19,11 +21,21 @@ from stridor.system.motion import Constraint, Structure, constrain
 from stridor.temporal.beta2 import step_limit
 from stridor.temporal.schedule import PhaseSpec, lay_out
 from stridor.temporal.simulate import Settings, simulate
-from stridor.temporal.steppers.modal import stepper as engine
+from stridor.temporal.steppers.modal import stepper as in_modes
+from stridor.temporal.steppers.sparse import stepper as on_freedoms
 
 pytestmark = pytest.mark.verification
 
 PATHS = ("modal", "nodal")
+
+
+@contextmanager
+def any_step() -> Iterator[None]:
+    """Steps beyond the limit, which are refused."""
+    with ExitStack() as patches:
+        for engine in (in_modes, on_freedoms):
+            patches.enter_context(mock.patch.object(engine, "choose_step", lambda limit, settings: settings.step))
+        yield
 
 
 def oscillator(omega=1.0, damping=0.0, load=None) -> System:
@@ -209,7 +221,7 @@ def test_stable_just_below_the_limit_and_not_just_above(beta2, path):
     # The limit is refused beforehand, so let it pass to see what it guards against.
     step = 1.001 * limit.step
     with (
-        mock.patch.object(engine, "choose_step", lambda limit, settings: settings.step),
+        any_step(),
         pytest.raises(AnalysisError, match=r"no longer finite.*phase run.*too large for this model") as error,
     ):
         run(system, steps * step, step=step, watch=("n0",), **common)
@@ -227,7 +239,7 @@ def test_blow_up_is_noticed_between_records(path):
     step = 1.1 * step_limit(system, 0.5).step
     start = (np.array([1.0, -1.0, 1.0, -1.0, 1.0]), 0.0, 0.0)
     with (
-        mock.patch.object(engine, "choose_step", lambda limit, settings: settings.step),
+        any_step(),
         pytest.raises(AnalysisError, match="no longer finite"),
     ):
         run(system, 5000 * step, step=step, start=start, path=path, record_every=10**6)
@@ -244,7 +256,7 @@ def test_damping_moves_the_limit_as_derived(beta2):
     ends = []
     for factor in (0.999, 1.001):
         step = factor * critical
-        with mock.patch.object(engine, "choose_step", lambda limit, settings: settings.step):
+        with any_step():
             u = run(system, 3000 * step, start=(1.0, 0.0, 0.0), step=step, beta2=beta2, watch=("mass",))
         ends.append(np.abs(u.displacement[-20:]).max())
     assert ends[0] < 1e-1

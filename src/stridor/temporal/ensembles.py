@@ -25,7 +25,7 @@ from .schedule import PhaseSpec
 from .settings import Settings, choose_step
 from .side_by_side import Block, Seen, Track
 from .simulate import plan, simulate
-from .steppers.modal import ModalStepper, modal_stepper
+from .steppers.modal import ModalStepper, choose_path, modal_stepper
 from .steppers.modal.vectors import LANES
 from .trajectory import Trajectory
 
@@ -124,7 +124,9 @@ def _shared(system: System, settings: Settings) -> tuple[ModalStepper | None, st
     finite = [c.name for c in system.contacts if c.sliding != "small"]
     if finite:
         return None, f'sliding = "finite" at {", ".join(finite)}'
-    return modal_stepper(system, settings, None), ""
+    modes, why = choose_path(system, settings)
+    assert modes is not None
+    return modal_stepper(system, settings, None, modes, why), ""
 
 
 def _all_cores() -> int:

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..errors import StridorError
 from ..system import System
-from ..system.uncoupled import UncoupledModes
 from ..typing import Array
 from .legs import Legs, Member, leg_phases
 from .phase_results import PhaseResults, fresh_statistics
@@ -63,14 +62,14 @@ class Block:
                 self._failed(k, 0, str(error))
                 count(self.legs.steps)
         if machines:
-            self._march(self.batch(machines, _modes(self.stepper), self.settings.watch), present, asked, count)
+            self._march(self.batch(machines, self.stepper.modes, self.settings.watch), present, asked, count)
 
     def warm(self) -> None:
         """Compile the loop, or load it."""
         member = self.tracks[0][0]
-        machine = modal_machine(self.system, self.stepper.scheme, _modes(self.stepper))
+        machine = modal_machine(self.system, self.stepper.scheme, self.stepper.modes)
         machine.repack()
-        batch = self.batch([machine], _modes(self.stepper), self.settings.watch)
+        batch = self.batch([machine], self.stepper.modes, self.settings.watch)
         acting = self.legs.forcing(0, 1, [[member]], self.system.motion.full_distance)
         batch.advance(0, acting, batch.room(0, self.settings.record_every))
 
@@ -81,7 +80,7 @@ class Block:
         settings = member.settings(self.settings)
         if settings.initial == "steady-sliding":
             schedule = schedule.from_steady()
-        return member_machine(member.system(system), stepper.scheme, _modes(stepper), schedule, settings)
+        return member_machine(member.system(system), stepper.scheme, stepper.modes, schedule, settings)
 
     def _march(
         self, batch: Batch, present: Sequence[int], asked: Callable[[], bool], count: Callable[[int], None]
@@ -170,8 +169,3 @@ class Block:
             interrupted=False,
             wall_seconds=0.0,
         )
-
-
-def _modes(stepper: ModalStepper) -> UncoupledModes:
-    assert stepper.modes is not None  # who makes a block has looked
-    return stepper.modes

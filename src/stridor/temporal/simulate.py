@@ -148,7 +148,10 @@ def stepper_for(system: System, settings: Settings, mu: float | None, why: str =
         return implicit_stepper(system, settings, mu, why)
     if why := _why_sparse(system, settings):
         return sparse_stepper(system, settings, mu, why)
-    return modal_stepper(system, settings, mu)
+    modes, reason = choose_path(system, settings)
+    if modes is None:
+        return sparse_stepper(system, settings, mu, reason, path="nodal")
+    return modal_stepper(system, settings, mu, modes, reason)
 
 
 def _why_sparse(system: System, settings: Settings) -> str:

@@ -13,9 +13,8 @@ from ....kernels import njit
 from ....typing import Array, IntArray
 from ...beta2 import Scheme
 from ...columns import REC_GAP, REC_NORMAL, REC_SLIP, REC_STATUS, REC_TANGENTIAL
+from ..borrow import borrow
 from .batch_pass import BatchFields, BatchModal, batch_constant, batch_pass, batch_watch
-from .borrow import borrow
-from .lending import lent_contacts, lent_scratch, lent_state
 from .operators import ContactArrays
 from .stage import Forcing, LoopState, Scratch, advance_rows, contact_stage, count_contacts, forces_of
 
@@ -77,23 +76,6 @@ def _member_contacts(x: ContactArrays, friction: Array) -> ContactArrays:  # pra
 def _member_forcing(x: BatchForcing, lane: int) -> Forcing:  # pragma: no cover - compiled
     """What acts on one member."""
     return Forcing(x.loads[:, lane], x.increments[:, lane], x.own, x.own, x.own, x.lift)
-
-
-@njit(cache=True, inline="always")
-def _lent(f: BatchFields) -> BatchFields:  # pragma: no cover - compiled
-    """The same fields, borrowed."""
-    return BatchFields(
-        borrow(f.ud), borrow(f.q), borrow(f.constant), borrow(f.push), borrow(f.pull), borrow(f.coefficients)
-    )
-
-
-@njit(cache=True, inline="always")
-def _lent_modal(m: BatchModal) -> BatchModal:  # pragma: no cover - compiled
-    """The same operators, borrowed."""
-    return BatchModal(
-        borrow(m.blocks), borrow(m.rows), borrow(m.rows_at), borrow(m.stream), borrow(m.stream_at), borrow(m.driven),
-        borrow(m.plain), borrow(m.acts), borrow(m.auxiliary), borrow(m.watch), m.gain, m.memory,
-    )  # fmt: skip
 
 
 @njit(cache=True, inline="always")
@@ -183,18 +165,9 @@ def run_batch(
     friction (L, m, k). lost (L,): the step at which a member was no longer finite, −1 while it is; such a member rests
     from there on.
     """
-    modal, contacts, fields = _lent_modal(modal), lent_contacts(contacts), _lent(fields)
-    states, scratch, compliance = lent_state(states), lent_scratch(scratch), borrow(compliance)
-    friction = borrow(friction)
-    forcing = BatchForcing(
-        borrow(forcing.loads), borrow(forcing.increments), borrow(forcing.changes), borrow(forcing.own),
-        borrow(forcing.lift),
-    )  # fmt: skip
-    lost = borrow(lost)
-    record = BatchRecord(
-        record.every, borrow(record.contacts), borrow(record.watch), borrow(record.kept), borrow(record.sums),
-        borrow(record.before), borrow(record.watch_lift),
-    )  # fmt: skip
+    modal, contacts, fields, states = borrow(modal), borrow(contacts), borrow(fields), borrow(states)
+    scratch, compliance, friction, forcing = borrow(scratch), borrow(compliance), borrow(friction), borrow(forcing)
+    lost, record = borrow(lost), borrow(record)
     rows, members = compliance.shape[0], friction.shape[0]
     batch_constant(modal, fields)
     for k in range(steps):

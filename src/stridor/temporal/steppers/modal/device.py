@@ -51,7 +51,6 @@ class DeviceBatch(Batch):
     def _shared_by_all(self, machine: Machine) -> DeviceModel:
         """Operators as the kernel reads them."""
         contacts, rows, path, scheme = self.table.contacts, self.table.force_rows, machine.modal, self.scheme
-        assert path is not None
         return DeviceModel(
             contacts=np.stack([contacts.kind, contacts.base, contacts.kept]),
             numbers=np.stack([contacts.gap, contacts.compliance]),

@@ -18,6 +18,7 @@ from numba import float64
 from ....typing import Array, IntArray
 from ...beta2 import Scheme
 from ...legs import Acting
+from ..curve import Foot
 from .batch_kernel import BatchRecord, finite_rows, keep_contacts, keep_point
 from .operators import ContactArrays
 from .stage import Forcing, LoopState, Scratch, advance_rows, contact_stage, count_contacts, forces_of
@@ -98,8 +99,8 @@ def _scratch_of(lane: int, model: DeviceModel, members: DeviceMembers) -> Scratc
     """The work space of one member."""
     rows, contacts, flat = members.rows[lane], members.contacts[lane], model.flat
     return Scratch(
-        rows[4], rows[5], members.weights[lane, 0], members.weights[lane, 1], flat, flat, model.table, contacts[2],
-        contacts[3], flat,
+        rows[4], rows[5], members.weights[lane, 0], members.weights[lane, 1], Foot(flat, flat, model.table),
+        contacts[2], contacts[3], flat,
     )  # fmt: skip
 
 

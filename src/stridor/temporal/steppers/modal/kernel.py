@@ -14,24 +14,12 @@ from ....typing import Array
 from ...arithmetic import CAREFUL, FAST
 from ...beta2 import Scheme
 from ...columns import DAMPING, REC_GAP, REC_NORMAL, REC_POSITION, REC_SLIP, REC_STATUS, REC_TANGENTIAL
-from .borrow import borrow
-from .layout import Fields, ModalRows, NodalRows, Record
-from .lending import (
-    lent_contacts,
-    lent_fields,
-    lent_forcing,
-    lent_modal,
-    lent_modal_rows,
-    lent_nodal,
-    lent_nodal_rows,
-    lent_record,
-    lent_scratch,
-    lent_state,
-)
+from ..borrow import borrow
+from ..curve import ROWS, leaves
+from .layout import Fields, ModalRows, Record
 from .modal_path import complete_modal, modal_constant, modal_energies, modal_pass
-from .nodal_path import complete_nodal, nodal_constant, nodal_energies, nodal_pass
-from .operators import ContactArrays, ModalArrays, NodalArrays
-from .stage import Forcing, LoopState, Scratch, accumulate, advance_rows, contact_stage, forces_of
+from .operators import ContactArrays, ModalArrays
+from .stage import Forcing, LoopState, Scratch, accumulate, advance_rows, contact_stage, forces_of, reference
 
 DONE, NEW_ROWS, OFF_LINE, NOT_FINITE = range(4)
 
@@ -57,14 +45,16 @@ def _record(
     dt, s, two_b = scheme.step, scheme.s, 2.0 * scheme.beta2
     for c in range(contacts.kind.shape[0]):
         base = contacts.base[c]
-        width = 2 if contacts.kind[c] == 0 else 10
-        slip = gap = 0.0
+        width = 2 if contacts.kind[c] == 0 else ROWS
+        slip, gap = 0.0, contacts.gap[c] if contacts.kind[c] == 0 else 0.0
         for a in range(width):
             slip += scratch.slide[c, a] * (state.rate[base + a] + two_b * scratch.moved[base + a]) / s
             gap += scratch.shape[c, a] * scratch.displacement[base + a]
+            if contacts.kind[c] != 0:
+                gap += scratch.shape[c, a] * reference(c, a, contacts, state)
         row = record.contacts[at, c]
         row[REC_NORMAL], row[REC_TANGENTIAL], row[REC_SLIP] = state.normal[c], state.tangential[c], slip
-        row[REC_GAP] = contacts.gap[c] + gap
+        row[REC_GAP] = gap
         row[REC_STATUS] = state.status[c]
         row[REC_POSITION] = state.segment[c] + state.xi[c]
     motions = forcing.increments.shape[1]
@@ -103,9 +93,7 @@ def _leaves_segment(contacts: ContactArrays, state: LoopState) -> bool:  # pragm
     for c in range(contacts.kind.shape[0]):
         if contacts.kind[c] != 0:
             count = contacts.nodes_at[c + 1] - contacts.nodes_at[c]
-            if state.xi[c] < -1e-12 and state.segment[c] > 0:
-                return True
-            if state.xi[c] > 1.0 + 1e-12 and state.segment[c] < count - 2:
+            if leaves(state.segment[c], state.xi[c], count - 1):
                 return True
     return False
 
@@ -138,9 +126,9 @@ def run_modal(
     loads_at: first row that carries no contact force.
     """
     # The caller keeps every array alive; borrowed ones cost no counting in the functions below.
-    modal, rows, contacts = lent_modal(modal), lent_modal_rows(rows), lent_contacts(contacts)
-    forcing, fields, state = lent_forcing(forcing), lent_fields(fields), lent_state(state)
-    scratch, record, compliance = lent_scratch(scratch), lent_record(record), borrow(compliance)
+    modal, rows, contacts, forcing = borrow(modal), borrow(rows), borrow(contacts), borrow(forcing)
+    fields, state, scratch, record = borrow(fields), borrow(state), borrow(scratch), borrow(record)
+    compliance = borrow(compliance)
     for k in range(steps):
         off = contact_stage(k, contacts, scheme, forcing, compliance, state, scratch)
         if off >= 0:
@@ -170,62 +158,6 @@ def run_modal(
         if forces_of(k + 1, scheme, forcing, state, fields.coefficients):
             modal_constant(modal, rows, fields, loads_at)
         lost = modal_pass(modal, scheme, rows, state.force, fields, state.predicted)
-        state.works[DAMPING] += lost * scheme.step
-        state.counters[0] += 1
-        if _leaves_segment(contacts, state):
-            return k + 1, NEW_ROWS
-    return steps, DONE
-
-
-@njit(cache=True, fastmath=CAREFUL)
-def run_nodal(
-    steps: int,
-    nodal: NodalArrays,
-    rows: NodalRows,
-    contacts: ContactArrays,
-    scheme: Scheme,
-    forcing: Forcing,
-    compliance: Array,
-    fields: Fields,
-    state: LoopState,
-    scratch: Scratch,
-    record: Record,
-    loads_at: int,
-) -> tuple[int, int]:  # pragma: no cover - compiled
-    """The same on freedoms, for any damping and any mass."""
-    # The caller keeps every array alive; borrowed ones cost no counting in the functions below.
-    nodal, rows, contacts = lent_nodal(nodal), lent_nodal_rows(rows), lent_contacts(contacts)
-    forcing, fields, state = lent_forcing(forcing), lent_fields(fields), lent_state(state)
-    scratch, record, compliance = lent_scratch(scratch), lent_record(record), borrow(compliance)
-    for k in range(steps):
-        off = contact_stage(k, contacts, scheme, forcing, compliance, state, scratch)
-        if off >= 0:
-            state.counters[3] = off
-            return k, OFF_LINE
-        if state.counters[0] % record.every == 0:
-            if not _all_finite(state):
-                return k, NOT_FINITE
-            kinetic, elastic = nodal_energies(nodal, scheme, fields.u, fields.q, fields.buffer)
-            complete_nodal(rows, state.force, fields)
-            _record(
-                kinetic,
-                elastic,
-                k,
-                contacts,
-                scheme,
-                forcing,
-                fields,
-                fields.buffer,
-                state,
-                scratch,
-                record,
-                loads_at,
-            )
-        accumulate(k, contacts, scheme, forcing, state, scratch, loads_at)
-        advance_rows(k, scheme, forcing, state, scratch)
-        if forces_of(k + 1, scheme, forcing, state, fields.coefficients):
-            nodal_constant(nodal, rows, fields)
-        lost = nodal_pass(nodal, scheme, rows, state.force, fields, state.predicted)
         state.works[DAMPING] += lost * scheme.step
         state.counters[0] += 1
         if _leaves_segment(contacts, state):

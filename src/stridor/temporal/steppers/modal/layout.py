@@ -28,16 +28,6 @@ class ModalRows(NamedTuple):
     at: IntArray
 
 
-class NodalRows(NamedTuple):
-    """Active rows on freedoms as CSR (a rows), and the answers (n, f) of the structure to force rows."""
-
-    ptr: IntArray
-    col: IntArray
-    val: Array
-    answers: Array
-    auxiliary: Array  # (aux, n) dense rows that carry loads and supports
-
-
 class Record(NamedTuple):
     """Decimated output: contacts (r, m, 6), watch (r, w, 3) of u, v, a, energies (r, 7), kept (1,) how many."""
 

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.linalg as spl
 
 from ....kernels import denormals_flushed
 from ....system import System
@@ -17,63 +14,44 @@ from ...aligned import aligned, aligned_zeros
 from ...beta2 import Scheme
 from ...columns import FIRST_OPEN, FIRST_STICK, STATISTICS, WORKS
 from ...schedule import Schedule
-from .kernel import run_modal, run_nodal
-from .layout import Fields, ModalRows, NodalRows, Record
-from .operators import (
-    FINITE,
-    POINTS_PER_FINITE_CONTACT,
-    ModalArrays,
-    NodalArrays,
-    RowTable,
-    nodal_arrays,
-    row_table,
-)
+from ..curve import ROWS, foot, nodes_of
+from .kernel import run_modal
+from .layout import Fields, ModalRows, Record
+from .operators import FINITE, ModalArrays, RowTable, row_table
 from .stage import Forcing, LoopState, Scratch
 from .vectors import LANES
-
-MODAL_LIMIT = 3000
 
 
 @dataclass
 class Machine:
-    """A system made ready to march: rows, path arrays, state. Built by ``modal_machine`` or
-    ``nodal_machine``; ``repack`` is called when a finite-sliding contact enters another segment."""
+    """A system made ready to march: rows, modes, state. Built by ``modal_machine``; ``repack`` is called when a
+    finite-sliding contact enters another segment."""
 
     system: System
     scheme: Scheme
     table: RowTable
-    modal: ModalArrays | None
-    nodal: NodalArrays | None
-    order: IntArray  # where in the path's arrays each mode lies, or which freedom each entry is
+    modal: ModalArrays
+    order: IntArray  # where in the loop's arrays each mode lies
     table_values: Array  # rows of the table in the path's coordinates, a zero row at the end
     state: LoopState
     fields: Fields
     scratch: Scratch
-    rows: ModalRows | NodalRows | None = None
+    rows: ModalRows | None = None
     compliance: Array | None = None
     lift: Array | None = None
-
-    @property
-    def path(self) -> str:
-        """Which path it takes: modal or nodal."""
-        return "modal" if self.modal is not None else "nodal"
 
     @property
     def contacts(self) -> int:
         """Number of contacts."""
         return len(self.system.contacts)
 
-    def coordinates(self, vector: Array, modes: UncoupledModes | None) -> Array:
-        """A vector of freedoms (n,) in the path's coordinates."""
-        if modes is None:
-            return vector[self.order]
+    def coordinates(self, vector: Array, modes: UncoupledModes) -> Array:
+        """A vector of freedoms (n,) in modes."""
         weighted = self.system.mass @ vector
         return self.laid_out(np.concatenate([b.vectors.T @ weighted[b.freedoms] for b in modes.real]))
 
     def laid_out(self, values: Array) -> Array:
-        """Rows or vectors (…, n) on freedoms or modes, in the order and padding of the loop."""
-        if self.nodal is not None:
-            return values[..., self.order]
+        """Rows or vectors (…, n) on modes, in the order and padding of the loop."""
         out = np.zeros((*values.shape[:-1], self.table_values.shape[1]))
         out[..., self.order] = values
         return out
@@ -88,10 +66,8 @@ class Machine:
             active += [first, first + 1]
             if contacts.kind[c] == FINITE:
                 count = int(contacts.nodes_at[c + 1] - contacts.nodes_at[c])
-                for k in range(POINTS_PER_FINITE_CONTACT - 1):
-                    node = int(self.state.segment[c]) - 1 + k
-                    inside = 0 <= node < count
-                    active += [first + 2 + 2 * node + d if inside else zero for d in range(2)]
+                for node in nodes_of(int(self.state.segment[c]), count):
+                    active += [first + 2 + 2 * int(node) + d if node >= 0 else zero for d in range(2)]
         auxiliary = zero - table.auxiliary
         active += list(range(auxiliary, zero))
         chosen = np.array(active, dtype=np.int64)
@@ -99,30 +75,8 @@ class Machine:
         self.lift = np.vstack([self.table.lift, np.zeros((1, table.motions))])[np.append(chosen, zero)]
         values = np.ascontiguousarray(self.table_values[np.append(chosen, zero)])
         force_rows = values[: table.force_rows]
-        if self.modal is not None:
-            self.rows = _modal_rows(values, self.modal)
-            self.compliance = np.ascontiguousarray(values[:-1] @ (self.modal.drive[:, None] * force_rows.T))
-        else:
-            assert self.nodal is not None
-            gain = self.nodal.load_gain
-            answers = np.zeros((values.shape[1], table.force_rows))
-            if table.force_rows:
-                answers[:] = gain * self._effective().solve(np.ascontiguousarray(force_rows.T))
-            sparse = sp.csr_array(values[:-1])
-            self.rows = NodalRows(
-                sparse.indptr.astype(np.int64),
-                sparse.indices.astype(np.int64),
-                sparse.data,
-                answers,
-                values[table.force_rows : -1],
-            )
-            self.compliance = np.ascontiguousarray(values[:-1] @ answers)
-
-    def _effective(self) -> Any:
-        order = self.order
-        system, scheme = self.system, self.scheme
-        effective = sp.csr_array(system.mass + scheme.beta2 * scheme.step * system.damping)
-        return spl.splu(sp.csc_array(effective[order][:, order]))
+        self.rows = _modal_rows(values, self.modal)
+        self.compliance = np.ascontiguousarray(values[:-1] @ (self.modal.drive[:, None] * force_rows.T))
 
     def predict(self) -> None:
         """Rows, their rates and their prediction from u, q and d as they are (start, or new rows)."""
@@ -139,19 +93,8 @@ class Machine:
         fields.coefficients[:] = coefficients
         auxiliary = self.table_values[-1 - self.table.auxiliary : -1]
         push = auxiliary.T @ coefficients
-        if self.modal is not None:
-            fields.constant[:] = self.modal.drive * push
-            fields.d[:] = self.modal.forward * fields.q - self.modal.restore * fields.u + fields.constant
-            return
-        assert self.nodal is not None
-        order, gain = self.order, self.nodal.load_gain
-        system, scheme = self.system, self.scheme
-        fields.constant[:] = gain * push
-        inverse = np.argsort(order)
-        u, q = fields.u[inverse], fields.q[inverse]
-        dt = scheme.step
-        right = dt * (system.mass @ q) - dt**2 / 2 * (system.damping @ q) - gain * (system.stiffness @ u)
-        fields.d[:] = self._effective().solve(right[order] + fields.constant)
+        fields.constant[:] = self.modal.drive * push
+        fields.d[:] = self.modal.forward * fields.q - self.modal.restore * fields.u + fields.constant
 
     def run(self, steps: int, schedule: Schedule, record: Record) -> tuple[int, int]:
         """March up to ``steps`` steps; what was done and why it ended (kernel codes)."""
@@ -159,6 +102,7 @@ class Machine:
         motion = self.system.motion
         assert self.lift is not None
         assert self.compliance is not None
+        assert self.rows is not None
         forcing = Forcing(
             schedule.load_factors(first, steps + 1),
             schedule.motion_increments(first, steps + 1),
@@ -167,12 +111,9 @@ class Machine:
             motion.stiffness_own,
             self.lift,
         )
-        arrays: Any = self.modal if self.modal is not None else self.nodal
-        rows: Any = self.rows
-        loop: Any = run_modal if self.modal is not None else run_nodal
         with denormals_flushed():
-            return loop(
-                steps, arrays, rows, self.table.contacts, self.scheme, forcing, self.compliance, self.fields,
+            return run_modal(
+                steps, self.modal, self.rows, self.table.contacts, self.scheme, forcing, self.compliance, self.fields,
                 self.state, self.scratch, record, self.table.force_rows,
             )  # fmt: skip
 
@@ -222,24 +163,11 @@ def modal_machine(system: System, scheme: Scheme, modes: UncoupledModes) -> Mach
         stiffness=padded(w2),
         blocks=blocks,
     )
-    return _machine(system, scheme, table, padded(real), modal=(arrays, index))
-
-
-def nodal_machine(system: System, scheme: Scheme) -> Machine:
-    """The scheme on the freedoms themselves, for any damping and any mass."""
-    table = row_table(system)
-    arrays, order = nodal_arrays(system, scheme)
-    return _machine(system, scheme, table, table.free.toarray()[:, order], nodal=(arrays, order))
+    return _machine(system, scheme, table, padded(real), arrays, index)
 
 
 def _machine(
-    system: System,
-    scheme: Scheme,
-    table: RowTable,
-    values: Array,
-    *,
-    modal: tuple[ModalArrays, IntArray] | None = None,
-    nodal: tuple[NodalArrays, IntArray] | None = None,
+    system: System, scheme: Scheme, table: RowTable, values: Array, arrays: ModalArrays, index: IntArray
 ) -> Machine:
     m, size = len(system.contacts), values.shape[1]
     active = table.force_rows + table.auxiliary
@@ -272,27 +200,12 @@ def _machine(
     scratch = Scratch(
         displacement=np.zeros(active + 1),
         moved=np.zeros(active + 1),
-        shape=np.zeros((m, 2 * POINTS_PER_FINITE_CONTACT)),
-        slide=np.zeros((m, 2 * POINTS_PER_FINITE_CONTACT)),
-        weights=np.zeros(4),
-        slopes=np.zeros(4),
-        nodes=np.zeros((4, 2)),
+        shape=np.zeros((m, ROWS)),
+        slide=np.zeros((m, ROWS)),
+        foot=foot(),
         delta=np.zeros(m),
         earlier=np.zeros(m),
         buffer=np.zeros(1),
     )
     padded = np.ascontiguousarray(np.vstack([values, np.zeros((1, size))]))
-    chosen = modal or nodal
-    assert chosen is not None
-    return Machine(
-        system,
-        scheme,
-        table,
-        modal[0] if modal else None,
-        nodal[0] if nodal else None,
-        chosen[1],
-        padded,
-        state,
-        fields,
-        scratch,
-    )
+    return Machine(system, scheme, table, arrays, index, padded, state, fields, scratch)

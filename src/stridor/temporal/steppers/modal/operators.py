@@ -1,4 +1,4 @@
-"""What the time loop works on: assembled operators as plain arrays, nodal or in a complete modal basis.
+"""What the time loop works on: assembled operators as plain arrays, in a complete modal basis.
 
 Rows are scalar observations r·u of the structure: relative motions of small-sliding contacts,
 positions of finite-sliding ones, load directions, couplings of moving supports. Contact forces act
@@ -11,18 +11,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ....contact.interface import Contact
-from ....errors import AnalysisError
 from ....laws.friction import friction_rows
 from ....system import System
 from ....typing import Array, IntArray, Sparse
-from ...beta2 import Scheme
+from ..curve import ROWS
 
 SMALL, FINITE = 0, 1
-POINTS_PER_FINITE_CONTACT = 5  # the slave and four master nodes
 
 
 class ContactArrays(NamedTuple):
@@ -52,22 +49,6 @@ class ModalArrays(NamedTuple):
     damping: Array
     stiffness: Array
     blocks: IntArray  # (b + 1,) mode ranges of uncoupled components
-
-
-class NodalArrays(NamedTuple):
-    """The scheme on freedoms: CSR of Δt²s/2 K, of Δt M − Δt²/2 C and of C; factor of M + β2ΔtC."""
-
-    k_ptr: IntArray
-    k_col: IntArray
-    k_val: Array
-    m_ptr: IntArray
-    m_col: IntArray
-    m_val: Array
-    c_ptr: IntArray
-    c_col: IntArray
-    c_val: Array
-    factor: Array  # (bandwidth + 1, n) lower LDLᵀ band: diagonal D, unit lower columns below it
-    load_gain: float  # Δt² s/2
 
 
 @dataclass(frozen=True)
@@ -103,7 +84,7 @@ def row_table(system: System) -> RowTable:
         free += blocks
         lift += lifts
         rows += sum(block.shape[0] for block in blocks)
-        active += 2 if contact.sliding == "small" else 2 * POINTS_PER_FINITE_CONTACT
+        active += 2 if contact.sliding == "small" else ROWS
         nodes.append(contact.master_positions)
         chords.append(np.append(contact.chords, 0.0))
         offsets.append(offsets[-1] + len(contact.master_positions))
@@ -146,43 +127,3 @@ def _contact_rows(contact: Contact) -> tuple[list[Sparse], list[Array]]:
         rows = sp.csr_array(np.array([contact.normal_row, contact.tangent_row]))
         return [rows], [np.array([contact.normal_lift, contact.tangent_lift])]
     return [contact.slave.free, contact.master.free], [contact.slave.lift, contact.master.lift]
-
-
-def nodal_arrays(system: System, scheme: Scheme) -> tuple[NodalArrays, IntArray]:
-    """Arrays of the nodal path and the order (n,) of freedoms that keeps its band narrow."""
-    effective = sp.csr_array(system.mass + scheme.beta2 * scheme.step * system.damping)
-    effective.eliminate_zeros()
-    order = np.asarray(sp.csgraph.reverse_cuthill_mckee(sp.csr_matrix(effective), symmetric_mode=True), dtype=np.int64)
-    gain = scheme.step**2 * scheme.s / 2
-
-    def permuted(matrix: Sparse) -> Sparse:
-        out = sp.csr_array(sp.csr_array(matrix)[order][:, order])
-        out.sort_indices()
-        return out
-
-    stiffness = permuted(gain * system.stiffness)
-    inertia = permuted(scheme.step * system.mass - scheme.step**2 / 2 * system.damping)
-    damping = permuted(system.damping)
-    k, m, c = (
-        (a.indptr.astype(np.int64), a.indices.astype(np.int64), a.data.astype(float))
-        for a in (stiffness, inertia, damping)
-    )
-    return NodalArrays(*k, *m, *c, factor=_band_factor(permuted(effective)), load_gain=gain), order
-
-
-def _band_factor(matrix: Sparse) -> Array:
-    """LDLᵀ of a symmetric positive definite band: row 0 is 1/D, row k the k-th subdiagonal of L."""
-    coo = sp.coo_array(matrix)
-    width = int(np.max(np.abs(coo.row - coo.col), initial=0))
-    n = matrix.shape[0]
-    band = np.zeros((width + 1, n))
-    lower = coo.row >= coo.col
-    band[(coo.row - coo.col)[lower], coo.col[lower]] = coo.data[lower]
-    try:
-        factor = sl.cholesky_banded(band, lower=True)
-    except sl.LinAlgError as error:
-        raise AnalysisError("the mass matrix is not positive definite: a freedom has stiffness but no mass") from error
-    diagonal = factor[0].copy()
-    factor = factor / diagonal
-    factor[0] = 1.0 / diagonal**2
-    return np.ascontiguousarray(factor)

@@ -10,10 +10,9 @@ so that it neither damps nor limits the step (docs/theory-temporal.md).
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
-from ....contact import multipliers, surface
+from ....contact import multipliers
 from ....kernels import njit
 from ....typing import Array, IntArray
 from ...beta2 import Scheme
@@ -32,6 +31,7 @@ from ...columns import (
     STICK_STEPS,
     SUPPORT,
 )
+from ..curve import Foot, project_in, turn
 from .operators import FINITE, ContactArrays
 
 _STICK, _SLIP = multipliers.STICK, multipliers.SLIP
@@ -39,7 +39,6 @@ _FINITE = FINITE
 
 _solve_contact = njit(cache=True)(multipliers.solve_contact)
 _solve_kept = njit(cache=True)(multipliers.solve_kept)
-_spline_weights = njit(cache=True)(surface.spline_weights)
 
 SWEEP_LIMIT = 500
 SWEEP_TOLERANCE = 1e-12
@@ -77,9 +76,7 @@ class Scratch(NamedTuple):
     moved: Array  # d/Δt of rows
     shape: Array  # (m, 10) row weights of the normal
     slide: Array  # (m, 10) row weights of the tangent
-    weights: Array
-    slopes: Array
-    nodes: Array
+    foot: Foot
     delta: Array
     earlier: Array  # (m,) gap at t_{n−1} of compliant contacts
     buffer: Array
@@ -110,64 +107,18 @@ def _local_weights(
     start, stop = contacts.nodes_at[c], contacts.nodes_at[c + 1]
     count = stop - start
     segment = state.segment[c]
-    nodes = scratch.nodes
     # Current positions of the four nodes that the loop carries, around the last segment; the others
     # stay at their reference and are not reached before the active rows follow.
     for k in range(4):
         node = segment - 1 + k
         if 0 <= node < count:
             for d in range(2):
-                nodes[k, d] = contacts.nodes[start + node, d] + scratch.displacement[base + 2 + 2 * k + d]
+                scratch.foot.nodes[k, d] = contacts.nodes[start + node, d] + scratch.displacement[base + 2 + 2 * k + d]
     x = contacts.slave[c, 0] + scratch.displacement[base]
     y = contacts.slave[c, 1] + scratch.displacement[base + 1]
-    xi, on_line = _project_in(segment, count, x, y, state.xi[c], contacts, start, scratch)
-    state.xi[c] = xi
-    sx = sy = 0.0
-    for k in range(4):
-        if scratch.slopes[k] != 0.0:
-            sx += scratch.slopes[k] * nodes[k, 0]
-            sy += scratch.slopes[k] * nodes[k, 1]
-    length = math.sqrt(sx * sx + sy * sy) * contacts.side[c]
-    tx, ty = sx / length, sy / length
-    scratch.slide[c, 0], scratch.slide[c, 1] = tx, ty
-    scratch.shape[c, 0], scratch.shape[c, 1] = -ty, tx
-    for k in range(4):
-        w = scratch.weights[k]
-        scratch.slide[c, 2 + 2 * k], scratch.slide[c, 3 + 2 * k] = -w * tx, -w * ty
-        scratch.shape[c, 2 + 2 * k], scratch.shape[c, 3 + 2 * k] = w * ty, -w * tx
+    state.xi[c], on_line = project_in(segment, x, y, state.xi[c], contacts.chords[start : stop - 1], scratch.foot)
+    turn(contacts.side[c], scratch.foot, scratch.shape[c], scratch.slide[c])
     return 10, on_line
-
-
-@njit(cache=True, inline="always")
-def _project_in(
-    segment: int,
-    count: int,
-    x: float,
-    y: float,
-    xi: float,
-    contacts: ContactArrays,
-    start: int,
-    scratch: Scratch,
-) -> tuple[float, bool]:  # pragma: no cover - compiled
-    """Nearest point within one segment; xi may pass 0 or 1, the rows follow at the next step."""
-    chords = contacts.chords[start : start + count - 1]
-    nodes, weights, slopes = scratch.nodes, scratch.weights, scratch.slopes
-    for _ in range(surface.MAX_PROJECTION_STEPS):
-        _spline_weights(segment, xi, chords, weights, slopes)
-        px = py = sx = sy = 0.0
-        for k in range(4):
-            if weights[k] != 0.0 or slopes[k] != 0.0:
-                px += weights[k] * nodes[k, 0]
-                py += weights[k] * nodes[k, 1]
-                sx += slopes[k] * nodes[k, 0]
-                sy += slopes[k] * nodes[k, 1]
-        step = ((x - px) * sx + (y - py) * sy) / (sx * sx + sy * sy)
-        xi = min(max(xi + step, -0.5), 1.5)
-        if abs(step) < 1e-13:
-            break
-    on_line = not ((segment == 0 and xi < -1e-9) or (segment == count - 2 and xi > 1.0 + 1e-9))
-    _spline_weights(segment, xi, chords, weights, slopes)
-    return xi, on_line
 
 
 @njit(cache=True, inline="always")
@@ -231,7 +182,7 @@ def _solve_all(
 
 
 @njit(cache=True, inline="always")
-def _reference(c: int, a: int, contacts: ContactArrays, state: LoopState) -> float:  # pragma: no cover - compiled
+def reference(c: int, a: int, contacts: ContactArrays, state: LoopState) -> float:  # pragma: no cover - compiled
     """Coordinate [m] of row a of a finite-sliding contact in the reference configuration."""
     if a < 2:
         return contacts.slave[c, a]
@@ -253,7 +204,7 @@ def _gap_before(
     gap = 0.0
     for a in range(10):
         before = state.value[base + a] - scheme.step * state.rate[base + a]
-        gap += scratch.shape[c, a] * (_reference(c, a, contacts, state) + before)
+        gap += scratch.shape[c, a] * (reference(c, a, contacts, state) + before)
     return gap
 
 
@@ -274,7 +225,7 @@ def _local_problem(
         return gap, slip, compliance[base, base], compliance[base, base + 1], compliance[base + 1, base + 1]
     gap = slip = 0.0
     for a in range(width):
-        gap += scratch.shape[c, a] * (_reference(c, a, contacts, state) + scratch.displacement[base + a])
+        gap += scratch.shape[c, a] * (reference(c, a, contacts, state) + scratch.displacement[base + a])
         slip += scratch.slide[c, a] * (scratch.displacement[base + a] - state.value[base + a])
     w_nn = w_nt = w_tt = 0.0
     for a in range(width):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.linalg as spl
 
 from ....errors import CaseError
 from ....sliding import steady_sliding
@@ -14,12 +12,13 @@ from ....typing import Array
 from ...schedule import Schedule
 from ...settings import Settings
 from ...stepper import Disturbance
+from ..starting import impulse, motion_of_bodies
 from .machine import Machine
 
 
 def initial_state(
     machine: Machine,
-    modes: UncoupledModes | None,
+    modes: UncoupledModes,
     schedule: Schedule,
     settings: Settings,
     disturbance: Disturbance | None = None,
@@ -43,7 +42,7 @@ def initial_state(
         state.status[:] = np.where(steady.active, 2, 0)
         if stretch.ramp_steps:
             raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
-    own = _motion_of_bodies(system, schedule) if settings.initial == "rest" else None
+    own = motion_of_bodies(system, schedule) if settings.initial == "rest" else None
     for added in (own, disturbance):
         if added is None:
             continue
@@ -57,25 +56,9 @@ def initial_state(
     machine.predict()
 
 
-def _motion_of_bodies(system: System, schedule: Schedule) -> Disturbance | None:
-    """Displacement, velocity and acceleration (n,) that bodies start with, None where all are at rest."""
-    if system.initial_displacement is None and system.initial_velocity is None:
-        return None
-    zero, stretch = np.zeros(system.size), schedule.stretches[0]
-    displacement = zero if system.initial_displacement is None else system.initial_displacement
-    velocity = zero if system.initial_velocity is None else system.initial_velocity
-    force = -(system.stiffness @ displacement) - system.damping @ velocity
-    if stretch.ramp_steps == 0:
-        for factor, vector in zip(stretch.loads_after, system.loads.values(), strict=True):
-            force = force + factor * vector
-    mass, diagonal = system.mass, system.mass.diagonal()
-    # The scheme starts from the acceleration that the forces give; a consistent mass only delays it by half a step.
-    return displacement, velocity, force / diagonal if mass.nnz == np.count_nonzero(diagonal) else zero
-
-
 def _slip_impulse(system: System, tangent_row: Array) -> Array:
     """Velocity (n,) that an impulse along a contact's tangent gives, one unit of slip speed."""
-    answer = spl.splu(sp.csc_array(system.mass)).solve(tangent_row)
+    answer = impulse(system, tangent_row)
     return answer / float(tangent_row @ answer)
 
 

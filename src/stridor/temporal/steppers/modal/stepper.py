@@ -1,10 +1,8 @@
-"""The stepper of point contacts on beams, in modes or on freedoms."""
+"""The stepper of point contacts on structures in their complete basis of modes."""
 
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.linalg as spl
 
 from ....errors import AnalysisError, CaseError
 from ....sliding import slip_speeds
@@ -21,9 +19,10 @@ from ...settings import Settings, choose_step, not_finite
 from ...sketch import BODIES, differing, sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
+from ..curve import check_stiffness, follow, left_the_line
 from .kernel import NEW_ROWS, NOT_FINITE, OFF_LINE
 from .layout import Record
-from .machine import MODAL_LIMIT, Machine, modal_machine, nodal_machine
+from .machine import Machine, modal_machine
 from .operators import FINITE
 from .start import coefficients, initial_state
 
@@ -31,36 +30,20 @@ STATE_FIELDS = ("u", "q", "d", "constant", "coefficients")
 PREDICTED = ("predicted", "value", "rate")
 
 
-def modal_stepper(system: System, settings: Settings, mu: float | None) -> ModalStepper:
-    """A system of point contacts made ready; mu scales every contact's friction law at its slip speed.
+def modal_stepper(
+    system: System, settings: Settings, mu: float | None, modes: UncoupledModes, reason: str
+) -> ModalStepper:
+    """A system of point contacts made ready; mu scales every contact's friction law at its slip speed. modes are those
+    of `choose_path`, reason is why.
 
-    Raises CaseError for a step beyond the limit, a path that does not take the system, and contact springs that the
-    step cannot follow.
+    Raises CaseError for a step beyond the limit and contact springs that the step cannot follow.
     """
     if mu is not None:
         system = system.with_friction(mu, np.abs(slip_speeds(system, system.motion.full)))
     limit = step_limit(system, settings.beta2)
     numbers = scheme(choose_step(limit, settings), settings.beta2)
-    _check_stiffness(system, numbers.step)
-    modes, reason = choose_path(system, settings)
-    machine = modal_machine(system, numbers, modes) if modes else nodal_machine(system, numbers)
-    return ModalStepper(machine, modes, limit, reason)
-
-
-def _check_stiffness(system: System, step: float) -> None:
-    """Refuse springs of contacts that slide finitely and swing faster than the step can follow: what the turning of
-    their normals stirs up would ring on for ever, with forces beyond all measure."""
-    for contact in system.contacts:
-        if contact.sliding == "small" or contact.compliance == 0.0:
-            continue
-        moved = step**2 * float(contact.normal_row @ spl.splu(sp.csc_array(system.mass)).solve(contact.normal_row))
-        if contact.compliance < moved:
-            raise CaseError(
-                f"contacts.{contact.name}.stiffness",
-                contact.stiffness,
-                f'with sliding = "finite" at most {1.0 / moved:.3g} N/m at a step of {step:.3g} s, which a stiffer '
-                'spring outruns; take it as rigid in time ([temporal] contact = "rigid"), or a smaller step',
-            )
+    check_stiffness(system, numbers.step)
+    return ModalStepper(modal_machine(system, numbers, modes), modes, limit, reason)
 
 
 def refuses(system: System) -> str:
@@ -69,14 +52,9 @@ def refuses(system: System) -> str:
 
 
 def choose_path(system: System, settings: Settings) -> tuple[UncoupledModes | None, str]:
-    """Complete modal basis where it is exact and affordable, else None; and the reason in words."""
+    """Complete modal basis where it is exact, else None; and the reason in words."""
     if settings.path == "nodal":
         return None, "asked for"
-    largest = max(len(part) for part in system.components)
-    if settings.path == "auto" and system.size > MODAL_LIMIT:
-        return None, f"{system.size} freedoms are too many for a complete modal basis"
-    if largest > MODAL_LIMIT:
-        raise CaseError("temporal.path", "modal", f"a body of {largest} freedoms is too large; take nodal")
     modes = uncoupled_modes(system)
     if modes.proportional:
         return modes, "complete modal basis: damping is proportional in every component, the scheme is the same"
@@ -90,12 +68,13 @@ def choose_path(system: System, settings: Settings) -> tuple[UncoupledModes | No
 class ModalStepper:
     """See `temporal.stepper.Stepper`."""
 
+    path = "modal"
     threaded = False
     works = WORK_COLUMNS
 
-    def __init__(self, machine: Machine, modes: UncoupledModes | None, limit: StepLimit, reason: str) -> None:
+    def __init__(self, machine: Machine, modes: UncoupledModes, limit: StepLimit, reason: str) -> None:
         self.machine, self.modes, self.limit, self.reason = machine, modes, limit, reason
-        self.scheme, self.path = machine.scheme, machine.path
+        self.scheme = machine.scheme
         contacts = machine.system.contacts
         self.contact_names, self.closed = tuple(c.name for c in contacts), tuple(c.closed for c in contacts)
         self.parts = sketch(machine.system, machine.system.contact_nodes())
@@ -162,7 +141,7 @@ class ModalStepper:
     def check(self, restart: Trajectory) -> None:
         """Raise CaseError for a state in the modes of other bodies: padded, they can have the same shape."""
         others = [part for part in differing(self.parts, restart.state["model"]) or () if part.name in BODIES]
-        if others and self.path == "modal":
+        if others:
             raise CaseError(
                 "restart",
                 " and ".join(part.name for part in others),
@@ -192,14 +171,13 @@ class ModalStepper:
         rows = [machine.system.points[name].free[:2].toarray() for name in settings.watch]
         lift = [machine.system.points[name].lift[:2] for name in settings.watch]
         free = np.vstack([np.zeros((0, machine.system.size)), *rows])
-        inner = free if self.modes is None else self.modes.project(free)[0]
         self.record = Record(
             every=every,
             contacts=np.zeros((count, machine.contacts, CONTACT_RECORD)),
             watch=np.zeros((count, len(free), 3)),
             energies=np.zeros((count, ENERGY_RECORD)),
             kept=np.zeros(1, dtype=np.int64),
-            watch_rows=np.ascontiguousarray(machine.laid_out(inner)),
+            watch_rows=np.ascontiguousarray(machine.laid_out(self.modes.project(free)[0])),
             watch_lift=np.vstack([np.zeros((0, machine.table.motions)), *lift]),
         )
         machine.run(0, schedule, self.record)
@@ -213,10 +191,7 @@ class ModalStepper:
         at = self.done * self.scheme.step
         if code == OFF_LINE:
             contact = machine.system.contacts[int(machine.state.counters[3])]
-            raise AnalysisError(
-                f"contact {contact.name}: the slave point left the master line over an end at t = {at:.6g} s "
-                f"(phase {phase}); shorten the phase, slow the support down or lengthen the master"
-            )
+            raise AnalysisError(left_the_line(contact.name, at, phase))
         # Between records, or where no row sees it.
         finite = np.isfinite(machine.fields.u).all() and np.isfinite(machine.fields.q).all()
         if code == NOT_FINITE or not finite:
@@ -225,9 +200,6 @@ class ModalStepper:
     def velocity(self) -> Array:
         """Velocity (n,) of the freedoms, β2 of a step before the present."""
         machine, out = self.machine, np.zeros(self.system.size)
-        if self.modes is None:
-            out[machine.order] = machine.fields.q
-            return out
         q, first = machine.fields.q[machine.order], 0
         for block in self.modes.real:
             count = block.vectors.shape[1]
@@ -243,13 +215,7 @@ def _follow_segments(machine: Machine) -> None:
         if contacts.kind[c] == 0:
             continue
         start = int(contacts.nodes_at[c])
-        count = int(contacts.nodes_at[c + 1]) - start
-        segment, xi = int(state.segment[c]), float(state.xi[c])
-        if xi < 0.0 and segment > 0:
-            state.segment[c] = segment - 1
-            state.xi[c] = 1.0 + xi * contacts.chords[start + segment] / contacts.chords[start + segment - 1]
-        elif xi > 1.0 and segment < count - 2:
-            state.segment[c] = segment + 1
-            state.xi[c] = (xi - 1.0) * contacts.chords[start + segment] / contacts.chords[start + segment + 1]
+        chords = contacts.chords[start : int(contacts.nodes_at[c + 1]) - 1]
+        state.segment[c], state.xi[c] = follow(int(state.segment[c]), float(state.xi[c]), chords)
     machine.repack()
     machine.predict()

@@ -36,6 +36,11 @@ class SplitDamping:
         return self.rest.nnz > 0
 
 
+def no_damping(size: int) -> SplitDamping:
+    """Where nothing of it is left to split."""
+    return SplitDamping(np.zeros(size), np.zeros(size), sp.csr_array((size, size)))
+
+
 def split_damping(system: System) -> SplitDamping:
     """Split the damping matrix of a system, each uncoupled part of it by its own factor; of unsymmetric matrices the
     symmetric parts."""

@@ -8,7 +8,8 @@ In terms of q alone (docs/theory-temporal.md, a and b) the scheme reads
     (M + β2 Δt C_d) a_n = f_n − K u_n − C_r q_n + Gᵀp_n − C_d q_n,       q_{n+1} = q_n + Δt a_n,
     v_n = (1 − β2) q_n + β2 q_{n+1},       u_{n+1} = u_n + Δt [(1/2 + β2) q_{n+1} − (β2 − 1/2) q_n],
 
-where C_d is the diagonal part of the damping and C_r the rest, which acts on q_n, the velocity β2 Δt before t_n. Skew
+where C_d is the diagonal part of the damping and C_r the rest, which acts on q_n, the velocity β2 Δt before t_n. Where
+M + β2 Δt C is solved with as it is, C_d is all of C (`step_matrix`). Skew
 parts of imported matrices act beside them (`unsymmetric`).
 
 Works of the structure: with y_n = K u_n + C_r q_n the power v·y holds the change of the elastic energy and what C_r
@@ -21,6 +22,8 @@ from __future__ import annotations
 from ....kernels import njit
 from ....typing import Array
 from ...columns import DAMPING, FRICTION, NORMAL
+from ..borrow import borrow
+from .feet import follow_feet
 from .forcing import (
     CIRCULATORY,
     GYROSCOPIC,
@@ -37,12 +40,14 @@ from .node_stage import SWEEP_LIMIT, NodeScratch, NodeState, contact_power, solv
 from .node_table import NodeTable
 from .products import WITH_STIFFNESS, Fields, Structure, advance
 from .recording import Record, begin_record, end_record, statistics
+from .step_matrix import StepMatrix, advance_whole, correct_whole, take_drag
 from .unsymmetric import MOST_PASSES, Unsymmetric, apply_force, converged, keep_before, keep_free, powers
 
 DONE, NOT_FINITE = 0, 1
 
 
-@njit(cache=True)
+# The functions of the contacts are inlined: handing a hundred arrays on costs more than a few contacts do.
+@njit(cache=True, inline="always")
 def _correct(
     a: Structure, f: Fields, table: NodeTable, nodes: NodeState, work: NodeScratch
 ) -> float:  # pragma: no cover - compiled
@@ -66,20 +71,24 @@ def _correct(
     return extra
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _contacts_of_step(
-    increments: Array, a: Structure, f: Fields, table: NodeTable, nodes: NodeState, work: NodeScratch, state: LoopState,
-    w: StepWork,
+    increments: Array, a: Structure, f: Fields, b: StepMatrix, table: NodeTable, nodes: NodeState, work: NodeScratch,
+    state: LoopState, w: StepWork,
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Forces at t_n into the motion to t_{n+1}: powers of normal and tangential forces, and what they add to that of
     the structure."""
     count = _solve_contacts(increments, a, f, table, nodes, work, state, w)
-    extra = _correct(a, f, table, nodes, work) if count else 0.0
+    extra = 0.0
+    if count and b.before.shape[0]:
+        correct_whole(count, a, f, table, nodes, work)
+    elif count:
+        extra = _correct(a, f, table, nodes, work)
     normal, friction = _after_contacts(count, increments, a, table, nodes, work, state, w)
     return normal, friction, extra
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _solve_contacts(
     increments: Array, a: Structure, f: Fields, table: NodeTable, nodes: NodeState, work: NodeScratch, state: LoopState,
     w: StepWork,
@@ -88,14 +97,14 @@ def _solve_contacts(
     for c in range(table.indices.shape[0]):
         work.u[c], work.q[c] = f.u[table.indices[c]], f.q[table.indices[c]]
     count, sweeps = solve_nodes(
-        a.numbers[0], a.numbers[2:4], w.displacement, increments, table, nodes, work, w.status
+        a.numbers[0], a.numbers[2:4], w.displacement, increments, state.motion[1], table, nodes, work, w.status
     )
     state.counters[MOST_SWEEPS] = max(state.counters[MOST_SWEEPS], min(sweeps, SWEEP_LIMIT))
     state.counters[UNCONVERGED] += sweeps > SWEEP_LIMIT
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _after_contacts(
     count: int, increments: Array, a: Structure, table: NodeTable, nodes: NodeState, work: NodeScratch,
     state: LoopState, w: StepWork,
@@ -150,27 +159,36 @@ def _unsymmetric_step(
 
 @njit(cache=True)
 def run_steps(
-    steps: int, a: Structure, f: Fields, x: Unsymmetric, g: Forcing, table: NodeTable, nodes: NodeState,
+    steps: int, a: Structure, f: Fields, x: Unsymmetric, b: StepMatrix, g: Forcing, table: NodeTable, nodes: NodeState,
     work: NodeScratch, state: LoopState, w: StepWork, record: Record,
 ) -> tuple[int, int]:  # pragma: no cover - compiled
-    """Up to ``steps`` steps; how many were done and why it ended (DONE, NOT_FINITE)."""
-    step = a.numbers[0]
+    """Up to ``steps`` steps; how many were done and why it ended (DONE, NOT_FINITE, NEW_ROWS, OFF_LINE)."""
+    # The caller keeps every array alive; borrowed ones cost no counting in the functions below.
+    a, f, x, b, g = borrow(a), borrow(f), borrow(x), borrow(b), borrow(g)
+    table, nodes = borrow(table), borrow(nodes)
+    work, state, w, record = borrow(work), borrow(state), borrow(w), borrow(record)
+    step, skew, whole = a.numbers[0], x.force.shape[0] > 0, b.before.shape[0] > 0
     for k in range(steps):
         begin_step(k, a, f, g, state, w)
         recording = state.counters[STEPS_DONE] % record.every == 0
-        if recording and not begin_record(a, f, g, state, w, record):
+        if recording and not begin_record(a, f, b, g, state, w, record):
             return k, NOT_FINITE
-        skew = x.force.shape[0] > 0
         if skew:
             keep_before(f, x)
-        taken = advance(a, f, w.power)
-        normal = friction = 0.0
+        taken = normal = friction = 0.0
+        if whole:
+            advance_whole(a, f, b)
+        else:
+            taken = advance(a, f, w.power)
+        code = follow_feet(w.displacement, f.u, table, nodes, work)
         if skew:
             normal, friction, extra = _unsymmetric_step(g.increments[k], a, f, x, table, nodes, work, state, w)
             taken += extra
         elif table.gap.shape[0]:
-            normal, friction, extra = _contacts_of_step(g.increments[k], a, f, table, nodes, work, state, w)
+            normal, friction, extra = _contacts_of_step(g.increments[k], a, f, b, table, nodes, work, state, w)
             taken += extra
+        if whole:
+            taken = take_drag(a, f, b)
         if recording:
             end_record(a, f, table, nodes, work, state, w, record)
         state.works[DAMPING] += taken * step
@@ -185,4 +203,6 @@ def run_steps(
         for p in range(w.after.shape[0]):
             state.motion[0, p], state.motion[1, p] = w.displacement[p], w.after[p]
         state.counters[STEPS_DONE] += 1
+        if code:
+            return k + 1, code
     return steps, DONE

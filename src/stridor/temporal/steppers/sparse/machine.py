@@ -18,22 +18,26 @@ from ...beta2 import Scheme
 from ...columns import FIRST_OPEN, FIRST_STICK, STATISTICS
 from ...inputs import DIAGONAL
 from ...schedule import Schedule
-from .damping import SplitDamping, split_damping
+from ..curve import ROWS, follow, foot
+from .damping import SplitDamping, no_damping, split_damping
 from .forcing import COUNTERS, CUBIC, LOOP_WORKS, SKEW_WORKS, STEPS_DONE, Forcing, LoopState, StepWork
 from .loop import run_steps
 from .node_stage import NodeScratch, NodeState
-from .node_table import NodeTable, node_table
+from .node_table import Answers, NodeTable, node_table
 from .products import DASHPOTS, WITH_STIFFNESS, Fields, Structure, stored_energies
 from .recording import Record
+from .step_matrix import StepMatrix, is_diagonal, no_step_matrix, step_matrix
 from .storage import Layout, lay_out_freedoms, parts, upper_blocks
 from .unsymmetric import Unsymmetric, halves, unsymmetric
 
+FEW_WIDTH = 2  # of blocks in a model that stays in the first cache: whole registers, and none of them padded
 OFFSET_STEPS = 100  # in which the gap that a renewal of the rows made fades
 
 
 @dataclass
 class Machine:
-    """Arrays and state. surfaces follow the sliding; nodes are the contacts as they are paired now."""
+    """Arrays and state. surfaces follow the sliding; nodes are the contacts as they are paired now; answers gives what
+    unit forces along rows move over one step."""
 
     system: System
     scheme: Scheme
@@ -41,6 +45,8 @@ class Machine:
     structure: Structure
     fields: Fields
     unsymmetric: Unsymmetric
+    whole: StepMatrix
+    answers: Answers
     constant: Forcing  # without loads and increments by step
     state: LoopState
     nodes: ContactNodes
@@ -53,11 +59,6 @@ class Machine:
     def done(self) -> int:
         """Steps done."""
         return int(self.state.counters[STEPS_DONE])
-
-    @property
-    def gain(self) -> Array:
-        """Displacement of each entry over one step by a unit force [m/N]."""
-        return self.structure.numbers[2] * self.structure.kick
 
     @property
     def displacement(self) -> Array:
@@ -76,12 +77,22 @@ class Machine:
     def set_nodes(self, nodes: ContactNodes) -> None:
         """Take contact nodes as they are paired now; forces, status and offsets are kept."""
         self.nodes = nodes
-        self.table = node_table(nodes, self.layout, self.gain, self.system.motion.full)
+        self.table = packed_nodes(self.system, nodes, self.layout, (self.whole, self.answers), self.contacts.segment)
         self.scratch = _scratch(self.table)
         self.contacts = self.contacts._replace(q=self.fields.q[self.table.indices])
 
+    def follow_curves(self) -> None:
+        """Take the rows of the segments that points which slide finitely have come to."""
+        segment, xi = self.contacts.segment, self.contacts.xi
+        for i, contact in enumerate(self.system.contacts):
+            if contact.sliding == "finite":
+                segment[i], xi[i] = follow(int(segment[i]), float(xi[i]), contact.chords)
+        self.set_nodes(self.nodes)
+
     def show(self) -> None:
-        """Bring what the stiffness sees up to u and q."""
+        """Bring what the stiffness and the damping see up to u and q."""
+        if len(self.whole.drag):
+            self.whole.drag[self.layout.index] = self.system.damping @ self.fields.q[self.layout.index]
         if self.structure.flags[0]:
             self.fields.shown[:] = self.fields.u + self.structure.factor * self.fields.q
         self.contacts.q[:] = self.fields.q[self.table.indices]
@@ -103,19 +114,24 @@ class Machine:
         structure, fields, table, nodes = self.structure, self.fields, self.table, self.contacts
         with denormals_flushed():
             return run_steps(
-                steps, structure, fields, self.unsymmetric, forcing, table, nodes, self.scratch, self.state, work,
-                record,
+                steps, structure, fields, self.unsymmetric, self.whole, forcing, table, nodes, self.scratch, self.state,
+                work, record,
             )  # fmt: skip
 
 
-def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Machine:
-    """Pack a system with the given contact nodes. Raises CaseError for a mass that is not diagonal, AnalysisError for
-    a freedom without mass or a friction law without a compiled form."""
-    mass = diagonal_mass(system)
-    damping = split_damping(system)
-    layout = lay_out_freedoms(system)
+def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes, *, lagged: bool = True) -> Machine:
+    """Pack a system with the given contact nodes. lagged: damping that is not diagonal acts on the older velocity; else
+    steps solve with it and with the mass, which need not be diagonal either. Raises CaseError for a mass that must be
+    diagonal and is not, AnalysisError for a freedom without mass or a friction law without a compiled form."""
+    whole = not (lagged or (is_diagonal(system.mass, DIAGONAL) and is_diagonal(system.damping)))
+    layout = lay_out_freedoms(system, width=0 if lagged else FEW_WIDTH)
     skew = unsymmetric(halves(system), layout)
-    structure = _structure(system, scheme, layout, mass, damping)
+    if whole:
+        matrix, answers = step_matrix(system, scheme, layout)
+        structure = _structure(system, scheme, layout, system.mass.diagonal(), no_damping(system.size))
+    else:
+        structure = _structure(system, scheme, layout, diagonal_mass(system), split_damping(system))
+        matrix, answers = no_step_matrix(layout, structure.numbers[2] * structure.kick)
     u = aligned_zeros((layout.size,))
     fields = Fields(
         u=u,
@@ -136,17 +152,30 @@ def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes) -> Ma
         base=aligned_zeros((layout.size,)),
         reference=np.array([0.0, 1.0 - 1.0 / OFFSET_STEPS]),
     )
-    table = node_table(nodes, layout, structure.numbers[2] * structure.kick, system.motion.full)
+    segments = np.array([c.segment for c in system.contacts] + [0] * (nodes.count - len(system.contacts)))
+    table = packed_nodes(system, nodes, layout, (matrix, answers), segments)
     contacts = NodeState(
         force=np.zeros((nodes.count, nodes.directions + 1)),
         status=np.zeros(nodes.count, dtype=np.int64),
         offset=np.zeros(nodes.count),
         q=np.zeros(len(table.indices)),
+        segment=segments.astype(np.int64),
+        xi=np.array([c.xi for c in system.contacts] + [0.0] * (nodes.count - len(system.contacts))),
     )
     forcing = _forcing(system, layout)
     return Machine(
-        system, scheme, layout, structure, fields, skew, forcing, state, nodes, system.surfaces, table, contacts,
-        _scratch(table),
+        system, scheme, layout, structure, fields, skew, matrix, answers, forcing, state, nodes, system.surfaces,
+        table, contacts, _scratch(table),
+    )  # fmt: skip
+
+
+def packed_nodes(
+    system: System, nodes: ContactNodes, layout: Layout, matrix: tuple[StepMatrix, Answers], segments: IntArray
+) -> NodeTable:
+    """Contact nodes on the entries of a layout; segments (m,) that points which slide finitely are in."""
+    return node_table(
+        nodes, layout, matrix[1], system.motion.full, whole=len(matrix[0].before) > 0, contacts=system.contacts,
+        segments=segments,
     )  # fmt: skip
 
 
@@ -154,8 +183,7 @@ def diagonal_mass(system: System) -> Array:
     """The diagonal (n,) [kg] of a lumped mass. Raises CaseError where it is not lumped, AnalysisError where one is
     zero."""
     mass = system.mass.diagonal()
-    off = sp.csr_array(system.mass - sp.diags_array(mass))
-    if off.nnz and np.abs(off.data).max() > DIAGONAL * np.abs(mass).max():
+    if not is_diagonal(system.mass, DIAGONAL):
         raise CaseError(
             "bodies",
             None,
@@ -242,6 +270,9 @@ def _scratch(table: NodeTable) -> NodeScratch:
         marked=np.zeros(nodes, dtype=np.int64),
         speed=np.zeros((nodes, t)),
         force=np.zeros((2, t + 1)),
+        foot=foot(),
+        normal=np.zeros(ROWS),
+        tangent=np.zeros(ROWS),
     )
 
 

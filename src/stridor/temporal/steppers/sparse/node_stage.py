@@ -20,6 +20,7 @@ from typing import NamedTuple
 from ....contact import multipliers
 from ....kernels import njit
 from ....typing import Array, IntArray
+from ..curve import Foot
 from .disc import solve_disc
 from .node_table import NodeTable
 
@@ -33,18 +34,22 @@ NEWTON_STEPS = 60  # on the force of a layer that hardens
 
 class NodeState(NamedTuple):
     """What contacts carry from step to step: force (m, d) at the step before [N], status (m,), offset (m,) [m] of the
-    gap after a renewal of the rows, and q (l,) [m/s] of the entries they touch, at t_n."""
+    gap after a renewal of the rows, and q (l,) [m/s] of the entries they touch, at t_n; segment and xi (m,) of the feet
+    of points that slide finitely."""
 
     force: Array
     status: IntArray
     offset: Array
     q: Array
+    segment: IntArray
+    xi: Array
 
 
 class NodeScratch(NamedTuple):
     """Work space: u, q (l,) at t_{n+1}, correction (l,) of u by forces; gap (m,), slip (m, d−1) [m] free of forces;
     earlier (m,) [m]: gap at t_{n−1} of compliant nodes, zero of rigid ones;
-    chosen (m,): nodes that take part, marked (m,); speed (m, d−1) [m/s] of slip at t_n; force (2, d) of one node."""
+    chosen (m,): nodes that take part, marked (m,); speed (m, d−1) [m/s] of slip at t_n; force (2, d) of one node;
+    foot, normal and tangent (10,) weights of the rows of one point that slides finitely."""
 
     u: Array
     q: Array
@@ -56,20 +61,22 @@ class NodeScratch(NamedTuple):
     marked: IntArray
     speed: Array
     force: Array
+    foot: Foot
+    normal: Array
+    tangent: Array
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _push(i: int, change: Array, table: NodeTable, correction: Array) -> None:  # pragma: no cover - compiled
     """Forces (d,) on node i into the correction."""
-    for p in range(table.ptr[i], table.ptr[i + 1]):
-        c = table.col[p]
+    for p in range(table.push_ptr[i], table.push_ptr[i + 1]):
         total = 0.0
         for j in range(change.shape[0]):
-            total += table.row[p, j] * change[j]
-        correction[c] += table.gain[c] * total
+            total += table.push[p, j] * change[j]
+        correction[table.push_col[p]] += total
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _take_in(
     i: int, count: int, increments: Array, ratio: Array, table: NodeTable, state: NodeState, work: NodeScratch
 ) -> int:  # pragma: no cover - compiled
@@ -87,7 +94,7 @@ def _take_in(
     return count + 1
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _solve_node(
     i: int,
     sign: float,
@@ -115,7 +122,7 @@ def _solve_node(
     return status
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _relax(
     i: int, step: float, new: Array, table: NodeTable, state: NodeState, work: NodeScratch
 ) -> int:  # pragma: no cover - compiled
@@ -159,7 +166,7 @@ def _relax(
     return status
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _sweeps(
     count: int, limit: int, step: float, status: IntArray, table: NodeTable, state: NodeState, work: NodeScratch
 ) -> int:  # pragma: no cover - compiled
@@ -185,36 +192,37 @@ def _sweeps(
     return limit + 1
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _gap_before(
     i: int,
     gap: float,
     step: float,
     ratio: Array,
     increments: Array,
+    rate: Array,
     table: NodeTable,
     state: NodeState,
     work: NodeScratch,
 ) -> float:  # pragma: no cover - compiled
-    """Gap [m] of node i at t_{n−1}, from its free one at t_{n+1}, the free increment and q_n."""
+    """Gap [m] of node i at t_{n−1}, from its free one at t_{n+1}, the increments, those of supports too, and q_n."""
     for p in range(table.ptr[i], table.ptr[i + 1]):
         c = table.col[p]
         gap -= table.row[p, 0] * (ratio[0] * work.q[c] - ratio[1] * state.q[c] + step * state.q[c])
     for m in range(increments.shape[0]):
-        gap -= 2.0 * table.lift[i, 0, m] * increments[m]
+        gap -= table.lift[i, 0, m] * (increments[m] + step * rate[m])
     return gap
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def solve_nodes(
-    step: float, ratio: Array, x: Array, increments: Array, table: NodeTable, state: NodeState, work: NodeScratch,
-    status: IntArray,
+    step: float, ratio: Array, x: Array, increments: Array, rate: Array, table: NodeTable, state: NodeState,
+    work: NodeScratch, status: IntArray,
 ) -> tuple[int, int]:  # pragma: no cover - compiled
     """Forces at t_n into state.force from work.u and work.q, the free motion, which then follow them.
 
-    x (p,) supports at t_{n+1}, increments (p,) over the step. Returns how many nodes took part (work.chosen) and the
-    sweeps done, more than SWEEP_LIMIT where they did not settle. status (m,) is that of the step; state.status stays
-    that of the step before.
+    x (p,) supports at t_{n+1}, increments (p,) over the step, rate (p,) their q_n. Returns how many nodes took part
+    (work.chosen) and the sweeps done, more than SWEEP_LIMIT where they did not settle. status (m,) is that of the
+    step; state.status stays that of the step before.
     """
     m = table.gap.shape[0]
     count = 0
@@ -227,7 +235,7 @@ def solve_nodes(
         work.gap[i] = gap
         work.earlier[i] = 0.0
         if table.compliance[i] > 0.0:
-            work.earlier[i] = _gap_before(i, gap, step, ratio, increments, table, state, work)
+            work.earlier[i] = _gap_before(i, gap, step, ratio, increments, rate, table, state, work)
         work.marked[i] = 0
         status[i] = _OPEN
         if gap + work.earlier[i] < 0.0 or state.force[i, 0] > 0.0 or table.kept[i]:
@@ -262,7 +270,7 @@ def solve_nodes(
     return count, done
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def contact_power(
     count: int, beta2: float, velocity: Array, table: NodeTable, state: NodeState, work: NodeScratch
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -285,7 +293,7 @@ def contact_power(
     return normal, friction
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def slip_over_step(i: int, ratio: Array, increments: Array, table: NodeTable, state: NodeState, work: NodeScratch) -> (
     float
 ):  # pragma: no cover - compiled

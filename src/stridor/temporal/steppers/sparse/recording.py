@@ -29,6 +29,7 @@ from .forcing import CIRCULATORY, CUBIC, GYROSCOPIC, KEPT, NODES_KEPT, STEPS_DON
 from .node_stage import NodeScratch, NodeState, slip_over_step
 from .node_table import NodeTable
 from .products import WITH_STIFFNESS, Fields, Structure, stored_energies
+from .step_matrix import StepMatrix, kinetic_energy
 
 
 class Record(NamedTuple):
@@ -50,10 +51,12 @@ class Record(NamedTuple):
 
 
 @njit(cache=True)
-def energies(a: Structure, f: Fields, g: Forcing, state: LoopState, row: Array) -> None:
+def energies(a: Structure, f: Fields, b: StepMatrix, g: Forcing, state: LoopState, row: Array) -> None:
     # pragma: no cover - compiled
     """Kinetic and elastic energy half a step before t_n and the works up to there into row (7,) or (9,)."""
     kinetic, elastic = stored_energies(a, f)
+    if b.before.shape[0]:
+        kinetic = kinetic_energy(f, b)
     for j in range(5):
         row[2 + j] = state.works[j]
     if a.flags[2] == WITH_STIFFNESS:
@@ -73,7 +76,7 @@ def energies(a: Structure, f: Fields, g: Forcing, state: LoopState, row: Array) 
     row[0], row[1] = kinetic, elastic + state.works[CUBIC]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def statistics(
     count: int, ratio: Array, step: float, increments: Array, table: NodeTable, nodes: NodeState, work: NodeScratch,
     status: IntArray, state: LoopState, sums: Array,
@@ -158,11 +161,12 @@ def _record_contacts(
 
 
 @njit(cache=True)
-def begin_record(a: Structure, f: Fields, g: Forcing, state: LoopState, w: StepWork, record: Record) -> bool:
-    # pragma: no cover - compiled
+def begin_record(
+    a: Structure, f: Fields, b: StepMatrix, g: Forcing, state: LoopState, w: StepWork, record: Record
+) -> bool:  # pragma: no cover - compiled
     """What a record needs of t_n before the step; whether the energies are finite."""
     at = state.counters[KEPT]
-    energies(a, f, g, state, record.energies[at])
+    energies(a, f, b, g, state, record.energies[at])
     for r in range(w.watched.shape[0]):
         w.watched[r, 0] = dot(record.watch_ptr, record.watch_col, record.watch_val, r, f.u)
         w.watched[r, 1] = dot(record.watch_ptr, record.watch_col, record.watch_val, r, f.q)

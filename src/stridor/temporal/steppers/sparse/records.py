@@ -18,14 +18,14 @@ CONTACT_COLUMNS = 5
 SKEW_COLUMNS = {"circulatory": ENERGY_RECORD - 2, "gyroscopic": ENERGY_RECORD - 1}
 
 
-def buffers(machine: Machine, schedule: Schedule, settings: Settings) -> Record:
-    """Room for all records from the present step on."""
+def buffers(machine: Machine, schedule: Schedule, settings: Settings, *, each_node: bool = True) -> Record:
+    """Room for all records from the present step on; each_node: for those of single nodes too."""
     every = settings.record_every
     count = max((schedule.steps - 1) // every - (machine.done - 1) // every, 0)
     system, nodes = machine.system, machine.nodes
     d, p = system.dimension, len(system.motion.names)
     per_record = nodes.count * (16 * (nodes.directions + 1) + 1)
-    nodes_every = max(1, int(np.ceil(count * per_record / NODE_HISTORY_BYTES))) if nodes.count else 0
+    nodes_every = max(1, int(np.ceil(count * per_record / NODE_HISTORY_BYTES))) if nodes.count and each_node else 0
     kept = count // nodes_every + 1 if nodes_every else 0
     rows = [sp.csr_array(system.points[name].free[:d]) for name in settings.watch]
     lift = [np.asarray(system.points[name].lift)[:d].reshape(d, p) for name in settings.watch]
@@ -49,7 +49,7 @@ def buffers(machine: Machine, schedule: Schedule, settings: Settings) -> Record:
 def node_history(machine: Machine, record: Record, start: int, kept: int) -> NodeHistory | None:
     """Histories of the nodes, where there are any; start: number of the first record, kept: of them."""
     nodes = machine.nodes
-    if not nodes.count:
+    if not record.nodes_every:
         return None
     number = np.arange(start, start + kept)
     number = number[number % record.nodes_every == 0]

@@ -12,6 +12,7 @@ from ....typing import Array
 from ...schedule import Schedule
 from ...settings import Settings
 from ...stepper import Disturbance
+from ..starting import impulse, motion_of_bodies
 from .machine import Machine
 from .node_table import sliding_directions
 
@@ -32,13 +33,8 @@ def begin(
     u, v, a = np.zeros(system.size), np.zeros(system.size), np.zeros(system.size)
     if settings.initial == "steady-sliding":
         u, v = _steady(machine, schedule, settings, mu)
-    else:
-        if system.initial_displacement is not None:
-            u = u + system.initial_displacement
-        if system.initial_velocity is not None:
-            v = v + system.initial_velocity
-        # Loads that are there at t = 0 act as at rest: half a step early, which nothing later feels.
-        a = -(system.stiffness @ u + system.damping @ v) / system.mass.diagonal()
+    elif own := motion_of_bodies(system, schedule):
+        u, v, a = own
     if disturbance is not None:
         u, v, a = u + disturbance[0], v + disturbance[1], a + disturbance[2]
     # q_0 = v_0 − β2 Δt a_0 starts the scheme without a jump (docs/theory-temporal.md).
@@ -77,6 +73,6 @@ def _slip_impulse(system: System, nodes: ContactNodes, contact: int) -> Array:
     """Velocity (n,) that equal impulses on the nodes of a contact along its sliding give, mean slip speed one."""
     mine = nodes.select(nodes.owner == contact)
     along = mine.along(sliding_directions(mine, system.motion.full))
-    answer = (along.T @ np.ones(mine.count)) / system.mass.diagonal()
+    answer = impulse(system, along.T @ np.ones(mine.count))
     mean = float(np.mean(along @ answer))
     return answer / mean if mean > 0.0 else answer

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ....contact.nodes import ContactNodes
-from ....errors import AnalysisError, CaseError
+from ....errors import AnalysisError
 from ....system import System
 from ....typing import Array
-from ...beta2 import StepLimit, scheme
+from ...beta2 import StepLimit, scheme, step_limit
 from ...columns import WORK_COLUMNS
 from ...inputs import unfit_in_time
 from ...node_history import NodeHistory
@@ -21,6 +21,8 @@ from ...settings import Settings, choose_step, not_finite
 from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
+from ..curve import check_stiffness, left_the_line
+from .feet import NEW_ROWS, OFF_LINE
 from .forcing import KEPT, MOST_SWEEPS, STEPS_DONE, UNCONVERGED
 from .limit import step_limit_assembled
 from .loop import NOT_FINITE
@@ -33,33 +35,32 @@ from .start import begin
 SAVED = {
     "fields": ("u", "q", "shown", "push"),
     "state": ("works", "statistics", "counters", "motion", "coefficients", "base", "reference"),
-    "contacts": ("force", "status", "offset"),
+    "contacts": ("force", "status", "offset", "segment", "xi"),
+    "whole": ("drag",),
 }
 
 
-def sparse_stepper(system: System, settings: Settings, mu: float | None, reason: str) -> SparseStepper:
-    """A system of assembled matrices made ready; mu scales every contact's friction law at its slip speed. reason: why
-    it is marched on these.
+def sparse_stepper(
+    system: System, settings: Settings, mu: float | None, reason: str, *, path: str = "assembled"
+) -> SparseStepper:
+    """A system of assembled matrices made ready; mu scales every contact's friction law at its slip speed. path:
+    "nodal" takes any mass and damping without lag, "assembled" steps that solve nothing; reason: why it is that.
 
-    Raises CaseError for a mass that is not lumped, points that slide finitely and a step beyond the limit,
-    AnalysisError for matrices that time does not take.
+    Raises CaseError on the path "assembled" for a mass that is not lumped, for contact springs that the step cannot
+    follow and a step beyond the limit, AnalysisError for matrices that time does not take.
     """
     if why := unfit_in_time(system):
         raise AnalysisError(why)
-    diagonal_mass(system)
-    for contact in system.contacts:
-        if contact.sliding == "finite":
-            raise CaseError(
-                f"contacts.{contact.name}.sliding",
-                "finite",
-                f'"small" in a run on assembled matrices ({reason}), in which a point stays where it is on its master',
-            )
+    lagged = path == "assembled"
+    if lagged:
+        diagonal_mass(system)
     nodes = system.contact_nodes()
     if mu is not None:
         nodes = with_friction(nodes, mu, system.motion.full)
-    limit = step_limit_assembled(system, settings.beta2)
-    machine = assembled_machine(system, scheme(choose_step(limit, settings), settings.beta2), nodes)
-    return SparseStepper(machine, limit, reason)
+    limit = (step_limit_assembled if lagged else step_limit)(system, settings.beta2)
+    numbers = scheme(choose_step(limit, settings), settings.beta2)
+    check_stiffness(system, numbers.step)
+    return SparseStepper(assembled_machine(system, numbers, nodes, lagged=lagged), limit, path, reason)
 
 
 def with_friction(nodes: ContactNodes, mu: float, factors: Array) -> ContactNodes:
@@ -74,16 +75,15 @@ def with_friction(nodes: ContactNodes, mu: float, factors: Array) -> ContactNode
 
 
 class SparseStepper:
-    """See `temporal.stepper.Stepper`. Contacts that slide finitely have their rows found again as they go."""
+    """See `temporal.stepper.Stepper`. Surfaces that slide finitely have their rows found again as they go."""
 
-    path = "assembled"
-
-    def __init__(self, machine: Machine, limit: StepLimit, reason: str) -> None:
-        self.machine, self.limit, self.reason, self.scheme = machine, limit, reason, machine.scheme
+    def __init__(self, machine: Machine, limit: StepLimit, path: str, reason: str) -> None:
+        self.machine, self.limit, self.scheme = machine, limit, machine.scheme
+        self.path, self.reason = path, reason
         self.contact_names, self.closed = machine.nodes.names, machine.nodes.closed
         self.works = WORK_COLUMNS | (SKEW_COLUMNS if len(machine.unsymmetric.force) else {})
         self.parts = sketch(machine.system, machine.nodes)
-        self.finite = bool(machine.system.finitely_sliding)
+        self.finite = any(surface.sliding == "finite" for surface in machine.system.surfaces)
         self.distances = node_distances(machine.system) if self.finite else np.zeros(0)
         # Of the rows: the step of their next renewal, the first for finite sliding, and the steps since the last.
         self.renewal = np.array([0, 1])
@@ -143,8 +143,12 @@ class SparseStepper:
 
     def bounds(self) -> Bounds:
         """What is counted."""
+        lines = [len(c.chords) - 1 if c.sliding == "finite" else c.segment for c in self.system.contacts]
+        last = np.array(lines + [0] * (self.machine.nodes.count - len(lines)))
+        first = np.array([0 if c.sliding == "finite" else c.segment for c in self.system.contacts])
         return {
             "contacts_status": STATUS_RANGE,
+            "contacts_segment": (np.append(first, np.zeros(len(last) - len(first))), last),
             "state_counters": (0, INFINITY),
             "state_statistics": (-1.0, INFINITY),
             "renewal": (np.array([0, 1]), INFINITY),
@@ -156,6 +160,8 @@ class SparseStepper:
     def resume(self, restart: Trajectory, schedule: Schedule, *, changed: bool) -> None:
         """Take up a state that was checked."""
         machine, size = self.machine, self.system.size
+        machine.contacts.segment[:] = restart.state["contacts_segment"]
+        machine.set_nodes(machine.nodes)
         if self.finite:
             # Rows as they were last found: first at that displacement, then the state itself.
             machine.fields.u[machine.layout.index] = restart.state["renewed_at"][:size]
@@ -177,7 +183,8 @@ class SparseStepper:
 
     def make_room(self, schedule: Schedule, settings: Settings) -> None:
         """Room for all records from the present step on."""
-        self.record = buffers(self.machine, schedule, settings)
+        # Where every contact is a point, it is its own node.
+        self.record = buffers(self.machine, schedule, settings, each_node=self.path == "assembled")
         self.machine.run(0, schedule, self.record)
 
     def advance(self, steps: int, schedule: Schedule, phase: str) -> None:
@@ -188,8 +195,19 @@ class SparseStepper:
                 self._renew(phase)
             steps = min(steps, int(self.renewal[0]) - self.done)
         _, code = machine.run(steps, schedule, self.record)
+        if code == NEW_ROWS:
+            machine.follow_curves()
+        if code == OFF_LINE:
+            beyond = (k for k, c in enumerate(self.system.contacts) if self._off(k, len(c.chords)))
+            name = self.system.contacts[next(beyond)].name
+            raise AnalysisError(left_the_line(name, self.done * self.scheme.step, phase))
         if code == NOT_FINITE or not np.isfinite(machine.fields.u.sum() + machine.fields.q.sum()):
             raise AnalysisError(not_finite(self.done * self.scheme.step, phase, self.scheme.step))
+
+    def _off(self, k: int, chords: int) -> bool:
+        """Whether the foot of a point is beyond an end of a line of so many chords."""
+        segment, xi = int(self.machine.contacts.segment[k]), float(self.machine.contacts.xi[k])
+        return (segment == 0 and xi < -1e-9) or (segment == chords - 1 and xi > 1.0 + 1e-9)
 
     def _renew(self, phase: str) -> None:
         machine = self.machine

@@ -66,12 +66,13 @@ class Layout:
         return sp.csr_array((coo.data, (coo.row, self.index[coo.col])), shape=(matrix.shape[0], self.size))
 
 
-def lay_out_freedoms(system: System) -> Layout:
-    """Group the freedoms into blocks, the blocks in an order that keeps coupled ones close (reverse Cuthill–McKee)."""
+def lay_out_freedoms(system: System, *, width: int = 0) -> Layout:
+    """Group the freedoms into blocks, the blocks in an order that keeps coupled ones close (reverse Cuthill–McKee).
+    width: that of blocks where no nodes are told, 0 for that which streams the fewest bytes."""
     pattern = sp.csr_array(abs(system.stiffness) + abs(system.damping) + abs(system.mass))
     if not system.symmetric_definite:
         pattern = sp.csr_array(pattern + pattern.T)
-    group, inside, width = _groups(system, pattern)
+    group, inside, width = _groups(system, pattern, width)
     count = int(group.max()) + 1
     coo = sp.coo_array(pattern)
     graph = sp.csr_matrix((np.ones(coo.nnz), (group[coo.row], group[coo.col])), shape=(count, count))
@@ -81,7 +82,7 @@ def lay_out_freedoms(system: System) -> Layout:
     return Layout(width, count, rank[group] * LANES[width] + inside)
 
 
-def _groups(system: System, pattern: Sparse) -> tuple[IntArray, IntArray, int]:
+def _groups(system: System, pattern: Sparse, wanted: int = 0) -> tuple[IntArray, IntArray, int]:
     """Block (n,) of each freedom, place within it (n,), and the width: nodes of the bodies, else consecutive ones."""
     group, inside = np.full(system.size, -1), np.zeros(system.size, dtype=np.int64)
     count = 0
@@ -99,7 +100,7 @@ def _groups(system: System, pattern: Sparse) -> tuple[IntArray, IntArray, int]:
         width = max(width, d)
     rest = np.flatnonzero(group < 0)
     if not width:
-        width = _cheapest_width(pattern)
+        width = wanted or _cheapest_width(pattern)
     group[rest] = count + np.arange(len(rest)) // width
     inside[rest] = np.arange(len(rest)) % width
     return group.astype(np.int64), inside, width
