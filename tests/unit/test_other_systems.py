@@ -57,7 +57,8 @@ def test_verbs_work_without_calls_of_posix(folder: Path):
     for _ in range(2):  # what the first one left does not stop the second
         done = program("onsets", "two-beams.toml", cwd=folder)
         assert done.returncode == 0, done.stderr.decode()
-    assert sorted(path.name for path in (folder / "two-beams.out").iterdir()) == ["onsets.csv", "onsets.nc"]
+    written = sorted(path.name for path in (folder / "two-beams.out").iterdir())
+    assert written == ["onsets.csv", "onsets.nc", "onsets.png"]
 
 
 def test_a_folder_that_is_locked_is_refused_without_them(folder: Path):

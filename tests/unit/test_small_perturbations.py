@@ -11,7 +11,6 @@ import scipy.sparse as sp
 
 import stridor as st
 from benches import paper_case
-from marching import simulate_assembled
 from rubbing_block import rubbing_block
 from solid_cases import BELT
 from stridor.agreement import perturbation
@@ -19,7 +18,6 @@ from stridor.agreement.perturbation import perturb
 from stridor.modal.options import Options
 from stridor.study.settings import settings_of
 from stridor.study.without_effect import without_effect
-from stridor.temporal.schedule import PhaseSpec
 
 
 def nodes_of(owner: list[int], tangent: np.ndarray | None = None) -> Any:
@@ -74,14 +72,6 @@ def test_perturbations_stay_in_the_reference_configuration_over_surfaces_too() -
     assert len(one.signal) > 64
     assert np.array_equal(one.signal, two.signal)
     assert np.any(one.signal)
-
-
-def test_points_that_slide_finitely_are_not_marched_on_assembled_matrices() -> None:
-    lumped = {f"bodies.{name}.{key}": value for name in ("beam1", "beam2")
-              for key, value in (("mass", "lumped"), ("damping", {"mass": 50.0, "stiffness": 0.0}))}  # fmt: skip
-    system = st.build_system(paper_case(contacts__A__sliding="finite").with_(lumped))
-    with pytest.raises(st.CaseError, match=r'contacts\.A\.sliding: .finite. – "small" in a run on assembled .*asked for'):
-        simulate_assembled(system, [PhaseSpec("slide", 1e-6, {}, {})], None)
 
 
 def test_bodies_move_at_the_start_of_runs_from_rest_alone() -> None:
