@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,39 @@ def test_cycle_and_run_agree(compared: Agreement, answer: FourAnswers):
     assert still.verdict == "not decided: μ = 0.5: no cycle was found, and the run has not saturated"
     assert compared.agree
     assert "μ = 0.5: no cycle" not in compared.verdict
+
+
+@pytest.mark.parametrize("mu", [0.3, 0.9])
+def test_a_run_that_comes_to_rest_is_compared_like_any_other(mu: float):
+    """Stable, until the last of the motion is rounding; and beyond the onset on a belt that stops."""
+    phases: list[dict[str, Any]] = [{"name": "slide", "duration": 1500.0 if mu == 0.3 else 60.0}]
+    phases += [] if mu == 0.3 else [{"name": "stop", "duration": 520.0, "velocities": {"belt": 0.0}}]
+    changes = {"temporal.stepper": "explicit", "temporal.step": 0.05, "temporal.perturbation": 0.01}
+    case = mode_coupling(0.1 if mu == 0.3 else 0.3, 0.1).with_(changes | {"phases": phases})
+    (row,) = st.compare(case, [mu], critical=False).comparisons
+    assert row.settled is None
+    assert row.unsettled in ("the run has come to rest", "the run is too short to tell whether it has saturated")
+
+
+def test_what_was_compared_is_kept_where_cycles_cannot_be_sought(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    case = stick_slip(**IMPLICIT | {"phases": [{"name": "slide", "duration": 20.0}]})
+
+    def fails(*_: object, **__: object) -> None:
+        raise st.AnalysisError("no such luck")
+
+    def stops(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("stridor.study.comparison.find_cycles", fails)
+    found = st.compare(case, [0.5], critical=False, cycles=True)
+    assert len(found.comparisons) == len(found.answers) == 1
+    assert not found.agree
+    assert "cycles were not sought to the end: no such luck" in found.verdict
+    data = st.open(st.save(found, tmp_path / "compare.nc"))
+    assert json.loads(data.attrs["answers"]) == [answer.to_json() for answer in found.answers]
+    monkeypatch.setattr("stridor.study.comparison._onset", stops)
+    again = st.compare(case, [0.5], critical=False, cycles=True)
+    assert (len(again.comparisons), again.answers, again.interrupted) == (1, (), True)
 
 
 @pytest.mark.slow

@@ -175,18 +175,19 @@ def _judged(
     return good, f"{AGREE if good else DISAGREE}{at}: {told}, {'' if good else 'not '}{within}"
 
 
-def with_answers(agreement: Agreement, answers: Sequence[FourAnswers]) -> Agreement:
+def with_answers(agreement: Agreement, answers: Sequence[FourAnswers], why_none: str = "") -> Agreement:
     """An agreement with cycles beside it: its verdict is one on all of it, "agree" only where each part does and none
-    is missing, as where it was interrupted."""
+    is missing, as where it was interrupted or why_none says why cycles were not sought."""
     said = agreement.verdict
     begun = next((word for word in (AGREE, DISAGREE, UNDECIDED) if said.startswith(word)), UNDECIDED)
     counted = [a.agrees for a in answers if not a.silent]
     if begun == DISAGREE or False in counted:
         word = DISAGREE
-    elif begun == UNDECIDED or None in counted or agreement.interrupted:
+    elif begun == UNDECIDED or None in counted or agreement.interrupted or why_none:
         word = UNDECIDED
     else:
         word = AGREE
     parts = [said.removeprefix(begun), *(f"cycle and run, {a.verdict}" for a in answers if not a.silent)]
+    parts += [why_none] if why_none and not any(why_none in part for part in parts) else []
     parts += ["interrupted before all was compared"] if agreement.interrupted else []
     return replace(agreement, verdict=word + "; ".join(parts), answers=tuple(answers))

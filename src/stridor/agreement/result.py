@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -133,7 +134,8 @@ class Agreement(Tabular):
         return heads, rows
 
     def to_xarray(self) -> Any:
-        """xarray.Dataset with dimension mu, as `st.save` writes it."""
+        """xarray.Dataset with dimension mu, as `st.save` writes it; cycles and runs beside it are JSON in the attribute
+        ``answers``."""
         rows = self.comparisons
 
         def column(values: list[float | None]) -> list[float]:
@@ -153,6 +155,8 @@ class Agreement(Tabular):
             value = getattr(self, name)
             data.attrs[name] = np.nan if value is None else value
         data.attrs["verdict"] = self.verdict
+        if self.answers:
+            data.attrs["answers"] = json.dumps([answer.to_json() for answer in self.answers])
         return data
 
     def _repr_html_(self) -> str:

@@ -15,6 +15,7 @@ PARTS = 4  # of the tail, whose amplitudes are held against one another
 LEAST_PERIODS = 5.0  # of the line, in each of them
 STEADY = 0.01  # of the amplitude: by how much it may differ between them where its growth was over before it was seen
 SHOWN = 0.1  # growth rate times the tail: what would show there
+AT_REST = 1e-9  # of the largest velocity in the phase: what no longer swings
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,8 @@ def settled(
         return None, "the run is too short behind its growth to tell what it has settled to"
     halves = np.array([0.5 * float(np.ptp(piece)) for piece in np.array_split(signal, PARTS)])
     amplitude = 0.5 * float(np.ptp(signal))
+    if amplitude <= AT_REST * float(np.abs(run.velocity[part, 0, direction]).max(initial=0.0)):
+        return None, "the run has come to rest"
     steady = np.ptp(halves) <= STEADY * amplitude and abs(rate) * len(signal) * run.sampling >= SHOWN
     if not (fitted.saturated or steady):
         return None, "the run has not saturated"

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..agreement import Agreement, Comparison, Store
 from ..agreement.four_answers import four_answers, with_answers
-from ..errors import CaseError
+from ..errors import CaseError, StridorError
 from ..periodic import Cycle, CycleOnset
 from ..temporal.trajectory import Trajectory
 from . import analyses
@@ -65,22 +65,31 @@ def _with_cycles(work: Workspace, found: Agreement, progress: Callable[[str], No
         try:
             result = find_cycles(work, mus, progress=told)
         except CaseError as error:
-            if error.problems[0].where != "case":
-                raise
             why = f"cycles were not sought: {error.problems[0].accepted}"
+        except StridorError as error:  # what was compared is not lost with it
+            why = f"cycles were not sought to the end: {error}"
         else:
             cycles, stopped = result.cycles, result.interrupted
-            notes += [f"cycles: {line}" for line in (*result.missing, *result.warnings)]
+            notes += [f"cycles: {line}" for line in (*result.missing, *result.warnings, *result.notes)]
+    onset: CycleOnset | None = None
+    if not stopped:
+        try:
+            onset, doubt = _onset(work)
+            notes += [doubt] if doubt else []
+        except StridorError as error:
+            notes.append(f"onsets: {error}")
+        except KeyboardInterrupt:
+            stopped = True
     noted = replace(found, notes=(*found.notes, *notes), interrupted=stopped)
     if stopped:
         return with_answers(noted, ())
-    onset = _onset(work)
     return with_answers(
         noted,
         [
             four_answers(c, onset, [one for one in cycles if one.mu == c.mu], work.modal.max_frequency_hz, why)
             for c in found.comparisons
         ],
+        why,
     )
 
 
@@ -97,8 +106,9 @@ def _why_not(work: Workspace) -> str:
     return ""
 
 
-def _onset(work: Workspace) -> CycleOnset | None:
-    """The lowest onset of growth in modal.friction_range."""
-    growing = [o for o in analyses.onsets(work).onsets if not o.stabilising]
-    first = min(growing, key=lambda o: o.mu, default=None)
-    return None if first is None else CycleOnset(first.mu, first.frequency_hz, first.stabilising)
+def _onset(work: Workspace) -> tuple[CycleOnset | None, str]:
+    """The lowest onset of growth in modal.friction_range, and what is said of a list that is not whole."""
+    found = analyses.onsets(work)
+    first = min((o for o in found if not o.stabilising), key=lambda o: o.mu, default=None)
+    doubt = "" if found.complete else f"onsets: {found.completeness}"
+    return None if first is None else CycleOnset(first.mu, first.frequency_hz, first.stabilising), doubt

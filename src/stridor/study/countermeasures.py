@@ -73,6 +73,7 @@ def rank_countermeasures(
         empty = np.zeros(0)
         source = provenance(work, "countermeasures", time.perf_counter() - started, mu=linear.mu)
         return Countermeasures(linear.mu, target, empty.astype(np.int64), empty + 0j, (), margin, told, source)
+    target = target if target == "sum" else int(target)
     if target != "sum" and target not in linear.modes.branch[unstable]:
         accepted = f'"sum", or an unstable branch: {", ".join(str(b) for b in linear.modes.branch[unstable])}'
         raise CaseError("target", target, accepted)

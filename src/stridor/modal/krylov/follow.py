@@ -104,7 +104,7 @@ class Follower:
             tried += 1
             if tried > MOST_TRIED:
                 at = f"{self.state.mu:.6g}"
-                raise FollowingError(f"branches cannot be told apart near μ = {at}: modes go on as one over a range")
+                raise FollowingError(f"branches cannot be told apart near μ = {at}: {MOST_TRIED} steps led no further")
             step = min(self._step, self.longest)
             # No sliver is left over for rounding to make.
             step = left if left <= 1.01 * step else step

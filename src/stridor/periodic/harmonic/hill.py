@@ -23,6 +23,7 @@ APART = 0.5  # between the centres of two roots of one exponent
 ALIKE = 0.02  # of a multiplier
 CENTRAL = 0.9  # of series: how far from k = 0
 EDGE = 0.15  # of half ω: how far beyond it roots are looked at
+SO_NEAR = 10.0  # times as far from one as the nearest: another so near may be the own one of the motion
 
 
 def hill_size(cycle: Balanced) -> int:
@@ -109,10 +110,14 @@ def _chosen(exponents: ComplexArray, centres: Array, period: float, count: int) 
 
 
 def _without_own(found: ComplexArray) -> Hill:
+    """What is left without the multiplier of the motion itself, the nearest to one, and how far that is from it: where
+    another is about as near, as beside a fold, the motion's own may be either, and off by as much as the other."""
     off = np.abs(found - 1.0)
     own = int(np.argmin(off))
     rest = np.delete(found, own)
-    return Hill(rest[np.argsort(-np.abs(rest), kind="stable")], float(off[own]))
+    other = float(np.delete(off, own).min(initial=np.inf))
+    error = other if other < SO_NEAR * off[own] else float(off[own])
+    return Hill(rest[np.argsort(-np.abs(rest), kind="stable")], error)
 
 
 def _toeplitz(cycle: Balanced) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
