@@ -182,7 +182,7 @@ _CYCLES = {
     "residual": _Rule(("cycle",), low=0.0),
     "grazed": _Rule(("cycle",), low=0.0, missing=True),
     "defect": _Rule(("cycle",), low=0.0, missing=True),
-    "own_off": _Rule(("cycle",), low=0.0, missing=True, needed=False),
+    "own_off": _Rule(("cycle",), low=0.0, missing=True),
     "time": _Rule(_CYCLE, low=0.0),
     "multiplier": _Rule(("cycle", "multiplier_number", "part"), missing=True),
     "status": _Rule(_CYCLE_CONTACT, "i", 0, 2),

@@ -223,11 +223,11 @@ def _read(data: Any, k: int, told: Any, names: tuple[str, ...], points: tuple[st
     )
     if any(c.contact not in names or len(c.behind) != len(names) for c in changes):
         raise ValueError("changes of contacts that there are not")
-    numbers = {name: float(data[name].values[k]) if name in data else float("nan") for name in NUMBERS}
+    numbers = {name: float(data[name].values[k]) for name in NUMBERS}
     series = _method(told) == "harmonic"
     if np.isfinite(numbers["grazed"]) == series or np.isfinite(numbers["defect"]) != series:
         raise ValueError("grazed is what shooting tells, defect harmonic balance")
-    if "own_off" in data and np.isfinite(numbers["own_off"]) != (series and bool(told["multiplied"])):
+    if np.isfinite(numbers["own_off"]) != (series and bool(told["multiplied"])):
         raise ValueError("harmonic balance tells how far the motion's own multiplier is off, where it has any")
     return Cycle(
         **numbers, time=data["time"].values[k], **{name: data[name].values[k] for name in HISTORIES},
