@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 import stridor as st
-from stridor.agreement import critical_friction, modal_assurance, perturb
+from mode_coupling import mode_coupling
+from stridor.agreement import Perturbation, critical_friction, linear_part, modal_assurance, perturb
+from stridor.agreement.result import judge
 from stridor.case import template_text
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.onsets import onsets
 from stridor.study.analyses import settings_of
-from stridor.temporal.signals import components, envelope, growth, spectrogram, spectrum
+from stridor.temporal.signals import Components, components, envelope, growth, spectrogram, spectrum
 
 pytestmark = pytest.mark.verification
 
@@ -48,6 +50,50 @@ def test_every_mode_seen_in_time_is_a_complex_mode(case: st.Case, mu: float) -> 
     assert seen.grows == (fastest.real > 0)
     if seen.grows:
         assert seen.growth_rate == pytest.approx(fastest.real, rel=0.01)
+
+
+@pytest.mark.parametrize("stepper", ["exact", "implicit"])
+@pytest.mark.parametrize("damping", [0.0, 0.1, 0.5])
+def test_decay_in_time_is_that_of_a_mode(damping: float, stepper: str) -> None:
+    """Motion dies away to rounding, or to what implicit contact is solved to, long before the march ends: what is left
+    is no vibration. Dashpots c at 45° both ways damp the minimal model by c in all directions: Re λ = −c/2."""
+    steps = {"temporal.stepper": "implicit", "temporal.step": 5e-3, "temporal.record_every": 2}
+    case = mode_coupling(damping, 0.1).with_(steps if stepper == "implicit" else {})
+    (compared,) = st.compare(case, [0.6], critical=False, only=["growth"]).comparisons
+    assert compared.agrees is True
+    assert compared.perturbation.growth_rate == pytest.approx(-damping / 2, rel=1e-3, abs=1e-7)
+    assert compared.frequency_error < 1e-4
+
+
+def test_what_is_left_of_a_signal_that_died_is_cut_and_growth_from_nothing_is_not() -> None:
+    time = np.linspace(0.0, 100.0, 4001)
+    noise = 1e-8 * np.cos(0.7 * time)
+    decays = np.exp(-time) * np.cos(9.0 * time) + noise
+    steady = np.array([1e3])
+    assert time[len(linear_part(decays[:, None], steady))] == pytest.approx(np.log(1e5), abs=0.4)
+    grows = decays + 1e-6 * np.exp(0.1 * time) * np.cos(5.0 * time)
+    assert len(linear_part(grows[:, None], steady)) == len(time)
+
+
+def test_a_decay_that_is_no_mode_s_is_not_agreed() -> None:
+    nothing = Components(np.zeros(0, dtype=complex), np.zeros(0))
+
+    def said(seen: complex, mode: complex) -> tuple[bool | None, str]:
+        rate = abs(seen.real - mode.real) / max(abs(mode.real), 1e-300)
+        perturbation = Perturbation(0.6, seen, np.zeros(0), 1.0, nothing)
+        return judge(0.6, unstable=mode.real > 0, here=mode, perturbation=perturbation,
+                     frequency=abs(seen.imag / mode.imag - 1.0), rate=rate)  # fmt: skip
+
+    agrees, why = said(-0.002 + 1.8j, -0.05 + 1.56j)
+    assert agrees is None
+    assert "none of the modes" in why
+    # A mode beyond the band may grow where those of the band are stable.
+    assert judge(0.6, False, 2.0 + 30.0j, Perturbation(0.6, 2.0 + 30.0j, np.zeros(0), 1.0, nothing), 0.0, 0.0)[0] is False
+    assert said(0.024 + 0.29j, -0.05 + 1.1j)[0] is False
+    assert said(-0.045 + 1.1j, -0.05 + 1.1j)[0] is True
+    assert said(-0.035 + 1.1j, -0.05 + 1.1j)[0] is None
+    assert said(0.045 + 1.1j, 0.05 + 1.1j)[0] is False
+    assert said(1e-9 + 1.1j, 1.1j) == (True, "μ = 0.6: both stable (in time it neither grows nor decays)")
 
 
 def test_critical_friction_by_bisection_encloses_the_modal_onset(case: st.Case) -> None:

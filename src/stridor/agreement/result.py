@@ -15,11 +15,13 @@ from ..notebook import Shown, html_table
 from ..tabular import Cell, Rows, Tabular, dataset, split
 from ..temporal.signals import Growth
 from .settled import Settled
-from .small_motion import Perturbation
+from .small_motion import LEVEL, Perturbation
 
 if TYPE_CHECKING:
     from .four_answers import FourAnswers
 
+# Within which decay in time is that of a mode: to be stable it need not be as near as growth, which is the answer.
+SAME_DECAY = 0.25
 GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
 AGREE, DISAGREE, UNDECIDED = "agree: ", "disagree: ", "not decided: "
 
@@ -231,15 +233,28 @@ def _judged(
             "there is no small vibration to compare"
         )
     said = "unstable" if unstable else "stable"
-    if perturbation.eigenvalue == 0 or not np.isfinite(perturbation.eigenvalue):
+    if not perturbation.shows:
         return None, f"μ = {mu:g}: modal says {said}, but the signal in time shows no vibration to compare with"
-    if unstable != perturbation.grows:
-        other = "grows" if perturbation.grows else "decays"
-        return False, f"μ = {mu:g}: they disagree; modal says {said}, the temporal perturbation {other}"
-    if not unstable:
-        return True, f"μ = {mu:g}: both stable (slowest decay in time {perturbation.growth_rate:.4g} 1/s)"
+    seen = perturbation.eigenvalue
+    # Without damping both rates are zero but for rounding, and a share of nothing says nothing.
+    still = max(abs(seen.real), abs(here.real)) <= 2 * LEVEL * abs(here)
     # What is not a number is not good.
-    if not (frequency <= GOOD_FREQUENCY and rate <= GOOD_GROWTH):
+    good = frequency <= GOOD_FREQUENCY and (rate <= GOOD_GROWTH or still)
+    if unstable != perturbation.grows and not (good and still):
+        other = "grows" if perturbation.grows else "does not grow"
+        return False, f"μ = {mu:g}: they disagree; modal says {said}, the temporal perturbation {other}"
+    if not unstable and not (frequency <= GOOD_FREQUENCY and (rate <= SAME_DECAY or still)):
+        return None, (
+            f"μ = {mu:g}: both stable, but what decays slowest in time, {_vibration(seen)}, is none of the modes (the "
+            f"nearest is {_vibration(here)}), so that it is not known to be a motion of the system"
+        )
+    if not unstable:
+        slowest = "in time it neither grows nor decays" if still else (
+            f"slowest decay in time {readable(seen.real, 4)} 1/s, of the mode {readable(here.real, 4)} 1/s, "
+            f"{100 * rate:.2g} %"
+        )
+        return True, f"μ = {mu:g}: both stable ({slowest})"
+    if not good:
         return False, (
             f"μ = {mu:g}: both unstable, but frequency differs by {100 * frequency:.2g} % and growth by "
             f"{100 * rate:.2g} %"
@@ -249,6 +264,11 @@ def _judged(
         f"{readable(here.real, 4, decimals=1)} against {readable(perturbation.growth_rate, 4, decimals=1)} 1/s "
         f"({100 * rate:.2g} %)"
     )
+
+
+def _vibration(lam: complex) -> str:
+    """Frequency and growth of λ in words."""
+    return f"{readable(lam.imag / (2 * np.pi), 5)} Hz with {readable(lam.real, 4)} 1/s"
 
 
 def likeness(verdict: str, dominant: float | None, mac: float | None) -> str:

@@ -146,7 +146,7 @@ def agreement_table(comparison: Comparison) -> Table:
     names = {True: "unstable", False: "stable"}
     undecided = comparison.agrees is None
     same = unstable == temporal.grows and not undecided
-    seen = "not seen" if undecided else names[temporal.grows]
+    seen = names[temporal.grows] if temporal.shows else "not seen"
     judged = "not decided" if undecided else _judged(same)
     rows = [
         Row(("steady sliding is", names[unstable], seen, "", judged), _kind(same)),

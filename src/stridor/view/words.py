@@ -210,6 +210,11 @@ def _agreement_sentence(inputs: ReportInputs) -> str:
             )
         elif c.agrees:
             said = f"at μ = {c.mu:g} both find steady sliding stable"
+        elif c.agrees is None and c.perturbation.shows:
+            said = (
+                f"at μ = {c.mu:g} the modes are {'unstable' if len(c.unstable_hz) else 'stable'} and the vibration "
+                f"{'grows' if c.perturbation.grows else 'decays'} in time, but these are not known to be one motion"
+            )
         elif c.agrees is None:
             said = f"at μ = {c.mu:g} the signal in time shows nothing to compare"
         else:
@@ -353,7 +358,7 @@ def summary_table(inputs: ReportInputs) -> Table | None:
             names = ("stable", "unstable")
             good = {True: "✓ agree", False: "✗ differ", None: "not decided"}[c.agrees]
             at = f"at μ = {c.mu:g}"
-            seen = "not seen" if c.agrees is None else names[both[1]]
+            seen = names[both[1]] if c.perturbation.shows else "not seen"
             rows.append(Row((f"steady sliding {at}", names[both[0]], seen, "", good), "good" if c.agrees else "bad"))
             if any(both):
                 modal = c.modal_eigenvalue
