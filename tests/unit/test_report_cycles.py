@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,12 +54,31 @@ def test_cycles_of_another_model_are_not(found: Cycles, tmp_path: Path):
     assert '<section id="limit-cycles"' not in text
     assert "cycles.nc is of another case: its limit cycles are not shown." in text
     st.save(st.onsets(mode_coupling(0.02, 0.1)), tmp_path / "cycles.nc")
-    assert "cycles.nc is of another case" in page(mode_coupling(0.02, 0.1), tmp_path)
+    assert "cycles.nc holds no cycles: " in page(mode_coupling(0.02, 0.1), tmp_path)
+    st.save(replace(found, provenance={}), tmp_path / "cycles.nc")
+    assert "cycles.nc does not tell its case: " in page(mode_coupling(0.02, 0.1), tmp_path)
     (tmp_path / "cycles.nc").write_bytes(b"no file of results")
     assert "cycles.nc cannot be read: " in page(mode_coupling(0.02, 0.1), tmp_path)
     (tmp_path / "cycles.nc").unlink()
     text = page(mode_coupling(0.02, 0.1), tmp_path)
     assert "cycles.nc" not in text
+
+
+def test_a_run_of_another_system_or_that_has_not_settled_is_not_drawn(found: Cycles, tmp_path: Path):
+    st.save(found, tmp_path / "cycles.nc")
+    case = mode_coupling(0.02, 0.1).with_({"temporal.record_every": 2, "temporal.perturbation": 0.05})
+
+    def caption(duration: float, **phase: dict[str, float]) -> str:
+        asked = case.with_({"phases": [{"name": "slide", "duration": duration, **phase}]})
+        outcome = st.run(asked, tmp_path, only=["modes", "onsets", "simulate", "report"])
+        assert outcome.report is not None
+        text = re.sub(r"[\s\u00a0]+", " ", outcome.report.read_text(encoding="utf-8"))
+        (told,) = re.findall(r"(?:The run in time is not drawn|Cross: )[^<]*", text)
+        return told
+
+    assert caption(400.0).startswith("Cross: the run in time")
+    assert "the run is too short" in caption(60.0)
+    assert "they go with full loads and speeds, and the run ends with others (press)." in caption(400.0, loads={"press": 0.5})
 
 
 def test_the_loudest_and_the_rows(found: Cycles):

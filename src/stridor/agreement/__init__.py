@@ -6,7 +6,7 @@ from .four_answers import GOOD_AMPLITUDE, CycleSeen, FourAnswers
 from .kept import Store
 from .perturbation import perturb
 from .result import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, Agreement, Comparison
-from .settled import Settled
+from .settled import Settled, settled
 from .shapes import modal_assurance, mode_shape
 from .small_motion import LINEAR, PERTURBATION, Perturbation, linear_part
 
@@ -33,4 +33,5 @@ __all__ = [
     "modal_assurance",
     "mode_shape",
     "perturb",
+    "settled",
 ]

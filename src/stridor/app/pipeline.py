@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..agreement import Store, modal_assurance
-from ..case import Case
+from ..agreement import Store, dominant_response, modal_assurance, settled
 from ..digits import measured
 from ..errors import CaseError, StridorError
 from ..io.atomic import write_text
@@ -26,6 +25,7 @@ from ..modal.onsets import Onsets
 from ..notebook import Shown, html_table
 from ..periodic import Cycles
 from ..study.asked import require_friction
+from ..study.comparison import other_in_time
 from ..study.everything import Everything, compute_everything
 from ..study.fingerprint import same_model
 from ..study.parts import OF_REPORT, Parts, chosen_parts
@@ -197,23 +197,45 @@ def _run(
         return Outcome(None, tuple(files), everything)
     if log is not None:
         log("report")
-    inputs = _with_cycles(report_inputs(everything), case, None if fresh else target / "cycles.nc")
+    inputs = _with_cycles(report_inputs(everything), work, None if fresh else target / "cycles.nc")
     return Outcome(write_report(inputs, target), tuple(files), everything)
 
 
-def _with_cycles(inputs: ReportInputs, case: Case, path: Path | None) -> ReportInputs:
+def _with_cycles(inputs: ReportInputs, work: Workspace, path: Path | None) -> ReportInputs:
     """The same with the limit cycles in a file, if they are of this very model; a note where they are not."""
+
+    def noted(what: str) -> ReportInputs:
+        return replace(inputs, notes=(*inputs.notes, f"{what}: its limit cycles are not shown."))
+
     if path is None or not path.is_file():
         return inputs
     try:
         found = open_result(path)
     except StridorError as error:
         return replace(inputs, notes=(*inputs.notes, f"{path.name} cannot be read: {error}"))
-    if not isinstance(found, Cycles) or not same_model(case, found.provenance.get("fingerprint", {})):
-        return replace(
-            inputs, notes=(*inputs.notes, f"{path.name} is of another case: its limit cycles are not shown.")
-        )
-    return replace(inputs, cycles=found)
+    if not isinstance(found, Cycles):
+        return noted(f"{path.name} holds no cycles")
+    if "fingerprint" not in found.provenance:
+        return noted(f"{path.name} does not tell its case")
+    if not same_model(work.case("report"), found.provenance["fingerprint"]):
+        return noted(f"{path.name} is of another case")
+    return replace(inputs, cycles=found, beside_cycles=_beside(inputs, work))
+
+
+def _beside(inputs: ReportInputs, work: Workspace) -> str:
+    """Why the run in time is not drawn beside cycles; "" where it is, or where there is none."""
+    run = inputs.trajectory
+    if run is None or not run.phases or not len(run.time):
+        return ""
+    if run.interrupted:
+        return "it was cut"
+    if inputs.unsaturated is not None:
+        return "it still grows"
+    if other := other_in_time(work):
+        return other
+    rate = 0.0 if inputs.modes is None else float(inputs.modes.growth_rate.max(initial=0.0))
+    found, why = settled(run, *dominant_response(run, work.modal.max_frequency_hz), rate)
+    return "" if found is not None else why
 
 
 def _before(work: Workspace, path: Path) -> Trajectory | None:

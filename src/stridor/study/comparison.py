@@ -95,14 +95,19 @@ def _with_cycles(work: Workspace, found: Agreement, progress: Callable[[str], No
 
 def _why_not(work: Workspace) -> str:
     """Why no cycle can be held against the runs; "" where they can."""
+    return f"cycles were not sought: {other}" if (other := other_in_time(work)) else ""
+
+
+def other_in_time(work: Workspace) -> str:
+    """What makes the run in time another system than that of its cycles; "" where they are one."""
     compliance = work.structured("compare").contact_nodes().compliance
     if settings_of(work).contact == "rigid" and np.any(compliance > 0.0):
-        return "cycles were not sought: contact in time is another than theirs (temporal.contact)"
+        return "contact in time is another than theirs (temporal.contact)"
     factors: dict[str, float] = {}
     for phase in phases_of(work):
         factors |= {**phase.loads, **phase.velocities, **phase.displacements}
     if off := [name for name, factor in factors.items() if factor != 1.0]:
-        return f"cycles were not sought: they go with full loads and speeds, and the run ends with others ({off[0]})"
+        return f"they go with full loads and speeds, and the run ends with others ({off[0]})"
     return ""
 
 

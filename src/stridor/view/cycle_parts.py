@@ -87,14 +87,15 @@ def cycle_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     result, run = inputs.cycles, inputs.trajectory
     if result is None or not (result.cycles or result.onsets):
         return
-    shown = run is not None and inputs.mu is not None and inputs.unsaturated is None and not run.interrupted
+    shown = run is not None and inputs.mu is not None and not inputs.beside_cycles
     runs = [(inputs.mu, run)] if shown and inputs.mu is not None and run is not None and len(run.time) else []
     yield ReportFigure(
         "cycle-branches",
         "Limit cycles over friction",
         "Half the range of the slip velocity, of the contact where it is largest, and the frequency. Drawn through: "
         "stable; dashed: unstable or undecided. Diamonds: folds. Triangles: onsets of growth of steady sliding."
-        + (" Cross: the run in time, over the last quarter of its last phase." if runs else ""),
+        + (" Cross: the run in time, over the last quarter of its last phase." if runs else "")
+        + (f" The run in time is not drawn beside them: {inputs.beside_cycles}." if inputs.beside_cycles else ""),
         "Slip amplitude and frequency of limit cycles over the friction coefficient.",
         cycle_branches(result, runs),
     )

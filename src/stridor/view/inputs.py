@@ -61,7 +61,8 @@ class ReportInputs:
     found, by the name of the figure or table here ("frequency-pair": "figure 3").
     steady: equilibrium of every contact node; shape_vector (n,): the mode that grows fastest, friction_energy (m,):
     what friction feeds into it at each slave node. sensitivities, measures: what changes of the case do;
-    unsaturated: that the run still grows. cycles: limit cycles of this case that were found before. timings [s]
+    unsaturated: that the run still grows. cycles: limit cycles of this case that were found before;
+    beside_cycles: why the run is not held against them. timings [s]
     by analysis; versions by program; case_text: the case file as written; created: date and time; warnings and notes in
     words.
     """
@@ -108,6 +109,7 @@ class ReportInputs:
     measures: Countermeasures | None = None
     unsaturated: Unsaturated | None = None
     cycles: Cycles | None = None
+    beside_cycles: str = ""
 
     @property
     def max_frequency_hz(self) -> float:
