@@ -90,7 +90,7 @@ def test_the_loudest_and_the_rows(found: Cycles):
     table = cycle_table(found)
     assert table is not None
     assert f"{len(found.cycles) - len(rows)} more cycles are in cycles.csv." in table.caption
-    assert cycle_words(found)[0].startswith("What it swings in beyond an onset, by shooting on the exact motion, computed on ")
+    assert cycle_words(found)[0].startswith("Limit cycles, by shooting on the exact motion, computed on ")
 
 
 def test_a_run_is_drawn_where_it_has_come_to():

@@ -575,8 +575,16 @@ def test_auto_leaves_to_others_what_implicit_steps_refuse_at_the_start(why: str,
         system = block_on_belt(speed=0.2)
         system = replace(system, contacts=(replace(system.contacts[0], gap=-0.1 if why == "overlap" else 0.0),))
         phases = [PhaseSpec("slide", 1.0, {"press": 1.0}, {"belt": 1.0})]
-    result = simulate(system, phases, Settings(stepper="auto", record_every=1, max_frequency_hz=5.0))
+    settings = Settings(stepper="auto", record_every=1, max_frequency_hz=5.0)
+    result = simulate(system, phases, settings)
     assert (result.path == "implicit") == (why == "nothing")
+    told = {"overlap": "a rigid contact starts with overlap", "jump": "a distance that changes at once", "nothing": ""}[why]
+    assert ("implicit steps do not begin so: " in result.path_reason) == (why != "nothing")
+    assert told in result.path_reason
+    # What is said beforehand is what is done.
+    path, reason, _ = plan(system, settings, phases)
+    assert path == result.path
+    assert result.path_reason.startswith(reason)
 
 
 def test_what_of_a_start_the_coordinates_do_not_have_is_said():

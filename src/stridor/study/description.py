@@ -25,7 +25,7 @@ from ..temporal.settings import choose_step
 from ..temporal.simulate import plan
 from .matrix_reports import matrix_reports
 from .pressed import unpressed_in_time
-from .settings import settings_of
+from .settings import phases_of, settings_of
 from .unit_warnings import resolution_warnings, unit_warnings
 from .workspace import Problem, Workspace
 
@@ -189,7 +189,7 @@ def _law_words(friction: Friction) -> str:
 def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     """The time step against its limit, and how the time loop will go; added to the data."""
     settings = settings_of(case)
-    path, reason, limit = plan(system, settings)
+    path, reason, limit = plan(system, settings, phases_of(case))
     step = choose_step(limit, settings)
     steps = sum(round(p.duration / step) for p in case.phases)
     data |= {"step": step, "step_limit": limit.step, "limiting_body": limit.body, "path": path, "steps": steps}

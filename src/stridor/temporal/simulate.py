@@ -74,12 +74,9 @@ def simulate(
         record_every=settings.record_every,
         watch=settings.watch,
     )
-    asked = settings
-    settings, why = _chosen(system, settings)
+    settings, why = _chosen(system, settings, () if restart is not None else phases)
     if settings.stepper == "implicit":
         settings = replace(settings, step=whole_steps(settings, phases))
-        if asked.stepper == "auto" and restart is None and why_not_begun(system, settings, phases):
-            settings, why = replace(asked, stepper="explicit"), ""
     stepper = stepper_for(system, settings, mu, why)
     motion = system.motion
     schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
@@ -106,26 +103,31 @@ def _check_step(phases: Sequence[PhaseSpec], schedule: Schedule) -> None:
             )  # fmt: skip
 
 
-def plan(system: System, settings: Settings) -> tuple[str, str, StepLimit]:
-    """How a system would be marched: path, why it is taken, and the limit of the step. Raises CaseError where the
-    stepper that is asked for does not take it."""
+def plan(system: System, settings: Settings, phases: Sequence[PhaseSpec] = ()) -> tuple[str, str, StepLimit]:
+    """How a system would be marched, through phases where these are given: path, why it is taken, and the limit of the
+    step. Raises CaseError where the stepper that is asked for does not take it."""
     system = settings.system(system)
-    settings, exactly = _chosen(system, settings)
+    settings, why = _chosen(system, settings, phases)
     if settings.stepper == "exact":
         refuse(system)
-        return "exact", exactly, step_limit(system, 0.5)
+        return "exact", why, step_limit(system, 0.5)
     if settings.stepper == "implicit":
         refuse_implicit(system, settings)
         step = whole_steps(settings, ())
-        return "implicit", exactly, StepLimit(step, 2 * np.pi / step, "the highest frequency asked for", 1.0)
-    if why := _why_sparse(system, settings):
-        return "assembled", why, step_limit_assembled(system, settings.beta2)
+        return "implicit", why, StepLimit(step, 2 * np.pi / step, "the highest frequency asked for", 1.0)
+    if sparse := _why_sparse(system, settings):
+        return "assembled", _joined(sparse, why), step_limit_assembled(system, settings.beta2)
     modes, reason = choose_path(system, settings)
-    return "modal" if modes else "nodal", reason, step_limit(system, settings.beta2)
+    return "modal" if modes else "nodal", _joined(reason, why), step_limit(system, settings.beta2)
 
 
-def _chosen(system: System, settings: Settings) -> tuple[Settings, str]:
-    """Settings with the stepper that "auto" comes to, and why it is not the explicit one, "" where it is."""
+def _joined(*reasons: str) -> str:
+    return "; ".join(reason for reason in reasons if reason)
+
+
+def _chosen(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> tuple[Settings, str]:
+    """Settings with the stepper that "auto" comes to, and why: of explicit steps only where phases, if there are any,
+    keep it from others."""
     if settings.stepper != "auto":
         return settings, "asked for" if settings.stepper in ("exact", "implicit") else ""
     usual = settings.path == "auto" and settings.beta2 == 0.5
@@ -135,23 +137,26 @@ def _chosen(system: System, settings: Settings) -> tuple[Settings, str]:
     resolved = highest is not None and (settings.step is None or COARSE < settings.step * highest <= COARSEST)
     if usual and resolved and count >= MANY and not why_not_implicit(system, settings):
         why = f"{count} contact nodes, from {MANY} on steps that resolve {settings.max_frequency_hz:g} Hz are cheaper"
-        return replace(settings, stepper="implicit"), why
+        implicit = replace(settings, stepper="implicit")
+        if phases and (not_so := why_not_begun(system, replace(implicit, step=whole_steps(settings, phases)), phases)):
+            return replace(settings, stepper="explicit"), f"implicit steps do not begin so: {not_so}"
+        return implicit, why
     return replace(settings, stepper="explicit"), ""
 
 
-def stepper_for(system: System, settings: Settings, mu: float | None, why: str = "asked for") -> Stepper:
-    """The method of time stepping that suits a system, or the one that the settings ask for; ``why`` it is not the
-    explicit one."""
+def stepper_for(system: System, settings: Settings, mu: float | None, why: str = "") -> Stepper:
+    """The method of time stepping that suits a system, or the one that the settings ask for; ``why`` it came to that
+    (`_chosen`)."""
     if settings.stepper == "exact":
-        return exact_stepper(system, settings, mu, why)
+        return exact_stepper(system, settings, mu, why or "asked for")
     if settings.stepper == "implicit":
-        return implicit_stepper(system, settings, mu, why)
-    if why := _why_sparse(system, settings):
-        return sparse_stepper(system, settings, mu, why)
+        return implicit_stepper(system, settings, mu, why or "asked for")
+    if sparse := _why_sparse(system, settings):
+        return sparse_stepper(system, settings, mu, _joined(sparse, why))
     modes, reason = choose_path(system, settings)
     if modes is None:
-        return sparse_stepper(system, settings, mu, reason, path="nodal")
-    return modal_stepper(system, settings, mu, modes, reason)
+        return sparse_stepper(system, settings, mu, _joined(reason, why), path="nodal")
+    return modal_stepper(system, settings, mu, modes, _joined(reason, why))
 
 
 def _why_sparse(system: System, settings: Settings) -> str:

@@ -49,7 +49,7 @@ def cycle_words(result: Cycles) -> tuple[str, ...]:
     by = " and ".join(way for name, way in ways.items() if name in methods)
     made = str(result.provenance.get("created", ""))[:10]
     said = [
-        f"What it swings in beyond an onset{f', by {by}' if by else ''}{f', computed on {made}' if made else ''}: "
+        f"Limit cycles{f', by {by}' if by else ''}{f', computed on {made}' if made else ''}: "
         f"{result.sentence}. Motions end in stable cycles; an unstable one is the border between two states."
     ]
     return (*said, *(f"{line[0].upper()}{line[1:]}." for line in result.warnings))
