@@ -16,6 +16,7 @@ from stridor.modal.complex_modes import complex_modes
 from stridor.modal.onsets import onsets
 from stridor.study.analyses import settings_of
 from stridor.temporal.signals import Components, components, envelope, growth, spectrogram, spectrum
+from stridor.view.temporal_tables import agreement_table
 
 pytestmark = pytest.mark.verification
 
@@ -63,6 +64,14 @@ def test_decay_in_time_is_that_of_a_mode(damping: float, stepper: str) -> None:
     assert compared.agrees is True
     assert compared.perturbation.growth_rate == pytest.approx(-damping / 2, rel=1e-3, abs=1e-7)
     assert compared.frequency_error < 1e-4
+
+
+def test_the_table_of_a_report_holds_decay_to_what_the_verdict_does() -> None:
+    case = mode_coupling(0.1, 0.1)
+    (found,) = st.compare(case, [0.6], critical=False, only=["growth"]).comparisons
+    for share, kind in ((0.9, "good"), (0.7, "bad")):
+        seen = replace(found.perturbation, eigenvalue=complex(share * found.modal_eigenvalue.real, found.modal_eigenvalue.imag))
+        assert agreement_table(replace(found, perturbation=seen)).rows[2].kind == kind
 
 
 def test_what_is_left_of_a_signal_that_died_is_cut_and_growth_from_nothing_is_not() -> None:

@@ -5,7 +5,7 @@ from .critical import critical_friction
 from .four_answers import GOOD_AMPLITUDE, CycleSeen, FourAnswers
 from .kept import Store
 from .perturbation import perturb
-from .result import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, Agreement, Comparison
+from .result import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, SAME_DECAY, Agreement, Comparison
 from .settled import Settled, settled
 from .shapes import modal_assurance, mode_shape
 from .small_motion import LINEAR, PERTURBATION, Perturbation, linear_part
@@ -19,6 +19,7 @@ __all__ = [
     "LINEAR",
     "PARTS",
     "PERTURBATION",
+    "SAME_DECAY",
     "Agreement",
     "Comparison",
     "CycleSeen",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..agreement import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, Agreement, Comparison
+from ..agreement import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, SAME_DECAY, Agreement, Comparison
 from ..modal.complex_modes import ComplexModes
 from ..temporal.attractor import settled
 from ..temporal.energy import EnergyBalance
@@ -151,7 +151,7 @@ def agreement_table(comparison: Comparison) -> Table:
     rows = [
         Row(("steady sliding is", names[unstable], seen, "", judged), _kind(same)),
         agreed("frequency [Hz]", modal.imag / (2 * np.pi), temporal.frequency_hz, GOOD_FREQUENCY),
-        agreed("growth rate [1/s]", modal.real, temporal.growth_rate, GOOD_GROWTH),
+        agreed("growth rate [1/s]", modal.real, temporal.growth_rate, GOOD_GROWTH if unstable else SAME_DECAY),
     ]
     if comparison.growth_mac is not None:
         mac = comparison.growth_mac
