@@ -29,7 +29,7 @@ from ..temporal.simulate import plan, simulate
 from ..threads import one_thread
 from ..typing import Array, ComplexArray, IntArray, Sparse
 from .shapes import component_shape, node_rows
-from .small_motion import DIED, DIED_IMPLICIT, PERTURBATION, Perturbation, linear_part, whole
+from .small_motion import PERTURBATION, Perturbation, linear_part, whole
 
 TOLD_APART = 40  # modes, each of two poles, that `components` tells apart in one signal
 FASTEST = 3  # modes to start with where these are not all
@@ -91,7 +91,7 @@ def perturb(
     speed = np.linalg.norm(slip, axis=1)
     start, moved = _in_equal_measure(nodes, lam, vectors)
     start *= PERTURBATION * speed[speed > 0.0].min() / len(chosen)
-    path, _, limit = plan(system, settings)
+    _, _, limit = plan(system, settings)
     step = settings.step or choose_step(limit, settings)
     every = max(1, int(1.0 / (SAMPLES * max_frequency_hz * step)))
     # One node of each contact, of those that slide: the one that moves most.
@@ -102,8 +102,7 @@ def perturb(
     quiet = replace(settings, step=step, initial="steady-sliding", perturbation=0.0, watch=names, record_every=every)
     disturbance = start[0], start[1], start[2]
     run = whole(simulate(watched, [_as_steady(system, length)], quiet, mu=mu, disturbance=disturbance))
-    died = DIED_IMPLICIT if path == "implicit" else DIED
-    signal = linear_part(run.velocity[:, : len(leaders), 0], speed[leaders], died=died)
+    signal = linear_part(run.velocity[:, : len(leaders), 0], speed[leaders])
     band = components(signal, run.sampling, max_frequency_hz=max_frequency_hz)
     form = None
     if shape:

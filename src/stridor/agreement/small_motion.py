@@ -14,8 +14,8 @@ from .shapes import TimeShape
 PERTURBATION = 1e-5  # of the slip speed, at the start
 LINEAR = 0.02  # of the slip speed: beyond it the perturbation is no longer small
 # Of the largest of a signal: what stays below it to the end has died away. What is left is rounding of the steady
-# motion, or, of implicit steps, what their contact is not solved to, which adds up over a run: it has any rate.
-DIED, DIED_IMPLICIT = 1e-5, 1e-2
+# motion, which has any rate.
+DIED = 1e-5
 LEVEL = 1e-6  # of |λ|: growth or decay in time below it is none, of motion that nothing damps
 
 
@@ -60,14 +60,14 @@ def whole(run: Trajectory) -> Trajectory:
     return run
 
 
-def linear_part(signals: Array, steady: Array, *, skip: int = 0, died: float = DIED) -> Array:
+def linear_part(signals: Array, steady: Array, *, skip: int = 0) -> Array:
     """Of slip speeds less their steady values, (k, m), that which moves most, while all of them stay below 2 % of the
-    steady ones (m,), and until it stays below the share ``died`` of its largest for good; ``skip`` instants at the
+    steady ones (m,), and until it stays below `DIED` of its largest for good; ``skip`` instants at the
     start, which may hold the spike of a sudden impulse, are left out."""
     over = np.flatnonzero(np.any(np.abs(signals) > LINEAR * np.abs(steady), axis=1))
     last = int(over[0]) if len(over) else len(signals)
     first = min(last // 8, skip)
     contact = int(np.argmax(np.abs(signals[first:last]).max(axis=0, initial=0.0)))
     moved = np.abs(signals[first:last, contact])
-    heard = np.flatnonzero(moved > died * moved.max(initial=0.0))
+    heard = np.flatnonzero(moved > DIED * moved.max(initial=0.0))
     return signals[first : first + (int(heard[-1]) + 1 if len(heard) else 0), contact]

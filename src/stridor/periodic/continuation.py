@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import time as clock
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -21,6 +22,7 @@ FIRST = 0.02
 MOST = 400  # points
 TURN = 0.6  # cosine between two headings
 FLAT = 1e-4  # of a heading: a fold
+HALVINGS = 14  # cycles between two others that are closed for one
 STOPPED = "it was stopped"
 UNFINISHED = ("could not be followed", "could not be closed", "points were made", "of computing were over")
 
@@ -97,10 +99,16 @@ def unfinished(end: str) -> bool:
 
 
 def follow(
-    branch: Followed[P], first: P, heading: Array, seen: Seen[P], most: int = MOST, seconds: float = math.inf
+    branch: Followed[P],
+    first: P,
+    heading: Array,
+    seen: Seen[P],
+    most: int = MOST,
+    seconds: float = math.inf,
+    unsolved: Callable[[str], None] | None = None,
 ) -> str:
     """Follow a branch from a cycle until it leaves the range; why it ended, STOPPED where ``seen`` said so. seconds: of
-    processor time, what ``seen`` takes included."""
+    processor time, what ``seen`` takes included. unsolved: is told each fold that was passed and could not be closed."""
     low, high = branch.between
     spot, length = Spot(first, heading), FIRST
     until = clock.process_time() + seconds
@@ -121,6 +129,8 @@ def follow(
             return f"it comes to steady sliding at μ = {closed.mu:.6g}"
         if spot.heading[-1] * turned[-1] < 0.0:
             fold = _fold(branch, spot, length, turned)
+            if fold is None and unsolved is not None:
+                unsolved(f"its fold near μ = {spot.mu:.6g} to {closed.mu:.6g} could not be closed, and is not marked")
             if fold is not None and not seen(fold, fold=True):
                 return STOPPED
         if not seen(closed, fold=False):
@@ -139,24 +149,28 @@ def _turned(branch: Followed[P], spot: Spot[P], closed: P) -> Array:
 
 
 def _fold(branch: Followed[P], spot: Spot[P], length: float, turned: Array) -> P | None:
-    """The cycle between two at which μ turns back, by regula falsi on the heading; None where that fails."""
+    """The cycle between two at which μ turns back, by regula falsi on the heading, and by halves where no cycle is
+    found there or little is gained; None where that fails. At a corner of the branch the heading jumps: then the cycle
+    is as near to it as a branch is followed by."""
     low, high = (0.0, float(spot.heading[-1])), (length, float(turned[-1]))
-    found = None
-    for _ in range(6):
-        middle = low[0] - low[1] * (high[0] - low[0]) / (high[1] - low[1])
+    halve = False
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low[0] + high[0]) if halve else low[0] - low[1] * (high[0] - low[0]) / (high[1] - low[1])
         try:
             found = branch.corrected(branch.ahead(spot, middle), spot.heading)
             branch.forget()
             here = float(branch.heading(found, spot.heading)[-1])
         except (AnalysisError, np.linalg.LinAlgError):
-            return None
-        if abs(here) < FLAT:
+            if halve:
+                return None
+            halve = True
+            continue
+        before = high[0] - low[0]
+        low, high = ((middle, here), high) if here * low[1] > 0.0 else (low, (middle, here))
+        if abs(here) < FLAT or high[0] - low[0] < SMALLEST:
             return found
-        if here * low[1] > 0.0:
-            low, high = (middle, here), (high[0], 0.5 * high[1])
-        else:
-            low, high = (low[0], 0.5 * low[1]), (middle, here)
-    return found
+        halve = not halve and high[0] - low[0] > 0.5 * before
+    return None
 
 
 def _to_the_edge(branch: Followed[P], spot: Spot[P], beyond: P, seen: Seen[P]) -> str:

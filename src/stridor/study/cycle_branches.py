@@ -17,7 +17,8 @@ Kept = Callable[[], bool]
 
 @dataclass
 class Traced:
-    """A branch while it is followed: its cycles, closed and as data, which of them are folds, and how it ends."""
+    """A branch while it is followed: its cycles, closed and as data, which of them are folds, how it ends, and folds
+    of it that were passed and could not be closed."""
 
     method: Method[Any, Any]
     closed: list[Any] = field(default_factory=list[Any])
@@ -26,6 +27,7 @@ class Traced:
     begins: str = ""
     ends: str = "it was stopped"
     onset: int | None = None
+    unsolved: list[str] = field(default_factory=list[str])
 
     def add(self, closed: Any, said: str, *, fold: bool) -> None:
         """Another cycle behind the last."""
@@ -127,7 +129,8 @@ class Tracer:
 
         if include and not seen(first, fold=False):
             return
-        traced.ends = follow(branch, first, heading, seen, self.points, self.method.branch_seconds)
+        limit = self.method.branch_seconds
+        traced.ends = follow(branch, first, heading, seen, self.points, limit, traced.unsolved.append)
         if traced.ends.startswith("it comes to steady sliding"):
             last = traced.cycles[-1]
             for onset in others:

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import interrupts
 from ..errors import CaseError
-from ..periodic import Cycle, CycleOnset, Cycles, Family, unfinished, why_not_shooting
+from ..periodic import Cycle, CycleBranch, CycleOnset, Cycles, Family, unfinished, why_not_shooting
 from ..periodic.harmonic import HarmonicFamily, why_not_harmonic
 from ..system import System
 from ..typing import Array
@@ -219,15 +219,14 @@ class _Search:
     def result(self) -> Cycles:
         """All of it: single cycles by μ, then branch after branch."""
         found = sorted(self.single, key=lambda one: one.mu)
-        branches = []
+        branches: list[CycleBranch] = []
+        lost: list[str] = []
         for traced in self.tracer.traced:
             if traced.cycles:
                 branches.append(traced.result(len(found)))
                 found += traced.cycles
-        lost = [
-            f"branch {k}: {end}" for k, branch in enumerate(branches, start=1) for end in (branch.begins, branch.ends)
-            if unfinished(end)
-        ]  # fmt: skip
+                said = [end for end in (traced.begins, traced.ends) if unfinished(end)]
+                lost += [f"branch {len(branches)}: {words}" for words in (*said, *traced.unsolved)]
         made = provenance(
             self.work, "cycles", time.perf_counter() - self.started,
             between=None if self.between is None else list(self.between), push=self.pushes,

@@ -49,14 +49,23 @@ def same_model(case: Case, before: Mapping[str, Any]) -> bool:
     """Whether a fingerprint is that of the same bodies, contacts, loads and motions, and of files with the same
     contents, whatever phases and time steps are."""
 
-    def of_model(told: Mapping[str, Any]) -> tuple[dict[str, Any], Any]:
-        kept = {path: value for path, value in told["values"].items() if path.split(".")[0] not in IN_TIME}
-        return kept, told["files"]
-
     try:
-        return of_model(json.loads(json.dumps(fingerprint(case, None)))) == of_model(before)
+        now = json.loads(json.dumps(fingerprint(case, None)))
+        changed = _changed(case, now["values"], before["values"])
+        return not any(path.split(".")[0] not in IN_TIME for path in changed) and now["files"] == before["files"]
     except (KeyError, TypeError, AttributeError):
         return False
+
+
+def _changed(case: Case, now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
+    """Paths of the values that are others than before."""
+    given = {path for path, _ in _flat(case.model_dump(mode="json", exclude_unset=True, exclude_none=True), ())}
+
+    def learned(path: str) -> bool:
+        """A number that the program has learned since stands at its default."""
+        return path not in then and path not in given and _known(path, then)
+
+    return [path for path in dict.fromkeys([*now, *then]) if now.get(path) != then.get(path) and not learned(path)]
 
 
 def differences(case: Case, mu: float | None, before: Trajectory) -> tuple[list[Difference], list[Difference]]:
@@ -66,14 +75,10 @@ def differences(case: Case, mu: float | None, before: Trajectory) -> tuple[list[
     fingerprint that can be read.
     """
     then, now = _readable(before), fingerprint(case, mu)
-    given = {path for path, _ in _flat(case.model_dump(mode="json", exclude_unset=True, exclude_none=True), ())}
-    found: list[Difference] = []
-    for path in dict.fromkeys([*now["values"], *then["values"]]):
-        was, now_is = then["values"].get(path), now["values"].get(path)
-        # A number that the program has learned since stands at its default.
-        learned = path not in then["values"] and path not in given and _known(path, then["values"])
-        if was != now_is and not learned:
-            found.append(Difference(path, was, now_is))
+    found = [
+        Difference(path, then["values"].get(path), now["values"].get(path))
+        for path in _changed(case, now["values"], then["values"])
+    ]
     if then["mu"] != mu:
         found.append(Difference("mu", then["mu"], mu))
     for path in dict.fromkeys([*now["files"], *then["files"]]):

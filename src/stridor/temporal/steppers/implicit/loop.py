@@ -38,6 +38,9 @@ from ...columns import (
 from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, Nodes, Record, State, Structure, Work
 from .node_law import SWEEP_LIMIT, solve_nodes, total_of
 
+# Steps after which gaps and velocities of the nodes are read off the structure again. From step to step they are
+# added up, with the gap over the step taken in and out: the digits that this loses drift one way, as a slip would.
+RENEWED = 32
 FINISHED, NOT_FINITE, HARD = 0, 1, 2
 _SLIP, _STICK = multipliers.SLIP, multipliers.STICK
 
@@ -322,6 +325,15 @@ def _move_nodes(rate: Array, a: Structure, nodes: Nodes, state: State, work: Wor
 
 
 @njit(cache=True)
+def _renew(nodes: Nodes, state: State, d: int) -> None:  # pragma: no cover - compiled
+    """Gaps and velocities of the nodes as the structure has them."""
+    for i in range(len(nodes.gap)):
+        state.place[i] = _dot(nodes.row[i * d], state.q)
+        for j in range(d):
+            state.speed[i * d + j] = _dot(nodes.row[i * d + j], state.v)
+
+
+@njit(cache=True)
 def run_steps(
     steps: int, given: bool, loads: Array, increments: Array, rates: Array, a: Structure, nodes: Nodes, state: State,
     work: Work, record: Record,
@@ -360,4 +372,6 @@ def run_steps(
             state.impulse[:] = work.impulse
             state.status[:] = work.status
         state.counters[DONE] += 1
+        if m and state.counters[DONE] % RENEWED == 0:
+            _renew(nodes, state, work.local.shape[1])
     return steps, FINISHED
