@@ -21,7 +21,7 @@ import stridor as st
 from benches import paper_case
 from stridor.app.page.running import sound_of_file
 from stridor.app.page.runs import Queue, Run, Wish
-from stridor.studies.workers import spawned
+from stridor.studies.processes import spawned
 
 SHORT = {
     "bodies.beam1.elements": 4, "bodies.beam2.elements": 8, "temporal.step": 2e-7, "temporal.record_every": 5,

@@ -108,7 +108,7 @@ def follow(
     unsolved: Callable[[str], None] | None = None,
 ) -> str:
     """Follow a branch from a cycle until it leaves the range; why it ended, STOPPED where ``seen`` said so. seconds: of
-    processor time, what ``seen`` takes included. unsolved: is told each fold that was passed and could not be closed."""
+    processor time, what ``seen`` takes included. unsolved: is told each fold that was passed and not closed."""
     low, high = branch.between
     spot, length = Spot(first, heading), FIRST
     until = clock.process_time() + seconds

@@ -12,7 +12,8 @@ from matplotlib.lines import Line2D
 
 from ..errors import AnalysisError
 from ..typing import Array
-from ..view.style import BLUE, GREY, INK, ORANGE, VERMILION, legend_above, panel, styled
+from ..view.colours import BLUE, GREY, INK, ORANGE, VERMILION
+from ..view.style import legend_above, panel, styled
 from .result import StudyResult, numbers
 from .uncertainty import Indices, grows
 

@@ -11,23 +11,22 @@ import contextlib
 import multiprocessing
 import os
 import signal
-import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from typing import Any
 
 from ..errors import AnalysisError
+from .processes import spawned
 from .rows import Row
 from .task import Batch, Task, answered, died
 
 TRIES = 3  # of a row by itself, at which a worker dies
 EVERY = 0.25  # seconds between the results that a worker sends
 PATIENCE = 5.0  # seconds that a worker has to end
-THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 Answer = Callable[[Task, Batch], Iterator[tuple[int, Row]]]
@@ -132,46 +131,6 @@ class LocalWorkers:
         worker = _Worker(*spawned(_work, "stridor study", self.task, self.answer))
         self._workers.append(worker)
         return worker
-
-
-def spawned(target: Callable[..., object], name: str, *given: Any) -> tuple[Any, Any]:
-    """A new process with one BLAS thread, ``target(pipe, *given)`` in it, and our end of the pipe."""
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=target, args=(theirs, *given), name=name, daemon=True)
-    with one_thread_each(), main_left_out():
-        process.start()
-    theirs.close()  # so that the pipe ends with the process
-    return process, ours
-
-
-@contextlib.contextmanager
-def one_thread_each() -> Generator[None]:
-    """Processes that start here compute with one thread: there are as many as cores."""
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
-@contextlib.contextmanager
-def main_left_out() -> Generator[None]:
-    """Processes that start here do not import the script that starts them, which would start a study again where it
-    lacks ``if __name__ == "__main__"``; nothing of it is needed."""
-    main = sys.modules["__main__"].__dict__
-    before = {name: main[name] for name in ("__file__", "__spec__") if name in main}
-    main.pop("__file__", None)
-    main["__spec__"] = None
-    try:
-        yield
-    finally:
-        main.update(before)
 
 
 def _work(pipe: Any, task: Task, answer: Answer) -> None:

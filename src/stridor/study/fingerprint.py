@@ -48,7 +48,6 @@ def fingerprint(case: Case, mu: float | None) -> dict[str, Any]:
 def same_model(case: Case, before: Mapping[str, Any]) -> bool:
     """Whether a fingerprint is that of the same bodies, contacts, loads and motions, and of files with the same
     contents, whatever phases and time steps are."""
-
     try:
         now = json.loads(json.dumps(fingerprint(case, None)))
         changed = _changed(case, now["values"], before["values"])

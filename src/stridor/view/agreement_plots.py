@@ -10,7 +10,8 @@ from ..agreement import Comparison, Perturbation
 from ..digits import measured
 from ..modal.complex_modes import ComplexModes
 from ..temporal.signals import Components, low_passed
-from .style import BLUE, VERMILION, extrema, legend_above, panel, styled, zero_line
+from .colours import BLUE, VERMILION
+from .style import extrema, legend_above, panel, styled, zero_line
 
 RANGE_FACTOR = 1.35
 

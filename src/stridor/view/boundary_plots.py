@@ -14,7 +14,8 @@ from matplotlib.patheffects import Normal, Stroke
 
 from ..study.boundary_result import Boundary
 from ..typing import Array, IntArray
-from .style import INK, legend_above, panel, styled
+from .colours import INK
+from .style import legend_above, panel, styled
 
 RASTER = 240  # points along each number in which regions are shaded
 LEAST = 0.004  # of the rectangle: regions smaller than that bear no number

@@ -12,8 +12,9 @@ from matplotlib.patches import Patch
 
 from ..periodic import Cycle, Cycles
 from ..temporal.trajectory import Trajectory
+from .colours import BLUE, COLOURS, GREY, INK, STATUS_COLOURS, VERMILION
 from .cycle_shown import STRIPS, strips
-from .style import BLUE, COLOURS, GREY, INK, STATUS_COLOURS, VERMILION, legend_above, stacked, styled
+from .style import legend_above, stacked, styled
 
 DASHED = (0, (4, 2))
 

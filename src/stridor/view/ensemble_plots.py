@@ -12,7 +12,8 @@ from matplotlib.ticker import MaxNLocator
 
 from ..study.ensemble_result import AXES, Ensemble
 from ..typing import Array, IntArray
-from .style import COLOURS, GREY, INK, new_figure, styled
+from .colours import COLOURS, GREY, INK
+from .style import new_figure, styled
 
 NAMES = {"mu": "friction coefficient μ", "load": "factor of loads", "speed": "factor of speeds",
          "perturbation": "perturbation [m/s]"}  # fmt: skip

@@ -19,9 +19,10 @@ from ..system import System
 from ..temporal.node_history import NodeHistory
 from ..temporal.trajectory import STATUS
 from ..typing import Array, BoolArray, IntArray
+from .colours import BLUE, GREY, INK, VERMILION
 from .interface_columns import Columns, arc_length, columns_along, seen_from_normal
 from .sliding_marks import mark_on_line, mark_on_patch
-from .style import BLUE, GREY, INK, VERMILION, WIDTH, largest, legend_above, panel, styled, zero_line
+from .style import WIDTH, largest, legend_above, panel, styled, zero_line
 
 Quantity = Literal["pressure", "status", "slip", "gap"]
 QUANTITIES = ("pressure", "status", "slip", "gap")

@@ -15,7 +15,8 @@ from ..errors import CaseError, kind_of
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..typing import Array, BoolArray
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, legend_above, panel, styled, zero_line
+from .colours import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
+from .style import legend_above, panel, styled, zero_line
 
 LINES = (BLUE, GREEN, PURPLE, SKY, ORANGE)  # vermilion is kept for what is unstable
 MU = "friction coefficient μ"

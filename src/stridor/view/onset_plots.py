@@ -10,8 +10,9 @@ from ..digits import measured
 from ..modal.full import ParametricOnsets
 from ..modal.onsets import Onsets
 from ..modal.parametric import ModesAtPoints
+from .colours import BLUE, GREY, INK, VERMILION
 from .modal_plots import MU
-from .style import BLUE, GREY, INK, VERMILION, legend_above, panel, stacked, styled, zero_line
+from .style import legend_above, panel, stacked, styled, zero_line
 
 MOST_NAMED = 12  # onsets with their value beside them
 

@@ -16,7 +16,8 @@ from ..study.countermeasures import Countermeasures
 from ..study.damping_map import DampingMap
 from ..study.sensitivities import Sensitivities
 from ..typing import Array
-from .style import BLUE, COLOURS, INK, ORANGE, VERMILION, legend_above, panel, styled
+from .colours import BLUE, COLOURS, INK, ORANGE, VERMILION
+from .style import legend_above, panel, styled
 from .tables import significant
 
 LEVELS = 12

@@ -13,7 +13,8 @@ from ..case.bodies import BeamBody
 from ..case.points import PointRef
 from ..system import System
 from ..typing import Array, ComplexArray
-from .style import COLOURS, GREEN, GREY, INK, PURPLE, VERMILION, legend_above, new_figure, panel, root_figure, styled
+from .colours import COLOURS, GREEN, GREY, INK, PURPLE, VERMILION
+from .style import legend_above, new_figure, panel, root_figure, styled
 
 Shape = Mapping[str, ComplexArray]
 AMPLITUDE = 0.11  # of the model's extent: how far the largest motion is drawn

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 
 from ..sliding.points import mean_direction
 from ..typing import Array
+from .colours import GREY, INK
 from .interface_columns import seen_from_normal
-from .style import GREY, INK
 
 
 def mark_on_patch(ax: Axes, position: Array, tangents: Array, slip: Array) -> None:

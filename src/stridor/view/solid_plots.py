@@ -21,9 +21,10 @@ from matplotlib.tri import Triangulation
 from ..errors import CaseError
 from ..system import System
 from ..typing import Array, ComplexArray
+from .colours import COLOURS, GREY, INK
 from .depth_picture import Camera, sharp_edges, surface_picture
 from .skin import Skin, at_largest, distinct, drawn_scale, facet_edges, mode_title, skin_of
-from .style import COLOURS, GREY, INK, WIDTH, legend_above, new_figure, root_figure, styled
+from .style import WIDTH, legend_above, new_figure, root_figure, styled
 
 VIEW = (28.0, -58.0)  # elevation and azimuth [degrees]
 EDGES_UP_TO = 6000  # facets; with more of them their edges would cover the colours

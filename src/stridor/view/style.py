@@ -16,12 +16,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from ..typing import Array
-
-# Okabe and Ito (2008), in the order in which lines take them.
-BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9"
-INK, GREY, FAINT = "#222222", "#767676", "#D9D9D9"
-COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
-STATUS_COLOURS = {"stick": "#C7DDF0", "slip": "#F8F3DF", "separation": "#F6CFA8"}
+from .colours import BLUE, COLOURS, FAINT, GREY, INK
 
 SCREEN_DPI = 110  # in notebooks
 WIDTH = 7.6  # inches: the text width of a report

@@ -12,8 +12,8 @@ from ...case.bodies import BeamBody
 from ...errors import CaseError
 from ...system import System
 from ...typing import Array
+from ...view.colours import COLOURS, GREEN, VERMILION
 from ...view.skin import Skin, skin_of
-from ...view.style import COLOURS, GREEN, VERMILION
 from .mesh_marks import held_nodes, pushes, slides
 
 WIDTH = 300.0  # units of the drawing, which the page fits into its column

@@ -11,7 +11,7 @@ from nicegui import Client, events, ui
 
 from ...case import templates
 from ...errors import CaseError, StridorError
-from ...view.style import BLUE, GREEN, INK, VERMILION
+from ...view.colours import BLUE, GREEN, INK, VERMILION
 from . import panel_compare, panel_cycle, panel_locus, panel_map, panel_mode, panel_model, panel_run
 from .levers import friction_range
 from .panel import asset

@@ -7,7 +7,7 @@ from typing import Any
 from nicegui import ui
 
 from ...errors import CaseError
-from ...view.style import BLUE, INK, STATUS_COLOURS, VERMILION
+from ...view.colours import BLUE, INK, STATUS_COLOURS, VERMILION
 from .panel import Panel
 from .runs import ENDS, Wish
 from .session import Session

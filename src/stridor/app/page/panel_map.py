@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import events, ui
 
 from ...errors import CaseError
-from ...view.style import VERMILION
+from ...view.colours import VERMILION
 from .levers import Lever, friction_range
 from .panel import Panel
 from .runs import ENDS, Wish

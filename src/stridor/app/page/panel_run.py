@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import events, ui
 
 from ...errors import CaseError
-from ...view.style import BLUE, STATUS_COLOURS, VERMILION
+from ...view.colours import BLUE, STATUS_COLOURS, VERMILION
 from .panel import Panel, asset
 from .runs import ENDS, SOUNDS, Run, Wish
 from .session import Session, started

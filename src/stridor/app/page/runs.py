@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from ...studies.workers import spawned
+from ...studies.processes import spawned
 from .running import serve
 from .worker import ended, hung_up
 

@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Any
 
 from ...heap import give_back
-from ...studies.workers import spawned
+from ...studies.processes import spawned
 
 PATIENCE = 0.5  # seconds that an answer may take before a newer question stops it
 IDLE = "idle"  # the part that says: what comes now is for when nobody asks
