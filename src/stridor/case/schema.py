@@ -399,6 +399,11 @@ class Temporal(Table):
         description='"explicit", "exact", "implicit" or "auto": step by step, from one change of contact to the next, '
         "by parts of the shortest period of interest, or by size",
     )
+    cutoff_hz: Positive | None = Field(
+        default=None,
+        description="a number > 0 [Hz], the frequency up to which exact steps, and cycles by shooting, take modes of "
+        "the structure, with static answers for the rest (left out: all modes)",
+    )
     watch: tuple[str, ...] = Field(default=(), description=f"a list of points, each {POINT[8:]}")
 
 

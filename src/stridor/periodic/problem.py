@@ -9,10 +9,11 @@ import numpy as np
 from ..errors import AnalysisError, CaseError
 from ..sliding import full_motion, slip_speeds, steady_nodes
 from ..system import System
-from ..temporal.steppers.exact.basis import Basis, complete_basis
+from ..temporal.steppers.basis import Basis
+from ..temporal.steppers.coordinates import left_out
 from ..temporal.steppers.exact.drive import Piece
 from ..temporal.steppers.exact.statuses import BACKWARD, FORWARD, GAP, Pairs, Status
-from ..temporal.steppers.exact.stepper import pairs_of, why_not_exact
+from ..temporal.steppers.exact.stepper import coordinates_of, pairs_of, why_not_exact
 from ..temporal.steppers.exact.varied import VariedMotion
 from ..temporal.steppers.sparse.stepper import with_friction
 from ..typing import Array
@@ -59,14 +60,22 @@ class SlidingProblem:
 
 
 class Family:
-    """The problems of one system over μ."""
+    """The problems of one system over μ, in all its modes or those up to ``cutoff_hz`` and static answers."""
 
-    def __init__(self, system: System) -> None:
-        refuse_cycles(system)
+    def __init__(self, system: System, cutoff_hz: float | None = None) -> None:
+        refuse_cycles(system, cutoff_hz)
         self.system = system
-        self.basis = complete_basis(system)
+        self.coordinates = coordinates_of(system, cutoff_hz)
+        self.basis = self.coordinates.basis
         self.speeds = slip_of(system)
         self._made: dict[float, SlidingProblem] = {}
+
+    @property
+    def lacking(self) -> str:
+        """What a truncated basis is made of and lacks, "" of all modes."""
+        if not self.coordinates.modes:
+            return ""
+        return f"cycles of {self.coordinates.words}: {left_out(self.system, self.coordinates).words}"
 
     def at(self, mu: float) -> SlidingProblem:
         """The problem at a friction coefficient; the last few are kept. Raises AnalysisError where nothing slides
@@ -123,9 +132,9 @@ def slip_of(system: System) -> Array:
     return np.asarray(system.contact_nodes().tangent_lift @ full_motion(system), dtype=float).ravel()
 
 
-def why_not_shooting(system: System) -> str:
-    """Why cycles of a system cannot be shot at; "" where they can."""
-    why = why_not_exact(system)
+def why_not_shooting(system: System, cutoff_hz: float | None = None) -> str:
+    """Why cycles of a system cannot be shot at, on all its modes or those up to ``cutoff_hz``; "" where they can."""
+    why = why_not_exact(system, cutoff_hz)
     if not why and system.load_steps:
         why = "it has load steps, so that what drives it does not stay the same"
     if not why and not np.any(full_motion(system)):
@@ -133,7 +142,7 @@ def why_not_shooting(system: System) -> str:
     return why
 
 
-def refuse_cycles(system: System) -> None:
+def refuse_cycles(system: System, cutoff_hz: float | None = None) -> None:
     """Raise CaseError for a system whose cycles cannot be sought."""
-    if why := why_not_shooting(system):
+    if why := why_not_shooting(system, cutoff_hz):
         raise CaseError("case", "no cycles can be sought of it", f"what the exact stepper takes; {why}")

@@ -77,7 +77,7 @@ def cycles(
         raise CaseError("case", "matrices that depend on mu", "cycles of a system whose matrices do not")
     if harmonics is not None and not (float(harmonics).is_integer() and 1 <= harmonics <= MOST_ASKED):
         raise CaseError("harmonics", harmonics, f"1 to {MOST_ASKED} harmonics")
-    chosen = _chosen(work.system(), method)
+    chosen = _chosen(work.system(), method, work.temporal.cutoff_hz)
     if harmonics is not None and chosen != "harmonic":
         raise CaseError("harmonics", harmonics, 'harmonics of method "harmonic"; shooting has none')
     if pushes is not None and chosen == "harmonic":
@@ -98,11 +98,11 @@ def cycles(
     return search.result()
 
 
-def _chosen(system: System, method: str) -> str:
+def _chosen(system: System, method: str, cutoff_hz: float | None) -> str:
     """The method by which cycles are sought. Raises CaseError where it does not take the system."""
     if method not in METHODS:
         raise CaseError("method", method, ", ".join(METHODS))
-    shooting, harmonic = why_not_shooting(system), why_not_harmonic(system)
+    shooting, harmonic = why_not_shooting(system, cutoff_hz), why_not_harmonic(system)
     if method == "auto":
         method = "harmonic" if shooting and not harmonic else "shooting"
     why, other, instead = (
@@ -127,19 +127,22 @@ class _Search:
         self.work, self.between, self.pushes, self.seconds = work, between, pushes, seconds
         self.progress, self.keep, self.started, self.points = progress, keep, started, points
         self.harmonics = harmonics
+        self.notes: list[str] = []
         self.method: Method[Any, Any] = self._method(chosen)
         self.tracer = Tracer(self.method, between or (0.0, 1.0), points, self._kept)
         self.onsets: tuple[CycleOnset, ...] = ()
         self.single: list[Cycle] = []
         self.missing: list[str] = []
-        self.notes: list[str] = []
         self.interrupted = False
         self.doing = ""
 
     def _method(self, chosen: str) -> Method[Any, Any]:
         system = self.work.system()
         if chosen == "shooting":
-            return Shooting(Family(system), SECONDS if self.seconds is None else self.seconds)
+            family = Family(system, self.work.temporal.cutoff_hz)
+            if lacking := family.lacking:
+                self.notes.append(lacking)
+            return Shooting(family, SECONDS if self.seconds is None else self.seconds)
         known = self._onsets(self.between or self.work.modal.friction_range)
         highest = max((o.frequency_hz for o in known), default=0.0) or self.work.modal.max_frequency_hz
         limit = math.inf if self.seconds is None else self.seconds

@@ -39,5 +39,5 @@ def settings_of(case: Marches) -> Settings:
     watch = tuple(t.watch)
     return Settings(
         t.step, t.beta2, t.record_every, t.path, t.initial, t.perturbation, watch, t.contact, t.stepper,
-        case.modal.max_frequency_hz,
+        case.modal.max_frequency_hz, t.cutoff_hz,
     )  # fmt: skip

@@ -6,6 +6,7 @@
 - modal.prestress: but for assembled matrices with meshed solids; `compare`, `simulate`
 - modal.damped = false: `simulate`, `compare`
 - temporal.path: assembled matrices in time; with temporal.beta2: stepper = "exact" or "implicit"
+- temporal.cutoff_hz: unless stepper = "exact"
 - comparison.bracket, comparison.tolerance: without critical friction
 - bodies.NAME.initial_velocity, initial_displacement: from steady sliding
 - temporal.contact = "rigid": where every contact is rigid; where it acts, contacts.NAME.stiffness on `simulate`
@@ -72,6 +73,7 @@ def _given(case: Case, solver: str | None) -> bool:
         or case.temporal.path != "auto"
         or case.temporal.contact != "as given"
         or case.temporal.stepper != "explicit"
+        or case.temporal.cutoff_hz is not None
     )
 
 
@@ -124,6 +126,8 @@ def _of_modes(case: Case, verb: str, solver: str | None, *, few: bool) -> Iterat
 def _of_time(case: Case, verb: str, *, few: bool) -> Iterator[str]:
     if verb not in IN_TIME:
         return
+    if case.temporal.cutoff_hz is not None and case.temporal.stepper in ("explicit", "implicit"):
+        yield f'temporal.cutoff_hz has no effect: temporal.stepper = "{case.temporal.stepper}" takes no such modes'
     if case.temporal.stepper in ("exact", "implicit"):
         why = "takes no steps" if case.temporal.stepper == "exact" else "has a scheme of its own"
         for key, usual in (("path", "auto"), ("beta2", 0.5)):

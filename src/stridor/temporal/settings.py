@@ -19,7 +19,8 @@ class Settings:
     "rigid" takes contact stiffness out of the time loop, as the paper has it; "as given" leaves it in. stepper
     "explicit" is the scheme of the paper; "exact" goes from one change of contact to the next, and its step is that of
     the records alone; "implicit" takes steps of a part of the shortest period asked for, that of max_frequency_hz,
-    which nothing else here looks at; "auto" takes "exact" for systems as small as `simulate.SMALL`, and "implicit"
+    which nothing else here looks at; cutoff_hz is for exact steps alone: modes up to there and static answers in place
+    of the complete basis; "auto" takes "exact" for systems as small as `simulate.SMALL`, and "implicit"
     for `simulate.MANY` contact nodes where a frequency is given and a step is not."""
 
     step: float | None = None
@@ -32,6 +33,7 @@ class Settings:
     contact: Literal["as given", "rigid"] = "as given"
     stepper: Literal["explicit", "exact", "implicit", "auto"] = "explicit"
     max_frequency_hz: float | None = None
+    cutoff_hz: float | None = None
 
     def system(self, system: System) -> System:
         """The system that the time loop takes."""

@@ -109,7 +109,7 @@ def plan(system: System, settings: Settings, phases: Sequence[PhaseSpec] = ()) -
     system = settings.system(system)
     settings, why = _chosen(system, settings, phases)
     if settings.stepper == "exact":
-        refuse(system)
+        refuse(system, settings.cutoff_hz)
         return "exact", why, step_limit(system, 0.5)
     if settings.stepper == "implicit":
         refuse_implicit(system, settings)

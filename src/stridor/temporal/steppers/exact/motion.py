@@ -10,7 +10,7 @@ import numpy as np
 from ....errors import AnalysisError
 from ....typing import Array, ComplexArray
 from ...columns import FRICTION, NORMAL, SUPPORT, WORKS
-from .basis import Basis
+from ..basis import Basis
 from .decisions import CLOSE, Impact, State, Touching, choices, consistent_status, impact, landing
 from .drive import Piece
 from .powers import Powers

@@ -19,7 +19,7 @@ import scipy.linalg as sl
 
 from ....errors import AnalysisError
 from ....typing import Array, ComplexArray
-from .basis import Basis
+from ..basis import Basis
 from .drive import Piece
 
 GAP, STICK, FORWARD, BACKWARD = range(4)  # a slave that slips moves along the tangent, or against it

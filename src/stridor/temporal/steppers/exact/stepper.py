@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-import scipy.sparse.linalg as spl
 
 from ....errors import AnalysisError, CaseError
 from ....sliding import slip_speeds, steady_sliding, steady_sliding_nodes
@@ -44,8 +43,9 @@ from ...settings import Settings, choose_step, not_finite
 from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
+from ..basis import Basis, complete_basis
+from ..coordinates import Coordinates, left_out, truncated
 from ..sparse.stepper import with_friction
-from .basis import Basis, complete_basis
 from .drive import pieces
 from .motion import Motion
 from .outputs import Outputs, Records
@@ -56,12 +56,16 @@ MOST_FREEDOMS = 1500
 SAMPLE = 0.1  # rad of the fastest mode between times at which the largest forces are looked for
 MOST_SAMPLES = 100_000  # numbers for that between two changes
 DONE = 0  # where the counters have the steps done
+TOLD_FROM = 1e-3  # of the initial state: what is left out of it is said from there on
 
 
-def why_not_exact(system: System) -> str:
-    """Why it does not take a system; "" where it does."""
-    if system.size > MOST_FREEDOMS:
-        return f"{system.size} freedoms are too many: each status of the contacts has its own modes, of all of them"
+def why_not_exact(system: System, cutoff_hz: float | None = None) -> str:
+    """Why it does not take a system, on all its modes or those up to ``cutoff_hz``; "" where it does."""
+    if system.size > MOST_FREEDOMS and cutoff_hz is None:
+        return (
+            f"{system.size} freedoms are too many: each status of the contacts has its own modes, of all of them; "
+            "temporal.cutoff_hz takes those up to a frequency"
+        )
     if why := no_complete_basis(system, nodes=True):
         return why
     if system.surfaces and system.dimension == 3:
@@ -83,22 +87,32 @@ def why_not_exact(system: System) -> str:
     return ""
 
 
-def refuse(system: System) -> None:
+def refuse(system: System, cutoff_hz: float | None = None) -> None:
     """Raise CaseError for a system that it does not take."""
-    if why := why_not_exact(system):
+    if why := why_not_exact(system, cutoff_hz):
         raise CaseError("temporal.stepper", "exact", f'no such system: {why}; take "explicit"')
 
 
 def exact_stepper(system: System, settings: Settings, mu: float | None, why: str = "asked for") -> ExactStepper:
     """A system made ready, and why this way; mu scales every contact's friction law at its slip speed. Raises CaseError
     for a system that it does not take."""
-    refuse(system)
+    refuse(system, settings.cutoff_hz)
     if mu is not None:
         full = system.motion.full
         surfaces = [replace(s, nodes=with_friction(s.nodes, mu, full)) for s in system.surfaces]
         surfaces = tuple(replace(s, law=s.nodes.laws[0]) for s in surfaces)
         system = replace(system.with_friction(mu, np.abs(slip_speeds(system, full))), surfaces=surfaces)
     return ExactStepper(system, settings, why)
+
+
+def coordinates_of(system: System, cutoff_hz: float | None) -> Coordinates:
+    """All modes of a system, or those up to ``cutoff_hz`` and static answers; CaseError where they are too many."""
+    if cutoff_hz is None:
+        return Coordinates(complete_basis(system), 0, np.inf)
+    found = truncated(system, cutoff_hz)
+    if found.basis.size > MOST_FREEDOMS:
+        raise CaseError("temporal.cutoff_hz", cutoff_hz, f"a frequency with up to {MOST_FREEDOMS} modes below it")
+    return found
 
 
 def pairs_of(system: System, basis: Basis) -> Pairs:
@@ -136,7 +150,10 @@ class ExactStepper:
         self._system, self._why = system, why
         self.limit = step_limit(system, 0.5)  # of explicit steps
         self.scheme = scheme(choose_step(self.limit, settings), 0.5)
-        self.basis = complete_basis(system)
+        self.coordinates = coordinates_of(system, settings.cutoff_hz)
+        self.basis = self.coordinates.basis
+        self.lacking = left_out(system, self.coordinates) if self.coordinates.modes else None
+        self.start_lacking = 0.0  # of the initial displacement or velocity, by mass
         self.pairs = pairs_of(system, self.basis)
         self.contact_names = system.contact_nodes().names
         self.closed = ()
@@ -158,6 +175,10 @@ class ExactStepper:
     def reason(self) -> str:
         """Why this method, and what it did that is not exact."""
         said = f"{self._why}: from one change of contact to the next, in the complete modes of each status"
+        if self.lacking is not None:
+            said += f", of {self.coordinates.words}; {self.lacking.words}"
+        if self.start_lacking > TOLD_FROM:
+            said += f"; {100 * self.start_lacking:.2g} % of the initial state, by its mass, has no place in them"
         if landed := self.motion.landed:
             said += f"; contacts that threw one another off ever faster were brought to rest {landed} times"
         return said
@@ -219,22 +240,27 @@ class ExactStepper:
             )
             active = np.asarray(found.active, dtype=bool)
             u = u + found.displacement - system.motion.lift @ stretch.distances_after
-            mass = spl.splu(sp.csc_array(system.mass))
-            for way, row in zip(self._ways, system.contact_nodes().tangent.toarray(), strict=True):
-                answer = mass.solve(row)
-                v = v + settings.perturbation * way * answer / float(row @ answer)
         else:
             u = u if system.initial_displacement is None else u + system.initial_displacement
             v = v if system.initial_velocity is None else v + system.initial_velocity
         if disturbance is not None:
             u, v = u + disturbance[0], v + disturbance[1]
         motion.q, motion.v = self._coordinates(u, v)
+        self.start_lacking = max(self._share_left_out(u, motion.q), self._share_left_out(v, motion.v))
+        if steady:
+            for way, row in zip(self._ways, self.pairs.tangent, strict=True):
+                motion.v = motion.v + settings.perturbation * way * row / float(row @ row)
         piece = motion.pieces[0]
         speed = piece.displacements @ piece.derivative @ piece.powers(0.0)
         if not steady:
             push = self.pairs.inertia.T @ speed
             motion.v = motion.v - push
         motion.start(self._touching(active if steady else None))
+
+    def _share_left_out(self, u: Array, q: Array) -> float:
+        """The part of a start (n,), by its mass, that its coordinates (k,) do not have."""
+        whole = float(u @ (self._system.mass @ u)) if self.coordinates.modes else 0.0
+        return math.sqrt(max(1.0 - float(q @ q) / whole, 0.0)) if whole > 0.0 else 0.0
 
     def _touching(self, active: Array | None, rounding: float = 1e-12) -> dict[int, float]:
         """Contacts that are closed now, and their slip [m/s]; active (m,): which those are, where that is known."""

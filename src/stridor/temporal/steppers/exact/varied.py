@@ -20,7 +20,7 @@ import scipy.linalg as sl
 
 from ....errors import AnalysisError
 from ....typing import Array, ComplexArray
-from .basis import Basis
+from ..basis import Basis
 from .decisions import Impact
 from .drive import Piece
 from .motion import Anchor, Motion

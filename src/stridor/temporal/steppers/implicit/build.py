@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as sl
-import scipy.sparse as sp
 
 from ....contact.nodes import ContactNodes
 from ....laws.friction import friction_rows
@@ -12,29 +11,12 @@ from ....system import System
 from ....typing import Array, Sparse
 from ...columns import STATISTICS
 from ...phase_results import fresh_statistics
-from ..exact.basis import Basis
+from ..basis import Basis
 from ..sparse.node_table import sliding_directions
 from .arrays import COUNTERS, Nodes, State, Structure, Work
 from .warp import warped
 
 COUPLED = 1e-9  # of the damping: what beside the diagonal counts
-
-
-def rows_of(nodes: ContactNodes) -> tuple[Sparse, Array]:
-    """Rows (m d, n) of the nodes, normal, then tangents of each, and their lift (m d, p)."""
-    m, t = nodes.count, nodes.directions
-    each = np.arange(m * t)
-    order = np.argsort(np.concatenate([np.arange(m) * (t + 1), each // t * (t + 1) + each % t + 1]))
-    rows = sp.csr_array(sp.vstack([sp.csr_array(nodes.normal), sp.csr_array(nodes.tangent)]))[order]
-    return sp.csr_array(rows), np.concatenate([nodes.normal_lift, nodes.tangent_lift])[order]
-
-
-def pushed_at(system: System, rows: Sparse) -> Sparse:
-    """Forces (n, k) that act on the structure: of contacts, loads and supports."""
-    motion = system.motion
-    loads = [sp.csr_array(np.reshape(load, (1, -1))) for load in system.loads.values()]
-    carried = [sp.csr_array(np.asarray(m).T) for m in (motion.mass, motion.damping)]
-    return sp.csc_array(sp.vstack([rows, *loads, *carried]).T)
 
 
 def structure_of(system: System, basis: Basis, step: float) -> Structure:

@@ -23,10 +23,10 @@ from ...settings import Settings, not_finite
 from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
+from ..coordinates import COMPLETE, Coordinates, coordinates, pushed_at, rows_of
 from ..sparse.stepper import with_friction
 from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED, Nodes, Record, State, Structure
-from .basis import COMPLETE, Coordinates, coordinates
-from .build import fresh_state, nodes_of, pushed_at, rows_of, structure_of, work_space
+from .build import fresh_state, nodes_of, structure_of, work_space
 from .loop import HARD, NOT_FINITE, run_steps
 from .newton import newton
 from .node_law import SWEEP_LIMIT, solve_nodes

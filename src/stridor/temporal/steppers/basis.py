@@ -1,4 +1,4 @@
-"""Coordinates of the exact stepper: modes of the structure without contacts, of unit mass."""
+"""Coordinates of steppers: modes of the structure without contacts, of unit mass."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sl
 
-from ....errors import AnalysisError
-from ....system import System
-from ....typing import Array
+from ...errors import AnalysisError
+from ...system import System
+from ...typing import Array
 
 
 @dataclass(frozen=True)
