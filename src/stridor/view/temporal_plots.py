@@ -16,17 +16,8 @@ from ..temporal.energy import EnergyBalance
 from ..temporal.signals import Spectrogram, Spectrum, low_passed
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
+from .colours import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, PURPLE, SKY, STATUS_COLOURS, VERMILION
 from .style import (
-    BLUE,
-    COLOURS,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PURPLE,
-    SKY,
-    STATUS_COLOURS,
-    VERMILION,
     draw_history,
     extrema,
     legend_above,
