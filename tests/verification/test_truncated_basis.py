@@ -112,6 +112,14 @@ def test_where_it_has_no_effect_is_said():
     assert not any("cutoff" in line for line in lines)
 
 
+def test_a_cutoff_below_all_modes_is_refused():
+    block = mode_coupling(0.1, 0.1).with_({"temporal.cutoff_hz": 1e-3})
+    with pytest.raises(st.CaseError, match=r"temporal\.cutoff_hz: 0\.001 – a frequency with modes of the structure below it"):
+        st.simulate(block, 0.9)
+    with pytest.raises(st.CaseError, match="a frequency with modes"):
+        st.cycles(block, mu=0.9)
+
+
 def test_a_large_system_is_taken_with_one():
     fine = {"bodies.beam1.elements": 60, "bodies.beam2.elements": 480, "temporal.stepper": "exact", "temporal.step": 1e-6}
     case = bench().with_(fine | {"temporal.initial": "steady-sliding", "temporal.perturbation": 1e-3, "phases.press.duration": 1e-4, "phases.slide.duration": 1e-4})

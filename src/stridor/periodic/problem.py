@@ -73,7 +73,7 @@ class Family:
     @property
     def lacking(self) -> str:
         """What a truncated basis is made of and lacks, "" of all modes."""
-        if not self.coordinates.modes:
+        if self.coordinates.complete:
             return ""
         return f"cycles of {self.coordinates.words}: {left_out(self.system, self.coordinates).words}"
 

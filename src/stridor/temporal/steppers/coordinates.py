@@ -28,16 +28,22 @@ HEAVIER = 1.01  # times the mass at a contact: said from there on
 
 @dataclass(frozen=True)
 class Coordinates:
-    """basis of unit mass; modes: how many of its vectors are modes, 0 where it is complete; up to highest_hz."""
+    """basis of unit mass; modes: how many of its vectors are modes up to highest_hz, which is infinite where it is
+    complete."""
 
     basis: Basis
     modes: int
     highest_hz: float
 
     @property
+    def complete(self) -> bool:
+        """Whether it has all modes."""
+        return np.isinf(self.highest_hz)
+
+    @property
     def words(self) -> str:
         """What it is made of."""
-        if not self.modes:
+        if self.complete:
             return f"all {self.basis.size} modes of the structure"
         statics = self.basis.size - self.modes
         return f"{self.modes} modes up to {self.highest_hz:.6g} Hz and {statics} static answers at contacts and loads"
@@ -60,12 +66,18 @@ def pushed_at(system: System, rows: Sparse) -> Sparse:
     return sp.csc_array(sp.vstack([rows, *loads, *carried]).T)
 
 
+def all_modes(system: System) -> Coordinates:
+    """The complete basis. Raises AnalysisError where the mass is not positive definite."""
+    found = complete_basis(system)
+    return Coordinates(found, found.size, np.inf)
+
+
 def coordinates(system: System, pushed: Sparse, highest_hz: float | None, small: int = COMPLETE) -> Coordinates:
     """All modes of a system of up to ``small`` freedoms, or where no frequency is given; else those up to
     ``highest_hz`` and the static answers to the forces ``pushed`` (n, k). Raises AnalysisError where the mass is not
     positive definite."""
     if system.size <= small or highest_hz is None:
-        return Coordinates(complete_basis(system), 0, np.inf)
+        return all_modes(system)
     omega = 2 * np.pi * highest_hz
     mass, stiffness = sp.csr_array(system.mass), sp.csr_array(system.stiffness)
     factor, shift = _held(stiffness, mass, omega)
@@ -123,10 +135,11 @@ def truncated(system: System, cutoff_hz: float) -> Coordinates:
     pushed = pushed_at(system, rows_of(system.contact_nodes())[0])
     if system.size > COMPLETE:
         return coordinates(system, pushed, cutoff_hz, small=0)
-    whole = complete_basis(system)
+    found = all_modes(system)
+    whole = found.basis
     low = whole.stiffness <= (2 * np.pi * cutoff_hz) ** 2
     if np.all(low):
-        return Coordinates(whole, 0, np.inf)
+        return found
     static = (pushed.T @ whole.vectors[:, ~low]).T / whole.stiffness[~low, None]
     length = np.linalg.norm(static, axis=0)
     spanned, sizes, _ = np.linalg.svd(static[:, length > 0.0] / length[length > 0.0], full_matrices=False)
@@ -162,6 +175,8 @@ class Left:
 def left_out(system: System, found: Coordinates) -> Left:
     """What a truncated basis lacks, by one factorisation at half of its highest frequency."""
     nodes, basis = system.contact_nodes(), found.basis
+    if not nodes.count:
+        return Left(0.0, 0.5 * found.highest_hz, 1.0)
     rows = sp.csc_array(sp.vstack([sp.csr_array(nodes.normal), sp.csr_array(nodes.tangent)]).T).toarray()
     at_hz = 0.5 * found.highest_hz
     shift = (2 * np.pi * at_hz) ** 2

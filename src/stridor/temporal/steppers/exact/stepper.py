@@ -43,8 +43,8 @@ from ...settings import Settings, choose_step, not_finite
 from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
-from ..basis import Basis, complete_basis
-from ..coordinates import Coordinates, left_out, truncated
+from ..basis import Basis
+from ..coordinates import Coordinates, all_modes, left_out, truncated
 from ..sparse.stepper import with_friction
 from .drive import pieces
 from .motion import Motion
@@ -108,8 +108,10 @@ def exact_stepper(system: System, settings: Settings, mu: float | None, why: str
 def coordinates_of(system: System, cutoff_hz: float | None) -> Coordinates:
     """All modes of a system, or those up to ``cutoff_hz`` and static answers; CaseError where they are too many."""
     if cutoff_hz is None:
-        return Coordinates(complete_basis(system), 0, np.inf)
+        return all_modes(system)
     found = truncated(system, cutoff_hz)
+    if not found.modes:
+        raise CaseError("temporal.cutoff_hz", cutoff_hz, "a frequency with modes of the structure below it")
     if found.basis.size > MOST_FREEDOMS:
         raise CaseError("temporal.cutoff_hz", cutoff_hz, f"a frequency with up to {MOST_FREEDOMS} modes below it")
     return found
@@ -152,7 +154,7 @@ class ExactStepper:
         self.scheme = scheme(choose_step(self.limit, settings), 0.5)
         self.coordinates = coordinates_of(system, settings.cutoff_hz)
         self.basis = self.coordinates.basis
-        self.lacking = left_out(system, self.coordinates) if self.coordinates.modes else None
+        self.lacking = None if self.coordinates.complete else left_out(system, self.coordinates)
         self.start_lacking = 0.0  # of the initial displacement or velocity, by mass
         self.pairs = pairs_of(system, self.basis)
         self.contact_names = system.contact_nodes().names
@@ -259,7 +261,7 @@ class ExactStepper:
 
     def _share_left_out(self, u: Array, q: Array) -> float:
         """The part of a start (n,), by its mass, that its coordinates (k,) do not have."""
-        whole = float(u @ (self._system.mass @ u)) if self.coordinates.modes else 0.0
+        whole = 0.0 if self.coordinates.complete else float(u @ (self._system.mass @ u))
         return math.sqrt(max(1.0 - float(q @ q) / whole, 0.0)) if whole > 0.0 else 0.0
 
     def _touching(self, active: Array | None, rounding: float = 1e-12) -> dict[int, float]:
