@@ -23,7 +23,8 @@ from stridor.temporal import simulate as simulate_module
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.simulate import Settings, plan, simulate
-from stridor.temporal.steppers.implicit import basis, loop, node_law, stepper, warp, whole_steps
+from stridor.temporal.steppers import coordinates
+from stridor.temporal.steppers.implicit import loop, node_law, stepper, warp, whole_steps
 from stridor.temporal.steppers.implicit.node_law import spring_force
 from stridor.temporal.steppers.implicit.warp import warped
 
@@ -330,7 +331,7 @@ COARSE = {
 @pytest.mark.parametrize("complete", [True, False], ids=["all modes", "reduced"])
 def test_a_pad_on_a_disc_grows_as_the_modes_say(contact: str, complete: bool, monkeypatch: pytest.MonkeyPatch):
     """45 nodes in space, friction that turns with the slip: growth within 1 % with 30 steps to the period."""
-    monkeypatch.setattr(basis, "COMPLETE", 2000 if complete else 100)
+    monkeypatch.setattr(coordinates, "COMPLETE", 2000 if complete else 100)
     case = st.loads(template_text("pad-on-disc")).with_(COARSE | {"temporal.contact": contact})
     off = off_modes(case, 0.5, 3000.0, [30])
     assert off[0, 0] < 0.01
@@ -594,7 +595,7 @@ def test_what_of_a_start_the_coordinates_do_not_have_is_said():
     # Every other freedom moved one way, all others the other: nothing that vibrates below 6 kHz.
     rough = np.where(np.arange(system.size) % 2, 1.0, -1.0)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(basis, "COMPLETE", 10)
+        patch.setattr(coordinates, "COMPLETE", 10)
         result = simulate(replace(system, initial_velocity=1e-3 * rough), phases_of(case), settings_of(case))
     share = float(result.path_reason.split("; ")[1].split(" %")[0])
     assert 80 < share < 100

@@ -129,6 +129,7 @@ USUAL: Mapping[str, Usual] = {
     "Modal.friction_range": _RANGE_OF_MU,
     "Modal.max_frequency_hz": _usual("a highest frequency", "Hz", 10.0, 1e7, kHz=1e3),
     "Temporal.step": _usual("a time step", "s", 1e-12, 1e-2, us=1e-6, ns=1e-9),
+    "Temporal.cutoff_hz": _usual("a cut-off frequency", "Hz", 10.0, 1e9, kHz=1e3),
     "Temporal.perturbation": _usual("an extra slip speed", "m/s", 1e-15, 10.0, mm_s=1e-3),
     "Comparison.mu": _RANGE_OF_MU,
     "Comparison.bracket": _RANGE_OF_MU,

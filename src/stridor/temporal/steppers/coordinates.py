@@ -72,11 +72,11 @@ def all_modes(system: System) -> Coordinates:
     return Coordinates(found, found.size, np.inf)
 
 
-def coordinates(system: System, pushed: Sparse, highest_hz: float | None, small: int = COMPLETE) -> Coordinates:
-    """All modes of a system of up to ``small`` freedoms, or where no frequency is given; else those up to
+def coordinates(system: System, pushed: Sparse, highest_hz: float | None, small: int | None = None) -> Coordinates:
+    """All modes of a system of up to ``small`` freedoms (`COMPLETE`), or where no frequency is given; else those up to
     ``highest_hz`` and the static answers to the forces ``pushed`` (n, k). Raises AnalysisError where the mass is not
     positive definite."""
-    if system.size <= small or highest_hz is None:
+    if system.size <= (COMPLETE if small is None else small) or highest_hz is None:
         return all_modes(system)
     omega = 2 * np.pi * highest_hz
     mass, stiffness = sp.csr_array(system.mass), sp.csr_array(system.stiffness)
