@@ -70,12 +70,11 @@ class Family:
         self.speeds = slip_of(system)
         self._made: dict[float, SlidingProblem] = {}
 
-    @property
-    def lacking(self) -> str:
-        """What a truncated basis is made of and lacks, "" of all modes."""
+    def lacking(self, asked_hz: float) -> str:
+        """What a truncated basis is made of and lacks where frequencies up to one are asked for, "" of all modes."""
         if self.coordinates.complete:
             return ""
-        return f"cycles of {self.coordinates.words}: {left_out(self.system, self.coordinates).words}"
+        return f"cycles of {self.coordinates.words}: {left_out(self.system, self.coordinates, asked_hz).words}"
 
     def at(self, mu: float) -> SlidingProblem:
         """The problem at a friction coefficient; the last few are kept. Raises AnalysisError where nothing slides

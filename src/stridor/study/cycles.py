@@ -140,7 +140,7 @@ class _Search:
         system = self.work.system()
         if chosen == "shooting":
             family = Family(system, self.work.temporal.cutoff_hz)
-            if lacking := family.lacking:
+            if lacking := family.lacking(self.work.modal.max_frequency_hz):
                 self.notes.append(lacking)
             return Shooting(family, SECONDS if self.seconds is None else self.seconds)
         known = self._onsets(self.between or self.work.modal.friction_range)

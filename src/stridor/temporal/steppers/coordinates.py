@@ -166,19 +166,20 @@ class Left:
     @property
     def words(self) -> str:
         """What a reader must know of it."""
-        said = f"receptance at the contacts is off by {100 * self.receptance_off:.2g} % at {self.at_hz:.6g} Hz"
+        said = f"receptance at the contacts is off by {100 * self.receptance_off:.3g} % at {self.at_hz:.6g} Hz"
         if self.heavier > HEAVIER:
             said += f", and what strikes there is up to {self.heavier:.3g} times as heavy as on all modes"
         return said
 
 
-def left_out(system: System, found: Coordinates) -> Left:
-    """What a truncated basis lacks, by one factorisation at half of its highest frequency."""
+def left_out(system: System, found: Coordinates, asked_hz: float | None = None) -> Left:
+    """What a truncated basis lacks, by one factorisation at half of its highest frequency, or at the highest that is
+    asked for where that is above it: statics alone are right at any frequency low enough."""
     nodes, basis = system.contact_nodes(), found.basis
+    at_hz = max(0.5 * found.highest_hz, asked_hz or 0.0)
     if not nodes.count:
-        return Left(0.0, 0.5 * found.highest_hz, 1.0)
+        return Left(0.0, at_hz, 1.0)
     rows = sp.csc_array(sp.vstack([sp.csr_array(nodes.normal), sp.csr_array(nodes.tangent)]).T).toarray()
-    at_hz = 0.5 * found.highest_hz
     shift = (2 * np.pi * at_hz) ** 2
     dynamic = sp.csr_array(sp.csr_array(system.stiffness) - shift * sp.csr_array(system.mass))
     with factorise(dynamic, symmetric=True) as factor:

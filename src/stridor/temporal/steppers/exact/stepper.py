@@ -154,7 +154,8 @@ class ExactStepper:
         self.scheme = scheme(choose_step(self.limit, settings), 0.5)
         self.coordinates = coordinates_of(system, settings.cutoff_hz)
         self.basis = self.coordinates.basis
-        self.lacking = None if self.coordinates.complete else left_out(system, self.coordinates)
+        highest = settings.max_frequency_hz
+        self.lacking = None if self.coordinates.complete else left_out(system, self.coordinates, highest)
         self.start_lacking = 0.0  # of the initial displacement or velocity, by mass
         self.pairs = pairs_of(system, self.basis)
         self.contact_names = system.contact_nodes().names
