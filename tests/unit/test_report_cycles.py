@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 import stridor as st
 from mode_coupling import mode_coupling
 from stridor.periodic import Cycles
+from stridor.study.fingerprint import fingerprint, same_model
 from stridor.view.cycle_parts import cycle_table, cycle_words, loudest, worth_a_row
 from stridor.view.cycle_plots import cycle_branches
 
@@ -104,3 +106,15 @@ def test_a_run_is_drawn_where_it_has_come_to():
     (cross,) = (line for line in figure.axes[0].lines if line.get_marker() == "x")
     assert float(np.asarray(cross.get_ydata())[0]) == pytest.approx(cycle.slip_amplitude, rel=0.01)
     assert 0.5 * np.ptp(run.slip_speed) > 1.5 * cycle.slip_amplitude
+
+
+def test_a_key_that_the_program_has_learned_since_makes_no_other_model_at_its_default():
+    case = mode_coupling(0.02, 0.1)
+    before = json.loads(json.dumps(fingerprint(case, None)))
+    assert same_model(case, before)
+    del before["values"]["contacts.rub.sliding"]  # "small" by default
+    assert same_model(case, before)
+    before["values"]["contacts.rub.sliding"] = "finite"
+    assert not same_model(case, before)
+    del before["values"]["contacts.rub.sliding"], before["values"]["contacts.rub.stiffness"]  # which the case gives
+    assert not same_model(case, before)

@@ -177,9 +177,11 @@ class ExactStepper:
     @property
     def reason(self) -> str:
         """Why this method, and what it did that is not exact."""
-        said = f"{self._why}: from one change of contact to the next, in the complete modes of each status"
-        if self.lacking is not None:
-            said += f", of {self.coordinates.words}; {self.lacking.words}"
+        said = f"{self._why}: from one change of contact to the next, in the "
+        if self.lacking is None:
+            said += "complete modes of each status"
+        else:
+            said += f"modes of each status, on {self.coordinates.words}; {self.lacking.words}"
         if self.start_lacking > TOLD_FROM:
             said += f"; {100 * self.start_lacking:.2g} % of the initial state, by its mass, has no place in them"
         if landed := self.motion.landed:
