@@ -21,8 +21,9 @@ from stridor.system import System
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.simulate import Settings, plan, simulate
+from stridor.temporal.steppers.exact.leaps import Leaps
 from stridor.temporal.steppers.exact.motion import Motion
-from stridor.temporal.steppers.exact.search import CROSSED, NONE, Numbers, first_root, parts_of
+from stridor.temporal.steppers.exact.search import CROSSED, NONE, first_root, numbers_of, parts_of, planes
 from stridor.temporal.steppers.exact.statuses import STICK as STICKS
 
 pytestmark = pytest.mark.verification
@@ -161,6 +162,7 @@ def off_explicit(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[list[float
     grid, duration = 0.01, 12.0
     asked = {"velocities": {"belt": 1.0}, "start": (start, 0.0, 0.0), "watch": ("first", "last")}
     with monkeypatch.context() as patch:
+        patch.setattr(Leaps, "plain", 0)
         undecided = Undecided(patch)
         wanted = exact(system, duration, step=grid, **asked)
     size = np.abs(wanted.displacement).max()
@@ -202,6 +204,62 @@ def test_explicit_runs_go_to_it_with_smaller_steps(seeds: range, monkeypatch: py
     assert refused <= 0.01 * len(seeds)
 
 
+@pytest.mark.parametrize(
+    "seeds", [range(8), pytest.param(range(100, 400), marks=pytest.mark.slow)], ids=["few", "many"]
+)
+def test_plain_changes_are_those_of_all_changes(seeds: range, monkeypatch: pytest.MonkeyPatch):
+    """The compiled way through plain changes against `Motion.passed` for all of them: the same motion, works, times of
+    statuses and largest forces, up to where rounding has grown."""
+    changes = 0
+    for seed in seeds:
+        system, start = random_system(seed)
+        asked = {"velocities": {"belt": 1.0}, "start": (start, 0.0, 0.0), "watch": ("first", "last")}
+        found: list[st.Trajectory | str] = []
+        for plain in (Leaps.plain, 0):
+            with monkeypatch.context() as patch:
+                patch.setattr(Leaps, "plain", plain)
+                try:
+                    found.append(exact(system, 6.0, step=0.01, **asked))
+                except st.AnalysisError as jams:
+                    found.append(str(jams))
+        fast, plainly = found
+        if isinstance(fast, str) or isinstance(plainly, str):
+            assert str(fast).split(" (t =")[0] == str(plainly).split(" (t =")[0], seed
+            continue
+        size = np.abs(plainly.displacement).max()
+        assert fast.displacement == pytest.approx(plainly.displacement, abs=1e-7 * size), seed
+        for name, work in plainly.works.items():
+            assert fast.works[name] == pytest.approx(work, abs=1e-7 * np.abs(plainly.kinetic).max()), (seed, name)
+        for phase, other in zip(fast.phases, plainly.phases, strict=True):
+            for contact, kept in other.contacts.items():
+                for what, value in vars(kept).items():
+                    wanted = value if value is None else pytest.approx(value, rel=1e-5, abs=1e-7)
+                    assert getattr(phase.contacts[contact], what) == wanted, (seed, what)
+        changes += int(np.count_nonzero(np.diff(fast.status, axis=0)))
+    assert changes > 3 * len(seeds)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_largest_forces_are_those_of_all_times(seed: int):
+    """Few records and many: as large a force, as fast a slip, and none of the many is larger."""
+    system, start = random_system(seed)
+    asked = {"velocities": {"belt": 1.0}, "start": (start, 0.0, 0.0)}
+    few, many = (exact(system, 3.0, step=step, **asked) for step in (0.5, 2e-4))
+    for c, name in enumerate(many.contact_names):
+        told, other = (run.phases[-1].contacts[name] for run in (few, many))
+        pairs = (
+            ("max_normal_force", many.normal_force[:, c]),
+            ("max_tangential_force", many.tangential_force[:, c]),
+            ("max_slip_speed", np.where(many.status[:, c] == SLIP, many.slip_speed[:, c], 0.0)),
+        )
+        for what, seen in pairs:
+            largest = getattr(told, what)
+            assert largest == pytest.approx(getattr(other, what), rel=3e-6)
+            assert np.abs(seen).max() <= largest * (1 + 3e-6)
+            # Smooth between records, but at an impact.
+            assert np.abs(seen).max() >= largest * 0.98 or what != "max_tangential_force"
+
+
 def test_the_first_root_is_the_first():
     """Sums of three modes, some of which turn many times on the first part: against a fine grid."""
     rng = np.random.default_rng(5)
@@ -215,8 +273,10 @@ def test_the_first_root_is_the_first():
         values = (weights @ modes).real + rows[:, :1] + rows[:, 1:] * times
         if values[:, 0].min() <= 0.0:
             continue
-        numbers = Numbers(weights, np.abs(weights), rows)
-        code, which, when, *_ = first_root(numbers, poles, np.ones(3, dtype=complex), parts_of(poles, 1.0), 1.0, 0)
+        numbers, start = numbers_of(weights, poles, rows), planes(np.ones(3, dtype=complex))
+        code, which, when, *_ = first_root(
+            numbers, planes(poles), start, parts_of(poles, 1.0), 1.0, 0, np.empty(6)
+        )
         below = np.flatnonzero(values.min(axis=0) < 0.0)
         met += len(below) > 0
         if len(below) == 0:  # a dip between two points of the grid may be a root all the same

@@ -8,15 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....errors import AnalysisError
-from ....typing import Array, ComplexArray
+from ....typing import Array, ComplexArray, IntArray
 from ...columns import FRICTION, NORMAL, SUPPORT, WORKS
 from ..basis import Basis
 from .decisions import CLOSE, Impact, State, Touching, choices, consistent_status, impact, landing
 from .drive import Piece
-from .powers import Powers
-from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, parts_of
+from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, numbers_of, parts_of, planes
 from .statuses import BACKWARD, FORWARD, GAP, STICK, TAYLOR, Driven, Flow, Pairs, Regime, Status, sense
 
+UNTOLD = (
+    "a force, gap or slip of a contact stays so close to zero that no change of status can be told from rounding, "
+    'which the exact stepper does not pass; take stepper = "explicit"'
+)
 STRETCH = 256  # longest parts that are looked through from one beginning of the modes
 HELD = 1e-9  # of a row: what is left of it where contacts leave it no motion
 STORM, MOMENT = 300, 0.3  # so many events within so much of the fastest mode's time [rad]: they accumulate
@@ -31,10 +34,9 @@ class Watched:
     flow: Flow
     meanings: tuple[tuple[str, int], ...]
     weights: ComplexArray
-    sizes: Array
+    numbers: Numbers
     slow: Array
     table: Parts
-    powers: Powers
 
 
 @dataclass(frozen=True)
@@ -60,10 +62,6 @@ class Anchor:
         zeta = self.zeta * np.exp(self.watched.flow.split.poles * after)
         return self.watched.flow.sizes(zeta, self.slow_at(after))
 
-    def works(self, after: Array) -> Array:
-        """Works (t, 5) [J] from the beginning of these modes to some times (t,) after it."""
-        return self.watched.powers.works(self.zeta, self.terms, after)
-
     def slow_at(self, after: float) -> Array:
         """What is slow, some time after."""
         return after ** np.arange(len(self.terms)) @ self.terms
@@ -75,22 +73,20 @@ class Motion:
     Displacement q and velocity v (k,) at ``time``, the status of the contacts and where each began to stick.
     """
 
-    works_counted = True  # what comes after may do without
-
     def __init__(self, basis: Basis, pairs: Pairs, pieces: list[Piece]) -> None:
         self.basis, self.pairs, self.pieces = basis, pairs, pieces
         self.piece = 0
         self.time = 0.0
         self.q, self.v = np.zeros(basis.size), np.zeros(basis.size)
         self.status: Status = (GAP,) * pairs.count
-        self.holds = np.zeros(pairs.count)
+        self.holds: Array = np.zeros(pairs.count)
         self.level = 0
         self.events = self.unsure = self.crowded = 0
         self.crowd_since = self.latest = 0.0  # [s], the first and the last event of a moment
         self.parted = np.full(pairs.count, -1.0)  # [s], when each contact opened
-        self.parted_from = np.zeros(pairs.count, dtype=np.int64)  # and its status before
+        self.parted_from: IntArray = np.zeros(pairs.count, dtype=np.int64)  # and its status before
         self.landed = 0
-        self.works = np.zeros(WORKS)  # [J] up to the beginning of the present modes
+        self.works: Array = np.zeros(WORKS)  # [J] up to the beginning of the present modes: of impacts, and what `Leaps` adds
         self._sizes = np.zeros(basis.size), np.zeros(basis.size)  # of the terms of q and v
         self._regimes: dict[Status, Regime] = {}
         self._driven: dict[tuple[Status, int], Driven] = {}
@@ -142,15 +138,12 @@ class Motion:
             last = self.pieces[self.piece].end
             limit = min(anchor.span, last - anchor.time)
             code, which, after, level, _, unsure = first_root(
-                Numbers(anchor.watched.weights, anchor.watched.sizes, anchor.watched.slow @ anchor.terms.T),
-                anchor.watched.flow.split.poles, anchor.zeta, anchor.watched.table, limit, self.level,
+                anchor.watched.numbers._replace(rows=anchor.watched.slow @ anchor.terms.T),
+                planes(anchor.watched.flow.split.poles), planes(anchor.zeta), anchor.watched.table, limit, self.level, np.empty(2 * len(anchor.zeta)),
             )  # fmt: skip
             self.level, self.unsure = level, self.unsure + unsure
             if code == UNDECIDED:
-                raise AnalysisError(
-                    "a force, gap or slip of a contact stays so close to zero that no change of status can be told "
-                    'from rounding, which the exact stepper does not pass; take stepper = "explicit"'
-                )
+                raise AnalysisError(UNTOLD)
             if code == CROSSED:
                 self.next = (min(anchor.time + after, last), *anchor.watched.meanings[which])
             elif anchor.time + limit >= last * (1 - 1e-15):
@@ -185,8 +178,6 @@ class Motion:
         time, meaning, c = self.next
         anchor = self.anchor
         self.next, self.anchor = None, None
-        if self.works_counted:
-            self.works = self.works + anchor.works(np.array([time - anchor.time]))[0]
         self.q, self.v = anchor.state(time)
         self._sizes = anchor.sizes(time)
         self.time = time
@@ -392,4 +383,5 @@ def _watched(regime: Regime, piece: Piece) -> Watched:
     longest = min(1.0 / slowest if np.isfinite(slowest) else np.inf, piece.end - piece.start)
     stacked = np.array(weights, dtype=complex).reshape(len(meanings), len(poles))
     rest = np.array(slow).reshape(len(meanings), len(flow.slow))
-    return Watched(flow, tuple(meanings), stacked, np.abs(stacked), rest, parts_of(poles, longest), Powers(flow))
+    numbers = numbers_of(stacked, poles, rest)
+    return Watched(flow, tuple(meanings), stacked, numbers, rest, parts_of(poles, longest))

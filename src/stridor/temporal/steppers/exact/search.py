@@ -16,30 +16,50 @@ import numpy as np
 
 from ....kernels import njit
 from ....typing import Array, ComplexArray
-from ...arithmetic import CAREFUL
+from ...arithmetic import FAST
 
 NONE, CROSSED, UNDECIDED = range(3)
 MOST_UNSURE = 200  # parts of the finest in one search
+GROWTH = 16.0  # of the bound, where a part is twice as long
 LET_GO = 1e-12  # of the size of its terms
+EPS = 2.0**-52
 SHORTEST = 1e-7  # rad of the fastest mode on the finest parts: on finer ones rounding holds the modes still
 
 
 class Parts(NamedTuple):
-    """Of parts h = longest/2ʲ, j = 0 … L − 1: factors exp(λ h) (L, f), how far off its cubic a mode of size one can be
-    (bent), and off the line between its ends its rate (turned)."""
+    """Of parts h = longest/2ʲ, j = 0 … L − 1: factors exp(λ h) (L, f), real and imaginary, how far off its cubic a mode
+    of size one can be (bent), and off the line between its ends its rate (turned)."""
 
     longest: float
-    factors: ComplexArray
+    real: Array
+    imag: Array
     bent: Array
     turned: Array
 
 
 class Numbers(NamedTuple):
-    """Terms of several numbers: weights (m, f) of the modes, their sizes, polynomials (m, J)."""
+    """Terms of several numbers: real and imaginary weights (m, f) of the modes, those of their rates, their sizes,
+    polynomials (m, J)."""
 
-    weights: ComplexArray
+    real: Array
+    imag: Array
+    rate_real: Array
+    rate_imag: Array
     sizes: Array
     rows: Array
+
+
+def planes(values: ComplexArray) -> Array:
+    """Real and imaginary parts (2, f)."""
+    return np.stack([values.real, values.imag])
+
+
+def numbers_of(weights: ComplexArray, poles: ComplexArray, rows: Array) -> Numbers:
+    """Numbers with weights (m, f) of modes λ (f,) and polynomials (m, J)."""
+    turning = weights * poles
+    return Numbers(
+        weights.real.copy(), weights.imag.copy(), turning.real.copy(), turning.imag.copy(), np.abs(weights), rows
+    )
 
 
 def parts_of(poles: ComplexArray, longest: float) -> Parts:
@@ -52,7 +72,8 @@ def parts_of(poles: ComplexArray, longest: float) -> Parts:
     # A mode that turns many times on a part is bounded by itself and by its cubic.
     bent = np.minimum(size**4 / 384, 2.0 + 8.0 / 27.0 * size) * grown
     turned = np.minimum(size**2 / 8, 2.0) * grown * np.abs(poles)
-    return Parts(longest, np.exp(moved), bent, turned)
+    grown, angle = np.exp(moved.real), moved.imag
+    return Parts(longest, grown * np.cos(angle), grown * np.sin(angle), bent, turned)
 
 
 @njit(cache=True)
@@ -66,7 +87,7 @@ def polynomial(row: Array, t: float) -> tuple[float, float]:  # pragma: no cover
 
 
 @njit(cache=True)
-def _derivative(row: Array, end: float, order: int) -> float:  # pragma: no cover - compiled
+def derivative_bound(row: Array, end: float, order: int) -> float:  # pragma: no cover - compiled
     """Most that a derivative of a polynomial can be up to ``end``."""
     total = 0.0
     for j in range(row.shape[0] - 1, order - 1, -1):
@@ -77,89 +98,163 @@ def _derivative(row: Array, end: float, order: int) -> float:  # pragma: no cove
     return total
 
 
-@njit(cache=True, fastmath=CAREFUL)
-def _sums(weights: ComplexArray, zeta: ComplexArray, poles: ComplexArray) -> tuple[float, float]:
-    # pragma: no cover - compiled
-    """Value and rate of the modes."""
-    total = rate = 0.0
-    for k in range(zeta.shape[0]):
-        real = weights[k].real * zeta[k].real - weights[k].imag * zeta[k].imag
-        imag = weights[k].real * zeta[k].imag + weights[k].imag * zeta[k].real
-        total += real
-        rate += real * poles[k].real - imag * poles[k].imag
-    return total, rate
-
-
-@njit(cache=True, fastmath=CAREFUL)
-def _most(sizes: Array, zeta: ComplexArray, bounds: Array) -> float:  # pragma: no cover - compiled
+@njit(cache=True, fastmath=FAST)
+def sum_of(real: Array, imag: Array, zr: Array, zi: Array) -> float:  # pragma: no cover - compiled
+    """Re Σ a_k ζ_k."""
     total = 0.0
-    for k in range(zeta.shape[0]):
-        total += sizes[k] * bounds[k] * (abs(zeta[k].real) + abs(zeta[k].imag))
+    for k in range(zr.shape[0]):
+        total += real[k] * zr[k] - imag[k] * zi[k]
+    return total
+
+
+@njit(cache=True, fastmath=FAST)
+def most(sizes: Array, bounds: Array, amounts: Array) -> float:  # pragma: no cover - compiled
+    """Most that modes of some amounts (f,) can be off."""
+    total = 0.0
+    for k in range(amounts.shape[0]):
+        total += sizes[k] * bounds[k] * amounts[k]
     return total
 
 
 @njit(cache=True)
-def _root(
-    weights: ComplexArray, row: Array, poles: ComplexArray, zeta: ComplexArray, time: float, length: float, let: float
-) -> float:  # pragma: no cover - compiled
-    """Where a number falls through −let behind ``time``, at which the modes are ζ: Newton's method, kept between."""
+def turn(
+    zr: Array, zi: Array, real: Array, imag: Array, to_real: Array, to_imag: Array
+) -> None:  # pragma: no cover - compiled
+    """Modes times some factors (f,)."""
+    for k in range(zr.shape[0]):
+        one, two = zr[k], zi[k]
+        to_real[k] = one * real[k] - two * imag[k]
+        to_imag[k] = one * imag[k] + two * real[k]
+
+
+@njit(cache=True)
+def _guess(length: float, ends: tuple[float, float, float, float]) -> float:  # pragma: no cover - compiled
+    """Where the cubic through values and rates at both ends falls through zero."""
+    y, rate, then, later = ends
+    two = (3.0 * (then - y) / length - 2.0 * rate - later) / length
+    three = (rate + later - 2.0 * (then - y) / length) / (length * length)
     low, high = 0.0, length
-    t = 0.5 * length
+    t = length * y / (y - then)
+    for _ in range(20):
+        value = ((three * t + two) * t + rate) * t + y
+        if value > 0.0:
+            low = t
+        else:
+            high = t
+        slope = (3.0 * three * t + 2.0 * two) * t + rate
+        following = t - value / slope if slope != 0.0 else low
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if abs(following - t) <= 1e-9 * length:
+            break
+        t = following
+    return t
+
+
+@njit(cache=True, fastmath={"contract"})
+def _move(modes: Array, poles: Array, step: float, fastest: float) -> None:  # pragma: no cover - compiled
+    """Modes [Re; Im] (2f,) moved on by a time, by nine terms of the exponential where these tell all digits."""
+    f = poles.shape[1]
+    if abs(step) * fastest > 0.05:
+        for k in range(f):
+            grown = math.exp(poles[0, k] * step)
+            cosine, sine = grown * math.cos(poles[1, k] * step), grown * math.sin(poles[1, k] * step)
+            real, imag = modes[k], modes[f + k]
+            modes[k], modes[f + k] = real * cosine - imag * sine, real * sine + imag * cosine
+        return
+    for k in range(f):
+        a, b = poles[0, k] * step, poles[1, k] * step
+        real, imag = 1.0, 0.0
+        for n in range(9, 0, -1):
+            real, imag = 1.0 + (real * a - imag * b) / n, (real * b + imag * a) / n
+        one, two = modes[k], modes[f + k]
+        modes[k], modes[f + k] = one * real - two * imag, one * imag + two * real
+
+
+@njit(cache=True)
+def _root(
+    numbers: Numbers,
+    i: int,
+    poles: Array,
+    zr: Array,
+    zi: Array,
+    span: tuple[float, float],
+    let: float,
+    ends: tuple[float, float, float, float],
+    modes: Array,
+) -> float:  # pragma: no cover - compiled
+    """Where a number falls through −let behind the first time of ``span``, at which the modes are ζ, before its second
+    number [s]: Newton's method, kept between; ends: values and rates there. modes: [Re; Im] (2f,) at the root."""
+    time, length = span
+    low, high = 0.0, length
+    t = _guess(length, (ends[0] + let, ends[1], ends[2] + let, ends[3]))
+    noise = abs(numbers.rows[i, 0])
+    for k in range(zr.shape[0]):
+        noise += numbers.sizes[i, k] * (abs(zr[k]) + abs(zi[k]))
+    noise *= EPS
+    f, fastest = zr.shape[0], 0.0
+    for k in range(f):
+        fastest = max(fastest, abs(poles[0, k]) + abs(poles[1, k]))
+        grown = math.exp(poles[0, k] * t)
+        cosine, sine = grown * math.cos(poles[1, k] * t), grown * math.sin(poles[1, k] * t)
+        modes[k], modes[f + k] = zr[k] * cosine - zi[k] * sine, zr[k] * sine + zi[k] * cosine
     for _ in range(200):
-        y, rate = polynomial(row, time + t)
-        y += let
-        for k in range(zeta.shape[0]):
-            term = weights[k] * zeta[k] * np.exp(poles[k] * t)
-            y += term.real
-            rate += (term * poles[k]).real
+        y, rate = polynomial(numbers.rows[i], time + t)
+        y += let + sum_of(numbers.real[i], numbers.imag[i], modes[:f], modes[f:])
+        rate += sum_of(numbers.rate_real[i], numbers.rate_imag[i], modes[:f], modes[f:])
         if y > 0.0:
             low = t
         else:
             high = t
         following = t - y / rate if rate != 0.0 else low
-        if abs(following - t) <= 4e-16 * abs(following):
+        # A step that rounding makes leads no further.
+        if abs(following - t) <= 4e-16 * abs(following) or abs(y) <= noise:
             break
         if not low < following < high:
             following = 0.5 * (low + high)
+        _move(modes, poles, following - t, fastest)
         t = following
-    return min(max(t, low), high)
+    return t
 
 
 @njit(cache=True)
 def first_root(
-    numbers: Numbers, poles: ComplexArray, start: ComplexArray, table: Parts, limit: float, level: int
+    numbers: Numbers, poles: Array, start: Array, table: Parts, limit: float, level: int, modes: Array
 ) -> tuple[int, int, float, int, int, int]:  # pragma: no cover - compiled
     """The first of several numbers y_i (m,) to reach zero before ``limit`` [s]; the last part may end behind it.
 
-    start ζ (f,): the modes at t = 0; level: that of the first part. Returns what ended it, which number, when, the
-    level of the last part, how many parts there were, and how many of the finest could not be decided.
+    poles λ and start ζ (2, f), real and imaginary parts: the modes at t = 0; level: that of the first part. Returns
+    what ended it, which number, when, the level of the last part, how many parts there were, and how many of the finest
+    could not be decided; ``modes`` (2f,) are [Re; Im] of those at the root.
     """
-    m, f = numbers.weights.shape
-    zeta, following = start.copy(), np.empty(f, dtype=np.complex128)
+    m, f = numbers.real.shape
+    zr, zi, amounts = start[0].copy(), start[1].copy(), np.empty(f)
+    following, following_imag = np.empty(f), np.empty(f)
     now, rate, then, later = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
-    let = np.zeros(m)
+    let, trial = np.zeros(m), np.empty(2 * f)
     for i in range(m):
         y, slope = polynomial(numbers.rows[i], 0.0)
-        total, turning = _sums(numbers.weights[i], zeta, poles)
-        now[i], rate[i] = y + total, slope + turning
+        now[i] = y + sum_of(numbers.real[i], numbers.imag[i], zr, zi)
+        rate[i] = slope + sum_of(numbers.rate_real[i], numbers.rate_imag[i], zr, zi)
         size = LET_GO * abs(numbers.rows[i, 0])
         for k in range(f):
-            size += LET_GO * numbers.sizes[i, k] * abs(zeta[k])
+            size += LET_GO * numbers.sizes[i, k] * math.hypot(zr[k], zi[k])
         if now[i] < size:
             let[i] = size - min(now[i], 0.0)
+    for k in range(f):
+        amounts[k] = abs(zr[k]) + abs(zi[k])
     time, parts, unsure = 0.0, 0, 0
-    lowest = table.factors.shape[0] - 1
+    lowest = table.real.shape[0] - 1
     level = min(level, lowest)  # that of another status, whose table may be longer
     while time < limit:
         length = table.longest * 0.5**level
         parts += 1
-        for k in range(f):
-            following[k] = zeta[k] * table.factors[level, k]
-        doubtful, below, which = 0, 0, -1
+        turn(zr, zi, table.real[level], table.imag[level], following, following_imag)
+        doubtful, below, which, grows = 0, 0, -1, True
         for i in range(m):
             y, slope = polynomial(numbers.rows[i], time + length)
-            total, turning = _sums(numbers.weights[i], following, poles)
-            y, slope = y + total, slope + turning
+            y += sum_of(numbers.real[i], numbers.imag[i], following, following_imag)
+            slope += sum_of(numbers.rate_real[i], numbers.rate_imag[i], following, following_imag)
             then[i], later[i] = y, slope
             if y + let[i] <= 0.0:
                 below += 1
@@ -169,15 +264,18 @@ def first_root(
             third = length / 3.0
             least = min(min(now[i], now[i] + third * rate[i]), min(y, y - third * slope)) + let[i]
             if least > 0.0:
-                least -= _derivative(numbers.rows[i], time + length, 4) * length**4 / 384
-                least -= _most(numbers.sizes[i], zeta, table.bent[level])
+                off = derivative_bound(numbers.rows[i], time + length, 4) * length**4 / 384
+                off += most(numbers.sizes[i], table.bent[level], amounts)
+                grows = grows and off * GROWTH < least
+                least -= off
             if least <= 0.0:
                 doubtful += 1
         if below == 1 and doubtful == 0 and now[which] + let[which] > 0.0:
-            bend = _derivative(numbers.rows[which], time + length, 3) * length * length / 8
-            bend += _most(numbers.sizes[which], zeta, table.turned[level])
+            bend = derivative_bound(numbers.rows[which], time + length, 3) * length * length / 8
+            bend += most(numbers.sizes[which], table.turned[level], amounts)
             if max(rate[which], later[which]) + bend < 0.0:
-                t = _root(numbers.weights[which], numbers.rows[which], poles, zeta, time, length, let[which])
+                ends = (now[which], rate[which], then[which], later[which])
+                t = _root(numbers, which, poles, zr, zi, (time, length), let[which], ends, modes)
                 if time + t > limit:
                     break
                 return CROSSED, which, time + t, level, parts, unsure
@@ -188,9 +286,11 @@ def first_root(
             first = length
             for i in range(m):
                 if then[i] + let[i] <= 0.0 < now[i] + let[i]:
-                    t = _root(numbers.weights[i], numbers.rows[i], poles, zeta, time, length, let[i])
+                    ends = (now[i], rate[i], then[i], later[i])
+                    t = _root(numbers, i, poles, zr, zi, (time, length), let[i], ends, trial)
                     if t < first:
                         which, first = i, t
+                        modes[:] = trial
             if time + first > limit:
                 break
             return CROSSED, which, time + first, level, parts, unsure
@@ -199,11 +299,12 @@ def first_root(
             return UNDECIDED, -1, time, level, parts, unsure
         time += length
         for k in range(f):
-            zeta[k] = following[k]
+            zr[k], zi[k] = following[k], following_imag[k]
+            amounts[k] = abs(zr[k]) + abs(zi[k])
         for i in range(m):
             now[i], rate[i] = then[i], later[i]
             if now[i] > let[i]:
                 let[i] = 0.0
-        if doubtful == 0 and level > 0:
+        if doubtful == 0 and grows and level > 0:
             level -= 1
     return NONE, -1, limit, level, parts, unsure

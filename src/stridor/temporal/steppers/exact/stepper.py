@@ -17,21 +17,13 @@ from ...beta2 import scheme, step_limit
 from ...columns import (
     CONTACT_RECORD,
     ENERGY_RECORD,
-    FIRST_OPEN,
-    FIRST_STICK,
-    MAX_NORMAL,
-    MAX_SPEED,
-    MAX_TANGENTIAL,
-    OPEN_STEPS,
     REC_GAP,
     REC_NORMAL,
     REC_POSITION,
     REC_SLIP,
     REC_STATUS,
     REC_TANGENTIAL,
-    SLIP_STEPS,
     STATISTICS,
-    STICK_STEPS,
     WORK_COLUMNS,
 )
 from ...node_history import NodeHistory
@@ -47,14 +39,14 @@ from ..basis import Basis
 from ..coordinates import Coordinates, all_modes, left_out, truncated
 from ..sparse.stepper import with_friction
 from .drive import pieces
+from .leaps import Leaps
 from .motion import Motion
-from .outputs import Outputs, Records
-from .statuses import BACKWARD, GAP, STICK, Pairs
+from .observed import Records
+from .outputs import Outputs
+from .statuses import BACKWARD, GAP, Pairs
 
 MOST_CONTACTS = 4
 MOST_FREEDOMS = 1500
-SAMPLE = 0.1  # rad of the fastest mode between times at which the largest forces are looked for
-MOST_SAMPLES = 100_000  # numbers for that between two changes
 DONE = 0  # where the counters have the steps done
 TOLD_FROM = 1e-3  # of the initial state: what is left out of it is said from there on
 
@@ -166,8 +158,9 @@ class ExactStepper:
         self.parts = sketch(system, system.contact_nodes())
         self.statistics = fresh_statistics(self.pairs.count, STATISTICS)
         self.motion = Motion(self.basis, self.pairs, [])
-        self._done = self._recorded = 0
-        self._counted = 0.0
+        self.leaps: Leaps | None = None
+        self._done = 0
+        self._counted = 0.0  # [s], up to where times of statuses were counted before
 
     @property
     def system(self) -> System:
@@ -196,7 +189,7 @@ class ExactStepper:
     @property
     def recorded(self) -> int:
         """How many records are filled."""
-        return self._recorded
+        return 0 if self.leaps is None else self.leaps.recorded
 
     @property
     def sweeps(self) -> tuple[int, int]:
@@ -215,11 +208,11 @@ class ExactStepper:
         """Histories of the nodes where contacts are of surfaces: each has one."""
         if not self._system.surfaces:
             return None
-        nodes, values = self._system.contact_nodes(), self.record.contacts[: self._recorded]
+        nodes, values = self._system.contact_nodes(), self.record.contacts[: self.recorded]
         along = self._ways[None, :, None]
         return NodeHistory(
             names=nodes.names, owner=nodes.owner, position=nodes.position, area=nodes.area, tangents=nodes.tangents,
-            time=(start + np.arange(self._recorded)) * self.every * self.scheme.step,
+            time=(start + np.arange(self.recorded)) * self.every * self.scheme.step,
             normal_force=values[:, :, REC_NORMAL], tangential_force=along * values[:, :, REC_TANGENTIAL, None],
             slip_velocity=along * values[:, :, REC_SLIP, None], gap=values[:, :, REC_GAP],
             status=values[:, :, REC_STATUS].astype(np.int64),
@@ -305,14 +298,16 @@ class ExactStepper:
         q, v, holds, works = motion.q, motion.v, motion.holds, motion.works
         if motion.anchor is not None:
             q, v = motion.anchor.state(now)
-            works = works + motion.anchor.works(np.array([now - motion.anchor.time]))[0]
+        if self.leaps is not None and self.leaps.works is not None:
+            works = self.leaps.works
+        counted = self._counted if self.leaps is None else self.leaps.counted
         counters = [self._done, motion.piece, motion.level, motion.events, motion.unsure, motion.crowded, motion.landed]
         vectors = self.basis.vectors
         found: dict[str, Any] = {
             "exact_u": vectors @ motion.q, "exact_w": vectors @ motion.v, "exact_q": motion.q, "exact_v": motion.v,
             "exact_now_u": vectors @ q, "exact_now_w": vectors @ v, "exact_now_works": works,
             "exact_holds": holds, "exact_works": motion.works,
-            "exact_times": np.array([motion.time, self._counted, motion.crowd_since, motion.latest]),
+            "exact_times": np.array([motion.time, counted, motion.crowd_since, motion.latest]),
             "exact_parted": motion.parted, "exact_parted_from": motion.parted_from,
             "exact_status": np.array(motion.status, dtype=np.int64), "exact_counters": np.array(counters),
             "exact_statistics": self.statistics,
@@ -377,28 +372,28 @@ class ExactStepper:
             rows.append(self._system.points[name].free[:2].toarray())
             lifts.append(self._system.points[name].lift[:2])
         watch = np.vstack(rows) @ self.basis.vectors
-        self.outputs = Outputs(watch, np.vstack(lifts))
         self.every = every
         self.record = Records(
             np.zeros((count, len(self.contact_names), CONTACT_RECORD)),
             np.zeros((count, len(watch), 3)),
             np.zeros((count, ENERGY_RECORD)),
+            self._ways,
         )
+        self.leaps = Leaps(
+            Outputs(watch, np.vstack(lifts)), self.record, self.statistics, schedule.step, every, self._done,
+            self._counted,
+        )  # fmt: skip
         for c, contact in enumerate(self._system.contacts):
             self.record.contacts[:, c, REC_POSITION] = contact.segment + contact.xi
 
     def advance(self, steps: int, schedule: Schedule, phase: str) -> None:
         """Up to so many steps, and through all events on the way."""
+        assert self.leaps is not None
         motion, step = self.motion, self.scheme.step
         last = self._done + steps
         end = last * step
         try:
-            while True:
-                time = motion.reach(end)
-                self._keep(time, last)
-                self._count(min(time, end))
-                if time >= end:
-                    break
+            while not self.leaps.go(motion, end, last):
                 motion.passed()
         except AnalysisError as error:
             self._done = min(max(self._done, int(motion.time / step)), last)
@@ -406,50 +401,6 @@ class ExactStepper:
         self._done = last
         if motion.anchor is not None and not np.all(np.isfinite(motion.anchor.state(end)[0])):
             raise AnalysisError(not_finite(end, phase, step))
-
-    def _keep(self, time: float, last: int) -> None:
-        """Records that fall before ``time`` and before step ``last``."""
-        anchor, step, every = self.motion.anchor, self.scheme.step, self.every
-        if anchor is None:
-            return
-        first = -(-self._done // every) if self._recorded == 0 else self._next
-        stop = min(int(np.ceil(time / step / every - 1e-9)), -(-last // every))
-        stop = min(stop, first + len(self.record.contacts) - self._recorded)
-        self._next = max(first, stop)
-        if stop <= first:
-            return
-        after = np.maximum(np.arange(first, stop) * every * step - anchor.time, 0.0)
-        here = slice(self._recorded, self._recorded + stop - first)
-        self.outputs.write(anchor, after, self.motion.works, self.record, here)
-        self._recorded = here.stop
-        contacts = self.record.contacts[here]
-        contacts[:, :, [REC_TANGENTIAL, REC_SLIP]] *= self._ways[:, None]
-        self._extremes(np.abs(contacts[..., [REC_NORMAL, REC_TANGENTIAL, REC_SLIP]]).max(axis=0, initial=0.0))
-
-    def _extremes(self, values: Array) -> None:
-        for column, number in ((MAX_NORMAL, 0), (MAX_TANGENTIAL, 1)):
-            self.statistics[:, column] = np.maximum(self.statistics[:, column], values[:, number])
-        slips = np.array([s not in (GAP, STICK) for s in self.motion.status])
-        self.statistics[:, MAX_SPEED] = np.maximum(self.statistics[:, MAX_SPEED], np.where(slips, values[:, 2], 0.0))
-
-    def _count(self, time: float) -> None:
-        """Time spent in the present status, in steps; forces at its end."""
-        step = self.scheme.step
-        share = max(time - self._counted, 0.0) / step
-        for c, now in enumerate(self.motion.status):
-            column = {GAP: OPEN_STEPS, STICK: STICK_STEPS}.get(now, SLIP_STEPS)
-            self.statistics[c, column] += share
-            first = {GAP: FIRST_OPEN, STICK: FIRST_STICK}.get(now)
-            if first is not None and share > 0.0 and self.statistics[c, first] < 0.0:
-                self.statistics[c, first] = self._counted / step
-        self._counted = max(time, self._counted)
-        anchor = self.motion.anchor
-        if anchor is None or share == 0.0 or not len(self.contact_names):
-            return
-        fine = share * step * self.motion.fastest() / SAMPLE
-        count = int(min(np.ceil(fine) + 1, max(MOST_SAMPLES // max(len(anchor.zeta), 1), 64)))
-        times = np.linspace(time - share * step, time, max(count, 2)) - anchor.time
-        self._extremes(np.abs(self.outputs.contacts_at(anchor, np.maximum(times, 0.0))).max(axis=0))
 
     def velocity(self) -> Array:
         """Velocity (n,) of the freedoms now."""

@@ -39,11 +39,9 @@ class _Before(NamedTuple):
 
 
 class VariedMotion(Motion):
-    """A motion that does not count works and takes along a variation of m directions: dq, dv (k, m) and, of contacts
+    """A motion that takes along a variation of m directions: dq, dv (k, m) and, of contacts
     that stick, dholds (contacts, m). grazed: the least rate with which a number went through zero, over what its terms
     amount to. words: the changes of contact since the beginning."""
-
-    works_counted = False
 
     def __init__(self, basis: Basis, pairs: Pairs, pieces: list[Piece]) -> None:
         super().__init__(basis, pairs, pieces)
