@@ -163,8 +163,8 @@ def _count(state: State, time: float, step: float) -> None:  # pragma: no cover 
 @njit(cache=True)
 def leap(
     store: Array, legs_at: IntArray, legs: IntArray, options_at: IntArray, options: IntArray, bench: Bench,
-    state: State, zeta: Array, terms: Array, ahead: Array, records: Records, end: float, step: float, every: int, last: int,
-    fastest: float, plain: int,
+    state: State, zeta: Array, terms: Array, ahead: Array, records: Records, end: float, step: float, every: int,
+    last: int, fastest: float, plain: int,
 ) -> tuple[int, Array, Array, Array]:  # fmt: skip # pragma: no cover - compiled
     """Up to ``end`` [s], with records before step ``last``; what ended it, ζ (2, f) and terms (J, S) of the modes, and
     modes ahead (2f,), at the next change.

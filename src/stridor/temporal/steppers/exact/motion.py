@@ -86,7 +86,7 @@ class Motion:
         self.parted = np.full(pairs.count, -1.0)  # [s], when each contact opened
         self.parted_from: IntArray = np.zeros(pairs.count, dtype=np.int64)  # and its status before
         self.landed = 0
-        self.works: Array = np.zeros(WORKS)  # [J] up to the beginning of the present modes: of impacts, and what `Leaps` adds
+        self.works: Array = np.zeros(WORKS)  # [J] up to the beginning of the present modes; `Leaps` counts them
         self._sizes = np.zeros(basis.size), np.zeros(basis.size)  # of the terms of q and v
         self._regimes: dict[Status, Regime] = {}
         self._driven: dict[tuple[Status, int], Driven] = {}
@@ -139,7 +139,8 @@ class Motion:
             limit = min(anchor.span, last - anchor.time)
             code, which, after, level, _, unsure = first_root(
                 anchor.watched.numbers._replace(rows=anchor.watched.slow @ anchor.terms.T),
-                planes(anchor.watched.flow.split.poles), planes(anchor.zeta), anchor.watched.table, limit, self.level, np.empty(2 * len(anchor.zeta)),
+                planes(anchor.watched.flow.split.poles), planes(anchor.zeta), anchor.watched.table, limit,
+                self.level, np.empty(2 * len(anchor.zeta)),
             )  # fmt: skip
             self.level, self.unsure = level, self.unsure + unsure
             if code == UNDECIDED:

@@ -23,7 +23,7 @@ from ...columns import (
 from .forms import ELASTIC, FORMS, KINETIC
 from .search import GROWTH, derivative_bound, most, polynomial, turn
 from .statuses import GAP, STICK
-from .sums import dot, forms_at, modes_at, product, slow_at
+from .sums import forms_at, modes_at, product, row_on, slow_at
 from .tables import (
     BENT,
     LONGEST,
@@ -86,7 +86,7 @@ def record(
         if number == first or number % TURNS == 0:
             modes_at(course.zeta, poles, after, modes)
         else:
-            turn(modes[:f], modes[f:], turning[0], turning[1], following[:f], following[f:])
+            turn(modes, turning[:1], turning[1:], 0, following)
             modes[:] = following
         if number < span[0]:
             continue
@@ -178,23 +178,23 @@ def extremes(
         for j in range(terms.shape[0]):
             for s in range(terms.shape[1]):
                 polynomials[i, j] += slow_rows[r, s] * terms[j, s]
-        y, slope = polynomial(polynomials[i], time)
-        ends[i, 0] = y + dot(weights[r], modes)
-        ends[i, 1] = slope + dot(rates[r], modes)
-        then = polynomial(polynomials[i], stop)[0] + dot(weights[r], last)
+        y, slope = polynomial(polynomials, i, time)
+        ends[i, 0] = y + row_on(weights, r, modes)
+        ends[i, 1] = slope + row_on(rates, r, modes)
+        then = polynomial(polynomials, i, stop)[0] + row_on(weights, r, last)
         _raise(statistics[r // CONTACT_ROWS], rows[i, 1], slips[i], max(abs(ends[i, 0]), abs(then)))
     for k in range(f):
         amounts[k] = abs(modes[k]) + abs(modes[f + k])
     while time < stop:
         length = longest * 0.5**level
         within = time + length <= stop  # else what is behind the end only bounds what is before it
-        turn(modes[:f], modes[f:], real[level], imag[level], following[:f], following[f:])
+        turn(modes, real, imag, level, following)
         doubtful, grows = False, True
         for i in range(count):
             r = rows[i, 0]
-            y, slope = polynomial(polynomials[i], time + length)
-            y += dot(weights[r], following)
-            slope += dot(rates[r], following)
+            y, slope = polynomial(polynomials, i, time + length)
+            y += row_on(weights, r, following)
+            slope += row_on(rates, r, following)
             ends[i, 2], ends[i, 3] = y, slope
             known = statistics[r // CONTACT_ROWS, rows[i, 1]]
             if slips[i] > 0.0:
@@ -205,8 +205,8 @@ def extremes(
             top = max(abs(ends[i, 0] + third * ends[i, 1]), abs(y - third * slope), abs(ends[i, 0]), abs(y))
             top -= (1.0 + SURE) * known
             if top <= 0.0:
-                off = derivative_bound(polynomials[i], time + length, 4) * length**4 / 384
-                off += most(sizes[r], bent[level], amounts)
+                off = derivative_bound(polynomials, i, time + length, 4) * length**4 / 384
+                off += most(sizes, r, bent, level, amounts)
                 grows = grows and top + GROWTH * off < 0.0
                 top += off
             doubtful = doubtful or top > 0.0

@@ -21,7 +21,7 @@ from ...arithmetic import FAST
 NONE, CROSSED, UNDECIDED = range(3)
 MOST_UNSURE = 200  # parts of the finest in one search
 GROWTH = 16.0  # of the bound, where a part is twice as long
-LET_GO = 1e-12  # of the size of its terms
+LET_GO = 2.0**-46  # of the size of its terms, by which rounding is judged
 EPS = 2.0**-52
 SHORTEST = 1e-7  # rad of the fastest mode on the finest parts: on finer ones rounding holds the modes still
 
@@ -76,55 +76,58 @@ def parts_of(poles: ComplexArray, longest: float) -> Parts:
     return Parts(longest, grown * np.cos(angle), grown * np.sin(angle), bent, turned)
 
 
+# Rows are told by their numbers, not as arrays of their own: these are counted, which takes longer than short sums.
+
+
 @njit(cache=True)
-def polynomial(row: Array, t: float) -> tuple[float, float]:  # pragma: no cover - compiled
+def polynomial(rows: Array, i: int, t: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Value and slope."""
     total = slope = 0.0
-    for j in range(row.shape[0] - 1, -1, -1):
+    for j in range(rows.shape[1] - 1, -1, -1):
         slope = slope * t + total
-        total = total * t + row[j]
+        total = total * t + rows[i, j]
     return total, slope
 
 
 @njit(cache=True)
-def derivative_bound(row: Array, end: float, order: int) -> float:  # pragma: no cover - compiled
+def derivative_bound(rows: Array, i: int, end: float, order: int) -> float:  # pragma: no cover - compiled
     """Most that a derivative of a polynomial can be up to ``end``."""
     total = 0.0
-    for j in range(row.shape[0] - 1, order - 1, -1):
+    for j in range(rows.shape[1] - 1, order - 1, -1):
         factor = 1.0
-        for i in range(order):
-            factor *= j - i
-        total = total * end + factor * abs(row[j])
+        for n in range(order):
+            factor *= j - n
+        total = total * end + factor * abs(rows[i, j])
     return total
 
 
 @njit(cache=True, fastmath=FAST)
-def sum_of(real: Array, imag: Array, zr: Array, zi: Array) -> float:  # pragma: no cover - compiled
-    """Re Σ a_k ζ_k."""
-    total = 0.0
-    for k in range(zr.shape[0]):
-        total += real[k] * zr[k] - imag[k] * zi[k]
-    return total
+def number_at(numbers: Numbers, i: int, modes: Array) -> tuple[float, float]:  # pragma: no cover - compiled
+    """What modes [Re; Im] (2f,) have of a number and of its rate."""
+    f, total, rate = numbers.real.shape[1], 0.0, 0.0
+    for k in range(f):
+        total += numbers.real[i, k] * modes[k] - numbers.imag[i, k] * modes[f + k]
+        rate += numbers.rate_real[i, k] * modes[k] - numbers.rate_imag[i, k] * modes[f + k]
+    return total, rate
 
 
 @njit(cache=True, fastmath=FAST)
-def most(sizes: Array, bounds: Array, amounts: Array) -> float:  # pragma: no cover - compiled
-    """Most that modes of some amounts (f,) can be off."""
+def most(sizes: Array, i: int, bounds: Array, level: int, amounts: Array) -> float:  # pragma: no cover - compiled
+    """Most that modes of some amounts (f,) can be off on a part."""
     total = 0.0
     for k in range(amounts.shape[0]):
-        total += sizes[k] * bounds[k] * amounts[k]
+        total += sizes[i, k] * bounds[level, k] * amounts[k]
     return total
 
 
 @njit(cache=True)
-def turn(
-    zr: Array, zi: Array, real: Array, imag: Array, to_real: Array, to_imag: Array
-) -> None:  # pragma: no cover - compiled
-    """Modes times some factors (f,)."""
-    for k in range(zr.shape[0]):
-        one, two = zr[k], zi[k]
-        to_real[k] = one * real[k] - two * imag[k]
-        to_imag[k] = one * imag[k] + two * real[k]
+def turn(modes: Array, real: Array, imag: Array, row: int, found: Array) -> None:  # pragma: no cover - compiled
+    """Modes [Re; Im] (2f,) times a row of factors (·, f)."""
+    f = real.shape[1]
+    for k in range(f):
+        one, two = modes[k], modes[f + k]
+        found[k] = one * real[row, k] - two * imag[row, k]
+        found[f + k] = one * imag[row, k] + two * real[row, k]
 
 
 @njit(cache=True)
@@ -176,32 +179,31 @@ def _root(
     numbers: Numbers,
     i: int,
     poles: Array,
-    zr: Array,
-    zi: Array,
+    start: Array,
     span: tuple[float, float],
     let: float,
     ends: tuple[float, float, float, float],
     modes: Array,
 ) -> float:  # pragma: no cover - compiled
-    """Where a number falls through −let behind the first time of ``span``, at which the modes are ζ, before its second
-    number [s]: Newton's method, kept between; ends: values and rates there. modes: [Re; Im] (2f,) at the root."""
+    """Where a number falls through −let behind the first time of ``span``, at which modes are ``start`` (2f,), before
+    its second number [s]: Newton's method, kept between; ends: values and rates there; modes (2f,): those at the
+    root."""
     time, length = span
     low, high = 0.0, length
     t = _guess(length, (ends[0] + let, ends[1], ends[2] + let, ends[3]))
     noise = abs(numbers.rows[i, 0])
-    for k in range(zr.shape[0]):
-        noise += numbers.sizes[i, k] * (abs(zr[k]) + abs(zi[k]))
-    noise *= EPS
-    f, fastest = zr.shape[0], 0.0
+    f, fastest = poles.shape[1], 0.0
     for k in range(f):
+        noise += numbers.sizes[i, k] * (abs(start[k]) + abs(start[f + k]))
         fastest = max(fastest, abs(poles[0, k]) + abs(poles[1, k]))
-        grown = math.exp(poles[0, k] * t)
-        cosine, sine = grown * math.cos(poles[1, k] * t), grown * math.sin(poles[1, k] * t)
-        modes[k], modes[f + k] = zr[k] * cosine - zi[k] * sine, zr[k] * sine + zi[k] * cosine
+    noise *= EPS
+    modes[:] = start
+    _move(modes, poles, t, fastest)
     for _ in range(200):
-        y, rate = polynomial(numbers.rows[i], time + t)
-        y += let + sum_of(numbers.real[i], numbers.imag[i], modes[:f], modes[f:])
-        rate += sum_of(numbers.rate_real[i], numbers.rate_imag[i], modes[:f], modes[f:])
+        y, rate = polynomial(numbers.rows, i, time + t)
+        of_modes, turning = number_at(numbers, i, modes)
+        y += let + of_modes
+        rate += turning
         if y > 0.0:
             low = t
         else:
@@ -228,33 +230,33 @@ def first_root(
     could not be decided; ``modes`` (2f,) are [Re; Im] of those at the root.
     """
     m, f = numbers.real.shape
-    zr, zi, amounts = start[0].copy(), start[1].copy(), np.empty(f)
-    following, following_imag = np.empty(f), np.empty(f)
+    here, following, amounts = np.empty(2 * f), np.empty(2 * f), np.empty(f)
     now, rate, then, later = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     let, trial = np.zeros(m), np.empty(2 * f)
+    for k in range(f):
+        here[k], here[f + k] = start[0, k], start[1, k]
+        amounts[k] = abs(here[k]) + abs(here[f + k])
     for i in range(m):
-        y, slope = polynomial(numbers.rows[i], 0.0)
-        now[i] = y + sum_of(numbers.real[i], numbers.imag[i], zr, zi)
-        rate[i] = slope + sum_of(numbers.rate_real[i], numbers.rate_imag[i], zr, zi)
+        y, slope = polynomial(numbers.rows, i, 0.0)
+        of_modes, turning = number_at(numbers, i, here)
+        now[i], rate[i] = y + of_modes, slope + turning
         size = LET_GO * abs(numbers.rows[i, 0])
         for k in range(f):
-            size += LET_GO * numbers.sizes[i, k] * math.hypot(zr[k], zi[k])
+            size += LET_GO * numbers.sizes[i, k] * math.hypot(here[k], here[f + k])
         if now[i] < size:
             let[i] = size - min(now[i], 0.0)
-    for k in range(f):
-        amounts[k] = abs(zr[k]) + abs(zi[k])
     time, parts, unsure = 0.0, 0, 0
     lowest = table.real.shape[0] - 1
     level = min(level, lowest)  # that of another status, whose table may be longer
     while time < limit:
         length = table.longest * 0.5**level
         parts += 1
-        turn(zr, zi, table.real[level], table.imag[level], following, following_imag)
+        turn(here, table.real, table.imag, level, following)
         doubtful, below, which, grows = 0, 0, -1, True
         for i in range(m):
-            y, slope = polynomial(numbers.rows[i], time + length)
-            y += sum_of(numbers.real[i], numbers.imag[i], following, following_imag)
-            slope += sum_of(numbers.rate_real[i], numbers.rate_imag[i], following, following_imag)
+            y, slope = polynomial(numbers.rows, i, time + length)
+            of_modes, turning = number_at(numbers, i, following)
+            y, slope = y + of_modes, slope + turning
             then[i], later[i] = y, slope
             if y + let[i] <= 0.0:
                 below += 1
@@ -264,18 +266,18 @@ def first_root(
             third = length / 3.0
             least = min(min(now[i], now[i] + third * rate[i]), min(y, y - third * slope)) + let[i]
             if least > 0.0:
-                off = derivative_bound(numbers.rows[i], time + length, 4) * length**4 / 384
-                off += most(numbers.sizes[i], table.bent[level], amounts)
+                off = derivative_bound(numbers.rows, i, time + length, 4) * length**4 / 384
+                off += most(numbers.sizes, i, table.bent, level, amounts)
                 grows = grows and off * GROWTH < least
                 least -= off
             if least <= 0.0:
                 doubtful += 1
         if below == 1 and doubtful == 0 and now[which] + let[which] > 0.0:
-            bend = derivative_bound(numbers.rows[which], time + length, 3) * length * length / 8
-            bend += most(numbers.sizes[which], table.turned[level], amounts)
+            bend = derivative_bound(numbers.rows, which, time + length, 3) * length * length / 8
+            bend += most(numbers.sizes, which, table.turned, level, amounts)
             if max(rate[which], later[which]) + bend < 0.0:
                 ends = (now[which], rate[which], then[which], later[which])
-                t = _root(numbers, which, poles, zr, zi, (time, length), let[which], ends, modes)
+                t = _root(numbers, which, poles, here, (time, length), let[which], ends, modes)
                 if time + t > limit:
                     break
                 return CROSSED, which, time + t, level, parts, unsure
@@ -287,7 +289,7 @@ def first_root(
             for i in range(m):
                 if then[i] + let[i] <= 0.0 < now[i] + let[i]:
                     ends = (now[i], rate[i], then[i], later[i])
-                    t = _root(numbers, i, poles, zr, zi, (time, length), let[i], ends, trial)
+                    t = _root(numbers, i, poles, here, (time, length), let[i], ends, trial)
                     if t < first:
                         which, first = i, t
                         modes[:] = trial
@@ -299,8 +301,8 @@ def first_root(
             return UNDECIDED, -1, time, level, parts, unsure
         time += length
         for k in range(f):
-            zr[k], zi[k] = following[k], following_imag[k]
-            amounts[k] = abs(zr[k]) + abs(zi[k])
+            here[k], here[f + k] = following[k], following[f + k]
+            amounts[k] = abs(here[k]) + abs(here[f + k])
         for i in range(m):
             now[i], rate[i] = then[i], later[i]
             if now[i] > let[i]:

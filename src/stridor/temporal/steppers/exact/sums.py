@@ -13,7 +13,6 @@ from ....typing import Array, IntArray
 from ...arithmetic import FAST
 from ...columns import WORKS
 from .forms import FORMS
-from .search import sum_of
 from .tables import (
     CROSS_IMAG,
     CROSS_REAL,
@@ -38,13 +37,13 @@ def modes_at(zeta: Array, poles: Array, time: float, found: Array) -> None:  # p
 
 
 @njit(cache=True, fastmath=FAST)
-def quadratic_at(packed: Array, modes: Array) -> float:  # pragma: no cover - compiled
-    """A form of modes (2f,): the rows of its lower triangle one after the other."""
+def quadratic_at(packed: Array, number: int, modes: Array) -> float:  # pragma: no cover - compiled
+    """A form of modes (2f,), of several (r, ·): the rows of its lower triangle one after the other."""
     at, total = 0, 0.0
     for i in range(modes.shape[0]):
         here = 0.0
         for j in range(i + 1):
-            here += packed[at + j] * modes[j]
+            here += packed[number, at + j] * modes[j]
         at += i + 1
         total += here * modes[i]
     return total
@@ -56,6 +55,15 @@ def dot(row: Array, vector: Array) -> float:  # pragma: no cover - compiled
     total = 0.0
     for j in range(row.shape[0]):
         total += row[j] * vector[j]
+    return total
+
+
+@njit(cache=True, fastmath=FAST)
+def row_on(rows: Array, i: int, vector: Array) -> float:  # pragma: no cover - compiled
+    """One of some rows (·, n) on a vector (n,)."""
+    total = 0.0
+    for j in range(rows.shape[1]):
+        total += rows[i, j] * vector[j]
     return total
 
 
@@ -139,6 +147,14 @@ def _still(pair: Array, zeta: Array, time: float) -> float:  # pragma: no cover 
     return (size * share).real * time
 
 
+@njit(cache=True, fastmath=FAST)
+def _along(real: Array, imag: Array, w: int, j: int, modes: Array) -> float:  # pragma: no cover - compiled
+    f, total = real.shape[2], 0.0
+    for k in range(f):
+        total += real[w, j, k] * modes[k] - imag[w, j, k] * modes[f + k]
+    return total
+
+
 @njit(cache=True)
 def forms_at(
     store: Array, where: IntArray, zeta: Array, modes: Array, time: float, along_real: Array, along_imag: Array,
@@ -146,16 +162,16 @@ def forms_at(
 ) -> None:  # fmt: skip # pragma: no cover - compiled
     """Energies and primitives of powers (7,) at a time at which modes are (2f,), up to that of number ``last``."""
     which, quadratic, still = matrix(store, where, WHICH), matrix(store, where, QUADRATIC), matrix(store, where, STILL)
-    f, count = along_real.shape[2], along_real.shape[1]
+    count = along_real.shape[1]
     for w in range(last):
         total = 0.0
         for j in range(2 * count - 1, -1, -1):
             total = total * time + alone[w, j]
         if which[0, w] >= 0.0:
-            total += quadratic_at(quadratic[int(which[0, w])], modes)
+            total += quadratic_at(quadratic, int(which[0, w]), modes)
         power = 1.0
         for j in range(count):
-            total += power * sum_of(along_real[w, j], along_imag[w, j], modes[:f], modes[f:])
+            total += power * _along(along_real, along_imag, w, j, modes)
             power *= time
         found[w] = total
     for i in range(still.shape[0]):

@@ -161,9 +161,7 @@ class VariedMotion(Motion):
                 self.dholds[c] = pairs.tangent[c] @ moved + speeds[c] * shift
         behind = self.dv + np.outer(before.a, shift)
         if (struck := self._struck) is not None and len(struck.held):
-            behind = behind - struck.pushed.T @ np.linalg.solve(
-                struck.held @ struck.pushed.T, struck.held @ behind
-            )
+            behind = behind - struck.pushed.T @ np.linalg.solve(struck.held @ struck.pushed.T, struck.held @ behind)
         anchor = self._anchored()
         after = self._rates(anchor, self.time)[1]
         self.dq = moved - np.outer(self.v, shift)
