@@ -96,7 +96,7 @@ def test_the_first_regime_of_the_bench_over_the_cutoff():
     assert off[40e3] < 0.03
     assert off[15e3] > 0.05  # a basis too small is told from one that is not
     for run in runs.values():
-        assert energy_balance(run).error < 1e-8
+        assert energy_balance(run).error < 1e-9
     reason = runs[100e3].path_reason
     assert "modes up to 100000 Hz and " in reason
     assert "receptance at the contacts is off by " in reason
