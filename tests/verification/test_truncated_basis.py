@@ -12,9 +12,11 @@ import scipy.linalg as sl
 import stridor as st
 from mode_coupling import mode_coupling
 from stridor.case import template_text
+from stridor.study.settings import settings_of
 from stridor.study.without_effect import without_effect
 from stridor.system import System
 from stridor.temporal.energy import energy_balance
+from stridor.temporal.simulate import plan
 from stridor.temporal.steppers import coordinates as of_steppers
 from stridor.temporal.steppers.coordinates import left_out, truncated
 
@@ -113,6 +115,14 @@ def test_where_it_has_no_effect_is_said():
     assert any(line.startswith("temporal.cutoff_hz has no effect") for line in without_effect(case, "simulate"))
     lines = without_effect(case.with_({"temporal.stepper": "exact"}), "simulate")
     assert not any("cutoff" in line for line in lines)
+    auto = case.with_({"temporal.stepper": "auto"})
+    assert not any("cutoff" in line for line in without_effect(auto, "simulate"))
+    assert plan(st.build_system(auto), settings_of(auto))[:2] == (
+        "exact", "temporal.cutoff_hz gives modes up to 30000 Hz, which it takes"
+    )  # fmt: skip
+    falling = {"law": "weakening", "coefficient": 0.1, "static_coefficient": 0.12, "decay_speed": 0.05}
+    lines = without_effect(auto.with_({"contacts.A.friction": falling}), "simulate")
+    assert 'temporal.cutoff_hz has no effect: temporal.stepper = "auto" comes to explicit steps here' in lines
 
 
 def test_a_cutoff_below_all_modes_is_refused():

@@ -6,7 +6,7 @@
 - modal.prestress: but for assembled matrices with meshed solids; `compare`, `simulate`
 - modal.damped = false: `simulate`, `compare`
 - temporal.path: assembled matrices in time; with temporal.beta2: stepper = "exact" or "implicit"
-- temporal.cutoff_hz: unless stepper = "exact"
+- temporal.cutoff_hz: unless stepper is "exact" or comes to it
 - comparison.bracket, comparison.tolerance: without critical friction
 - bodies.NAME.initial_velocity, initial_displacement: from steady sliding
 - temporal.contact = "rigid": where every contact is rigid; where it acts, contacts.NAME.stiffness on `simulate`
@@ -22,6 +22,7 @@ from collections.abc import Iterator
 from ..case import Case
 from ..case.bodies import SolidBody
 from ..system.pairs import is_point_on_line
+from .settings import settings_of
 from .workspace import Workspace
 
 IN_TIME = ("simulate", "compare", "run")
@@ -45,7 +46,7 @@ def without_effect(problem: Case | Workspace, verb: str, *, solver: str | None =
     lines = [*_of_materials(case), *_of_comparison(case, verb), *_of_start(case, verb)]
     if _given(case, solver):
         few = _of_few_points(work, case)
-        lines += [*_of_modes(case, verb, solver, few=few), *_of_time(case, verb, few=few)]
+        lines += [*_of_modes(case, verb, solver, few=few), *_of_time(work, case, verb, few=few)]
     return lines
 
 
@@ -123,11 +124,16 @@ def _of_modes(case: Case, verb: str, solver: str | None, *, few: bool) -> Iterat
         yield "modal.damped = false acts on modes and onsets only: the time loop and the comparison keep the damping"
 
 
-def _of_time(case: Case, verb: str, *, few: bool) -> Iterator[str]:
+def _of_time(work: Workspace, case: Case, verb: str, *, few: bool) -> Iterator[str]:
     if verb not in IN_TIME:
         return
     if case.temporal.cutoff_hz is not None and case.temporal.stepper in ("explicit", "implicit"):
         yield f'temporal.cutoff_hz has no effect: temporal.stepper = "{case.temporal.stepper}" takes no such modes'
+    elif case.temporal.cutoff_hz is not None and case.temporal.stepper == "auto":
+        from ..temporal.simulate import comes_to
+
+        if (chosen := comes_to(work.system(), settings_of(work))) != "exact":
+            yield f'temporal.cutoff_hz has no effect: temporal.stepper = "auto" comes to {chosen} steps here'
     if case.temporal.stepper in ("exact", "implicit"):
         why = "takes no steps" if case.temporal.stepper == "exact" else "has a scheme of its own"
         for key, usual in (("path", "auto"), ("beta2", 0.5)):

@@ -121,6 +121,11 @@ def plan(system: System, settings: Settings, phases: Sequence[PhaseSpec] = ()) -
     return "modal" if modes else "nodal", _joined(reason, why), step_limit(system, settings.beta2)
 
 
+def comes_to(system: System, settings: Settings) -> str:
+    """The stepper that settings come to: "auto" is another one for each system."""
+    return _chosen(settings.system(system), settings, ())[0].stepper
+
+
 def _joined(*reasons: str) -> str:
     return "; ".join(reason for reason in reasons if reason)
 
@@ -133,6 +138,9 @@ def _chosen(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> 
     usual = settings.path == "auto" and settings.beta2 == 0.5
     if usual and system.size <= SMALL and not why_not_exact(system):
         return replace(settings, stepper="exact"), f"{system.size} freedoms, up to {SMALL} are few"
+    cutoff = settings.cutoff_hz
+    if usual and cutoff is not None and not why_not_exact(system, cutoff):
+        return replace(settings, stepper="exact"), f"temporal.cutoff_hz gives modes up to {cutoff:g} Hz, which it takes"
     count, highest = system.contact_nodes().count, settings.max_frequency_hz
     resolved = highest is not None and (settings.step is None or COARSE < settings.step * highest <= COARSEST)
     if usual and resolved and count >= MANY and not why_not_implicit(system, settings):
