@@ -62,6 +62,22 @@ def random_plane(seed: int) -> Plane:
     return plane(terms, ((low, 1.0), (0.0, 1.5)), float(rng.uniform(2.0, 5.0)))
 
 
+def random_islands(seed: int) -> tuple[str, list[np.ndarray]]:
+    """A damping over x and mu, each in [0, 1], with one to three hollows in it, as a formula; and the islands on which it
+    is negative, places (m, 2) of each on a grid of 401 × 401 points."""
+    rng = np.random.default_rng([seed, 9])
+    formula, (x, mu) = "0.1", np.meshgrid(np.linspace(0.0, 1.0, 401), np.linspace(0.0, 1.0, 401), indexing="ij")
+    value = np.full(x.shape, 0.1)
+    for _ in range(rng.integers(1, 4)):
+        a, b = rng.uniform(0.05, 0.95, 2)
+        width = rng.uniform(0.05, 0.2)
+        other, depth = width * rng.uniform(0.5, 2.0), rng.uniform(0.08, 0.14)
+        formula += f" - {depth}*exp(-((x - {a})/{width})**2 - ((mu - {b})/{other})**2)"
+        value -= depth * np.exp(-(((x - a) / width) ** 2) - ((mu - b) / other) ** 2)
+    names, count = ndi.label(value < 0)
+    return formula, [np.stack([x[names == k], mu[names == k]], axis=1) for k in range(1, count + 1)]
+
+
 def eigenvalues(problem: Plane, places: np.ndarray) -> np.ndarray:
     """All of them (m, 2n) at places (m, 2) in shares of the ranges, from the terms by NumPy alone."""
     n, places = len(problem.terms[0]), np.atleast_2d(places)

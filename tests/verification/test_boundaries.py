@@ -14,7 +14,7 @@ import stridor as st
 from benches import paper_case
 from matrix_cases import matrix_case
 from program import stridor
-from random_boundaries import disagreement, distance, eigenvalues, growing, off_the_curves, random_plane
+from random_boundaries import disagreement, distance, eigenvalues, growing, off_the_curves, random_islands, random_plane
 from stridor.io.seals import seal
 from stridor.modal.boundary import Found, Plane, boundaries, march, search
 from stridor.study.boundary_problem import Asked, plane_of, solved_problem
@@ -173,6 +173,31 @@ def test_an_island_that_cuts_no_line_and_is_nowhere_counted_is_not_excluded(tmp_
     assert "Not excluded" in found.sentence
     finer = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0), lines=21)
     assert len(finer.curves) == 1  # at 0.55 there is a line now
+
+
+def missed_islands(seed: int, folder: Path) -> tuple[int, int]:
+    """How many islands of growth no curve goes round, of how many."""
+    formula, islands = random_islands(seed)
+    _, found = traced(damped_by(folder, formula), "x", (0.0, 1.0), 1.0)
+    points = np.vstack([np.zeros((0, 2)), *(curve.points for curve in found.curves)])
+    near = [np.abs(points[:, None] - island[None]).max(axis=2).min(initial=1.0) for island in islands]
+    assert found.agree
+    return sum(off > 0.01 for off in near), len(islands)
+
+
+@pytest.mark.parametrize("seed", [13, 103, 142])
+def test_small_islands_are_found_up_the_growth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    """They cut no line and are betrayed by no count, but by how the damping falls off around them."""
+    assert missed_islands(seed, tmp_path)[0] == 0
+    monkeypatch.setattr(search, "CLIMBING", 0)
+    assert missed_islands(seed, tmp_path)[0] > 0
+
+
+@pytest.mark.slow
+def test_of_many_small_islands_next_to_none_is_missed(tmp_path: Path) -> None:
+    told = np.array([missed_islands(seed, tmp_path) for seed in range(150)])
+    assert told[:, 1].sum() > 150
+    assert told[:, 0].sum() <= 0.02 * told[:, 1].sum()
 
 
 def test_branches_that_all_but_meet_are_not_taken_for_one_another(tmp_path: Path) -> None:

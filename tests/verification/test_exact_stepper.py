@@ -313,6 +313,23 @@ def test_a_mass_on_an_obstacle_grows_and_parts_as_in_explicit_steps(mu: float | 
     assert energy_balance(wanted).error < CLOSED
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_slip_on_an_obstacle_is_told_along_the_tangent_by_all(way: float):
+    """Of a mass, and of its mirror image on a belt that goes the other way: in steps of each kind, and in cycles."""
+    springs = {f"springs.k{k}.direction": (way * x, 0.5) for k, x in ((1, -0.75**0.5), (2, 0.75**0.5))}
+    short = {"phases.slide.duration": 1.0, "temporal.perturbation": 0.01}
+    case = mode_coupling(0.02, way).with_(springs | short)
+    wanted = st.simulate(case)
+    assert np.sign(wanted.slip_speed[0, 0]) == way
+    for stepper in ("explicit", "implicit"):
+        other = st.simulate(case.with_({"temporal.stepper": stepper, "temporal.step": 0.01, "temporal.record_every": 5}))
+        assert other.slip_speed == pytest.approx(wanted.slip_speed, abs=1e-3)
+        assert other.tangential_force == pytest.approx(wanted.tangential_force, abs=2e-2)
+    for method in ("shooting", "harmonic"):
+        cycle = st.cycles(case, mu=[0.95], method=method).cycles[0]
+        assert np.sign(cycle.slip_velocity.mean()) == way
+
+
 def corner(**changes: Any) -> st.Case:
     """A mass on two springs over a belt."""
     case = st.Case(

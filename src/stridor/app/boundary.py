@@ -74,7 +74,7 @@ def _conclusion(result: Boundary, case: Case) -> Conclusion:
     if not result.curves:
         counts = {c.unstable_modes for c in result.counted}
         growing = f"; {counted(counts.pop(), 'mode')} grow wherever that was counted" if len(counts) == 1 else ""
-        return Conclusion(f"no curve in the rectangle up to {result.max_frequency_hz:g} Hz{growing}", "modes")
+        return Conclusion(f"no curve was found in the rectangle up to {result.max_frequency_hz:g} Hz{growing}", "modes")
     if not outer:
         return Conclusion(f"{len(result.curves)} curves; something grows on both sides of each of them", "modes")
     lowest = [np.where(curve.outer, curve.y, np.inf) for curve in outer]

@@ -108,11 +108,12 @@ class Family:
         names = tuple(system.points)
         free = [system.points[n].free[:2].toarray() for n in names]
         lift = [system.points[n].lift[:2] for n in names]
-        ways = np.where(system.contact_nodes().slip_velocity(motion.full)[:, 0] < 0.0, -1.0, 1.0)
-        ways[: len(system.contacts)] = 1.0
+        nodes = system.contact_nodes()
+        backwards = nodes.slip_velocity(motion.full)[:, 0] < 0.0
+        ways = np.where(backwards & ~np.isnan(nodes.area), -1.0, 1.0)  # those of points are their tangents
         return SlidingProblem(
             float(mu), basis, pairs, Piece(0.0, horizon, loads, displacements), weight.T @ u, status, self.speeds,
-            system.contact_nodes().names, ways,
+            nodes.names, ways,
             np.vstack([np.zeros((0, system.size)), *free]) @ basis.vectors,
             np.vstack([np.zeros((0, len(motion.names))), *lift]), names,
         )  # fmt: skip

@@ -101,18 +101,18 @@ class Plane:
         near = bool(np.any(np.abs(grows) > NEAR_TOP * self.top))
         return Count(len(grows), growing_roots(grows), not near)
 
-    def rates(self, p: Array, found: DenseModes) -> Array:
-        """∇ Re λ (2, k) of modes at a point."""
+    def slopes(self, p: Array, found: DenseModes) -> ComplexArray:
+        """∇λ (2, k) of modes at a point; not finite where λ is double."""
         lam, z, w = found.values, found.right, found.left
         mass, damping, _ = self.matrices(p)
         by_lam = np.einsum("ij,ij->j", w, 2 * lam * expanded(mass, z) + expanded(damping, z))
-        rates = np.zeros((2, len(lam)))
+        slopes = np.zeros((2, len(lam)), dtype=complex)
         for axis, direction in enumerate(np.eye(2)):
             a, b, c = self.changes(p, direction)
             moved = lam**2 * expanded(a, z) + lam * expanded(b, z) + expanded(c, z)
             with np.errstate(all="ignore"):
-                rates[axis] = (-np.einsum("ij,ij->j", w, moved) / by_lam).real
-        return rates
+                slopes[axis] = -np.einsum("ij,ij->j", w, moved) / by_lam
+        return slopes
 
     @one_thread
     def onsets(self, axis: int, value: float) -> Answer:

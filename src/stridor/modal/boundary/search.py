@@ -4,7 +4,8 @@ Along every line the search for onsets finds where growth begins and ends. An on
 one. Then three things must hold, each of which may fail: every onset of every line lies on a curve, curves cross the
 lines nowhere else, and at points between the lines as many roots grow as the curves say. Where modes at such a point
 would come to the axis within its mesh if they were straight, it is counted there as well. Wherever curves and counts
-differ, further lines are laid.
+differ, further lines are laid. Modes that decay at these points are climbed to the tops of their rates between them
+(`climb`).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from ...errors import AnalysisError
 from ...typing import Array
 from ..onset import Onset
+from .climb import Seen, climb, tops
 from .curve import Crossing, Curve, Drawn, crossings
 from .march import joined, traced
 from .plane import Count, Plane
@@ -28,6 +30,7 @@ ROUNDS = 4  # of further lines
 BESIDE = 1e-9  # how far inside the rectangle lines on its edges are crossed
 REACH = 2e-3  # along a line: how far off an onset its point on the curve may be
 FORETOLD = 3  # counts at places where modes are expected on the axis, around one point
+CLIMBING = 12  # solves on the way to tops of growth, for each point at first; what is begun is finished
 EVEN = 8  # places along a line at which it is counted, beside those between curves
 ALIKE = 0.02  # of ω: onset and crossing that are one
 HALVINGS = 9  # until a difference between counts and curves is placed
@@ -133,8 +136,7 @@ class _Search:
         cells = [(x, y) for k, x in enumerate(middles.tolist()) for y in middles.tolist()[:: -1 if k % 2 else 1]]
         for cell in cells:
             self._look(np.array(cell))
-        for point in list(self.found.looked):
-            self._look_ahead(point)
+        self._look_between()
         for _ in range(ROUNDS):
             places = self._contradicted()
             new = [(axis, float(p[axis])) for _, p in places for axis in (0, 1) if not self._laid(axis, float(p[axis]))]
@@ -192,20 +194,31 @@ class _Search:
         if at is not None:
             self.found.looked.append(at)
 
-    def _look_ahead(self, at: Looked) -> None:
-        """Count where modes would come to the axis within the mesh if they were straight, a little beyond that."""
+    def _look_between(self) -> None:
+        """Count where modes that decay at the points so far may grow: where their rates lead, and up to tops."""
         if self.plane.reversible:
             return
-        found = self.plane.modes(at.p)
-        rates, growth = self.plane.rates(at.p, found), found.values.real
+        mesh, seen = 1.0 / (self.number - 1), [Seen.at(self.plane, at.p) for at in self.found.looked]
+        for here in seen:
+            self._look_ahead(here, mesh)
+        most = self.plane.solves + CLIMBING * len(seen)
+        for here, k in tops(self.plane, seen, mesh):
+            if self.plane.solves >= most:
+                break
+            p = climb(self.plane, here, k, mesh)
+            if p is not None:
+                self._look(p)
+
+    def _look_ahead(self, here: Seen, mesh: float) -> None:
+        """Count where modes would come to the axis within the mesh if they were straight, a little beyond that."""
+        rates, growth = here.slopes.real, here.values.real
         size = np.sum(rates**2, axis=0)
         with np.errstate(all="ignore"):
             steps = -1.3 * growth / size * rates
         distance = np.hypot(*steps)
-        mesh = 1.0 / (self.number - 1)
         near = np.flatnonzero(np.isfinite(distance) & (distance <= mesh))
         for k in near[np.argsort(distance[near])][:FORETOLD].tolist():
-            p = np.clip(at.p + steps[:, k], EDGE, 1.0 - EDGE)
+            p = np.clip(here.p + steps[:, k], EDGE, 1.0 - EDGE)
             if all(float(np.hypot(*(p - other.p))) > 0.05 * mesh for other in self.found.looked):
                 self._look(p)
 

@@ -46,11 +46,9 @@ def sampled_series(cycle: Balanced, reached_from: str) -> Cycle:
 def _ways(cycle: Balanced) -> Array:
     """Directions (m, d) along which slip and friction are told: a point's tangent, a surface's steady slip."""
     family = cycle.family
-    points = len(family.system.contacts)
     ways = np.where(family.speed[:, None] > 0.0, family.slip / np.maximum(family.speed, 1e-300)[:, None], 0.0)
-    still = family.speed == 0.0
-    ways[still, 0] = 1.0
-    ways[:points] = 1.0
+    along = (family.speed == 0.0) | np.isnan(family.system.contact_nodes().area)
+    ways[along] = np.eye(1, ways.shape[1])
     return ways
 
 

@@ -150,12 +150,13 @@ class ExactStepper:
         self.lacking = None if self.coordinates.complete else left_out(system, self.coordinates, highest)
         self.start_lacking = 0.0  # of the initial displacement or velocity, by mass
         self.pairs = pairs_of(system, self.basis)
-        self.contact_names = system.contact_nodes().names
+        nodes = system.contact_nodes()
+        self.contact_names = nodes.names
         self.closed = ()
         # Slip and friction of surfaces are told along their sliding, those of points along the tangent.
-        self._ways = np.where(system.contact_nodes().slip_velocity(system.motion.full)[:, 0] < 0.0, -1.0, 1.0)
-        self._ways[: len(system.contacts)] = 1.0
-        self.parts = sketch(system, system.contact_nodes())
+        backwards = nodes.slip_velocity(system.motion.full)[:, 0] < 0.0
+        self._ways = np.where(backwards & ~np.isnan(nodes.area), -1.0, 1.0)
+        self.parts = sketch(system, nodes)
         self.statistics = fresh_statistics(self.pairs.count, STATISTICS)
         self.motion = Motion(self.basis, self.pairs, [])
         self.leaps: Leaps | None = None
