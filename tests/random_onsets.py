@@ -244,7 +244,9 @@ def passing(problem: Problem, one: tuple[float, np.ndarray], other: tuple[float,
     where it cannot be told whether one that does grows."""
     (low, first), (high, last) = one, other
     top = problem.top
-    rows, columns = linear_sum_assignment(np.abs(first[:, None] - last))
+    # On the sphere, where what leaves through infinity is near what comes from there; along a line all sums are the same.
+    sizes = np.sqrt(top**2 + np.abs(first[:, None]) ** 2) * np.sqrt(top**2 + np.abs(last) ** 2)
+    rows, columns = linear_sum_assignment(np.abs(first[:, None] - last) / sizes)
     first, last = first[rows], last[columns]
     step, was, now = np.abs(first - last), np.abs(first), np.abs(last)
     near = (np.minimum(was, now) - step <= top) & (np.maximum(was, now) + step >= top)

@@ -76,6 +76,24 @@ def test_all_that_opens_at_the_very_start(tmp_path: Path) -> None:
     assert not disagreement(replace(problem, solve=lambda _: found), tmp_path)[0]
 
 
+def test_a_divergence_that_ends_just_before_a_pair_begins(tmp_path: Path) -> None:
+    """Both within 4e-6 of the range: one root more grows, of as many modes."""
+    found = random_problem(986).solve(tmp_path)
+    assert found.complete
+    close = [o for o in found.onsets if 17.0 < o.mu < 17.1]
+    assert [(o.kind, o.roots) for o in close] == [("divergence", -1), ("flutter", 2)]
+
+
+def test_half_of_a_pair_that_comes_into_the_band_at_once(tmp_path: Path) -> None:
+    """A pair leaves the band, falls apart above it, and one half comes back faster than any mode moves."""
+    problem = random_problem(1153)
+    found = problem.solve(tmp_path)
+    assert found.complete
+    assert "1 leaves the band at μ ≈ 0.4136" in found.completeness
+    assert "1 comes into the band at μ ≈ 0.4151 (0 Hz" in found.completeness
+    assert not disagreement(replace(problem, solve=lambda _: found), tmp_path)[0]
+
+
 def test_what_is_counted_at_both_ends_is_held_against_onsets_on_them() -> None:
     def onset(mu: float, *, stabilising: bool = False) -> Onset:
         return Onset(mu, 1.0, "flutter", False, stabilising, (0, 0), 0.0, None, None)

@@ -141,14 +141,26 @@ class _Search:
         onsets, passing = list[Onset](), list[Passing]()
         for before, after in pairwise(grid):
             for low, high in self._changes(before, after):
-                root = self._solved(low, high)
-                if root is not None:
-                    onset = as_onset(self.source.family, root)
-                    if not any(self._same(onset, other) for other in onsets):
-                        onsets.append(onset)
-                elif (lam := self._at_edge(low, high)) is not None:
-                    passing.append(Passing(self.start + high.t, lam, high.number - low.number))
+                for found in self._explained(low, high):
+                    if isinstance(found, Passing):
+                        passing.append(found)
+                    elif not any(self._same(found, other) for other in onsets):
+                        onsets.append(found)
         return Counted(tuple((self.start + c.t, c.number) for c in grid), tuple(onsets), tuple(passing))
+
+    def _explained(self, low: _Count, high: _Count) -> Iterator[Onset | Passing]:
+        """What changes in an interval; where neither is found in it, in its halves: half of a pair that falls apart
+        above the band comes into it faster than any mode."""
+        root = self._solved(low, high)
+        if root is not None:
+            yield as_onset(self.source.family, root)
+        elif (lam := self._at_edge(low, high)) is not None:
+            yield Passing(self.start + high.t, lam, high.number - low.number)
+        elif high.t - low.t > SMALLEST * self.width:
+            middle = self._at(0.5 * (low.t + high.t))
+            for half in ((low, middle), (middle, high)):
+                for part in self._changes(*half):
+                    yield from self._explained(*part)
 
     def _same(self, one: Onset, other: Onset) -> bool:
         near = abs(one.mu - other.mu) <= 1e-8 * self.width and one.stabilising == other.stabilising
@@ -282,10 +294,10 @@ class _Search:
 
 
 def _one(low: _Count, high: _Count) -> bool:
-    """Whether it is one flutter pair or one divergence that makes the difference."""
+    """Whether it is one flutter pair or one divergence that makes the difference: a divergence that ends beside a pair
+    that begins leaves one root more as well, of as many modes."""
     more, fewer = (high, low) if high.number > low.number else (low, high)
-    change = more.number - fewer.number
-    return change == 1 or (change == 2 and int(more.growing.sum()) == int(fewer.growing.sum()) + 1)
+    return more.number - fewer.number <= 2 and int(more.growing.sum()) == int(fewer.growing.sum()) + 1
 
 
 def _rates(found: Eigenpairs) -> ComplexArray:
