@@ -172,13 +172,13 @@ def leap(
     legs and options: by the number of a status, where in legs_at (·, LEG, 3) and options_at (·, OPTION, 3) it is. zeta,
     terms and ahead are those of modes that were begun, where what comes next is known; fastest [1/s], by which a
     moment is measured, and plain: how many changes of one are."""
-    times, counts, moving = state.times, state.counts, state.moving
-    size, m = moving.shape[0], state.status.shape[0]
+    moving, kept_holds, works, works_now, status_now, parted, parted_from, times, counts, statistics = state
+    size, m = moving.shape[0], status_now.shape[0]
     between = every * step
     while True:
         code = 0
         for c in range(m):
-            code = 4 * code + state.status[c]
+            code = 4 * code + status_now[c]
         place = legs[code]
         if place < 0:
             counts[NEEDED] = code
@@ -204,8 +204,8 @@ def leap(
         ends = max(min(ends, begins + records.contacts.shape[0] - counts[RECORDED]), begins)
         if ends > begins:
             record(
-                store, where, course, state.status, state.works, between, (begins, ends), counts[RECORDED], records,
-                state.statistics,
+                store, where, course, status_now, works, between, (begins, ends), counts[RECORDED], records,
+                statistics,
             )  # fmt: skip
             counts[NEXT_RECORD] = ends
             counts[RECORDED] += ends - begins
@@ -214,19 +214,19 @@ def leap(
         else:
             modes_at(zeta, matrix(store, where, POLES), stop - times[NOW], modes)
         counts[PEAK_LEVEL] = extremes(
-            store, where, course, state.status, (max(times[COUNTED], times[NOW]), stop), modes, counts[PEAK_LEVEL],
-            bench.sliding, state.statistics,
+            store, where, course, status_now, (max(times[COUNTED], times[NOW]), stop), modes, counts[PEAK_LEVEL],
+            bench.sliding, statistics,
         )  # fmt: skip
         _count(state, stop, step)
         forms_at(store, where, zeta, modes, stop - times[NOW], along_real, along_imag, alone, WORKS, forms)
         for w in range(WORKS):
-            state.works_now[w] = state.works[w] + forms[w] - first[w]
+            works_now[w] = works[w] + forms[w] - first[w]
         if times[NEXT] >= end:
             return REACHED, zeta, terms, ahead
         # Through it.
         kind = counts[NEXT_KIND]
         if kind == PIECE:
-            state.works[:] = state.works_now
+            works[:] = works_now
             return CHANGE, zeta, terms, ahead
         slow, own = np.empty(s), np.empty(size)
         behind, amounts = np.empty(size), np.empty(size)
@@ -238,7 +238,7 @@ def leap(
         if kind == CONTACT:
             crowd = counts[CROWDED] if stop - times[CROWD_SINCE] <= MOMENT / fastest else 0
             if crowd + 1 > plain:
-                state.works[:] = state.works_now
+                works[:] = works_now
                 return CHANGE, zeta, terms, ahead
             sizes = np.empty(f)
             for k in range(f):
@@ -250,13 +250,13 @@ def leap(
             for i in range(size):
                 amounts[i] += own[i]
             meaning = matrix(store, where, MEANINGS)[counts[NEXT_NUMBER]]
-            status, holds, works = state.status.copy(), state.holds.copy(), state.works_now.copy()
+            status, holds, struck = status_now.copy(), kept_holds.copy(), works_now.copy()
             went, missing = go_through(
                 store, options_at, options, bench, int(meaning[0]), int(meaning[1]), stop, status, behind, amounts,
-                holds, works,
+                holds, struck,
             )  # fmt: skip
             if went == LEFT:
-                state.works[:] = state.works_now
+                works[:] = works_now
                 return CHANGE, zeta, terms, ahead
             if went != DONE:
                 counts[NEEDED] = missing
@@ -267,11 +267,11 @@ def leap(
             counts[EVENTS] += 1
             times[LATEST] = stop
             for c in range(m):
-                if status[c] == GAP and state.status[c] != GAP:
-                    state.parted[c], state.parted_from[c] = stop, state.status[c]
-            state.status[:], state.holds[:], state.works[:] = status, holds, works
+                if status[c] == GAP and status_now[c] != GAP:
+                    parted[c], parted_from[c] = stop, status_now[c]
+            status_now[:], kept_holds[:], works[:] = status, holds, struck
         else:
-            state.works[:] = state.works_now
+            works[:] = works_now
         moving[:] = behind
         times[NOW] = stop
         counts[NEXT_KIND] = LATER

@@ -76,21 +76,23 @@ def record(
         matrix(store, where, POLES), matrix(store, where, OBSERVED), matrix(store, where, OBSERVED_SLOW)
     )  # fmt: skip
     turning = matrix(store, where, RECORD_TURN)
+    zeta, terms, along_real, along_imag, alone, first_forms, began = course
+    contacts, watch, energies, ways = records
     f, m = poles.shape[1], status.shape[0]
-    modes, following, slow = np.empty(2 * f), np.empty(2 * f), np.empty(course.terms.shape[1])
+    modes, following, slow = np.empty(2 * f), np.empty(2 * f), np.empty(terms.shape[1])
     values, own, forms = np.empty(rows.shape[0]), np.empty(rows.shape[0]), np.empty(FORMS)
-    watched = records.watch.shape[1]
-    first = max(math.ceil(course.began / between - 1e-9), span[0] // TURNS * TURNS)
+    watched = watch.shape[1]
+    first = max(math.ceil(began / between - 1e-9), span[0] // TURNS * TURNS)
     for number in range(first, span[1]):
-        after = max(number * between - course.began, 0.0)
+        after = max(number * between - began, 0.0)
         if number == first or number % TURNS == 0:
-            modes_at(course.zeta, poles, after, modes)
+            modes_at(zeta, poles, after, modes)
         else:
             turn(modes, turning[:1], turning[1:], 0, following)
             modes[:] = following
         if number < span[0]:
             continue
-        slow_at(course.terms, after, slow)
+        slow_at(terms, after, slow)
         product(rows, modes, values)
         product(slow_rows, slow, own)
         for i in range(values.shape[0]):
@@ -98,22 +100,22 @@ def record(
         row = at + number - span[0]
         for c in range(m):
             force, friction, slip = values[CONTACT_ROWS * c], values[CONTACT_ROWS * c + 1], values[CONTACT_ROWS * c + 2]
-            records.contacts[row, c, REC_NORMAL] = force
-            records.contacts[row, c, REC_TANGENTIAL] = records.ways[c] * friction
-            records.contacts[row, c, REC_SLIP] = records.ways[c] * slip
-            records.contacts[row, c, REC_GAP] = values[CONTACT_ROWS * c + 3]
+            contacts[row, c, REC_NORMAL] = force
+            contacts[row, c, REC_TANGENTIAL] = ways[c] * friction
+            contacts[row, c, REC_SLIP] = ways[c] * slip
+            contacts[row, c, REC_GAP] = values[CONTACT_ROWS * c + 3]
             now = status[c]
-            records.contacts[row, c, REC_STATUS] = 0 if now == GAP else 1 if now == STICK else 2
+            contacts[row, c, REC_STATUS] = 0 if now == GAP else 1 if now == STICK else 2
             seen(statistics[c], now, force, friction, slip)
         for w in range(watched):
             for kind in range(3):
-                records.watch[row, w, kind] = values[CONTACT_ROWS * m + kind * watched + w]
+                watch[row, w, kind] = values[CONTACT_ROWS * m + kind * watched + w]
         forms_at(
-            store, where, course.zeta, modes, after, course.along_real, course.along_imag, course.alone, FORMS, forms
+            store, where, zeta, modes, after, along_real, along_imag, alone, FORMS, forms
         )
-        records.energies[row, 0], records.energies[row, 1] = forms[KINETIC], forms[ELASTIC]
+        energies[row, 0], energies[row, 1] = forms[KINETIC], forms[ELASTIC]
         for w in range(WORKS):
-            records.energies[row, 2 + w] = works[w] + forms[w] - course.first[w]
+            energies[row, 2 + w] = works[w] + forms[w] - first_forms[w]
 
 
 @njit(cache=True)

@@ -23,6 +23,7 @@ MOST_UNSURE = 200  # parts of the finest in one search
 GROWTH = 16.0  # of the bound, where a part is twice as long
 LET_GO = 2.0**-46  # of the size of its terms, by which rounding is judged
 EPS = 2.0**-52
+SHARES = tuple(1.0 / n for n in range(9, 0, -1))  # of a power series from term to term
 SHORTEST = 1e-7  # rad of the fastest mode on the finest parts: on finer ones rounding holds the modes still
 
 
@@ -76,7 +77,8 @@ def parts_of(poles: ComplexArray, longest: float) -> Parts:
     return Parts(longest, grown * np.cos(angle), grown * np.sin(angle), bent, turned)
 
 
-# Rows are told by their numbers, not as arrays of their own: these are counted, which takes longer than short sums.
+# Rows are told by their numbers, and tuples are taken apart first: arrays that are made or taken from one are counted,
+# which takes longer than short sums.
 
 
 @njit(cache=True)
@@ -102,12 +104,14 @@ def derivative_bound(rows: Array, i: int, end: float, order: int) -> float:  # p
 
 
 @njit(cache=True, fastmath=FAST)
-def number_at(numbers: Numbers, i: int, modes: Array) -> tuple[float, float]:  # pragma: no cover - compiled
+def number_at(
+    real: Array, imag: Array, rate_real: Array, rate_imag: Array, i: int, modes: Array
+) -> tuple[float, float]:  # pragma: no cover - compiled
     """What modes [Re; Im] (2f,) have of a number and of its rate."""
-    f, total, rate = numbers.real.shape[1], 0.0, 0.0
+    f, total, rate = real.shape[1], 0.0, 0.0
     for k in range(f):
-        total += numbers.real[i, k] * modes[k] - numbers.imag[i, k] * modes[f + k]
-        rate += numbers.rate_real[i, k] * modes[k] - numbers.rate_imag[i, k] * modes[f + k]
+        total += real[i, k] * modes[k] - imag[i, k] * modes[f + k]
+        rate += rate_real[i, k] * modes[k] - rate_imag[i, k] * modes[f + k]
     return total, rate
 
 
@@ -168,8 +172,9 @@ def _move(modes: Array, poles: Array, step: float, fastest: float) -> None:  # p
     for k in range(f):
         a, b = poles[0, k] * step, poles[1, k] * step
         real, imag = 1.0, 0.0
-        for n in range(9, 0, -1):
-            real, imag = 1.0 + (real * a - imag * b) / n, (real * b + imag * a) / n
+        for n in range(9):
+            share = SHARES[n]
+            real, imag = 1.0 + share * (real * a - imag * b), share * (real * b + imag * a)
         one, two = modes[k], modes[f + k]
         modes[k], modes[f + k] = one * real - two * imag, one * imag + two * real
 
@@ -189,19 +194,20 @@ def _root(
     its second number [s]: Newton's method, kept between; ends: values and rates there; modes (2f,): those at the
     root."""
     time, length = span
+    real, imag, rate_real, rate_imag, sizes, rows = numbers
     low, high = 0.0, length
     t = _guess(length, (ends[0] + let, ends[1], ends[2] + let, ends[3]))
-    noise = abs(numbers.rows[i, 0])
+    noise = abs(rows[i, 0])
     f, fastest = poles.shape[1], 0.0
     for k in range(f):
-        noise += numbers.sizes[i, k] * (abs(start[k]) + abs(start[f + k]))
+        noise += sizes[i, k] * (abs(start[k]) + abs(start[f + k]))
         fastest = max(fastest, abs(poles[0, k]) + abs(poles[1, k]))
     noise *= EPS
     modes[:] = start
     _move(modes, poles, t, fastest)
     for _ in range(200):
-        y, rate = polynomial(numbers.rows, i, time + t)
-        of_modes, turning = number_at(numbers, i, modes)
+        y, rate = polynomial(rows, i, time + t)
+        of_modes, turning = number_at(real, imag, rate_real, rate_imag, i, modes)
         y += let + of_modes
         rate += turning
         if y > 0.0:
@@ -229,7 +235,9 @@ def first_root(
     what ended it, which number, when, the level of the last part, how many parts there were, and how many of the finest
     could not be decided; ``modes`` (2f,) are [Re; Im] of those at the root.
     """
-    m, f = numbers.real.shape
+    real, imag, rate_real, rate_imag, sizes, rows = numbers
+    longest, turn_real, turn_imag, bent, turned = table
+    m, f = real.shape
     here, following, amounts = np.empty(2 * f), np.empty(2 * f), np.empty(f)
     now, rate, then, later = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     let, trial = np.zeros(m), np.empty(2 * f)
@@ -237,25 +245,25 @@ def first_root(
         here[k], here[f + k] = start[0, k], start[1, k]
         amounts[k] = abs(here[k]) + abs(here[f + k])
     for i in range(m):
-        y, slope = polynomial(numbers.rows, i, 0.0)
-        of_modes, turning = number_at(numbers, i, here)
+        y, slope = polynomial(rows, i, 0.0)
+        of_modes, turning = number_at(real, imag, rate_real, rate_imag, i, here)
         now[i], rate[i] = y + of_modes, slope + turning
-        size = LET_GO * abs(numbers.rows[i, 0])
+        size = LET_GO * abs(rows[i, 0])
         for k in range(f):
-            size += LET_GO * numbers.sizes[i, k] * math.hypot(here[k], here[f + k])
+            size += LET_GO * sizes[i, k] * math.hypot(here[k], here[f + k])
         if now[i] < size:
             let[i] = size - min(now[i], 0.0)
     time, parts, unsure = 0.0, 0, 0
-    lowest = table.real.shape[0] - 1
+    lowest = turn_real.shape[0] - 1
     level = min(level, lowest)  # that of another status, whose table may be longer
     while time < limit:
-        length = table.longest * 0.5**level
+        length = longest * 0.5**level
         parts += 1
-        turn(here, table.real, table.imag, level, following)
+        turn(here, turn_real, turn_imag, level, following)
         doubtful, below, which, grows = 0, 0, -1, True
         for i in range(m):
-            y, slope = polynomial(numbers.rows, i, time + length)
-            of_modes, turning = number_at(numbers, i, following)
+            y, slope = polynomial(rows, i, time + length)
+            of_modes, turning = number_at(real, imag, rate_real, rate_imag, i, following)
             y, slope = y + of_modes, slope + turning
             then[i], later[i] = y, slope
             if y + let[i] <= 0.0:
@@ -266,15 +274,15 @@ def first_root(
             third = length / 3.0
             least = min(min(now[i], now[i] + third * rate[i]), min(y, y - third * slope)) + let[i]
             if least > 0.0:
-                off = derivative_bound(numbers.rows, i, time + length, 4) * length**4 / 384
-                off += most(numbers.sizes, i, table.bent, level, amounts)
+                off = derivative_bound(rows, i, time + length, 4) * length**4 / 384
+                off += most(sizes, i, bent, level, amounts)
                 grows = grows and off * GROWTH < least
                 least -= off
             if least <= 0.0:
                 doubtful += 1
         if below == 1 and doubtful == 0 and now[which] + let[which] > 0.0:
-            bend = derivative_bound(numbers.rows, which, time + length, 3) * length * length / 8
-            bend += most(numbers.sizes, which, table.turned, level, amounts)
+            bend = derivative_bound(rows, which, time + length, 3) * length * length / 8
+            bend += most(sizes, which, turned, level, amounts)
             if max(rate[which], later[which]) + bend < 0.0:
                 ends = (now[which], rate[which], then[which], later[which])
                 t = _root(numbers, which, poles, here, (time, length), let[which], ends, modes)
