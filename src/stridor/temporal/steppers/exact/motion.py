@@ -13,6 +13,7 @@ from ...columns import FRICTION, NORMAL, SUPPORT, WORKS
 from ..basis import Basis
 from .decisions import CLOSE, Impact, State, Touching, choices, consistent_status, impact, landing
 from .drive import Piece
+from .leap import MOMENT, PLAIN, STRETCH
 from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, numbers_of, parts_of, planes
 from .statuses import BACKWARD, FORWARD, GAP, STICK, TAYLOR, Driven, Flow, Pairs, Regime, Status, sense
 
@@ -20,11 +21,10 @@ UNTOLD = (
     "a force, gap or slip of a contact stays so close to zero that no change of status can be told from rounding, "
     'which the exact stepper does not pass; take stepper = "explicit"'
 )
-STRETCH = 256  # longest parts that are looked through from one beginning of the modes
 HELD = 1e-9  # of a row: what is left of it where contacts leave it no motion
-STORM, MOMENT = 300, 0.3  # so many events within so much of the fastest mode's time [rad]: they accumulate
+STORM = 300  # so many events within a `MOMENT`: they accumulate
 # Contacts that throw one another off: behind so many events of a moment, throws shorter than this [rad] end at once.
-LANDINGS = ((8, 1e-4), (100, 1e-2))
+LANDINGS = ((PLAIN, 1e-4), (100, 1e-2))
 
 
 @dataclass(frozen=True)
