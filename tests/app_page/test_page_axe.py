@@ -19,7 +19,7 @@ pytestmark = [
 GRAVE = ("serious", "critical")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_axe_finds_nothing_grave(browser: Any, address: str, scheme: str) -> None:
     with page_at(browser, address, color_scheme=scheme) as page:
         page.evaluate(AXE.read_text(encoding="utf-8"))

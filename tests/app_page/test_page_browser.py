@@ -235,7 +235,9 @@ def test_who_has_not_the_token_is_refused(address: str):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize(
+    "name", ["SIGINT", *(pytest.param(name, marks=pytest.mark.slow) for name in ("SIGTERM", "SIGHUP"))]
+)
 def test_a_signal_ends_it_with_its_processes_and_files_and_without_a_word(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     with serving() as (process, address):

@@ -249,6 +249,7 @@ def test_two_beams_against_onsets_of_the_full_problem() -> None:
         assert [f for _, f in at] == pytest.approx([o.frequency_hz for o in onsets], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_tongues_of_two_beams_against_onsets_of_the_full_problem() -> None:
     """Thirteen curves over a thickness that fold, cross and end in a tip, on columns at which all onsets are sought anew."""
     case, path, ends = paper_case(), "bodies.beam1.thickness", (0.001, 0.002)
@@ -315,7 +316,10 @@ def wrong(seed: int) -> tuple[bool, str]:
     return True, f"seed {seed}: no boundary at {off[0].round(4)}" if off else ""
 
 
-@pytest.mark.parametrize("seeds", [range(5), (7, 10), (13, 100), (140, 278)], ids=str)
+MORE = [pytest.param(seeds, marks=pytest.mark.slow) for seeds in ((13, 100), (140, 278))]
+
+
+@pytest.mark.parametrize("seeds", [range(5), (7, 10), *MORE], ids=str)
 def test_random_problems(seeds) -> None:
     assert [wrong(seed) for seed in seeds] == [(True, "")] * len(seeds)
 
