@@ -422,6 +422,27 @@ def test_a_mass_that_two_walls_hold():
     assert found.normal_force[-1] == pytest.approx([1.0, 1.0], abs=1e-12)
 
 
+def test_a_root_of_a_number_that_is_zero_has_its_modes():
+    numbers, modes = numbers_of(np.zeros((1, 1), dtype=complex), np.array([1j]), np.array([[0.0, 0.0, 0.0, -1.0]])), np.full(2, np.nan)
+    code, _, when, *_ = first_root(
+        numbers, planes(np.array([1j])), planes(np.ones(1, dtype=complex)), parts_of(np.array([1j]), 1.0), 1.0, 0, modes
+    )
+    assert code == CROSSED
+    assert modes == pytest.approx([np.cos(when), np.sin(when)], abs=1e-12)
+
+
+def test_what_was_computed_before_an_error_is_kept_whole():
+    """It sticks for 2 s and then slips critically damped: modes that are one are refused there."""
+    block = block_on_belt(law=StaticKinetic(0.3, 0.4), speed=0.1, damping=2.0)
+    with pytest.raises(st.AnalysisError, match="all but one") as refused:
+        exact(block, 6.0, velocities={"belt": 1.0}, start=(0.0, [0.1, 0.0], 0.0), step=1e-3)
+    kept = refused.value.trajectory
+    assert str(refused.value).endswith("(t = 2 s, phase run)")
+    assert len(kept.time) == 2000
+    assert np.all(kept.status == STICK)
+    assert kept.state["exact_q"] == pytest.approx([0.2, 0.0], abs=1e-9)
+
+
 def test_critical_damping_is_refused():
     with pytest.raises(st.AnalysisError, match=r"two modes at 1 rad/s are all but one .* take stepper = \"explicit\""):
         st.simulate(corner(**{"springs.kx.damping": 2.0, "contacts.rub.stiffness": "rigid"}))

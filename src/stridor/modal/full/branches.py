@@ -206,7 +206,10 @@ def _opening(source: Along, end: RegionModes, state: State, top: float) -> list[
             continue
         slopes = np.linalg.eigvals(-np.linalg.solve(gram, y.T @ change.residual(lam, x)))
         size = np.abs(lam).mean()
-        least = max(FLAT * size / (family.high - family.low), 1e-6 * float(np.abs(slopes).max()))
+        # What little damps it puts growth off: by more than that it is a passage as any other.
+        decay = 0.0 if family.neutral else -float(lam.real.min())
+        width = family.high - family.low
+        least = max(FLAT * size / width, 1e-6 * float(np.abs(slopes).max()), decay / (OPENING * width))
         for slope in slopes[slopes.real > least]:
             near = np.argsort(np.abs(state.values - lam[0]))[: max(len(mine), 2)]
             branch = int(near[0])

@@ -11,7 +11,7 @@ every μ is built anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -223,10 +223,7 @@ class Smooth:
         else:
             problems = [self.built(self.low + p * (self.high - self.low)) for p in (0.0, *PROBES, 1.0)]
             mass, damping, stiffness = ([getattr(q, role) for q in problems] for role in ROLES)
-        if not any(d.nnz and np.any(d.data) for d in damping):
-            return True
-        potential = all(deviation(m, sp.csr_array(m.T)) <= EXACT for m in (*mass, *stiffness))
-        return potential and all(deviation(d, sp.csr_array(-d.T)) <= EXACT for d in damping)
+        return _mirrored(mass, damping, stiffness)
 
     @property
     def sizes(self) -> Array:
@@ -278,6 +275,11 @@ class Family(Smooth):
     def freedoms(self) -> int:
         """Number of freedoms n; the forces of rigid contacts are unknowns beyond them."""
         return self.size
+
+    @cached_property
+    def neutral(self) -> bool:
+        """Whether −λ̄ is an eigenvalue with every λ at the low end, as it is everywhere where ``reversible``."""
+        return _mirrored(*([matrix] for matrix in self.built(self.low).matrices()))
 
     def bordered(self, here: Quadratic, lam: complex, border: Border) -> BorderedFactor:
         """Factors of P(λ) with a border. Raises AnalysisError where it is singular."""
@@ -419,6 +421,14 @@ def deviation(one: Sparse, other: Sparse) -> float:
     rows, columns = (np.asarray(sizes.max(axis=a).toarray()).ravel() for a in (1, 0))
     scale = np.sqrt(rows[apart.row] * columns[apart.col])
     return float(np.max(np.abs(apart.data) / np.maximum(scale, 1e-300)))
+
+
+def _mirrored(mass: Sequence[Sparse], damping: Sequence[Sparse], stiffness: Sequence[Sparse]) -> bool:
+    """Whether nothing works on velocities, or gyroscopic forces alone do and all others have a potential."""
+    if not any(d.nnz and np.any(d.data) for d in damping):
+        return True
+    potential = all(deviation(m, sp.csr_array(m.T)) <= EXACT for m in (*mass, *stiffness))
+    return potential and all(deviation(d, sp.csr_array(-d.T)) <= EXACT for d in damping)
 
 
 def _leja(low: float, high: float, count: int) -> list[float]:

@@ -54,8 +54,8 @@ LATER, CONTACT, PIECE, ANEW = range(4)
 # of the last change of a moment, the end of the piece, how long the modes may be used.
 NOW, NEXT, COUNTED, CROWD_SINCE, LATEST, PIECE_END, SPAN = range(7)
 TIMES = 7
-LEVEL, EVENTS, UNSURE, CROWDED, PEAK_LEVEL, NEXT_KIND, NEXT_NUMBER, NEEDED, NEXT_RECORD, RECORDED = range(10)
-COUNTS = 10
+LEVEL, EVENTS, UNSURE, CROWDED, PEAK_LEVEL, NEXT_KIND, NEXT_NUMBER, NEEDED, NEXT_RECORD, RECORDED, SEARCHED = range(11)
+COUNTS = 11
 
 
 class State(NamedTuple):
@@ -132,7 +132,7 @@ def _look(
     code, which, after, level, _, unsure = first_root(
         numbers, matrix(store, where, POLES), zeta, table, limit, counts[LEVEL], ahead
     )
-    counts[LEVEL] = level
+    counts[SEARCHED], counts[LEVEL] = counts[LEVEL], level
     counts[UNSURE] += unsure
     if code == UNDECIDED:
         return False
@@ -270,6 +270,7 @@ def leap(
                 if status[c] == GAP and status_now[c] != GAP:
                     parted[c], parted_from[c] = stop, status_now[c]
             status_now[:], kept_holds[:], works[:] = status, holds, struck
+            works_now[:] = works
         else:
             works[:] = works_now
         moving[:] = behind

@@ -32,6 +32,7 @@ from .leap import (
     PIECE_END,
     PLAIN,
     RECORDED,
+    SEARCHED,
     SPAN,
     TIMES,
     UNSURE,
@@ -62,7 +63,7 @@ class Leaps:
         self.recorded, self.next = 0, -(-done // every)
         self.counted = counted
         self.works: Array | None = None
-        self._peak = 0
+        self._peak = self._level = 0
         self._piece = -1
         self._anchor: Anchor | None = None
         self._ahead, self._modes_ahead = (LATER, 0), np.zeros(0)
@@ -85,7 +86,11 @@ class Leaps:
             if code != NEEDS:
                 break
             motion.status = tuple(int(now) for now in state.status)
-            self._provide(motion, int(state.counts[NEEDED]))
+            try:
+                self._provide(motion, int(state.counts[NEEDED]))
+            except AnalysisError:
+                self._take(motion, state, zeta, terms, ahead)
+                raise
             fastest = motion.fastest()
         self._take(motion, state, zeta, terms, ahead)
         if code == NO_TELLING:
@@ -103,6 +108,7 @@ class Leaps:
         counts[[PEAK_LEVEL, NEXT_RECORD, RECORDED]] = self._peak, self.next, self.recorded
         if motion.anchor is not None and motion.anchor is self._anchor and motion.next is not None:
             counts[[NEXT_KIND, NEXT_NUMBER]] = self._ahead
+            counts[LEVEL], counts[SEARCHED] = self._level, motion.level
             times[[NEXT, SPAN]] = motion.next[0], motion.anchor.span
             zeta, terms, ahead = planes(motion.anchor.zeta), motion.anchor.terms, self._modes_ahead
         works = motion.works.copy()
@@ -131,6 +137,8 @@ class Leaps:
             return
         watched = motion.watched()
         self._ahead, self._modes_ahead = (kind, number), ahead
+        # A restart looks ahead anew, from the level at which that was begun.
+        self._level, motion.level = motion.level, int(counts[SEARCHED])
         motion.anchor = self._anchor = Anchor(
             motion.time, watched, zeta[0] + 1j * zeta[1], terms[0].copy(), terms, float(times[SPAN])
         )

@@ -209,7 +209,7 @@ def extremes(
             if top <= 0.0:
                 off = derivative_bound(polynomials, i, time + length, 4) * length**4 / 384
                 off += most(sizes, r, bent, level, amounts)
-                grows = grows and top + GROWTH * off < 0.0
+                grows = grows and top + GROWTH * off <= 0.0
                 top += off
             doubtful = doubtful or top > 0.0
         if doubtful and level < lowest:

@@ -301,6 +301,8 @@ def first_root(
                     if t < first:
                         which, first = i, t
                         modes[:] = trial
+            if first == length:  # a number that is zero from the beginning on
+                modes[:] = following
             if time + first > limit:
                 break
             return CROSSED, which, time + first, level, parts, unsure

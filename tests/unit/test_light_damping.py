@@ -1,0 +1,23 @@
+"""Damping that is all but none: growth begins where it is gone, not where modes are counted as on the axis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import stridor as st
+from matrix_cases import matrix_case
+
+UNIT = np.eye(2)
+
+
+def test_damping_that_is_all_but_none_puts_growth_off(tmp_path: Path) -> None:
+    """2e-8 − 2e-6 μ: the modes decay by 1e-8 of their frequency at μ = 0, and grow from μ = 0.01 on."""
+    terms = [
+        (UNIT, "mass", ""), (np.diag([1.0, 4.0]), "stiffness", ""),
+        (2e-8 * UNIT, "damping", ""), (-2e-6 * UNIT, "damping", "mu"),
+    ]  # fmt: skip
+    found = st.onsets(matrix_case(tmp_path, terms, 1.0, (0.0, 0.5)))
+    assert found.complete, found.completeness
+    np.testing.assert_allclose([onset.mu for onset in found.onsets], [0.01] * 2, rtol=1e-9)
