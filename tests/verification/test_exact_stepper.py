@@ -554,6 +554,33 @@ def test_a_run_that_is_cut_goes_on_to_the_last_digit(monkeypatch: pytest.MonkeyP
     assert np.abs(changed.displacement[len(part.time)] - whole.displacement[len(part.time)]).max() < 1e-9
 
 
+@pytest.mark.parametrize("cut", [74, 185, 333])
+def test_random_runs_that_are_cut_go_on_to_the_last_digit(cut: int, monkeypatch: pytest.MonkeyPatch):
+    """A restart looks ahead anew, from where the leg that was cut began to be looked through."""
+
+    def stop(done: int, planned: int) -> None:
+        if done >= cut:
+            raise KeyboardInterrupt
+
+    for seed in (1, 2, 5, 12, 23):
+        system, start = random_system(seed)
+        asked = {"velocities": {"belt": 1.0}, "start": (start, 0.0, 0.0), "watch": ("first", "last"), "step": 0.01}
+        whole = exact(system, 6.0, **asked)
+        settings = Settings(record_every=1, watch=("first", "last"), step=0.01, stepper="exact")
+        phases = [PhaseSpec("run", 6.0, {}, {"belt": 1.0}, 0.0)]
+        began = tuple(np.broadcast_to(np.asarray(part, dtype=float), system.size) for part in asked["start"])
+        with monkeypatch.context() as patch:
+            in_chunks(patch, 37)
+            part = simulate(system, phases, settings, disturbance=began, progress=stop)
+        assert part.interrupted
+        again = simulate(system, phases, settings, restart=part)
+        for name in ("displacement", "normal_force", "kinetic"):
+            assert np.array_equal(getattr(again, name), getattr(whole, name)), (seed, name)
+        for name in whole.contact_names:
+            largest = (run.phases[-1].contacts[name].max_normal_force for run in (again, whole))
+            assert next(largest) == pytest.approx(next(largest), rel=2e-6)
+
+
 def test_large_models_are_refused_before_anything_is_computed():
     pad = st.loads(template_text("pad-on-disc")).with_({"temporal.stepper": "exact"})
     pad = pad.with_({f"bodies.{name}.mesh.divisions": [3, 6, 1] for name in ("disc", "lining", "plate")})
