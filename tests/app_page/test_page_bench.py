@@ -104,6 +104,7 @@ def test_the_geometry_is_sent_once(bench: Bench, state: State, unstable: Any, fo
     assert "geometry" in moved["shape"]
 
 
+@pytest.mark.slow
 def test_twenty_moves_leave_nothing_behind():
     case = st.loads(template_text("two-beams")).with_({
         "bodies.beam1.elements": 6, "bodies.beam2.elements": 12, "modal.max_frequency_hz": 8e3,

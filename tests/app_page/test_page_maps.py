@@ -29,6 +29,7 @@ def maps(x: str, y: str, x_range: tuple[float, float], y_range: tuple[float, flo
     return told, said
 
 
+@pytest.mark.slow
 def test_curves_of_a_map_are_those_of_the_boundary() -> None:
     told, said = maps("mu", STIFFNESS, (0.0, 0.6), (5e9, 2e10))
     assert len(told) == len(mapping.LINES)

@@ -150,6 +150,7 @@ def test_both_approaches_and_the_report(browser: Any, short: str, tmp_path: Path
         shot(page, "compare", full_page=True)
 
 
+@pytest.mark.slow
 def test_a_click_on_the_map_goes_there(browser: Any, short: str) -> None:
     with page_at(browser, short) as page:
         page.get_by_role("tab", name="Stability map").click()

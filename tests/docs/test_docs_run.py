@@ -30,7 +30,11 @@ def follow(page: Path, folder: Path, *, slow: bool) -> Page:
     return Page(page, folder, slow).follow()
 
 
-@pytest.mark.parametrize("page", FOLLOWED, ids=lambda page: page.stem)
+LONG = {"boundaries"}  # weekly
+EACH_RUN = [pytest.param(page, marks=pytest.mark.slow) if page.stem in LONG else page for page in FOLLOWED]
+
+
+@pytest.mark.parametrize("page", EACH_RUN, ids=lambda page: page.stem)
 def test_page_can_be_followed(page: Path, tmp_path: Path) -> None:
     follow(page, tmp_path, slow=False)
 

@@ -71,7 +71,7 @@ for verb in sys.argv[2].split(";"):
 @pytest.mark.parametrize(
     ("template", "changes", "left_out"),
     [
-        ("two-beams", BEAMS, ()),
+        pytest.param("two-beams", BEAMS, (), marks=pytest.mark.slow),
         pytest.param("pad-on-disc", PAD, ("compare", "run", "cycles", "damping-map", "ensemble", "boundary"), marks=pytest.mark.slow),
     ],
 )

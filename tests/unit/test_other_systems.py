@@ -53,6 +53,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_verbs_work_without_calls_of_posix(folder: Path):
     for _ in range(2):  # what the first one left does not stop the second
         done = program("onsets", "two-beams.toml", cwd=folder)
