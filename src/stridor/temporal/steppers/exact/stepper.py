@@ -364,7 +364,7 @@ class ExactStepper:
         return weight.T @ np.asarray(u, dtype=float), weight.T @ np.asarray(w, dtype=float)
 
     def make_room(self, schedule: Schedule, settings: Settings) -> None:
-        """Room for all records from the present step on; loads the compiled search."""
+        """Room for all records from the present step on."""
         every = settings.record_every
         count = max((schedule.steps - 1) // every - (self._done - 1) // every, 0)
         rows: list[Array] = [np.zeros((0, self._system.size))]
