@@ -27,6 +27,7 @@ def complex_modes(
     max_frequency_hz: float | None = None,
     damped: bool = True,
     vectors: bool | Literal["right"] = False,
+    residuals: bool = True,
     friction_damping: bool = False,
     prestress: bool = False,
     solver: str | None = None,
@@ -38,7 +39,8 @@ def complex_modes(
 
     count: how many branches, lowest frequencies at μ = 0 first; max_frequency_hz instead takes all that start below it,
     and those that start a little above and come below it at one of these μ. vectors keeps left and right ones, "right"
-    those alone where that saves time. source: where eigenpairs come from, "receptance" (point contacts on a complete
+    those alone where that saves time. residuals=False leaves backward errors out where they cost something
+    (`ComplexModes.residual`). source: where eigenpairs come from, "receptance" (point contacts on a complete
     basis), "krylov" (sparse matrices that stand without friction), "reduced" (a model over μ, its modes solved in full)
     or "full" (any matrices); None takes what suits the system, and the next where that turns out not to.
     friction_damping (across the direction of sliding), prestress and the direct solver matter on sparse matrices only.
@@ -53,7 +55,7 @@ def complex_modes(
         raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
     options = Options(friction_damping, prestress, solver, source)
     asked = Asked(
-        max_frequency_hz, damped=damped, options=options, count=count, vectors=vectors, progress=progress,
-        numbered_at=numbered_at,
+        max_frequency_hz, damped=damped, options=options, count=count, vectors=vectors, residuals=residuals,
+        progress=progress, numbered_at=numbered_at,
     )  # fmt: skip
     return answered(system, asked, lambda source, a: source.modes(system, values, a), without_following=True)

@@ -47,6 +47,7 @@ def modes_by_receptance(
     max_frequency_hz: float | None,
     damped: bool,
     vectors: bool | Literal["right"],
+    residuals: bool = True,
     progress: Progress | None,
 ) -> ComplexModes:
     """Modes at the friction coefficients values (k,), as `complex_modes` gives them.
@@ -91,8 +92,11 @@ def modes_by_receptance(
         shapes[0][:, still] = constant.T
         for row, m in enumerate(values):
             shapes[1][row, still] = _left_of_fixed(coupling, eigenvalues[0, still], constant, float(m)).T
-    part = _pairs(spectrum, judge, eigenvalues[:, moving], values, shapes if vectors else None, moving)
-    eigenvalues[:, moving], residual[:, moving] = part
+    if vectors or residuals:
+        part = _pairs(spectrum, judge, eigenvalues[:, moving], values, shapes if vectors else None, moving)
+        eigenvalues[:, moving], residual[:, moving] = part
+    else:
+        residual[:, moving] = np.nan
     return ComplexModes(
         mu=values,
         eigenvalues=eigenvalues,

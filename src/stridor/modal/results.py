@@ -30,7 +30,8 @@ class ComplexModes(Rates, Tabular):
     """Modes over μ (k,), one column per branch (b,): a sequence of `Branch`, and of a slice of it modes again.
 
     eigenvalues λ (k, b) [1/s]: growth rate + j angular frequency. branch (b,) numbers the modes from
-    1 by frequency at μ = 0. residual (k, b): componentwise backward error in the assembled matrices.
+    1 by frequency at μ = 0. residual (k, b): componentwise backward error in the assembled matrices, NaN
+    where it was not asked for, which leaves λ as the contacts' receptance gives it, to about 1e-9 of |λ|.
     right, left (k, b, n) unit vectors where asked for, else None. damped: whether C was used.
     open_contacts: contacts that carry no load in steady sliding and so take no part. completeness: of matrices without
     structure, for each μ what speaks for no mode of the band being missed, and what the numbers are if branches could
@@ -140,7 +141,7 @@ class ComplexModes(Rates, Tabular):
             rows = [
                 (
                     int(self.branch[b]), readable(self.frequency_hz[0, b]), readable(self.growth_rate[0, b], 4),
-                    readable(ratio[0, b], 4), "unstable" if marks[0, b] else "", f"{self.residual[0, b]:.0e}",
+                    readable(ratio[0, b], 4), "unstable" if marks[0, b] else "", _error(float(self.residual[0, b])),
                 )
                 for b in self.order(0)
             ]  # fmt: skip
@@ -227,7 +228,7 @@ class ComplexModes(Rates, Tabular):
                         "growth_rate": float(self.growth_rate[k, b]),
                         "damping_ratio": float(ratio[k, b]),
                         "unstable": bool(marks[k, b]),
-                        "residual": float(self.residual[k, b]),
+                        "residual": float(self.residual[k, b]) if np.isfinite(self.residual[k, b]) else None,
                         "branch": int(self.branch[b]),
                     }
                     for b in self.order(k, sort)
@@ -249,6 +250,10 @@ class ComplexModes(Rates, Tabular):
             **({"notes": list(self.notes)} if self.notes else {}),
             **({"interrupted_of": self.planned} if self.planned is not None else {}),
         }
+
+
+def _error(residual: float) -> str:
+    return f"{residual:.0e}" if np.isfinite(residual) else ""
 
 
 def grows(values: ComplexArray, top: float) -> BoolArray:

@@ -142,16 +142,20 @@ def _split_unseen(modes: UncoupledModes, real: Array, *, sloped: bool) -> tuple[
     fixed: list[complex] = []
     combinations: list[Array] = []
     start = 0
+    like_next = _same(stiffness, damping, order[:-1], order[1:])
+    alone = ~(np.append(like_next, False) | np.insert(like_next, 0, False))[: len(order)]
+    felt = np.abs(seen).max(axis=0, initial=0.0) > UNCOUPLED_TOLERANCE * scale
+    coupled[order[alone]] = felt[order[alone]]
     while start < len(order):
+        if alone[start] and felt[order[start]]:
+            start += 1
+            continue
         stop = start + 1
         while stop < len(order) and _same(stiffness, damping, order[start], order[stop]):
             stop += 1
         group = order[start:stop]
         if len(group) == 1:
-            basis, rank = (
-                np.eye(1),
-                int(np.abs(seen[:, group]).max(initial=0.0) > UNCOUPLED_TOLERANCE * scale),
-            )
+            basis, rank = np.eye(1), 0
         else:
             _, values, vh = np.linalg.svd(seen[:, group], full_matrices=True)
             basis, rank = vh, int(np.sum(values > UNCOUPLED_TOLERANCE * scale))
@@ -176,10 +180,11 @@ def _split_unseen(modes: UncoupledModes, real: Array, *, sloped: bool) -> tuple[
     )
 
 
-def _same(stiffness: Array, damping: Array, i: int, j: int) -> bool:
-    return bool(
-        abs(stiffness[i] - stiffness[j]) <= 1e-11 * abs(stiffness[j])
-        and abs(damping[i] - damping[j]) <= 1e-9 * max(abs(damping[j]), 1e-12 * np.sqrt(abs(stiffness[j])))
+def _same(stiffness: Array, damping: Array, i: IntArray, j: IntArray) -> BoolArray:
+    """Whether poles i (k,) and j (k,) are one but for rounding."""
+    least = 1e-12 * np.sqrt(np.abs(stiffness[j]))
+    return (np.abs(stiffness[i] - stiffness[j]) <= 1e-11 * np.abs(stiffness[j])) & (
+        np.abs(damping[i] - damping[j]) <= 1e-9 * np.maximum(np.abs(damping[j]), least)
     )
 
 

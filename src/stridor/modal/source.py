@@ -43,7 +43,7 @@ class Asked:
     follow: branches are followed that start up to so many times the band. numbered_at: the μ from which on they may be
     followed, where their names are of no matter; sources that follow from 0 whatever is asked go on doing so. carried:
     what one stretch of μ hands on to the next. unfollowed: why they were not, where another
-    source tried.
+    source tried. residuals: whether backward errors are asked for; sources that have them anyway give them.
     """
 
     max_frequency_hz: float | None
@@ -51,6 +51,7 @@ class Asked:
     options: Options
     count: int | None = 20
     vectors: bool | Literal["right"] = False
+    residuals: bool = True
     progress: Progress | None = None
     follow: float = 1.1
     numbered_at: float = 0.0
@@ -99,7 +100,7 @@ class Receptance:
         """See `EigenSource`."""
         return modes_by_receptance(
             system, values, count=asked.count or 20, max_frequency_hz=asked.max_frequency_hz, damped=asked.damped,
-            vectors=asked.vectors, progress=asked.progress,
+            vectors=asked.vectors, residuals=asked.residuals, progress=asked.progress,
         )  # fmt: skip
 
     def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:

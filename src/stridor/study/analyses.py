@@ -76,6 +76,7 @@ def modes(
     damped: bool | None = None,
     vectors: bool | Literal["right"] = False,
     check: bool = True,
+    residuals: bool = True,
     progress: Progress | None = None,
 ) -> ComplexModes:
     """Complex modes at one or many friction coefficients (default: the problem's own).
@@ -83,9 +84,10 @@ def modes(
     All modes with frequencies up to modal.max_frequency_hz are found; kept are the ``count`` lowest (default
     modal.modes) and every unstable one, with max_frequency_hz all up to that. band_hz: of all found, those between two
     frequencies, under the same numbers; without ``count`` every one of them. check: whether what grows in the band is
-    sought anew in the full problem (`checked_modes`). progress is called with the number of friction coefficients done
-    and of all. A workspace keeps the modes, with vectors those at one μ. Raises CaseError for a bad μ, AnalysisError
-    where the steady sliding state does not exist.
+    sought anew in the full problem (`checked_modes`). residuals=False, where nothing is checked, leaves backward errors
+    out where they cost something: for pictures (`ComplexModes.residual`). progress is called with the number of
+    friction coefficients done and of all. A workspace keeps the modes, with vectors those at one μ. Raises CaseError
+    for a bad μ, AnalysisError where the steady sliding state does not exist.
     """
     require_frequency(max_frequency_hz)
     if count is not None:
@@ -98,12 +100,16 @@ def modes(
     asked = ("modes", *np.shape(values), *np.ravel(values).tolist(), band, damped, check)
     # What has vectors serves who wants none.
     more = {False: (False, "right", True), "right": ("right", True), True: (True,)}[vectors]
-    result = next((r for v in more if (r := work.answers.known((*asked, v))) is not None), None)
+    judged = residuals or check
+    served = [(*asked, v, j) for v in more for j in ((True,) if judged else (False, True))]
+    result = next((r for key in served if (r := work.answers.known(key)) is not None), None)
     if result is None:
-        result = _modes(work, values, band, damped=damped, vectors=vectors, check=check, progress=progress)
+        result = _modes(
+            work, values, band, damped=damped, vectors=vectors, check=check, residuals=judged, progress=progress
+        )
         # What was cut short is not for others, nor are vectors of a sweep, which are large.
         if not result.interrupted and (not vectors or len(result.mu) == 1):
-            work.answers.keep((*asked, vectors), result)
+            work.answers.keep((*asked, vectors, judged), result)
     result = replace(result, right=result.right if vectors else None, left=result.left if vectors is True else None)
     if band_hz is not None:
         result = result.between(*band_hz)
@@ -120,6 +126,7 @@ def _modes(
     damped: bool,
     vectors: bool | Literal["right"],
     check: bool,
+    residuals: bool,
     progress: Progress | None,
 ) -> ComplexModes:
     """Every mode of the band: followed from μ = 0 and checked, or where matrices depend on μ sought at each."""
@@ -141,8 +148,8 @@ def _modes(
         notes = (*taken_as_closed(work.system()), *decided_by_meshes(work.system(), single, options.solver))
     else:
         result = complex_modes(
-            work.system(), values, max_frequency_hz=band, damped=damped, vectors=vectors, progress=progress,
-            **asdict(options),
+            work.system(), values, max_frequency_hz=band, damped=damped, vectors=vectors, residuals=residuals,
+            progress=progress, **asdict(options),
         )  # fmt: skip
         notes = taken_as_closed(work.system())
     made = provenance(work, "modes", time.perf_counter() - started, damped=damped)

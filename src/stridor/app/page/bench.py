@@ -201,7 +201,7 @@ class Bench:
             if large:
                 send("progress", {"what": f"modes at {done} of {planned} friction coefficients"})
 
-        return modes(work, mus, max_frequency_hz=_band(work), check=False, progress=told)
+        return modes(work, mus, max_frequency_hz=_band(work), check=False, residuals=False, progress=told)
 
     def _shape(
         self, model: _Model, system: System, here: ComplexModes, branch: int, send: Send, *, energy: bool
