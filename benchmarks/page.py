@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -64,8 +65,10 @@ def measure(address: str, moves: int, levers: list[str]) -> None:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1280, "height": 720})
         page.set_default_timeout(900_000)  # large models take minutes to be made
+        began = time.perf_counter()
         page.goto(address)
         page.wait_for_function("typeof stridor !== 'undefined' && stridor.state.onsets !== null")
+        print(f"the page with its onsets after {time.perf_counter() - began:.1f} s", flush=True)
         paths: list[str] = page.evaluate("stridor.state.levers.map((lever) => lever.path)")
         for path in levers or paths[:4]:
             each = [moved(page, path, k / moves) for k in range(1, moves)]
@@ -88,6 +91,7 @@ def compute(case: list[str], moves: int, levers: list[str]) -> None:
     """The same moves, asked of what the page's process runs."""
     from stridor.app.page import source_of
     from stridor.app.page.bench import bench
+    from stridor.app.page.levers import friction_range
     from stridor.app.page.levers import levers as levers_of
     from stridor.app.page.state import State, checked, first_state
     from stridor.app.page.worker import IDLE
@@ -108,13 +112,15 @@ def compute(case: list[str], moves: int, levers: list[str]) -> None:
     known = {lever.path: lever for lever in levers_of(checked(first.source))}
     asked(first)
     for path in levers or list(known)[:3]:
-        lever = known[path]
+        lever = known.get(path)
+        low, high = friction_range(first.case()) if lever is None else (lever.low, lever.high)
         each: list[float] = []
         for k in range(moves):
             share = 0.4 + 0.2 * k / moves
-            low, high = lever.low, lever.high
-            value = low * (high / low) ** share if lever.scale == "log" else low + (high - low) * share
-            each.append(asked(first.with_change(path, value)))
+            by_factors = lever is not None and lever.scale == "log"
+            value = low * (high / low) ** share if by_factors else low + (high - low) * share
+            moved_to = replace(first, mu=value) if lever is None else first.with_change(path, value)
+            each.append(asked(moved_to))
         print(f"{path}: processor time of a move, {spread(each[1:])}")
 
 

@@ -5,6 +5,7 @@ from .branch import Bifurcation, CycleBranch, bifurcations
 from .continuation import Followed, follow, unfinished
 from .cycle import Cycle
 from .cycles import CycleOnset, Cycles
+from .parting import Unclosed
 from .problem import Family, SlidingProblem, refuse_cycles, why_not_shooting
 from .returns import NoReturn, cycles_reached, growing, pushed, same
 from .sampling import sampled
@@ -23,6 +24,7 @@ __all__ = [
     "Followed",
     "NoReturn",
     "SlidingProblem",
+    "Unclosed",
     "bifurcations",
     "born",
     "close",

@@ -13,6 +13,7 @@ from ..notebook import counted, html_table
 from ..tabular import Cell, Rows, Tabular, dataset
 from .branch import Bifurcation, CycleBranch
 from .cycle import NEUTRAL, Change, Cycle
+from .parting import Unclosed
 
 SCHEMA = "stridor.cycles/1"
 HISTORIES = {
@@ -46,7 +47,7 @@ class Cycles(Tabular):
 
     onsets: those of steady sliding in ``between`` (None where only single μ were asked for). missing: what was looked
     for and not found, or not followed to its end, in words; there may be cycles that no motion and no branch led to.
-    interrupted: whether it was stopped on its way.
+    unclosed: motions that were followed and closed after no period. interrupted: whether it was stopped on its way.
     """
 
     cycles: tuple[Cycle, ...]
@@ -57,6 +58,7 @@ class Cycles(Tabular):
     notes: tuple[str, ...] = ()
     interrupted: bool = False
     provenance: dict[str, Any] = field(default_factory=dict)
+    unclosed: tuple[Unclosed, ...] = ()
 
     def branch_of(self, number: int) -> int | None:
         """The number (from 0) of the branch that a cycle lies on, None of one that was not followed."""
@@ -147,6 +149,7 @@ class Cycles(Tabular):
             "branches": [b.to_json() for b in self.branches],
             "onsets": [dict(vars(o)) for o in self.onsets],
             "missing": list(self.missing),
+            "unclosed": [u.to_json() for u in self.unclosed],
             "notes": list(self.notes),
             "warnings": list(self.warnings),
             "interrupted": self.interrupted,
@@ -212,6 +215,7 @@ class Cycles(Tabular):
             cycles, branches, tuple(CycleOnset(**o) for o in document["onsets"]),
             None if between is None else (float(between[0]), float(between[1])), tuple(document["missing"]),
             tuple(document["notes"]), bool(document["interrupted"]), json.loads(data.attrs["provenance"]),
+            tuple(Unclosed.from_json(told) for told in document.get("unclosed", ())),
         )  # fmt: skip
 
 

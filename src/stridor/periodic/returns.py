@@ -13,6 +13,7 @@ from ..temporal.steppers.exact.statuses import GAP, STICK, Status
 from ..temporal.steppers.exact.varied import VariedMotion
 from ..typing import Array
 from .chart import Chart
+from .parting import Unclosed, next_change, parting
 from .problem import SlidingProblem
 from .shooting import Closed, close, distance, multipliers
 
@@ -28,11 +29,12 @@ GROWN = 1.2  # of the amplitude at which a mode would first change a contact
 
 
 class NoReturn(AnalysisError):
-    """A motion that was followed to no cycle; steady: it came to steady sliding."""
+    """A motion that was followed to no cycle; steady: it came to steady sliding; unclosed: whether motions beside it
+    part from it, where that was followed."""
 
-    def __init__(self, message: str, *, steady: bool = False) -> None:
+    def __init__(self, message: str, *, steady: bool = False, unclosed: Unclosed | None = None) -> None:
         super().__init__(message)
-        self.steady = steady
+        self.steady, self.unclosed = steady, unclosed
 
 
 @dataclass(frozen=True)
@@ -112,11 +114,11 @@ def cycles_reached(
     tried, nearest = NEAR / CLOSER, np.inf
     scale = np.sqrt(np.abs(problem.basis.stiffness))
     moving = scale[scale > 1e-6 * scale.max(initial=0.0)]
-    quiet = QUIET / float(moving.min(initial=1.0) if len(moving) else 1.0)
+    quiet = QUIET / float(moving.min(initial=1.0) if len(moving) else 1.0)  # [s]
     until = clock.process_time() + seconds  # so that what is found does not hang on what runs beside
     amplitude, last = 0.0, ""
     while len(passed) < CHANGES and clock.process_time() < until:
-        change = _next_change(motion, (passed[-1].time if passed else 0.0) + quiet)
+        change = next_change(motion, (passed[-1].time if passed else 0.0) + quiet)
         if change is None:
             if found:
                 return found
@@ -143,13 +145,17 @@ def cycles_reached(
             return found
     if found:
         return found
-    why = "the motion is quasi-periodic or chaotic, or takes longer to come to its cycle"
-    if len(passed) < CHANGES:
-        why = f"its {seconds:g} s of computing were over, which says nothing of whether there is a cycle"
+    unclosed = None
+    why = f"its {seconds:g} s of computing were over, which says nothing of whether there is a cycle"
+    if len(passed) == CHANGES:
+        unclosed = parting(problem, motion, CHANGES, quiet, until - clock.process_time())
+        why = "the motion is quasi-periodic or chaotic, or takes longer to come to its cycle"
+        why = why if unclosed is None else unclosed.words
     raise NoReturn(
         f"no return within {len(passed)} changes of contact, the nearest {nearest:.2g} of the amplitude off{last}: "
-        f"{why}"
-    )
+        f"{why}",
+        unclosed=unclosed,
+    )  # fmt: skip
 
 
 def same(one: Closed, other: Closed) -> bool:
@@ -158,19 +164,6 @@ def same(one: Closed, other: Closed) -> bool:
         return False
     twice = other.word * 2
     return not one.word or any(twice[k : k + len(one.word)] == one.word for k in range(len(other.word)))
-
-
-def _next_change(motion: VariedMotion, until: float) -> tuple[str, int] | None:
-    """Go through the next change of contact, None where there is none for long."""
-    while motion.reach(until) < until:
-        assert motion.next is not None
-        meaning, c = motion.next[1:]
-        motion.passed()
-        if meaning == "piece":
-            return None
-        if meaning != "stretch":
-            return meaning, c
-    return None
 
 
 def _at_rest(problem: SlidingProblem, motion: VariedMotion, before: float) -> NoReturn:

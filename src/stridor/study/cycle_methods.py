@@ -18,6 +18,7 @@ from ..periodic import (
     CycleOnset,
     Family,
     NoReturn,
+    Unclosed,
     born,
     close,
     cycles_reached,
@@ -46,10 +47,11 @@ MethodName = Literal["auto", "shooting", "harmonic"]
 @dataclass(frozen=True)
 class Unreached:
     """What was tried and led to no cycle, or not to all, in words; expected: as it should, to steady sliding or to the
-    end of the range."""
+    end of the range; unclosed: what is known of the motion that closed after no period."""
 
     words: str
     expected: bool = False
+    unclosed: Unclosed | None = None
 
 
 P = TypeVar("P")
@@ -132,7 +134,8 @@ class Shooting:
             try:
                 cycles_reached(problem, motion, self.seconds, partial(told, said))
             except NoReturn as none:
-                told(said, Unreached(f"μ = {mu:.6g}, from {said}: {none}", none.steady))
+                unclosed = none.unclosed and replace(none.unclosed, reached_from=said)
+                told(said, Unreached(f"μ = {mu:.6g}, from {said}: {none}", none.steady, unclosed))
             except AnalysisError as error:
                 told(said, Unreached(f"μ = {mu:.6g}, from {said}: {error}"))
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import interrupts
 from ..errors import CaseError
-from ..periodic import Cycle, CycleBranch, CycleOnset, Cycles, Family, unfinished, why_not_shooting
+from ..periodic import Cycle, CycleBranch, CycleOnset, Cycles, Family, Unclosed, unfinished, why_not_shooting
 from ..periodic.harmonic import HarmonicFamily, why_not_harmonic
 from ..system import System
 from ..typing import Array
@@ -133,6 +133,7 @@ class _Search:
         self.onsets: tuple[CycleOnset, ...] = ()
         self.single: list[Cycle] = []
         self.missing: list[str] = []
+        self.unclosed: list[Unclosed] = []
         self.interrupted = False
         self.doing = ""
 
@@ -187,6 +188,7 @@ class _Search:
         def told(said: str, found: Any) -> None:
             if isinstance(found, Unreached):
                 (self.notes if found.expected else self.missing).append(found.words)
+                self.unclosed += [found.unclosed] if found.unclosed is not None else []
             elif not any(self.method.same(found, other) for other in here):
                 here.append(found)
                 self._add(found, said)
@@ -239,5 +241,5 @@ class _Search:
             made["fingerprint"] = fingerprint(self.work.given, None)
         return Cycles(
             tuple(found), tuple(branches), self.onsets, self.between, (*self.missing, *lost), tuple(self.notes),
-            self.interrupted, made,
+            self.interrupted, made, tuple(self.unclosed),
         )  # fmt: skip

@@ -166,12 +166,14 @@ class Bench:
 
     def _answer_reduced(self, state: State, model: _Model, reduced: Reduced, send: Send) -> None:
         """On a reduced model: first the modes at the μ of the page, then the curves."""
-        here, error = reduced.here(state, vectors=state.branch is not None)
-        send("at", {**modes_at(here, state.mu, checked=False), "said": _certified(reduced, error)})
+        here, error_of = reduced.here(state, vectors=state.branch is not None)
+        at = modes_at(here, state.mu, checked=False)
+        send("at", {**at, "said": f"{reduced.words}; the error of λ is being estimated."})
         branch, whole = state.branch, reduced.work.system()
         offered = branch is not None and self._shape(model, whole, here, branch, send, energy=False)
         if offered:
             send("tornado", _asked_for(state, reduced.seconds))
+        send("at", {**at, "said": _certified(reduced, error_of())})
         self._leisure = True
         send(IDLE, None)
         if model.locus is None:
@@ -180,8 +182,8 @@ class Bench:
                 send("locus", {**locus_of(found), "said": _certified(reduced, error)})
             model.locus = found  # of all points: what is given up halfway is drawn anew
             send("model", _described(model))
-            here, error = reduced.here(state, vectors=state.branch is not None)
-            send("at", {**modes_at(here, state.mu, checked=False), "said": _certified(reduced, error)})
+            here, error_of = reduced.here(state, vectors=state.branch is not None)
+            send("at", {**modes_at(here, state.mu, checked=False), "said": _certified(reduced, error_of())})
         model.onsets = model.onsets or reduced.onsets(state)
         send("onsets", model.onsets)
         if state.branch is not None:

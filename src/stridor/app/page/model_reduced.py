@@ -72,11 +72,13 @@ class Reduced:
         """Whether a state differs in nothing but what the model is over, and lies in the ranges of that."""
         return base_of(state).model == self.base and self.model.problem.inside(self._point(state))
 
-    def here(self, state: State, *, vectors: bool = False) -> tuple[ComplexModes, float]:
-        """Modes at the μ of a state, and the largest estimated error of their λ, relative. Their numbers are those of
-        the nearest point where they are known, until `sweep` has followed them from μ = 0."""
-        found = self.model.modes(self._point(state))
-        return self._modes([found], [self._numbers(found, state)], vectors=vectors), float(found.error.max(initial=0.0))
+    def here(self, state: State, *, vectors: bool = False) -> tuple[ComplexModes, Callable[[], float]]:
+        """Modes at the μ of a state, and what estimates the largest error of their λ, relative, which takes some of a
+        slider's time. Their numbers are those of the nearest point where they are known, until `sweep` has followed
+        them from μ = 0."""
+        found = self.model.modes(self._point(state), judged=False)
+        made = self._modes([found], [self._numbers(found, state)], vectors=vectors)
+        return made, lambda: float(self.model.judged(found).error.max(initial=0.0))
 
     def sweep(self, state: State) -> Iterator[tuple[ComplexModes, float]]:
         """Branches over the range of μ and at the μ of a state, and the largest estimated error: of few points first,

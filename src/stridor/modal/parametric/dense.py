@@ -250,8 +250,8 @@ def made_of(projected: Array, factors: Array, powers: Array, lam: complex) -> Ar
 
 
 def assembled(projected: Array, factors: Array, powers: Array) -> tuple[Array, Array, Array]:
-    """M, D and K (r, r) from projected terms (t, r, r)."""
-    total = np.zeros((3, *projected.shape[1:]))
-    for part, factor, power in zip(projected, factors, powers, strict=True):
-        total[2 - power] += factor * part
+    """M, D and K (r, s), or what else goes with each power of λ, from projected terms (t, r, s)."""
+    # One pass through the terms, which are more than the cache holds.
+    each = np.where(np.array([[2], [1], [0]]) == powers, factors, 0.0)
+    total = (each @ projected.reshape(len(projected), -1)).reshape(3, *projected.shape[1:])
     return total[0], total[1], total[2]

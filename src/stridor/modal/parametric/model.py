@@ -14,7 +14,7 @@ one was cut from, at points it was not made for, and kept ten times larger than 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -122,8 +122,9 @@ class ReducedModel(Shown):
         return int(self.projected.shape[1])
 
     @one_thread
-    def modes(self, values: Mapping[str, float] | Sequence[float]) -> ReducedModes:
-        """All modes up to the promised frequency at a point of the box. Raises CaseError for unknown parameters."""
+    def modes(self, values: Mapping[str, float] | Sequence[float], *, judged: bool = True) -> ReducedModes:
+        """All modes up to the promised frequency at a point of the box. Not judged, their residual and estimated error
+        are NaN until `judged` has them. Raises CaseError for unknown parameters."""
         point = self.problem.point(values)
         factors, powers = self.problem.factors(point), self.problem.powers
         matrices = assembled(self.projected, factors, powers)
@@ -132,10 +133,17 @@ class ReducedModel(Shown):
         found = self.states.modes(matrices, self.frequency, REACH) if self.states is not None and inside else None
         if found is None:
             found = dense_modes(*matrices, self.frequency, REACH, whole=self.whole)
-        residual, error = self._judged(matrices, factors, found)
-        return ReducedModes(
-            point, found.values, residual, error, error <= self.bound, inside, found.right, found.left
+        unknown = np.full(len(found.values), np.nan)
+        made = ReducedModes(
+            point, found.values, unknown, unknown, np.zeros(len(unknown), dtype=bool), inside, found.right, found.left
         )  # fmt: skip
+        return self._judged(made, matrices, factors) if judged else made
+
+    @one_thread
+    def judged(self, modes: ReducedModes) -> ReducedModes:
+        """The same modes with their residual and estimated error."""
+        factors = self.problem.factors(self.problem.point(modes.point))
+        return self._judged(modes, assembled(self.projected, factors, self.problem.powers), factors)
 
     def expand(self, modes: ReducedModes, *, left: bool = False) -> ComplexArray:
         """Right or left vectors (n, k) of unit length."""
@@ -146,12 +154,12 @@ class ReducedModel(Shown):
         """Componentwise backward errors (k,) in the full problem, formed there."""
         return self.problem.at(modes.point).backward_error(modes.values, self.expand(modes))
 
-    def _judged(self, matrices: tuple[Array, Array, Array], factors: Array, found: DenseModes) -> tuple[Array, Array]:
-        lam, powers = found.values, self.problem.powers
-        right = sketched(self.right_sketch, factors, powers, lam, found.right)
-        left = sketched(self.left_sketch, factors, powers, lam, found.left)
-        error = self.constant * product_over_slope(matrices, found, right, left)
-        return np.maximum(right, left), error
+    def _judged(self, modes: ReducedModes, matrices: tuple[Array, Array, Array], factors: Array) -> ReducedModes:
+        lam, powers = modes.values, self.problem.powers
+        right = sketched(self.right_sketch, factors, powers, lam, modes.right)
+        left = sketched(self.left_sketch, factors, powers, lam, modes.left)
+        error = self.constant * product_over_slope(matrices, modes, right, left)
+        return replace(modes, residual=np.maximum(right, left), error=error, passed=error <= self.bound)
 
 
 def sketched(sketch: Array, factors: Array, powers: Array, lam: ComplexArray, z: ComplexArray) -> Array:
@@ -163,17 +171,13 @@ def sketched_rests(
     sketch: Array, factors: Array, powers: Array, lam: ComplexArray, z: ComplexArray
 ) -> ComplexArray:
     """Sketches (s, k) of scaled residuals of z (r, k): what acts on one power of λ at once."""
-    total: ComplexArray = np.zeros((sketch.shape[1], len(lam)), dtype=complex)
-    for power in range(3):
-        chosen = np.flatnonzero((powers == power) & (factors != 0.0))
-        if len(chosen):
-            matrix = np.tensordot(factors[chosen], sketch[chosen], axes=1)
-            total += lam**power * expanded(matrix, z)
+    of_mass, of_damping, of_stiffness = (expanded(matrix, z) for matrix in assembled(sketch, factors, powers))
+    total: ComplexArray = (of_mass * lam + of_damping) * lam + of_stiffness
     return total
 
 
 def product_over_slope(
-    matrices: tuple[Array, Array, Array], found: DenseModes, right: Array, left: Array
+    matrices: tuple[Array, Array, Array], found: DenseModes | ReducedModes, right: Array, left: Array
 ) -> Array:
     """ρ_right ρ_left / |λ yᵀP'(λ)x| (k,)."""
     mass, damping, _ = matrices
