@@ -43,11 +43,10 @@ class Seen:
 
     def follow(self, k: int, other: Seen) -> int | None:
         """Number of mode k at another point: the nearest to where both slopes lead, None where there is none."""
-        if not len(other.values):
-            return None
         way = other.p - self.p
         off = np.abs(other.values - self.values[k] - 0.5 * (way @ self.slopes[:, k] + way @ other.slopes))
-        return int(np.argmin(np.where(np.isfinite(off), off, np.inf)))
+        known = np.flatnonzero(np.isfinite(off))
+        return int(known[np.argmin(off[known])]) if len(known) else None
 
     def rises_to(self, k: int, other: Seen) -> bool:
         """Whether the rate of mode k rises to another point uphill: over all of the way, and at both of its ends."""
@@ -66,7 +65,7 @@ def tops(plane: Plane, seen: Sequence[Seen], mesh: float) -> Iterator[tuple[Seen
         near = [other for other in seen if other is not here and np.hypot(*(other.p - here.p)) <= NEIGHBOUR * mesh]
         steep = np.hypot(*here.slopes.real) * mesh
         for k, lam in enumerate(here.values.tolist()):
-            decays = lam.real < 0.0 and abs(lam) > AT_REST * plane.top
+            decays = lam.real < -UNSTABLE_RELATIVE * abs(lam) and abs(lam) > AT_REST * plane.top
             if decays and steep[k] > FLAT * abs(lam.real) and not any(here.rises_to(k, other) for other in near):
                 found.append((-lam.real / abs(lam), number, k))
     for _, number, k in sorted(found):
@@ -82,16 +81,17 @@ def climb(plane: Plane, here: Seen, k: int, mesh: float) -> Array | None:
         steep = float(np.hypot(*up))
         if not steep * mesh > FLAT * abs(rate):
             return None
-        step = BEYOND * abs(rate) / steep**2 * up
+        step = max(BEYOND * abs(rate) / steep, SHORT * mesh) * (up / steep)
         if inverse is not None:
             step = inverse @ up
             if rate + HOPE * 0.5 * float(up @ step) < 0.0:
                 return None
         length = float(np.hypot(*step))
-        step *= min(1.0, reach / length)
+        if not length <= reach:
+            step = reach / length * step
         p = here.p + step
-        if np.any((p <= 0.0) | (p >= 1.0)):
-            return None  # lines on the edges have been searched
+        if not np.all((p > 0.0) & (p < 1.0)):
+            return None  # lines on the edges have been searched; a bend may be no number
         try:
             there = Seen.at(plane, p)
         except AnalysisError:
