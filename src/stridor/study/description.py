@@ -190,7 +190,7 @@ def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     """The time step against its limit, and how the time loop will go; added to the data."""
     settings = settings_of(case)
     path, reason, limit = plan(system, settings, phases_of(case))
-    step = choose_step(limit, settings)
+    step = choose_step(limit, settings, path)
     steps = sum(round(p.duration / step) for p in case.phases)
     data |= {"step": step, "step_limit": limit.step, "limiting_body": limit.body, "path": path, "steps": steps}
     share = f"{100 * step / limit.step:.0f} % of the stability limit {limit.step:.4g} s (set by {limit.body})"

@@ -14,10 +14,9 @@ from ..errors import CaseError
 from ..sliding import full_motion
 from ..system import System
 from ..temporal.ensembles import Outcome, march_all
-from ..temporal.legs import Member, require_window
-from ..temporal.settings import Settings, choose_step
-from ..temporal.simulate import Progress
-from ..temporal.simulate import plan as step_limits
+from ..temporal.legs import Member, in_two, require_window
+from ..temporal.settings import Settings
+from ..temporal.simulate import Progress, step_of
 from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
 from .analyses import check_extent
@@ -102,7 +101,7 @@ def ensemble(
 def _check_window(work: Workspace, system: System, settings: Settings, window: float) -> None:
     """Refuse a window that is none, or of too few records for a spectrum."""
     require_window(window)
-    step = choose_step(step_limits(system, settings)[2], settings)
+    step = step_of(system, settings, in_two(phases_of(work), window))
     count = int(window * work.phases[-1].duration / step / settings.record_every)
     if count < LEAST_RECORDS:
         raise CaseError(

@@ -22,7 +22,7 @@ from collections.abc import Iterator
 from ..case import Case
 from ..case.bodies import SolidBody
 from ..system.pairs import is_point_on_line
-from .settings import settings_of
+from .settings import phases_of, settings_of
 from .workspace import Workspace
 
 IN_TIME = ("simulate", "compare", "run")
@@ -132,8 +132,10 @@ def _of_time(work: Workspace, case: Case, verb: str, *, few: bool) -> Iterator[s
     elif case.temporal.cutoff_hz is not None and case.temporal.stepper == "auto":
         from ..temporal.simulate import comes_to
 
-        if (chosen := comes_to(work.system(), settings_of(work))) != "exact":
-            yield f'temporal.cutoff_hz has no effect: temporal.stepper = "auto" comes to {chosen} steps here'
+        chosen, why = comes_to(work.system(), settings_of(work), phases_of(work))
+        if chosen != "exact":
+            said = 'temporal.cutoff_hz has no effect: temporal.stepper = "auto" comes to'
+            yield f"{said} {chosen} steps here{f' ({why})' if why else ''}"
     if case.temporal.stepper in ("exact", "implicit"):
         why = "takes no steps" if case.temporal.stepper == "exact" else "has a scheme of its own"
         for key, usual in (("path", "auto"), ("beta2", 0.5)):

@@ -19,12 +19,12 @@ from ..system import System
 from ..threads import one_thread
 from .devices import Gpu, first_line, place
 from .inputs import check_inputs
-from .legs import Legs, leg_phases, legs_of
+from .legs import Legs, in_two, leg_phases, legs_of
 from .march import Progress
 from .schedule import PhaseSpec
-from .settings import Settings, choose_step
+from .settings import Settings
 from .side_by_side import Block, Seen, Track
-from .simulate import plan, simulate
+from .simulate import plan, simulate, step_of
 from .steppers.modal import ModalStepper, choose_path, modal_stepper
 from .steppers.modal.vectors import LANES
 from .trajectory import Trajectory
@@ -72,11 +72,12 @@ def march_all(
         taken, phases, step=settings.step, beta2=settings.beta2, record_every=settings.record_every,
         watch=settings.watch,
     )  # fmt: skip
+    parts = in_two(phases, window)
     gpu, said = place(device, len(tracks))
-    stepper, reason = (None, "asked for") if separately else _shared(taken, settings)
+    stepper, reason = (None, "asked for") if separately else _shared(taken, settings, parts)
     if stepper is None and device == "gpu":
         raise CaseError("device", device, f"cpu: what is run separately ({reason}) runs on no GPU")
-    step = stepper.scheme.step if stepper is not None else choose_step(plan(system, settings)[2], settings)
+    step = stepper.scheme.step if stepper is not None else step_of(system, settings, parts)
     legs = legs_of(phases, taken, step, len(tracks[0]), window, steady=settings.initial == "steady-sliding")
     if stepper is None:
         cut = _one_by_one(system, replace(settings, step=step), tracks, seen, legs, progress)
@@ -116,9 +117,9 @@ def _on(gpu: Gpu, common: Block) -> tuple[list[Block], str]:
     return blocks, ""
 
 
-def _shared(system: System, settings: Settings) -> tuple[ModalStepper | None, str]:
+def _shared(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> tuple[ModalStepper | None, str]:
     """The stepper whose operators all members share, else None and why not."""
-    path, why, _ = plan(system, settings)
+    path, why, _ = plan(system, settings, phases)
     if path != "modal":
         return None, why
     finite = [c.name for c in system.contacts if c.sliding != "small"]

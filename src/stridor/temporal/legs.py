@@ -157,13 +157,12 @@ def legs_of(
 ) -> Legs:
     """The legs of ``count`` members one after the other; window: share of the last phase, in (0, 1]. Raises CaseError
     for another one, and one that begins before the ramp of that phase ends."""
-    require_window(window)
     last, names = phases[-1], list(system.motion.names)
     kept = last.duration * (1.0 - window)
     if last.ramp > kept or (count > 1 and last.duration * RISE > kept):
         least = max(last.ramp / last.duration, RISE if count > 1 else 0.0)
         raise CaseError("window", window, f"at most {1.0 - least:g}: before it loads and speeds still change by a ramp")
-    legs = [tuple(phases[:-1]) + _split(last, window)]
+    legs = [in_two(phases, window)]
     for k in range(1, count):
         name = f"{last.name} {k + 1}"
         legs.append(_split(PhaseSpec(name, last.duration, {}, {}), window))
@@ -179,6 +178,12 @@ def legs_of(
         rises.append(_rise(step, stretches, RISE * last.duration) if k else None)
         at += len(leg)
     return Legs(tuple(legs), tuple(schedules), tuple(rises))
+
+
+def in_two(phases: Sequence[PhaseSpec], window: float) -> tuple[PhaseSpec, ...]:
+    """Phases with the last one in two, the second of which is the window. Raises CaseError for a share that is none."""
+    require_window(window)
+    return (*phases[:-1], *_split(phases[-1], window))
 
 
 def _split(phase: PhaseSpec, window: float) -> tuple[PhaseSpec, ...]:

@@ -9,6 +9,8 @@ import numpy as np
 
 from ..typing import Array
 
+ROUNDED = 1e-3  # of a phase: as far as whole steps may end beside it
+
 
 @dataclass(frozen=True)
 class PhaseSpec:
@@ -55,6 +57,22 @@ class Schedule:
         """The same where prescribed distances are in their place at the start, as in steady sliding."""
         first = self.stretches[0]
         return Schedule(self.step, (replace(first, distances_before=first.distances_after), *self.stretches[1:]))
+
+    def uneven(self, phases: Sequence[PhaseSpec]) -> str:
+        """Which of its phases steps round to another length, in words; "" for none."""
+        for phase, stretch in zip(phases, self.stretches, strict=True):
+            taken = (stretch.last - stretch.first) * self.step
+            if abs(taken - phase.duration) > ROUNDED * phase.duration:
+                return f"{phase.name} of {phase.duration:g} s would take {taken:g} s"
+        return ""
+
+    @property
+    def jump(self) -> str:
+        """In which phase a prescribed distance changes at once, in words; "" for none."""
+        for s in self.stretches:
+            if s.ramp_steps == 0 and np.any(s.distances_after != s.distances_before):
+                return f"a distance that changes at once in phase {s.name}"
+        return ""
 
     def stretch_at(self, step: int) -> Stretch:
         """The phase that step number ``step`` belongs to."""

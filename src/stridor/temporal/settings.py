@@ -48,13 +48,14 @@ def not_finite(time: float, phase: str, step: float) -> str:
     )
 
 
-def choose_step(limit: StepLimit, settings: Settings) -> float:
-    """Δt [s] within the limit, which records of the exact stepper need not keep; raises CaseError beyond it."""
+def choose_step(limit: StepLimit, settings: Settings, path: str = "") -> float:
+    """Δt [s] within the limit, which records of the exact stepper and implicit steps need not keep, on a path that
+    "auto" may have come to; raises CaseError beyond it."""
     if settings.step is None:
         if not np.isfinite(limit.step):
             raise CaseError("temporal.step", None, "nothing in the system oscillates, so no step follows; give one")
         return limit.share * limit.step
-    if settings.stepper not in ("exact", "implicit") and settings.step > limit.step:
+    if not {"exact", "implicit"} & {settings.stepper, path} and settings.step > limit.step:
         raise CaseError(
             "temporal.step",
             settings.step,

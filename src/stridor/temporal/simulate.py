@@ -17,16 +17,16 @@ from .march import Checkpoint, March, Progress
 from .observe import Observer
 from .restart import settings_of_restart
 from .schedule import PhaseSpec, Schedule, lay_out
-from .settings import Settings
+from .settings import Settings, choose_step
 from .stepper import Disturbance, Stepper
-from .steppers.exact import exact_stepper, refuse, why_not_exact
-from .steppers.implicit import COARSEST, implicit_stepper, whole_steps, why_not_begun, why_not_implicit
+from .steppers.exact import exact_not_begun, exact_stepper, refuse, why_not_exact
+from .steppers.implicit import COARSEST, implicit_stepper, whole_steps, why_not_implicit
 from .steppers.implicit import refuse as refuse_implicit
 from .steppers.modal import choose_path, modal_stepper, refuses
 from .steppers.sparse import sparse_stepper, step_limit_assembled
+from .steppers.starting import not_begun
 from .trajectory import Trajectory
 
-ROUNDED = 1e-3  # of a phase: as far as whole steps may end beside it
 SMALL = 40  # freedoms up to which "auto" goes from event to event: there that is faster than steps, and exact
 MANY = 8  # contact nodes from which on it takes implicit steps
 COARSE = 0.01  # of the shortest period asked for: a step that is given and smaller is taken to be one of explicit steps
@@ -74,10 +74,17 @@ def simulate(
         record_every=settings.record_every,
         watch=settings.watch,
     )
-    settings, why = _chosen(system, settings, () if restart is not None else phases)
+    settings, why = _chosen(system, settings, phases, restart)
     if settings.stepper == "implicit":
         settings = replace(settings, step=whole_steps(settings, phases))
-    stepper = stepper_for(system, settings, mu, why)
+    try:
+        stepper = stepper_for(system, settings, mu, why)
+    except CaseError as error:
+        where, given, accepted = error.args
+        if settings.stepper != "explicit" or where != "temporal.step" or not why:
+            raise
+        accepted += f'; temporal.stepper = "auto" comes to explicit steps: {why}'
+        raise CaseError(where, given, accepted) from None
     motion = system.motion
     schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
     if settings.stepper in ("exact", "implicit"):
@@ -94,13 +101,8 @@ def simulate(
 
 def _check_step(phases: Sequence[PhaseSpec], schedule: Schedule) -> None:
     """Refuse steps that round phases to other lengths, which the stability limit keeps explicit ones from."""
-    for phase, stretch in zip(phases, schedule.stretches, strict=True):
-        taken = (stretch.last - stretch.first) * schedule.step
-        if abs(taken - phase.duration) > ROUNDED * phase.duration:
-            raise CaseError(
-                "temporal.step", schedule.step,
-                f"a step that phases are multiples of: {phase.name} of {phase.duration:g} s would take {taken:g} s",
-            )  # fmt: skip
+    if found := schedule.uneven(phases):
+        raise CaseError("temporal.step", schedule.step, f"a step that phases are multiples of: {found}")
 
 
 def plan(system: System, settings: Settings, phases: Sequence[PhaseSpec] = ()) -> tuple[str, str, StepLimit]:
@@ -113,7 +115,7 @@ def plan(system: System, settings: Settings, phases: Sequence[PhaseSpec] = ()) -
         return "exact", why, step_limit(system, 0.5)
     if settings.stepper == "implicit":
         refuse_implicit(system, settings)
-        step = whole_steps(settings, ())
+        step = whole_steps(settings, phases)
         return "implicit", why, StepLimit(step, 2 * np.pi / step, "the highest frequency asked for", 1.0)
     if sparse := _why_sparse(system, settings):
         return "assembled", _joined(sparse, why), step_limit_assembled(system, settings.beta2)
@@ -121,20 +123,48 @@ def plan(system: System, settings: Settings, phases: Sequence[PhaseSpec] = ()) -
     return "modal" if modes else "nodal", _joined(reason, why), step_limit(system, settings.beta2)
 
 
-def comes_to(system: System, settings: Settings) -> str:
-    """The stepper that settings come to: "auto" is another one for each system."""
-    return _chosen(settings.system(system), settings, ())[0].stepper
+def step_of(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> float:
+    """The step [s] that phases would be marched with. Raises CaseError for one that the stepper does not take."""
+    path, _, limit = plan(system, settings, phases)
+    return choose_step(limit, settings, path)
+
+
+def comes_to(system: System, settings: Settings, phases: Sequence[PhaseSpec] = ()) -> tuple[str, str]:
+    """The stepper that settings come to, through phases where these are given, and why: "auto" is another one for each
+    system."""
+    chosen, why = _chosen(settings.system(system), settings, phases)
+    return chosen.stepper, why
 
 
 def _joined(*reasons: str) -> str:
     return "; ".join(reason for reason in reasons if reason)
 
 
-def _chosen(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> tuple[Settings, str]:
+def _chosen(
+    system: System, settings: Settings, phases: Sequence[PhaseSpec], restart: Trajectory | None = None
+) -> tuple[Settings, str]:
     """Settings with the stepper that "auto" comes to, and why: of explicit steps only where phases, if there are any,
-    keep it from others."""
+    keep it from others. A run that is gone on from keeps its own."""
     if settings.stepper != "auto":
         return settings, "asked for" if settings.stepper in ("exact", "implicit") else ""
+    if restart is not None:
+        before = replace(settings, stepper=restart.path if restart.path in ("exact", "implicit") else "explicit")
+        usual, why = _suiting(system, settings)
+        return before, why if usual.stepper == before.stepper else "as in the run that it goes on from"
+    chosen, why = _suiting(system, settings)
+    if not phases or chosen.stepper == "explicit":
+        return chosen, why
+    if chosen.stepper == "exact":
+        not_so = exact_not_begun(system, chosen, phases)
+    else:
+        not_so = not_begun(system, replace(chosen, step=whole_steps(settings, phases)), phases)
+    if not_so:
+        return replace(settings, stepper="explicit"), f"{chosen.stepper} steps do not begin so: {not_so}"
+    return chosen, why
+
+
+def _suiting(system: System, settings: Settings) -> tuple[Settings, str]:
+    """Settings with the stepper that suits a system, whatever its phases, and why."""
     usual = settings.path == "auto" and settings.beta2 == 0.5
     if usual and system.size <= SMALL and not why_not_exact(system):
         return replace(settings, stepper="exact"), f"{system.size} freedoms, up to {SMALL} are few"
@@ -145,10 +175,7 @@ def _chosen(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> 
     resolved = highest is not None and (settings.step is None or COARSE < settings.step * highest <= COARSEST)
     if usual and resolved and count >= MANY and not why_not_implicit(system, settings):
         why = f"{count} contact nodes, from {MANY} on steps that resolve {settings.max_frequency_hz:g} Hz are cheaper"
-        implicit = replace(settings, stepper="implicit")
-        if phases and (not_so := why_not_begun(system, replace(implicit, step=whole_steps(settings, phases)), phases)):
-            return replace(settings, stepper="explicit"), f"implicit steps do not begin so: {not_so}"
-        return implicit, why
+        return replace(settings, stepper="implicit"), why
     return replace(settings, stepper="explicit"), ""
 
 

@@ -1,6 +1,8 @@
-"""Where bodies start, alike for every loop of the explicit scheme."""
+"""Where bodies start, alike for every loop of the explicit scheme; what other steppers do not start from."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -8,8 +10,11 @@ import scipy.sparse.linalg as spl
 
 from ...system import System
 from ...typing import Array
-from ..schedule import Schedule
+from ..schedule import PhaseSpec, Schedule, lay_out
+from ..settings import Settings
 from ..stepper import Disturbance
+
+OVERLAP = 1e-6  # of its terms: what of a closed gap is rounding
 
 
 def motion_of_bodies(system: System, schedule: Schedule) -> Disturbance | None:
@@ -34,3 +39,20 @@ def impulse(system: System, row: Array) -> Array:
     if mass.nnz == np.count_nonzero(diagonal):
         return row / diagonal
     return spl.splu(sp.csc_array(mass)).solve(row)
+
+
+def not_begun(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> str:
+    """Why exact and implicit steps do not take phases from their start on; "" where they do. settings: with a step."""
+    assert settings.step is not None, "the step was found before"
+    motion, nodes = system.motion, system.contact_nodes()
+    schedule = lay_out(phases, settings.step, list(system.loads), list(motion.names), motion.full_distance)
+    if found := schedule.uneven(phases):
+        return f"phases are no multiples of the step {settings.step:g} s: {found}"
+    if settings.initial == "steady-sliding":
+        return schedule.from_steady().jump
+    if schedule.jump or not nodes.count:
+        return schedule.jump
+    u = np.zeros(system.size) if system.initial_displacement is None else system.initial_displacement
+    gap, size = nodes.gap + nodes.normal @ u, np.abs(nodes.gap) + np.abs(nodes.normal) @ np.abs(u)
+    overlaps = (nodes.compliance == 0.0) & ~nodes.kept & (gap < -OVERLAP * size)
+    return "a rigid contact starts with overlap" if overlaps.any() else ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -30,7 +31,7 @@ from ...node_history import NodeHistory
 from ...phase_results import fresh_statistics
 from ...restart import motion_ratio
 from ...saved import INFINITY, Bounds
-from ...schedule import Schedule
+from ...schedule import PhaseSpec, Schedule
 from ...settings import Settings, choose_step, not_finite
 from ...sketch import sketch
 from ...stepper import Disturbance
@@ -38,6 +39,7 @@ from ...trajectory import Trajectory
 from ..basis import Basis
 from ..coordinates import Coordinates, all_modes, left_out, truncated
 from ..sparse.stepper import with_friction
+from ..starting import not_begun
 from .drive import pieces
 from .leaps import Leaps
 from .motion import Motion
@@ -83,6 +85,12 @@ def refuse(system: System, cutoff_hz: float | None = None) -> None:
     """Raise CaseError for a system that it does not take."""
     if why := why_not_exact(system, cutoff_hz):
         raise CaseError("temporal.stepper", "exact", f'no such system: {why}; take "explicit"')
+
+
+def exact_not_begun(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> str:
+    """Why it does not take phases from their start on; "" where it does."""
+    step = choose_step(step_limit(system, 0.5), settings) if settings.step is None else settings.step
+    return not_begun(system, replace(settings, step=step), phases)
 
 
 def exact_stepper(system: System, settings: Settings, mu: float | None, why: str = "asked for") -> ExactStepper:
@@ -284,13 +292,10 @@ class ExactStepper:
         return found
 
     def _lay_out(self, schedule: Schedule) -> None:
-        for stretch in schedule.stretches:
-            if stretch.ramp_steps == 0 and np.any(stretch.distances_after != stretch.distances_before):
-                raise CaseError(
-                    "phases",
-                    f"a distance that changes at once in phase {stretch.name}",
-                    'a ramp [s] > 0 where supports are pressed away, or stepper = "explicit"',
-                )
+        if schedule.jump:
+            raise CaseError(
+                "phases", schedule.jump, 'a ramp [s] > 0 where supports are pressed away, or stepper = "explicit"'
+            )
         self.motion = Motion(self.basis, self.pairs, pieces(schedule))
 
     def state(self) -> dict[str, Array]:

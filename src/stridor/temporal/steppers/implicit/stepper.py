@@ -18,13 +18,14 @@ from ...columns import ENERGY_RECORD, WORK_COLUMNS
 from ...node_history import NodeHistory
 from ...restart import motion_ratio
 from ...saved import INFINITY, STATUS_RANGE, Bounds
-from ...schedule import PhaseSpec, Schedule, lay_out
+from ...schedule import PhaseSpec, Schedule
 from ...settings import Settings, not_finite
 from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
 from ..coordinates import COMPLETE, Coordinates, coordinates, pushed_at, rows_of
 from ..sparse.stepper import with_friction
+from ..starting import OVERLAP
 from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED, Nodes, Record, State, Structure
 from .build import fresh_state, nodes_of, structure_of, work_space
 from .loop import HARD, NOT_FINITE, run_steps
@@ -40,7 +41,6 @@ MOST_ROWS = 4000  # of contact: normal and tangents of each node
 NODE_HISTORY_BYTES = 500e6
 CONTACT_COLUMNS = 5
 TOLD_FROM = 1e-3  # of the initial state: what is left out of it is said from there on
-OVERLAP = 1e-6  # of its terms: what of a closed gap is rounding
 
 
 def why_not_implicit(system: System, settings: Settings) -> str:
@@ -64,21 +64,6 @@ def refuse(system: System, settings: Settings) -> None:
     """Raise CaseError for a system that it does not take."""
     if why := why_not_implicit(system, settings):
         raise CaseError("temporal.stepper", "implicit", f'no such system: {why}; take "explicit"')
-
-
-def why_not_begun(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> str:
-    """Why it does not take phases from their start on; "" where it does. settings: with a step."""
-    assert settings.step is not None, "the step was found before (`whole_steps`)"
-    motion, nodes = system.motion, system.contact_nodes()
-    schedule = lay_out(phases, settings.step, list(system.loads), list(motion.names), motion.full_distance)
-    if found := _jump(schedule):
-        return found
-    if settings.initial == "steady-sliding" or not nodes.count:
-        return ""
-    u = np.zeros(system.size) if system.initial_displacement is None else system.initial_displacement
-    gap, size = nodes.gap + nodes.normal @ u, np.abs(nodes.gap) + np.abs(nodes.normal) @ np.abs(u)
-    overlaps = (nodes.compliance == 0.0) & ~nodes.kept & (gap < -OVERLAP * size)
-    return "a rigid contact starts with overlap" if overlaps.any() else ""
 
 
 def whole_steps(settings: Settings, phases: Sequence[PhaseSpec]) -> float:
@@ -369,15 +354,7 @@ class ImplicitStepper:
         )  # fmt: skip
 
 
-def _jump(schedule: Schedule) -> str:
-    """What changes at once, "" where nothing does."""
-    for stretch in schedule.stretches:
-        if stretch.ramp_steps == 0 and np.any(stretch.distances_after != stretch.distances_before):
-            return f"a distance that changes at once in phase {stretch.name}"
-    return ""
-
-
 def _refuse_jumps(schedule: Schedule) -> None:
-    if found := _jump(schedule):
+    if found := schedule.jump:
         accepted = 'a ramp [s] > 0 where supports are pressed away, or stepper = "explicit"'
         raise CaseError("phases", found, accepted)
