@@ -365,6 +365,21 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
         assert boundary().agree  # the curve is found on other lines
 
 
+@pytest.mark.parametrize("factor", ["x - mu", "mu - x", "x**2 - mu**2 + 0.1 * (x - mu)"])
+def test_a_boundary_through_the_points_at_which_is_counted(tmp_path: Path, factor: str) -> None:
+    """μ = x passes through the middle of every cell, where rounding would decide what grows."""
+    found = st.stability_boundary(damped_by(tmp_path, factor), "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0))
+    assert found.agree
+    (curve,) = found.curves
+    assert curve.y == pytest.approx(curve.x, abs=1e-9)
+    assert (found.unstable_modes(0.3, 0.6), found.unstable_modes(0.6, 0.3)) == ((0, 1) if factor == "mu - x" else (1, 0))
+
+
+def test_a_number_that_nothing_depends_on(tmp_path: Path) -> None:
+    with pytest.raises(st.CaseError, match=r"^y: 'mu' – the case has no contacts and no factor that names it"):
+        st.stability_boundary(damped_by(tmp_path, "x"), "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0))
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -73,7 +73,9 @@ def _conclusion(result: Boundary, case: Case) -> Conclusion:
     outer = [curve for curve in result.curves if curve.outer.any()]
     if not result.curves:
         counts = {c.unstable_modes for c in result.counted}
-        growing = f"; {counted(counts.pop(), 'mode')} grow wherever that was counted" if len(counts) == 1 else ""
+        many = counts.pop() if len(counts) == 1 else None
+        grow = "" if many is None else f"; {counted(many, 'mode')} {'grows' if many == 1 else 'grow'}"
+        growing = f"{grow} wherever that was counted" if grow else ""
         return Conclusion(f"no curve was found in the rectangle up to {result.max_frequency_hz:g} Hz{growing}", "modes")
     if not outer:
         return Conclusion(f"{len(result.curves)} curves; something grows on both sides of each of them", "modes")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
 
 from ..case import Case
-from ..errors import AnalysisError, CaseError
+from ..errors import AnalysisError, CaseError, Problem
 from ..modal.boundary import Plane
 from ..modal.parametric import ParametricProblem, ReducedModel
 from ..system import build_system
@@ -66,6 +66,19 @@ class Solved:
 def solved_problem(case: Case, asked: Asked, top: float) -> Solved:
     """What is solved up to top [Hz]. Raises CaseError and AnalysisError where neither a reduced model nor the full
     problem serves."""
+    try:
+        return _solved(case, asked, top)
+    except CaseError as error:
+        # A range of a box is one of x or y here.
+        asked_as = {f"box.{box_name(case, path)}": (axis, path) for axis, path in zip("xy", asked.paths, strict=True)}
+        problems: list[Problem] = []
+        for problem in error.problems:
+            axis, path = asked_as.get(problem.where, (problem.where, problem.given))
+            problems.append(replace(problem, where=axis, given=path if problem.given is None else problem.given))
+        raise CaseError.many(problems) from error
+
+
+def _solved(case: Case, asked: Asked, top: float) -> Solved:
     names = box_name(case, asked.paths[0]), box_name(case, asked.paths[1])
     box = dict(zip(names, asked.ends, strict=True))
     freedoms, method = build_system(case).size, asked.method

@@ -69,7 +69,8 @@ def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> Co
         elsewhere = {*case.parameters, *case.factor_names}
         for name in (FRICTION, STIFFNESS):
             if name in box and name not in elsewhere:
-                raise CaseError(f"box.{name}", None, "the case has no contacts; give a range of another number")
+                why = "the case has no contacts and no factor that names it, so that nothing depends on it"
+                raise CaseError(f"box.{name}", None, f"{why}; take another number")
     exact = {FRICTION, STIFFNESS, *case.parameters}
     settings = case.modal
     family = ParametricSystems(

@@ -19,6 +19,7 @@ import numpy as np
 from ...errors import AnalysisError
 from ...typing import Array
 from ..onset import Onset
+from ..tolerances import UNSTABLE_RELATIVE
 from .climb import Seen, climb, tops
 from .curve import Crossing, Curve, Drawn, crossings
 from .march import joined, traced
@@ -35,6 +36,9 @@ EVEN = 8  # places along a line at which it is counted, beside those between cur
 ALIKE = 0.02  # of ω: onset and crossing that are one
 HALVINGS = 9  # until a difference between counts and curves is placed
 ASIDE = 1e-4  # how far beside a curve others are counted
+ON_CURVE = 1e-5  # how near to one that counts is taken to be on it
+AWAY = 0.07  # of the mesh: how far beside it is counted then
+TRIED = 3  # times, as another one may run through there
 EDGE = 1e-3  # of a line: crossings so near its ends may lie beyond them
 
 
@@ -190,9 +194,23 @@ class _Search:
 
     # -- counts -------------------------------------------------------------------------------------------------------
     def _look(self, p: Array) -> None:
-        at = self._at(p)
-        if at is not None:
-            self.found.looked.append(at)
+        """Count at a point (2,), or beside it where a curve runs through it, on which rounding would decide."""
+        for left in reversed(range(TRIED)):
+            try:
+                found = self.plane.modes(p)
+            except AnalysisError:
+                return
+            rates = self.plane.slopes(p, found).real
+            near = ON_CURVE * np.hypot(*rates)
+            told = near > UNSTABLE_RELATIVE * np.abs(found.values)  # others are on no curve, or on the axis everywhere
+            on = np.flatnonzero(told & (np.abs(found.values.real) <= near))
+            if not len(on) or not left:
+                break
+            moved = p + AWAY / (self.number - 1) * rates[:, on[0]] / np.hypot(*rates[:, on[0]])
+            if not np.all((moved > 0.0) & (moved < 1.0)):
+                break
+            p = moved
+        self.found.looked.append(Looked(p, self.plane.count(found)))
 
     def _look_between(self) -> None:
         """Count where modes that decay at the points so far may grow: where their rates lead, and up to tops."""
