@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import CaseError
 from ..modal.boundary import Curve, Found, boundaries
 from ..modal.parametric import ReducedModel
+from ..threads import one_thread
 from ..typing import IntArray
 from .asked import require_range
 from .boundary_again import position_error, solved_again
@@ -29,6 +30,7 @@ from .workspace import Problem, Workspace
 BESIDE = 1e-4  # of the ranges: how far beside a curve the others are counted
 
 
+@one_thread
 def stability_boundary(
     problem: Problem,
     x: str,
