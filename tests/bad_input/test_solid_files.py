@@ -304,6 +304,18 @@ def test_pieces_that_share_no_node(folder: Path) -> None:
     )
 
 
+def test_cells_that_are_open_along_an_edge(folder: Path) -> None:
+    """A square of 8 nodes beside one of 4: its midside node on their common edge belongs to it alone."""
+    points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [2, 0], [2, 1], [1.5, 0], [2, 0.5], [1.5, 1], [1, 0.5]], dtype=float) * 0.01
+    text = inp(points, np.array([[0, 1, 2, 3]]), rest="*ELEMENT, TYPE=CPS8, ELSET=body\n 2, 2, 5, 6, 3, 7, 8, 9, 10\n")
+    (folder / "a.inp").write_text(text)
+    case = st.loads(SPACE.replace('"3d"', '"plane stress"\nthickness = 0.01').replace("FILE", "a.inp"), folder=folder)
+    assert st.describe(case).warnings == (
+        "bodies.slider: 1 midside node belongs to the cells on one side only, the first at (0.01, 0.005): the mesh is "
+        "open along its edge; take linear or quadratic cells on both sides, or tie two bodies",
+    )
+
+
 # -- groups --------------------------------------------------------------------------------------------------------------
 
 GROUPS = {

@@ -8,6 +8,7 @@ import pytest
 from stridor.errors import CaseError
 from stridor.mesh import shapes
 from stridor.mesh.boundary import cell_facets, match_facets
+from stridor.mesh.hanging import hanging
 from stridor.mesh.model import Mesh
 from stridor.mesh.quality import check_mesh, edge_lengths, pieces, turned_over
 
@@ -149,6 +150,42 @@ def test_pieces_count_what_shares_no_node():
     )
     assert pieces(twice) == 2
     check_mesh(twice, "mesh")
+
+
+LOW, HIGH = ((0, 0, 0), (2, 1, 1), (2, 1, 1)), ((0, 0, 1), (2, 1, 1), (2, 1, 1))
+
+
+def together(lower: Mesh, upper: Mesh) -> Mesh:
+    """Two meshes with what lies at one place as one node."""
+    points, number = np.unique(np.round(np.vstack([lower.points, upper.points]), 9), axis=0, return_inverse=True)
+    shift = len(lower.points)
+    cells = {kind: number[block] for kind, block in lower.cells.items()}
+    for kind, block in upper.cells.items():
+        cells[kind] = np.vstack([*([cells[kind]] if kind in cells else []), number[block + shift]])
+    return Mesh(points, cells)
+
+
+@pytest.mark.parametrize(
+    ("below", "above", "count"),
+    [
+        ("hexahedron", "hexahedron", 0), ("hexahedron20", "hexahedron20", 0), ("hexahedron", "tetra", 0),
+        ("hexahedron", "hexahedron20", 7), ("hexahedron20", "hexahedron27", 2), ("hexahedron20", "tetra10", 2),
+    ],
+)  # fmt: skip
+def test_midside_nodes_that_belong_to_the_cells_on_one_side_only(below: str, above: str, count: int):
+    """Of two squares 7 edges, of hexahedra of 27 nodes and of tetrahedra what lies in the middle of both squares."""
+    mesh = together(shapes.block(*LOW, kind=below), shapes.block(*HIGH, kind=above))
+    check_mesh(mesh, "mesh")
+    found = hanging(mesh)
+    assert len(found) == count
+    assert np.all(mesh.points[found][:, 2] == 1.0)
+
+
+def test_linear_and_quadratic_cells_in_the_plane():
+    linear, quadratic = shapes.rectangle((0, 0), (2, 1), (2, 1)), shapes.rectangle((0, 1), (2, 1), (2, 1), order=2)
+    mesh = together(linear, quadratic)
+    assert mesh.points[hanging(mesh)].tolist() == [[0.5, 1.0], [1.5, 1.0]]
+    assert not len(hanging(together(linear, shapes.rectangle((0, 1), (2, 1), (2, 1)))))
 
 
 def test_edge_lengths_and_elements_per_wavelength():

@@ -14,6 +14,7 @@ from ..case.matrix_checks import MU
 from ..case.schema import Contact, Friction, Load, Spring, TabulatedTable, Tie
 from ..case.usual import USUAL
 from ..errors import AnalysisError
+from ..mesh.hanging import hanging
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths, pieces
 from ..notebook import Shown, counted, html_table
@@ -363,8 +364,8 @@ def balance_words(steady: SurfaceSliding) -> str:
 
 
 def mesh_warnings(case: Case, system: System) -> list[str]:
-    """What of the meshes is probably not meant: several pieces, points off their body, material that slides out of its
-    surface, overlaps passed over."""
+    """What of the meshes is probably not meant: several pieces, midside nodes on one side only, points off their body,
+    material that slides out of its surface, overlaps passed over."""
     found: list[str] = []
     for solid in system.solids:
         body = case.bodies[solid.name]
@@ -377,6 +378,14 @@ def mesh_warnings(case: Case, system: System) -> list[str]:
             found.append(
                 f"{where}: {count} pieces that share no node; a tie, a spring or a support must hold each of them, or "
                 "merge the nodes where they should be one"
+            )
+        if len(open_at := hanging(mesh)):
+            place = ", ".join(f"{x:.6g}" for x in mesh.points[open_at[0]])
+            belong, edges = ("belongs", "its edge") if len(open_at) == 1 else ("belong", "their edges")
+            found.append(
+                f"{where}: {counted(len(open_at), 'midside node')} {belong} to the cells on one side only, the first "
+                f"at ({place}): the mesh is open along {edges}; take linear or quadratic cells on both sides, or tie two "
+                "bodies"
             )
         for point, position in body.points.items():
             off = float(np.min(np.linalg.norm(solid.points - np.array(position), axis=1)))
