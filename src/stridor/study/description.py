@@ -384,8 +384,8 @@ def mesh_warnings(case: Case, system: System) -> list[str]:
             belong, edges = ("belongs", "its edge") if len(open_at) == 1 else ("belong", "their edges")
             found.append(
                 f"{where}: {counted(len(open_at), 'midside node')} {belong} to the cells on one side only, the first "
-                f"at ({place}): the mesh is open along {edges}; take linear or quadratic cells on both sides, or tie two "
-                "bodies"
+                f"at ({place}): the mesh is open along {edges}; take linear or quadratic cells on both sides, or "
+                "tie two bodies"
             )
         for point, position in body.points.items():
             off = float(np.min(np.linalg.norm(solid.points - np.array(position), axis=1)))
