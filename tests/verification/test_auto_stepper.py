@@ -64,6 +64,14 @@ def test_a_step_of_records_too_long_for_explicit_ones_is_refused_with_why_it_cam
     with pytest.raises(st.CaseError, match=r"explicit scheme is unstable .*comes to explicit steps: exact .* overlap"):
         simulate(block(-0.1), phases(5.0), replace(AUTO, step=5.0))
     assert simulate(block(), phases(10.0), replace(AUTO, step=5.0)).path == "exact"
+    uneven = case(**{"temporal.step": 5.0, "phases": [{"name": "slide", "duration": 12.0}]})
+    with pytest.raises(st.CaseError, match="comes to explicit steps: exact steps do not begin so: phases are no multiples"):
+        st.describe(uneven)
+
+
+def test_steps_beyond_all_number_are_told_in_a_few_digits():
+    (line,) = [line for line in st.describe(case(**{"temporal.step": 1e-300})).lines if line.startswith("time step")]
+    assert line.endswith("; 6e+301 steps")
 
 
 def case(**changes: Any) -> st.Case:

@@ -22,8 +22,7 @@ from ..sliding import steady_nodes
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
 from ..temporal.inputs import unfit_in_time
-from ..temporal.settings import choose_step
-from ..temporal.simulate import plan
+from ..temporal.simulate import plan, step_of
 from .matrix_reports import matrix_reports
 from .pressed import unpressed_in_time
 from .settings import phases_of, settings_of
@@ -191,7 +190,7 @@ def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     """The time step against its limit, and how the time loop will go; added to the data."""
     settings = settings_of(case)
     path, reason, limit = plan(system, settings, phases_of(case))
-    step = choose_step(limit, settings, path)
+    step = step_of(system, settings, phases_of(case))
     steps = sum(round(p.duration / step) for p in case.phases)
     data |= {"step": step, "step_limit": limit.step, "limiting_body": limit.body, "path": path, "steps": steps}
     share = f"{100 * step / limit.step:.0f} % of the stability limit {limit.step:.4g} s (set by {limit.body})"
@@ -200,7 +199,7 @@ def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     elif path == "implicit":
         share = f"{1.0 / (step * case.modal.max_frequency_hz):.3g} to the period of modal.max_frequency_hz"
     return [
-        f"time step {step:.4g} s, {share}; {steps} steps",
+        f"time step {step:.4g} s, {share}; {steps if steps < 1e12 else format(float(steps), '.3g')} steps",
         f"time loop: {path} path ({reason})",
     ]
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -77,14 +78,8 @@ def simulate(
     settings, why = _chosen(system, settings, phases, restart)
     if settings.stepper == "implicit":
         settings = replace(settings, step=whole_steps(settings, phases))
-    try:
+    with _saying(settings, why):
         stepper = stepper_for(system, settings, mu, why)
-    except CaseError as error:
-        where, given, accepted = error.args
-        if settings.stepper != "explicit" or where != "temporal.step" or not why:
-            raise
-        accepted += f'; temporal.stepper = "auto" comes to explicit steps: {why}'
-        raise CaseError(where, given, accepted) from None
     motion = system.motion
     schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
     if settings.stepper in ("exact", "implicit"):
@@ -126,7 +121,21 @@ def plan(system: System, settings: Settings, phases: Sequence[PhaseSpec] = ()) -
 def step_of(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> float:
     """The step [s] that phases would be marched with. Raises CaseError for one that the stepper does not take."""
     path, _, limit = plan(system, settings, phases)
-    return choose_step(limit, settings, path)
+    with _saying(*_chosen(settings.system(system), settings, phases)):
+        return choose_step(limit, settings, path)
+
+
+@contextmanager
+def _saying(settings: Settings, why: str) -> Generator[None]:
+    """Say with a step that is refused why "auto" has come to explicit ones (`_chosen`)."""
+    try:
+        yield
+    except CaseError as error:
+        where, given, accepted = error.args
+        if settings.stepper != "explicit" or where != "temporal.step" or not why:
+            raise
+        accepted += f'; temporal.stepper = "auto" comes to explicit steps: {why}'
+        raise CaseError(where, given, accepted) from None
 
 
 def comes_to(system: System, settings: Settings, phases: Sequence[PhaseSpec] = ()) -> tuple[str, str]:
