@@ -54,6 +54,11 @@ def install() -> None:
         # What a parent process has switched off (nohup, a shell's background jobs) stays off.
         if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _handle)
+    insist()
+
+
+def insist() -> None:
+    """Let what `interrupt` raises be raised again until it is `heard`, in a process with a handler of its own."""
     if hasattr(signal, "SIGALRM"):
         signal.signal(signal.SIGALRM, _again)
     _program.installed = True
@@ -110,7 +115,7 @@ def held() -> Generator[HeldSignals]:
         elif block.late:
             _insist()
         else:
-            _raise()
+            interrupt()
 
 
 @contextlib.contextmanager
@@ -146,7 +151,7 @@ def _handle(number: int, frame: FrameType | None) -> None:
     if block is not None and block.ending and not block.late:
         block.late = True
         return
-    _raise()
+    interrupt()
 
 
 def _again(number: int, frame: FrameType | None) -> None:
@@ -155,8 +160,8 @@ def _again(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
 
-def _raise() -> None:
-    """KeyboardInterrupt, and again later should it be dropped by a callback."""
+def interrupt() -> None:
+    """Raise KeyboardInterrupt, and again later should it be dropped by a callback."""
     _insist()
     raise KeyboardInterrupt
 

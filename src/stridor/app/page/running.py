@@ -11,6 +11,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+from ... import interrupts
+
 if TYPE_CHECKING:
     from ...periodic import Cycles
     from ...study.workspace import Workspace
@@ -36,7 +38,7 @@ class _Page:
 
     def tell(self, part: str, content: Any) -> None:
         """Tell it, whole: what is half written into a pipe spoils it."""
-        with self._whole:
+        with interrupts.held(), self._whole:
             try:
                 self._pipe.send((part, content))
             except OSError:
@@ -46,7 +48,7 @@ class _Page:
         """A signal: Ctrl-C goes to all processes of a terminal and means nothing here, the pipe will end."""
         if self.breaks_off and self.stop.is_set() and not self._whole.locked():
             self.breaks_off = False
-            raise KeyboardInterrupt
+            interrupts.interrupt()
 
     def _reading(self) -> None:
         while True:
@@ -70,6 +72,7 @@ def serve(pipe: Any, wish: Wish) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     page = _Page(pipe)
     signal.signal(signal.SIGINT, page.interrupted)
+    interrupts.insist()
     from ...case import loads
     from ...errors import StridorError
     from ...study.workspace import Workspace
@@ -179,6 +182,7 @@ def _cycles(page: _Page, wish: Wish, work: Workspace) -> None:
     try:
         found = cycles(work, wish.mu, progress=progress, keep=keep)
     except KeyboardInterrupt:  # before there was anything to be kept
+        interrupts.heard()
         page.tell("stopped", STOPPED)
         return
     page.breaks_off = False
