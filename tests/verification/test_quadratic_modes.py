@@ -13,7 +13,7 @@ import scipy.sparse.linalg as spl
 from scipy.optimize import linear_sum_assignment
 
 from stridor.errors import AnalysisError
-from stridor.modal.quadratic import Quadratic, Region, dense, find_modes, undamped_count
+from stridor.modal.quadratic import Quadratic, Region, dense, find_modes, polish, undamped_count
 from stridor.modal.quadratic import count as counting
 from stridor.modal.quadratic import find as finding
 from stridor.modal.quadratic import search as searching
@@ -533,3 +533,22 @@ def test_a_mode_that_the_first_real_block_lacks_is_brought_by_the_second_once():
     hidden = lam[(np.abs(lam - disc.centre) <= disc.radius) & (lam.imag >= 0)]
     assert found.completeness.later == len(hidden) > 2
     assert f"brought {len(hidden)} more and then no other" in found.completeness.sentence
+
+
+@pytest.mark.parametrize("given", [True, False])
+@pytest.mark.parametrize("copies", [1, 2, 3])
+def test_a_poor_pair_is_polished_even_where_it_is_defective(copies: int, given: bool) -> None:
+    n, rng = 120, np.random.default_rng(0)
+    squares = np.diag(1e4 * np.arange(1.0, n + 1) ** 2)
+    for k in range(1, copies):
+        squares[k, k], squares[k - 1, k] = squares[0, 0], 0.3 * squares[0, 0]
+    rows, columns = (np.eye(n) + 0.3 * sp.random_array((n, n), density=0.02, rng=rng).toarray() for _ in range(2))
+    problem = quadratic(rows @ columns, np.zeros((n, n)), rows @ squares @ columns)
+    lam, x = 100j * (1 + 1e-6), np.linalg.solve(columns, np.eye(n)[:, 0]) + 1e-6 * rng.standard_normal(n)
+    for side, start in ((problem, x + 0j if given else None), (problem.transposed, None)):
+        found = polish.polished(side, lam, start, solver=None)
+        assert found is not None
+        assert found[2] < 1e-10
+        assert found[2] == side.backward_error(np.array([found[0]]), found[1][:, None])[0]
+        # Copies k times over are known to the k-th root of that.
+        assert abs(found[0] - 100j) < 100 * (1e-12, 1e-5, 1e-3)[copies - 1]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sl
 
-from ..direct.dense import lu_factors
+from ..direct.dense import DenseFactor, lu_factors
 from ..errors import AnalysisError
 from ..stages import passing, stage
 from ..typing import Array, ComplexArray
@@ -158,7 +158,7 @@ class DenseProblem(OverNumber):
         """Factors of P(λ), its rows of the size of one, with a border."""
         r = here.size
         whole = np.zeros((r + 1, r + 1), dtype=complex)
-        whole[:r, :r] = lam**2 * here.mass + lam * here.damping + here.stiffness
+        whole[:r, :r] = here.at(lam)
         whole[border.row, r] = whole[r, border.column] = border.scale
         return DenseFactor.of(whole)
 
@@ -170,36 +170,6 @@ class DenseProblem(OverNumber):
         """‖P(λ)x‖∞ over what it is made of."""
         rest = np.abs(self.at(mu).applied(lam, x))
         return float(rest.max() / max(float((self._entries(lam, mu) @ np.abs(x)).max()), 1e-300))
-
-
-@dataclass(frozen=True)
-class DenseFactor:
-    """LU factors of a matrix whose rows were divided by ``rows`` (n,)."""
-
-    factors: tuple[Any, Any]
-    rows: Array
-
-    @staticmethod
-    def of(matrix: ComplexArray) -> DenseFactor:
-        """Raises AnalysisError where it is singular."""
-        rows = np.maximum(np.abs(matrix).max(axis=1), 1e-300)
-        try:
-            factors = lu_factors(matrix / rows[:, None], check_finite=False)
-        except (sl.LinAlgError, ValueError) as error:
-            raise AnalysisError("the bordered matrix is singular") from error
-        return DenseFactor(factors, rows)
-
-    def solve(self, right: ComplexArray, *, transpose: bool = False) -> ComplexArray:
-        """A⁻¹ right, or A⁻ᵀ right (never conjugated), of right (n,) or (n, k)."""
-        scale = self.rows if right.ndim == 1 else self.rows[:, None]
-        if transpose:
-            found: ComplexArray = sl.lu_solve(self.factors, right, trans=1, check_finite=False) / scale
-        else:
-            found = sl.lu_solve(self.factors, right / scale, check_finite=False)
-        return found
-
-    def free(self) -> None:
-        """Nothing to give back."""
 
 
 def combined(basis: Array, weights: Any) -> Any:

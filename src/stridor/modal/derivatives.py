@@ -28,11 +28,11 @@ from ..sliding import steady_nodes
 from ..stages import passing, stage
 from ..system import System
 from ..typing import Array, BoolArray, ComplexArray, IntArray, Sparse
-from .inverse_iteration import Iterated, two_sided
 from .krylov.problem import problem_held
 from .krylov.steady import contact_rows, steadiness, touching_nodes
 from .options import Options
 from .pencil import Pencil
+from .quadratic.inverse_iteration import Iterated, two_sided
 from .quadratic.problem import times
 
 BELIEVED = 1e-7  # relative change of λ, or distance from the guess, above which it has gone elsewhere

@@ -23,7 +23,6 @@ from ..threads import one_thread
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .complex_modes import complex_modes
 from .full.growth import growing_roots
-from .inverse_iteration import solved_beside
 from .joined import matched
 from .krylov import Carried
 from .krylov.problem import problem_of
@@ -31,6 +30,7 @@ from .onset import refuted
 from .onsets import Onsets, onsets
 from .options import Options
 from .quadratic import Quadratic, band_modes, is_stiff
+from .quadratic.inverse_iteration import solved_beside
 from .quadratic.polish import pairs
 from .quadratic.problem import times
 from .quadratic.reach import searched

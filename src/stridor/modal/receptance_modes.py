@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 from typing import Literal
 
 import numpy as np
 
-from ..direct import SingularMatrix
 from ..errors import AnalysisError
 from ..system import System
 from ..system.uncoupled import uncoupled_modes
 from ..typing import Array, ComplexArray, IntArray
 from .backward_error import BackwardError
 from .coupling import PointCoupling, couple
-from .inverse_iteration import Iterated, two_sided
 from .pencil import Pencil
+from .quadratic.inverse_iteration import solved_beside
 from .results import ComplexModes, Progress, require_memory
 from .roots import ReceptanceProblem, spectrum_of
 from .tracking import Tracker
@@ -163,11 +161,7 @@ def _refined(
     # Some of every direction: on a pole the modal sum may lack the very one that is sought.
     spread = np.random.default_rng(0).standard_normal(n) / np.sqrt(n)
     given = [np.append(spread if not np.all(np.isfinite(v)) else v + 1e-3 * spread, forces) for v in (right, left)]
-    found: Iterated | None = None
-    for part in BESIDE:
-        with contextlib.suppress(SingularMatrix):
-            found = two_sided(pencil.whole, lam, *given, beside=part * lam)
-            break
+    found = solved_beside(pencil.whole, lam, *given, parts=BESIDE)
     if found is None:
         return lam, right, left
     x, y = found.right[:n], found.left[:n]

@@ -19,10 +19,10 @@ from .backward_error import BackwardError
 from .coupling import PointCoupling
 from .full.family import Family
 from .histories import Entries, StabilityChange, reported, unexplained
-from .inverse_iteration import null_vectors
 from .newton import Root, crossing, exceptional, meeting, standstill
 from .onset import Branches, Onset, Onsets
 from .options import Options
+from .quadratic.inverse_iteration import null_vectors
 from .receptance_modes import prepare, unfit_words
 from .results import grows
 from .roots import ReceptanceProblem

@@ -17,10 +17,10 @@ from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...threads import one_thread
 from ...typing import Array
-from ..inverse_iteration import solved_beside
 from ..onset import Onsets
 from ..options import Options
 from ..quadratic.dense import unit
+from ..quadratic.inverse_iteration import solved_beside
 from ..quadratic.reach import searched
 from ..results import ComplexModes, Progress
 from ..unfit import Unfit
@@ -119,11 +119,7 @@ def _confirmed(
             said = f"at {lam[k].imag / (2 * np.pi):.6g} Hz the reduced model has a mode that the full problem has not"
             raise Unfit(f"{said}, at μ = {mu:g}", band_hz)
         lam[k], right[:, k], left[:, k] = solved.lam, solved.right, solved.left
-        pair = np.array([solved.lam])
-        residual[k] = max(
-            float(problem.backward_error(pair, right[:, [k]])[0]),
-            float(problem.transposed.backward_error(pair, left[:, [k]])[0]),
-        )
+        residual[k] = solved.residual(problem).max()
     order, n = np.lexsort((lam.real, lam.imag)), family.freedoms
     lam, right, left = lam[order], unit(right[:n, order]), unit(left[:n, order])
     return ModesAtFriction(without_rounding(family, lam), right, left, residual[order], "")

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sl
 
-from ...direct.dense import lu_factors
+from ...direct.dense import DenseFactor, lu_factors
 from ...errors import AnalysisError
 from ...typing import Array, BoolArray, ComplexArray
+from ..quadratic.inverse_iteration import iterated
+from ..quadratic.problem import Quadratic
 from .basis import expanded
 
 NEAR = (1.2, 4.0)  # modes up to this much above the band are solved for together: first try, second try
@@ -147,13 +149,14 @@ def _with_damping(
             break
     if number > FEW or np.any(watched & (np.abs(lam - first) >= MOVED * _apart(first))):
         return None
+    problem = Quadratic(*matrices)
     for k in np.flatnonzero(open_modes):
         # Two modes that are about to meet take the inverse itself.
-        apart = _apart(lam)[k]
-        value, z[:, k], w[:, k] = _inverse_iteration(complex(lam[k]), z[:, k], w[:, k], matrices)
-        if not abs(value - lam[k]) < JUMP * apart:
+        apart, old = _apart(lam)[k], complex(lam[k])
+        found = iterated(problem, DenseFactor.of(problem.at(old * (1 + OFF))), old, z[:, k], w[:, k], fewest=2)
+        if found is None or not abs(found.lam - old) < JUMP * apart:
             return None
-        lam[k] = value
+        lam[k], z[:, k], w[:, k] = found.lam, found.right, found.left
     if number and np.any(watched & _unsettled(lam, w, _images(matrices, z), _images(transposed, w))):
         return None
     inside = np.abs(lam) <= top
@@ -200,20 +203,6 @@ def _unsettled(lam: ComplexArray, w: ComplexArray, ours: Images, theirs: Images)
     slope = np.einsum("ij,ij->j", w, 2 * lam * ours[0] + ours[1])
     unsettled: BoolArray = ~(right * left <= SMALL * np.abs(lam * slope))
     return unsettled
-
-
-def _inverse_iteration(
-    lam: complex, z: ComplexArray, w: ComplexArray, matrices: Matrices
-) -> tuple[complex, ComplexArray, ComplexArray]:
-    """λ, right and left vectors (r,) of one mode from those close by, by one factorisation."""
-    mass, damping, stiffness = matrices
-    beside = lam * (1 + OFF)
-    factor = lu_factors(beside**2 * mass + beside * damping + stiffness)
-    slope = 2 * lam * mass + damping
-    for _ in range(2):
-        z, w = sl.lu_solve(factor, slope @ z), sl.lu_solve(factor, slope.T @ w, trans=1)
-        z, w = z / np.linalg.norm(z), w / np.linalg.norm(w)
-    return complex(_functional(np.array([lam]), w[:, None], _images(matrices, z[:, None]))[0]), z, w
 
 
 def _images(matrices: Matrices, z: ComplexArray) -> Images:

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import AnalysisError
 from ...threads import one_thread
 from ...typing import Array, ComplexArray
-from ..inverse_iteration import two_sided
+from ..quadratic.inverse_iteration import two_sided
 from ..quadratic.problem import Quadratic
 from ..tolerances import CONFIRMED
 from .model import ReducedModel

@@ -18,7 +18,7 @@ from ...typing import Array, BoolArray, ComplexArray
 from .count import undamped_count, unknown
 from .dense import all_modes
 from .krylov import Krylov
-from .polish import ALIKE, SPREAD, biorthogonal, inverse_iteration, merged, pairs, snapped, tuned
+from .polish import ALIKE, SPREAD, biorthogonal, merged, pairs, polished, snapped, tuned
 from .problem import Quadratic
 from .region import BORDER, MARGIN, PAD, Disc, Region, cells, remaining, uncovered
 from .search import BLOCK, DiscModes, Search, TooClose
@@ -363,12 +363,13 @@ class _Run:
         bad = np.flatnonzero(~(found.error <= self.tolerance))
         values, shapes, error = found.values.copy(), found.shapes.copy(), found.error.copy()
         for index in bad[:POLISHED]:
-            lam, x, left = inverse_iteration(
-                problem, complex(values[index]), shapes[:, index], tolerance=self.tolerance, solver=self.solver
-            )
+            better = polished(problem, complex(values[index]), shapes[:, index], solver=self.solver)
             self.factorisations += 1
+            if better is None:
+                continue
+            lam, x, left = better
             if left < error[index] and (which == "right" or abs(lam - values[index]) <= ALIKE * self.padded.scale):
-                values[index], shapes[:, index], error[index] = lam, x[:, 0], left
+                values[index], shapes[:, index], error[index] = lam, x, left
         bad = np.flatnonzero(~(error <= self.tolerance))
         if len(bad):
             shown = ", ".join(f"{v:.6g}" for v in values[bad[:3]])
@@ -385,13 +386,9 @@ class _Run:
         y[:, ours] = left.shapes[:, theirs]
         for index in np.setdiff1d(np.arange(len(found.values)), ours):
             self.factorisations += 1
-            y[:, index] = inverse_iteration(
-                self.problem.transposed,
-                complex(found.values[index]),
-                None,
-                tolerance=self.tolerance,
-                solver=self.solver,
-            )[1][:, 0]
+            partner = polished(self.problem.transposed, complex(found.values[index]), None, solver=self.solver)
+            if partner is not None:
+                y[:, index] = partner[1]
         return y
 
     def _sentence(

@@ -6,48 +6,34 @@ import numpy as np
 import scipy
 import scipy.linalg as sl
 
-from ...direct import SingularMatrix, factorise
 from ...typing import Array, ComplexArray, IntArray
 from .dense import unit
+from .inverse_iteration import solved_beside
 from .problem import Quadratic
-from .search import DiscModes, start
+from .search import DiscModes
 
 ALIKE = 1e-9  # of the scale: eigenvalues closer than this are one, or copies of one
 SPREAD = 1e-5  # how far rounding spreads copies of a defective one
 PARALLEL = 1e-6  # 1 − |xᴴx'| of what is the same shape
-STEPS = 5
 
 
-def inverse_iteration(
-    problem: Quadratic, lam: complex, x: ComplexArray | None, *, tolerance: float, solver: str | None
-) -> tuple[complex, ComplexArray, float]:
-    """λ, x (n, 1) and backward error after inverse iteration from (λ, x), or from an arbitrary x, with its own factors.
+def polished(
+    problem: Quadratic, lam: complex, x: ComplexArray | None, *, solver: str | None
+) -> tuple[complex, ComplexArray, float] | None:
+    """λ, x (n,) and backward error after two-sided inverse iteration from (λ, x), or from an arbitrary x.
 
-    The shift stays beside λ, so that P is regular there: P(σ)v = P'(λ)x is solved, and λ becomes σ − xᴴx/xᴴv.
+    λ is the one of the two-sided functional or, where that has less, as at a defective eigenvalue, whose left vector
+    says nothing of λ, the one that makes ‖P(λ)x‖ smallest. None where the iteration does not settle.
     """
-    shift = lam + 1e-7 * (abs(lam) or 1.0) * (1 + 1j)
-    while True:
-        try:
-            factor = factorise(problem.at(complex(shift)), solver=solver)
-            break
-        except SingularMatrix:
-            shift = lam + 2 * (shift - lam)
-    with factor:
-        held = unit(start(problem.size, 1, 7)) if x is None else unit(x.reshape(-1, 1))
-        best = (lam, held, float(problem.backward_error(np.array([lam]), held)[0]))
-        value = lam
-        for _ in range(STEPS):
-            slope = 2 * value * (problem.mass @ held) + problem.damping @ held
-            answer = factor.solve(slope)
-            along = complex((held.conj().T @ answer)[0, 0])
-            value = shift - 1 / along if along != 0 else value
-            held = unit(answer)
-            error = float(problem.backward_error(np.array([value]), held)[0])
-            if error < best[2]:
-                best = (value, held, error)
-            if best[2] <= 0.1 * tolerance:
-                break
-    return best
+    found = solved_beside(problem, lam, x, None, solver=solver)
+    if found is None:
+        return None
+    slope = problem.slope(found.lam, found.right)
+    step = np.vdot(slope, problem.applied(found.lam, found.right)) / np.vdot(slope, slope)
+    values = np.array([found.lam, found.lam - step])
+    error = problem.backward_error(values, np.stack([found.right, found.right], axis=1))
+    best = int(np.argmin(error))
+    return complex(values[best]), found.right, float(error[best])
 
 
 def merged(parts: list[DiscModes], scale: float) -> DiscModes:

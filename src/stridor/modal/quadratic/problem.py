@@ -17,7 +17,8 @@ CHUNK = 64  # columns worked on at a time
 
 @dataclass(frozen=True, repr=False)
 class Quadratic(Shown):
-    """(λ²M + λD + K) x = 0 with real csr matrices (n, n), of which none needs symmetry or full rank."""
+    """(λ²M + λD + K) x = 0 with real csr matrices (n, n), of which none needs symmetry or full rank. Dense
+    arrays serve as well."""
 
     mass: Sparse
     damping: Sparse
@@ -40,7 +41,7 @@ class Quadratic(Shown):
     @cached_property
     def transposed(self) -> Quadratic:
         """The problem whose right vectors are the left ones of this."""
-        return Quadratic(*(sp.csr_array(m.T) for m in (self.mass, self.damping, self.stiffness)))
+        return Quadratic(*(m.T if isinstance(m, np.ndarray) else sp.csr_array(m.T) for m in self.matrices()))
 
     @cached_property
     def _aligned(self) -> tuple[list[Any], IntArray, IntArray]:
@@ -65,6 +66,8 @@ class Quadratic(Shown):
 
     def at(self, lam: complex) -> Sparse:
         """P(λ), complex unless λ is real."""
+        if isinstance(self.mass, np.ndarray):
+            return lam**2 * self.mass + lam * self.damping + self.stiffness
         (mass, damping, stiffness), where, rows = self._aligned
         return sp.csr_array((lam**2 * mass + lam * damping + stiffness, where, rows), shape=self.mass.shape)
 
