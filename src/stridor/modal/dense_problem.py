@@ -16,6 +16,7 @@ from ..stages import passing, stage
 from ..typing import Array, ComplexArray
 from .newton import Border
 from .quadratic.problem import Quadratic
+from .shift_inverted import companion, damped_pairs, undamped_pairs
 
 LONG = 500  # rows of a matrix from which all its eigenvalues take seconds
 REACH = 1.8  # eigenpairs up to this much above the band are looked at
@@ -91,11 +92,17 @@ class DenseProblem(OverNumber):
             self.remembered(Eigenpairs(mu, coordinate, values, right, left, coordinate[:0], len(right)))
         return self._known[mu]
 
+    @passing()
     def solve(self, mu: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Coordinates x (k,), right and left vectors (r, k) at a real or complex μ, |λ| up to REACH times the band."""
-        x, right, left = (_quadratic if self.damped else _linear)(
-            *self.matrices(mu), self.frequency, upper=self.damped and not isinstance(mu, complex)
-        )
+        mass, damping, stiffness = self.matrices(mu)
+        _said(len(mass) * (2 if self.damped else 1))
+        if self.damped:
+            x, right, left = damped_pairs(
+                mass, damping, stiffness, self.frequency, REACH, upper=not isinstance(mu, complex), factorise=_factor
+            )
+        else:
+            x, right, left = undamped_pairs(mass, stiffness, self.frequency, REACH, factorise=_factor)
         order = np.lexsort((x.real, np.abs(x)))
         return x[order], right[:, order], left[:, order]
 
@@ -186,39 +193,6 @@ def upper_root(squares: ComplexArray) -> ComplexArray:
 
 
 @passing()
-def _linear(
-    mass: Array, damping: Array, stiffness: Array, frequency: float, *, upper: bool
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """x = λ² and right and left vectors of (xM + K) z = 0, shifted and inverted at x = frequency²."""
-    _said(len(mass))
-    shift = frequency**2
-    factor = _factor(stiffness + shift * mass)
-    theta, left, right = sl.eig(sl.lu_solve(factor, shift * mass), left=True, right=True)
-    with np.errstate(all="ignore"):
-        x = shift - shift / theta
-        chosen = np.flatnonzero(np.isfinite(x) & (np.abs(x) <= (REACH * frequency) ** 2))
-    return x[chosen], right[:, chosen], _transposed_solve(factor, left[:, chosen].conj())
-
-
-@passing()
-def _quadratic(
-    mass: Array, damping: Array, stiffness: Array, frequency: float, *, upper: bool
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """x = λ and right and left vectors of (x²M + xC + K) z = 0, shifted and inverted at x = frequency; ``upper`` leaves
-    out the lower half plane."""
-    _said(2 * len(mass))
-    companion, factor = _companion(mass, damping, stiffness, frequency)
-    r = len(mass)
-    theta, left, right = sl.eig(companion, left=True, right=True)
-    with np.errstate(all="ignore"):
-        x = frequency * (1 + 1 / theta)
-        chosen = np.isfinite(x) & (np.abs(x) <= REACH * frequency)
-    chosen = np.flatnonzero(chosen & (x.imag >= 0) if upper else chosen)
-    z = np.where(np.abs(theta[chosen]) > 1, right[:r, chosen], right[r:, chosen])
-    return x[chosen], z, _transposed_solve(factor, left[:r, chosen].conj())
-
-
-@passing()
 def eigenvalues(mass: Array, damping: Array, stiffness: Array, frequency: float) -> ComplexArray:
     """All finite λ (k,) of (λ²M + λC + K) z = 0, without damping one of each ±λ, shifted and inverted at λ = frequency:
     those of about that size are as good as can be, whatever else there is. The mass need not be regular."""
@@ -229,7 +203,7 @@ def eigenvalues(mass: Array, damping: Array, stiffness: Array, frequency: float)
         with np.errstate(all="ignore"):
             squares: ComplexArray = shift - shift / theta
         return upper_root(squares[np.isfinite(squares)])
-    theta = sl.eigvals(_companion(mass, damping, stiffness, frequency)[0])
+    theta = sl.eigvals(companion(mass, damping, stiffness, frequency, factorise=_factor)[0])
     with np.errstate(all="ignore"):
         values: ComplexArray = frequency * (1 + 1 / theta)
     return values[np.isfinite(values)]
@@ -239,25 +213,6 @@ def _said(unknowns: int) -> None:
     """Name what takes seconds from some hundred unknowns on; one of many, so no line of a log."""
     if unknowns >= LONG:
         stage(f"all eigenvalues of a dense matrix of {unknowns} rows", logged=False)
-
-
-def _companion(mass: Array, damping: Array, stiffness: Array, frequency: float) -> tuple[Array, tuple[Array, Array]]:
-    """The matrix (2r, 2r) whose eigenvalues are θ = 1/(λ/frequency − 1), and the factors of P(frequency)."""
-    mass, damping = frequency**2 * mass, frequency * damping
-    r = len(mass)
-    factor = _factor(mass + damping + stiffness)
-    companion = np.zeros((2 * r, 2 * r), dtype=stiffness.dtype)
-    companion[:r, :r] = -sl.lu_solve(factor, damping + 2 * mass)
-    companion[:r, r:] = -sl.lu_solve(factor, mass)
-    companion[r:, :r] = np.eye(r)
-    return companion, factor
-
-
-def _transposed_solve(factor: tuple[Any, Any], right: Any) -> Any:
-    """A⁻ᵀ right; for a real matrix and complex right sides in real arithmetic."""
-    if factor[0].dtype.kind == "c" or right.dtype.kind != "c":
-        return sl.lu_solve(factor, right, trans=1)
-    return sl.lu_solve(factor, right.real, trans=1) + 1j * sl.lu_solve(factor, right.imag, trans=1)
 
 
 def _factor(matrix: Array) -> tuple[Array, Array]:

@@ -13,13 +13,13 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg as sl
 
-from ..direct.dense import lu_factors
 from ..errors import AnalysisError
 from ..system.uncoupled import UncoupledModes
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .coupling import PointCoupling
 from .deflation import deflation
 from .receptance import Receptance, wanted_pairs
+from .shift_inverted import companion
 from .single_contact import SingleContact, polish_single
 
 CONVERGED = 1e-9  # of the step before last: convergence is at least quadratic
@@ -299,17 +299,9 @@ def dense_roots(spectrum: ReceptanceProblem, mu: float, limit: float) -> Complex
         right, left = sl.null_space(normal[rigid]), sl.null_space(push[rigid])
         mass, damping, stiffness = (left.T @ a @ right for a in (mass, damping, stiffness))
     shift = limit / 13
-    n = len(mass)
-    factor = lu_factors(shift**2 * mass + shift * damping + stiffness)
-    companion = np.block(
-        [
-            [-sl.lu_solve(factor, 2 * shift * mass + damping), -sl.lu_solve(factor, mass) * shift],
-            [np.eye(n) / shift, np.zeros((n, n))],
-        ]
-    )
-    inverse = sl.eigvals(companion)
-    inverse = inverse[np.abs(inverse) > 1.0 / (3 * limit)]
-    values = shift + 1.0 / inverse
+    theta = sl.eigvals(companion(mass, damping, stiffness, shift)[0])
+    theta = theta[np.abs(theta) > shift / (3 * limit)]
+    values = shift * (1.0 + 1.0 / theta)
     values = np.where(np.abs(values.imag) < 1e-9 * np.abs(values), values.real + 0j, values)
     values = values[np.abs(values) <= limit]
     fixed = spectrum.fixed

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sl
 
-from ...direct.dense import DenseFactor, lu_factors
+from ...direct.dense import DenseFactor
 from ...errors import AnalysisError
 from ...typing import Array, BoolArray, ComplexArray
 from ..quadratic.inverse_iteration import iterated
 from ..quadratic.problem import Quadratic
+from ..shift_inverted import damped_pairs, undamped_pairs
 from .basis import expanded
 
 NEAR = (1.2, 4.0)  # modes up to this much above the band are solved for together: first try, second try
@@ -54,7 +55,7 @@ def dense_modes(
         try:
             found = None if whole else _by_undamped(mass, damping, stiffness, frequency, reach)
             if found is None:
-                found = _by_companion(mass, damping, stiffness, frequency, reach)
+                found = DenseModes(*damped_pairs(mass, damping, stiffness, frequency, reach))
         except (ValueError, sl.LinAlgError) as error:
             raise AnalysisError("the reduced problem is singular or not finite; check the parameters") from error
     order = np.lexsort((found.values.real, found.values.imag))
@@ -64,37 +65,14 @@ def dense_modes(
     )
 
 
-def _by_companion(mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float) -> DenseModes:
-    """Through the companion matrix, inverted at λ = frequency."""
-    scaled_mass, scaled_damping = frequency**2 * mass, frequency * damping
-    r = len(mass)
-    factor = lu_factors(scaled_mass + scaled_damping + stiffness)
-    companion = np.zeros((2 * r, 2 * r))
-    companion[:r, :r] = -sl.lu_solve(factor, scaled_damping + 2 * scaled_mass)
-    companion[:r, r:] = -sl.lu_solve(factor, scaled_mass)
-    companion[r:, :r] = np.eye(r)
-    theta, left, right = sl.eig(companion, left=True, right=True)
-    x = frequency * (1 + 1 / theta)
-    chosen = np.flatnonzero(np.isfinite(x) & (np.abs(x) <= reach * frequency) & (x.imag >= 0))
-    z = np.where(np.abs(theta[chosen]) > 1, right[:r, chosen], right[r:, chosen])
-    y = left[:r, chosen].conj()
-    y = sl.lu_solve(factor, y.real, trans=1) + 1j * sl.lu_solve(factor, y.imag, trans=1)
-    return DenseModes(x[chosen], z, y)
-
-
 def _by_undamped(mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float) -> DenseModes | None:
     """Through the modes without damping, at an eighth of the cost: those nearby solved for with damping, the others'
     answer to it added, λ by the two-sided Rayleigh functional. None where damping is too strong for that, or λ real.
 
     What is left on both sides bounds the error, whose product is kept below SMALL of λ.
     """
-    shift = frequency**2
-    factor = lu_factors(stiffness + shift * mass)
-    theta, left, right = sl.eig(sl.lu_solve(factor, shift * mass), left=True, right=True)
-    left = left.conj()
-    left = sl.lu_solve(factor, left.real, trans=1) + 1j * sl.lu_solve(factor, left.imag, trans=1)
+    squares, right, left = undamped_pairs(mass, stiffness, frequency, np.inf)
     left = left / np.linalg.norm(left, axis=0)
-    squares = shift - shift / theta
     for near in NEAR:
         found = _with_damping((mass, damping, stiffness), squares, right, left, frequency, reach, near)
         if found is not None:
@@ -110,26 +88,23 @@ def _with_damping(
     and all but the close ones answer for what is left; None where the answers do not settle."""
     mass, damping, stiffness = matrices
     transposed = mass.T, damping.T, stiffness.T
-    finite = np.isfinite(squares)
-    near = finite & (np.abs(squares) <= (nearby * reach * frequency) ** 2)
-    far = np.flatnonzero(finite & ~near)
-    mine = np.flatnonzero(near)
+    near = np.abs(squares) <= (nearby * reach * frequency) ** 2
+    far, mine = np.flatnonzero(~near), np.flatnonzero(near)
     if not len(mine):
         return None
     inner_right, inner_left = _real_span(right[:, mine], squares[mine]), _real_span(left[:, mine], squares[mine])
     inner_mass, inner_damping, inner_stiffness = (
         inner_left.T @ (matrix @ inner_right) for matrix in (mass, damping, stiffness)
     )
-    inner = _by_companion(inner_mass, inner_damping, inner_stiffness, frequency, EDGE * reach)
-    lam = inner.values
+    lam, z, w = damped_pairs(inner_mass, inner_damping, inner_stiffness, frequency, EDGE * reach)
     if not len(lam) or np.any(lam.imag <= 1e-3 * frequency):
         return None
-    z, w = inner_right @ inner.right, inner_left @ inner.left
+    z, w = inner_right @ z, inner_left @ w
     z, w = z / np.linalg.norm(z, axis=0), w / np.linalg.norm(w, axis=0)
     # Answer of the modes further away: (λ²M + K)⁻¹ is a sum over modes.
     weight = np.einsum("ij,ij->j", left, mass @ right)
     top = reach * frequency
-    scale = np.where(finite, 1.0 / (np.sqrt(np.abs(weight)) * np.maximum(np.sqrt(np.abs(squares)), top)), 0.0)
+    scale = 1.0 / (np.sqrt(np.abs(weight)) * np.maximum(np.sqrt(np.abs(squares)), top))
     if top * _coupling(damping, right[:, far] * scale[far], left * scale) > HIDDEN:
         return None
     ours, theirs = _images(matrices, z), _images(transposed, w)

@@ -19,6 +19,7 @@ import scipy.linalg as sl
 
 from ...direct.dense import lu_factors
 from ...typing import Array, ComplexArray
+from ..shift_inverted import transposed_solve
 from .dense import DenseModes
 
 
@@ -53,8 +54,7 @@ class States:
             values = frequency * (1 + 1 / theta)
         chosen = np.flatnonzero(np.isfinite(values) & (np.abs(values) <= reach * frequency) & (values.imag >= 0))
         chosen = chosen[np.lexsort((values[chosen].real, values[chosen].imag))]
-        back = left[:, chosen].conj()
-        back = sl.lu_solve(factor, back.real, trans=1) + 1j * sl.lu_solve(factor, back.imag, trans=1)
+        back = transposed_solve(factor, left[:, chosen].conj())
         x, y = _motion(self.right @ right[:, chosen], r), _motion(self.left @ back, r)
         return DenseModes(values[chosen], x, y)
 
