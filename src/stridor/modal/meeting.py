@@ -8,6 +8,7 @@ meet, and what is which beyond is a matter of taste: the first grows, and where 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ OPPOSITE = 0.5  # of their difference: the sum of the slopes of two modes beside
 FAINT = 1e-12  # of the largest coefficient: one that says nothing
 KNOWN = 1e-3  # of a step: how well the cubic knows how far off the axis its zero is
 SHORT = 1e-4  # of μ: steps in which it is known to better than MET
+ROUNDING = 1e-9  # of b: how far beside zero a straight way passes that runs through it
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,26 @@ def beyond(
     angle = float(np.sum(np.angle((1 - zeros) / (0 - zeros))))
     going_on = before / max(abs(before), 1e-300) * np.exp(0.5j * angle)
     return Beyond(bool((after * np.conj(going_on)).real < 0), sure)
+
+
+def halves(first: complex, second: complex) -> tuple[complex, complex]:
+    """Mean and squared half difference of two values."""
+    return (first + second) / 2, ((first - second) / 2) ** 2
+
+
+def through_zero(square: complex, before: complex) -> bool:
+    """Whether the squared half difference has passed through zero on a straight line."""
+    ratio = square / before if before else -1.0 + 0j
+    return bool(ratio.real < 0 and abs(ratio.imag) < ROUNDING * abs(ratio))
+
+
+def continued(square: complex, before: complex, half: complex, grows: Callable[[complex], bool]) -> complex:
+    """√square continuous with ``half`` = √before along the straight way; where that runs through zero, the root by
+    which the first of the two ``grows``."""
+    if not through_zero(square, before):
+        return half * np.sqrt(complex(square / before))
+    root = complex(np.sqrt(complex(square)))
+    return root if grows(root) else -root
 
 
 def _zeros(start: complex, end: complex, first: complex, second: complex) -> ComplexArray:

@@ -14,7 +14,7 @@ from .backward_error import BackwardError
 from .coupling import PointCoupling, couple
 from .pencil import Pencil
 from .quadratic.inverse_iteration import solved_beside
-from .results import ComplexModes, Progress, require_memory
+from .results import ComplexModes, Progress, at_each, require_memory
 from .roots import ReceptanceProblem, spectrum_of
 from .tracking import Tracker
 from .unfit import Unfit
@@ -65,7 +65,8 @@ def modes_by_receptance(
     tracker = Tracker(spectrum, limit)
     start, fixed = tracker.origin, spectrum.fixed
     require_memory(len(values), len(start) + len(fixed), system.size if vectors else 0)
-    values, followed, planned = _followed(tracker, values, progress)
+    values, rows, planned = at_each(values, lambda at: tracker.advance(at).roots[: len(start)], progress)
+    followed = np.array(rows)
     every = np.concatenate([start, fixed])
     columns = np.argsort(np.abs(every.imag), kind="stable")
     number = np.empty(len(columns), dtype=np.int64)
@@ -107,27 +108,6 @@ def modes_by_receptance(
         max_frequency_hz=max_frequency_hz,
         planned=planned,
     )
-
-
-def _followed(
-    tracker: Tracker, values: Array, progress: Progress | None
-) -> tuple[Array, ComplexArray, int | None]:
-    """μ (k,), roots (k, b), and how many μ there were to be where it was interrupted."""
-    start, asked = tracker.origin, len(values)
-    followed = np.zeros((asked, len(start)), dtype=complex)
-    done = np.zeros(asked, dtype=bool)
-    try:
-        for at, k in enumerate(np.argsort(values, kind="stable"), start=1):
-            followed[k] = tracker.advance(float(values[k])).roots[: len(start)]
-            done[k] = True
-            if progress is not None:
-                progress(at, asked)
-    except KeyboardInterrupt:
-        if not done.any():
-            raise
-    if done.all():
-        return values, followed, None
-    return values[done], followed[done], asked
 
 
 def _judge_fixed(judge: BackwardError, lam: ComplexArray, vectors: ComplexArray, mu: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, overload
+from typing import Any, Literal, TypeVar, overload
 
 import numpy as np
 
@@ -22,6 +22,7 @@ MOST_BYTES = 4e9  # of eigenvalues and vectors held at one time
 LEAST = 1e-5  # of the band: what |λ| is taken to be at least for that
 BORDER = 1e-12  # of the band: what rounding may put a mode outside by
 
+T = TypeVar("T")
 Progress = Callable[[int, int], None]
 
 
@@ -265,6 +266,24 @@ def grows(values: ComplexArray, top: float) -> BoolArray:
 def off_rounding(values: ComplexArray, rounding: float) -> ComplexArray:
     """Eigenvalues (k,) whose real part may be rounding, a share of |λ|, put on the imaginary axis."""
     return np.where(np.abs(values.real) <= rounding * np.abs(values), 1j * values.imag, values)
+
+
+def at_each(
+    values: Array, solve: Callable[[float], T], progress: Progress | None = None
+) -> tuple[Array, list[T], int | None]:
+    """The μ (k,), what ``solve`` gives at each, called from the lowest to the highest, and how many μ there were to be
+    where it was interrupted. Raises KeyboardInterrupt where nothing is done yet."""
+    found: dict[int, T] = {}
+    try:
+        for at, k in enumerate(np.argsort(values, kind="stable").tolist(), start=1):
+            found[k] = solve(float(values[k]))
+            if progress is not None:
+                progress(at, len(values))
+    except KeyboardInterrupt:
+        if not found:
+            raise
+    done = np.array(sorted(found))
+    return values[done], [found[k] for k in sorted(found)], None if len(done) == len(values) else len(values)
 
 
 def require_memory(rows: int, columns: int, freedoms: int = 0) -> None:

@@ -17,7 +17,7 @@ import scipy
 
 from ..errors import AnalysisError, FollowingError
 from ..typing import BoolArray, ComplexArray, IntArray
-from .meeting import beyond
+from .meeting import beyond, continued, halves
 from .roots import ReceptanceProblem, dense_roots, frictionless_roots, polish
 
 CLOSE = 0.25  # a correction may be this fraction of the distance to the next root
@@ -167,10 +167,10 @@ class Tracker:
         pairs = self._pairs(old, predicted)
         splits: dict[int, tuple[complex, complex, complex]] = {}
         for i, j in pairs:
-            a, b = _pair(old.roots[i], old.roots[j] if j >= 0 else np.conj(old.roots[i]))
+            a, b = halves(old.roots[i], old.roots[j] if j >= 0 else np.conj(old.roots[i]))
             da, db = _pair_slope(old, i, j)
             splits[i] = (a + step * da, b + step * db, b)
-            half = _continued_root(splits[i][1], b, _half(old, i, j))
+            half = continued(splits[i][1], b, _half(old, i, j), _grows)
             predicted[i] = splits[i][0] + half
             if j >= 0:
                 predicted[j] = splits[i][0] - half
@@ -289,7 +289,7 @@ class Tracker:
                 partner = roots[twin]
                 twin += 1
             a_guess, b_guess, b_old = splits[i]
-            a, b = _pair(roots[i], partner)
+            a, b = halves(roots[i], partner)
             # The pair's own quantities must follow their prediction; a sign of √b that flips against
             # the continuous one would show here as a wrong b or be caught by the next check.
             if abs(b - b_guess) > 0.3 * max(abs(b_guess - b_old), 1e-3 * abs(b_old)):
@@ -299,11 +299,6 @@ class Tracker:
                 return False
         alone = ~paired
         return bool(np.all(np.abs(roots[:count] - predicted)[alone] <= CLOSE * gap.min(axis=1)[alone]))
-
-
-def _pair(first: complex, second: complex) -> tuple[complex, complex]:
-    """Mean a and squared half difference b."""
-    return (first + second) / 2, ((first - second) / 2) ** 2
 
 
 def _half(old: RootState, i: int, j: int) -> complex:
@@ -317,17 +312,7 @@ def _pair_slope(old: RootState, i: int, j: int) -> tuple[complex, complex]:
     return (slope + other) / 2, (first - second) * (slope - other) / 2
 
 
-def _continued_root(b: complex, b_old: complex, half_old: complex) -> complex:
-    """√b continuous with half_old = √b_old along the straight way from b_old to b.
-
-    Where that way meets zero (an exact coalescence, undamped) the sense is free: the first branch
-    of the pair is then the one that becomes unstable.
-    """
-    if b_old == 0:
-        ratio: complex = -1.0
-    else:
-        ratio = b / b_old
-    if ratio.real < 0 and abs(ratio.imag) < 1e-9 * abs(ratio):
-        half = np.sqrt(complex(b))
-        return half if half.real > 0 or (half.real == 0 and half.imag > 0) else -half
-    return half_old * np.sqrt(complex(ratio))
+def _grows(half: complex) -> bool:
+    """Whether the one of two λ that lies ``half`` beyond their mean grows or, where they only oscillate, has the higher
+    frequency."""
+    return half.real > 0 or (half.real == 0 and half.imag > 0)

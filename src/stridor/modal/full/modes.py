@@ -25,7 +25,7 @@ from ..options import Options
 from ..quadratic import band_modes, is_stiff
 from ..quadratic.dense import unit
 from ..quadratic.reach import searched
-from ..results import ComplexModes, Progress, require_memory
+from ..results import ComplexModes, Progress, at_each, require_memory
 from .basis import DECAY
 from .family import SystemFamily, family_of
 from .growth import without_rounding
@@ -85,24 +85,17 @@ def modes_at_each(
     values: Array, modes: Callable[[float], ModesAtFriction], freedoms: int, progress: Progress | None,
     vectors: bool | Literal["right"],
 ) -> tuple[Array, list[ModesAtFriction], int | None]:  # fmt: skip
-    """The μ (k,), what ``modes`` finds at each, and how many there were to be where it was interrupted."""
-    found: dict[int, ModesAtFriction] = {}
-    try:
-        for at, k in enumerate(np.argsort(values, kind="stable").tolist(), start=1):
-            found[k] = modes(float(values[k]))
-            if vectors is not True:
-                found[k] = replace(found[k], left=None)
-            if not vectors:
-                found[k] = replace(found[k], right=found[k].right[:0])
-            if at == 1:
-                require_memory(len(values), len(found[k].values), freedoms if vectors else 0)
-            if progress is not None:
-                progress(at, len(values))
-    except KeyboardInterrupt:
-        if not found:
-            raise
-    done = np.array(sorted(found))
-    return values[done], [found[k] for k in done.tolist()], None if len(done) == len(values) else len(values)
+    """What ``modes`` finds `at_each` μ, with the ``vectors`` that are wanted."""
+
+    def solved(mu: float) -> ModesAtFriction:
+        found = modes(mu)
+        if mu == values.min():
+            require_memory(len(values), len(found.values), freedoms if vectors else 0)
+        if vectors is not True:
+            found = replace(found, left=None)
+        return found if vectors else replace(found, right=found.right[:0])
+
+    return at_each(values, solved, progress)
 
 
 def family_over(

@@ -17,7 +17,7 @@ from ...errors import FollowingError
 from ...stages import passing, stage
 from ...typing import Array, BoolArray, ComplexArray, IntArray
 from ..dense_problem import Eigenpairs, OverNumber
-from ..meeting import beyond
+from ..meeting import ROUNDING, beyond, continued, halves, through_zero
 
 CLEAR = 0.3  # an eigenvalue is the predicted one if it is this much nearer than any other
 ALIKE = 0.5  # and its shape has at least this much in common
@@ -27,7 +27,6 @@ ASIDE = 0.83  # of a step that ends where modes coincide
 SMALLEST_STEP = 1e-9
 MOST_TRIED = 600  # steps tried within one of the longest: ten places where modes meet take some 400
 NARROW = 1e-5  # step over μ below which two values that pass each other beside zero count as having met
-ROUNDING = 1e-9
 FOLLOWED = 1.25  # branches are followed up to this much above the band
 
 
@@ -273,8 +272,8 @@ def _as_pair(old: State, found: Eigenpairs, i: int, index: IntArray, clear: Bool
         if step > NARROW * max(found.mu, 1e-2):
             return None
         new_square = -abs(new_square / square) * square
-    half = continued(new_square, square, (old.coordinate[i] - old.coordinate[j]) / 2)
-    if i > j and _turned(new_square, square):
+    half = continued(new_square, square, (old.coordinate[i] - old.coordinate[j]) / 2, _grows)
+    if i > j and through_zero(new_square, square):
         half = -half
     first = int(np.argmin(np.abs(found.coordinate[both] - new_mean - half)))
     if (new_square * square.conjugate()).real > 0 and _crossed(old, found, (i, j), both[[first, 1 - first]]):
@@ -298,11 +297,6 @@ def _crossed(old: State, found: Eigenpairs, branches: tuple[int, int], both: Int
     return exchanged <= STRAIGHT * abs(before) and kept > 4 * exchanged
 
 
-def halves(first: complex, second: complex) -> tuple[complex, complex]:
-    """Mean and squared half difference of two values."""
-    return (first + second) / 2, ((first - second) / 2) ** 2
-
-
 def _past_zero(square: complex, before: complex) -> float:
     """How far the straight line between two complex numbers passes from zero; infinite where it leads away from it."""
     if (square * before.conjugate()).real >= 0:
@@ -310,17 +304,7 @@ def _past_zero(square: complex, before: complex) -> float:
     return abs((square * before.conjugate()).imag) / abs(square - before)
 
 
-def _turned(square: complex, before: complex) -> bool:
-    """Whether the squared half difference has passed through zero on a straight line."""
-    ratio = square / before if before else -1.0 + 0j
-    return bool(ratio.real < 0 and abs(ratio.imag) < ROUNDING * abs(ratio))
-
-
-def continued(square: complex, before: complex, half: complex) -> complex:
-    """√square continuous with ``half`` = √before; where zero lies between, the first of the two grows beyond."""
-    if not _turned(square, before):
-        return half * np.sqrt(complex(square / before))
-    root = complex(np.sqrt(complex(square)))
-    if abs(root.imag) > 1e-9 * abs(root):
-        return root if root.imag > 0 else -root
-    return -root if root.real > 0 else root
+def _grows(half: complex) -> bool:
+    """Whether the one of two λ² that lies ``half`` beyond their mean grows or, where both are real, has the higher
+    frequency."""
+    return half.imag > 0 if abs(half.imag) > 1e-9 * abs(half) else half.real <= 0

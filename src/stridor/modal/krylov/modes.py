@@ -11,10 +11,10 @@ import numpy as np
 from ...errors import CaseError
 from ...system import System
 from ...threads import one_thread
-from ...typing import Array, BoolArray
+from ...typing import Array, BoolArray, ComplexArray
 from ..options import Options
 from ..quadratic.reach import searched
-from ..results import ComplexModes, Progress, off_rounding, require_memory
+from ..results import ComplexModes, Progress, at_each, off_rounding, require_memory
 from ..tolerances import BELIEVED, SPLIT_RELATIVE
 from .follow import Follower
 from .problem import problem_of
@@ -59,28 +59,12 @@ def krylov_modes(
     band = Band(count, None if asked is None else searched(problem.pencil(top).condensed(), asked))
     reduced = projected(problem, band, top)
     converge_over(reduced, numbered_at + samples(top - numbered_at), between=NAMES, left=vectors is True)
-    values, planned = _converged(reduced, values, progress, left=vectors is True)
+    values, _, planned = at_each(
+        values, lambda at: converge_at(reduced, [at], tolerance=BELIEVED, left=vectors is True), progress
+    )
     found = _followed(reduced, values, band, damped=damped, vectors=vectors, start=numbered_at)
     planned = found.planned if planned is None else planned
     return replace(found, max_frequency_hz=max_frequency_hz, planned=planned)
-
-
-def _converged(
-    reduced: Reduced, values: Array, progress: Progress | None, *, left: bool
-) -> tuple[Array, int | None]:
-    """The μ (k,) at which the band's pairs are exact, and how many there were to be where it was interrupted."""
-    order = np.argsort(values, kind="stable")
-    done = np.zeros(len(values), dtype=bool)
-    try:
-        for at, k in enumerate(order, start=1):
-            converge_at(reduced, [float(values[k])], tolerance=BELIEVED, left=left)
-            done[k] = True
-            if progress is not None:
-                progress(at, len(values))
-    except KeyboardInterrupt:
-        if not done.any():
-            raise
-    return (values, None) if done.all() else (values[done], len(values))
 
 
 def _followed(
@@ -98,38 +82,32 @@ def _followed(
         branches = np.flatnonzero(first.values.imag <= MARGIN * band.frequency)
     follower.named = len(branches)
     require_memory(len(values), len(branches), problem.size if vectors else 0)
-    shape = (len(values), len(branches))
-    eigenvalues, residual = np.zeros(shape, dtype=complex), np.zeros(shape)
-    right, left = np.zeros((2, *shape, problem.size if vectors else 0), dtype=complex)
-    done = np.zeros(len(values), dtype=bool)
-    try:
-        for k in np.argsort(values, kind="stable"):
-            mu = float(values[k])
-            state = follower.advance(mu)
-            lam, index = state.values[branches], state.index[branches]
-            u, p = reduced.expand(state.found.right[:, index])
-            residual[k] = problem.pencil(mu).backward_error(lam, u, p)
-            eigenvalues[k] = lam if reduced.damped else off_rounding(lam, SPLIT_RELATIVE)
-            if vectors:
-                right[k] = u.T
-            if vectors is True:
-                left[k] = left_vectors(reduced, lam, state.found.left[:, index], mu)[0].T
-            done[k] = True
-    except KeyboardInterrupt:
-        if not done.any():
-            raise
-    eigenvalues = eigenvalues[done]
+
+    def at(mu: float) -> tuple[ComplexArray, Array, ComplexArray, ComplexArray]:
+        state = follower.advance(mu)
+        lam, index = state.values[branches], state.index[branches]
+        u, p = reduced.expand(state.found.right[:, index])
+        left = left_vectors(reduced, lam, state.found.left[:, index], mu)[0] if vectors is True else u[:0]
+        return (
+            lam if reduced.damped else off_rounding(lam, SPLIT_RELATIVE),
+            problem.pencil(mu).backward_error(lam, u, p),
+            u.T if vectors else u[:0].T,
+            left.T,
+        )
+
+    done, rows, planned = at_each(values, at)
+    eigenvalues, residual, right, left = (np.array(part) for part in zip(*rows, strict=True))
     found = ComplexModes(
-        mu=values[done],
+        mu=done,
         eigenvalues=eigenvalues,
         branch=np.arange(1, len(branches) + 1),
-        residual=residual[done],
+        residual=residual,
         damped=damped,
-        right=right[done] if vectors else None,
-        left=left[done] if vectors is True else None,
+        right=right if vectors else None,
+        left=left if vectors is True else None,
         open_contacts=problem.open_contacts,
         contact_state=problem.contact_state,
-        planned=None if done.all() else len(values),
+        planned=planned,
     )
     if band.frequency is None:
         return found
