@@ -22,8 +22,8 @@ from _common import machine
 from stridor.case import template_text
 from stridor.studies.rows import variables
 from stridor.studies.schema import Study
-from stridor.studies.store import Head, Store
-from stridor.studies.task import Batch
+from stridor.studies.store import Head, OpenStore
+from stridor.studies.task import SampleBatch
 
 SCATTER = {
     "mu": {"range": (0.0, 0.5)},
@@ -65,7 +65,7 @@ def scheduling(address: str) -> None:
 
     with Client(address, set_as_default=False) as client:
         for rows in (1, 100):
-            batch = Batch(tuple(range(rows)), ((0.0,),) * rows, (False,) * rows)
+            batch = SampleBatch(tuple(range(rows)), ((0.0,),) * rows, (False,) * rows)
             started = time.perf_counter()
             client.gather([client.submit(len, batch.places, pure=False) for _ in range(1000)])
             each = (time.perf_counter() - started) / 1000
@@ -80,7 +80,7 @@ def writing(rows: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         head = Head(study.document(), "", {})
         values = np.random.default_rng(1).random((rows, 3))
-        store = Store.made(Path(folder) / "x.zarr", head, values, dict.fromkeys(SCATTER, ""), columns, {"mode": 40})
+        store = OpenStore.made(Path(folder) / "x.zarr", head, values, dict.fromkeys(SCATTER, ""), columns, {"mode": 40})
         started = time.perf_counter()
         for first in range(0, rows, 1000):
             store.write({k: row for k in range(first, min(first + 1000, rows))})

@@ -15,7 +15,7 @@ import numpy as np
 from benches import Slave, bench, paper_case
 from stridor.laws import Tabulated
 from stridor.system import System, build_system
-from stridor.temporal.ensembles import Outcome, march_all
+from stridor.temporal.ensembles import EnsembleOutcome, march_all
 from stridor.temporal.legs import Member
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.settings import Settings
@@ -59,7 +59,7 @@ def made(name: str) -> DeviceCase:
     return DeviceCase(bench(*slaves, elements=4), settings, [[Member(0.05)], [Member(0.3, 0.5, 4.0)]], phases)
 
 
-def run_on(device: str, case: DeviceCase) -> tuple[Outcome, dict[tuple[int, int], Trajectory | str]]:
+def run_on(device: str, case: DeviceCase) -> tuple[EnsembleOutcome, dict[tuple[int, int], Trajectory | str]]:
     """What is seen of each member."""
     found: dict[tuple[int, int], Trajectory | str] = {}
     outcome = march_all(
@@ -69,7 +69,7 @@ def run_on(device: str, case: DeviceCase) -> tuple[Outcome, dict[tuple[int, int]
     return outcome, found
 
 
-def numbers(outcome: Outcome, found: dict[tuple[int, int], Trajectory | str]) -> dict[str, np.ndarray]:
+def numbers(outcome: EnsembleOutcome, found: dict[tuple[int, int], Trajectory | str]) -> dict[str, np.ndarray]:
     """All that a run left, by name."""
     out: dict[str, np.ndarray] = {"device": np.array(outcome.device)}
     for (track, leg), run in found.items():

@@ -376,12 +376,12 @@ def test_a_fault_in_another_process_is_told_and_ends_all(tmp_path: Path):
 import numpy as np, scipy.sparse as sp
 from stridor import direct
 from stridor.direct import slepc_backend
-solve = slepc_backend.Share.solve
+solve = slepc_backend.ProcessShare.solve
 def broken(self, right, transpose):
     if slepc_backend._team.ranks.number == 1:
         raise MemoryError("no more of it")
     return solve(self, right, transpose)
-slepc_backend.Share.solve = broken
+slepc_backend.ProcessShare.solve = broken
 direct.factorise(sp.csr_array(np.eye(4)), solver="slepc")
 """
     done = python("-c", script, cwd=tmp_path)

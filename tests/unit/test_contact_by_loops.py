@@ -918,7 +918,7 @@ def test_masses_of_slaves_are_shared_without_loss() -> None:
     rng = np.random.default_rng(21)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     weights = np.array([[0.5, 0.75, -0.25], [0.25, 0.75, 0.0], [0.0, 0.0, 0.0]])
-    held = ties.Tie(np.zeros((3, 3), dtype=int), weights, np.zeros((3, 3)), np.zeros(3))
+    held = ties.NodeTies(np.zeros((3, 3), dtype=int), weights, np.zeros((3, 3)), np.zeros(3))
     bond = ties.Bond("w", held, np.zeros((3, 3), dtype=int), np.zeros((1, 3), dtype=int), turn)
     shared = bond.shares
     assert shared.tie.weights == pytest.approx(np.array([[1 / 3, 1 / 2, 1 / 6], [0.25, 0.75, 0], [0, 0, 0]]))
@@ -933,8 +933,8 @@ def test_bonds_turn_what_their_leaders_do() -> None:
     turn = np.array([[0.6, -0.8], [0.8, 0.6]])
     # Nodes 0 and 1 free, 2 led by both, 3 led by 2 and 1.
     freedoms = np.arange(8).reshape(4, 2)
-    first = ties.Tie(np.array([[0, 1]]), np.array([[0.3, 0.7]]), np.zeros((1, 2)), np.zeros(1))
-    second = ties.Tie(np.array([[1, 0]]), np.array([[0.4, 0.6]]), np.zeros((1, 2)), np.zeros(1))
+    first = ties.NodeTies(np.array([[0, 1]]), np.array([[0.3, 0.7]]), np.zeros((1, 2)), np.zeros(1))
+    second = ties.NodeTies(np.array([[1, 0]]), np.array([[0.4, 0.6]]), np.zeros((1, 2)), np.zeros(1))
     bonds = [
         ties.Bond("a", first, freedoms[[2]], freedoms[[0, 1]], turn),
         ties.Bond("b", second, freedoms[[3]], freedoms[[1, 2]]),
@@ -952,7 +952,7 @@ def test_bonds_turn_what_their_leaders_do() -> None:
 
 def check(points, normals, limit: float = 0.1, distance=None) -> None:
     points, normals = np.array(points, dtype=float), np.array(normals, dtype=float)
-    found = ties.Tie(
+    found = ties.NodeTies(
         np.zeros((len(points), 1), dtype=int), np.ones((len(points), 1)), points,
         np.abs(points[:, 1]) if distance is None else np.array(distance),
     )  # fmt: skip

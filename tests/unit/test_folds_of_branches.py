@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stridor.errors import AnalysisError
-from stridor.periodic.continuation import Spot, follow
+from stridor.periodic.continuation import BranchPoint, follow
 
 TOP = 0.3
 
@@ -33,7 +33,7 @@ class Curve:
     def _mu(self, x: float) -> float:
         return TOP - abs(x) ** self.power
 
-    def ahead(self, spot: Spot[Place], length: float) -> Place:
+    def ahead(self, spot: BranchPoint[Place], length: float) -> Place:
         return Place(spot.point.x + length * spot.heading[0], spot.mu + length * spot.heading[1])
 
     def corrected(self, guess: Place, heading: np.ndarray) -> Place:

@@ -23,7 +23,7 @@ from stridor.temporal.beta2 import StepLimit, scheme
 from stridor.temporal.energy import EnergyBalance
 from stridor.temporal.schedule import PhaseSpec, lay_out
 from stridor.temporal.settings import Settings
-from stridor.temporal.sketch import Part
+from stridor.temporal.sketch import SketchPart
 from stridor.temporal.steppers.modal import ModalStepper, start
 from stridor.temporal.steppers.sparse import damping, limit, renewal, step_matrix, storage
 from stridor.temporal.steppers.sparse import machine as assembled_machine
@@ -632,13 +632,13 @@ def test_a_saved_state_is_looked_through() -> None:
 def test_sketches_tell_models_apart_beyond_rounding() -> None:
     rng = np.random.default_rng(6)
     for scale in (1.0, 1e-8, 1e9):
-        part = Part("mass", scale * rng.normal(size=3), 4 * scale)
+        part = SketchPart("mass", scale * rng.normal(size=3), 4 * scale)
         for off, same in ((3.9e-9, True), (4.1e-9, False)):
             other = part.row.copy()
             other[1] += off * scale
             assert part.same(other) is same
         assert not part.same(part.row * (1 + 1e-6))
-    parts = [Part("a", np.array([1.0, 2.0]), 2.0), Part("b", np.array([3.0]), 3.0), Part("c", np.zeros(0), 0.0)]
+    parts = [SketchPart("a", np.array([1.0, 2.0]), 2.0), SketchPart("b", np.array([3.0]), 3.0), SketchPart("c", np.zeros(0), 0.0)]
     saved_as = sketch.packed(parts)
     assert saved_as.tolist() == [1, 2, 2, 3, 3, 0]
     assert sketch.differing(parts, saved_as) == []
@@ -666,7 +666,7 @@ def run_before(**changes) -> Any:
 def refused_by(path: str, before: Any, *, step=1e-6, b2=0.5, every=50, watch=("tip",), join=True) -> str:
     """What is said of a state, "" where it is taken; the stepper has no arrays and no parts of its own."""
     stepper: Any = SimpleNamespace(
-        scheme=scheme(step, b2), path=path, parts=[Part("mass", np.array([1.0]), 2.0)], check=lambda restart: None,
+        scheme=scheme(step, b2), path=path, parts=[SketchPart("mass", np.array([1.0]), 2.0)], check=lambda restart: None,
         state=dict, bounds=dict, counted=("counters", 0),
     )  # fmt: skip
     try:
@@ -699,7 +699,7 @@ def test_a_state_of_another_scheme_or_record_is_refused(march: str) -> None:
 
 
 def test_another_model_is_refused_by_its_parts() -> None:
-    parts = [Part("mass", np.array([1.0]), 1.0), Part("load P", np.array([2.0]), 2.0)]
+    parts = [SketchPart("mass", np.array([1.0]), 1.0), SketchPart("load P", np.array([2.0]), 2.0)]
     before: Any = SimpleNamespace(state={"model": sketch.packed(parts)})
     restart._check_model(parts, before, changed=False)
     others = [replace(parts[0], numbers=np.array([1.1])), replace(parts[1], numbers=np.array([2.5]))]
@@ -712,9 +712,9 @@ def test_another_model_is_refused_by_its_parts() -> None:
 
 
 def test_supports_may_change_their_speed_and_not_their_direction() -> None:
-    def parts_of(*numbers) -> list[Part]:
-        return [Part("mass", np.array([1.0]), 1.0)] + [
-            Part(f"{sketch.MOTION} {name}", np.array(n), float(np.abs(n).sum()), sketch.SOLVED)
+    def parts_of(*numbers) -> list[SketchPart]:
+        return [SketchPart("mass", np.array([1.0]), 1.0)] + [
+            SketchPart(f"{sketch.MOTION} {name}", np.array(n), float(np.abs(n).sum()), sketch.SOLVED)
             for name, n in zip(("belt", "jaw"), numbers, strict=True)
         ]
 

@@ -18,7 +18,7 @@ from stridor.modal.parametric.factors import (
     Formula,
     ParameterFactor,
     Product,
-    Tabulated,
+    TabulatedFactor,
     Times,
     factor_from_json,
     product_of,
@@ -27,9 +27,9 @@ from stridor.modal.parametric.family import merged, term_of
 
 POINT = {"mu": 0.4, "k": 1.7, "Omega": 12.0}
 MU, K = Axis("mu", (0.0, 0.2, 0.7, 0.9)), Axis("k", (0.5, 1.0, 3.0), logarithmic=True)
-TABLE = Tabulated((MU, K), tuple((m**3 - 2 * m) * (1 + np.log(k) ** 2) for m in MU.points for k in K.points))
+TABLE = TabulatedFactor((MU, K), tuple((m**3 - 2 * m) * (1 + np.log(k) ** 2) for m in MU.points for k in K.points))
 CASES: list[tuple[ParameterFactor, float]] = [
-    (Tabulated((MU,), tuple(m**3 for m in MU.points)), 0.064),
+    (TabulatedFactor((MU,), tuple(m**3 for m in MU.points)), 0.064),
     (TABLE, (0.064 - 0.8) * (1 + np.log(1.7) ** 2)),
     (Times((Product((("mu", 1.0),)), TABLE)), 0.4 * (0.064 - 0.8) * (1 + np.log(1.7) ** 2)),
     (Times((Formula("1/Omega", ("Omega",)), TABLE, Product((("k", 1.0),)))), 1.7 / 12 * TABLE(POINT)),
@@ -50,10 +50,10 @@ def test_value_slope_and_the_way_through_json_of_tables(factor: ParameterFactor,
 
 
 def test_slopes_at_the_points_of_a_table() -> None:
-    cube = Tabulated((MU,), tuple(m**3 for m in MU.points))
+    cube = TabulatedFactor((MU,), tuple(m**3 for m in MU.points))
     assert [cube({"mu": m}) for m in MU.points] == [m**3 for m in MU.points]
     assert [cube.slope({"mu": m}, "mu") for m in MU.points] == pytest.approx([3 * m**2 for m in MU.points], abs=1e-14)
-    squares = Tabulated((K,), tuple(np.log(k) ** 2 for k in K.points))
+    squares = TabulatedFactor((K,), tuple(np.log(k) ** 2 for k in K.points))
     assert squares.slope({"k": 3.0}, "k") == pytest.approx(2 * np.log(3) / 3, rel=1e-14)
     assert np.isnan(squares({"k": -1.0}))
 

@@ -5,7 +5,7 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
-from stridor.modal.parametric.basis import Basis
+from stridor.modal.parametric.basis import ReducedBasis
 from stridor.modal.parametric.offline import embedding_of
 from stridor.modal.parametric.problem import Parameter, ParametricProblem, Term
 from stridor.modal.parametric.proportional import proportional
@@ -86,7 +86,7 @@ def test_products_are_those_of_the_terms_themselves(mass):
     problem = ParametricProblem(terms, (Parameter("c", 0.0, 1.0, 0.5),))
     metric = sp.csr_array(chain(1) + mass)
     embedding = embedding_of(N, 1.0 / np.sqrt(metric.diagonal()))
-    basis = Basis(problem, metric, embedding)
+    basis = ReducedBasis(problem, metric, embedding)
     rng = np.random.default_rng(0)
     for count in (4, 3, 250):
         basis.add(rng.standard_normal((N, count)), 1e-8)

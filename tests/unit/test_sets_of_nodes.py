@@ -13,11 +13,11 @@ import scipy.sparse as sp
 from stridor.contact.multipliers import OPEN, SLIP, STICK
 from stridor.errors import AnalysisError
 from stridor.sliding import history, points, surfaces
-from stridor.sliding.equilibrium import NEWTON_STEPS, ContactRows, Equilibrium, NodeState, changed, find_touching
+from stridor.sliding.equilibrium import NEWTON_STEPS, ContactRows, Equilibrium, NodeEquilibrium, changed, find_touching
 from stridor.sliding.redundant import closed, redundant
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip, _Change, increments_of
 from stridor.system.load_steps import LoadStep
-from stridor.system.model import Answers
+from stridor.system.model import AnswerCache
 
 
 def nodes_like(count: int, directions: int) -> StickSlip:
@@ -206,7 +206,7 @@ def test_a_body_that_moves_a_million_times_its_size_is_loose(monkeypatch, size: 
     bar = SimpleNamespace(points=np.array([[50.0, 10.0], [53.0, 10.5]]))
     system = SimpleNamespace(lines=(), solids=(bar,))
     monkeypatch.setattr(surfaces, "_loose", lambda *given: "it is loose")
-    state = NodeState(np.zeros(0, dtype=bool), np.array([0.0, -size]), np.zeros(0), np.zeros(0))
+    state = NodeEquilibrium(np.zeros(0, dtype=bool), np.array([0.0, -size]), np.zeros(0), np.zeros(0))
     if held:
         surfaces._require_held(system, None, state, 1e-9)
         with pytest.raises(AnalysisError, match="it is loose"):
@@ -219,7 +219,7 @@ def test_a_body_that_moves_a_million_times_its_size_is_loose(monkeypatch, size: 
 def hardening(cubic: tuple[float, ...], *, gap=(0.0, 0.0), load: float = 1.0) -> Equilibrium:
     """Two masses on springs of 100 N/m, each pressed with 1 N, or another load, on a contact of 1 mm/N."""
     system = SimpleNamespace(
-        of_matrices=Answers(), size=2, stiffness=sp.csr_array(np.diag([100.0, 100.0])), cubic=None, symmetric_definite=True,
+        of_matrices=AnswerCache(), size=2, stiffness=sp.csr_array(np.diag([100.0, 100.0])), cubic=None, symmetric_definite=True,
     )  # fmt: skip
     rows = ContactRows(
         sp.csr_array(np.eye(2)), np.array(gap), np.full(2, 1e-3), np.array(cubic), np.zeros(2, dtype=bool)

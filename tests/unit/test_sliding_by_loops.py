@@ -18,13 +18,13 @@ from stridor.direct import SingularMatrix
 from stridor.errors import AnalysisError
 from stridor.laws import Coulomb, Weakening
 from stridor.sliding import equilibrium, points, pressing, stretches, surfaces
-from stridor.sliding.equilibrium import NodeState, find_touching, offenders
+from stridor.sliding.equilibrium import NodeEquilibrium, find_touching, offenders
 from stridor.sliding.redundant import redundant
 from stridor.sliding.resultants import balance, resultants
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip
-from stridor.sliding.stretches import Stretch, _different, _Look, _probes, _Search
+from stridor.sliding.stretches import Stretch, _different, _Equilibria, _Look, _probes
 from stridor.sliding.surfaces import SurfaceSliding
-from stridor.system.model import Answers
+from stridor.system.model import AnswerCache
 
 # What NumPy warns of is a fault here, whatever comes of it.
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
@@ -166,13 +166,13 @@ def test_offenders_are_those_beyond_rounding_and_the_worst_come_first() -> None:
             force = size * rng.normal(size=m) * 10.0 ** rng.integers(-14, 1, size=m)
             gap = size * rng.normal(size=m) * 10.0 ** rng.integers(-14, 1, size=m)
             load = size * rng.choice([0.1, 10.0])
-            pulled, closing = offenders(NodeState(active, np.zeros(0), force, gap), movable, load)
+            pulled, closing = offenders(NodeEquilibrium(active, np.zeros(0), force, gap), movable, load)
             rounding, width = 1e-12 * max(*np.abs(force), load), 1e-12 * max(np.abs(gap))
             assert list(pulled) == sorted((i for i in range(m) if active[i] and force[i] < -rounding), key=lambda i: force[i])
             assert list(closing) == sorted(
                 (i for i in range(m) if not active[i] and movable[i] and gap[i] < -width), key=lambda i: gap[i]
             )
-    empty = NodeState(np.zeros(0, dtype=bool), np.zeros(0), np.zeros(0), np.zeros(0))
+    empty = NodeEquilibrium(np.zeros(0, dtype=bool), np.zeros(0), np.zeros(0), np.zeros(0))
     assert [len(x) for x in offenders(empty, np.zeros(0, dtype=bool), 0.0)] == [0, 0]
 
 
@@ -193,7 +193,7 @@ class Tried:
         if forces is None:
             raise SingularMatrix("", None)
         forces = np.asarray(forces, dtype=float)
-        return NodeState(active.copy(), np.array([float(len(self.asked))]), np.where(active, forces, 0.0), np.where(active, 0.0, forces))  # fmt: skip
+        return NodeEquilibrium(active.copy(), np.array([float(len(self.asked))]), np.where(active, forces, 0.0), np.where(active, 0.0, forces))  # fmt: skip
 
 
 def test_settling_begins_with_the_guess_and_what_is_kept() -> None:
@@ -280,12 +280,12 @@ def test_residual_is_the_largest_imbalance_over_the_largest_force() -> None:
             coefficient=coefficient, stretch=np.array([0.3, -0.2]),
             rows=SimpleNamespace(free=sp.csr_array(rows), lift=lift),
         )  # fmt: skip
-        system = SimpleNamespace(of_matrices=Answers(), stiffness=sp.csr_array(stiffness), cubic=springs if cubic else None, size=n)
+        system = SimpleNamespace(of_matrices=AnswerCache(), stiffness=sp.csr_array(stiffness), cubic=springs if cubic else None, size=n)
         nodes = SimpleNamespace(compliance=np.zeros(m), gap=np.zeros(m))
         found = equilibrium.Equilibrium(
             system, nodes, sp.csr_array(push), force, symmetric=False, solver=None, travel=np.array([0.4])
         )
-        given = NodeState(np.ones(m, dtype=bool), u, normal, np.zeros(m))
+        given = NodeEquilibrium(np.ones(m, dtype=bool), u, normal, np.zeros(m))
         imbalance, terms = [], []
         for i in range(n):
             left = sum(stiffness[i, j] * u[j] for j in range(n))
@@ -299,10 +299,10 @@ def test_residual_is_the_largest_imbalance_over_the_largest_force() -> None:
             )  # fmt: skip
         assert found.residual(given) == pytest.approx(max(map(abs, imbalance)) / max(terms), rel=1e-12)
     still = equilibrium.Equilibrium(
-        SimpleNamespace(of_matrices=Answers(), stiffness=sp.csr_array(stiffness), cubic=None, size=n), nodes, sp.csr_array(push), np.zeros(n),
+        SimpleNamespace(of_matrices=AnswerCache(), stiffness=sp.csr_array(stiffness), cubic=None, size=n), nodes, sp.csr_array(push), np.zeros(n),
         symmetric=False, solver=None,
     )  # fmt: skip
-    assert still.residual(NodeState(np.ones(m, dtype=bool), np.zeros(n), np.zeros(m), np.zeros(m))) == 0.0
+    assert still.residual(NodeEquilibrium(np.ones(m, dtype=bool), np.zeros(n), np.zeros(m), np.zeros(m))) == 0.0
 
 
 def pressed(rng, *, stiff: float, size: float, mu: float = 0.2) -> Any:
@@ -348,7 +348,7 @@ def test_equilibria_are_those_that_trying_all_sets_finds(stiff: float, size: flo
             continue
         tried += 1
         u, forces, open_by = right[0]
-        system: Any = SimpleNamespace(of_matrices=Answers(), stiffness=sp.csr_array(stiffness), cubic=None, size=6, symmetric_definite=True)
+        system: Any = SimpleNamespace(of_matrices=AnswerCache(), stiffness=sp.csr_array(stiffness), cubic=None, size=6, symmetric_definite=True)
         rows = equilibrium.ContactRows(sp.csr_array(normal), gap, compliance, np.zeros(4), np.zeros(4, dtype=bool))
         solver = equilibrium.Equilibrium(system, rows, sp.csr_array(push), force, symmetric=False, solver=None)
         for guess in (None, rng.random(4) < 0.5):
@@ -700,7 +700,7 @@ def model(monkeypatch, forces, *, own: float = 0.1, size: int = 10, none_beyond:
     monkeypatch.setattr(stretches, "steady_sliding_nodes", steady)
     held = np.isin(np.arange(len(forces)), kept)
     nodes = SimpleNamespace(count=len(forces), kept=held)
-    once = Answers().once
+    once = AnswerCache().once
     return SimpleNamespace(contact_nodes=lambda: nodes, loads={"P": 1}, load_steps=(), size=size, once=once), asked
 
 
@@ -813,12 +813,12 @@ def test_probes_lie_within_on_both_sides_of_what_is_foreseen() -> None:
 
 def test_what_runs_out_is_foreseen_from_the_side_that_knows(monkeypatch) -> None:
     system, _ = model(monkeypatch, LINES)
-    search = _Search(system, None)
+    search = _Equilibria(system, None)
     looks = [search.at(mu) for mu in (0.0, 0.1, 0.5, 0.6)]
     assert search._foreseen(looks[1], looks[2]) == pytest.approx(0.31)  # the first of three lines from below
-    alone = _Search(system, None)
+    alone = _Equilibria(system, None)
     assert alone._foreseen(alone.at(0.1), alone.at(0.5)) is None
-    above = _Search(system, None)
+    above = _Equilibria(system, None)
     looks = [above.at(mu) for mu in (0.1, 0.5, 0.6)]
     assert above._foreseen(looks[0], looks[1]) == pytest.approx(0.33)  # and the last from above
 

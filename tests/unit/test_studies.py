@@ -24,7 +24,7 @@ from stridor.studies import reduced_rows
 from stridor.studies.parts import Part
 from stridor.studies.rows import Row, failed, full_row
 from stridor.studies.tables import Keep
-from stridor.studies.task import Batch, Task
+from stridor.studies.task import SampleBatch, Task
 from stridor.studies.workers import LocalWorkers
 
 FEW = ["bodies.beam1.elements=3", "bodies.beam2.elements=6", "modal.max_frequency_hz=3e3"]
@@ -165,7 +165,7 @@ def test_a_study_that_is_killed_thirty_times_goes_on(case: st.Case, tmp_path: Pa
     _survives(case, tmp_path, iter(rng.uniform(0.0, 5.0, 32).tolist()))
 
 
-def _deadly(task: Task, batch: Batch) -> Iterator[tuple[int, Row]]:
+def _deadly(task: Task, batch: SampleBatch) -> Iterator[tuple[int, Row]]:
     """Row 3 kills whoever computes it; row 5 only the first time."""
     for place in batch.places:
         mark = Path(task.model) / f"{place}"
@@ -176,7 +176,7 @@ def _deadly(task: Task, batch: Batch) -> Iterator[tuple[int, Row]]:
 
 
 def test_a_row_that_kills_its_workers_fails_and_others_do_not(tmp_path: Path) -> None:
-    batches = [Batch(tuple(range(k, k + 4)), ((0.0,),) * 4, (False,) * 4) for k in (0, 4, 8)]
+    batches = [SampleBatch(tuple(range(k, k + 4)), ((0.0,),) * 4, (False,) * 4) for k in (0, 4, 8)]
     rows: dict[int, Row] = {}
     with LocalWorkers(Task("", "modes", ("mu",), Keep(), str(tmp_path)), 2, _deadly) as workers:
         for found in workers.answers(iter(batches)):
@@ -320,7 +320,7 @@ def test_rows_near_the_boundary_are_solved_in_full() -> None:
     first = st.onsets(case, (0.0, 1.0)).first
     assert first is not None
     study = st.Study(case=case, parameters=SCATTER, sampling={"method": "sobol", "samples": 64})
-    model = reduced_rows.Reduced(
+    model = reduced_rows.FrictionModels(
         (st.reduced_model(case, {"mu": (0.0, 1.0), MASS: (1.0, 20.0)}),), "modes", {}
     )
     at = {"mu": first.mu, MASS: 10.0}
@@ -331,14 +331,14 @@ def test_rows_near_the_boundary_are_solved_in_full() -> None:
 
 
 def test_a_model_that_is_wrong_is_found_out(case: st.Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    real = reduced_rows.Reduced.row
+    real = reduced_rows.FrictionModels.row
     scale = 1 + 1e-6
 
     def shifted(self, values, keep):
         row = real(self, values, keep)
         return row if row is None else row | {"frequency_hz": row["frequency_hz"] * scale}
 
-    monkeypatch.setattr(reduced_rows.Reduced, "row", shifted)
+    monkeypatch.setattr(reduced_rows.FrictionModels, "row", shifted)
     lines: list[str] = []
     study = st.Study(case=case, parameters=SCATTER, sampling={"method": "sobol", "samples": 64})
     st.run_study(study, tmp_path, workers=1, say=lines.append)

@@ -26,7 +26,7 @@ from test_view_plots import (
 from benches import paper_case
 from stridor.stages import heard
 from stridor.temporal.signals import spectrogram
-from stridor.view import BodyModes, FrictionCurve, NamedShape, ReportInputs, write_report
+from stridor.view import FrictionCurve, NamedFrequencies, NamedShape, ReportInputs, write_report
 from stridor.view import report as report_module
 from stridor.view.modal_tables import onset_tables
 from stridor.view.report import sections, tidy
@@ -86,7 +86,7 @@ def full_inputs(**changes) -> ReportInputs:
         "modes": modes,
         "undamped_sweep": sweep(damped=False),
         "damped_sweep": modes,
-        "body_modes": {"beam1": BodyModes(np.array([0.0, 491.9]), ("rigid", "F1"))},
+        "body_modes": {"beam1": NamedFrequencies(np.array([0.0, 491.9]), ("rigid", "F1"))},
         "coupled_hz": np.array([102.4, 489.3]),
         "undamped_onsets": found_onsets(damped=False),
         "damped_onsets": found_onsets(),

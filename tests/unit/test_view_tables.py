@@ -9,7 +9,7 @@ import pytest
 from test_view_plots import agreement, balance, found_onsets, trajectory
 
 from benches import paper_case
-from stridor.view.inputs import BodyModes, ReportInputs
+from stridor.view.inputs import NamedFrequencies, ReportInputs
 from stridor.view.modal_tables import body_table, coupled_table, frequency_tables, onset_tables
 from stridor.view.tables import number, paired, percent, same_as_printed, significant
 from stridor.view.temporal_tables import contact_table, energy_table, values_table
@@ -31,14 +31,14 @@ def test_a_printed_frequency_that_nothing_comes_near_stays_alone():
 
 
 def test_rigid_motion_has_a_partner_without_a_percentage():
-    table = body_table("beam1", BodyModes(np.array([0.0, 491.94])), PRINTED.bodies["beam1"][:2])
+    table = body_table("beam1", NamedFrequencies(np.array([0.0, 491.94])), PRINTED.bodies["beam1"][:2])
     assert [row.cells[:3] for row in table.rows] == [("rigid", "0.0", "0"), ("F1", "491.9", "492")]
     assert table.rows[0].cells[3] == ""
     assert table.rows[1].cells[3] == "−0.01 %"
 
 
 def test_misprints_are_marked_and_their_note_is_shown():
-    modes = BodyModes(np.array([6199.6, 8439.6, 9261.1]), ("F5", "T1", "F6"))
+    modes = NamedFrequencies(np.array([6199.6, 8439.6, 9261.1]), ("F5", "T1", "F6"))
     table = body_table("beam2", modes, PRINTED.bodies["beam2"][4:7])
     misprint = table.rows[1]
     assert misprint.kind == "far"
@@ -55,7 +55,7 @@ def test_the_coupled_mode_that_is_not_printed_is_shown_and_marked():
 
 def test_without_a_reference_only_computed_columns_remain():
     case = paper_case().with_({"reference": None})
-    inputs = ReportInputs(case, body_modes={"beam1": BodyModes(np.array([491.9]), ("F1",))})
+    inputs = ReportInputs(case, body_modes={"beam1": NamedFrequencies(np.array([491.9]), ("F1",))})
     assert frequency_tables(inputs)[0].heads == ("mode", "computed [Hz]")
     solved = ReportInputs(case, undamped_onsets=found_onsets(damped=False))
     assert "printed μ" not in onset_tables(solved)[0].heads

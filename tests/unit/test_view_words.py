@@ -14,7 +14,7 @@ from stridor.case import template_text
 from stridor.modal.complex_modes import ComplexModes
 from stridor.modal.onsets import Onsets
 from stridor.temporal.signals import Components
-from stridor.view.inputs import BodyModes, ReportInputs
+from stridor.view.inputs import NamedFrequencies, ReportInputs
 from stridor.view.modal_tables import body_table, frequency_tables
 from stridor.view.words import _agreement_sentence, _onset_sentence, model_in_words
 
@@ -72,9 +72,9 @@ def test_a_contacts_stiffness_has_the_unit_of_what_it_is() -> None:
 
 
 def test_letters_of_modes_are_those_that_there_are() -> None:
-    beam = body_table("beam", BodyModes(np.array([1.0, 2.0]), ("F1", "T1")), ())
-    solid = body_table("disc", BodyModes(np.array([1.0]), ("E1",)), ())
+    beam = body_table("beam", NamedFrequencies(np.array([1.0, 2.0]), ("F1", "T1")), ())
+    solid = body_table("disc", NamedFrequencies(np.array([1.0]), ("E1",)), ())
     assert (beam.caption, solid.caption) == ("F: bending, T: traction.", "E: elastic.")
     case = st.loads(rubbing_block("max_frequency_hz = 30e3"))
-    inputs = ReportInputs(case=case, body_modes={"stiff": BodyModes(np.zeros(0), ())})
+    inputs = ReportInputs(case=case, body_modes={"stiff": NamedFrequencies(np.zeros(0), ())})
     assert frequency_tables(inputs) == []

@@ -15,7 +15,7 @@ from stridor.case import template_text
 from stridor.errors import CaseError
 from stridor.modal import complex_modes, over_friction, receptance_modes
 from stridor.system import build, uncoupled
-from stridor.system.model import MOST_ANSWERS, Answers
+from stridor.system.model import MOST_ANSWERS, AnswerCache
 from stridor.system.uncoupled import uncoupled_modes
 from stridor.view import report
 
@@ -214,7 +214,7 @@ def test_settings_of_a_system_are_checked_as_those_of_a_case(case: st.Case) -> N
 
 
 def test_the_oldest_of_very_many_answers_is_forgotten() -> None:
-    answers = Answers()
+    answers = AnswerCache()
     for asked in range(MOST_ANSWERS + 1):
         assert answers.once(asked, lambda asked=asked: -asked) == -asked
     assert answers.known(0) is None

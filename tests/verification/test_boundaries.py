@@ -17,7 +17,7 @@ from program import stridor
 from random_boundaries import disagreement, distance, eigenvalues, growing, off_the_curves, random_islands, random_plane
 from stridor.io.seals import seal
 from stridor.modal.boundary import Found, Plane, boundaries, march, search
-from stridor.study.boundary_problem import Asked, plane_of, solved_problem
+from stridor.study.boundary_problem import BoundaryAsked, plane_of, solved_problem
 from stridor.study.boundary_result import Boundary
 
 pytestmark = pytest.mark.verification
@@ -66,7 +66,7 @@ def crossing_branches(folder: Path) -> st.Case:
 
 def traced(case: st.Case, x: str, ends: tuple[float, float], high: float) -> tuple[Plane, Found]:
     """What `stability_boundary` traces, before it is put into the units of the case."""
-    asked = Asked((x, "mu"), (ends, (0.0, high)), "auto", 1e-8, 1e-3, LINES)
+    asked = BoundaryAsked((x, "mu"), (ends, (0.0, high)), "auto", 1e-8, 1e-3, LINES)
     plane, _ = plane_of(solved_problem(case, asked, case.modal.max_frequency_hz), asked.ends)
     return plane, boundaries(plane, 1e-3, LINES)
 
@@ -346,7 +346,7 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
         assert not found.agree
         assert {end for curve in found.curves for end in curve.ends} >= {"lost"}
     with monkeypatch.context() as patch:
-        patch.setattr(search._Search, "_seed", lambda *_: None)
+        patch.setattr(search._CurveSearch, "_seed", lambda *_: None)
         found = boundary()
         assert not found.agree
         assert not found.curves
@@ -360,8 +360,8 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
         with pytest.raises(st.AnalysisError, match="not today"):
             boundary()
     with monkeypatch.context() as patch:
-        lay = search._Search._lay
-        patch.setattr(search._Search, "_lay", lambda self, axis, value: None if value > 0.3 else lay(self, axis, value))
+        lay = search._CurveSearch._lay
+        patch.setattr(search._CurveSearch, "_lay", lambda self, axis, value: None if value > 0.3 else lay(self, axis, value))
         assert boundary().agree  # the curve is found on other lines
 
 

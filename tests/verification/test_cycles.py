@@ -16,11 +16,11 @@ from random_contacts import random_system
 from stridor.case import template_text
 from stridor.laws import Coulomb, StaticKinetic
 from stridor.periodic import (
-    Branch,
-    Closed,
+    ClosedShot,
     Cycles,
     Family,
     NoReturn,
+    ShootingBranch,
     born,
     close,
     cycles_reached,
@@ -38,7 +38,7 @@ from stridor.study.cycle_methods import Shooting
 DAMPED = 0.02
 
 
-def advanced(closed: Closed, xi: np.ndarray, periods: int) -> np.ndarray:
+def advanced(closed: ClosedShot, xi: np.ndarray, periods: int) -> np.ndarray:
     """Where a start of the chart is after some periods, by the plain motion."""
     motion = started(closed.problem, closed.chart, xi, varied=False)
     end = periods * closed.period
@@ -103,7 +103,7 @@ def test_motions_beside_a_cycle_come_to_it_or_leave_it(seeds: range):
     looked = 0
     for seed in seeds:
         family = Family(random_system(seed if seed % 4 else seed + 1)[0])  # with damping
-        found: list[Closed] = []
+        found: list[ClosedShot] = []
         for mu in (0.5, 0.8, 1.2):
             try:
                 problem = family.at(mu)
@@ -247,9 +247,9 @@ def test_what_was_found_is_kept_when_the_search_is_stopped():
 def test_a_cycle_is_kept_when_the_motion_to_it_is_stopped(monkeypatch: pytest.MonkeyPatch):
     """The motion goes on behind a cycle that is said to be unstable; stopped there, the cycle is not lost."""
     closed, going_on = returns._closed, returns._next_change
-    met: list[Closed] = []
+    met: list[ClosedShot] = []
 
-    def noted(*given) -> Closed:
+    def noted(*given) -> ClosedShot:
         met.append(closed(*given))
         return met[-1]
 
@@ -270,10 +270,10 @@ def test_a_cycle_is_kept_when_the_motion_to_it_is_stopped(monkeypatch: pytest.Mo
 
 
 def test_a_branch_whose_end_at_the_edge_is_lost_says_so(monkeypatch: pytest.MonkeyPatch):
-    def lost(*_: object) -> Closed:
+    def lost(*_: object) -> ClosedShot:
         raise st.AnalysisError("nothing is there")
 
-    monkeypatch.setattr(Branch, "at", lost)
+    monkeypatch.setattr(ShootingBranch, "at", lost)
     found = st.cycles(mode_coupling(DAMPED, 0.1), between=(0.7, 0.78), push=0.2)
     branch = found.branches[0]
     assert branch.ends.endswith("its cycle at the edge, μ = 0.78, could not be closed: nothing is there")
@@ -315,11 +315,11 @@ def test_a_fold_is_solved_for():
     """The two beams: behind their onset the branch turns back, and goes on unstable below it."""
     case = st.loads(template_text("two-beams")).with_({"bodies.beam1.elements": 20, "bodies.beam2.elements": 18})
     (onset,) = st.onsets(case, (0.06, 0.1)).onsets
-    branch = Branch(Family(st.Workspace(case).system()), (0.06, 0.1))
+    branch = ShootingBranch(Family(st.Workspace(case).system()), (0.06, 0.1))
     first, heading = born(branch, onset.mu, onset.frequency_hz)
     met: list[tuple[float, float, bool]] = []
 
-    def seen(closed: Closed, *, fold: bool) -> bool:
+    def seen(closed: ClosedShot, *, fold: bool) -> bool:
         met.append((closed.problem.value, float(np.abs(multipliers(closed)[0])), fold))
         return True
 

@@ -309,9 +309,9 @@ def test_a_sweep_goes_up_and_down_through_each_column(along):
 
 
 def test_which_mode_responds_is_named_only_near_its_frequency():
-    from stridor.study.ensemble_modes import Growing
+    from stridor.study.ensemble_modes import UnstableModes
 
-    growing = Growing(np.array([8, 12]), np.array([8641.0, 16700.0]), np.array([300.0, 20.0]))
+    growing = UnstableModes(np.array([8, 12]), np.array([8641.0, 16700.0]), np.array([300.0, 20.0]))
     number, frequency, deviation = growing.nearest(8700.0)
     assert (number, frequency) == (8, 8641.0)
     assert deviation == pytest.approx(59 / 8641)
@@ -319,7 +319,7 @@ def test_which_mode_responds_is_named_only_near_its_frequency():
     assert growing.nearest(16700.0 * 1.051)[0] == 0
     assert growing.nearest(1780.0)[:2] == (0, 8641.0)
     assert growing.nearest(np.nan)[0] == 0
-    assert Growing(np.array([], dtype=int), np.array([]), np.array([])).nearest(8700.0)[0] == 0
+    assert UnstableModes(np.array([], dtype=int), np.array([]), np.array([])).nearest(8700.0)[0] == 0
 
 
 def test_the_modal_map_is_that_of_the_modes_at_each_friction_and_speed():

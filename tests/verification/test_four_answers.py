@@ -14,7 +14,7 @@ import pytest
 import stridor as st
 from mode_coupling import mode_coupling
 from program import stridor
-from stridor.agreement import GOOD_AMPLITUDE, Agreement, Settled
+from stridor.agreement import GOOD_AMPLITUDE, Agreement, SettledVelocity
 from stridor.agreement.four_answers import FourAnswers, four_answers, with_answers
 from stridor.temporal.signals import line_frequency
 
@@ -119,7 +119,7 @@ def test_what_differs_is_not_said_to_agree(answer: FourAnswers):
     other = st.cycles(case, 1.2).cycles
     assert four_answers(here, onset, other, 1.0).verdict.startswith("disagree: μ = 1.4: the run swings at ")
     run = here.settled
-    assert isinstance(run, Settled)
+    assert isinstance(run, SettledVelocity)
 
     def said(cycles: Any = (cycle,), why: str = "", **changed: Any) -> tuple[bool | None, str]:
         found = four_answers(replace(here, **changed), onset, cycles, 1.0, why)

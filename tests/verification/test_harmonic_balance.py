@@ -20,7 +20,7 @@ from stridor.case import template_text
 from stridor.fe.assembly import assemble_beam
 from stridor.fe.beam import BeamElement, BeamMesh
 from stridor.laws import Coulomb, Hyperbolic, StaticKinetic, Tabulated, Weakening
-from stridor.periodic import Closed, Cycle, Cycles, Family, cycles_reached, growing, pushed, sampled
+from stridor.periodic import ClosedShot, Cycle, Cycles, Family, cycles_reached, growing, pushed, sampled
 from stridor.periodic.cycle import OWN
 from stridor.periodic.harmonic import (
     Balanced,
@@ -363,9 +363,9 @@ def test_the_derivative_is_the_difference(space: bool):
         assert found == pytest.approx(wanted, abs=1e-4 * np.abs(wanted).max())
 
 
-def cycles_of(system: System) -> list[Closed]:
+def cycles_of(system: System) -> list[ClosedShot]:
     """By shooting at μ = 0.8."""
-    found: list[Closed] = []
+    found: list[ClosedShot] = []
     try:
         problem = Family(system).at(0.8)
         motions = [pushed(problem, 3.0 * problem.sliding_speed), *(m for _, m in growing(problem))]

@@ -29,7 +29,7 @@ def bench() -> st.Case:
 
 
 @pytest.fixture(scope="module")
-def answered(bench: st.Case, tmp_path_factory: pytest.TempPathFactory) -> tuple[st.Study, reduced_rows.Reduced]:
+def answered(bench: st.Case, tmp_path_factory: pytest.TempPathFactory) -> tuple[st.Study, reduced_rows.FrictionModels]:
     parameters = {name: {"range": ends} for name, ends in BOX.items()}
     study = st.Study(case=bench, parameters=parameters, sampling={"method": "sobol", "samples": 64})
     return study, reduced_rows.made(study, bench, np.array(list(BOX.values())).T, tmp_path_factory.mktemp("box") / "m-modes")
@@ -53,7 +53,7 @@ def test_numbers_are_those_of_the_full_problem(bench: st.Case, answered, count: 
 def test_what_is_not_known_has_no_number(answered, monkeypatch: pytest.MonkeyPatch) -> None:
     study, reduced = answered
     values = {name: float(np.mean(ends)) for name, ends in BOX.items()}
-    bare = reduced_rows.Reduced(reduced.models, reduced.compute, reduced.names)
+    bare = reduced_rows.FrictionModels(reduced.models, reduced.compute, reduced.names)
     assert not bare.row(values, study.keep)["branch"].any()
     # A way that would take more points than there may be.
     monkeypatch.setattr(line, "TRIES", 0)
@@ -67,6 +67,6 @@ def test_damaged_numbers_are_none(bench: st.Case, answered, tmp_path: Path) -> N
     path.mkdir()
     save_reduced(reduced.models[0], path / "00.npz", case=bench)
     (path / "00-branches.json").write_text('[{"mu": 0.1, "real": ')
-    again = reduced_rows.Reduced.read(str(path), bench)
+    again = reduced_rows.FrictionModels.read(str(path), bench)
     assert again.anchors == ((),)
     assert not again.row({name: float(np.mean(ends)) for name, ends in BOX.items()}, study.keep)["branch"].any()

@@ -20,7 +20,7 @@ from stridor.contact.surfaces import SurfaceContact, operators
 from stridor.errors import AnalysisError
 from stridor.laws import Coulomb, Weakening
 from stridor.sliding import friction_damping_matrix, steady_sliding, steady_sliding_nodes, touching
-from stridor.sliding.equilibrium import NodeState, offenders
+from stridor.sliding.equilibrium import NodeEquilibrium, offenders
 from stridor.sliding.resultants import resultants
 from stridor.system import System, build_system
 from stridor.system.model import CubicSprings, PrescribedMotion, Solid
@@ -448,7 +448,7 @@ def test_only_what_is_beyond_rounding_pulls_or_penetrates():
     force = np.array([1.0, -0.3e-12, -3e-12, 0.0, 0.0, 0.0])
     gap = np.array([0.0, 0.0, 0.0, 2.0, -0.6e-12, -6e-12])
     active = np.array([True, True, True, False, False, False])
-    state = NodeState(active, np.zeros(1), force, gap)
+    state = NodeEquilibrium(active, np.zeros(1), force, gap)
     pulled, closing = offenders(state, np.ones(6, dtype=bool), 0.5)
     assert list(pulled) == [2]
     assert list(closing) == [5]
@@ -457,5 +457,5 @@ def test_only_what_is_beyond_rounding_pulls_or_penetrates():
     # A node that cannot move closes no gap.
     assert not len(offenders(state, np.arange(6) != 5, 0.5)[1])
     # The worst first.
-    worse = NodeState(np.ones(3, dtype=bool), np.zeros(1), np.array([1.0, -1e-6, -1e-3]), np.zeros(3))
+    worse = NodeEquilibrium(np.ones(3, dtype=bool), np.zeros(1), np.array([1.0, -1e-6, -1e-3]), np.zeros(3))
     assert list(offenders(worse, np.ones(3, dtype=bool), 0.5)[0]) == [2, 1]

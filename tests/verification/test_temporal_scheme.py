@@ -17,7 +17,7 @@ from benches import Slave, bench, paper_case
 from marching import one_phase, paper_scheme, points_of, rod, run
 from stridor.errors import AnalysisError, CaseError
 from stridor.system import System, build_system
-from stridor.system.motion import Constraint, Structure, constrain
+from stridor.system.motion import Constraint, FreeStructure, constrain
 from stridor.temporal.beta2 import step_limit
 from stridor.temporal.schedule import PhaseSpec, lay_out
 from stridor.temporal.simulate import Settings, simulate
@@ -88,7 +88,7 @@ def test_moving_support_is_the_scheme_as_printed(beta2, path):
     others."""
     mass, stiffness = rod(1.0, 1.0, 1.0, 1.0, 4)
     damping = 0.3 * mass + 0.02 * stiffness
-    structure = Structure(*(sp.csr_array(x) for x in (mass, damping, stiffness)))
+    structure = FreeStructure(*(sp.csr_array(x) for x in (mass, damping, stiffness)))
     free, motion = constrain(structure, [Constraint("end", (0,), (2.0,))])
     system = System(
         mass[np.ix_(free, free)], damping[np.ix_(free, free)], stiffness[np.ix_(free, free)], motion=motion,

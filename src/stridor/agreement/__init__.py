@@ -3,10 +3,10 @@
 from .comparison import PARTS, compare, dominant_response
 from .critical import critical_friction
 from .four_answers import GOOD_AMPLITUDE, CycleSeen, FourAnswers
-from .kept import Store
+from .kept import PartStore
 from .perturbation import perturb
 from .result import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, SAME_DECAY, Agreement, Comparison
-from .settled import Settled, settled
+from .settled import SettledVelocity, settled
 from .shapes import modal_assurance, mode_shape
 from .small_motion import LINEAR, PERTURBATION, Perturbation, linear_part
 
@@ -24,9 +24,9 @@ __all__ = [
     "Comparison",
     "CycleSeen",
     "FourAnswers",
+    "PartStore",
     "Perturbation",
-    "Settled",
-    "Store",
+    "SettledVelocity",
     "compare",
     "critical_friction",
     "dominant_response",

@@ -26,10 +26,10 @@ from ..temporal.trajectory import Trajectory
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .critical import compare_critical
-from .kept import Plain, Store, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
+from .kept import PartStore, Plain, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
 from .perturbation import modes_as_in_time, perturb
 from .result import Agreement, Comparison, Critical, judge, likeness, overall
-from .settled import Settled, settled, settled_of
+from .settled import SettledVelocity, settled, settled_of
 from .shapes import by_body, modal_assurance, mode_shape
 from .small_motion import Perturbation, whole
 
@@ -70,7 +70,7 @@ def compare(
     runs: dict[float, Trajectory] | None = None,
     progress: Callable[[str], None] | None = None,
     only: Collection[str] | None = None,
-    kept: Store | None = None,
+    kept: PartStore | None = None,
     finished: Callable[[Comparison], None] | None = None,
     options: Options | None = None,
 ) -> Agreement:
@@ -152,7 +152,7 @@ class _At:
     settings: Settings
     limit: float
     runs: dict[float, Trajectory]
-    kept: Store | None
+    kept: PartStore | None
     say: Callable[[str], None]
     options: Options | None = None
 
@@ -279,7 +279,7 @@ class _Answer:
     fitted: Growth | None
     responding: int | None
     mac: float | None
-    settled: Settled | None
+    settled: SettledVelocity | None
     unsettled: str
 
 

@@ -14,7 +14,7 @@ from ..modal.options import Options
 from ..modal.over_friction import modes_of_band, onsets_of_band
 from ..system import System
 from ..temporal.simulate import Settings
-from .kept import Store, bool_of, float_of
+from .kept import PartStore, bool_of, float_of
 from .perturbation import options_in_time, perturb
 from .result import GOOD_CRITICAL, Critical
 
@@ -37,7 +37,7 @@ def critical_friction(
     tolerance: float = 5e-4,
     max_frequency_hz: float = 40e3,
     progress: Say | None = None,
-    kept: Store | None = None,
+    kept: PartStore | None = None,
 ) -> tuple[float, tuple[float, float]]:
     """Bisect the μ at which small perturbations begin to grow in time; the middle and the last bracket.
 
@@ -81,7 +81,7 @@ def compare_critical(
     bracket: tuple[float, float] | None,
     tolerance: float,
     progress: Say,
-    kept: Store | None,
+    kept: PartStore | None,
     options: Options | None = None,
 ) -> Critical:
     """Both critical friction coefficients, and whether they are one. Raises what the analyses raise."""
@@ -106,7 +106,7 @@ def _in_time(
     bracket: tuple[float, float] | None,
     tolerance: float,
     progress: Say,
-    kept: Store | None,
+    kept: PartStore | None,
     options: Options,
 ) -> Critical:
     """The critical friction by bisection in time, held against the modal one."""
@@ -136,7 +136,7 @@ def _in_time(
 
 
 def _modal(
-    system: System, between: tuple[float, float], limit: float, kept: Store | None, options: Options
+    system: System, between: tuple[float, float], limit: float, kept: PartStore | None, options: Options
 ) -> tuple[float | None, str, list[str]]:
     """The first onset, None where there is none, what speaks for that, and what grows before any; taken from what is
     kept if it is there."""

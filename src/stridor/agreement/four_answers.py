@@ -12,7 +12,7 @@ from ..digits import readable
 from ..periodic import Cycle, CycleOnset
 from ..tabular import Cell
 from .result import AGREE, DISAGREE, GOOD_FREQUENCY, UNDECIDED, Agreement, Comparison
-from .settled import Settled
+from .settled import SettledVelocity
 
 GOOD_AMPLITUDE = 0.05
 AS_STRONG = 0.5  # of the strongest line: one that may be the strongest of a run as well
@@ -50,7 +50,7 @@ class FourAnswers:
     comparison: Comparison
     cycles: tuple[CycleSeen, ...]
     chosen: int | None
-    run: Settled | None
+    run: SettledVelocity | None
     frequency_error: float | None
     amplitude_error: float | None
     agrees: bool | None
@@ -117,7 +117,7 @@ def four_answers(
     return FourAnswers(comparison.mu, onset, comparison, seen, chosen, run, *errors, agrees, said)
 
 
-def _seen(cycle: Cycle, run: Settled | None, limit: float) -> CycleSeen:
+def _seen(cycle: Cycle, run: SettledVelocity | None, limit: float) -> CycleSeen:
     line = amplitude = None
     if run is not None and run.point in cycle.watch_names:
         velocity = cycle.velocity[:, cycle.watch_names.index(run.point), "xyz".index(run.direction)]
@@ -128,7 +128,7 @@ def _seen(cycle: Cycle, run: Settled | None, limit: float) -> CycleSeen:
     return CycleSeen(cycle.frequency_hz, line, amplitude, cycle.slip_amplitude, cycle.stable, cycle.method)
 
 
-def _chosen(seen: Sequence[CycleSeen], run: Settled | None) -> int | None:
+def _chosen(seen: Sequence[CycleSeen], run: SettledVelocity | None) -> int | None:
     """What may be held against a run is what a run can come to."""
     able = [k for k, cycle in enumerate(seen) if cycle.stable is not False]
     if not able:

@@ -13,7 +13,7 @@ from .small_motion import Perturbation
 Plain = Mapping[str, Any]
 
 
-class Store(Protocol):
+class PartStore(Protocol):
     """Where finished parts are put and sought, by name and friction coefficient."""
 
     def get(self, part: str, mu: float | None) -> Plain | None:

@@ -14,7 +14,7 @@ from ..modal.onset import refuted
 from ..notebook import Shown, html_table
 from ..tabular import Cell, Rows, Tabular, dataset, split
 from ..temporal.signals import Growth
-from .settled import Settled
+from .settled import SettledVelocity
 from .small_motion import LEVEL, Perturbation
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class Comparison(Shown):
     verdict: str
     growth_mac: float | None = None
     completeness: str = ""
-    settled: Settled | None = None
+    settled: SettledVelocity | None = None
     unsettled: str = ""
 
     @property

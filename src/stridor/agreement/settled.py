@@ -19,7 +19,7 @@ AT_REST = 1e-9  # of the largest velocity in the phase: what no longer swings
 
 
 @dataclass(frozen=True)
-class Settled:
+class SettledVelocity:
     """The velocity of a watched point, in the direction in which it is largest, over the last quarter of a run that has
     saturated: ``point`` and ``direction`` ("x", "y", "z"), frequency_hz of its strongest line, amplitude [m/s] half its
     range, and spread, by how much that differs between four parts of the quarter, relative."""
@@ -38,7 +38,7 @@ class Settled:
 
 def settled(
     run: Trajectory, dominant_hz: float | None, fitted: Growth | None, rate: float
-) -> tuple[Settled | None, str]:
+) -> tuple[SettledVelocity | None, str]:
     """What a run has settled to, by its dominant line and the growth of that (`dominant_response`); else why nothing
     can be said.
 
@@ -62,15 +62,15 @@ def settled(
     steady = np.ptp(halves) <= STEADY * amplitude and abs(rate) * len(signal) * run.sampling >= SHOWN
     if not (fitted.saturated or steady):
         return None, "the run has not saturated"
-    return Settled(
+    return SettledVelocity(
         run.watch_names[0], "xyz"[direction], line_frequency(signal, run.sampling, dominant_hz), amplitude,
         float(np.ptp(halves)) / amplitude,
     ), ""  # fmt: skip
 
 
-def settled_of(data: Plain | None) -> Settled | None:
+def settled_of(data: Plain | None) -> SettledVelocity | None:
     """What was kept. Raises KeyError, TypeError or ValueError for what is damaged."""
     if data is None:
         return None
     numbers = (float(data[name]) for name in ("frequency_hz", "amplitude", "spread"))
-    return Settled(str(data["point"]), str(data["direction"]), *numbers)
+    return SettledVelocity(str(data["point"]), str(data["direction"]), *numbers)

@@ -68,8 +68,8 @@ def _conclusion(result: DampingMap) -> Conclusion:
     i, j = (int(k) for k in np.unravel_index(int(np.nanargmin(result.onset_mu)), result.onset_mu.shape))
     low, high = float(result.onset_mu[i, j]), float(np.nanmax(result.onset_mu))
     said = f"over both numbers the lowest onset goes from μ = {low:.6f} to {high:.6f}"
-    there = (f"{result.x}={result.x_values[i]:.6g}", f"{result.y}={result.y_values[j]:.6g}")
-    return Conclusion(said, "onsets", ("--set", there[0], "--set", there[1]))
+    point = (f"{result.x}={result.x_values[i]:.6g}", f"{result.y}={result.y_values[j]:.6g}")
+    return Conclusion(said, "onsets", ("--set", point[0], "--set", point[1]))
 
 
 def _show(result: DampingMap) -> None:

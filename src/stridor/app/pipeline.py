@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..agreement import Store, dominant_response, modal_assurance, settled
+from ..agreement import PartStore, dominant_response, modal_assurance, settled
 from ..digits import measured
 from ..errors import CaseError, StridorError
 from ..io.atomic import write_text
@@ -28,13 +28,13 @@ from ..study.asked import require_friction
 from ..study.comparison import other_in_time
 from ..study.everything import Everything, compute_everything
 from ..study.fingerprint import same_model
-from ..study.parts import OF_REPORT, Parts, chosen_parts
+from ..study.parts import OF_REPORT, RunParts, chosen_parts
 from ..study.provenance import versions
 from ..study.workspace import Problem, Workspace
 from ..temporal.signals import low_passed, spectrogram, spectrum
 from ..temporal.simulate import Progress
 from ..temporal.trajectory import Trajectory
-from ..view.inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
+from ..view.inputs import FrictionCurve, NamedFrequencies, NamedShape, ReportInputs
 from ..view.report import write_report
 from ..view.words import verdict
 
@@ -113,7 +113,7 @@ def run(
     only: Collection[str] | None = None,
     skip: Collection[str] | None = None,
     fresh: bool = False,
-    kept: Store | None = None,
+    kept: PartStore | None = None,
 ) -> Outcome:
     """Compute everything, keep each result as soon as it is there, write the report into ``folder``.
 
@@ -136,7 +136,7 @@ def report(
     log: Callable[[str], None] | None = None,
     skip: Collection[str] | None = None,
     fresh: bool = False,
-    kept: Store | None = None,
+    kept: PartStore | None = None,
 ) -> Outcome:
     """The page of a case without any run in time: modes, onsets, sensitivities, counter-measures, shapes.
 
@@ -163,13 +163,13 @@ def _folder(problem: Problem, folder: str | Path | None) -> Path:
 def _run(
     work: Workspace,
     target: Path,
-    parts: Parts,
+    parts: RunParts,
     *,
     mu: float | None = None,
     progress: Progress | None = None,
     log: Callable[[str], None] | None = None,
     fresh: bool,
-    kept: Store | None,
+    kept: PartStore | None,
 ) -> Outcome:
     case = work.case("run")
     files: list[Path] = []
@@ -267,7 +267,7 @@ def report_inputs(e: Everything) -> ReportInputs:
         damped_sweep=e.sweep_damped,
         undamped_pair=e.zoom_undamped,
         damped_pair=e.zoom_damped,
-        body_modes={name: BodyModes(b.frequency_hz, b.labels) for name, b in e.bodies.items()},
+        body_modes={name: NamedFrequencies(b.frequency_hz, b.labels) for name, b in e.bodies.items()},
         coupled_hz=None if e.coupled is None else np.sort(e.coupled.frequency_hz[0]),
         undamped_onsets=e.onsets_undamped,
         damped_onsets=e.onsets_damped,

@@ -47,7 +47,7 @@ _LEAST_MASTER_ELEMENTS = 3  # a C1 spline needs neighbours on both sides
 
 
 @dataclass
-class Parts:
+class SoundTables:
     """The sound tables of a case. `broken` holds the names whose tables are not: they exist, but say nothing.
 
     Names are (table, name); a whole broken table is (table, "*").
@@ -79,7 +79,7 @@ class Parts:
         return (table, name) in self.broken or (table, "*") in self.broken
 
 
-def problems_between(parts: Parts) -> list[Problem]:
+def problems_between(parts: SoundTables) -> list[Problem]:
     """Everything wrong between (not within) the values of the sound parts, in the order of the file."""
     shapes = [*shape_problems(parts.bodies)]
     unsound = {problem.where.split(".")[1] for problem in shapes}
@@ -115,7 +115,7 @@ def slave_side(slave: BeamBody, master: BeamBody) -> int:
     return 0 if abs(off) <= _SIDE_TOLERANCE * slave.length_m else int(math.copysign(1, off))
 
 
-def _material_problems(parts: Parts) -> Iterator[Problem]:
+def _material_problems(parts: SoundTables) -> Iterator[Problem]:
     for name, body in parts.bodies.items():
         if not isinstance(body, BeamBody | SolidBody):
             continue
@@ -134,7 +134,7 @@ def _material_problems(parts: Parts) -> Iterator[Problem]:
 _AXES = {2: ("x", "y"), 3: ("x", "y", "z")}
 
 
-def _support_problems(parts: Parts) -> Iterator[Problem]:
+def _support_problems(parts: SoundTables) -> Iterator[Problem]:
     held: dict[tuple[str, int, str], str] = {}
     for name, support in parts.supports.items():
         where = f"supports.{name}"
@@ -183,7 +183,7 @@ def _beam_support_problems(
             yield Problem(f"{where}.fixed", support.fixed, accepted)
 
 
-def _load_problems(parts: Parts) -> Iterator[Problem]:
+def _load_problems(parts: SoundTables) -> Iterator[Problem]:
     for name, load in parts.loads.items():
         where = f"loads.{name}"
         if load.acts_on_bodies:
@@ -207,7 +207,7 @@ def _load_problems(parts: Parts) -> Iterator[Problem]:
             yield Problem(f"{where}.pressure", load.pressure, "a pressure acts on a boundary; a point takes a force")
 
 
-def _contact_problems(parts: Parts) -> Iterator[Problem]:
+def _contact_problems(parts: SoundTables) -> Iterator[Problem]:
     pairs: dict[frozenset[str], str] = {}
     for name, contact in parts.contacts.items():
         where = f"contacts.{name}"
@@ -288,7 +288,7 @@ def _friction_problems(where: str, friction: Friction) -> Iterator[Problem]:
 
 
 def _pairing_problems(
-    parts: Parts, where: str, contact: Contact, slave: PointRef, master: BeamBody
+    parts: SoundTables, where: str, contact: Contact, slave: PointRef, master: BeamBody
 ) -> Iterator[Problem]:
     body = parts.bodies[slave.body]
     position = body.coordinates(slave.distance) if isinstance(body, BeamBody) else slave.coordinates
@@ -311,7 +311,7 @@ def _pairing_problems(
         yield Problem(f"{where}.side", None, f'missing – give "left" or "right" of {contact.master}')
 
 
-def _tie_problems(parts: Parts) -> Iterator[Problem]:
+def _tie_problems(parts: SoundTables) -> Iterator[Problem]:
     for name, tie in parts.ties.items():
         where = f"ties.{name}"
         slave = yield from _location(parts, tie.slave, f"{where}.slave", boundary=True)
@@ -324,7 +324,9 @@ def _tie_problems(parts: Parts) -> Iterator[Problem]:
                 yield Problem(f"{where}.slave", tie.slave, accepted)
 
 
-def _repetition_problems(parts: Parts, where: str, tie: Tie, slave: Location, master: Location) -> Iterator[Problem]:
+def _repetition_problems(
+    parts: SoundTables, where: str, tie: Tie, slave: Location, master: Location
+) -> Iterator[Problem]:
     """Ties within a body without a way from one of its sides to the other, and ways that are none."""
     dimension = parts.bodies[slave.body].dimension
     if tie.translation is None and tie.rotation is None:
@@ -356,7 +358,7 @@ def _repetition_problems(parts: Parts, where: str, tie: Tie, slave: Location, ma
             yield Problem(f"{where}.rotation.centre", turn.centre, f"must have {dimension} numbers")
 
 
-def _link_problems(parts: Parts) -> Iterator[Problem]:
+def _link_problems(parts: SoundTables) -> Iterator[Problem]:
     """Springs and dashpots."""
     links: list[tuple[str, Spring | Dashpot]] = [
         *((f"springs.{name}", link) for name, link in parts.springs.items()),
@@ -396,7 +398,7 @@ def _is_placeless(body: AnyBody) -> bool:
     return isinstance(body, MatrixBody) and body.mesh is None
 
 
-def _same(parts: Parts, first: PointRef, second: PointRef) -> bool:
+def _same(parts: SoundTables, first: PointRef, second: PointRef) -> bool:
     if first.node or second.node:
         return False  # known once the mesh is read
     ends = [position_of(parts.bodies[p.body], p) for p in (first, second)]
@@ -411,7 +413,7 @@ def position_of(body: AnyBody, point: PointRef) -> tuple[float, ...]:
     return point.coordinates
 
 
-def _phase_problems(parts: Parts) -> Iterator[Problem]:
+def _phase_problems(parts: SoundTables) -> Iterator[Problem]:
     seen: set[str] = set()
     moving = _moving(parts)
     for name in sorted(set(parts.supports) & set(parts.bodies)):
@@ -438,7 +440,7 @@ def _phase_problems(parts: Parts) -> Iterator[Problem]:
         yield from _factor_problems(parts, where, phase, moving)
 
 
-def _factor_problems(parts: Parts, where: str, phase: Phase | SteadyStep, moving: list[str]) -> Iterator[Problem]:
+def _factor_problems(parts: SoundTables, where: str, phase: Phase | SteadyStep, moving: list[str]) -> Iterator[Problem]:
     """Factors of loads and motions that are not there; moving: names of the motions."""
     for name, factor in phase.loads.items():
         if name not in parts.loads and not parts.is_broken("loads", name):
@@ -453,13 +455,13 @@ def _factor_problems(parts: Parts, where: str, phase: Phase | SteadyStep, moving
             yield Problem(f"{where}.velocities.{name}", factor, accepted)
 
 
-def _moving(parts: Parts) -> list[str]:
+def _moving(parts: SoundTables) -> list[str]:
     """Names of what moves with a prescribed velocity."""
     moving = [name for name, support in parts.supports.items() if support.velocity]
     return moving + [name for name, body in parts.bodies.items() if getattr(body, "sliding", None) is not None]
 
 
-def _steady_problems(parts: Parts) -> Iterator[Problem]:
+def _steady_problems(parts: SoundTables) -> Iterator[Problem]:
     steady = parts.steady
     if steady.friction == "sliding" and steady.steps:
         accepted = 'nothing – load steps have no effect where every contact slides; write friction = "stick-slip"'
@@ -486,7 +488,7 @@ def _steady_problems(parts: Parts) -> Iterator[Problem]:
             yield Problem(f"{where}.duration", step.duration, accepted)
 
 
-def _setting_problems(parts: Parts) -> Iterator[Problem]:
+def _setting_problems(parts: SoundTables) -> Iterator[Problem]:
     for where, pair in (
         ("modal.friction_range", parts.modal.friction_range),
         ("comparison.bracket", parts.comparison.bracket),
@@ -500,14 +502,14 @@ def _setting_problems(parts: Parts) -> Iterator[Problem]:
         yield from _point(parts, reference, f"temporal.watch.{number}")
 
 
-def _reference_problems(parts: Parts) -> Iterator[Problem]:
+def _reference_problems(parts: SoundTables) -> Iterator[Problem]:
     for name in parts.reference.bodies if parts.reference else ():
         if name not in parts.bodies and not parts.is_broken("bodies", name):
             yield Problem(f"reference.bodies.{name}", None, no_such("body", name, parts.names("bodies")))
 
 
 def _location(
-    parts: Parts, reference: str, where: str, *, boundary: bool = False
+    parts: SoundTables, reference: str, where: str, *, boundary: bool = False
 ) -> Generator[Problem, None, Location | None]:
     """The point or boundary, None where it cannot be known; yields the problem where it is the reference's fault."""
     head = reference.partition("@" if "@" in reference else ".")[0]
@@ -524,7 +526,7 @@ def _location(
     return location
 
 
-def _point(parts: Parts, reference: str, where: str) -> Generator[Problem, None, PointRef | None]:
+def _point(parts: SoundTables, reference: str, where: str) -> Generator[Problem, None, PointRef | None]:
     """The point, None where it cannot be known; yields the problem where it is the reference's fault."""
     head = reference.partition("@" if "@" in reference else ".")[0]
     if parts.is_broken("bodies", head):

@@ -25,7 +25,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
 @dataclass
-class _Location:
+class _WalkPosition:
     """Where the walk has come to: the path, the type wanted and the value written there, and what it must be.
 
     table: the table that the last key belongs to, with its alternatives where a tag chose it among several;
@@ -85,9 +85,9 @@ def problems_of(error: ValidationError, data: object, root: type[BaseModel]) -> 
     return list(found.values())
 
 
-def _reach(loc: Sequence[str | int], data: object, root: type[BaseModel]) -> _Location:
+def _reach(loc: Sequence[str | int], data: object, root: type[BaseModel]) -> _WalkPosition:
     """Follow a location of pydantic's as far as it names something that a user wrote or should write."""
-    location = _Location((), root, data)
+    location = _WalkPosition((), root, data)
     for step in loc:
         if step == "[key]":  # the key itself is wrong
             break
@@ -119,7 +119,7 @@ def _reach(loc: Sequence[str | int], data: object, root: type[BaseModel]) -> _Lo
     return location
 
 
-def _unknown_key(location: _Location) -> tuple[Problem, str]:
+def _unknown_key(location: _WalkPosition) -> tuple[Problem, str]:
     """The problem, and the key that was probably meant ("" if unclear)."""
     assert location.table is not None, "only tables have unknown keys"
     key, where, accepted = str(location.path[-1]), dotted(location.path), ", ".join(location.table.model_fields)
@@ -147,14 +147,14 @@ def _too_deep(
     return Problem(dotted((*path, key)), value, accepted)
 
 
-def _bad_key(location: _Location) -> Problem:
+def _bad_key(location: _WalkPosition) -> Problem:
     where, key = dotted(location.path), str(location.path[-1])
     if location.keys:
         return Problem(where, None, f"unknown key{choice(key, location.keys, 'accepted')}")
     return Problem(where, None, f"not a name; a name is {NAME_RULE}")
 
 
-def _bad_tag(location: _Location) -> Problem:
+def _bad_tag(location: _WalkPosition) -> Problem:
     tables = _tables(location.annotation)
     tag = next(name for name, field in tables[0].model_fields.items() if _words(field.annotation))
     where, given = dotted((*location.path, tag)), _item(location.value, tag)
@@ -167,7 +167,7 @@ def _bad_tag(location: _Location) -> Problem:
     return Problem(where, given, f"must be {accepted}{did_you_mean(suggestion)}")
 
 
-def _bad_value(location: _Location) -> Problem:
+def _bad_value(location: _WalkPosition) -> Problem:
     where, given = dotted(location.path), location.value
     tables = _tables(location.annotation)
     if len(tables) == 1 and not isinstance(given, Mapping):
@@ -175,7 +175,7 @@ def _bad_value(location: _Location) -> Problem:
     return Problem(where, given, f"must be {location.description}{_hint(location)}")
 
 
-def _hint(location: _Location) -> str:
+def _hint(location: _WalkPosition) -> str:
     """What probably went wrong with a value of the wrong kind, "" if unclear."""
     given, number = location.value, "number" in location.description
     if isinstance(given, str):

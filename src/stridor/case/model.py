@@ -10,7 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError, model_validator
 from ..errors import CaseError, Problem, kind_of
 from ..notebook import Shown, counted, html_table
 from .bodies import BeamBody, MatrixBody
-from .checks import Parts, problems_between, slave_side
+from .checks import SoundTables, problems_between, slave_side
 from .expression import parse_expression
 from .fields import Name
 from .given import as_written, plain
@@ -102,7 +102,7 @@ class Case(Shown, Table):
     def _fits_together(self) -> Case:
         # A CaseError is no ValueError: it passes through pydantic as it is.
         tables = {name: getattr(self, name) for name in type(self).model_fields if name not in ("title", "units")}
-        if problems := problems_between(Parts(**tables)):
+        if problems := problems_between(SoundTables(**tables)):
             raise CaseError.many(problems)
         return self
 
@@ -248,9 +248,9 @@ def _carried(
         yield present
 
 
-def _sound(data: Mapping[str, Any], error: ValidationError) -> Parts:
+def _sound(data: Mapping[str, Any], error: ValidationError) -> SoundTables:
     """What of the data is sound although the whole is not."""
-    parts = Parts()
+    parts = SoundTables()
     errors = error.errors(include_url=False, include_input=False)
     faults = {item["loc"][:2] for item in errors}
     unknown = [str(item["loc"][0]) for item in errors if item["type"] == "extra_forbidden" and len(item["loc"]) == 1]

@@ -2,8 +2,8 @@
 
 A slave node on a facet moves as the facet does at that place. Since the weights interpolate positions as well, any
 motion linear in the coordinates, a rotation or a constant strain, is carried over exactly. A node beside the master by
-a distance δ is an exception: a rotation θ then strains the slave by θ δ at that node. `Tie.point` says where to move
-such nodes before the matrices are made.
+a distance δ is an exception: a rotation θ then strains the slave by θ δ at that node. `NodeTies.point` says where to
+move such nodes before the matrices are made.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _SAME_DIRECTION = 0.5  # cosine between outward normals above which surfaces do 
 
 
 @dataclass(frozen=True)
-class Tie:
+class NodeTies:
     """s slave nodes on a master: displacement of the slave = Σ weights · displacement of nodes.
 
     nodes (s, r) in the master's numbering and weights (s, r), unused places holding node 0 with weight 0; point (s, d)
@@ -49,7 +49,7 @@ class Bond:
     """
 
     where: str
-    tie: Tie
+    tie: NodeTies
     slave: IntArray
     master: IntArray
     rotation: Array | None = None
@@ -65,7 +65,7 @@ class Bond:
         return replace(self, tie=replace(self.tie, weights=weights), rotation=rotation)
 
 
-def tie(slave_points: Array, master: MasterSurface, *, where: str, tolerance: float) -> Tie:
+def tie(slave_points: Array, master: MasterSurface, *, where: str, tolerance: float) -> NodeTies:
     """Places of slave points (s, d) [m] on the undisplaced master, as its facets interpolate.
 
     On a Curve the facets themselves count, straight or quadratic, not the spline through their nodes; on a
@@ -93,11 +93,11 @@ def tie(slave_points: Array, master: MasterSurface, *, where: str, tolerance: fl
             f"({at}) m; tie only nodes that lie on it, or set a larger tolerance"
         )
         raise CaseError(where, None, accepted)
-    return Tie(nodes, weights, point, distance)
+    return NodeTies(nodes, weights, point, distance)
 
 
 def check_facing(
-    slave_points: Array, slave_normals: Array, master: MasterSurface, found: Tie, *, where: str, limit: float
+    slave_points: Array, slave_normals: Array, master: MasterSurface, found: NodeTies, *, where: str, limit: float
 ) -> None:
     """Raise CaseError naming ``where`` unless the slave nodes (s, d) [m] with outward unit normals (s, d), NaN where a
     node has none, face the master, and lie within ``limit`` [m] of their places on it: an element, whatever tolerance

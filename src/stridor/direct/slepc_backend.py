@@ -33,7 +33,7 @@ OUT_OF_MEMORY = (-5, -7, -13, -19)
 SPACE, MOST_SPACE = 30, 20_000
 
 
-class Share:
+class ProcessShare:
     """What one process holds of a factorised matrix of PETSc. All processes make theirs, solve and free together.
 
     fault: MUMPS's INFOG(1:2), the same in all processes; where the first is negative there are no factors.
@@ -120,7 +120,7 @@ class Team:
         self.apart = self.ranks.size > 1 and words is not None and not self.ranks.alike(words)
         if self.apart:
             self.ranks, self._all = Ranks(only_this()), self.petsc.COMM_SELF
-        self._shares: dict[int, Share] = {}
+        self._shares: dict[int, ProcessShare] = {}
         self._numbers = itertools.count(1)
         self._lock = threading.RLock()
         self._forgotten: deque[int] = deque()
@@ -130,7 +130,7 @@ class Team:
             atexit.register(self._dismiss)
 
     # -- in the first process ------------------------------------------------------------------------------------------
-    def factorise(self, matrix: Sparse, symmetric: bool) -> tuple[int, Share]:
+    def factorise(self, matrix: Sparse, symmetric: bool) -> tuple[int, ProcessShare]:
         """A number for the factors of a matrix (csr), and this process's share of them."""
         self._require_counts(matrix)
         held = sp.csr_array(sp.triu(matrix, format="csr")) if symmetric else matrix
@@ -141,7 +141,7 @@ class Team:
                 self._free(self._forgotten.popleft())
             given = self._handed_out(number, held, symmetric)
             del held  # where there are factors, there is no memory to spare
-            self._shares[number] = share = Share(self.petsc, self._all, given, symmetric)
+            self._shares[number] = share = ProcessShare(self.petsc, self._all, given, symmetric)
         return number, share
 
     def _require_counts(self, matrix: Sparse) -> None:
@@ -228,7 +228,7 @@ class Team:
     def _obey(self, order: list[int]) -> bool:
         what, number = order[:2]
         if what == FACTORISE:
-            self._shares[number] = Share(self.petsc, self._all, self._received(*order[2:5]), bool(order[3]))
+            self._shares[number] = ProcessShare(self.petsc, self._all, self._received(*order[2:5]), bool(order[3]))
         elif what == SOLVE:
             n, wide, transpose = order[2:5]
             first, end = self.ranks.bounds(n)[self.ranks.number :][:2]

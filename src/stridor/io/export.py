@@ -96,15 +96,15 @@ def export(
         raise CaseError("format", format, f"one of {', '.join(FORMATS)}")
     chosen, work, target = format, Workspace.of(problem), Path(folder)
     mine = [target / name for name in dict.fromkeys((*(file_of(n, chosen) for n in _NAMES), *_TABLES))]
-    there = [path for path in mine if path.exists()]
-    if there and not force:
-        more = f" and {len(there) - 1} more files" if len(there) > 1 else ""
-        held = f"{target} holds {there[0].name}{more} of an earlier export"
+    existing = [path for path in mine if path.exists()]
+    if existing and not force:
+        more = f" and {len(existing) - 1} more files" if len(existing) > 1 else ""
+        held = f"{target} holds {existing[0].name}{more} of an earlier export"
         raise CaseError("folder", None, f"{held}; take another folder, or replace them (--force)")
     model = exported_model(work, mu)
     with claimed(target):
         written = _written(work, model, target, chosen)
-        for path in set(there) - set(written.files):
+        for path in set(existing) - set(written.files):
             # Matrices of an earlier export would be taken for those of this one.
             path.unlink()
     return written

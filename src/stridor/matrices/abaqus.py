@@ -21,7 +21,7 @@ from .checks import chosen_in_any_case, nameless
 from .entries import assembled, check_symmetric, mirrored, sides
 from .model import Labels, Role, StoredMatrix
 from .numbers import fortran_number
-from .source import Source, counted, printable, source_at, unended
+from .source import MatrixFile, counted, printable, source_at, unended
 
 # Where *BOUNDARY holds a freedom Abaqus writes 1e36 on the diagonal of the stiffness. A factor may have made that
 # smaller, but no stiffness is as large as this.
@@ -87,7 +87,7 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     return StoredMatrix(matrix, path.name, labels, role, form, section.name or None, notes + unended(data))
 
 
-def _role(source: Source) -> Role | None:
+def _role(source: MatrixFile) -> Role | None:
     """What the name of the file says. Raises CaseError for what is no matrix of M, C or K."""
     found = _KIND.findall(source.path.name.upper().split(".")[0])
     kind = found[-1] if found else ""
@@ -101,7 +101,7 @@ def _role(source: Source) -> Role | None:
     return _ROLES.get(kind)
 
 
-def _sections(source: Source, data: bytes) -> list[_Section]:
+def _sections(source: MatrixFile, data: bytes) -> list[_Section]:
     """What stands between keyword lines; comments (**) are left out."""
     found = [_Section()]
     start = 0
@@ -128,7 +128,7 @@ def _sections(source: Source, data: bytes) -> list[_Section]:
     return found
 
 
-def _refuse_keyword(source: Source, number: int, text: str, keyword: str) -> NoReturn:
+def _refuse_keyword(source: MatrixFile, number: int, text: str, keyword: str) -> NoReturn:
     if keyword == "CLOAD":
         source.refuse_line(number, text, "the file holds loads, no matrix")
     if keyword in ("USER ELEMENT", "MATRIX"):
@@ -139,7 +139,7 @@ def _refuse_keyword(source: Source, number: int, text: str, keyword: str) -> NoR
     source.refuse_line(number, text, "only *MATRIX INPUT and comments (**) may stand between lines of a matrix")
 
 
-def _chosen(sections: list[_Section], name: str | None, source: Source) -> _Section:
+def _chosen(sections: list[_Section], name: str | None, source: MatrixFile) -> _Section:
     names = [s.name or f"matrix {k}" for k, s in enumerate(sections, 1)]
     if len(sections) == 1 and (name is None or not sections[0].name):
         nameless(source, name)
@@ -147,7 +147,7 @@ def _chosen(sections: list[_Section], name: str | None, source: Source) -> _Sect
     return sections[names.index(chosen_in_any_case(source, name, names))]
 
 
-def _scale(section: _Section, source: Source) -> float:
+def _scale(section: _Section, source: MatrixFile) -> float:
     given = (section.options or {}).get("SCALE FACTOR", (section.options or {}).get("SCALEFACTOR", "1"))
     value = fortran_number(given)
     if value == 0.0 or not math.isfinite(value):
@@ -156,7 +156,7 @@ def _scale(section: _Section, source: Source) -> float:
 
 
 def _formed(
-    matrix: Sparse, section: _Section, rows: IntArray, columns: IntArray, source: Source
+    matrix: Sparse, section: _Section, rows: IntArray, columns: IntArray, source: MatrixFile
 ) -> tuple[Sparse, Literal["symmetric", "general"], tuple[str, ...]]:
     """The whole matrix, whether it is "symmetric" or "general", and notes: as its header says, else as its entries
     show."""
@@ -206,7 +206,7 @@ def _numbered(table: Array) -> tuple[IntArray, IntArray, Labels]:
     return index[:count], index[count:], Labels(node[at], direction[at])
 
 
-def _table(source: Source, data: bytes, spans: list[tuple[int, int]]) -> tuple[Array | None, int]:
+def _table(source: MatrixFile, data: bytes, spans: list[tuple[int, int]]) -> tuple[Array | None, int]:
     """All lines (k, 5) or (k, 3), and which."""
     width = 0
     held: list[Array] = []
@@ -228,7 +228,7 @@ def _table(source: Source, data: bytes, spans: list[tuple[int, int]]) -> tuple[A
     return (np.concatenate(held) if held else None), width
 
 
-def _refuse_width(source: Source, data: bytes, at: int, line: bytes, width: int) -> NoReturn:
+def _refuse_width(source: MatrixFile, data: bytes, at: int, line: bytes, width: int) -> NoReturn:
     number = data.count(b"\n", 0, at) + 1
     words = printable(line).replace(",", " ").split()
     if width in (4, 6) and all(math.isfinite(fortran_number(word)) for word in words):
@@ -271,7 +271,7 @@ def _limits(width: int) -> tuple[Array, Array]:
     return low, np.array([_LARGEST_NODE, _LARGEST_FREEDOM] * 2, dtype=float)
 
 
-def _slow(source: Source, data: bytes, start: int, text: bytes, width: int) -> Array:
+def _slow(source: MatrixFile, data: bytes, start: int, text: bytes, width: int) -> Array:
     """The same, line by line, for the sake of the line that is wrong. Raises CaseError."""
     lowest, highest = _limits(width)
     table: list[list[float]] = []

@@ -15,7 +15,7 @@ from .checks import nameless, whole_numbers
 from .entries import assembled, from_half
 from .model import Labels, Role, StoredMatrix
 from .numbers import whole_number
-from .source import Source, beside, quoted, source_at
+from .source import MatrixFile, beside, quoted, source_at
 from .tables import read_numbers
 
 _ROLES: dict[str, Role] = {".sti": "stiffness", ".mas": "mass"}
@@ -50,7 +50,7 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     return StoredMatrix(matrix, path.name, labels, role, "symmetric", notes=notes + half + more)
 
 
-def _labels(source: Source, size: int) -> tuple[Labels | None, int, tuple[str, ...]]:
+def _labels(source: MatrixFile, size: int) -> tuple[Labels | None, int, tuple[str, ...]]:
     """Labels from the .dof file beside the matrix, how many freedoms there are, and notes; size: the largest index."""
     names = beside(source, *(source.path.with_suffix(s).name for s in (".dof", ".DOF")))
     if names is None:
@@ -67,7 +67,7 @@ def _labels(source: Source, size: int) -> tuple[Labels | None, int, tuple[str, .
     return Labels(node, direction), len(node), ()
 
 
-def _freedoms(source: Source, text: bytes) -> tuple[IntArray, IntArray]:
+def _freedoms(source: MatrixFile, text: bytes) -> tuple[IntArray, IntArray]:
     """Nodes and directions from lines "node.direction". Raises CaseError."""
     nodes: list[int] = []
     directions: list[int] = []

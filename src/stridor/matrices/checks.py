@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 
 from ..typing import Array, IntArray
-from .source import Source, counted
+from .source import MatrixFile, counted
 
 # A damping matrix of a few dashpots has fewer entries than rows; beyond this many rows that is taken for an error.
 _MOST_ROWS = 10_000_000
 _MOST_LISTED = 12
 
 
-def nameless(source: Source, name: str | None, held: str | None = None) -> None:
+def nameless(source: MatrixFile, name: str | None, held: str | None = None) -> None:
     """Raises CaseError if a matrix is asked for by a name in a file that holds one, of no name or of the name held."""
     if name is not None and name.strip().lower() != (held or "").lower():
         known = f"its name is {held}" if held else "it has no name"
         source.refuse(f"holds one matrix only, and {known}; leave out the name {name!r}")
 
 
-def chosen(source: Source, name: str | None, names: Mapping[str, bool], others: str = "") -> str:
+def chosen(source: MatrixFile, name: str | None, names: Mapping[str, bool], others: str = "") -> str:
     """The name of the matrix that is meant; names: whether each candidate has several rows and columns.
 
     Without a name it is the only candidate, or the only one that is no vector and no single number. others: what else
@@ -40,7 +40,7 @@ def chosen(source: Source, name: str | None, names: Mapping[str, bool], others: 
     return found[0]
 
 
-def chosen_in_any_case(source: Source, name: str | None, names: Iterable[str]) -> str:
+def chosen_in_any_case(source: MatrixFile, name: str | None, names: Iterable[str]) -> str:
     """The same where capitals make no difference, and every name is that of a matrix. Raises CaseError for one that
     several matrices have."""
     held = list(names)
@@ -57,7 +57,7 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(held[:_MOST_LISTED]) + more or "none"
 
 
-def real_part(source: Source, values: Any) -> Any:
+def real_part(source: MatrixFile, values: Any) -> Any:
     """Values as they are, or their real part. Raises CaseError for what are no numbers, or have imaginary parts."""
     kind = values.dtype.kind
     if kind == "c":
@@ -72,7 +72,7 @@ def real_part(source: Source, values: Any) -> Any:
     return values
 
 
-def real_values(source: Source, values: Any, location: Callable[[int], str] = "value {}".format) -> Array:
+def real_values(source: MatrixFile, values: Any, location: Callable[[int], str] = "value {}".format) -> Array:
     """Finite doubles of the shape of values. Raises CaseError for what are no numbers, complex or not finite ones.
 
     location: says in words where the k-th value stands, from 1.
@@ -86,7 +86,7 @@ def real_values(source: Source, values: Any, location: Callable[[int], str] = "v
     return real
 
 
-def whole_numbers(source: Source, values: Any, what: str) -> IntArray:
+def whole_numbers(source: MatrixFile, values: Any, what: str) -> IntArray:
     """Values (k,) as int64. Raises CaseError where one is no whole number, or too large to be told from the next."""
     if values.ndim != 1 or values.dtype.kind not in "iuf":
         source.refuse(f"its {what} are no list of whole numbers")
@@ -97,7 +97,7 @@ def whole_numbers(source: Source, values: Any, what: str) -> IntArray:
     return values.astype(np.int64)
 
 
-def square(source: Source, rows: int, columns: int) -> int:
+def square(source: MatrixFile, rows: int, columns: int) -> int:
     """The size of a matrix that is square and not empty. Raises CaseError otherwise."""
     if rows != columns or rows < 1:
         empty = "" if rows and columns else " and not empty"
@@ -105,7 +105,7 @@ def square(source: Source, rows: int, columns: int) -> int:
     return rows
 
 
-def check_size(source: Source, size: int, entries: int) -> None:
+def check_size(source: MatrixFile, size: int, entries: int) -> None:
     """Raises CaseError for a matrix of so many rows that so few entries cannot be all of it."""
     # Rows without entries cost nothing in a file, but memory here.
     if size > max(_MOST_ROWS, entries):
@@ -113,7 +113,7 @@ def check_size(source: Source, size: int, entries: int) -> None:
         source.refuse(f"claims {size} rows but holds only {held}; it must have broken off")
 
 
-def check_indices(source: Source, row: IntArray, column: IntArray, size: int, first: int) -> None:
+def check_indices(source: MatrixFile, row: IntArray, column: IntArray, size: int, first: int) -> None:
     """Raises CaseError for entries (k,), counted from 0, outside of a matrix; first: what the file counts from."""
     wrong = np.flatnonzero((row < 0) | (row >= size) | (column < 0) | (column >= size))
     if len(wrong):
@@ -122,7 +122,7 @@ def check_indices(source: Source, row: IntArray, column: IntArray, size: int, fi
         source.refuse(f"{entry} lies outside of the matrix of {size} rows and columns, which are counted from {first}")
 
 
-def expanded(source: Source, pointers: Any, count: int, lines: int, first: int = 0) -> IntArray:
+def expanded(source: MatrixFile, pointers: Any, count: int, lines: int, first: int = 0) -> IntArray:
     """Which row (or column) each entry belongs to, from 0, by pointers (lines + 1,) that count from the first.
 
     count: entries that there are. Raises CaseError for pointers that do not fit.

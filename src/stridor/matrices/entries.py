@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from ..typing import Array, IntArray, Sparse
 from .checks import check_indices, check_size, real_part, real_values, square
-from .source import Source
+from .source import MatrixFile
 
 # Halves that a program prints twice differ by rounding at most.
 _SAME = 1e-9
@@ -17,7 +17,7 @@ _BLOCK = 1 << 22  # values of a full matrix that are looked at together
 
 
 def assembled(
-    source: Source, row: IntArray, column: IntArray, values: Any, shape: tuple[int, int], first: int = 1
+    source: MatrixFile, row: IntArray, column: IntArray, values: Any, shape: tuple[int, int], first: int = 1
 ) -> tuple[Sparse, tuple[str, ...]]:
     """Entries (k,), counted from 0, as a csr matrix with sorted columns, and what is to be noted about it.
 
@@ -42,7 +42,7 @@ def assembled(
     return matrix, ((noted,) if twice else ())
 
 
-def from_dense(source: Source, values: Any) -> Sparse:
+def from_dense(source: MatrixFile, values: Any) -> Sparse:
     """A square array (n, n) as a csr matrix of what is not 0. Raises CaseError."""
     if values.ndim != 2:
         source.refuse(f"is an array of {values.ndim} dimensions; must be a square matrix of 2")
@@ -74,7 +74,7 @@ def _filled(block: Array) -> Sparse:
 
 
 def from_half(
-    source: Source, row: IntArray, column: IntArray, values: Any, shape: tuple[int, int], sign: int = 1
+    source: MatrixFile, row: IntArray, column: IntArray, values: Any, shape: tuple[int, int], sign: int = 1
 ) -> tuple[Sparse, tuple[str, ...]]:
     """As `assembled`, for entries of one half: the other half is the transpose times sign.
 
@@ -105,7 +105,7 @@ def sides(matrix: Sparse) -> tuple[int, int]:
     return both, int(pattern.nnz) - both
 
 
-def check_symmetric(source: Source, matrix: Sparse, *, stored_only: bool, says: str, instead: str) -> None:
+def check_symmetric(source: MatrixFile, matrix: Sparse, *, stored_only: bool, says: str, instead: str) -> None:
     """Raises CaseError where entries that mirror each other differ, though the file says otherwise.
 
     stored_only: an entry without counterpart says nothing; otherwise the counterpart is zero. says, instead: what the

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import CaseError
 from ..typing import Array
 from .numbers import fortran_number
-from .source import Source, quoted
+from .source import MatrixFile, quoted
 
 _MOST_COLUMNS = 4096
 _SPARE_COLUMNS = 256
@@ -45,7 +45,7 @@ class Format:
         return -(-count // len(self.starts))
 
 
-def formats_in(source: Source, text: str) -> list[str]:
+def formats_in(source: MatrixFile, text: str) -> list[str]:
     """The first three groups in brackets of the fourth line."""
     found: list[str] = []
     depth, begin = 0, 0
@@ -62,7 +62,7 @@ def formats_in(source: Source, text: str) -> list[str]:
     return found[:3]
 
 
-def format_of(source: Source, text: str) -> Format:
+def format_of(source: MatrixFile, text: str) -> Format:
     """What a format such as (1P,5D16.8) means. Raises CaseError for one that is not of equal fields."""
     bad = f"line 4: the format {text[:40]} is not understood; accepted are such as (8I10), (1P,5D16.8), (4(1X,E20.12))"
     inner = "".join(text.upper().split())[1:-1]
@@ -99,7 +99,7 @@ def format_of(source: Source, text: str) -> Format:
 
 
 def cut(
-    source: Source, lines: list[bytes], layout: Format, count: int, before: int, what: str
+    source: MatrixFile, lines: list[bytes], layout: Format, count: int, before: int, what: str
 ) -> tuple[Array, tuple[str, ...]]:
     """Numbers (count,) of a format from lines, and what is to be noted about them.
 
@@ -128,7 +128,7 @@ def _one_less(lines: list[bytes], layout: Format, count: int) -> Format | None:
     return replace(layout, starts=tuple(range(0, many * width, width)), width=width)
 
 
-def _cut(source: Source, lines: list[bytes], layout: Format, count: int, before: int, what: str) -> Array:
+def _cut(source: MatrixFile, lines: list[bytes], layout: Format, count: int, before: int, what: str) -> Array:
     """Numbers (count,) by the columns of a format. Raises CaseError."""
     longest = max(map(len, lines))
     if longest > layout.end + _SPARE_COLUMNS:

@@ -15,7 +15,7 @@ from .entries import assembled, from_half
 from .fortran_format import cut, format_of, formats_in
 from .model import Labels, StoredMatrix
 from .numbers import whole_number
-from .source import Source, beside, printable, quoted, source_at, unended
+from .source import MatrixFile, beside, printable, quoted, source_at, unended
 
 _DIRECTIONS = {"UX": 1, "UY": 2, "UZ": 3, "ROTX": 4, "ROTY": 5, "ROTZ": 6}
 _PARTS = ("pointers", "row indices", "values")
@@ -59,7 +59,7 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
 
 
 def _numbers(
-    source: Source, lines: list[bytes], formats: str, cards: list[int], needed: tuple[int, ...]
+    source: MatrixFile, lines: list[bytes], formats: str, cards: list[int], needed: tuple[int, ...]
 ) -> tuple[list[Array], tuple[str, ...]]:
     """Pointers, row indices and values: so many as needed, in so many lines as the cards (all, …) say, one after the
     other; and notes. Raises CaseError."""
@@ -86,7 +86,7 @@ def _numbers(
 
 
 def _matrix(
-    source: Source, kind: str, shape: tuple[int, int], parts: list[Array]
+    source: MatrixFile, kind: str, shape: tuple[int, int], parts: list[Array]
 ) -> tuple[Sparse, tuple[str, ...]]:
     pointers, indices, numbers = parts
     values = numbers[0::2] + 1j * numbers[1::2] if kind[0] == "C" else numbers
@@ -99,7 +99,7 @@ def _matrix(
     return from_half(source, row, column, values, shape, -1 if kind[1] == "Z" else 1)
 
 
-def _check_kind(source: Source, kind: str, rows: int, columns: int, elements: int) -> None:
+def _check_kind(source: MatrixFile, kind: str, rows: int, columns: int, elements: int) -> None:
     """Raises CaseError for a type of matrix that is not read."""
     if len(kind) != 3 or kind[0] not in "RCPIQ" or kind[1] not in "SUHZR" or kind[2] not in "AE":
         source.refuse(f"line 3: {kind!r} is no type of matrix, such as RUA or RSA")
@@ -110,7 +110,7 @@ def _check_kind(source: Source, kind: str, rows: int, columns: int, elements: in
     square(source, rows, columns)
 
 
-def _counts(source: Source, text: str, number: int, least: int) -> list[int]:
+def _counts(source: MatrixFile, text: str, number: int, least: int) -> list[int]:
     """Whole numbers of a line of the head, in fields of 14 columns. Raises CaseError."""
     counts = [count for word in text.split() if (count := whole_number(word)) is not None]
     if len(counts) < max(least, len(text.split())):
@@ -118,7 +118,7 @@ def _counts(source: Source, text: str, number: int, least: int) -> list[int]:
     return counts
 
 
-def _labels(source: Source, size: int) -> Labels | None:
+def _labels(source: MatrixFile, size: int) -> Labels | None:
     """Labels from the .mapping file beside the matrix, None if there is none. Raises CaseError if it does not fit."""
     path = source.path
     stems = (path.with_suffix(".mapping"), path.with_suffix(".MAPPING"), path.with_name(path.name + ".mapping"))

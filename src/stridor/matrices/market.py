@@ -14,7 +14,7 @@ from .checks import nameless, real_values, square, whole_numbers
 from .entries import assembled, from_half
 from .model import StoredMatrix
 from .numbers import whole_number
-from .source import Source, Stream, quoted, source_at
+from .source import MatrixFile, Stream, quoted, source_at
 from .tables import LONGEST_LINE, read_numbers
 
 _BANNER = b"%%matrixmarket"
@@ -54,7 +54,7 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     return StoredMatrix(matrix, source.path.name, form=form, notes=notes + more)
 
 
-def _banner(source: Source, text: bytes) -> tuple[str, str, str]:
+def _banner(source: MatrixFile, text: bytes) -> tuple[str, str, str]:
     """Layout, field and symmetry from the first line. Raises CaseError."""
     words = text.lower().split()
     if not words or words[0] != _BANNER:
@@ -74,7 +74,7 @@ def _banner(source: Source, text: bytes) -> tuple[str, str, str]:
     return given[1], given[2], given[3]
 
 
-def _sizes(source: Source, stream: Stream, needed: int) -> tuple[int, list[int]]:
+def _sizes(source: MatrixFile, stream: Stream, needed: int) -> tuple[int, list[int]]:
     """The number of the line with the sizes, and these: rows, columns and perhaps entries. Raises CaseError."""
     line, text = 1, b""
     while not text or text.startswith(b"%"):

@@ -15,7 +15,7 @@ from . import matlab_hdf5, matlab_older
 from .checks import chosen
 from .matlab_variable import Variable
 from .model import StoredMatrix
-from .source import Source, source_at
+from .source import MatrixFile, source_at
 
 
 def read(path: Path, name: str | None, where: str) -> StoredMatrix:
@@ -43,7 +43,7 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
         source.unreadable("a MATLAB .mat file", error)
 
 
-def _stored(source: Source, name: str | None, held: dict[str, Variable], others: dict[str, str]) -> StoredMatrix:
+def _stored(source: MatrixFile, name: str | None, held: dict[str, Variable], others: dict[str, str]) -> StoredMatrix:
     """The matrix meant; held: matrices by their dotted names; others: kind of each variable that is none."""
     if name in others:
         kind = others[str(name)]

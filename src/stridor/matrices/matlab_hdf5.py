@@ -11,14 +11,14 @@ import numpy as np
 from .checks import expanded, square, whole_numbers
 from .entries import assembled, from_dense
 from .matlab_variable import DEEPEST, NUMERIC, Loaded, Variable
-from .source import Source
+from .source import MatrixFile
 
 # What gzip can make of a byte is a little over 1000 bytes.
 _MOST_PACKED = 1100
 _MOST_VARIABLES = 10_000
 
 
-def variables(source: Source, file: Any) -> tuple[dict[str, Variable], dict[str, str]]:
+def variables(source: MatrixFile, file: Any) -> tuple[dict[str, Variable], dict[str, str]]:
     """Matrices by their dotted names, and the kinds of what is none; file: an h5py.File. Raises CaseError."""
     held: dict[str, Variable] = {}
     others: dict[str, str] = {}
@@ -28,7 +28,7 @@ def variables(source: Source, file: Any) -> tuple[dict[str, Variable], dict[str,
     return held, others
 
 
-def _walk(source: Source, group: Any, path: str, held: dict[str, Variable], others: dict[str, str]) -> None:
+def _walk(source: MatrixFile, group: Any, path: str, held: dict[str, Variable], others: dict[str, str]) -> None:
     """Finds matrices of numbers by their dotted names, and the kinds of what is none."""
     for key in group:
         # Names with # are MATLAB's own stores of cells and objects. Links may lead out of the file.
@@ -63,7 +63,7 @@ def _attribute(item: Any, key: str) -> str:
     return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _sparse_shape(source: Source, group: Any) -> tuple[int, int]:
+def _sparse_shape(source: MatrixFile, group: Any) -> tuple[int, int]:
     """Rows and columns of a sparse matrix. Raises CaseError."""
     rows = np.ravel(group.attrs["MATLAB_sparse"])
     if len(rows) != 1 or rows.dtype.kind not in "iu":
@@ -74,12 +74,12 @@ def _sparse_shape(source: Source, group: Any) -> tuple[int, int]:
     return int(rows[0]), jc.shape[0] - 1
 
 
-def _full(item: Any, source: Source) -> Loaded:
+def _full(item: Any, source: MatrixFile) -> Loaded:
     # MATLAB stores by columns, HDF5 by rows: what is read is the transpose.
     return from_dense(source, _numbers(source, item, 2).T), ()
 
 
-def _sparse(group: Any, source: Source) -> Loaded:
+def _sparse(group: Any, source: MatrixFile) -> Loaded:
     """A sparse matrix, which is stored by columns: jc points into ir (row indices) and data. Raises CaseError."""
     size = square(source, *_sparse_shape(source, group))
     pointers = whole_numbers(source, _numbers(source, group["jc"], 1), "pointers")
@@ -95,7 +95,7 @@ def _sparse(group: Any, source: Source) -> Loaded:
     return assembled(source, row[: len(column)], column, values[: len(column)], (size, size))
 
 
-def _numbers(source: Source, item: Any, dimensions: int) -> Any:
+def _numbers(source: MatrixFile, item: Any, dimensions: int) -> Any:
     """The values of a dataset. Raises CaseError before reading if they cannot be in the file."""
     if not isinstance(item, h5py.Dataset) or len(item.shape or ()) != dimensions:
         source.refuse(f"is not stored as MATLAB stores it: its values are no array of {dimensions} dimensions")

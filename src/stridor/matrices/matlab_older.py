@@ -14,7 +14,7 @@ import numpy as np
 from .checks import expanded, square, whole_numbers
 from .entries import assembled, from_dense
 from .matlab_variable import DEEPEST, INTEGERS, NUMERIC, Loaded, Variable
-from .source import Source
+from .source import MatrixFile
 
 _PRECISIONS_4 = {0: "f8", 1: "f4", 2: "i4", 3: "i2", 4: "u2", 5: "u1"}
 _TYPES_5 = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
@@ -25,7 +25,7 @@ _BEFORE = ("unknown", "cell", "struct", "object", "char", "sparse", "double", "s
 _CLASSES_5 = (*_BEFORE, *INTEGERS, "function", "opaque", "object")
 
 
-def variables(source: Source, data: bytes) -> tuple[dict[str, Variable], dict[str, str]]:
+def variables(source: MatrixFile, data: bytes) -> tuple[dict[str, Variable], dict[str, str]]:
     """Matrices by their dotted names, and the kinds of what is none. Raises CaseError."""
     held: dict[str, Variable] = {}
     others: dict[str, str] = {}
@@ -51,7 +51,7 @@ def _sort_in(
                 _sort_in(f"{key}.{field}", inner, held, others, depth + 1)
 
 
-def _version_4(source: Source, data: bytes) -> Iterator[tuple[str, Variable]]:
+def _version_4(source: MatrixFile, data: bytes) -> Iterator[tuple[str, Variable]]:
     """Variables by name: a head of five whole numbers, the name, the values by columns."""
     at = 0
     while at < len(data):
@@ -82,14 +82,14 @@ def _version_4(source: Source, data: bytes) -> Iterator[tuple[str, Variable]]:
             yield key, Variable("double", (rows, columns), partial(_full, full))
 
 
-def _triplets_4(source: Source, values: Any, rows: int, columns: int) -> Variable:
+def _triplets_4(source: MatrixFile, values: Any, rows: int, columns: int) -> Variable:
     """A sparse matrix of version 4: row, column, value and perhaps imaginary part, the sizes in the last row."""
     if columns not in (3, 4) or rows < 1 or values.size != rows * columns:
         source.refuse(f"is no .mat file of version 4: a sparse matrix has {columns} columns of numbers; must be 3 or 4")
     table = values.reshape((rows, columns), order="F")
     size = whole_numbers(source, table[-1, :2], "rows and columns")
 
-    def load(source: Source) -> Loaded:
+    def load(source: MatrixFile) -> Loaded:
         row, column = (whole_numbers(source, table[:-1, k], ("row", "column")[k] + " indices") - 1 for k in range(2))
         numbers = table[:-1, 2] + (1j * table[:-1, 3] if columns == 4 else 0)
         return assembled(source, row, column, numbers, (int(size[0]), int(size[1])))
@@ -97,7 +97,7 @@ def _triplets_4(source: Source, values: Any, rows: int, columns: int) -> Variabl
     return Variable("sparse", (int(size[0]), int(size[1])), load)
 
 
-def _full(values: Any, source: Source) -> Loaded:
+def _full(values: Any, source: MatrixFile) -> Loaded:
     return from_dense(source, values), ()
 
 
@@ -105,7 +105,7 @@ def _full(values: Any, source: Source) -> Loaded:
 class _Elements:
     """The elements of a version 5 file or of one of its variables, in turn."""
 
-    source: Source
+    source: MatrixFile
     data: bytes
     order: str
     at: int = 0
@@ -138,7 +138,7 @@ class _Elements:
         return np.frombuffer(content, dtype)
 
 
-def _version_5(source: Source, data: bytes) -> Iterator[tuple[str, Variable]]:
+def _version_5(source: MatrixFile, data: bytes) -> Iterator[tuple[str, Variable]]:
     """Variables by name, from elements that may be packed by zlib."""
     orders = {b"IM": "<", b"MI": ">"}
     if len(data) < 128 or data[126:128] not in orders:
@@ -157,7 +157,7 @@ def _version_5(source: Source, data: bytes) -> Iterator[tuple[str, Variable]]:
             yield key, variable
 
 
-def _unpacked(source: Source, content: bytes, before: int) -> bytes:
+def _unpacked(source: MatrixFile, content: bytes, before: int) -> bytes:
     """A variable that is packed by zlib; before: bytes that others were unpacked to. Raises CaseError."""
     unpacker = zlib.decompressobj()
     data = bytearray()
@@ -170,7 +170,7 @@ def _unpacked(source: Source, content: bytes, before: int) -> bytes:
     return bytes(data)
 
 
-def _variable_5(source: Source, content: bytes, order: str) -> tuple[str, Variable]:
+def _variable_5(source: MatrixFile, content: bytes, order: str) -> tuple[str, Variable]:
     """The name of a variable, and what it is. Raises CaseError."""
     if not content:  # an empty field of a struct
         return "", Variable("double", (0, 0), partial(_full, np.zeros((0, 0))))
@@ -213,7 +213,7 @@ def _fields_5(inner: _Elements) -> dict[str, Variable]:
     return found
 
 
-def _values_5(inner: _Elements, kind: str, shape: tuple[int, ...], is_complex: bool, source: Source) -> Loaded:
+def _values_5(inner: _Elements, kind: str, shape: tuple[int, ...], is_complex: bool, source: MatrixFile) -> Loaded:
     """A full or sparse matrix. Raises CaseError."""
     row = inner.numbers() if kind == "sparse" else None
     pointers = inner.numbers() if kind == "sparse" else None
@@ -236,5 +236,5 @@ def _values_5(inner: _Elements, kind: str, shape: tuple[int, ...], is_complex: b
     return assembled(source, held[: len(column)], column, values[: len(column)], (size, size))
 
 
-def _size(source: Source) -> int:
+def _size(source: MatrixFile) -> int:
     return source.path.stat().st_size

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..typing import Sparse
-from .source import Source
+from .source import MatrixFile
 
 INTEGERS = ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
 NUMERIC = ("double", "single", "sparse", *INTEGERS)
@@ -22,7 +22,7 @@ class Variable:
 
     kind: str
     shape: tuple[int, ...]
-    load: Callable[[Source], Loaded] | None = None
+    load: Callable[[MatrixFile], Loaded] | None = None
     fields: Callable[[], dict[str, Variable]] = dict
 
     @property

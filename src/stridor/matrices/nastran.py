@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from ..typing import Sparse
 from .model import Labels, Role, StoredMatrix
-from .source import Source
+from .source import MatrixFile
 
 SYMMETRIC = 6
 LARGEST_GRID = 2**31 - 1
@@ -14,7 +14,7 @@ REAL = (1, 2)
 _NOTE = "The matrix is stored as complex numbers; all imaginary parts are 0."
 
 
-def check_form(source: Source, form: int, accepted: tuple[int, ...], forms: Mapping[int, str]) -> None:
+def check_form(source: MatrixFile, form: int, accepted: tuple[int, ...], forms: Mapping[int, str]) -> None:
     """Raises CaseError for a form that is not accepted; forms: what the others are called."""
     if form not in accepted:
         shown = f"{form} ({forms[form]})" if form in forms else f"{form}, which is not known"
@@ -22,7 +22,7 @@ def check_form(source: Source, form: int, accepted: tuple[int, ...], forms: Mapp
 
 
 def named(
-    source: Source, matrix: Sparse, labels: Labels | None, form: int, kind: int, notes: tuple[str, ...]
+    source: MatrixFile, matrix: Sparse, labels: Labels | None, form: int, kind: int, notes: tuple[str, ...]
 ) -> StoredMatrix:
     """A matrix with what its name, form and kind say."""
     roles: dict[str, Role] = {"K": "stiffness", "M": "mass", "B": "damping"}

@@ -11,7 +11,7 @@ from .entries import assembled, check_symmetric, mirrored, sides, symmetric_part
 from .model import StoredMatrix
 from .nastran import SYMMETRIC, check_form, named
 from .op4_records import Header, records
-from .source import Source, source_at
+from .source import MatrixFile, source_at
 
 _ACCEPTED = (1, 2, SYMMETRIC)  # square ones are written as rectangular, too
 _FORMS = {3: "diagonal", 4: "lower triangle", 5: "upper triangle", 8: "identity", 9: "pseudo identity"}
@@ -42,12 +42,12 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     return _stored(source.of(found[0].name), *found)
 
 
-def _check(source: Source, header: Header) -> None:
+def _check(source: MatrixFile, header: Header) -> None:
     check_form(source, header.form, _ACCEPTED, _FORMS)
     square(source, abs(header.rows), header.columns)
 
 
-def _stored(source: Source, header: Header, values: tuple[IntArray, IntArray, Any]) -> StoredMatrix:
+def _stored(source: MatrixFile, header: Header, values: tuple[IntArray, IntArray, Any]) -> StoredMatrix:
     matrix, notes = assembled(source, *values, (header.columns, header.columns))
     # Columns are written from their first entry to their last, zeros between included.
     matrix.eliminate_zeros()
@@ -57,7 +57,7 @@ def _stored(source: Source, header: Header, values: tuple[IntArray, IntArray, An
     return named(source, matrix, None, header.form, header.kind, notes)
 
 
-def _whole(source: Source, matrix: Sparse) -> tuple[Sparse, tuple[str, ...]]:
+def _whole(source: MatrixFile, matrix: Sparse) -> tuple[Sparse, tuple[str, ...]]:
     """A matrix that is marked as symmetric. Raises CaseError where it is not."""
     both, alone = sides(matrix)
     if alone and not both:

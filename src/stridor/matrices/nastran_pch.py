@@ -19,7 +19,7 @@ from .entries import assembled, check_symmetric, mirrored, sides
 from .model import Labels, StoredMatrix
 from .nastran import LARGEST_GRID, REAL, SYMMETRIC, check_form, named
 from .numbers import fortran_number, whole_number
-from .source import Source, printable, source_at, unended
+from .source import MatrixFile, printable, source_at, unended
 
 _FIRST_ENTRY = 4  # name, grid and component of the column, nothing
 _ACCEPTED = (1, SYMMETRIC)
@@ -74,7 +74,7 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     return _stored(source.of(key), matrices[key.upper()], unended(data))
 
 
-def _stored(source: Source, found: _Matrix, notes: tuple[str, ...]) -> StoredMatrix:
+def _stored(source: MatrixFile, found: _Matrix, notes: tuple[str, ...]) -> StoredMatrix:
     check_form(source, found.form, _ACCEPTED, _FORMS)
     if not found.values:
         source.refuse("has no columns; is the file complete?")
@@ -95,7 +95,7 @@ def _stored(source: Source, found: _Matrix, notes: tuple[str, ...]) -> StoredMat
     return named(source, matrix, Labels(held // 8, held % 8), found.form, found.kind, notes)
 
 
-def _cards(source: Source, data: bytes) -> Iterator[_Card]:
+def _cards(source: MatrixFile, data: bytes) -> Iterator[_Card]:
     """DMIG cards, their continuation lines joined."""
     card: _Card | None = None
     for number, raw in enumerate(data.decode("latin-1").split("\n"), 1):
@@ -133,7 +133,7 @@ def _cards(source: Source, data: bytes) -> Iterator[_Card]:
         yield card
 
 
-def _take(source: Source, card: _Card, matrices: dict[str, _Matrix], wanted: str | None) -> None:
+def _take(source: MatrixFile, card: _Card, matrices: dict[str, _Matrix], wanted: str | None) -> None:
     name = printable(card.fields[0])
     if not name:
         _refuse(source, card, 0, "DMIG needs a name")
@@ -154,7 +154,7 @@ def _take(source: Source, card: _Card, matrices: dict[str, _Matrix], wanted: str
         _take_column(source, card, found)
 
 
-def _take_column(source: Source, card: _Card, found: _Matrix) -> None:
+def _take_column(source: MatrixFile, card: _Card, found: _Matrix) -> None:
     fields = card.fields
     column = _freedom(source, card, 1)
     for at in range(_FIRST_ENTRY, len(fields), 4):
@@ -171,7 +171,7 @@ def _take_column(source: Source, card: _Card, found: _Matrix) -> None:
         _refuse(source, card, 0, "the column has no entries; is a line missing?")
 
 
-def _freedom(source: Source, card: _Card, at: int) -> int:
+def _freedom(source: MatrixFile, card: _Card, at: int) -> int:
     """Number of a grid or scalar point and its component as one."""
     grid = _whole(source, card, at, "a grid or scalar point")
     component = _whole(source, card, at + 1, "a component") if card.fields[at + 1] else 0
@@ -182,20 +182,20 @@ def _freedom(source: Source, card: _Card, at: int) -> int:
     return 8 * grid + component
 
 
-def _whole(source: Source, card: _Card, at: int, what: str) -> int:
+def _whole(source: MatrixFile, card: _Card, at: int, what: str) -> int:
     value = whole_number(card.fields[at])
     if value is None:
         _refuse(source, card, at, f"{printable(card.fields[at])!r} is not {what}, a whole number")
     return value
 
 
-def _real(source: Source, card: _Card, at: int) -> float:
+def _real(source: MatrixFile, card: _Card, at: int) -> float:
     value = fortran_number(card.fields[at])
     if not math.isfinite(value):
         _refuse(source, card, at, f"{printable(card.fields[at])!r} is no finite number")
     return value
 
 
-def _refuse(source: Source, card: _Card, at: int, accepted: str) -> NoReturn:
+def _refuse(source: MatrixFile, card: _Card, at: int, accepted: str) -> NoReturn:
     number, text = card.line_of(at)
     source.refuse_line(number, text, accepted)

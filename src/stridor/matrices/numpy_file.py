@@ -22,7 +22,7 @@ from ..typing import IntArray, Sparse
 from .checks import chosen, expanded, nameless, square, whole_numbers
 from .entries import assembled, from_dense
 from .model import StoredMatrix
-from .source import Source, source_at
+from .source import MatrixFile, source_at
 
 _NEEDED = {
     "csr": ("indices", "indptr"),
@@ -60,7 +60,7 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
         source.unreadable("a NumPy file", error)
 
 
-def _from_archive(source: Source, archive: zipfile.ZipFile, name: str | None) -> StoredMatrix:
+def _from_archive(source: MatrixFile, archive: zipfile.ZipFile, name: str | None) -> StoredMatrix:
     members: dict[str, zipfile.ZipInfo] = {}
     for info in archive.infolist():
         key = info.filename.removesuffix(".npy")
@@ -114,7 +114,7 @@ class _Header:
             return _OBJECTS
         return f"{self.dtype}, {' × '.join(str(n) for n in self.shape) or 'a single one'}"
 
-    def values(self, source: Source, file: IO[bytes], size: int, key: str) -> Any:
+    def values(self, source: MatrixFile, file: IO[bytes], size: int, key: str) -> Any:
         """The array, whose file has size bytes, read without allocating what is merely claimed. Raises CaseError."""
         if self.kind == "O":
             source.refuse(f"{key} holds {_OBJECTS}")
@@ -129,7 +129,7 @@ class _Header:
         return np.frombuffer(data, dtype=self.dtype).reshape(self.shape, order="F" if self.by_columns else "C")
 
 
-def _header(source: Source, file: IO[bytes], key: str) -> _Header:
+def _header(source: MatrixFile, file: IO[bytes], key: str) -> _Header:
     """The head of a .npy. Raises CaseError for a version that is not read, and for a head that is longer than any."""
     version = np.lib.format.read_magic(file)
     readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
@@ -142,7 +142,7 @@ def _header(source: Source, file: IO[bytes], key: str) -> _Header:
     return _Header(*readers[version](io.BytesIO(length + file.read(claimed))))
 
 
-def _sparse(source: Source, arrays: Mapping[str, Any]) -> tuple[Sparse, tuple[str, ...]]:
+def _sparse(source: MatrixFile, arrays: Mapping[str, Any]) -> tuple[Sparse, tuple[str, ...]]:
     """The matrix of the arrays that scipy.sparse.save_npz writes for each of its formats, and notes."""
     notes: tuple[str, ...] = ()
     form = "csr"
@@ -176,7 +176,7 @@ def _sparse(source: Source, arrays: Mapping[str, Any]) -> tuple[Sparse, tuple[st
     return matrix, notes + more
 
 
-def _from_lines(source: Source, arrays: Mapping[str, Any], form: str, size: int) -> tuple[IntArray, IntArray, Any]:
+def _from_lines(source: MatrixFile, arrays: Mapping[str, Any], form: str, size: int) -> tuple[IntArray, IntArray, Any]:
     """Row, column and value of the entries of a matrix stored by rows, columns or rows of blocks."""
     data, indices = arrays["data"], whole_numbers(source, arrays["indices"], "indices")
     if len(indices) != len(data):
@@ -196,7 +196,7 @@ def _from_lines(source: Source, arrays: Mapping[str, Any], form: str, size: int)
     return (indices, major, data) if form == "csc" else (major, indices, data)
 
 
-def _from_diagonals(source: Source, arrays: Mapping[str, Any], size: int) -> tuple[IntArray, IntArray, Any]:
+def _from_diagonals(source: MatrixFile, arrays: Mapping[str, Any], size: int) -> tuple[IntArray, IntArray, Any]:
     """Row, column and value of the entries of a matrix stored by diagonals: data[i, j] is at row j - offsets[i]."""
     data, offsets = arrays["data"], whole_numbers(source, arrays["offsets"], "offsets")
     if len(offsets) != len(data) or len(np.unique(offsets)) != len(offsets):

@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import CaseError
 from ..typing import Array, IntArray
 from .numbers import fortran_number, whole_number
-from .source import Source, counted, printable
+from .source import MatrixFile, counted, printable
 
 _BIG = 65536
 _FORMAT = re.compile(r"(?:1P,?)?(\d+)[ED](\d+)\.\d+")
@@ -49,7 +49,7 @@ class Header:
 
 
 @dataclass
-class Entries:
+class EntryRuns:
     """Runs of entries: first row and column from 0, where its numbers begin, and how many entries it has."""
 
     rows: list[int] = field(default_factory=list)
@@ -74,7 +74,7 @@ class Entries:
         return rows + within, columns, starts + step * within
 
 
-def records(source: Source, data: bytes) -> Text | Binary:
+def records(source: MatrixFile, data: bytes) -> Text | Binary:
     """The records of a file, from its beginning to its end. Raises CaseError where it has none."""
     if data[:4] in (struct.pack(o + "i", n) for o in "<>" for n in (24, 48)):
         return Binary(source, data)
@@ -96,7 +96,7 @@ def _problem(header: Header) -> str | None:
 class Text:
     """An OUTPUT4 file of text, taken from its beginning to its end."""
 
-    def __init__(self, source: Source, data: bytes) -> None:
+    def __init__(self, source: MatrixFile, data: bytes) -> None:
         self._source = source
         self._lines = data.decode("latin-1").split("\n")
         self._at = 0
@@ -123,9 +123,9 @@ class Text:
             self._refuse(wrong)
         return header
 
-    def columns(self, header: Header) -> Entries:
+    def columns(self, header: Header) -> EntryRuns:
         """All columns of the matrix whose header has just been taken."""
-        entries = Entries()
+        entries = EntryRuns()
         self._numbers = []
         words = 2 if header.kind in (2, 4) else 1
         last = 0
@@ -154,13 +154,13 @@ class Text:
                     self._refuse("must begin a string of entries: its length and first row do not fit")
                 self._run(header, entries, row, column, size // words)
 
-    def values(self, header: Header, entries: Entries) -> tuple[IntArray, IntArray, Any]:
+    def values(self, header: Header, entries: EntryRuns) -> tuple[IntArray, IntArray, Any]:
         """Row and column from 0 and value of each entry (k,), real or complex."""
         rows, columns, offsets = entries.spread(header.parts)
         values = np.array(self._numbers)
         return rows, columns, values[offsets] + 1j * values[offsets + 1] if header.parts == 2 else values[offsets]
 
-    def _run(self, header: Header, entries: Entries, row: int, column: int, count: int) -> None:
+    def _run(self, header: Header, entries: EntryRuns, row: int, column: int, count: int) -> None:
         """Entries below one another; count: of numbers."""
         if count < 1 or count % header.parts or row < 1 or row - 1 + count // header.parts > abs(header.rows):
             self._refuse(f"leaves the matrix: it has {abs(header.rows)} rows")
@@ -202,7 +202,7 @@ class Text:
 class Binary:
     """The same for a file of Fortran records: each between two words that say its length in bytes."""
 
-    def __init__(self, source: Source, data: bytes) -> None:
+    def __init__(self, source: MatrixFile, data: bytes) -> None:
         self._source, self._data = source, data
         self._order = "<" if data[0] else ">"
         self._at = 0
@@ -228,9 +228,9 @@ class Binary:
             self._refuse(begin, wrong)
         return header
 
-    def columns(self, header: Header) -> Entries:
+    def columns(self, header: Header) -> EntryRuns:
         """All columns of the matrix whose header has just been taken."""
-        entries = Entries()
+        entries = EntryRuns()
         word = self._word
         words = 2 if header.kind in (2, 4) and word == 4 else 1
         step = words * header.parts
@@ -272,7 +272,7 @@ class Binary:
                 entries.add(row - 1, column - 1, at, size // step)
                 at += size * word
 
-    def values(self, header: Header, entries: Entries) -> tuple[IntArray, IntArray, Any]:
+    def values(self, header: Header, entries: EntryRuns) -> tuple[IntArray, IntArray, Any]:
         """Row and column from 0 and value of each entry (k,), real or complex."""
         size = 8 if self._word == 8 or header.kind in (2, 4) else 4
         kind = f"{self._order}f{size}"

@@ -17,7 +17,7 @@ from ..reading import bounded
 from ..typing import IntArray, Sparse
 from .model import Labels, StoredMatrix
 from .numbers import fortran_number
-from .source import Source, source_at
+from .source import MatrixFile, source_at
 
 _BY_SUFFIX = {
     ".npz": "numpy_file",
@@ -58,7 +58,7 @@ def read_matrix(path: str | Path, name: str | None = None, *, where: str = "matr
     return replace(stored, matrix=matrix)
 
 
-def _module(source: Source) -> str:
+def _module(source: MatrixFile) -> str:
     """Which module reads the file. Raises CaseError where none does, or the file is empty."""
     suffix = source.path.suffix.lower()
     packed = suffix == ".gz"

@@ -27,14 +27,14 @@ _START = 512
 
 
 @dataclass(frozen=True)
-class Source:
+class MatrixFile:
     """A file that is being read, and where the case names it; name: the one of its matrices that is read, if known."""
 
     path: Path
     where: str
     name: str = ""
 
-    def of(self, name: str) -> Source:
+    def of(self, name: str) -> MatrixFile:
         """The same for one of the file's matrices."""
         return replace(self, name=name)
 
@@ -114,7 +114,7 @@ class Source:
 class Stream:
     """Bytes of a file in turn, no more than ``limit`` where that is given."""
 
-    def __init__(self, file: BinaryIO, source: Source | None = None, limit: int = 0) -> None:
+    def __init__(self, file: BinaryIO, source: MatrixFile | None = None, limit: int = 0) -> None:
         self._file, self._source, self._left = file, source, limit
 
     def read(self, size: int = -1) -> bytes:
@@ -128,7 +128,7 @@ class Stream:
         line = self._file.readline(longest)
         return line if self._source is None else self._counted(line, self._source)
 
-    def _counted(self, data: bytes, source: Source) -> bytes:
+    def _counted(self, data: bytes, source: MatrixFile) -> bytes:
         self._left -= len(data)
         if self._left < 0:
             source.refuse(
@@ -138,9 +138,9 @@ class Stream:
         return data
 
 
-def source_at(path: Path, where: str) -> Source:
+def source_at(path: Path, where: str) -> MatrixFile:
     """The file at a path, found to be there and to hold something. Raises CaseError otherwise."""
-    source = Source(path, where)
+    source = MatrixFile(path, where)
     try:
         if path.is_dir():
             source.refuse("is a folder; must be a file")
@@ -157,7 +157,7 @@ def source_at(path: Path, where: str) -> Source:
     return source
 
 
-def beside(source: Source, *names: str) -> Source | None:
+def beside(source: MatrixFile, *names: str) -> MatrixFile | None:
     """The first file of these names in the folder of another that is there."""
     paths = (source.path.with_name(name) for name in names)
     found = next((p for p in paths if p.is_file() and p != source.path), None)

@@ -11,7 +11,7 @@ from typing import NoReturn
 import numpy as np
 
 from ..typing import Array
-from .source import Source, Stream, quoted, unended
+from .source import MatrixFile, Stream, quoted, unended
 
 _BLOCK = 1 << 22
 LONGEST_LINE = 1 << 16
@@ -23,7 +23,7 @@ _FORTRAN = bytes.maketrans(b"Dd", b"Ee")
 
 
 def read_numbers(
-    source: Source, stream: Stream, line: int, columns: int, most: int | None = None
+    source: MatrixFile, stream: Stream, line: int, columns: int, most: int | None = None
 ) -> tuple[Array, tuple[str, ...]]:
     """Numbers (k, columns) in the rest of a text file, as many on each line, and what is to be noted about them.
 
@@ -53,7 +53,7 @@ def read_numbers(
     return (np.concatenate(parts) if parts else np.empty((0, columns))), notes
 
 
-def _numbers(source: Source, text: bytes, line: int, columns: int) -> Array:
+def _numbers(source: MatrixFile, text: bytes, line: int, columns: int) -> Array:
     """Numbers (k, columns) of whole lines; line: lines before these."""
     if not text.strip():
         return np.empty((0, columns))
@@ -85,7 +85,7 @@ def _numbers(source: Source, text: bytes, line: int, columns: int) -> Array:
     return values.reshape(-1, columns)
 
 
-def _refuse(source: Source, number: int, text: bytes, columns: int) -> NoReturn:
+def _refuse(source: MatrixFile, number: int, text: bytes, columns: int) -> NoReturn:
     source.refuse(f"line {number}: {quoted(text)} must be {columns} finite number{'s'[: columns != 1]}")
 
 

@@ -26,7 +26,7 @@ _REFUSED = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
 
 
 @dataclass(frozen=True)
-class Element:
+class ElementRecord:
     """An element: kind of cell, or its type where it is not one of ours; nodes by their numbers in the file."""
 
     kind: str
@@ -80,7 +80,7 @@ class Scope:
 
     name: str = ""
     nodes: dict[int, Point] = field(default_factory=dict)
-    elements: dict[int, Element] = field(default_factory=dict)
+    elements: dict[int, ElementRecord] = field(default_factory=dict)
     nsets: dict[str, NamedSet] = field(default_factory=dict)
     elsets: dict[str, NamedSet] = field(default_factory=dict)
     surfaces: dict[str, SurfaceCard] = field(default_factory=dict)
@@ -157,7 +157,7 @@ class PartsReader:
             found = [first.whole(f, "the number of an element or node") for f in fields if f or needed]
             if (needed and len(found) != needed) or not found:
                 first.refuse(f"an element of type {type_name} is: its number, then {needed - 1} nodes")
-            element = Element(kind, tuple(found[1:]), first)
+            element = ElementRecord(kind, tuple(found[1:]), first)
             known = self._scope.elements.setdefault(found[0], element)
             if known is not element and (known.kind, known.nodes) != (element.kind, element.nodes):
                 first.refuse(f"element {found[0]} is already defined in line {known.line.number}")

@@ -13,7 +13,7 @@ from ..threads import one_thread
 from ..typing import Array
 from .options import Options
 from .results import UNSTABLE_RELATIVE, ComplexModes, Progress, grows
-from .source import Asked, answered
+from .source import ModesAsked, answered
 
 __all__ = ["UNSTABLE_RELATIVE", "ComplexModes", "Progress", "complex_modes", "grows"]
 
@@ -54,7 +54,7 @@ def complex_modes(
     if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)) or np.any(values < 0):
         raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
     options = Options(friction_damping, prestress, solver, source)
-    asked = Asked(
+    asked = ModesAsked(
         max_frequency_hz, damped=damped, options=options, count=count, vectors=vectors, residuals=residuals,
         progress=progress, numbered_at=numbered_at,
     )  # fmt: skip

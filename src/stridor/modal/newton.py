@@ -107,7 +107,7 @@ class NewtonProblem(Protocol):
 
 
 @dataclass(frozen=True)
-class Point:
+class NewtonPoint:
     """g and its derivatives at (λ, μ), and the vectors x and y (n,) that P all but takes to zero from both sides."""
 
     g: complex
@@ -126,9 +126,9 @@ class _Steps:
     enough: float  # steps as short as this may end in rounding
     shortest: float = np.inf
     idle: int = 0  # steps since then that brought nothing
-    kept: tuple[float, float, Point] | None = None
+    kept: tuple[float, float, NewtonPoint] | None = None
 
-    def end(self, step: float, omega: float, mu: float, here: Point) -> bool:
+    def end(self, step: float, omega: float, mu: float, here: NewtonPoint) -> bool:
         """Take in a step from (ω, μ); whether it is made of rounding, so that there is nothing to be gained."""
         stalled = step > STALLED * self.shortest
         self.idle = self.idle + 1 if stalled else 0
@@ -153,7 +153,7 @@ class Border:
         self.row = int(np.argmax(weight * np.abs(y)))
         self.scale = float(weight[self.column] * weight[self.row]) or 1.0
 
-    def at(self, lam: complex, mu: complex) -> Point:
+    def at(self, lam: complex, mu: complex) -> NewtonPoint:
         """g and its derivatives. Raises AnalysisError where even the bordered matrix is singular."""
         here, change = self.problem.at(mu), self.problem.slopes(mu)
         factor, scale, n = self.problem.bordered(here, lam, self), self.scale, here.mass.shape[0]
@@ -171,7 +171,7 @@ class Border:
         x_lam, x_mu = both[:n, 0], both[:n, 1]
         twice = 2 * times(here.mass, x) + 2 * here.slope(lam, x_lam)
         mixed = change.slope(lam, x) + here.slope(lam, x_mu) + change.applied(lam, x_lam)
-        return Point(
+        return NewtonPoint(
             g, complex(both[n, 0]), complex(both[n, 1]), complex(-(y @ twice) / scale), complex(-(y @ mixed) / scale),
             x, y,
         )  # fmt: skip
@@ -271,7 +271,7 @@ def exceptional(
     return None
 
 
-def _to_double(here: Point) -> tuple[complex, complex]:
+def _to_double(here: NewtonPoint) -> tuple[complex, complex]:
     """Newton's step in λ and μ to where two eigenvalues meet."""
     with np.errstate(all="ignore"):
         determinant = here.by_lam * here.by_lam_mu - here.by_mu * here.by_lam_lam
@@ -313,7 +313,7 @@ def standstill(
 
 
 def _judged(
-    problem: NewtonProblem, mu: float, lam: complex, here: Point, slope: float | None, square: float | None
+    problem: NewtonProblem, mu: float, lam: complex, here: NewtonPoint, slope: float | None, square: float | None
 ) -> Root | None:
     """The root with its backward error in the matrices as the system gives them there; None where that is too large."""
     residual = problem.backward_error(mu, lam, here.x)

@@ -37,7 +37,7 @@ Answer = TypeVar("Answer", ComplexModes, Onsets)
 
 
 @dataclass(frozen=True)
-class Asked:
+class ModesAsked:
     """What is asked of a source: the band (None: as many branches as ``count``), whether C is used, what is kept.
 
     follow: branches are followed that start up to so many times the band. numbered_at: the μ from which on they may be
@@ -78,16 +78,16 @@ class EigenSource(Protocol):
         """Why it does not take a system, as far as can be seen without computing; "" if it does."""
         ...
 
-    def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
+    def modes(self, system: System, values: Array, asked: ModesAsked) -> ComplexModes:
         """Modes at values (k,) of μ. Raises Unfit and FollowingError where another source may serve."""
         ...
 
-    def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
+    def onsets(self, system: System, friction_range: tuple[float, float], asked: ModesAsked) -> Onsets:
         """Onsets between two μ. Raises Unfit where another source may serve."""
         ...
 
 
-class Receptance:
+class ReceptanceSource:
     """Roots of the contacts' receptance."""
 
     name = "receptance"
@@ -96,21 +96,21 @@ class Receptance:
         """See `EigenSource`."""
         return no_complete_basis(system)
 
-    def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
+    def modes(self, system: System, values: Array, asked: ModesAsked) -> ComplexModes:
         """See `EigenSource`."""
         return modes_by_receptance(
             system, values, count=asked.count or 20, max_frequency_hz=asked.max_frequency_hz, damped=asked.damped,
             vectors=asked.vectors, residuals=asked.residuals, progress=asked.progress,
         )  # fmt: skip
 
-    def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
+    def onsets(self, system: System, friction_range: tuple[float, float], asked: ModesAsked) -> Onsets:
         """See `EigenSource`."""
         return onsets_by_receptance(
             system, friction_range, max_frequency_hz=asked.band_hz, damped=asked.damped, follow=asked.follow
         )
 
 
-class Krylov:
+class KrylovSource:
     """Frictionless modes and enrichment on one symmetric factorisation."""
 
     name = "krylov"
@@ -119,7 +119,7 @@ class Krylov:
         """See `EigenSource`."""
         return system.not_symmetric_definite
 
-    def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
+    def modes(self, system: System, values: Array, asked: ModesAsked) -> ComplexModes:
         """See `EigenSource`."""
         try:
             return krylov_modes(
@@ -129,7 +129,7 @@ class Krylov:
         except NotPositive as error:
             raise Unfit(str(error), asked.max_frequency_hz) from error
 
-    def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
+    def onsets(self, system: System, friction_range: tuple[float, float], asked: ModesAsked) -> Onsets:
         """See `EigenSource`."""
         try:
             return krylov_onsets(
@@ -140,7 +140,7 @@ class Krylov:
             raise Unfit(str(error), asked.max_frequency_hz) from error
 
 
-class Reduced:
+class ReducedSource:
     """A reduced model over μ, its modes solved in the full problem. Asked for by name."""
 
     name = "reduced"
@@ -149,14 +149,14 @@ class Reduced:
         """See `EigenSource`."""
         return ""
 
-    def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
+    def modes(self, system: System, values: Array, asked: ModesAsked) -> ComplexModes:
         """See `EigenSource`."""
         return reduced_modes(
             system, values, max_frequency_hz=asked.band_hz, damped=asked.damped, vectors=asked.vectors,
             options=asked.options, progress=asked.progress,
         )  # fmt: skip
 
-    def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
+    def onsets(self, system: System, friction_range: tuple[float, float], asked: ModesAsked) -> Onsets:
         """See `EigenSource`."""
         return reduced_onsets(
             system, friction_range, max_frequency_hz=asked.band_hz, damped=asked.damped, options=asked.options,
@@ -164,7 +164,7 @@ class Reduced:
         )  # fmt: skip
 
 
-class Full:
+class FullSource:
     """The region search, matrices of any structure."""
 
     name = "full"
@@ -173,7 +173,7 @@ class Full:
         """See `EigenSource`."""
         return ""
 
-    def modes(self, system: System, values: Array, asked: Asked) -> ComplexModes:
+    def modes(self, system: System, values: Array, asked: ModesAsked) -> ComplexModes:
         """See `EigenSource`."""
         if asked.max_frequency_hz is None and (why := system.not_symmetric_definite):
             raise CaseError("max_frequency_hz", None, f"missing – {why}: modes are sought in a band")
@@ -182,7 +182,7 @@ class Full:
             vectors=asked.vectors, options=asked.options, progress=asked.progress, unfollowed=asked.unfollowed,
         )  # fmt: skip
 
-    def onsets(self, system: System, friction_range: tuple[float, float], asked: Asked) -> Onsets:
+    def onsets(self, system: System, friction_range: tuple[float, float], asked: ModesAsked) -> Onsets:
         """See `EigenSource`."""
         return full_onsets(
             lambda _: system, friction_range, max_frequency_hz=asked.band_hz, damped=asked.damped,
@@ -190,8 +190,8 @@ class Full:
         )  # fmt: skip
 
 
-SOURCES: tuple[EigenSource, ...] = (Receptance(), Krylov(), Reduced(), Full())
-UNASKED = tuple(source for source in SOURCES if source.name != Reduced.name)
+SOURCES: tuple[EigenSource, ...] = (ReceptanceSource(), KrylovSource(), ReducedSource(), FullSource())
+UNASKED = tuple(source for source in SOURCES if source.name != ReducedSource.name)
 
 
 def sources_for(system: System, name: str | None = None) -> tuple[EigenSource, ...]:
@@ -214,7 +214,7 @@ def sources_for(system: System, name: str | None = None) -> tuple[EigenSource, .
 
 def by_receptance(system: System) -> bool:
     """Whether modes at any μ are roots of receptances unless something else is asked for: they cost next to nothing."""
-    return sources_for(system)[0].name == Receptance.name
+    return sources_for(system)[0].name == ReceptanceSource.name
 
 
 def require_full(name: str | None) -> None:
@@ -226,7 +226,7 @@ def require_full(name: str | None) -> None:
 
 
 def answered(
-    system: System, asked: Asked, ask: Callable[[EigenSource, Asked], Answer], *, without_following: bool
+    system: System, asked: ModesAsked, ask: Callable[[EigenSource, ModesAsked], Answer], *, without_following: bool
 ) -> Answer:
     """The answer of the first source that serves.
 

@@ -9,13 +9,12 @@ from .parting import Unclosed
 from .problem import Family, SlidingProblem, refuse_cycles, why_not_shooting
 from .returns import NoReturn, cycles_reached, growing, pushed, same
 from .sampling import sampled
-from .shooting import Closed, close, multipliers
-from .shooting_branch import Branch
+from .shooting import ClosedShot, close, multipliers
+from .shooting_branch import ShootingBranch
 
 __all__ = [
     "Bifurcation",
-    "Branch",
-    "Closed",
+    "ClosedShot",
     "Cycle",
     "CycleBranch",
     "CycleOnset",
@@ -23,6 +22,7 @@ __all__ = [
     "Family",
     "Followed",
     "NoReturn",
+    "ShootingBranch",
     "SlidingProblem",
     "Unclosed",
     "bifurcations",

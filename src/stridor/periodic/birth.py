@@ -10,14 +10,14 @@ from ..typing import Array
 from .chart import Chart
 from .problem import SlidingProblem
 from .returns import excited
-from .shooting import Closed, shoot
-from .shooting_branch import Branch
+from .shooting import ClosedShot, shoot
+from .shooting_branch import ShootingBranch
 
 LARGER = (0.02, 0.05, 0.1, 0.2, 0.3)  # of that size: by how much the first cycle is larger
 NEAR = 1e-3  # of a frequency: whether a mode is that of the onset
 
 
-def born(branch: Branch, mu: float, frequency_hz: float) -> tuple[Closed, Array]:
+def born(branch: ShootingBranch, mu: float, frequency_hz: float) -> tuple[ClosedShot, Array]:
     """The first cycle of the branch that begins at an onset, and the heading (s + 2,) away from it.
 
     Up to the size at which its mode first changes a contact, steady sliding at the onset swings freely, at every size;
@@ -54,7 +54,7 @@ def born(branch: Branch, mu: float, frequency_hz: float) -> tuple[Closed, Array]
     raise AnalysisError(last)
 
 
-def _guess(problem: SlidingProblem, chart: Chart, mode: int, size: float, frequency_hz: float) -> Closed:
+def _guess(problem: SlidingProblem, chart: Chart, mode: int, size: float, frequency_hz: float) -> ClosedShot:
     xi = chart.numbers(*excited(problem, mode, size))
     period = 1.0 / frequency_hz
-    return Closed(problem, chart, xi, period, shoot(problem, chart, xi, period), np.inf)
+    return ClosedShot(problem, chart, xi, period, shoot(problem, chart, xi, period), np.inf)

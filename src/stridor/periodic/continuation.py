@@ -41,7 +41,7 @@ Told = TypeVar("Told", contravariant=True)
 
 
 @dataclass(frozen=True)
-class Spot(Generic[P]):
+class BranchPoint(Generic[P]):
     """A point of a branch, and the direction in which the branch goes on there."""
 
     point: P
@@ -58,7 +58,7 @@ class Followed(Protocol[P]):
 
     between: tuple[float, float]
 
-    def ahead(self, spot: Spot[P], length: float) -> P:
+    def ahead(self, spot: BranchPoint[P], length: float) -> P:
         """A guess, a length along the branch."""
         ...
 
@@ -110,14 +110,14 @@ def follow(
     """Follow a branch from a cycle until it leaves the range; why it ended, STOPPED where ``seen`` said so. seconds: of
     processor time, what ``seen`` takes included. unsolved: is told each fold that was passed and not closed."""
     low, high = branch.between
-    spot, length = Spot(first, heading), FIRST
+    spot, length = BranchPoint(first, heading), FIRST
     until = clock.process_time() + seconds
     for _ in range(most):
         if clock.process_time() >= until:
             return f"its {seconds:g} s of computing were over at μ = {spot.mu:.6g}"
         try:
             closed = branch.corrected(branch.ahead(spot, length), spot.heading)
-            turned = _turned(branch, spot, closed)
+            tangent = _tangent(branch, spot, closed)
         except (AnalysisError, np.linalg.LinAlgError) as error:
             length *= 0.4
             if length < SMALLEST:
@@ -127,20 +127,20 @@ def follow(
             return _to_the_edge(branch, spot, closed, seen)
         if branch.vanished(closed):
             return f"it comes to steady sliding at μ = {closed.mu:.6g}"
-        if spot.heading[-1] * turned[-1] < 0.0:
-            fold = _fold(branch, spot, length, turned)
+        if spot.heading[-1] * tangent[-1] < 0.0:
+            fold = _fold(branch, spot, length, tangent)
             if fold is None and unsolved is not None:
                 unsolved(f"its fold near μ = {spot.mu:.6g} to {closed.mu:.6g} could not be closed, and is not marked")
             if fold is not None and not seen(fold, fold=True):
                 return STOPPED
         if not seen(closed, fold=False):
             return STOPPED
-        spot = Spot(*branch.settled(closed, turned))
+        spot = BranchPoint(*branch.settled(closed, tangent))
         length = min(length * 1.5, LARGEST)
     return f"{most} points were made"
 
 
-def _turned(branch: Followed[P], spot: Spot[P], closed: P) -> Array:
+def _tangent(branch: Followed[P], spot: BranchPoint[P], closed: P) -> Array:
     """The heading at the next cycle. Raises AnalysisError where the branch turned so much that another may be meant."""
     found = branch.heading(closed, spot.heading)
     if float(found @ spot.heading) < TURN:
@@ -148,11 +148,11 @@ def _turned(branch: Followed[P], spot: Spot[P], closed: P) -> Array:
     return found
 
 
-def _fold(branch: Followed[P], spot: Spot[P], length: float, turned: Array) -> P | None:
+def _fold(branch: Followed[P], spot: BranchPoint[P], length: float, tangent: Array) -> P | None:
     """The cycle between two at which μ turns back, by regula falsi on the heading, and by halves where no cycle is
     found there or little is gained; None where that fails. At a corner of the branch the heading jumps: then the cycle
     is as near to it as a branch is followed by."""
-    low, high = (0.0, float(spot.heading[-1])), (length, float(turned[-1]))
+    low, high = (0.0, float(spot.heading[-1])), (length, float(tangent[-1]))
     halve = False
     for _ in range(HALVINGS):
         middle = 0.5 * (low[0] + high[0]) if halve else low[0] - low[1] * (high[0] - low[0]) / (high[1] - low[1])
@@ -173,7 +173,7 @@ def _fold(branch: Followed[P], spot: Spot[P], length: float, turned: Array) -> P
     return None
 
 
-def _to_the_edge(branch: Followed[P], spot: Spot[P], beyond: P, seen: Seen[P]) -> str:
+def _to_the_edge(branch: Followed[P], spot: BranchPoint[P], beyond: P, seen: Seen[P]) -> str:
     """The cycle at the edge of the range, between the last one and one beyond."""
     edge = branch.between[0] if beyond.mu < branch.between[0] else branch.between[1]
     try:

@@ -15,7 +15,7 @@ from ..typing import Array
 from .chart import Chart
 from .parting import Unclosed, next_change, parting
 from .problem import SlidingProblem
-from .shooting import Closed, close, distance, multipliers
+from .shooting import ClosedShot, close, distance, multipliers
 
 NEAR = 0.02  # of the amplitude: returns so close are tried
 CLOSER = 0.3  # of the last one tried: what is tried next
@@ -101,8 +101,9 @@ def _begun(problem: SlidingProblem, motion: VariedMotion, q: Array, v: Array) ->
 
 
 def cycles_reached(
-    problem: SlidingProblem, motion: VariedMotion, seconds: float = SECONDS, met: Callable[[Closed], None] | None = None
-) -> list[Closed]:
+    problem: SlidingProblem, motion: VariedMotion, seconds: float = SECONDS,
+    met: Callable[[ClosedShot], None] | None = None,
+) -> list[ClosedShot]:
     """The cycle that a motion runs into, behind the unstable ones that it passed near to; ``met`` is given each when it
     is found.
 
@@ -110,7 +111,7 @@ def cycles_reached(
     to no cycle at all; what ``met`` takes does not count.
     """
     passed: list[_Met] = []
-    found: list[Closed] = []
+    found: list[ClosedShot] = []
     tried, nearest = NEAR / CLOSER, np.inf
     scale = np.sqrt(np.abs(problem.basis.stiffness))
     moving = scale[scale > 1e-6 * scale.max(initial=0.0)]
@@ -158,7 +159,7 @@ def cycles_reached(
     )  # fmt: skip
 
 
-def same(one: Closed, other: Closed) -> bool:
+def same(one: ClosedShot, other: ClosedShot) -> bool:
     """Whether two cycles of one problem are the same, by period and changes wherever they begin."""
     if abs(one.period - other.period) > 1e-7 * one.period or len(one.word) != len(other.word):
         return False
@@ -196,7 +197,7 @@ def _return(met: list[_Met], amplitude: float) -> tuple[int, float]:
     return next((lag, off) for lag, off in found if off <= max(3.0 * least, 1e-9))
 
 
-def _closed(problem: SlidingProblem, motion: VariedMotion, met: list[_Met], lag: int) -> Closed:
+def _closed(problem: SlidingProblem, motion: VariedMotion, met: list[_Met], lag: int) -> ClosedShot:
     """The cycle of a return of so many changes, begun amid the longest time without stick."""
     period = met[-1].time - met[-1 - lag].time
     parts = [(met[-1 - lag + i], met[-lag + i].time - met[-1 - lag + i].time) for i in range(lag)]
@@ -212,7 +213,7 @@ def _closed(problem: SlidingProblem, motion: VariedMotion, met: list[_Met], lag:
     return _primitive(close(problem, chart, chart.numbers(*ahead.anchor.state(end)), period))
 
 
-def _primitive(closed: Closed) -> Closed:
+def _primitive(closed: ClosedShot) -> ClosedShot:
     """The cycle once, where it was found several times round: a motion that comes to it slowly is as near to where it
     was behind several periods as behind one."""
     word = closed.word

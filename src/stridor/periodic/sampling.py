@@ -10,13 +10,13 @@ from ..temporal.steppers.exact.statuses import GAP
 from ..temporal.steppers.exact.statuses import STICK as STUCK
 from ..typing import Array
 from .cycle import OPEN, SLIP, STICK, Change, Cycle
-from .shooting import Closed, multipliers, started
+from .shooting import ClosedShot, multipliers, started
 
 SAMPLES = 512
 KEPT = 16  # of the multipliers
 
 
-def sampled(closed: Closed, reached_from: str) -> Cycle:
+def sampled(closed: ClosedShot, reached_from: str) -> Cycle:
     """The cycle as data."""
     problem = closed.problem
     motion = started(problem, closed.chart, closed.xi, varied=False)

@@ -44,7 +44,7 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class Closed:
+class ClosedShot:
     """A cycle in its chart: start ξ (s,), period [s], the shot that shows it, and how far from closing it is, in shares
     of the amplitude."""
 
@@ -111,7 +111,7 @@ def shoot(problem: SlidingProblem, chart: Chart, xi: Array, period: float, *, va
     )  # fmt: skip
 
 
-def close(problem: SlidingProblem, chart: Chart, xi: Array, period: float) -> Closed:
+def close(problem: SlidingProblem, chart: Chart, xi: Array, period: float) -> ClosedShot:
     """The cycle near a start and a period. Raises AnalysisError where Newton's method does not come to one."""
     shot = shoot(problem, chart, xi, period)
     before = residual = _residual(shot, xi)
@@ -140,7 +140,7 @@ def close(problem: SlidingProblem, chart: Chart, xi: Array, period: float) -> Cl
             f"no cycle closes near a return within {before:.2g} of the amplitude: Newton's method ends {residual:.2g} "
             "off"
         )
-    return Closed(problem, chart, xi, period, shot, residual)
+    return ClosedShot(problem, chart, xi, period, shot, residual)
 
 
 def _shortened(
@@ -148,14 +148,14 @@ def _shortened(
 ) -> tuple[Array, float, Shot] | None:
     """A step so short that it comes closer, None where none does."""
     for _ in range(5):
-        there, longer = xi + share * step[:-1], period + share * float(step[-1])
+        moved, longer = xi + share * step[:-1], period + share * float(step[-1])
         try:
-            shot = shoot(problem, chart, there, longer)
+            shot = shoot(problem, chart, moved, longer)
         except AnalysisError:
             share *= 0.4
             continue
-        if _residual(shot, there) < residual or residual < 1e-9:
-            return there, longer, shot
+        if _residual(shot, moved) < residual or residual < 1e-9:
+            return moved, longer, shot
         share *= 0.4
     return None
 
@@ -164,7 +164,7 @@ def _residual(shot: Shot, xi: Array) -> float:
     return float(np.linalg.norm(shot.end - xi)) / max(shot.amplitude, 1e-300)
 
 
-def multipliers(closed: Closed) -> ComplexArray:
+def multipliers(closed: ClosedShot) -> ComplexArray:
     """Floquet's multipliers without the one of the motion itself, largest first; complex (s − 1,)."""
     found: ComplexArray = np.linalg.eigvals(closed.shot.matrix).astype(complex)
     # The motion's own is one, but for rounding.
@@ -173,7 +173,7 @@ def multipliers(closed: Closed) -> ComplexArray:
     return rest[np.argsort(-np.abs(rest), kind="stable")]
 
 
-def _along(closed: Closed) -> complex:
+def _along(closed: ClosedShot) -> complex:
     """What the matrix multiplies the motion's own direction by: one, but for rounding."""
     rate = closed.shot.start_rate
     return complex(rate @ (closed.shot.matrix @ rate) / max(float(rate @ rate), 1e-300))

@@ -18,9 +18,9 @@ from ..errors import AnalysisError
 from ..temporal.steppers.exact.statuses import STICK
 from ..typing import Array
 from .chart import Chart
-from .continuation import Spot
+from .continuation import BranchPoint
 from .problem import Family
-from .shooting import ENOUGH, Closed, Shot, close, shoot, started
+from .shooting import ENOUGH, ClosedShot, Shot, close, shoot, started
 
 BESIDE = 1e-6  # of the range: for differences by μ
 GOOD = 1e-9  # of the amplitude: a corrected point
@@ -29,7 +29,7 @@ EDGE = 0.2  # of the time between two changes: a cycle that begins nearer to one
 CORRECTIONS = 9
 
 
-class Branch:
+class ShootingBranch:
     """A branch that is followed within a range (low, high) of μ."""
 
     def __init__(self, family: Family, between: tuple[float, float]) -> None:
@@ -37,7 +37,7 @@ class Branch:
         self.width = between[1] - between[0]
         self._slope: tuple[Chart, Array] | None = None
 
-    def corrected(self, guess: Closed, heading: Array) -> Closed:
+    def corrected(self, guess: ClosedShot, heading: Array) -> ClosedShot:
         """The cycle of the branch in the plane through a guess across a heading (s + 2,). Raises AnalysisError where
         Newton's method finds none."""
         chart, xi, period, mu = guess.chart, guess.xi, guess.period, guess.problem.value
@@ -68,8 +68,8 @@ class Branch:
             if not np.isfinite(size):
                 raise AnalysisError("Newton's method has no direction")
             step = step * min(1.0, 0.3 / max(size, 1e-300))
-            there = (here + step) * scale
-            xi, period, mu = there[:s], float(there[s]), float(there[s + 1])
+            unknowns = (here + step) * scale
+            xi, period, mu = unknowns[:s], float(unknowns[s]), float(unknowns[s + 1])
             if period <= 0.2 * guess.period or not self.between[0] - self.width <= mu <= self.between[1] + self.width:
                 raise AnalysisError("Newton's method leaves the range")
             shot = shoot(self.family.at(mu), chart, xi, period)
@@ -77,9 +77,9 @@ class Branch:
         residual = float(np.linalg.norm(shot.end - xi)) / max(shot.amplitude, 1e-300)
         if residual > ENOUGH or shot.status != chart.status:
             raise AnalysisError(f"Newton's method ends {residual:.2g} of the amplitude off a cycle")
-        return Closed(problem, chart, xi, period, shot, residual)
+        return ClosedShot(problem, chart, xi, period, shot, residual)
 
-    def heading(self, closed: Closed, along: Array) -> Array:
+    def heading(self, closed: ClosedShot, along: Array) -> Array:
         """The direction of the branch at a cycle, forwards as ``along`` (s + 2,) says."""
         chart, s, scale = closed.chart, closed.chart.size, self._scale(closed)
         shot = closed.shot
@@ -93,25 +93,25 @@ class Branch:
         found = np.linalg.solve(matrix, np.append(np.zeros(s + 1), 1.0))
         return found / np.linalg.norm(found)
 
-    def towards(self, closed: Closed, sense: float) -> Array:
+    def towards(self, closed: ClosedShot, sense: float) -> Array:
         """A heading to larger (1) or smaller μ (−1)."""
         along = np.zeros(closed.chart.size + 2)
         along[-1] = sense
         self._slope = None
         return self.heading(closed, along)
 
-    def ahead(self, spot: Spot[Closed], length: float) -> Closed:
+    def ahead(self, spot: BranchPoint[ClosedShot], length: float) -> ClosedShot:
         """A guess, a length along the branch."""
         closed, s = spot.point, spot.point.chart.size
         scale = self._scale(closed)
-        there = np.concatenate([closed.xi, [closed.period, spot.mu]]) + length * spot.heading * scale
-        return replace(closed, problem=self.family.at(float(there[-1])), xi=there[:s], period=float(there[s]))
+        unknowns = np.concatenate([closed.xi, [closed.period, spot.mu]]) + length * spot.heading * scale
+        return replace(closed, problem=self.family.at(float(unknowns[-1])), xi=unknowns[:s], period=float(unknowns[s]))
 
     def forget(self) -> None:
         """The derivative by μ, which is found anew then."""
         self._slope = None
 
-    def _scale(self, closed: Closed) -> Array:
+    def _scale(self, closed: ClosedShot) -> Array:
         s = closed.chart.size
         scale = np.full(s + 2, closed.shot.amplitude)
         scale[s], scale[s + 1] = closed.period, self.width
@@ -125,29 +125,29 @@ class Branch:
             self._slope = chart, (beside.end - shot.end) / step
         return self._slope[1]
 
-    def at(self, mu: float, one: Closed, other: Closed) -> Closed:
+    def at(self, mu: float, one: ClosedShot, other: ClosedShot) -> ClosedShot:
         """The cycle at a μ between two neighbours. Raises AnalysisError where none is near."""
         share = (mu - one.mu) / (other.mu - one.mu)
         xi = one.xi + share * (other.xi - one.xi)
         return close(self.family.at(mu), one.chart, xi, one.period + share * (other.period - one.period))
 
-    def vanished(self, closed: Closed) -> bool:
+    def vanished(self, closed: ClosedShot) -> bool:
         """Whether no contact changes any more."""
         return not closed.shot.words
 
-    def settled(self, closed: Closed, heading: Array) -> tuple[Closed, Array]:
+    def settled(self, closed: ClosedShot, heading: Array) -> tuple[ClosedShot, Array]:
         """The cycle and its heading as the next step begins with them."""
         begun = self.begun_elsewhere(closed)
         return (closed, heading) if begun is closed else (begun, self.carried_over(begun, heading))
 
-    def carried_over(self, begun: Closed, heading: Array) -> Array:
+    def carried_over(self, begun: ClosedShot, heading: Array) -> Array:
         """The heading at a cycle that was begun elsewhere: period and μ change as they did."""
         along = np.zeros(begun.chart.size + 2)
         along[-2:] = heading[-2:] / max(float(np.linalg.norm(heading[-2:])), 1e-300)
         self._slope = None
         return self.heading(begun, along)
 
-    def begun_elsewhere(self, closed: Closed) -> Closed:
+    def begun_elsewhere(self, closed: ClosedShot) -> ClosedShot:
         """The cycle, begun amid the longest time without stick if it begins too near to a change."""
         times = [w[0] for w in closed.shot.words]
         if not times:
@@ -171,4 +171,4 @@ class Branch:
         xi = chart.numbers(*motion.anchor.state(end))
         shot = shoot(problem, chart, xi, closed.period)
         residual = float(np.linalg.norm(shot.end - xi)) / max(shot.amplitude, 1e-300)
-        return Closed(problem, chart, xi, closed.period, shot, residual)
+        return ClosedShot(problem, chart, xi, closed.period, shot, residual)

@@ -40,7 +40,7 @@ class ContactRows:
 
 
 @dataclass(frozen=True)
-class NodeState:
+class NodeEquilibrium:
     """Displacement (n,) [m], normal force (m,) [N] and gap (m,) [m] for one set of touching nodes; residual: that of
     `Equilibrium.residual` where it is known."""
 
@@ -84,7 +84,7 @@ class Equilibrium:
         if cubic is not None and travel is not None:
             self.stretched = self.stretched + cubic.rows.lift @ travel
 
-    def solve(self, active: BoolArray, start: Array | None = None) -> NodeState:
+    def solve(self, active: BoolArray, start: Array | None = None) -> NodeEquilibrium:
         """The equilibrium with exactly these nodes touching, whichever the signs of gap and force.
 
         start (n,): where Newton's method begins for springs beyond the linear. Raises direct.SingularMatrix where the
@@ -97,20 +97,20 @@ class Equilibrium:
             if (found := self._by_prepared(active)) is not None:
                 return found
             u, normal = self._linear(active, None, None)
-            return NodeState(active, u, normal, nodes.gap + nodes.normal @ u)
+            return NodeEquilibrium(active, u, normal, nodes.gap + nodes.normal @ u)
         for _ in range(NEWTON_STEPS):
             before = u
             tangent, extra = self._springs(before)
             self._contacts(before)
             u, normal = self._linear(active, tangent, extra)
             if self._converged(before, u, active):
-                return NodeState(active, u, normal, nodes.gap + nodes.normal @ u)
+                return NodeEquilibrium(active, u, normal, nodes.gap + nodes.normal @ u)
         raise AnalysisError(
             "steady sliding: the springs beyond the linear find no equilibrium in "
             f"{NEWTON_STEPS} steps; check their coefficients (softening springs may have none)"
         )
 
-    def _by_prepared(self, active: BoolArray) -> NodeState | None:
+    def _by_prepared(self, active: BoolArray) -> NodeEquilibrium | None:
         """The equilibrium by the factors that many share; None where there are none, or not as good as its own."""
         nodes, shared = self.nodes, self.system.of_matrices
         if self.rubbing is None or not isinstance(nodes, ContactNodes):
@@ -123,7 +123,7 @@ class Equilibrium:
         if found is None:
             return None
         u, normal = found
-        state = NodeState(active, u, normal, nodes.gap + nodes.normal @ u)
+        state = NodeEquilibrium(active, u, normal, nodes.gap + nodes.normal @ u)
         residual = self.residual(state)
         if not residual <= BALANCED:
             return None
@@ -170,7 +170,7 @@ class Equilibrium:
         moved, size = float(np.abs(rows @ (u - before)).max(initial=0.0)), float(np.abs(rows @ u).max(initial=0.0))
         return moved <= 1e-12 * size
 
-    def residual(self, state: NodeState) -> float:
+    def residual(self, state: NodeEquilibrium) -> float:
         """Largest imbalance of a freedom over the largest force that takes part."""
         if state.residual is not None:
             return state.residual
@@ -225,7 +225,7 @@ def share_factors(system: System, factors: direct.Nearby) -> None:
 
 def find_touching(
     equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: int = 60
-) -> tuple[NodeState, int]:
+) -> tuple[NodeEquilibrium, int]:
     """Find the touching nodes: N ≥ 0 where they touch, gap ≥ 0 where they do not. Also returns the steps taken. Nodes
     of contacts kept closed touch, whichever the sign of N.
 
@@ -242,7 +242,7 @@ def find_touching(
     load = float(np.abs(equilibrium.force).max(initial=0.0))
     kept: BoolArray = movable & nodes.kept
     active: BoolArray = movable if guess is None else movable & (guess | kept)
-    last: NodeState | None = None
+    last: NodeEquilibrium | None = None
     seen: set[bytes] = set()
     care = 0
     for step in range(1, limit + 1):
@@ -277,7 +277,7 @@ def find_touching(
     )
 
 
-def offenders(state: NodeState, movable: BoolArray, load: float) -> tuple[IntArray, IntArray]:
+def offenders(state: NodeEquilibrium, movable: BoolArray, load: float) -> tuple[IntArray, IntArray]:
     """Touching nodes that pull and open nodes that penetrate, beyond rounding of forces as large as load [N]; the
     worst come first."""
     force, gap = state.normal_force, state.gap

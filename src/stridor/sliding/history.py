@@ -19,7 +19,7 @@ STILL = 1e-9
 
 
 @dataclass(frozen=True)
-class History:
+class LoadHistory:
     """Where load steps end. state: contact there, load: the last increment, slip (m, d−1) [m/s]: velocity with which
     motions that run on slide the nodes; residual: the largest of all increments; solved: sets of nodes tried."""
 
@@ -30,7 +30,7 @@ class History:
     solved: int
 
 
-def follow(system: System, *, mu: float | None, solver: str | None) -> History:
+def follow(system: System, *, mu: float | None, solver: str | None) -> LoadHistory:
     """Go through the load steps of a system. mu replaces the friction coefficient of every contact.
 
     Raises AnalysisError where friction cannot carry the loads of an increment, or a set of nodes does not settle.
@@ -52,7 +52,7 @@ def follow(system: System, *, mu: float | None, solver: str | None) -> History:
             raise AnalysisError(f"static equilibrium, {where}: {error}") from error
         residual = max(residual, left)
     assert load is not None, "a system with load steps has at least one"
-    return History(state, load, slip, residual, solution.solved)
+    return LoadHistory(state, load, slip, residual, solution.solved)
 
 
 def _loading(

@@ -27,7 +27,7 @@ from ..errors import AnalysisError
 from ..system import System
 from ..system.load_steps import LoadStep
 from ..typing import Array, BoolArray, IntArray, Sparse
-from .equilibrium import ContactRows, Equilibrium, NodeState
+from .equilibrium import ContactRows, Equilibrium, NodeEquilibrium
 
 LIMIT = 120  # sets of nodes tried in one increment
 ROUNDING = 1e-11  # of the largest force or way: what does not count as a violation
@@ -276,7 +276,7 @@ class StickSlip:
         return self._found(load, status, direction, state, node, along), equilibrium.residual(state)
 
     def _found(
-        self, load: Loading, status: IntArray, direction: Array, state: NodeState, node: IntArray, along: Array
+        self, load: Loading, status: IntArray, direction: Array, state: NodeEquilibrium, node: IntArray, along: Array
     ) -> Frictional:
         nodes, (m, t) = self.nodes, direction.shape
         normal = np.where(status != OPEN, state.normal_force[:m], 0.0)

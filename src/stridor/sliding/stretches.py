@@ -72,7 +72,7 @@ def stretches(
     nodes = system.contact_nodes()
     if not nodes.count or not system.loads or system.load_steps or bool(np.all(nodes.kept)):
         return (Stretch(low, high, None),)
-    search = _Search(system, solver)
+    search = _Equilibria(system, solver)
     own = search.own()
     if own is None:
         return (Stretch(low, high, None),)  # what there is to say, the modes say
@@ -99,7 +99,7 @@ def stretches(
     )  # fmt: skip
 
 
-def _equal(search: _Search, low: float, high: float, count: int) -> tuple[Stretch, ...]:
+def _equal(search: _Equilibria, low: float, high: float, count: int) -> tuple[Stretch, ...]:
     """Stretches of equal length with the nodes that touch in the middle of each."""
     edges = np.linspace(low, high, EQUAL + 1)
     result: list[Stretch] = []
@@ -147,7 +147,7 @@ def elsewhere_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
     )
 
 
-class _Search:
+class _Equilibria:
     """Equilibria by μ, each solved once, the nearest known one as its first guess."""
 
     def __init__(self, system: System, solver: str | None) -> None:

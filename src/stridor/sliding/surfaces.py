@@ -23,7 +23,7 @@ from ..notebook import Shown, counted, html_table
 from ..stages import passing, stage
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
-from .equilibrium import Equilibrium, NodeState, find_touching
+from .equilibrium import Equilibrium, NodeEquilibrium, find_touching
 from .history import STILL, follow
 from .pattern import left_by_facets, unexplained_patterns
 from .points import external_force, full_motion, words_of_friction
@@ -346,7 +346,7 @@ def _moved_most(system: System, size: Array) -> str:
     return system.dof_names[freedom] if freedom < len(system.dof_names) else f"freedom {freedom}"
 
 
-def _require_held(system: System, nodes: ContactNodes, state: NodeState, residual: float) -> None:
+def _require_held(system: System, nodes: ContactNodes, state: NodeEquilibrium, residual: float) -> None:
     """A mechanism that rounding keeps from being singular shows in displacements beyond any structure's size."""
     extents = [float(np.ptp(line.coordinates, axis=0).max()) for line in system.lines]
     extents += [float(np.ptp(solid.points, axis=0).max()) for solid in system.solids]

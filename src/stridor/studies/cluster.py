@@ -13,7 +13,7 @@ from typing import Any
 
 from ..errors import AnalysisError
 from .rows import Row
-from .task import Batch, Task, answered, died, program
+from .task import SampleBatch, Task, answered, died, program
 
 PATIENCE = 15.0  # seconds for a scheduler to answer
 AHEAD = 2  # batches that each worker is given at a time
@@ -75,11 +75,11 @@ class ClusterWorkers:
     def __exit__(self, *_: object) -> None:
         self._client.close()
 
-    def answers(self, batches: Iterable[Batch]) -> Iterator[dict[int, Row]]:
+    def answers(self, batches: Iterable[SampleBatch]) -> Iterator[dict[int, Row]]:
         """Rows as batches are done. Raises AnalysisError where a worker has another stridor, or the scheduler is
         gone."""
-        waiting, again = iter(batches), deque[Batch]()
-        running: dict[Any, Batch] = {}
+        waiting, again = iter(batches), deque[SampleBatch]()
+        running: dict[Any, SampleBatch] = {}
         done = self._distributed.as_completed(loop=self._client.loop)
         while True:
             while len(running) < AHEAD * self.count:
@@ -94,7 +94,7 @@ class ClusterWorkers:
             future = next(done)
             yield self._taken(future, running.pop(future), again)
 
-    def _taken(self, future: Any, batch: Batch, again: deque[Batch]) -> dict[int, Row]:
+    def _taken(self, future: Any, batch: SampleBatch, again: deque[SampleBatch]) -> dict[int, Row]:
         """The rows of a task; of one that kills its workers, or was lost, another try row by row."""
         try:
             return future.result()
@@ -117,7 +117,7 @@ def _program() -> str:
     return program()
 
 
-def _answered(task: Task, batch: Batch) -> dict[int, Row]:
+def _answered(task: Task, batch: SampleBatch) -> dict[int, Row]:
     return dict(answered(task, batch))
 
 

@@ -37,7 +37,7 @@ def anchors_noted(model: ReducedModel, case: Case, names: Mapping[str, str], pat
     """
     point = model.problem.reference
     low, high = next(((p.low, p.high) for p in model.problem.parameters if p.name == FRICTION), (None, None))
-    there = {path: point[own] for path, own in names.items() if own in point and path != FRICTION}
+    changes = {path: point[own] for path, own in names.items() if own in point and path != FRICTION}
     own = None
     if low is not None and high is not None:
         # Not at the ends themselves, where other nodes may be about to touch.
@@ -45,7 +45,7 @@ def anchors_noted(model: ReducedModel, case: Case, names: Mapping[str, str], pat
         own = low + (high - low) * shares
     stage("numbers of the branches, followed in the full problem")
     try:
-        found = modes(case.with_(there), own, max_frequency_hz=case.modal.max_frequency_hz, check=False)
+        found = modes(case.with_(changes), own, max_frequency_hz=case.modal.max_frequency_hz, check=False)
     except StridorError:
         return
     told = [

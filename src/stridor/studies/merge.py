@@ -11,7 +11,7 @@ from .rows import lengths, variables
 from .run import unit_of
 from .sampling import samples
 from .schema import Study
-from .store import DONE, Head, Store, dataset, head_of
+from .store import DONE, Head, OpenStore, dataset, head_of
 
 
 def merged(folder: Path, path: Path) -> list[str]:
@@ -20,17 +20,17 @@ def merged(folder: Path, path: Path) -> list[str]:
     places = sorted(p / "study.zarr" for p in folder.glob(FOLDERS) if (p / "study.zarr").is_dir())
     if not places:
         raise CaseError(str(folder), None, f"no parts there: folders {FOLDERS} that --part wrote")
-    heads = [head_of(place) for place in places]
-    for place, head in zip(places, heads, strict=True):
+    heads = [head_of(location) for location in places]
+    for location, head in zip(places, heads, strict=True):
         if head.digest != heads[0].digest:
-            raise CaseError(str(place), None, f"is of another study than {places[0]}")
+            raise CaseError(str(location), None, f"is of another study than {places[0]}")
     study = Study.from_document(heads[0].study)
     count = Part.read(heads[0].part).count
     told: list[str] = []
     if others := [str(p) for p, h in zip(places, heads, strict=True) if Part.read(h.part).count != count]:
         raise CaseError(others[0], None, f"is one of another number of parts than {places[0]}")
-    there = {Part.read(h.part).number for h in heads}
-    if missing := [str(k) for k in range(1, count + 1) if k not in there]:
+    present = {Part.read(h.part).number for h in heads}
+    if missing := [str(k) for k in range(1, count + 1) if k not in present]:
         listed = ", ".join(missing[:20]) + (" …" if len(missing) > 20 else "")
         told.append(f"parts missing: {listed} of {count}; their rows are not computed")
     head = Head(heads[0].study, heads[0].digest, heads[0].provenance)
@@ -38,9 +38,9 @@ def merged(folder: Path, path: Path) -> list[str]:
     columns, inner = variables(study.compute), lengths(study.compute, study.keep)
     if path.exists():
         shutil.rmtree(path)  # put together anew from parts, which stay
-    store = Store.made(path, head, values, {name: unit_of(name) for name in study.parameters}, columns, inner)
-    for place in places:
-        data = dataset(place)
+    store = OpenStore.made(path, head, values, {name: unit_of(name) for name in study.parameters}, columns, inner)
+    for location in places:
+        data = dataset(location)
         rows = {
             int(number): {name: values[k] for name, values in ((str(n), v.values) for n, v in data.items())}
             for k, number in enumerate(data["number"].values.tolist())
@@ -48,6 +48,6 @@ def merged(folder: Path, path: Path) -> list[str]:
         }
         store.write(rows)
         if left := int((data["status"].values < DONE).sum()):
-            told.append(f"{place.parent.name}: {left} rows not computed yet")
+            told.append(f"{location.parent.name}: {left} rows not computed yet")
     store.note(answers={"source": "parts", "why": f"{count} parts"}, without_effect=[])
     return told

@@ -41,7 +41,7 @@ EXTREMES, SOME = 12, 4  # samples on which models are proved
 
 
 @dataclass(frozen=True)
-class Reduced:
+class FrictionModels:
     """Models, each over a stretch of friction (one over all of it where friction is no parameter), and what is asked of
     them. names: of parameters of the study, those of the models. anchors: of each model, where numbers are known."""
 
@@ -51,14 +51,14 @@ class Reduced:
     anchors: tuple[tuple[Numbered, ...], ...] = ()
 
     @staticmethod
-    def read(path: str, case: Case) -> Reduced:
+    def read(path: str, case: Case) -> FrictionModels:
         """Models that `made` wrote into a folder. Raises CaseError where one is damaged."""
         folder = Path(path)
         compute: Compute = "onsets" if folder.name.endswith("onsets") else "modes"
         files = sorted(folder.glob("*.npz"))
         models = tuple(map(load_reduced, files))
         anchors = tuple(anchors_read(m, _numbers(f)) for m, f in zip(models, files, strict=True))
-        return Reduced(models, compute, _named(case), anchors)
+        return FrictionModels(models, compute, _named(case), anchors)
 
     def row(self, values: Mapping[str, float], keep: Keep) -> Row | None:
         """A row of the model that holds these values, None where none does."""
@@ -172,7 +172,7 @@ def unfit(study: Study, case: Case, rows: int) -> str:
     return ""
 
 
-def made(study: Study, case: Case, samples: Array, path: Path) -> Reduced:
+def made(study: Study, case: Case, samples: Array, path: Path) -> FrictionModels:
     """The models over all samples, kept in a folder. Raises CaseError and AnalysisError where there is none."""
     box = box_of(study, case, samples)
     constant = [p for k, p in enumerate(study.parameters) if samples[:, k].min() == samples[:, k].max()]
@@ -185,11 +185,11 @@ def made(study: Study, case: Case, samples: Array, path: Path) -> Reduced:
         model = reduced_model(own, part, bound=study.answers.bound)
         if model.whole and model.states is None:
             raise AnalysisError("damping is so strong that the reduced model is no faster")
-        place = path / f"{number:02}.npz"
-        save_reduced(model, place, case=own)
+        location = path / f"{number:02}.npz"
+        save_reduced(model, location, case=own)
         if study.compute == "modes":
-            anchors_noted(model, own, {name: named.get(name, name) for name in study.parameters}, _numbers(place))
-    return Reduced.read(str(path), case)
+            anchors_noted(model, own, {name: named.get(name, name) for name in study.parameters}, _numbers(location))
+    return FrictionModels.read(str(path), case)
 
 
 def _numbers(model: Path) -> Path:
@@ -219,6 +219,6 @@ def _by_touching(study: Study, case: Case, friction: tuple[float, float] | None)
 def proofs(samples: Array, seed: int) -> list[int]:
     """Places of samples (n, p) on which models are proved before they answer: where each number is least and largest,
     which is where other nodes touch if they do anywhere, and some at random."""
-    extreme = [int(place(samples[:, k])) for k in range(samples.shape[1]) for place in (np.argmin, np.argmax)]
+    extreme = [int(extreme_of(samples[:, k])) for k in range(samples.shape[1]) for extreme_of in (np.argmin, np.argmax)]
     some = np.random.default_rng(seed).permutation(len(samples))[:SOME].tolist()
     return list(dict.fromkeys([*extreme[:EXTREMES], *some]))

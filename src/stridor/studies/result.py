@@ -256,10 +256,10 @@ def _cell(value: Any) -> Cell:
 
 def open_study(path: str | Path, *, interrupted: bool = False) -> StudyResult:
     """The store of a study, or the folder that it lies in. Raises CaseError where there is none or it is damaged."""
-    place = Path(path)
-    if place.is_dir() and (place / "study.zarr").is_dir():
-        place = place / "study.zarr"
-    return StudyResult(place, dataset(place), interrupted)
+    location = Path(path)
+    if location.is_dir() and (location / "study.zarr").is_dir():
+        location = location / "study.zarr"
+    return StudyResult(location, dataset(location), interrupted)
 
 
 def numbers(result: StudyResult, name: str) -> Array:

@@ -26,7 +26,7 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Variable:
+class StoreColumn:
     """A column of the store: dtype "f8", "i8", "i1" or "str"; inner dimension, "" for one number a row; unit, words."""
 
     name: str
@@ -36,7 +36,7 @@ class Variable:
     inner: str = ""
 
 
-def variables(compute: Compute) -> tuple[Variable, ...]:
+def variables(compute: Compute) -> tuple[StoreColumn, ...]:
     """What a row holds beside the parameters, by what is computed."""
     return (*_COMMON, *_VARIABLES[compute])
 
@@ -186,63 +186,67 @@ _COMPUTED: dict[str, Callable[[Workspace, float | None, Keep], Row]] = {
 }  # fmt: skip
 
 _COMMON = (
-    Variable("status", "i1", "", "0 not computed yet, 1 computed, 2 failed (`error` says why)"),
-    Variable("error", "str", "", "why there is no result"),
-    Variable("note", "str", "", "what speaks against the result, where something does"),
-    Variable("source", "str", "", "full problem or reduced model"),
-    Variable("seconds", "f8", "s", "time that the row took"),
+    StoreColumn("status", "i1", "", "0 not computed yet, 1 computed, 2 failed (`error` says why)"),
+    StoreColumn("error", "str", "", "why there is no result"),
+    StoreColumn("note", "str", "", "what speaks against the result, where something does"),
+    StoreColumn("source", "str", "", "full problem or reduced model"),
+    StoreColumn("seconds", "f8", "s", "time that the row took"),
 )
 _ESTIMATED = (
-    Variable("estimated_error", "f8", "1", "estimated relative error of the eigenvalues; none where solved in full"),
-    Variable("confirmed", "i1", "", "1 where the row was solved in full as well and both agree, 2 where they do not"),
-    Variable("difference", "f8", "1", "relative difference of both where solved in full as well"),
+    StoreColumn("estimated_error", "f8", "1", "estimated relative error of the eigenvalues; none where solved in full"),
+    StoreColumn(
+        "confirmed", "i1", "", "1 where the row was solved in full as well and both agree, 2 where they do not"
+    ),
+    StoreColumn("difference", "f8", "1", "relative difference of both where solved in full as well"),
 )
-_VARIABLES: dict[str, tuple[Variable, ...]] = {
+_VARIABLES: dict[str, tuple[StoreColumn, ...]] = {
     "modes": (
-        Variable("frequency_hz", "f8", "Hz", "frequency Im λ / 2π", "mode"),
-        Variable("growth_rate", "f8", "1/s", "growth rate Re λ", "mode"),
-        Variable("branch", "i8", "", "number of the mode by frequency at μ = 0; 0 where not followed", "mode"),
-        Variable("unstable_modes", "i8", "", "how many modes of the band grow"),
-        Variable("modes_of_band", "i8", "", "how many modes there are in the band, kept or not"),
-        Variable("largest_growth_rate", "f8", "1/s", "largest growth rate of the band"),
-        Variable("largest_growth_frequency_hz", "f8", "Hz", "frequency of the mode that has it"),
+        StoreColumn("frequency_hz", "f8", "Hz", "frequency Im λ / 2π", "mode"),
+        StoreColumn("growth_rate", "f8", "1/s", "growth rate Re λ", "mode"),
+        StoreColumn("branch", "i8", "", "number of the mode by frequency at μ = 0; 0 where not followed", "mode"),
+        StoreColumn("unstable_modes", "i8", "", "how many modes of the band grow"),
+        StoreColumn("modes_of_band", "i8", "", "how many modes there are in the band, kept or not"),
+        StoreColumn("largest_growth_rate", "f8", "1/s", "largest growth rate of the band"),
+        StoreColumn("largest_growth_frequency_hz", "f8", "Hz", "frequency of the mode that has it"),
         *_ESTIMATED,
     ),
     "onsets": (
-        Variable("critical_mu", "f8", "1", "least friction coefficient from which on a mode grows"),
-        Variable("critical_frequency_hz", "f8", "Hz", "frequency of that mode there"),
-        Variable("onset_mu", "f8", "1", "friction coefficients where growth begins or ends", "onset"),
-        Variable("onset_frequency_hz", "f8", "Hz", "frequency there", "onset"),
-        Variable("onset_ends_growth", "f8", "", "1 where growth ends there, 0 where it begins", "onset"),
-        Variable("onsets", "i8", "", "how many there are, kept or not"),
-        Variable("growing_at_start", "i8", "", "how many modes grow at the low end of the range of friction already"),
-        Variable("complete", "i1", "", "1 where nothing speaks for further onsets, 0 where the list may lack some"),
+        StoreColumn("critical_mu", "f8", "1", "least friction coefficient from which on a mode grows"),
+        StoreColumn("critical_frequency_hz", "f8", "Hz", "frequency of that mode there"),
+        StoreColumn("onset_mu", "f8", "1", "friction coefficients where growth begins or ends", "onset"),
+        StoreColumn("onset_frequency_hz", "f8", "Hz", "frequency there", "onset"),
+        StoreColumn("onset_ends_growth", "f8", "", "1 where growth ends there, 0 where it begins", "onset"),
+        StoreColumn("onsets", "i8", "", "how many there are, kept or not"),
+        StoreColumn(
+            "growing_at_start", "i8", "", "how many modes grow at the low end of the range of friction already"
+        ),
+        StoreColumn("complete", "i1", "", "1 where nothing speaks for further onsets, 0 where the list may lack some"),
         *_ESTIMATED,
     ),
     "steady": (
-        Variable("normal_force", "f8", "N", "sum of the normal forces"),
-        Variable("largest_node_force", "f8", "N", "largest normal force of a contact node"),
-        Variable("open_nodes", "i8", "", "contact nodes that are open"),
-        Variable("sticking_nodes", "i8", "", "contact nodes that stick"),
-        Variable("slipping_nodes", "i8", "", "contact nodes that slip"),
-        Variable("residual", "f8", "1", "largest imbalance over the largest force"),
+        StoreColumn("normal_force", "f8", "N", "sum of the normal forces"),
+        StoreColumn("largest_node_force", "f8", "N", "largest normal force of a contact node"),
+        StoreColumn("open_nodes", "i8", "", "contact nodes that are open"),
+        StoreColumn("sticking_nodes", "i8", "", "contact nodes that stick"),
+        StoreColumn("slipping_nodes", "i8", "", "contact nodes that slip"),
+        StoreColumn("residual", "f8", "1", "largest imbalance over the largest force"),
     ),
     "simulate": (
-        Variable("dominant_frequency_hz", "f8", "Hz", "loudest frequency of the last phase"),
-        Variable("growth_rate_in_time", "f8", "1/s", "growth rate of the run, where it grows exponentially"),
-        Variable("saturated", "i1", "", "1 where growth has ended in the run, 0 where not, -1 unknown"),
-        Variable("stick_fraction", "f8", "1", "share of the last phase in stick, mean of the contacts"),
-        Variable("slip_fraction", "f8", "1", "share of the last phase in slip"),
-        Variable("separation_fraction", "f8", "1", "share of the last phase without contact"),
-        Variable("energy_error", "f8", "1", "what the balance of energies lacks, relative"),
-        Variable("steps", "i8", "", "time steps"),
+        StoreColumn("dominant_frequency_hz", "f8", "Hz", "loudest frequency of the last phase"),
+        StoreColumn("growth_rate_in_time", "f8", "1/s", "growth rate of the run, where it grows exponentially"),
+        StoreColumn("saturated", "i1", "", "1 where growth has ended in the run, 0 where not, -1 unknown"),
+        StoreColumn("stick_fraction", "f8", "1", "share of the last phase in stick, mean of the contacts"),
+        StoreColumn("slip_fraction", "f8", "1", "share of the last phase in slip"),
+        StoreColumn("separation_fraction", "f8", "1", "share of the last phase without contact"),
+        StoreColumn("energy_error", "f8", "1", "what the balance of energies lacks, relative"),
+        StoreColumn("steps", "i8", "", "time steps"),
     ),
     "compare": (
-        Variable("modal_frequency_hz", "f8", "Hz", "frequency of the mode compared"),
-        Variable("modal_growth_rate", "f8", "1/s", "its growth rate"),
-        Variable("frequency_in_time_hz", "f8", "Hz", "frequency of the perturbation in time"),
-        Variable("growth_rate_in_time", "f8", "1/s", "its growth rate"),
-        Variable("dominant_frequency_hz", "f8", "Hz", "loudest frequency of the full run"),
-        Variable("agree", "i1", "", "1 where both approaches agree, 0 where not, -1 not decided"),
+        StoreColumn("modal_frequency_hz", "f8", "Hz", "frequency of the mode compared"),
+        StoreColumn("modal_growth_rate", "f8", "1/s", "its growth rate"),
+        StoreColumn("frequency_in_time_hz", "f8", "Hz", "frequency of the perturbation in time"),
+        StoreColumn("growth_rate_in_time", "f8", "1/s", "its growth rate"),
+        StoreColumn("dominant_frequency_hz", "f8", "Hz", "loudest frequency of the full run"),
+        StoreColumn("agree", "i1", "", "1 where both approaches agree, 0 where not, -1 not decided"),
     ),
 }  # fmt: skip

@@ -31,8 +31,8 @@ from .result import StudyResult, open_study
 from .rows import Row, full_row, lengths, variables
 from .sampling import samples
 from .schema import Study
-from .store import DONE, FAILED, PENDING, Head, Store
-from .task import Batch, Task, program
+from .store import DONE, FAILED, PENDING, Head, OpenStore
+from .task import SampleBatch, Task, program
 from .uncertainty import Probability, missing_samples, probability
 from .workers import LocalWorkers
 
@@ -54,7 +54,7 @@ class Workers(Protocol):
     def words(self) -> str: ...
     def __enter__(self) -> Workers: ...
     def __exit__(self, *_: object) -> None: ...
-    def answers(self, batches: Iterator[Batch]) -> Iterator[dict[int, Row]]: ...
+    def answers(self, batches: Iterator[SampleBatch]) -> Iterator[dict[int, Row]]: ...
 
 
 def run_study(
@@ -84,9 +84,9 @@ def run_study(
         study = Study.load(study)
     if folder is None:
         raise CaseError("folder", None, "missing – give the folder that the study's store is to lie in")
-    place = Path(folder) if part is None else Path(folder) / part.folder
-    with claimed(place):
-        return _Run(study, place, part, go_on, progress, say or (lambda _: None)).all(workers, scheduler)
+    location = Path(folder) if part is None else Path(folder) / part.folder
+    with claimed(location):
+        return _Run(study, location, part, go_on, progress, say or (lambda _: None)).all(workers, scheduler)
 
 
 @dataclass
@@ -123,12 +123,12 @@ class _Run:
         return open_study(store.path, interrupted=self.interrupted)
 
     # -- the store ---------------------------------------------------------------------------------------------------
-    def _store(self, case: Case) -> Store:
+    def _store(self, case: Case) -> OpenStore:
         path = self.folder / NAME
         columns = variables(self.study.compute)
         digest = digest_of(self.study, case)
         if path.exists():
-            store = Store.opened(path, columns)
+            store = OpenStore.opened(path, columns)
             self._check(store, digest)
             return store
         values = samples(self.study)
@@ -139,13 +139,13 @@ class _Run:
         made = provenance(case, "study", 0.0) | {"programs": [program()]}
         head = Head(self.study.document(), digest, made, "" if self.part is None else str(self.part))
         parameters = {name: unit_of(name) for name in self.study.parameters}
-        store = Store.made(
+        store = OpenStore.made(
             path, head, values, parameters, columns, lengths(self.study.compute, self.study.keep), numbers=numbers
         )
         store.note(without_effect=without_effect(self.study, case, values))
         return store
 
-    def _check(self, store: Store, digest: str) -> None:
+    def _check(self, store: OpenStore, digest: str) -> None:
         """Raises CaseError where the store is not one of this study and this program."""
         head = store.head
         if head.part != ("" if self.part is None else str(self.part)):
@@ -167,7 +167,7 @@ class _Run:
         return np.flatnonzero((status == PENDING) | ((status == FAILED) & self.study.restart_failed))
 
     # -- who answers -------------------------------------------------------------------------------------------------
-    def _task(self, case: Case, store: Store) -> Task:
+    def _task(self, case: Case, store: OpenStore) -> Task:
         """The full problem, or a reduced model where there is one that agrees with it."""
         plain = Task(case.to_toml(), self.study.compute, tuple(self.study.parameters), self.study.keep, "", program())
         path = (self.folder / f"reduced-{self.study.compute}").resolve()
@@ -202,7 +202,7 @@ class _Run:
             raise AnalysisError(why)
         return why
 
-    def _proved(self, case: Case, values: Array, model: reduced_rows.Reduced) -> str:
+    def _proved(self, case: Case, values: Array, model: reduced_rows.FrictionModels) -> str:
         """What speaks against a model on a few samples solved in full, "" where they agree."""
         chosen, compared = reduced_rows.proofs(values, self.study.sampling.seed), 0
         for done, k in enumerate(chosen):
@@ -222,7 +222,7 @@ class _Run:
         return "" if compared else "the reduced model holds none of the samples that it is proved on"
 
     # -- the work ----------------------------------------------------------------------------------------------------
-    def _answer(self, store: Store, who: Workers) -> None:
+    def _answer(self, store: OpenStore, who: Workers) -> None:
         """Have every open row answered and written."""
         status = store.status
         places = self._open_rows(status)
@@ -247,7 +247,7 @@ class _Run:
             finally:
                 self._write(store)
 
-    def _write(self, store: Store) -> None:
+    def _write(self, store: OpenStore) -> None:
         rows, self.rows = self.rows, {}
         store.write(rows)
 
@@ -257,7 +257,7 @@ class _Run:
             mean = float(np.mean(seconds))
             self.rate = mean if not self.rate else 0.7 * self.rate + 0.3 * mean
 
-    def _batches(self, store: Store, places: IntArray, workers: int) -> Iterator[Batch]:
+    def _batches(self, store: OpenStore, places: IntArray, workers: int) -> Iterator[SampleBatch]:
         """Open rows in batches of about a second, smaller towards the end so that all workers end together."""
         values = store.samples
         chosen = np.random.default_rng(self.study.sampling.seed + 1).random(len(values)) < self.study.answers.confirm
@@ -269,11 +269,11 @@ class _Run:
             size = max(1, min(size, (len(places) - at) // (2 * workers) or 1))
             part = places[at : at + size]
             at += size
-            yield Batch(
+            yield SampleBatch(
                 tuple(part.tolist()), tuple(map(tuple, values[part].tolist())), tuple(chosen[part].tolist())
             )
 
-    def _more(self, store: Store) -> bool:
+    def _more(self, store: OpenStore) -> bool:
         """Add samples where the probability of instability is not known as well as asked for."""
         goal = self.study.goal
         if goal is None or self.part is not None:

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import AnalysisError, CaseError
 from ..typing import Array, IntArray
-from .rows import Row, Variable
+from .rows import Row, StoreColumn
 
 FORMAT = 1  # of the store; one with a larger number was written by a newer stridor
 KIND = "stridor study"
@@ -40,10 +40,10 @@ class Head:
     part: str = ""
 
 
-class Store:
+class OpenStore:
     """A store that is open for writing by this process alone."""
 
-    def __init__(self, path: Path, group: Any, variables: Sequence[Variable]) -> None:
+    def __init__(self, path: Path, group: Any, variables: Sequence[StoreColumn]) -> None:
         self.path, self._group, self.variables = path, group, tuple(variables)
 
     @staticmethod
@@ -52,11 +52,11 @@ class Store:
         head: Head,
         samples: Array,
         parameters: Mapping[str, str],
-        variables: Sequence[Variable],
+        variables: Sequence[StoreColumn],
         lengths: Mapping[str, int],
         *,
         numbers: IntArray | None = None,
-    ) -> Store:
+    ) -> OpenStore:
         """A new store of samples (n, p). parameters: their paths and units; numbers (n,): those of the rows in the
         whole study. Raises AnalysisError where it cannot be written."""
         temporary = path.with_name(f".{path.name}.new")
@@ -65,10 +65,10 @@ class Store:
             group = _zarr().create_group(temporary, attributes=_attributes(head, parameters))
             chunk = max(1, min(CHUNK, len(samples)))
             for k, (name, units) in enumerate(parameters.items()):
-                array = _array(group, Variable(name, "f8", units, "parameter of the study"), len(samples), chunk, {})
+                array = _array(group, StoreColumn(name, "f8", units, "parameter of the study"), len(samples), chunk, {})
                 array[:] = samples[:, k]
             number = np.arange(len(samples)) if numbers is None else numbers
-            words = Variable("number", "i8", "", "number of the sample in the study")
+            words = StoreColumn("number", "i8", "", "number of the sample in the study")
             _array(group, words, len(samples), chunk, {})[:] = number
             for variable in variables:
                 _array(group, variable, len(samples), chunk, lengths)
@@ -76,16 +76,16 @@ class Store:
         except OSError as error:
             shutil.rmtree(temporary, ignore_errors=True)
             raise AnalysisError(f"cannot write {path}: {error.strerror or error}") from error
-        return Store.opened(path, variables)
+        return OpenStore.opened(path, variables)
 
     @staticmethod
-    def opened(path: Path, variables: Sequence[Variable]) -> Store:
+    def opened(path: Path, variables: Sequence[StoreColumn]) -> OpenStore:
         """One that is there. Raises CaseError for what is none, and for one of a newer stridor."""
         group = _group(path, "r+")
         missing = [v.name for v in variables if v.name not in group]
         if missing:
             raise CaseError(str(path), None, f"a damaged store: {', '.join(missing)} missing; name another (--out)")
-        return Store(path, group, variables)
+        return OpenStore(path, group, variables)
 
     @property
     def head(self) -> Head:
@@ -124,7 +124,7 @@ class Store:
                 "same command goes on from there"
             ) from error
 
-    def _put(self, variable: Variable, places: IntArray, rows: Mapping[int, Row]) -> None:
+    def _put(self, variable: StoreColumn, places: IntArray, rows: Mapping[int, Row]) -> None:
         array = self._group[variable.name]
         given = [rows[int(k)].get(variable.name) for k in places]
         if variable.dtype == "str":
@@ -182,7 +182,7 @@ def _by_chunk(places: IntArray, chunk: int) -> list[IntArray]:
     return np.split(places, np.flatnonzero(np.diff(places // chunk)) + 1)
 
 
-def _array(group: Any, variable: Variable, rows: int, chunk: int, lengths: Mapping[str, int]) -> Any:
+def _array(group: Any, variable: StoreColumn, rows: int, chunk: int, lengths: Mapping[str, int]) -> Any:
     codecs = _zarr().codecs
     inner = (lengths[variable.inner],) if variable.inner else ()
     return group.create_array(

@@ -12,7 +12,7 @@ from ..errors import AnalysisError
 from ..study.case_key import sources_key
 from ..study.provenance import versions
 from ..threads import one_thread
-from .reduced_rows import Reduced
+from .reduced_rows import FrictionModels
 from .rows import Row, failed, full_row
 from .tables import Compute, Keep
 
@@ -39,7 +39,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Batch:
+class SampleBatch:
     """Places of rows in the store, the values (k, p) of each, and which of them are solved in full as well. tries: how
     often a worker has died at it."""
 
@@ -48,16 +48,16 @@ class Batch:
     confirm: tuple[bool, ...]
     tries: int = 0
 
-    def alone(self) -> Iterator[Batch]:
+    def alone(self) -> Iterator[SampleBatch]:
         """Each row by itself, tried once more."""
-        for place, values, confirm in zip(self.places, self.values, self.confirm, strict=True):
-            yield Batch((place,), (values,), (confirm,), self.tries + 1)
+        for number, values, confirm in zip(self.places, self.values, self.confirm, strict=True):
+            yield SampleBatch((number,), (values,), (confirm,), self.tries + 1)
 
-    def without(self, done: Mapping[int, Row]) -> Batch:
+    def without(self, done: Mapping[int, Row]) -> SampleBatch:
         """What is left of it."""
-        left = [k for k, place in enumerate(self.places) if place not in done]
+        left = [k for k, number in enumerate(self.places) if number not in done]
         parts = (tuple(part[k] for k in left) for part in (self.places, self.values, self.confirm))
-        return Batch(*parts, self.tries)  # type: ignore[arg-type]
+        return SampleBatch(*parts, self.tries)  # type: ignore[arg-type]
 
 
 def program() -> str:
@@ -65,17 +65,17 @@ def program() -> str:
     return f"{versions()['stridor']} {sources_key()[:12]}"
 
 
-def answered(task: Task, batch: Batch) -> Iterator[tuple[int, Row]]:
+def answered(task: Task, batch: SampleBatch) -> Iterator[tuple[int, Row]]:
     """The rows of a batch, one after the other. Raises AnalysisError where the worker has another stridor."""
     task.checked()
     case = _case(task.case)
     reduced = None if not task.model else _reduced(task.model, task.case)
-    for place, values, confirm in zip(batch.places, batch.values, batch.confirm, strict=True):
-        yield place, _row(task, case, reduced, dict(zip(task.names, values, strict=True)), confirm=confirm)
+    for number, values, confirm in zip(batch.places, batch.values, batch.confirm, strict=True):
+        yield number, _row(task, case, reduced, dict(zip(task.names, values, strict=True)), confirm=confirm)
 
 
 @one_thread
-def _row(task: Task, case: Case, reduced: Reduced | None, values: Mapping[str, float], *, confirm: bool) -> Row:
+def _row(task: Task, case: Case, reduced: FrictionModels | None, values: Mapping[str, float], *, confirm: bool) -> Row:
     if reduced is None:
         return full_row(case, task.compute, values, task.keep)
     started = time.perf_counter()
@@ -89,10 +89,10 @@ def _row(task: Task, case: Case, reduced: Reduced | None, values: Mapping[str, f
     return row
 
 
-def died(batch: Batch) -> dict[int, Row]:
+def died(batch: SampleBatch) -> dict[int, Row]:
     """Rows at which worker after worker died."""
     why = f"the worker process died {batch.tries + 1} times at this row: out of memory, or killed"
-    return {place: failed(why) for place in batch.places}
+    return {number: failed(why) for number in batch.places}
 
 
 @lru_cache(4)
@@ -101,5 +101,5 @@ def _case(text: str) -> Case:
 
 
 @lru_cache(2)
-def _reduced(path: str, case: str) -> Reduced:
-    return Reduced.read(path, _case(case))
+def _reduced(path: str, case: str) -> FrictionModels:
+    return FrictionModels.read(path, _case(case))

@@ -22,21 +22,21 @@ from typing import Any
 from ..errors import AnalysisError
 from .processes import spawned
 from .rows import Row
-from .task import Batch, Task, answered, died
+from .task import SampleBatch, Task, answered, died
 
 TRIES = 3  # of a row by itself, at which a worker dies
 EVERY = 0.25  # seconds between the results that a worker sends
 PATIENCE = 5.0  # seconds that a worker has to end
 
 
-Answer = Callable[[Task, Batch], Iterator[tuple[int, Row]]]
+Answer = Callable[[Task, SampleBatch], Iterator[tuple[int, Row]]]
 
 
 @dataclass
 class _Worker:
     process: Any
     pipe: Any  # a Connection, or on Windows a PipeConnection
-    batch: Batch | None = None
+    batch: SampleBatch | None = None
     done: dict[int, Row] = field(default_factory=dict[int, Row])
 
 
@@ -72,10 +72,10 @@ class LocalWorkers:
                 worker.process.kill()
         self._workers = []
 
-    def answers(self, batches: Iterable[Batch]) -> Iterator[dict[int, Row]]:
+    def answers(self, batches: Iterable[SampleBatch]) -> Iterator[dict[int, Row]]:
         """Rows as they are done, of batches that are taken one by one. Raises AnalysisError where a worker cannot do
         any of it."""
-        waiting, again = iter(batches), deque[Batch]()
+        waiting, again = iter(batches), deque[SampleBatch]()
         while True:
             self._hand_out(waiting, again)
             busy = [w for w in self._workers if w.batch is not None]
@@ -87,7 +87,7 @@ class LocalWorkers:
                 if rows:
                     yield rows
 
-    def _hand_out(self, waiting: Iterator[Batch], again: deque[Batch]) -> None:
+    def _hand_out(self, waiting: Iterator[SampleBatch], again: deque[SampleBatch]) -> None:
         """Give every worker that has nothing to do a batch; start workers while there is work."""
         while True:
             idle = next((w for w in self._workers if w.batch is None), None)
@@ -101,7 +101,7 @@ class LocalWorkers:
             with contextlib.suppress(OSError):  # who has died meanwhile is noticed when it is listened to
                 worker.pipe.send(batch)
 
-    def _received(self, worker: _Worker, again: deque[Batch]) -> dict[int, Row]:
+    def _received(self, worker: _Worker, again: deque[SampleBatch]) -> dict[int, Row]:
         """What a worker says: rows, that a batch is done, or nothing more at all."""
         batch = worker.batch
         assert batch is not None, "only those with a batch are listened to"
@@ -116,7 +116,7 @@ class LocalWorkers:
         worker.done.update(content)
         return content
 
-    def _buried(self, worker: _Worker, batch: Batch, again: deque[Batch]) -> dict[int, Row]:
+    def _buried(self, worker: _Worker, batch: SampleBatch, again: deque[SampleBatch]) -> dict[int, Row]:
         """What is done about a worker that died: another try of what it had not answered, row by row."""
         self.lost += 1
         self._workers.remove(worker)
@@ -143,8 +143,8 @@ def _work(pipe: Any, task: Task, answer: Answer) -> None:
             rows: dict[int, Row] = {}
             last = time.monotonic()
             try:
-                for place, row in answer(task, batch):
-                    rows[place] = row
+                for number, row in answer(task, batch):
+                    rows[number] = row
                     if time.monotonic() - last > EVERY:
                         pipe.send(("rows", rows))
                         rows, last = {}, time.monotonic()

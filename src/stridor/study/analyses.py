@@ -13,7 +13,7 @@ from typing import Any, Literal, overload
 
 import numpy as np
 
-from ..agreement import Agreement, Comparison, Store
+from ..agreement import Agreement, Comparison, PartStore
 from ..agreement import compare as compare_system
 from ..case.matrix_checks import MU
 from ..errors import AnalysisError, CaseError
@@ -356,7 +356,7 @@ def compare(
     runs: dict[float, Trajectory] | None = None,
     progress: Callable[[str], None] | None = None,
     only: Collection[str] | None = None,
-    kept: Store | None = None,
+    kept: PartStore | None = None,
     finished: Callable[[Comparison], None] | None = None,
 ) -> Agreement:
     """Both approaches at each μ (default comparison.mu, else the problem's own) and by their critical μ.

@@ -14,13 +14,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..errors import CaseError
-from ..modal.boundary import Curve, Found, boundaries
+from ..modal.boundary import Found, StabilityCurve, boundaries
 from ..modal.parametric import ReducedModel
 from ..threads import one_thread
 from ..typing import IntArray
 from .asked import require_range
 from .boundary_again import position_error, solved_again
-from .boundary_problem import Asked, Method, plane_of, solved_problem
+from .boundary_problem import BoundaryAsked, Method, plane_of, solved_problem
 from .boundary_result import Boundary, BoundaryCurve, CountedAt
 from .boundary_words import sentence, told
 from .options import options_of
@@ -61,7 +61,7 @@ def stability_boundary(
     work = Workspace.of(problem)
     case = work.case("a stability boundary")
     ends = require_range(x_range, "x_range"), require_range(y_range, "y_range")
-    asked = Asked((x, y), ends, method, bound, tolerance, lines)
+    asked = BoundaryAsked((x, y), ends, method, bound, tolerance, lines)
     asked.check(case)
     top = case.modal.max_frequency_hz if max_frequency_hz is None else float(max_frequency_hz)
     if not (np.isfinite(top) and top > 0):
@@ -81,7 +81,7 @@ def stability_boundary(
     )  # fmt: skip
 
 
-def _curve(found: Found, curve: Curve, model: ReducedModel | None) -> BoundaryCurve:
+def _curve(found: Found, curve: StabilityCurve, model: ReducedModel | None) -> BoundaryCurve:
     """A curve in the units of x and y, with how many modes grow on both sides of each point."""
     plane = found.plane
     width = plane.high - plane.low
@@ -95,7 +95,7 @@ def _curve(found: Found, curve: Curve, model: ReducedModel | None) -> BoundaryCu
     )  # fmt: skip
 
 
-def _beside(found: Found, curve: Curve) -> IntArray:
+def _beside(found: Found, curve: StabilityCurve) -> IntArray:
     """How many modes grow on the calmer side of each point (k,)."""
     numbers = np.zeros(len(curve.spots), dtype=np.int64)
     if not found.looked:

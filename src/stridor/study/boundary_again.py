@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import AnalysisError
-from ..modal.boundary import Curve, Found, Plane
-from ..modal.boundary.spot import Spot
+from ..modal.boundary import Found, Plane, StabilityCurve
+from ..modal.boundary.spot import CurvePoint
 from ..modal.full.line import ParameterLine
 from ..modal.full.passages import quiet
 from ..modal.newton import Root, crossing, meeting, standstill
@@ -22,7 +22,7 @@ AT_RANDOM = 2  # of all curves
 MOST = 12  # points
 
 
-def position_error(model: ReducedModel, plane: Plane, spot: Spot) -> float:
+def position_error(model: ReducedModel, plane: Plane, spot: CurvePoint) -> float:
     """How far the model is estimated to put a point off, in shares of the ranges: what it is estimated to be off in λ
     [1/s] over the slope of the growth. NaN where two undamped modes meet or one comes to rest, whose λ is double."""
     if spot.kind != "crossing":
@@ -56,7 +56,7 @@ def solved_again(
     return tuple(done), failed
 
 
-def _chosen(curves: list[Curve]) -> list[tuple[int, int]]:
+def _chosen(curves: list[StabilityCurve]) -> list[tuple[int, int]]:
     """(curve, point) of both ends and of the extreme x and y of each curve, as long as there are few, and of some at
     random."""
     wanted: list[tuple[int, int, int]] = []
@@ -72,7 +72,7 @@ def _chosen(curves: list[Curve]) -> list[tuple[int, int]]:
 
 
 def _again(
-    plane: Plane, problem: ParametricProblem, vectors: Array | None, spot: Spot, solver: str | None
+    plane: Plane, problem: ParametricProblem, vectors: Array | None, spot: CurvePoint, solver: str | None
 ) -> tuple[float, float] | None:
     """How far off a point was, in shares of the ranges, and the backward error; None where it is not found."""
     share = np.abs(spot.gradient) / np.hypot(*spot.gradient)

@@ -24,7 +24,7 @@ BESIDE = 1e-4  # of a range: how far from an end without any damping curves begi
 
 
 @dataclass(frozen=True)
-class Asked:
+class BoundaryAsked:
     """What was asked for."""
 
     paths: tuple[str, str]
@@ -50,7 +50,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Solved:
+class PlaneProblem:
     """The problem over x and y (names as a box calls them), its dense terms (t, r, r), and the basis (n, r) and model
     that they are of; None: all freedoms."""
 
@@ -63,7 +63,7 @@ class Solved:
     notes: tuple[str, ...]
 
 
-def solved_problem(case: Case, asked: Asked, top: float) -> Solved:
+def solved_problem(case: Case, asked: BoundaryAsked, top: float) -> PlaneProblem:
     """What is solved up to top [Hz]. Raises CaseError and AnalysisError where neither a reduced model nor the full
     problem serves."""
     try:
@@ -78,7 +78,7 @@ def solved_problem(case: Case, asked: Asked, top: float) -> Solved:
         raise CaseError.many(problems) from error
 
 
-def _solved(case: Case, asked: Asked, top: float) -> Solved:
+def _solved(case: Case, asked: BoundaryAsked, top: float) -> PlaneProblem:
     names = box_name(case, asked.paths[0]), box_name(case, asked.paths[1])
     box = dict(zip(names, asked.ends, strict=True))
     freedoms, method = build_system(case).size, asked.method
@@ -91,17 +91,19 @@ def _solved(case: Case, asked: Asked, top: float) -> Solved:
         try:
             model = reduced_model(case, box, max_frequency_hz=top, bound=asked.bound)
             notes = tuple(getattr(model.problem, "notes", ()))
-            return Solved(model.problem, names, model.projected, model.vectors, model, model.frequency, notes)
+            return PlaneProblem(model.problem, names, model.projected, model.vectors, model, model.frequency, notes)
         except AnalysisError as error:
             if asked.method == "reduced" or freedoms > MOST:
                 raise
             why = (f"all is solved in the full problem, there is no reduced model: {error}",)
     whole = parametric_problem(case, box)
     terms = np.array([term.matrix.toarray() for term in whole.terms])
-    return Solved(whole, names, terms, None, None, 2 * np.pi * top, (*whole.notes, *why))
+    return PlaneProblem(whole, names, terms, None, None, 2 * np.pi * top, (*whole.notes, *why))
 
 
-def plane_of(solved: Solved, ends: tuple[tuple[float, float], tuple[float, float]]) -> tuple[Plane, tuple[str, ...]]:
+def plane_of(
+    solved: PlaneProblem, ends: tuple[tuple[float, float], tuple[float, float]]
+) -> tuple[Plane, tuple[str, ...]]:
     """The rectangle, without ends at which nothing is damped while it is elsewhere, and what is to be said of that."""
     low, high = np.array(ends, dtype=float).T
     whole = Plane(solved.problem, solved.terms, solved.names, solved.problem.reference, solved.top, low, high)

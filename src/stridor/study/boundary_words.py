@@ -8,7 +8,7 @@ import numpy as np
 
 from ..modal.boundary import Found
 from ..notebook import counted
-from .boundary_problem import Solved
+from .boundary_problem import PlaneProblem
 from .boundary_result import SolvedAgain
 
 MOST_TOLD = 3
@@ -57,7 +57,8 @@ def _mesh(found: Found) -> str:
 
 
 def told(
-    found: Found, paths: tuple[str, str], solved: Solved, again: Sequence[SolvedAgain], failed: int, tolerance: float
+    found: Found, paths: tuple[str, str], solved: PlaneProblem, again: Sequence[SolvedAgain], failed: int,
+    tolerance: float,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Notes on how it was done, and warnings."""
     plane, notes, warnings = found.plane, list[str](), list[str]()

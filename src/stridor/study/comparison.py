@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..agreement import Agreement, Comparison, Store
+from ..agreement import Agreement, Comparison, PartStore
 from ..agreement.four_answers import four_answers, with_answers
 from ..errors import CaseError, StridorError
 from ..periodic import Cycle, CycleOnset
@@ -27,7 +27,7 @@ def compare(
     runs: dict[float, Trajectory] | None = None,
     progress: Callable[[str], None] | None = None,
     only: Collection[str] | None = None,
-    kept: Store | None = None,
+    kept: PartStore | None = None,
     finished: Callable[[Comparison], None] | None = None,
 ) -> Agreement:
     """Both approaches at each μ (default comparison.mu, else the problem's own) and by their critical μ.

@@ -13,7 +13,7 @@ from ..case.bodies import BeamBody, SolidBody
 from ..case.matrix_checks import MU
 from ..errors import CaseError
 from ..modal.krylov.steady import refuse_stick
-from ..system.imported import Share, load_terms
+from ..system.imported import ImportedTerm, load_terms
 from .asked import names_of, require_count, require_frequency
 from .measure_ranking import Ranking
 from .measure_verification import verified
@@ -139,7 +139,7 @@ def _factors(case: Case) -> list[str]:
     ]
 
 
-def _reach(share: Share) -> float:
+def _reach(share: ImportedTerm) -> float:
     """The fraction of all rows that hold anything."""
     rows = share.matrix.tocoo()
     return len(np.unique(rows.row[rows.data != 0])) / max(share.matrix.shape[0], 1)

@@ -12,12 +12,12 @@ import numpy as np
 
 from ..errors import AnalysisError
 from ..periodic import (
-    Branch,
-    Closed,
+    ClosedShot,
     Cycle,
     CycleOnset,
     Family,
     NoReturn,
+    ShootingBranch,
     Unclosed,
     born,
     close,
@@ -106,16 +106,16 @@ class Shooting:
     def __init__(self, family: Family, seconds: float = SECONDS) -> None:
         self.family, self.seconds = family, seconds
 
-    def branch(self, between: tuple[float, float]) -> Branch:
+    def branch(self, between: tuple[float, float]) -> ShootingBranch:
         """See `Method`."""
-        return Branch(self.family, between)
+        return ShootingBranch(self.family, between)
 
-    def born(self, branch: Branch, onset: CycleOnset) -> tuple[Closed, Array]:
+    def born(self, branch: ShootingBranch, onset: CycleOnset) -> tuple[ClosedShot, Array]:
         """See `Method`."""
         return born(branch, onset.mu, onset.frequency_hz)
 
     def reached(
-        self, mu: float, push: Sequence[float] | None, say: Say, told: Callable[[str, Closed | Unreached], None]
+        self, mu: float, push: Sequence[float] | None, say: Say, told: Callable[[str, ClosedShot | Unreached], None]
     ) -> None:
         """Where motions come to that begin in each growing mode, and in steady sliding that is pushed."""
         problem = self.family.at(mu)
@@ -139,19 +139,19 @@ class Shooting:
             except AnalysisError as error:
                 told(said, Unreached(f"μ = {mu:.6g}, from {said}: {error}"))
 
-    def sampled(self, cycle: Closed, said: str) -> Cycle:
+    def sampled(self, cycle: ClosedShot, said: str) -> Cycle:
         """See `Method`."""
         return sampled(cycle, said)
 
-    def lighter(self, cycle: Closed) -> Closed:
+    def lighter(self, cycle: ClosedShot) -> ClosedShot:
         """Without its matrix, which is large, and what is asked of it is known by then."""
         return replace(cycle, shot=replace(cycle.shot, matrix=np.zeros((0, 0))))
 
-    def again(self, kept: Closed, mu: float) -> Closed:
+    def again(self, kept: ClosedShot, mu: float) -> ClosedShot:
         """See `Method`."""
         return close(self.family.at(mu), kept.chart, kept.xi, kept.period)
 
-    def same(self, one: Closed, other: Closed) -> bool:
+    def same(self, one: ClosedShot, other: ClosedShot) -> bool:
         """See `Method`."""
         return same(one, other)
 

@@ -89,7 +89,7 @@ def cycles(
         if not (np.isfinite(low) and np.isfinite(high) and 0.0 <= low < high):
             raise CaseError("between", between, "two finite friction coefficients 0 ≤ low < high")
         between = low, high
-    search = _Search(work, between, chosen, harmonics, pushes, points, seconds, progress, keep, started)
+    search = _CycleSearch(work, between, chosen, harmonics, pushes, points, seconds, progress, keep, started)
     try:
         search.run(values)
     except KeyboardInterrupt:
@@ -115,7 +115,7 @@ def _chosen(system: System, method: str, cutoff_hz: float | None) -> str:
     return method
 
 
-class _Search:
+class _CycleSearch:
     """What was found so far."""
 
     def __init__(

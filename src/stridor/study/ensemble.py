@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import CaseError
 from ..sliding import full_motion
 from ..system import System
-from ..temporal.ensembles import Outcome, march_all
+from ..temporal.ensembles import EnsembleOutcome, march_all
 from ..temporal.legs import Member, in_two, require_window
 from ..temporal.settings import Settings
 from ..temporal.simulate import Progress, step_of
@@ -21,8 +21,8 @@ from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
 from .analyses import check_extent
 from .asked import require_count
-from .ensemble_modes import Found, unstable_modes
-from .ensemble_numbers import LEAST_RECORDS, Numbers, Observable, last_phase, numbers_of, observable_of
+from .ensemble_modes import UnstableMap, unstable_modes
+from .ensemble_numbers import LEAST_RECORDS, MemberNumbers, Observable, last_phase, numbers_of, observable_of
 from .ensemble_result import AXES, Ensemble
 from .pressed import require_pressed_in_time
 from .provenance import provenance
@@ -93,7 +93,7 @@ def ensemble(
         system, phases_of(work), replace(settings, watch=watch), plan.tracks, seen.see, window=window, cores=cores,
         progress=progress, separately=separately, device=device,
     )  # fmt: skip
-    found = _modes(work, plan) if modes else Found(None, (), ())
+    found = _modes(work, plan) if modes else UnstableMap(None, (), ())
     made = provenance(work, "ensemble", time.perf_counter() - started, **_asked(values, grid, sweep, swept, window))
     return _result(work, system, plan, seen, outcome, found, window, made)
 
@@ -206,7 +206,7 @@ class _Seen:
 
     def __init__(self, observable: Observable, max_frequency_hz: float, plan: _Plan, records: bool) -> None:
         self.observable, self.max_frequency_hz, self.plan, self.records = observable, max_frequency_hz, plan, records
-        self.numbers: dict[int, Numbers] = {}
+        self.numbers: dict[int, MemberNumbers] = {}
         self.errors: dict[int, str] = {}
         self.runs: dict[int, Trajectory] = {}
 
@@ -221,15 +221,15 @@ class _Seen:
             self.runs[row] = last_phase(run)
 
 
-def _modes(work: Workspace, plan: _Plan) -> Found:
+def _modes(work: Workspace, plan: _Plan) -> UnstableMap:
     if np.isnan(plan.rows[:, 0]).any():
-        return Found(None, (), ("no modal map: contacts have different friction coefficients; name mu",))
+        return UnstableMap(None, (), ("no modal map: contacts have different friction coefficients; name mu",))
     return unstable_modes(work, [float(v) for v in plan.rows[:, 0]], [float(v) for v in plan.rows[:, 2]])
 
 
 def _result(
-    work: Workspace, system: System, plan: _Plan, seen: _Seen, outcome: Outcome, found: Found, window: float,
-    made: dict[str, Any],
+    work: Workspace, system: System, plan: _Plan, seen: _Seen, outcome: EnsembleOutcome, found: UnstableMap,
+    window: float, made: dict[str, Any],
 ) -> Ensemble:  # fmt: skip
     """All rows."""
     count = len(plan.rows)

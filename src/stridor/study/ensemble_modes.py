@@ -21,7 +21,7 @@ SAME = 1e-12  # relative: coefficients of contacts that are one
 
 
 @dataclass(frozen=True)
-class Growing:
+class UnstableModes:
     """Unstable modes at one μ and speed: numbers, frequencies [Hz] and growth rates [1/s], all (b,)."""
 
     mode: IntArray
@@ -40,14 +40,14 @@ class Growing:
 
 
 @dataclass(frozen=True)
-class Found:
+class UnstableMap:
     """Unstable modes by μ and speed: a map, those at each of its points in the same order, and what is to be said."""
 
     map: ModalMap | None
-    growing: tuple[tuple[Growing, ...], ...]
+    growing: tuple[tuple[UnstableModes, ...], ...]
     notes: tuple[str, ...]
 
-    def at(self, mu: float, speed: float) -> Growing | None:
+    def at(self, mu: float, speed: float) -> UnstableModes | None:
         """Those of a member; None where it is not known."""
         if self.map is None:
             return None
@@ -56,23 +56,23 @@ class Found:
         return self.growing[i][j]
 
 
-def unstable_modes(work: Workspace, mus: Sequence[float], speeds: Sequence[float]) -> Found:
+def unstable_modes(work: Workspace, mus: Sequence[float], speeds: Sequence[float]) -> UnstableMap:
     """What grows at each μ, and at each speed where friction depends on it. Where that cannot be told, why not."""
     system = work.system()
     constant = all(c.law.constant for c in system.contacts) and all(s.law.constant for s in system.surfaces)
     values, own = np.unique(mus), np.unique([1.0]) if constant else np.unique(speeds)
-    columns: list[list[Growing]] = []
+    columns: list[list[UnstableModes]] = []
     try:
         for speed in own:
-            there, friction = _at_speed(work, system, values, float(speed))
-            found = modes(there, mu=friction)
+            at_speed, friction = _at_speed(work, system, values, float(speed))
+            found = modes(at_speed, mu=friction)
             columns.append([_growing(found, i) for i in range(len(values))])
     except StridorError as error:
-        return Found(None, (), (f"no modal map: {error}",))
+        return UnstableMap(None, (), (f"no modal map: {error}",))
     growing = tuple(tuple(column[i] for column in columns) for i in range(len(values)))
     count = np.array([[len(g.mode) for g in row] for row in growing], dtype=np.int64)
     fastest = np.array([[_fastest(g) for g in row] for row in growing])
-    return Found(ModalMap(values, own, count, fastest[..., 0], fastest[..., 1]), growing, ())
+    return UnstableMap(ModalMap(values, own, count, fastest[..., 0], fastest[..., 1]), growing, ())
 
 
 def _at_speed(work: Workspace, system: System, mus: Array, speed: float) -> tuple[Workspace, Array]:
@@ -87,18 +87,18 @@ def _at_speed(work: Workspace, system: System, mus: Array, speed: float) -> tupl
     }
     full = np.abs(slip_speeds(system, system.motion.full))
     laws = [(c.law, float(v)) for c, v in zip(system.contacts, full, strict=True)]
-    there = np.array([[law.scaled(float(mu), v).sliding(speed * v) for law, v in laws] for mu in mus])
-    if not laws or np.ptp(there, axis=1).max() > SAME * np.abs(there).max():
+    coefficients = np.array([[law.scaled(float(mu), v).sliding(speed * v) for law, v in laws] for mu in mus])
+    if not laws or np.ptp(coefficients, axis=1).max() > SAME * np.abs(coefficients).max():
         raise StridorError("friction depends on speed, and contacts that slide at several speeds have no common one")
-    return Workspace(case.with_(changes)), there[:, 0]
+    return Workspace(case.with_(changes)), coefficients[:, 0]
 
 
-def _growing(found: ComplexModes, i: int) -> Growing:
+def _growing(found: ComplexModes, i: int) -> UnstableModes:
     which = np.flatnonzero(found.unstable[i] & (found.frequency_hz[i] > 0.0))
-    return Growing(found.branch[which], found.frequency_hz[i][which], found.growth_rate[i][which])
+    return UnstableModes(found.branch[which], found.frequency_hz[i][which], found.growth_rate[i][which])
 
 
-def _fastest(growing: Growing) -> tuple[float, float]:
+def _fastest(growing: UnstableModes) -> tuple[float, float]:
     if not len(growing.mode):
         return np.nan, np.nan
     k = int(np.argmax(growing.growth_rate))

@@ -78,7 +78,7 @@ def named_observable(name: str, points: Sequence[str], contacts: Sequence[str], 
 
 
 @dataclass(frozen=True)
-class Numbers:
+class MemberNumbers:
     """Of one member, see `Ensemble`; contacts by name."""
 
     rms: float
@@ -89,7 +89,7 @@ class Numbers:
     contacts: Mapping[str, ContactStatistics]
 
 
-def numbers_of(run: Trajectory, observable: Observable, max_frequency_hz: float) -> Numbers:
+def numbers_of(run: Trajectory, observable: Observable, max_frequency_hz: float) -> MemberNumbers:
     """The window of a run, its last phase, in numbers; the frequency by way of the phase before it, whose end the
     filter takes up."""
     window = run.phase_slice()
@@ -109,7 +109,7 @@ def numbers_of(run: Trajectory, observable: Observable, max_frequency_hz: float)
     start = run.phase_slice(-2).start if len(run.phases) > 1 else window.start
     share = len(seen) / (window.stop - start)
     frequency = dominant_line(signals[start : window.stop, loudest], run.sampling, max_frequency_hz, share)[0]
-    return Numbers(rms, peak, math.nan if frequency is None else frequency, rate, regime, contacts)
+    return MemberNumbers(rms, peak, math.nan if frequency is None else frequency, rate, regime, contacts)
 
 
 def _one_state(contact: ContactStatistics) -> bool:

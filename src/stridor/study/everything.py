@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..agreement import Agreement, Store, mode_shape
+from ..agreement import Agreement, PartStore, mode_shape
 from ..agreement.kept import Plain
 from ..case import Case
 from ..case.matrix_checks import MU
@@ -27,7 +27,7 @@ from .analyses import BodyModes, Description, RunSummary
 from .clock import Clock, Log, Shelf
 from .measures import Countermeasures
 from .modal_parts import ModalParts
-from .parts import Parts, chosen_parts
+from .parts import RunParts, chosen_parts
 from .saturation import Unsaturated, unsaturated
 from .sensitivities import Sensitivities
 from .workspace import Workspace
@@ -86,12 +86,12 @@ class _Temporal:
     """What the temporal approach does for a report."""
 
     work: Workspace
-    parts: Parts
+    parts: RunParts
     clock: Clock
     progress: Progress | None
     keep: Callable[[str, object], None]
     before: Trajectory | None
-    kept: Store | None
+    kept: PartStore | None
     notes: list[str]
 
     def run(self) -> Trajectory | None:
@@ -150,7 +150,7 @@ class _MissingError(Exception):
 class _Finished:
     """Parts that are there, and nothing else."""
 
-    kept: Store
+    kept: PartStore
 
     def get(self, part: str, mu: float | None) -> Plain:
         """The part. Raises _MissingError where it would have to be computed."""
@@ -166,13 +166,13 @@ class _Finished:
 def compute_everything(
     problem: Case | Workspace,
     *,
-    parts: Parts | None = None,
+    parts: RunParts | None = None,
     mu: float | None = None,
     progress: Progress | None = None,
     log: Log | None = None,
     keep: Callable[[str, object], None] | None = None,
     before: Trajectory | None = None,
-    kept: Store | None = None,
+    kept: PartStore | None = None,
     shelf: Shelf | None = None,
 ) -> Everything:
     """Modes, onsets, the full run, the comparison, or the parts of them that are asked for. keep(name, result) is

@@ -193,12 +193,12 @@ def _other_nodes(work: Workspace, system: System, contact: ContactProblem) -> tu
         return ()
     for mu in work.modal.friction_range:
         try:
-            there = problem_of(system, mu, work.options).touching
+            touching = problem_of(system, mu, work.options).touching
         except AnalysisError as error:
             return (f"at mu = {mu:g} there is no steady sliding ({error}); Kc and Kf are those at the case's own mu",)
-        if not np.array_equal(there, contact.touching):
+        if not np.array_equal(touching, contact.touching):
             return (
-                f"other contact nodes touch at mu = {mu:g} ({len(there)}) than at the case's own "
+                f"other contact nodes touch at mu = {mu:g} ({len(touching)}) than at the case's own "
                 f"({len(contact.touching)}), which Kc and Kf are made of",
             )
     return ()

@@ -127,10 +127,10 @@ def _refused(found: Sequence[Difference]) -> Iterator[Problem]:
                 f"{more}; a restart takes the model as it was (durations of phases not yet over and what is recorded "
                 "may change); --changed (changed=True) goes on with what differs and records it"
             )
-        yield Problem(f"restart: {difference.path}", _Given(as_given(difference.after)), accepted)
+        yield Problem(f"restart: {difference.path}", _Verbatim(as_given(difference.after)), accepted)
 
 
-class _Given(str):
+class _Verbatim(str):
     """A text that is shown as it is."""
 
     __slots__ = ()

@@ -21,7 +21,7 @@ from .body_modes import BodyModes
 from .clock import Clock
 from .countermeasures import default_numbers, rank_countermeasures, whole_matrices
 from .measures import Countermeasures
-from .parts import Parts
+from .parts import RunParts
 from .sensitivities import Sensitivities, sensitivities
 from .workspace import Workspace
 
@@ -47,7 +47,7 @@ class ModalParts:
     else what tells most for its time."""
 
     def __init__(
-        self, work: Workspace, mu: float | None, parts: Parts, clock: Clock, keep: Callable[[str, object], None],
+        self, work: Workspace, mu: float | None, parts: RunParts, clock: Clock, keep: Callable[[str, object], None],
         notes: list[str],
     ) -> None:  # fmt: skip
         self.work, self.parts, self.clock, self.notes = work, parts, clock, notes

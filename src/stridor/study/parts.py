@@ -15,7 +15,7 @@ OF_REPORT = ("modes", "onsets", "sensitivities", "countermeasures", "report")
 
 
 @dataclass(frozen=True)
-class Parts:
+class RunParts:
     """What is computed: names of PARTS, and of the comparison its own parts (`agreement.PARTS`).
 
     What is left out is not computed; what is there of it from an earlier call on the same case is shown.
@@ -39,7 +39,7 @@ def chosen_parts(
     only: str | Collection[str] | None = None,
     skip: str | Collection[str] | None = None,
     default: Collection[str] = OF_RUN,
-) -> Parts:
+) -> RunParts:
     """The parts named, or those of ``default``, without those skipped. Parts of the comparison may be named alone;
     its full run takes `simulate` with it. Raises CaseError for other names, and where nothing is left."""
     named, left = _names(only, "only"), _names(skip, "skip")
@@ -58,7 +58,7 @@ def chosen_parts(
     found = (names & set(PARTS)) - left
     if not found:
         raise CaseError("skip", ", ".join(sorted(left)), f"leaves nothing to do; parts: {', '.join(PARTS)}")
-    return Parts(frozenset(found), frozenset(of_comparison), "critical" in inner)
+    return RunParts(frozenset(found), frozenset(of_comparison), "critical" in inner)
 
 
 def _names(given: str | Collection[str] | None, where: str) -> set[str]:

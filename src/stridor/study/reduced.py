@@ -16,14 +16,14 @@ from ..case.points import choice
 from ..errors import CaseError
 from ..sliding.stretches import elsewhere_words, stretches
 from ..system import System, build_system
-from ..system.imported import Share
+from ..system.imported import ImportedTerm
 from ..system.shares import system_shares
 from .workspace import Problem, Workspace
 
 if TYPE_CHECKING:
     from ..modal.parametric import Parameter, ReducedModel
     from ..modal.parametric.contacts import ContactsProblem
-    from ..modal.parametric.family import Piece
+    from ..modal.parametric.family import FactoredPart
     from ..modal.parametric.problem import Role
 
 REMEMBERED = 8  # systems of a case with other numbers
@@ -150,35 +150,35 @@ class _Numbers:
             self._built[key] = self._checked(build_system(self._case.with_(changes), mu).in_place())
         return self._built[key]
 
-    def structure(self, values: Mapping[str, float]) -> Mapping[str, Piece]:
+    def structure(self, values: Mapping[str, float]) -> Mapping[str, FactoredPart]:
         """The pieces of mass, damping and stiffness where others than [parameters] and friction have these values."""
-        from ..modal.parametric.family import Piece
+        from ..modal.parametric.family import FactoredPart
 
         if not self._case.imported:
             found = self.system(values)
             roles: tuple[Role, ...] = ("mass", "damping", "stiffness")
-            return {role: Piece(getattr(found, role), role) for role in roles}
+            return {role: FactoredPart(getattr(found, role), role) for role in roles}
         varied = self._case.with_(self._changes(values))
-        pieces: dict[str, Piece] = {}
+        pieces: dict[str, FactoredPart] = {}
         for k, share in enumerate(system_shares(varied)):
             self._checked(share.matrix)
             pieces[f"{share.role} {k}"] = self._piece(varied, share)
         return pieces
 
-    def _piece(self, case: Case, share: Share) -> Piece:
+    def _piece(self, case: Case, share: ImportedTerm) -> FactoredPart:
         """A term of an imported body with its factor; what of it is not varied is multiplied in."""
         from ..modal.parametric.factors import Formula
-        from ..modal.parametric.family import Piece
+        from ..modal.parametric.family import FactoredPart
 
         if not isinstance(share.factor, str):
-            return Piece(sp.csr_array(share.factor * share.matrix), share.role)
+            return FactoredPart(sp.csr_array(share.factor * share.matrix), share.role)
         expression = parse_expression(share.factor, (*case.parameters, MU), "factor")
         values = case.factor_values()
         varied = tuple(name for name in expression.names if name in self._box)
         if not varied:
-            return Piece(sp.csr_array(expression.value(values, "factor") * share.matrix), share.role)
+            return FactoredPart(sp.csr_array(expression.value(values, "factor") * share.matrix), share.role)
         fixed = tuple((name, values[name]) for name in expression.names if name not in varied)
-        return Piece(share.matrix, share.role, Formula(share.factor, varied, fixed))
+        return FactoredPart(share.matrix, share.role, Formula(share.factor, varied, fixed))
 
     def _changes(self, values: Mapping[str, float]) -> dict[str, float]:
         """Overrides of the case."""

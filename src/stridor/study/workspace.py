@@ -26,7 +26,7 @@ from ..notebook import Shown, counted
 from ..sliding import full_motion
 from ..sliding.surfaces import SurfaceSliding, steady_nodes
 from ..system import System, build_system
-from ..system.model import Answers
+from ..system.model import AnswerCache
 from ..temporal.inputs import unfit_in_time
 from .case_key import case_key
 from .options import options_of
@@ -75,7 +75,7 @@ class Workspace(Shown):
         self.modal: Modal = settings.modal
         self.temporal: Temporal = settings.temporal
         self.comparison: Comparison = settings.comparison
-        self.answers = Answers()
+        self.answers = AnswerCache()
 
     @staticmethod
     def of(problem: Problem) -> Workspace:

@@ -27,7 +27,7 @@ from .holders import holders_of
 from .links import Links, links_of
 from .load_steps import LoadStep
 from .model import CubicSprings, Line, Solid, System
-from .motion import PrescribedMotion, Structure, constrain, distance_name
+from .motion import FreeStructure, PrescribedMotion, constrain, distance_name
 from .pairs import is_point_on_line, point_contact, surface_contact
 from .supports import Tied, constraints_of, tie_matrix
 from .view import View
@@ -118,7 +118,7 @@ def _load_steps(case: Case, motion: PrescribedMotion) -> tuple[LoadStep, ...]:
     return tuple(found)
 
 
-def _structure(bodies: Mapping[str, BuiltBody], links: Links, tied: Tied | None) -> Structure:
+def _structure(bodies: Mapping[str, BuiltBody], links: Links, tied: Tied | None) -> FreeStructure:
     parts = list(bodies.values())
     mass, damping, stiffness = (beside([getattr(b, kind) for b in parts]) for kind in ("mass", "damping", "stiffness"))
     if links.rows.shape[0]:
@@ -126,7 +126,7 @@ def _structure(bodies: Mapping[str, BuiltBody], links: Links, tied: Tied | None)
         stiffness = stiffness + links.rows.T @ sp.diags_array(links.stiffness) @ links.rows
     if tied is not None:
         mass, damping, stiffness = tied.mass(mass), tied.within(damping), tied.within(stiffness)
-    return Structure(sp.csr_array(mass), sp.csr_array(damping), sp.csr_array(stiffness))
+    return FreeStructure(sp.csr_array(mass), sp.csr_array(damping), sp.csr_array(stiffness))
 
 
 def _translations(bodies: Mapping[str, BuiltBody], total: int) -> Array:

@@ -33,7 +33,7 @@ _ROTATIONS = (4, 5, 6)
 
 
 @dataclass(frozen=True)
-class Share:
+class ImportedTerm:
     """One term of a body before its factor: its role, its matrix, and the factor, a number or an expression."""
 
     role: Role
@@ -52,7 +52,7 @@ class Terms:
     stiffness: Sparse
     labels: Labels | None
     stored: tuple[StoredMatrix, ...]
-    shares: tuple[Share, ...]
+    shares: tuple[ImportedTerm, ...]
     values: tuple[float, ...]
 
 
@@ -83,7 +83,7 @@ def load_matrices(case: Case, name: str, body: MatrixBody, mu: float | None = No
     return _with_indices(case, name, body, mu)[0]
 
 
-def load_shares(case: Case, name: str, body: MatrixBody, mu: float | None = None) -> tuple[Share, ...]:
+def load_shares(case: Case, name: str, body: MatrixBody, mu: float | None = None) -> tuple[ImportedTerm, ...]:
     """The terms (N, N) that with their factors add up to the body's matrices, wherever the factors vary.
 
     Raises CaseError as `load_matrices`, and where a freedom has entries in no other term than those with a factor of
@@ -154,12 +154,12 @@ def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None)
     if body.scale != 1.0:
         matrices = [_in_metres(matrix, labels, body.scale) for matrix in matrices]
     sums = {role: sp.csr_array((size, size)) for role in ROLES}
-    shares: list[Share] = []
+    shares: list[ImportedTerm] = []
     values: list[float] = []
     for k, (term, role, matrix) in enumerate(zip(body.terms, roles, matrices, strict=True)):
         factor = _factor(case, term, mu, f"{where}.terms.{k}.factor")
         sums[role] = sp.csr_array(sums[role] + factor * matrix)
-        shares.append(Share(role, matrix, term.factor))
+        shares.append(ImportedTerm(role, matrix, term.factor))
         values.append(factor)
     return Terms(sums["mass"], sums["damping"], sums["stiffness"], labels, tuple(stored), tuple(shares), tuple(values))
 

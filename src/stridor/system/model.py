@@ -27,7 +27,7 @@ T = TypeVar("T")
 MOST_ANSWERS = 200  # kept of one system: equilibria of a sweep are vectors of all its freedoms
 
 
-class Answers:
+class AnswerCache:
     """What has been computed of some matrices, or of a whole system, by what was asked."""
 
     def __init__(self, of: tuple[Sparse, ...] = ()) -> None:
@@ -137,8 +137,8 @@ class System(Shown):
     placed: bool = False
     contact_cubic: Mapping[str, float] = field(default_factory=dict)
     touching_at: float | None = None
-    of_matrices: Answers = field(default_factory=Answers, repr=False, compare=False)
-    answers: Answers = field(default_factory=Answers, init=False, repr=False, compare=False)
+    of_matrices: AnswerCache = field(default_factory=AnswerCache, repr=False, compare=False)
+    answers: AnswerCache = field(default_factory=AnswerCache, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness"):
@@ -146,7 +146,7 @@ class System(Shown):
             object.__setattr__(self, name, matrix if isinstance(matrix, sp.csr_array) else sp.csr_array(matrix))
         own = (self.mass, self.damping, self.stiffness)
         if [id(matrix) for matrix in self.of_matrices.of] != [id(matrix) for matrix in own]:
-            object.__setattr__(self, "of_matrices", Answers(own))
+            object.__setattr__(self, "of_matrices", AnswerCache(own))
         if self.motion is None:  # pyright: ignore[reportUnnecessaryComparison]
             object.__setattr__(self, "motion", PrescribedMotion.none(self.size))
 

@@ -54,7 +54,7 @@ class PrescribedMotion:
 
 
 @dataclass(frozen=True)
-class Structure:
+class FreeStructure:
     """All freedoms before supports are applied: what bodies give. Matrices (N, N) csr."""
 
     mass: Sparse
@@ -100,7 +100,7 @@ def distance_name(table: str, name: str) -> str:
 
 
 def constrain(
-    structure: Structure,
+    structure: FreeStructure,
     constraints: list[Constraint],
     dropped: IntArray | None = None,
     translations: Array | None = None,
@@ -169,7 +169,7 @@ def _answer(block: Sparse, load: Array) -> Array:
         return np.linalg.lstsq(dense, load, rcond=1e-12)[0]
 
 
-def _static_lift(structure: Structure, free: IntArray, selection: Array, rigid: Array) -> Array:
+def _static_lift(structure: FreeStructure, free: IntArray, selection: Array, rigid: Array) -> Array:
     """L with K_ff L = −K_fp: the static answer, of least norm where the structure is free to move.
 
     rigid (N, p): translations that may be it. Where one balances to rounding it is taken, as a solve would only add

@@ -11,12 +11,12 @@ from ..case import Case
 from ..fe.assembly import beside
 from ..typing import Sparse
 from .bodies import BuiltBody, build_bodies
-from .imported import ROLES, Share, load_shares
+from .imported import ROLES, ImportedTerm, load_shares
 from .links import links_of
 from .supports import Tied, constraints_of, tie_matrix
 
 
-def system_shares(case: Case, mu: float | None = None) -> tuple[Share, ...]:
+def system_shares(case: Case, mu: float | None = None) -> tuple[ImportedTerm, ...]:
     """Matrices (n, n) on the freedoms of `build_system` that with their factors add up to its mass, damping and
     stiffness: one for each term of imported bodies, then one of each role for everything else, with factor one.
 
@@ -30,7 +30,7 @@ def system_shares(case: Case, mu: float | None = None) -> tuple[Share, ...]:
     tied = tie_matrix(case, bodies, total, constraints)
     followers = np.zeros(0, dtype=np.int64) if tied is None else tied.followers
     free = np.setdiff1d(np.arange(total), np.concatenate([np.array(sorted(held), dtype=np.int64), followers]))
-    shares: list[Share] = []
+    shares: list[ImportedTerm] = []
     for name, body in case.imported.items():
         mine = load_shares(case, name, body, mu)
         shares += [replace(share, matrix=_placed(share.matrix, bodies[name], total)) for share in mine]
@@ -40,7 +40,7 @@ def system_shares(case: Case, mu: float | None = None) -> tuple[Share, ...]:
         if links.rows.shape[0] and role != "mass":
             factor = links.damping if role == "damping" else links.stiffness
             rest = sp.csr_array(rest + links.rows.T @ sp.diags_array(factor) @ links.rows)
-        shares.append(Share(role, rest, 1.0))
+        shares.append(ImportedTerm(role, rest, 1.0))
     if tied is not None:
         masses = [b.mass for b in bodies.values()]
         lumped = all(np.all(sp.coo_array(m).row == sp.coo_array(m).col) for m in masses)
@@ -58,7 +58,7 @@ def _emptied(body: BuiltBody) -> BuiltBody:
     return replace(body, mass=nothing, damping=nothing, stiffness=nothing)
 
 
-def _tied(share: Share, tied: Tied, *, lumped: bool) -> Sparse:
+def _tied(share: ImportedTerm, tied: Tied, *, lumped: bool) -> Sparse:
     """TᵀAT, as a diagonal mass of all bodies together has it where that is diagonal."""
     if share.role == "mass" and lumped:
         return tied.mass(share.matrix)

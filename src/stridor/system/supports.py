@@ -15,7 +15,7 @@ from ..case.schema import Rotation
 from ..case.schema import Tie as TieCase
 from ..contact.curve import Curve
 from ..contact.facets import FacetSurface
-from ..contact.ties import Bond, Tie, check_facing, tie_transformation
+from ..contact.ties import Bond, NodeTies, check_facing, tie_transformation
 from ..contact.ties import tie as tie_weights
 from ..errors import CaseError
 from ..mesh.boundary import facets_within, require_boundary
@@ -126,10 +126,10 @@ class Tied:
         follows[self.followers] = True
         met = np.searchsorted(matrix.indptr, np.flatnonzero(follows[matrix.indices]), side="right") - 1
         changed = np.unique(np.concatenate([self.followers, self.matrix[self.followers].indices, met]))
-        place = np.arange(matrix.shape[0])
-        place[changed] = matrix.shape[0] + np.arange(len(changed))
+        order = np.arange(matrix.shape[0])
+        order[changed] = matrix.shape[0] + np.arange(len(changed))
         new = sp.csr_array(self.matrix.T)[changed] @ matrix @ self.matrix
-        found = sp.csr_array(sp.vstack([matrix, new], format="csr")[place])
+        found = sp.csr_array(sp.vstack([matrix, new], format="csr")[order])
         found.eliminate_zeros()
         found.sort_indices()
         return found
@@ -230,7 +230,7 @@ def _refuse_rotated_motion(bond: Bond, constraints: Sequence[Constraint]) -> Non
 
 
 def _only(bond: Bond, keep: BoolArray) -> Bond:
-    tie = Tie(bond.tie.nodes[keep], bond.tie.weights[keep], bond.tie.point[keep], bond.tie.distance[keep])
+    tie = NodeTies(bond.tie.nodes[keep], bond.tie.weights[keep], bond.tie.point[keep], bond.tie.distance[keep])
     return Bond(bond.where, tie, bond.slave[keep], bond.master, bond.rotation)
 
 

@@ -44,7 +44,7 @@ NAMES = tuple(f.name for f in fields(Averages))
 
 
 @dataclass(frozen=True)
-class Settled:
+class SettledContact:
     """One contact in the part of a run that repeats itself: since [s] the first separation of the last phase, until
     its end; peaks: how many there are; largest_normal_force [N] of its records; averages."""
 
@@ -94,12 +94,12 @@ class Spread(Shown):
         return {"runs": self.runs, "perturbation": self.perturbation, "seed": self.seed, "contacts": contacts}
 
 
-def settled(run: Trajectory) -> dict[str, Settled]:
+def settled(run: Trajectory) -> dict[str, SettledContact]:
     """The contacts that separate in the last phase, with averages from there on; others are not chaotic and left out.
 
     From the records: of a peak between two of them only the slope is seen.
     """
-    found: dict[str, Settled] = {}
+    found: dict[str, SettledContact] = {}
     if not run.phases or not len(run.time):
         return found
     phase, part = run.phases[-1], run.phase_slice()
@@ -120,7 +120,7 @@ def settled(run: Trajectory) -> dict[str, Settled]:
             high,
             *(float(np.mean(status == code)) for code in (1, 2, 0)),
         )
-        found[name] = Settled(float(since), float(phase.end), len(peaks), float(force.max()), averages)
+        found[name] = SettledContact(float(since), float(phase.end), len(peaks), float(force.max()), averages)
     return found
 
 

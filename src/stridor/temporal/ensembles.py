@@ -33,7 +33,7 @@ TOLD_SECONDS = 0.1
 
 
 @dataclass(frozen=True)
-class Outcome:
+class EnsembleOutcome:
     """How an ensemble was run: side by side or, for a reason in words, one after the other; whether it was cut short;
     step Δt [s]; on "cpu" or the GPU of that name, and what is to say about that."""
 
@@ -59,7 +59,7 @@ def march_all(
     progress: Progress | None = None,
     separately: bool = False,
     device: str = "cpu",
-) -> Outcome:
+) -> EnsembleOutcome:
     """March every track: its first member from the initial state, each further one from where the one before ended.
 
     Tracks are of one length. seen is called, from any thread, with each member's run or why there is none; the last
@@ -81,12 +81,12 @@ def march_all(
     legs = legs_of(phases, taken, step, len(tracks[0]), window, steady=settings.initial == "steady-sliding")
     if stepper is None:
         cut = _one_by_one(system, replace(settings, step=step), tracks, seen, legs, progress)
-        return Outcome(False, reason, cut, step)
+        return EnsembleOutcome(False, reason, cut, step)
     common = Block(stepper, settings, legs, tracks, range(len(tracks)), seen)
     if gpu is not None:
         blocks, failed = _on(gpu, common)
         if not failed:
-            return Outcome(True, "", _at_the_same_time(blocks, legs, progress, 1), step, gpu.name)
+            return EnsembleOutcome(True, "", _at_the_same_time(blocks, legs, progress, 1), step, gpu.name)
         said = f"{gpu.name} cannot run the time loop: {failed}"
         if device == "gpu":
             raise AnalysisError(f"{said}; device cpu runs it")
@@ -95,7 +95,7 @@ def march_all(
     blocks = common.cut(_cuts(len(tracks), cores or _all_cores()))
     with at_once():  # compiles the loop or loads it, before anybody waits for its end
         blocks[0].warm()
-    return Outcome(True, "", _at_the_same_time(blocks, legs, progress, cores or _all_cores()), step, said=said)
+    return EnsembleOutcome(True, "", _at_the_same_time(blocks, legs, progress, cores or _all_cores()), step, said=said)
 
 
 def _on(gpu: Gpu, common: Block) -> tuple[list[Block], str]:

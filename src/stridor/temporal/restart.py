@@ -11,7 +11,7 @@ from ..errors import CaseError
 from ..typing import Array
 from .saved import agrees, check_arrays, check_done
 from .settings import Settings
-from .sketch import MOTION, Part, differing, saved_row
+from .sketch import MOTION, SketchPart, differing, saved_row
 from .stepper import Stepper
 from .trajectory import HISTORIES, Trajectory
 
@@ -52,7 +52,7 @@ def check_restart(stepper: Stepper, restart: Trajectory, settings: Settings, *, 
     check_done(restart.state, *stepper.counted, restart.steps)
 
 
-def _check_model(parts: Sequence[Part], restart: Trajectory, *, changed: bool) -> None:
+def _check_model(parts: Sequence[SketchPart], restart: Trajectory, *, changed: bool) -> None:
     saved = np.asarray(restart.state.get("model", np.zeros(0)))
     found = differing(parts, saved)
     if found is None:
@@ -62,7 +62,7 @@ def _check_model(parts: Sequence[Part], restart: Trajectory, *, changed: bool) -
         raise CaseError("restart", "model", f"a state of the same model; these differ: {names}")
 
 
-def motion_ratio(parts: Sequence[Part], restart: Trajectory, names: Sequence[str]) -> Array:
+def motion_ratio(parts: Sequence[SketchPart], restart: Trajectory, names: Sequence[str]) -> Array:
     """Velocities (p,) of the moving supports over those that the saved state was computed with. Raises CaseError for
     another direction: the way gone so far would change with it."""
     ratios = np.ones(len(names))

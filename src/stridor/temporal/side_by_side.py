@@ -16,7 +16,7 @@ from .phase_results import PhaseResults, fresh_statistics
 from .schedule import lay_out
 from .settings import Settings, not_finite
 from .steppers.modal import ModalStepper
-from .steppers.modal.batch import Batch, friction_of, member_machine
+from .steppers.modal.batch import MemberBatch, friction_of, member_machine
 from .steppers.modal.batch_kernel import BatchRecord
 from .steppers.modal.machine import Machine, modal_machine
 from .trajectory import Trajectory
@@ -38,7 +38,7 @@ class Block:
     tracks: Sequence[Track]
     numbers: Sequence[int]
     seen: Seen
-    batch: type[Batch] = Batch
+    batch: type[MemberBatch] = MemberBatch
 
     @property
     def system(self) -> System:
@@ -83,7 +83,7 @@ class Block:
         return member_machine(member.system(system), stepper.scheme, stepper.modes, schedule, settings)
 
     def _march(
-        self, batch: Batch, present: Sequence[int], asked: Callable[[], bool], count: Callable[[int], None]
+        self, batch: MemberBatch, present: Sequence[int], asked: Callable[[], bool], count: Callable[[int], None]
     ) -> None:
         """Leg by leg; what is finished is seen at the end of each."""
         tracks = [self.tracks[k] for k in present]
@@ -114,7 +114,7 @@ class Block:
                 run = self._trajectory(batch, record, lane, leg, results[lane])
                 self.seen(self.numbers[k], leg, run)
 
-    def _results(self, batch: Batch, lane: int, leg: int) -> PhaseResults:
+    def _results(self, batch: MemberBatch, lane: int, leg: int) -> PhaseResults:
         """Statistics of one member, cleared where a leg begins."""
         statistics: Array = batch.states.statistics[lane]
         statistics[:] = fresh_statistics(*statistics.shape)
@@ -131,7 +131,9 @@ class Block:
         dt = self.stepper.scheme.step
         return not_finite(step * dt, self.legs.schedules[leg].stretch_at(step).name, dt)
 
-    def _trajectory(self, batch: Batch, record: BatchRecord, lane: int, leg: int, results: PhaseResults) -> Trajectory:
+    def _trajectory(
+        self, batch: MemberBatch, record: BatchRecord, lane: int, leg: int, results: PhaseResults
+    ) -> Trajectory:
         """The run of one member through one leg, without energies and without a state to go on from."""
         stepper, settings, scheme = self.stepper, self.settings, self.stepper.scheme
         kept, every = int(record.kept[0]), settings.record_every

@@ -23,7 +23,7 @@ BODIES = ("mass", "damping", "stiffness")
 
 
 @dataclass(frozen=True)
-class Part:
+class SketchPart:
     """One part of a system in numbers: its name in words, the numbers, how large what was summed is, how close another
     machine comes."""
 
@@ -42,17 +42,17 @@ class Part:
         return bool(np.all(np.abs(self.row - row) <= self.close * max(self.scale, float(row[-1]))))
 
 
-def sketch(system: System, nodes: ContactNodes) -> tuple[Part, ...]:
+def sketch(system: System, nodes: ContactNodes) -> tuple[SketchPart, ...]:
     """All parts of a system with its contact nodes in the reference configuration."""
     return tuple(_parts(system, nodes))
 
 
-def packed(parts: Sequence[Part]) -> Array:
+def packed(parts: Sequence[SketchPart]) -> Array:
     """The sketch as one array, as saved."""
     return np.concatenate([part.row for part in parts])
 
 
-def differing(parts: Sequence[Part], saved: Array) -> list[Part] | None:
+def differing(parts: Sequence[SketchPart], saved: Array) -> list[SketchPart] | None:
     """The parts that a saved sketch has otherwise; None where it has other parts."""
     rows = [part.row for part in parts]
     if saved.dtype.kind != "f" or saved.shape != (sum(len(row) for row in rows),) or not np.all(np.isfinite(saved)):
@@ -61,7 +61,7 @@ def differing(parts: Sequence[Part], saved: Array) -> list[Part] | None:
     return [part for part, row in zip(parts, np.split(saved, bounds), strict=True) if not part.same(row)]
 
 
-def saved_row(parts: Sequence[Part], saved: Array, name: str) -> Array:
+def saved_row(parts: Sequence[SketchPart], saved: Array, name: str) -> Array:
     """The saved numbers of one part, without their scale."""
     at = 0
     for part in parts:
@@ -71,15 +71,15 @@ def saved_row(parts: Sequence[Part], saved: Array, name: str) -> Array:
     raise KeyError(name)
 
 
-def _parts(system: System, nodes: ContactNodes) -> Iterator[Part]:
+def _parts(system: System, nodes: ContactNodes) -> Iterator[SketchPart]:
     n = system.size
     one, two = _probes(n)
-    yield Part("number of freedoms", np.array([float(n)]), 0.0)
+    yield SketchPart("number of freedoms", np.array([float(n)]), 0.0)
     for name in BODIES:
         matrix = getattr(system, name)
         across = matrix @ two
         numbers = np.array([matrix.trace(), one @ across, one @ (matrix @ one), two @ across])
-        yield Part(name, numbers, float(np.abs(matrix).sum()))
+        yield SketchPart(name, numbers, float(np.abs(matrix).sum()))
     for name, load in system.loads.items():
         yield _projected(f"load {name}", load, (one, two))
     yield from _motions(system, nodes)
@@ -91,7 +91,7 @@ def _parts(system: System, nodes: ContactNodes) -> Iterator[Part]:
         mine = nodes.select(nodes.owner == number)
         law = nodes.laws[number]
         friction = np.array([law.sticking, *(law.sliding(v) for v in SPEEDS)])
-        yield Part(f"contact {name}: friction", friction, float(np.abs(friction).max()))
+        yield SketchPart(f"contact {name}: friction", friction, float(np.abs(friction).max()))
         yield _projected(f"contact {name}: normals", mine.normal.T @ _probes(mine.count)[0], (one, two))
         along = mine.tangent.T @ _probes(mine.tangent.shape[0])[0]
         yield _projected(f"contact {name}: tangents", along, (one, two))
@@ -100,10 +100,10 @@ def _parts(system: System, nodes: ContactNodes) -> Iterator[Part]:
             # A gap is a difference of places.
             size = float(np.abs(mine.position).sum()) if what == "gap" else 0.0
             part = _projected(f"contact {name}: {what}", values, _probes(mine.count))
-            yield Part(part.name, part.numbers, part.scale + size)
+            yield SketchPart(part.name, part.numbers, part.scale + size)
 
 
-def _motions(system: System, nodes: ContactNodes) -> Iterator[Part]:
+def _motions(system: System, nodes: ContactNodes) -> Iterator[SketchPart]:
     """What is in proportion to the velocity of each moving support."""
     motion = system.motion
     one, two = _probes(system.size)
@@ -115,11 +115,11 @@ def _motions(system: System, nodes: ContactNodes) -> Iterator[Part]:
             (nodes.tangent_lift[:, p], second),
         )
         numbers = np.array([float(probe @ column) for column, probes in columns for probe in probes])
-        yield Part(f"{MOTION} {name}", numbers, sum(float(np.abs(c).sum()) for c, _ in columns), SOLVED)
+        yield SketchPart(f"{MOTION} {name}", numbers, sum(float(np.abs(c).sum()) for c, _ in columns), SOLVED)
 
 
-def _projected(name: str, values: Array, probes: Sequence[Array]) -> Part:
-    return Part(name, np.array([float(probe @ values) for probe in probes]), float(np.abs(values).sum()))
+def _projected(name: str, values: Array, probes: Sequence[Array]) -> SketchPart:
+    return SketchPart(name, np.array([float(probe @ values) for probe in probes]), float(np.abs(values).sum()))
 
 
 def _probes(size: int) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from .node_history import NodeHistory
 from .saved import Bounds
 from .schedule import Schedule
 from .settings import Settings
-from .sketch import Part
+from .sketch import SketchPart
 from .trajectory import Trajectory
 
 # Displacement, velocity and acceleration (n,) added to the initial state.
@@ -39,7 +39,7 @@ class Stepper(Protocol):
     path: str
     scheme: Scheme
     limit: StepLimit
-    parts: tuple[Part, ...]
+    parts: tuple[SketchPart, ...]
 
     @property
     def reason(self) -> str:

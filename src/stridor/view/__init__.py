@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .boundary_plots import stability_boundary
     from .cycle_plots import cycle_branches, cycle_period
     from .ensemble_plots import ensemble_map
-    from .inputs import BodyModes, FrictionCurve, NamedShape, ReportInputs
+    from .inputs import FrictionCurve, NamedFrequencies, NamedShape, ReportInputs
     from .plots import (
         Animation,
         acceleration_history,
@@ -48,8 +48,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Animation",
-    "BodyModes",
     "FrictionCurve",
+    "NamedFrequencies",
     "NamedShape",
     "ReportInputs",
     "acceleration_history",
@@ -90,7 +90,7 @@ __all__ = [
 ]
 
 _HOME = {
-    "BodyModes": "inputs",
+    "NamedFrequencies": "inputs",
     "FrictionCurve": "inputs",
     "NamedShape": "inputs",
     "ReportInputs": "inputs",

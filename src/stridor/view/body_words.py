@@ -23,7 +23,7 @@ from ..case.bodies import (
     SolidBody,
 )
 from ..case.schema import Contact
-from .tables import Row, Table, significant
+from .tables import Table, TableRow, significant
 
 
 def body_words(case: Case, name: str, body: AnyBody) -> str:
@@ -103,7 +103,7 @@ def bodies_table(case: Case) -> Table:
         ("elements", [str(body.elements) if isinstance(body, BeamBody) else "" for _, body in bodies]),
         ("mass matrix", [f"{b.mass:g} kg" if isinstance(b, MassBody) else getattr(b, "mass", "") for _, b in bodies]),
     )
-    rows = tuple(Row((name, *values)) for name, values in lines if any(values))
+    rows = tuple(TableRow((name, *values)) for name, values in lines if any(values))
     return Table("bodies", "Bodies", ("", *(name for name, _ in bodies)), rows, frozenset({0}))
 
 

@@ -12,7 +12,7 @@ from .figures import ReportFigure
 from .inputs import ReportInputs
 from .sensitivity_plots import countermeasure_bars, sensitivity_bars
 from .sensitivity_tables import countermeasure_table, sensitivity_table
-from .tables import Row, Table, quantity
+from .tables import Table, TableRow, quantity
 
 NEAR = 0.05  # of the frequency: an onset whose modes have no numbers belongs to a mode within it
 
@@ -26,13 +26,13 @@ def mechanism_table(inputs: ReportInputs) -> Table | None:
     mu = float(modes.mu[0])
     growing = [b for b in modes.order(0, "growth") if modes.unstable[0, b]]
     begun = [o for o in onsets.onsets if o.mu <= mu and not o.stabilising]
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     for b in growing:
         found = [o for o in begun if _belongs(o, modes, int(b))]
         last = found[-1] if found else None
         words = _words(last) if last else f"no onset of it below μ = {mu:g}: it grows from the lowest μ on"
         rows.append(
-            Row(
+            TableRow(
                 (
                     str(int(modes.branch[b])),
                     quantity(float(modes.frequency_hz[0, b]), 1),

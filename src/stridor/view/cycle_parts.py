@@ -11,7 +11,7 @@ from ..periodic import Cycle, Cycles
 from .cycle_plots import cycle_branches, cycle_period
 from .figures import ReportFigure
 from .inputs import ReportInputs
-from .tables import Row, Table
+from .tables import Table, TableRow
 
 STABLE = {True: "yes", False: "no", None: "undecided"}
 WORTH = 6  # cycles between the ends of a branch
@@ -57,7 +57,7 @@ def cycle_words(result: Cycles) -> tuple[str, ...]:
 
 def cycle_table(result: Cycles) -> Table | None:
     """A row for each cycle that `worth_a_row` names."""
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     for k in worth_a_row(result):
         c, branch = result.cycles[k], result.branch_of(k)
         force, shares = float(c.force_range[:, 1].max()), c.shares.max(axis=0)
@@ -67,7 +67,7 @@ def cycle_table(result: Cycles) -> Table | None:
             f"{c.largest_multiplier:.4g}" if c.multiplied else "", readable(c.slip_amplitude, 4), readable(force, 4),
             f"{100 * shares[1]:.1f} %", f"{100 * shares[0]:.1f} %", ", ".join(c.kinds),
         )  # fmt: skip
-        rows.append(Row(cells, "unstable" if c.stable is False else ""))
+        rows.append(TableRow(cells, "unstable" if c.stable is False else ""))
     if not rows:
         return None
     heads = (

@@ -20,7 +20,7 @@ from ..temporal.node_history import NodeHistory
 from ..temporal.trajectory import STATUS
 from ..typing import Array, BoolArray, IntArray
 from .colours import BLUE, GREY, INK, VERMILION
-from .interface_columns import Columns, arc_length, columns_along, seen_from_normal
+from .interface_columns import NodeColumns, arc_length, columns_along, seen_from_normal
 from .sliding_marks import mark_on_line, mark_on_patch
 from .style import WIDTH, largest, legend_above, panel, styled, zero_line
 
@@ -241,7 +241,7 @@ def chosen_records(time: Array, start: float | None, end: float | None) -> slice
 
 
 def map_values(
-    history: NodeHistory, nodes: IntArray, records: slice, columns: Columns, quantity: Quantity
+    history: NodeHistory, nodes: IntArray, records: slice, columns: NodeColumns, quantity: Quantity
 ) -> tuple[Array, Array]:
     """Time (rows,) [s] where rows of the picture begin, and what they show (rows, columns); NaN where there is none."""
     count = len(history.time[records])
@@ -261,14 +261,14 @@ def map_values(
     return history.time[records][begin], total / np.diff(np.append(begin, count))[:, None]
 
 
-def _summed(values: Array, columns: Columns) -> Array:
+def _summed(values: Array, columns: NodeColumns) -> Array:
     """Sums (r, columns) of values (r, m) of nodes."""
     total = np.zeros((len(values), columns.count))
     np.add.at(total.T, columns.column, values.T)
     return total
 
 
-def _pressure_columns(history: NodeHistory, nodes: IntArray, records: slice, columns: Columns) -> Array:
+def _pressure_columns(history: NodeHistory, nodes: IntArray, records: slice, columns: NodeColumns) -> Array:
     """Force over area (r, columns) [MPa], which nodes without area cannot spoil; for point contacts force [N]."""
     force = _summed(history.normal_force[records, nodes], columns)
     area = history.area[nodes]
@@ -278,7 +278,7 @@ def _pressure_columns(history: NodeHistory, nodes: IntArray, records: slice, col
     return np.where(whole > 0, 1e-6 * force / np.where(whole > 0, whole, 1.0), np.nan)
 
 
-def _status_rows(status: IntArray, columns: Columns, begin: IntArray) -> Array:
+def _status_rows(status: IntArray, columns: NodeColumns, begin: IntArray) -> Array:
     """Status (rows, columns): in a column the most frequent, in a row the rarest of the picture that occurs."""
     votes = np.stack([_summed((status == s).astype(float), columns) for s in range(3)])
     column = np.argmax(votes, axis=0)
@@ -302,7 +302,7 @@ def _time_edges(time: Array, span: Array) -> Array:
     return np.append(time, time[-1] + last)
 
 
-def _status_map(ax: Axes, columns: Columns, sides: Array, values: Array) -> None:
+def _status_map(ax: Axes, columns: NodeColumns, sides: Array, values: Array) -> None:
     colours = [MAP_COLOURS[name] for name in STATUS]
     look: Any = {"cmap": ListedColormap(colours), "norm": BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3)}
     ax.pcolormesh(columns.edges, sides, values, rasterized=True, **look)
@@ -310,7 +310,7 @@ def _status_map(ax: Axes, columns: Columns, sides: Array, values: Array) -> None
 
 
 def _value_map(
-    figure: Figure, ax: Axes, columns: Columns, sides: Array, values: Array, quantity: Quantity, *, area: bool
+    figure: Figure, ax: Axes, columns: NodeColumns, sides: Array, values: Array, quantity: Quantity, *, area: bool
 ) -> None:
     known = values[~np.isnan(values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)

@@ -22,7 +22,7 @@ from ..typing import Array, ComplexArray
 
 
 @dataclass(frozen=True)
-class BodyModes:
+class NamedFrequencies:
     """Natural frequencies (k,) [Hz] of a body alone, ascending, and a name of each: rigid, F1, T1, …"""
 
     frequency_hz: Array
@@ -76,7 +76,7 @@ class ReportInputs:
     damped_sweep: ComplexModes | None = None
     undamped_pair: ComplexModes | None = None
     damped_pair: ComplexModes | None = None
-    body_modes: Mapping[str, BodyModes] = field(default_factory=dict[str, BodyModes])
+    body_modes: Mapping[str, NamedFrequencies] = field(default_factory=dict[str, NamedFrequencies])
     coupled_hz: Array | None = None
     undamped_onsets: Onsets | None = None
     damped_onsets: Onsets | None = None

@@ -14,7 +14,7 @@ ALIGNED = 0.6  # mean length of unit tangents above which they count as one dire
 
 
 @dataclass(frozen=True)
-class Columns:
+class NodeColumns:
     """Contact nodes in columns along the interface: value (m,) of a node with its axis label, column (m,) it is in,
     and edges (c + 1,) of the c columns in the same unit."""
 
@@ -31,7 +31,7 @@ class Columns:
 
 def columns_along(
     position: Array, tangents: Array | None, *, along: Array | None = None, about: Array | None = None
-) -> Columns:
+) -> NodeColumns:
     """Columns of contact nodes at position (m, d) [m] with tangents (m, d−1, d).
 
     In the plane: arc length through all nodes, growing along the tangents, a column for each node. In space: distance
@@ -98,10 +98,10 @@ def seen_from_normal(position: Array, tangents: Array | None) -> tuple[Array, Ar
     return from_middle @ first, from_middle @ second
 
 
-def _columns(value: Array, label: str, most: int) -> Columns:
+def _columns(value: Array, label: str, most: int) -> NodeColumns:
     """Columns of nodes by value: one for each where two nodes or more share most of them, else ``most`` alike."""
     if not len(value):
-        return Columns(value, np.zeros(0, dtype=np.int64), np.array([0.0, 1.0]), label)
+        return NodeColumns(value, np.zeros(0, dtype=np.int64), np.array([0.0, 1.0]), label)
     low, high = float(value.min()), float(value.max())
     width = (high - low) or 1.0
     fine = np.round((value - low) / width * 1e6)
@@ -110,10 +110,10 @@ def _columns(value: Array, label: str, most: int) -> Columns:
         kinds, column = np.unique(np.minimum((value - low) / width * most, most - 1).astype(int), return_inverse=True)
     middle = np.bincount(column.ravel(), weights=value) / np.bincount(column.ravel())
     if len(middle) == 1:
-        return Columns(value, column.ravel(), middle + np.array([-0.5, 0.5]), label)
+        return NodeColumns(value, column.ravel(), middle + np.array([-0.5, 0.5]), label)
     inner = 0.5 * (middle[1:] + middle[:-1])
     ends = 2 * middle[[0, -1]] - inner[[0, -1]]
-    return Columns(value, column.ravel(), np.concatenate([ends[:1], inner, ends[1:]]), label)
+    return NodeColumns(value, column.ravel(), np.concatenate([ends[:1], inner, ends[1:]]), label)
 
 
 def _chain(position: Array) -> IntArray:

@@ -9,10 +9,10 @@ from ..digits import measured, readable
 from ..modal.complex_modes import UNSTABLE_RELATIVE, ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..typing import Array
-from .inputs import BodyModes, ReportInputs
+from .inputs import NamedFrequencies, ReportInputs
 from .tables import (
-    Row,
     Table,
+    TableRow,
     difference,
     drop_empty,
     is_far,
@@ -43,9 +43,9 @@ def frequency_tables(inputs: ReportInputs) -> list[Table]:
     return tables
 
 
-def body_table(name: str, modes: BodyModes, printed: tuple[ReferenceFrequency, ...]) -> Table:
+def body_table(name: str, modes: NamedFrequencies, printed: tuple[ReferenceFrequency, ...]) -> Table:
     """Natural frequencies of one body, beside the printed ones."""
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     for i, j in paired(modes.frequency_hz, [p.frequency_hz for p in printed]):
         label = modes.labels[i] if i is not None and i < len(modes.labels) else ""
         other = printed[j] if j is not None else None
@@ -74,13 +74,13 @@ def coupled_table(frequencies: Array, printed: tuple[ReferenceFrequency, ...], o
     for onset in reversed(onsets.onsets if onsets is not None else ()):
         for branch in onset.branches:
             meets[branch] = f"μ = {measured(onset.mu, 4)}, {measured(onset.frequency_hz, 0)} Hz"
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     for i, j in paired(frequencies, [p.frequency_hz for p in printed]):
         first = (str(i + 1) if i is not None else "", meets.get(i + 1, "") if i is not None else "")
         computed = float(frequencies[i]) if i is not None else None
         rows.append(_frequency_row(first, computed, printed[j] if j is not None else None, bool(printed)))
     # The place of a mode first, the meeting point after the numbers.
-    moved = tuple(Row((r.cells[0], *r.cells[2:5], r.cells[1], r.cells[5]), r.kind) for r in rows)
+    moved = tuple(TableRow((r.cells[0], *r.cells[2:5], r.cells[1], r.cells[5]), r.kind) for r in rows)
     heads = ("mode", "computed [Hz]", "printed [Hz]", "difference", "meets another at", "note")
     caption = f"Undamped, friction coefficient zero. {PRINTED if printed else ''}".strip()
     return drop_empty(
@@ -90,15 +90,15 @@ def coupled_table(frequencies: Array, printed: tuple[ReferenceFrequency, ...], o
 
 def _frequency_row(
     first: tuple[str, ...], computed: float | None, printed: ReferenceFrequency | None, compared: bool
-) -> Row:
+) -> TableRow:
     if printed is None:
         note = "not printed in the source" if compared else ""
-        return Row((*first, quantity(computed, 1), "", "", note), "new" if compared else "")
+        return TableRow((*first, quantity(computed, 1), "", "", note), "new" if compared else "")
     fraction = difference(computed, printed.frequency_hz) if computed is not None else None
     mark = " ▲" if is_far(fraction) else ""
     note = printed.note if computed is not None else "; ".join(filter(None, [printed.note, "not computed"]))
     cells = (quantity(computed, 1), significant(printed.frequency_hz, 8), percent(fraction) + mark, note)
-    return Row((*first, *cells), "far" if mark or computed is None else "")
+    return TableRow((*first, *cells), "far" if mark or computed is None else "")
 
 
 def onset_tables(inputs: ReportInputs) -> list[Table]:
@@ -119,7 +119,7 @@ def onset_tables(inputs: ReportInputs) -> list[Table]:
 
 
 def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> Table:
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     partners = _onset_partners(onsets.onsets, printed)
     for number_, onset in enumerate(onsets.onsets):
         other = partners.get(number_)
@@ -129,7 +129,7 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
         mark = " ▲" if is_far(mu_diff) and not rounded else ""
         remark = percent(mu_diff, 1) + mark + (" ≙" if rounded else "")
         rows.append(
-            Row(
+            TableRow(
                 (
                     quantity(onset.mu, 5),
                     significant(other.mu, 8) if other else "",
@@ -149,7 +149,7 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
     inside = [p for p in lost if onsets.friction_range[0] <= p.mu <= onsets.friction_range[1]]
     for p in inside:
         cells = ("", significant(p.mu, 8), "", "", significant(p.frequency_hz, 8), "", "", "", "not found here", p.note)
-        rows.append(Row(cells, "far"))
+        rows.append(TableRow(cells, "far"))
     heads = (
         "critical μ",
         "printed μ",
@@ -194,7 +194,7 @@ def _onset_partners(found: tuple[Onset, ...], printed: tuple[ReferenceOnset, ...
 
 def _solutions(found: list[Onset]) -> Table:
     """How each onset was solved and how growth opens beyond it."""
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     for onset in found:
         point = onset.exceptional_mu
         exceptional = ""
@@ -202,7 +202,7 @@ def _solutions(found: list[Onset]) -> Table:
             sign = "+" if point.imag >= 0 else "−"
             exceptional = f"{quantity(point.real, 7)} {sign} {significant(abs(point.imag), 2)} j"
         rows.append(
-            Row(
+            TableRow(
                 (
                     "damped" if onset.damped else "undamped",
                     quantity(onset.mu, 10),
@@ -230,7 +230,7 @@ def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float) -> Tabl
     row = modes.at(mu)
     order = [int(b) for b in modes.order(row) if modes.frequency_hz[row, b] <= max_frequency_hz]
     rows = tuple(
-        Row(
+        TableRow(
             (
                 str(int(modes.branch[b])),
                 readable(float(modes.frequency_hz[row, b])).replace("-", "−"),

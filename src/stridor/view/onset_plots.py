@@ -32,12 +32,12 @@ def onset_chart(onsets: Onsets | ParametricOnsets, *, ax: Axes | None = None) ->
         chosen = [(x, o.frequency_hz / 1e3) for x, o in zip(at, onsets, strict=True) if o.stabilising is ending]
         if chosen:
             ax.plot(*zip(*chosen, strict=True), "D", color=colour, mec=VERMILION, ms=6, label=words, clip_on=False)
-    for place, marker, values in ends:
+    for end, marker, values in ends:
         if values:
-            side = "start" if place == low else "end"
+            side = "start" if end == low else "end"
             label = f"grows at the {side} of the range"
             kilohertz = [abs(v.imag) / (2e3 * np.pi) for v in values]
-            ax.plot([place] * len(values), kilohertz, marker, color=INK, ms=6, ls="none", label=label, clip_on=False)
+            ax.plot([end] * len(values), kilohertz, marker, color=INK, ms=6, ls="none", label=label, clip_on=False)
     for x, o in list(zip(at, onsets, strict=True))[:MOST_NAMED]:
         right = x < (low + high) / 2
         ax.annotate(

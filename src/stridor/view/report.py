@@ -24,7 +24,7 @@ from .modal_tables import frequency_tables, modes_table, onset_tables
 from .page_files import template_text
 from .style import lay_out, styled
 from .surface_figures import contact_figures, shape_figures, surface_table
-from .tables import Row, Table, number
+from .tables import Table, TableRow, number
 from .temporal_tables import (
     agreement_table,
     contact_table,
@@ -41,7 +41,7 @@ _UNIT = re.compile(r"(\d) (Hz|kHz|N/m|N|m/s²|m/s|1/s|mm|s|GPa|%)(?!\w)")
 
 
 @dataclass(frozen=True)
-class Section:
+class Chapter:
     """A chapter: anchor, title, opening paragraphs, a list of short lines, then tables and figures in turn."""
 
     name: str
@@ -81,7 +81,7 @@ def write_report(inputs: ReportInputs, folder: Path) -> Path:
     return page
 
 
-def render(inputs: ReportInputs, chapters: list[Section], drawings: dict[str, str]) -> str:
+def render(inputs: ReportInputs, chapters: list[Chapter], drawings: dict[str, str]) -> str:
     """The page as HTML; drawings holds each figure's picture as a data URL."""
     reference = inputs.case.reference
     places = inputs.source_places
@@ -114,17 +114,17 @@ def _is_table(part: Table | ReportFigure) -> bool:
     return isinstance(part, Table)
 
 
-def sections(inputs: ReportInputs) -> list[Section]:
+def sections(inputs: ReportInputs) -> list[Chapter]:
     """All chapters that have something to show."""
     window = _window(inputs)
     chapters = [
-        Section(
+        Chapter(
             "model",
             "The model",
             lines=tuple(model_in_words(inputs)),
             parts=(*model_figures(inputs), bodies_table(inputs.case), *_surfaces(inputs)),
         ),
-        Section("frequencies", "Natural frequencies", parts=tuple(frequency_tables(inputs))),
+        Chapter("frequencies", "Natural frequencies", parts=tuple(frequency_tables(inputs))),
         _modal(inputs),
         _changes(inputs),
         _temporal(inputs, window),
@@ -147,7 +147,7 @@ def _window(inputs: ReportInputs) -> Window | None:
     return regime_window(run, inputs.dominant_hz)
 
 
-def _modal(inputs: ReportInputs) -> Section:
+def _modal(inputs: ReportInputs) -> Chapter:
     parts: list[Table | ReportFigure] = [*onset_tables(inputs), *modal_figures(inputs)]
     parts.extend(shape_figures(inputs))
     mechanisms = mechanism_table(inputs)
@@ -173,16 +173,16 @@ def _modal(inputs: ReportInputs) -> Section:
             "Eigenvalues λ of the system coupled by friction, linear about steady sliding: the growth rate is Re λ, "
             "the frequency Im λ/2π. A mode with positive growth rate is potentially unstable.",
         )
-    return Section("modal", "Modal approach", tuple(said), parts=tuple(parts))
+    return Chapter("modal", "Modal approach", tuple(said), parts=tuple(parts))
 
 
-def _changes(inputs: ReportInputs) -> Section:
+def _changes(inputs: ReportInputs) -> Chapter:
     """What a change of the case would do: derivatives, and counter-measures ranked by them."""
     parts = (*change_tables(inputs), *change_figures(inputs))
-    return Section("changes", "What a change would do", change_words(inputs), parts=parts)
+    return Chapter("changes", "What a change would do", change_words(inputs), parts=parts)
 
 
-def _temporal(inputs: ReportInputs, window: Window | None) -> Section:
+def _temporal(inputs: ReportInputs, window: Window | None) -> Chapter:
     parts: list[Table | ReportFigure] = []
     if inputs.trajectory is not None:
         parts = [simulation_table(inputs)]
@@ -200,23 +200,23 @@ def _temporal(inputs: ReportInputs, window: Window | None) -> Section:
             "The equations of motion marched in time with unilateral contact and Coulomb friction: the contact sticks, "
             "slips or separates as it must.",
         )
-    return Section("temporal", "Temporal approach", said, parts=tuple(parts))
+    return Chapter("temporal", "Temporal approach", said, parts=tuple(parts))
 
 
-def _cycles(inputs: ReportInputs) -> Section:
+def _cycles(inputs: ReportInputs) -> Chapter:
     """Limit cycles, where they were sought."""
     result = inputs.cycles
     if result is None:
-        return Section("limit-cycles", "Limit cycles")
+        return Chapter("limit-cycles", "Limit cycles")
     table = cycle_table(result)
     parts = (*cycle_figures(inputs), *(() if table is None else (table,)))
     # Ends of branches are told with these.
     missing = [line for line in result.missing if not line.startswith("branch ")]
     lines = (*branch_words(result), *missing, *result.notes)
-    return Section("limit-cycles", "Limit cycles", cycle_words(result), lines, parts)
+    return Chapter("limit-cycles", "Limit cycles", cycle_words(result), lines, parts)
 
 
-def _agreement(inputs: ReportInputs) -> Section:
+def _agreement(inputs: ReportInputs) -> Chapter:
     parts: list[Table | ReportFigure] = []
     said: tuple[str, ...] = ()
     if inputs.agreement is not None:
@@ -227,29 +227,29 @@ def _agreement(inputs: ReportInputs) -> Section:
             if inputs.modes is not None and same:
                 parts.append(identified_table(comparison, inputs.modes, inputs.max_frequency_hz))
     parts.extend(agreement_figures(inputs))
-    return Section("agreement", "Do both approaches agree?", said, parts=tuple(parts))
+    return Chapter("agreement", "Do both approaches agree?", said, parts=tuple(parts))
 
 
-def _reference(inputs: ReportInputs, window: Window | None) -> Section:
+def _reference(inputs: ReportInputs, window: Window | None) -> Chapter:
     reference = inputs.case.reference
     if reference is None:
-        return Section("reference", "The source")
+        return Chapter("reference", "The source")
     table = values_table(inputs, window)
     said = (f"Printed values are from: {reference.source}",) if reference.source else ()
     if reference.notes:
         said += ("What to know about the source:",)
-    return Section("reference", "The source", said, reference.notes, () if table is None else (table,))
+    return Chapter("reference", "The source", said, reference.notes, () if table is None else (table,))
 
 
 def about_tables(inputs: ReportInputs) -> list[Table]:
     """Versions and times taken."""
     tables: list[Table] = []
     if inputs.versions:
-        rows = tuple(Row((name, version)) for name, version in inputs.versions.items())
+        rows = tuple(TableRow((name, version)) for name, version in inputs.versions.items())
         tables.append(Table("versions", "Versions", ("program", "version"), rows, frozenset({0, 1})))
     if inputs.timings:
-        rows = [Row((name, number(seconds, 2))) for name, seconds in inputs.timings.items()]
-        rows.append(Row(("in all", number(sum(inputs.timings.values()), 2))))
+        rows = [TableRow((name, number(seconds, 2))) for name, seconds in inputs.timings.items()]
+        rows.append(TableRow(("in all", number(sum(inputs.timings.values()), 2))))
         tables.append(Table("timings", "Time taken", ("analysis", "wall time [s]"), tuple(rows), frozenset({0})))
     return tables
 

@@ -23,7 +23,7 @@ FLOOR = -60.0  # dB below the largest line, as in the report
 
 
 @dataclass(frozen=True)
-class Band:
+class ValueRanges:
     """Least and largest value (b,) of a history in each stretch of time; label, unit."""
 
     label: str
@@ -64,9 +64,9 @@ class RunSoFar:
     records: int
     time: list[float]
     phases: list[tuple[str, float, float]]
-    acceleration: Band | None
-    normal_force: list[Band]
-    tangential_force: list[Band]
+    acceleration: ValueRanges | None
+    normal_force: list[ValueRanges]
+    tangential_force: list[ValueRanges]
     status: dict[str, list[list[float]]]
     portrait: Portrait | None
     sonogram: Sonogram | None
@@ -84,22 +84,22 @@ def run_so_far(run: Trajectory, *, point: str | None = None, max_frequency_hz: f
     starts, sizes = edges[:-1], np.diff(edges)
     time = 0.5 * (run.time[starts] + run.time[edges[1:] - 1]) if count else np.zeros(0)
 
-    def band(label: str, unit: str, values: Array) -> Band:
-        return Band(label, unit, *(_plain(at.reduceat(values, starts)) for at in (np.minimum, np.maximum)))
+    def band(label: str, unit: str, values: Array) -> ValueRanges:
+        return ValueRanges(label, unit, *(_plain(at.reduceat(values, starts)) for at in (np.minimum, np.maximum)))
 
     acceleration, portrait, sonogram = None, None, None
     if run.watch_names and count:
-        place = run.watch_names.index(point) if point in run.watch_names else 0
-        name = run.watch_names[place]
+        index = run.watch_names.index(point) if point in run.watch_names else 0
+        name = run.watch_names[index]
         with np.errstate(all="ignore"):  # a run that does not stay stable
-            direction = loudest_direction(run.acceleration[:, place])
+            direction = loudest_direction(run.acceleration[:, index])
         axis = "xyz"[direction]
-        histories = (h[:, place, direction] for h in (run.displacement, run.velocity, run.acceleration))
+        histories = (h[:, index, direction] for h in (run.displacement, run.velocity, run.acceleration))
         displacement, velocity, history = histories
         acceleration = band(f"{name} {axis}", "m/s²", history)
         portrait = _portrait(f"{name} {axis}", displacement, velocity, run.sampling)
         sonogram = _sonogram(history, float(run.time[0]), run.sampling, max_frequency_hz)
-    def forces(values: Array) -> list[Band]:
+    def forces(values: Array) -> list[ValueRanges]:
         return [band(name, "N", values[:, c]) for c, name in enumerate(run.contact_names)] if count else []
 
     status = {

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ..digits import readable
 from ..study.countermeasures import Countermeasures, Measure
 from ..study.sensitivities import Sensitivities
-from .tables import Row, Table, drop_empty, quantity, significant
+from .tables import Table, TableRow, drop_empty, quantity, significant
 
 BADLY_CONDITIONED = 10.0
 SOME = 3  # modes that a cell of a table names
@@ -16,7 +16,7 @@ SOME = 3  # modes that a cell of a table names
 def sensitivity_table(result: Sensitivities) -> Table:
     """What a per cent of each number does to each mode."""
     rows = [
-        Row(
+        TableRow(
             (
                 str(int(result.branch[b])),
                 quantity(float(result.frequency_hz[b]), 1),
@@ -60,7 +60,7 @@ def _distance(distance: float) -> str:
 def countermeasure_table(result: Countermeasures) -> Table:
     """Changes by growth removed per per cent, and what came of the best when they were solved again."""
     rows = tuple(
-        Row(
+        TableRow(
             (
                 measure.words,
                 significant(measure.removed_per_percent),

@@ -26,7 +26,7 @@ def mark_on_patch(ax: Axes, position: Array, tangents: Array, slip: Array) -> No
     middle = points.mean(axis=0)
     along = (points - middle) @ flat
     room = 0.06 * float(np.ptp(points, axis=0).max())
-    turned = 90.0 if abs(flat[0]) > abs(flat[1]) else 0.0
+    rotation = 90.0 if abs(flat[0]) > abs(flat[1]) else 0.0
     for reach, sign, name in ((along.max(), 1.0, "leading edge"), (-along.min(), -1.0, "trailing edge")):
         tip = middle + sign * (reach + room) * flat
         tail = tip + sign * 2.2 * room * flat
@@ -34,7 +34,7 @@ def mark_on_patch(ax: Axes, position: Array, tangents: Array, slip: Array) -> No
         ends = (tip, tail) if inward else (tail, tip)
         ax.annotate("", tuple(ends[0]), tuple(ends[1]), arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.4})
         at = tail + sign * 0.7 * room * flat
-        ax.text(float(at[0]), float(at[1]), name, rotation=turned, ha="center", va="center", color=GREY, fontsize=8.5)
+        ax.text(float(at[0]), float(at[1]), name, rotation=rotation, ha="center", va="center", color=GREY, fontsize=8.5)
         ax.update_datalim([tuple(at + sign * 0.5 * room * flat)])
     ax.autoscale_view()
 

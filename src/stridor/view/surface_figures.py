@@ -14,7 +14,7 @@ from . import plots
 from .field_plots import contact_energies
 from .figures import ReportFigure
 from .inputs import ReportInputs
-from .tables import Row, Table, number, significant
+from .tables import Table, TableRow, number, significant
 
 
 def shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
@@ -92,7 +92,7 @@ def surface_table(inputs: ReportInputs) -> Table | None:
     if steady is None or not steady.resultants:
         return None
     rows = [
-        Row(
+        TableRow(
             (
                 name,
                 ", ".join(significant(float(f)) for f in found.force),

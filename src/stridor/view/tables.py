@@ -17,7 +17,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """Cells of a line, and its kind: "" plain, "far" a marked difference, "new" without printed partner,
     "unstable", "good", "bad"."""
 
@@ -32,7 +32,7 @@ class Table:
     name: str
     title: str
     heads: tuple[str, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[TableRow, ...]
     words: frozenset[int] = field(default_factory=frozenset[int])
     caption: str = ""
 
@@ -44,7 +44,7 @@ def drop_empty(table: Table) -> Table:
         table.name,
         table.title,
         tuple(table.heads[k] for k in keep),
-        tuple(Row(tuple(row.cells[k] for k in keep), row.kind) for row in table.rows),
+        tuple(TableRow(tuple(row.cells[k] for k in keep), row.kind) for row in table.rows),
         frozenset(index for index, k in enumerate(keep) if k in table.words),
         table.caption,
     )

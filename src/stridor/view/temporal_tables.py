@@ -11,8 +11,8 @@ from ..temporal.energy import EnergyBalance
 from ..temporal.trajectory import Trajectory
 from .inputs import ReportInputs
 from .tables import (
-    Row,
     Table,
+    TableRow,
     assigned,
     difference,
     drop_empty,
@@ -31,7 +31,7 @@ SAME_MODE = 0.02  # |Δλ|/|λ| within which an identified component is that mod
 def contact_table(trajectory: Trajectory) -> Table:
     """Statistics of every contact in every phase, from every step."""
     rows = tuple(
-        Row(
+        TableRow(
             (
                 phase.name,
                 name,
@@ -80,7 +80,7 @@ def settled_table(trajectory: Trajectory) -> Table | None:
     if not found:
         return None
     rows = tuple(
-        Row(
+        TableRow(
             (
                 name,
                 significant(part.since, 5),
@@ -128,9 +128,9 @@ def energy_table(balance: EnergyBalance) -> Table:
         ("stored at the end as motion", balance.kinetic, -1),
         ("stored at the end as deformation", balance.elastic, -1),
     )
-    rows = [Row((name, quantity(1e3 * value, 4))) for name, value, _ in entries]
+    rows = [TableRow((name, quantity(1e3 * value, 4))) for name, value, _ in entries]
     missing = sum(sign * value for _, value, sign in entries)
-    rows.append(Row(("missing at the end", significant(1e3 * missing, 2)), "good" if balance.closes else "bad"))
+    rows.append(TableRow(("missing at the end", significant(1e3 * missing, 2)), "good" if balance.closes else "bad"))
     caption = (
         f"Largest imbalance at any time: {significant(balance.error, 2)} of the largest energy that changed hands."
         if balance.checked
@@ -149,20 +149,20 @@ def agreement_table(comparison: Comparison) -> Table:
     seen = names[temporal.grows] if temporal.shows else "not seen"
     judged = "not decided" if undecided else _judged(same)
     rows = [
-        Row(("steady sliding is", names[unstable], seen, "", judged), _kind(same)),
+        TableRow(("steady sliding is", names[unstable], seen, "", judged), _kind(same)),
         agreed("frequency [Hz]", modal.imag / (2 * np.pi), temporal.frequency_hz, GOOD_FREQUENCY),
         agreed("growth rate [1/s]", modal.real, temporal.growth_rate, GOOD_GROWTH if unstable else SAME_DECAY),
     ]
     if comparison.growth_mac is not None:
         mac = comparison.growth_mac
         name = "likeness of shapes (MAC), small perturbation against mode"
-        rows.append(Row((name, "", number(mac, 3), "", _likeness(mac))))
+        rows.append(TableRow((name, "", number(mac, 3), "", _likeness(mac))))
     if comparison.dominant_frequency_hz is not None:
         heard = comparison.dominant_frequency_hz
         mode = None if comparison.responding is None else comparison.unstable_hz[comparison.responding]
         error = None if mode is None else heard / mode - 1
         rows.append(
-            Row(
+            TableRow(
                 (
                     "dominant frequency of the full run [Hz]",
                     quantity(mode, 1),
@@ -175,10 +175,10 @@ def agreement_table(comparison: Comparison) -> Table:
     if comparison.run_growth is not None:
         fitted = comparison.run_growth
         state = "saturated" if fitted.saturated else "not saturated"
-        rows.append(Row(("growth fitted in the full run [1/s]", "", quantity(fitted.rate, 1), "", state)))
+        rows.append(TableRow(("growth fitted in the full run [1/s]", "", quantity(fitted.rate, 1), "", state)))
     if comparison.mac is not None and comparison.responding is not None:
         rows.append(
-            Row(
+            TableRow(
                 (
                     "likeness of shapes (MAC), full run against mode",
                     "",
@@ -204,20 +204,20 @@ def _likeness(mac: float) -> str:
     return "alike in part" if mac >= 0.5 * GOOD_MAC else "not alike"
 
 
-def mac_row(comparison: Comparison) -> Row | None:
+def mac_row(comparison: Comparison) -> TableRow | None:
     """Likeness of the shapes of run and mode as a line of the summary."""
     # Without an unstable mode that answers there is no shape to hold the run against.
     if comparison.mac is None or comparison.responding is None:
         return None
     name = f"likeness of run and mode (MAC) at μ = {comparison.mu:g}"
-    return Row((name, "", number(comparison.mac, 3), "", _likeness(comparison.mac)))
+    return TableRow((name, "", number(comparison.mac, 3), "", _likeness(comparison.mac)))
 
 
-def agreed(name: str, modal: float, temporal: float, limit: float) -> Row:
+def agreed(name: str, modal: float, temporal: float, limit: float) -> TableRow:
     """One quantity by both approaches, judged by a relative limit."""
     error = (temporal - modal) / abs(modal) if modal else None
     good = error is not None and abs(error) <= limit
-    return Row((name, quantity(modal, 1), quantity(temporal, 1), percent(error, 3), _judged(good)), _kind(good))
+    return TableRow((name, quantity(modal, 1), quantity(temporal, 1), percent(error, 3), _judged(good)), _kind(good))
 
 
 def _judged(good: bool) -> str:
@@ -228,17 +228,17 @@ def _kind(good: bool) -> str:
     return "good" if good else "bad"
 
 
-def critical_row(agreement: Agreement) -> Row | None:
+def critical_row(agreement: Agreement) -> TableRow | None:
     """Critical friction of both approaches as a line of the summary."""
     modal, temporal = agreement.critical_mu_modal, agreement.critical_mu_temporal
     if modal is None and temporal is None:
         return None
     if modal is None or temporal is None:
-        return Row(("critical friction coefficient", quantity(modal, 5), quantity(temporal, 5), "", ""))
+        return TableRow(("critical friction coefficient", quantity(modal, 5), quantity(temporal, 5), "", ""))
     width = agreement.bracket[1] - agreement.bracket[0] if agreement.bracket else 0.0
     good = abs(modal - temporal) <= max(width, GOOD_CRITICAL * modal)
     cells = ("critical friction coefficient", quantity(modal, 5), quantity(temporal, 5), percent(temporal / modal - 1))
-    return Row((*cells, _judged(good)), _kind(good))
+    return TableRow((*cells, _judged(good)), _kind(good))
 
 
 def identified_table(comparison: Comparison, modes: ComplexModes, max_frequency_hz: float) -> Table:
@@ -248,12 +248,12 @@ def identified_table(comparison: Comparison, modes: ComplexModes, max_frequency_
     lam = lam[np.argsort(lam.imag)]
     found = comparison.perturbation.components.eigenvalues
     partners = assigned(np.abs(lam[:, None] - found) / np.abs(lam)[:, None], SAME_MODE) if len(found) else {}
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     for i, mode in enumerate(lam):
         j = partners.get(i)
         seen = complex(found[j]) if j is not None else None
         rows.append(
-            Row(
+            TableRow(
                 (
                     quantity(mode.imag / (2 * np.pi), 1),
                     quantity(seen.imag / (2 * np.pi), 1) if seen is not None else "",
@@ -307,14 +307,14 @@ def values_table(inputs: ReportInputs, window: Window | None) -> Table | None:
     if reference is None or not reference.values:
         return None
     known = computed_values(inputs, window)
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     for printed in reference.values:
         computed, what = known.get(printed.name, (None, ""))
         fraction = difference(computed, printed.value) if computed is not None else None
         rounded = computed is not None and same_as_printed(computed, printed.value)
         mark = " ▲" if is_far(fraction) and not rounded else ""
         rows.append(
-            Row(
+            TableRow(
                 (
                     printed.name.removesuffix("_hz").replace("_mu", " μ").replace("_", " "),
                     significant(computed, 5) if computed is not None else "not computed",

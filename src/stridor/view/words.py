@@ -16,7 +16,7 @@ from ..study.saturation import Unsaturated
 from ..temporal.changes import changes_of
 from .body_words import body_words, contact_words
 from .inputs import ReportInputs
-from .tables import Row, Table, drop_empty, significant
+from .tables import Table, TableRow, drop_empty, significant
 from .temporal_tables import agreed, critical_row, mac_row
 
 
@@ -344,14 +344,14 @@ def simulation_table(inputs: ReportInputs) -> Table:
         lines.append(
             (f"phase “{phase.name}”", f"{phase.duration:g} s{ramp}" + (f": {', '.join(factors)}" if factors else ""))
         )
-    rows = tuple(Row(line) for line in lines)
+    rows = tuple(TableRow(line) for line in lines)
     return drop_empty(Table("simulation", "Simulation", ("", "value"), rows, frozenset({0, 1})))
 
 
 def summary_table(inputs: ReportInputs) -> Table | None:
     """The verdict in numbers: modal against temporal."""
     agreement = inputs.agreement
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     if agreement is not None:
         for c in agreement.comparisons:
             both = len(c.unstable_hz) > 0, c.perturbation.grows
@@ -359,7 +359,8 @@ def summary_table(inputs: ReportInputs) -> Table | None:
             good = {True: "✓ agree", False: "✗ differ", None: "not decided"}[c.agrees]
             at = f"at μ = {c.mu:g}"
             seen = names[both[1]] if c.perturbation.shows else "not seen"
-            rows.append(Row((f"steady sliding {at}", names[both[0]], seen, "", good), "good" if c.agrees else "bad"))
+            cells = f"steady sliding {at}", names[both[0]], seen, "", good
+            rows.append(TableRow(cells, "good" if c.agrees else "bad"))
             if any(both):
                 modal = c.modal_eigenvalue
                 here = c.perturbation

@@ -5,8 +5,8 @@ along a curve, `curve` what comes of it, `crossings` where straight lines cross 
 curves are found and what is counted between them.
 """
 
-from .curve import Curve, Drawn, crossings, drawn
+from .curve import Drawn, StabilityCurve, crossings, drawn
 from .plane import Plane
 from .search import Found, boundaries
 
-__all__ = ["Curve", "Drawn", "Found", "Plane", "boundaries", "crossings", "drawn"]
+__all__ = ["Drawn", "Found", "Plane", "StabilityCurve", "boundaries", "crossings", "drawn"]

@@ -28,7 +28,7 @@ SHORT = 0.02  # of the mesh: no shorter step
 
 
 @dataclass(frozen=True)
-class Seen:
+class ModesAtPoint:
     """A point p (2,) with the modes there: λ (k,) and ∇λ (2, k)."""
 
     p: Array
@@ -36,19 +36,19 @@ class Seen:
     slopes: ComplexArray
 
     @classmethod
-    def at(cls, plane: Plane, p: Array) -> Seen:
+    def at(cls, plane: Plane, p: Array) -> ModesAtPoint:
         """By one solve. Raises AnalysisError where the matrices are singular."""
         found = plane.modes(p)
         return cls(p, found.values, plane.slopes(p, found))
 
-    def follow(self, k: int, other: Seen) -> int | None:
+    def follow(self, k: int, other: ModesAtPoint) -> int | None:
         """Number of mode k at another point: the nearest to where both slopes lead, None where there is none."""
         way = other.p - self.p
         off = np.abs(other.values - self.values[k] - 0.5 * (way @ self.slopes[:, k] + way @ other.slopes))
         known = np.flatnonzero(np.isfinite(off))
         return int(known[np.argmin(off[known])]) if len(known) else None
 
-    def rises_to(self, k: int, other: Seen) -> bool:
+    def rises_to(self, k: int, other: ModesAtPoint) -> bool:
         """Whether the rate of mode k rises to another point uphill: over all of the way, and at both of its ends."""
         j, way, up = self.follow(k, other), other.p - self.p, self.slopes[:, k].real
         if j is None or other.values[j].real <= self.values[k].real:
@@ -57,7 +57,7 @@ class Seen:
         return uphill and float(way @ other.slopes[:, j].real) > 0.0
 
 
-def tops(plane: Plane, seen: Sequence[Seen], mesh: float) -> Iterator[tuple[Seen, int]]:
+def tops(plane: Plane, seen: Sequence[ModesAtPoint], mesh: float) -> Iterator[tuple[ModesAtPoint, int]]:
     """Points and numbers of modes that decay there, and whose rate rises all the way to no neighbour; the least damped
     first."""
     found: list[tuple[float, int, int]] = []
@@ -72,7 +72,7 @@ def tops(plane: Plane, seen: Sequence[Seen], mesh: float) -> Iterator[tuple[Seen
         yield seen[number], k
 
 
-def climb(plane: Plane, here: Seen, k: int, mesh: float) -> Array | None:
+def climb(plane: Plane, here: ModesAtPoint, k: int, mesh: float) -> Array | None:
     """Where (2,) a mode grows that decays at a point, within some steps uphill; None where its top is lower, beyond the
     edge of the rectangle, or not found."""
     reach, inverse = 0.5 * mesh, None
@@ -93,23 +93,23 @@ def climb(plane: Plane, here: Seen, k: int, mesh: float) -> Array | None:
         if not np.all((p > 0.0) & (p < 1.0)):
             return None  # lines on the edges have been searched; a bend may be no number
         try:
-            there = Seen.at(plane, p)
+            new = ModesAtPoint.at(plane, p)
         except AnalysisError:
             return None
-        j = here.follow(k, there)
+        j = here.follow(k, new)
         if j is None:
             return None
-        if there.values[j].real > UNSTABLE_RELATIVE * abs(there.values[j]):
+        if new.values[j].real > UNSTABLE_RELATIVE * abs(new.values[j]):
             return p
-        inverse, bent = _updated(inverse, step, up - there.slopes[:, j].real)
-        if there.values[j].real <= rate:
+        inverse, bent = _updated(inverse, step, up - new.slopes[:, j].real)
+        if new.values[j].real <= rate:
             reach = 0.5 * float(np.hypot(*step))
             if reach < SHORT * mesh:
                 return None
             continue
         if not bent:
             reach = min(2.0 * reach, mesh)
-        here, k = there, j
+        here, k = new, j
     return None
 
 

@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from ...typing import Array, IntArray
-from .spot import Kind, Spot
+from .spot import CurvePoint, Kind
 
 PIECES = 16  # straight pieces that a cubic one is drawn in: off it by some 1e-5 of its length
 
 
 @dataclass(frozen=True)
-class Curve:
+class StabilityCurve:
     """Points in order, closed where the last meets the first again (which is then its last point, too).
 
     ends: what the first and the last point are, "edge" of the rectangle, "band" (the highest frequency), "zero
@@ -24,7 +24,7 @@ class Curve:
     unchecked: of how many pieces longer than the tolerance there is none.
     """
 
-    spots: tuple[Spot, ...]
+    spots: tuple[CurvePoint, ...]
     closed: bool
     ends: tuple[str, str]
     deviation: float = float("nan")
@@ -134,7 +134,7 @@ def crossings(curves: Sequence[Drawn], start: Array, end: Array) -> list[Crossin
             if not -1e-12 <= at <= 1 + 1e-12:
                 continue
             piece = points[k + 1] - points[k]
-            turned = (piece[0] * way[1] - piece[1] * way[0]) / (length * max(float(np.hypot(*piece)), 1e-300))
-            roots = int(np.sign(turned)) * int(sides[k]) * curve.roots
-            found.append(Crossing(at, float(omega[k] + part * (omega[k + 1] - omega[k])), number, abs(turned), roots))
+            sine = (piece[0] * way[1] - piece[1] * way[0]) / (length * max(float(np.hypot(*piece)), 1e-300))
+            roots = int(np.sign(sine)) * int(sides[k]) * curve.roots
+            found.append(Crossing(at, float(omega[k] + part * (omega[k + 1] - omega[k])), number, abs(sine), roots))
     return sorted(found, key=lambda c: c.at)

@@ -14,9 +14,9 @@ from itertools import combinations
 import numpy as np
 
 from ...typing import Array
-from .curve import Curve, hermite
+from .curve import StabilityCurve, hermite
 from .plane import Plane
-from .spot import Spot, settled
+from .spot import CurvePoint, settled
 
 LONGEST, SHORTEST = 0.15, 1e-6  # steps, in shares of the ranges
 FIRST = 0.02
@@ -35,18 +35,18 @@ INSIDE = 1e-12
 CUSP = 1e-4  # how far from one another curves may end that end in one cusp
 
 
-def traced(plane: Plane, seed: Spot, tolerance: float) -> Curve:
+def traced(plane: Plane, seed: CurvePoint, tolerance: float) -> StabilityCurve:
     """The curve through a point, both ways until it leaves the rectangle or the band, or comes back."""
     forward, end, closed = _march(plane, seed, 1)
-    backward: list[Spot] = []
+    backward: list[CurvePoint] = []
     start = end
     if not closed:
         backward, start, _ = _march(plane, seed, -1)
     spots = [*reversed(backward), seed, *forward]
-    return refined(plane, Curve(tuple(spots), closed, (start, end)), tolerance)
+    return refined(plane, StabilityCurve(tuple(spots), closed, (start, end)), tolerance)
 
 
-def joined(curves: Sequence[Curve]) -> list[Curve]:
+def joined(curves: Sequence[StabilityCurve]) -> list[StabilityCurve]:
     """The same curves; where two of one kind were lost at one place and frequency they end in a cusp there: three
     undamped modes meet, or little damping has rounded that off by less than the shortest step."""
     lost = [(k, e) for k, c in enumerate(curves) for e in (0, 1) if c.ends[e] == "lost"]
@@ -60,19 +60,19 @@ def joined(curves: Sequence[Curve]) -> list[Curve]:
 
 
 @dataclass
-class _Way:
+class _MarchState:
     """Where a march is: the last point, the direction (2,) in which it goes on, its bend [rad per length], the step."""
 
-    spot: Spot
+    spot: CurvePoint
     heading: Array
     bend: float
     step: float
 
 
-def _march(plane: Plane, seed: Spot, sense: int) -> tuple[list[Spot], str, bool]:
+def _march(plane: Plane, seed: CurvePoint, sense: int) -> tuple[list[CurvePoint], str, bool]:
     """Points after the first one, how it ends, and whether it came back."""
-    way = _Way(seed, sense * seed.tangent, 0.0, FIRST)
-    start, gone, found = way.heading, 0.0, list[Spot]()
+    way = _MarchState(seed, sense * seed.tangent, 0.0, FIRST)
+    start, gone, found = way.heading, 0.0, list[CurvePoint]()
     while len(found) < MOST:
         if _leaving(way):
             return found, "edge", False
@@ -90,13 +90,13 @@ def _march(plane: Plane, seed: Spot, sense: int) -> tuple[list[Spot], str, bool]
     return found, "lost", False
 
 
-def _at_top(plane: Plane, way: _Way, beyond: Spot) -> Spot:
+def _at_top(plane: Plane, way: _MarchState, beyond: CurvePoint) -> CurvePoint:
     """The point between the last one and one beyond the band at which ω is the highest frequency."""
     old, top = way.spot, plane.top
     best, first, last = beyond, (0.0, old.omega), (float(np.hypot(*(beyond.p - old.p))), beyond.omega)
     for _ in range(8):
         step = first[0] + (top - first[1]) / (last[1] - first[1]) * (last[0] - first[0])
-        new = _tried(plane, _Way(old, way.heading, way.bend, step))
+        new = _tried(plane, _MarchState(old, way.heading, way.bend, step))
         if new is None or abs(new.omega - top) >= abs(best.omega - top):
             break
         best = new
@@ -106,17 +106,17 @@ def _at_top(plane: Plane, way: _Way, beyond: Spot) -> Spot:
     return best
 
 
-def _on(way: _Way, new: Spot) -> _Way:
+def _on(way: _MarchState, new: CurvePoint) -> _MarchState:
     """The way from the new point on, its next step as long as the bend allows."""
     heading = new.tangent if new.tangent @ way.heading >= 0 else -new.tangent
     length = float(np.hypot(*(new.p - way.spot.p)))
     turn = _angle(way.heading, heading)
     factor = AIMED / max(abs(turn), AIMED / 2)
     step = float(np.clip(length * factor, SHORTEST, LONGEST))
-    return _Way(new, heading, turn / length if length else 0.0, step)
+    return _MarchState(new, heading, turn / length if length else 0.0, step)
 
 
-def _next(plane: Plane, way: _Way) -> Spot | None:
+def _next(plane: Plane, way: _MarchState) -> CurvePoint | None:
     """The next point; None where no step, however short, leads to one."""
     while way.step >= SHORTEST:
         new = _tried(plane, way)
@@ -126,18 +126,18 @@ def _next(plane: Plane, way: _Way) -> Spot | None:
     return None
 
 
-def _tried(plane: Plane, way: _Way) -> Spot | None:
+def _tried(plane: Plane, way: _MarchState) -> CurvePoint | None:
     """A step's point, on the edge of the rectangle where the step leads across that; None where there is none."""
-    ahead = _turned(way.heading, 0.5 * way.bend * way.step)
+    ahead = _rotated(way.heading, 0.5 * way.bend * way.step)
     target = way.spot.p + way.step * ahead
     if not _inside(target):
         return _at_edge(plane, way, target)
-    normal = _turned(way.heading, way.bend * way.step + 0.5 * np.pi)
+    normal = _rotated(way.heading, way.bend * way.step + 0.5 * np.pi)
     new = _corrected(plane, way, target, normal, BESIDE * way.step)
     return _at_edge(plane, way, new.p) if new is not None and not _inside(new.p) else new
 
 
-def _at_edge(plane: Plane, way: _Way, target: Array) -> Spot | None:
+def _at_edge(plane: Plane, way: _MarchState, target: Array) -> CurvePoint | None:
     """The point on the edge that the straight line from the last one to a target crosses, solved along the edge."""
     last, step = way.spot.p, target - way.spot.p
     shares = [
@@ -155,7 +155,7 @@ def _at_edge(plane: Plane, way: _Way, target: Array) -> Spot | None:
     return new
 
 
-def _corrected(plane: Plane, way: _Way, target: Array, direction: Array, reach: float) -> Spot | None:
+def _corrected(plane: Plane, way: _MarchState, target: Array, direction: Array, reach: float) -> CurvePoint | None:
     chord = plane.chord(target, direction, (-reach, reach))
     spot = way.spot
     omega = spot.omega + float(spot.turn @ (target - spot.p))
@@ -164,7 +164,7 @@ def _corrected(plane: Plane, way: _Way, target: Array, direction: Array, reach: 
     return settled(plane, spot.kind, chord, omega, spot.right, spot.left)
 
 
-def _follows(plane: Plane, way: _Way, new: Spot) -> bool:
+def _follows(plane: Plane, way: _MarchState, new: CurvePoint) -> bool:
     """Whether a point is the next one of the same eigenpair's curve."""
     old, step = way.spot, new.p - way.spot.p
     length = float(np.hypot(*step))
@@ -186,7 +186,7 @@ def _follows(plane: Plane, way: _Way, new: Spot) -> bool:
     return abs(new.omega - omega) <= OMEGA * max(old.omega, new.omega) and _like(plane, old, new)
 
 
-def _like(plane: Plane, one: Spot, other: Spot) -> bool:
+def _like(plane: Plane, one: CurvePoint, other: CurvePoint) -> bool:
     """Whether both have the same vectors, every unknown weighed by what its stiffness makes of it."""
     for a, b in ((one.right, other.right), (one.left, other.left)):
         a, b = plane.sizes * a, plane.sizes * b
@@ -195,7 +195,7 @@ def _like(plane: Plane, one: Spot, other: Spot) -> bool:
     return True
 
 
-def _back(way: _Way, new: Spot, seed: Spot, start: Array) -> bool:
+def _back(way: _MarchState, new: CurvePoint, seed: CurvePoint, start: Array) -> bool:
     """Whether the step from the last point to the new one passes the first again, in its direction and as its mode."""
     old, step = way.spot, new.p - way.spot.p
     length = float(np.hypot(*step))
@@ -209,7 +209,7 @@ def _back(way: _Way, new: Spot, seed: Spot, start: Array) -> bool:
     return same and float(np.hypot(*(seed.p - near))) <= 0.02 * length
 
 
-def refined(plane: Plane, curve: Curve, tolerance: float) -> Curve:
+def refined(plane: Plane, curve: StabilityCurve, tolerance: float) -> StabilityCurve:
     """The curve with points in the middle of every two, and more where a middle was not where it was expected."""
     spots, headings = curve.spots, curve.headings
     result, worst, unchecked = [spots[0]], 0.0, 0
@@ -218,12 +218,12 @@ def refined(plane: Plane, curve: Curve, tolerance: float) -> Curve:
         more, off, missing = _between(plane, ends[0], ends[1], tolerance, LEVELS)
         result += [*more, spots[k + 1]]
         worst, unchecked = max(worst, off), unchecked + missing
-    return Curve(tuple(result), curve.closed, curve.ends, worst, unchecked)
+    return StabilityCurve(tuple(result), curve.closed, curve.ends, worst, unchecked)
 
 
 def _between(
-    plane: Plane, one: tuple[Spot, Array], other: tuple[Spot, Array], tolerance: float, levels: int
-) -> tuple[list[Spot], float, int]:
+    plane: Plane, one: tuple[CurvePoint, Array], other: tuple[CurvePoint, Array], tolerance: float, levels: int
+) -> tuple[list[CurvePoint], float, int]:
     """Points between two, how far at most the last middle was off, and in how many pieces none was found."""
     (old, heading), (new, heading_to) = one, other
     length = float(np.hypot(*(new.p - old.p)))
@@ -232,7 +232,7 @@ def _between(
     # At a standstill growth changes sides where flutter ends on it, which is to be known as well as the curve.
     flips = (old.tangent @ heading) * (new.tangent @ heading_to) < 0
     (middle,) = hermite(old.p, heading, new.p, heading_to, np.array([0.5]))
-    across = _turned(new.p - old.p, 0.5 * np.pi) / length
+    across = _rotated(new.p - old.p, 0.5 * np.pi) / length
     chord = plane.chord(middle, across, (-0.3 * length, 0.3 * length))
     spot = settled(plane, old.kind, chord, 0.5 * (old.omega + new.omega), old.right, old.left)
     if spot is None or not _like(plane, old, spot):
@@ -247,7 +247,7 @@ def _between(
     return [*first, spot, *last], max(one_off, other_off), lost + lost_too
 
 
-def _even(old: Spot, middle: Spot, new: Spot, heading: Array, heading_to: Array) -> bool:
+def _even(old: CurvePoint, middle: CurvePoint, new: CurvePoint, heading: Array, heading_to: Array) -> bool:
     """Whether ω, too, is in the middle where the cubic through both ends has it: near places where two modes all but
     meet it changes within less than a step, and the curve turns there and back."""
     if old.kind != "crossing":
@@ -259,7 +259,7 @@ def _even(old: Spot, middle: Spot, new: Spot, heading: Array, heading_to: Array)
     return abs(middle.omega - expected) <= EVENLY * size + 1e-6 * middle.omega
 
 
-def _leaving(way: _Way) -> bool:
+def _leaving(way: _MarchState) -> bool:
     """Whether the last point is on the edge and the way leads out."""
     p, ahead = way.spot.p, way.heading
     return any(
@@ -271,7 +271,7 @@ def _inside(p: Array) -> bool:
     return bool(np.all(p >= -INSIDE) and np.all(p <= 1 + INSIDE))
 
 
-def _turned(vector: Array, angle: float) -> Array:
+def _rotated(vector: Array, angle: float) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
 

@@ -119,7 +119,7 @@ class Plane:
         """Every change of stability on the line on which the coordinate ``axis`` has a value, by the one search that
         there is. Raises AnalysisError."""
         line = self.line(axis, value)
-        source = _Counted(line, self.top, self.terms, self)
+        source = _CountedLine(line, self.top, self.terms, self)
         source.find_at_rest()
         self.solves += 2
         return search(line, [lambda: source], (0.0, 1.0), ends_of(line, 0.0, 1.0, self.top), self.top)
@@ -193,7 +193,7 @@ class Chord(DenseProblem):
         return super().bordered(here, lam, border)
 
 
-class _Counted(OnTerms):
+class _CountedLine(OnTerms):
     """A line whose eigenvalue problems are counted."""
 
     def __init__(self, line: ParameterLine, frequency: float, terms: Array, plane: Plane) -> None:

@@ -20,11 +20,11 @@ from ...errors import AnalysisError
 from ...typing import Array
 from ..onset import Onset
 from ..tolerances import UNSTABLE_RELATIVE
-from .climb import Seen, climb, tops
-from .curve import Crossing, Curve, Drawn, crossings
+from .climb import ModesAtPoint, climb, tops
+from .curve import Crossing, Drawn, StabilityCurve, crossings
 from .march import joined, traced
 from .plane import Count, Plane
-from .spot import Kind, Spot, settled
+from .spot import CurvePoint, Kind, settled
 
 LINES = 5  # in both directions
 ROUNDS = 4  # of further lines
@@ -43,7 +43,7 @@ EDGE = 1e-3  # of a line: crossings so near its ends may lie beyond them
 
 
 @dataclass(frozen=True)
-class Line:
+class OnsetLine:
     """Onsets on the line on which the coordinate ``axis`` has a value: (place, ω, roots) of each. complete: whether the
     search says that there are no others; why: why not. counted: whether roots counted between the curves that cross it
     say so in its place."""
@@ -79,8 +79,8 @@ class Found:
     that their number changes where no curve is."""
 
     plane: Plane
-    curves: list[Curve] = field(default_factory=list[Curve])
-    lines: list[Line] = field(default_factory=list[Line])
+    curves: list[StabilityCurve] = field(default_factory=list[StabilityCurve])
+    lines: list[OnsetLine] = field(default_factory=list[OnsetLine])
     looked: list[Looked] = field(default_factory=list[Looked])
     wrong: list[tuple[str, Array]] = field(default_factory=list[tuple[str, Array]])
     passing: bool = False
@@ -116,10 +116,10 @@ def boundaries(
     tolerance: how far the cubic pieces may be off, in shares of the ranges. Raises AnalysisError where no line can be
     searched.
     """
-    return _Search(plane, tolerance, lines, progress).all()
+    return _CurveSearch(plane, tolerance, lines, progress).all()
 
 
-class _Search:
+class _CurveSearch:
     def __init__(
         self, plane: Plane, tolerance: float, lines: int, progress: Callable[[int, int], None] | None
     ) -> None:
@@ -165,12 +165,12 @@ class _Search:
         try:
             answer = self.plane.onsets(axis, value)
         except AnalysisError as error:
-            self.found.lines.append(Line(axis, value, (), complete=False, why=str(error)))
+            self.found.lines.append(OnsetLine(axis, value, (), complete=False, why=str(error)))
             self._failed.append(error)
             return
         inside = [o for o in answer.onsets if 2 * np.pi * o.frequency_hz <= self.plane.top]
         onsets = tuple((o.mu, 2 * np.pi * o.frequency_hz, o.roots) for o in inside)
-        line = Line(axis, value, onsets, answer.complete, answer.why)
+        line = OnsetLine(axis, value, onsets, answer.complete, answer.why)
         self.found.lines.append(line)
         for onset in inside:
             if not _pairs(line, crossings(self.found.drawn, *line.ends), self.tolerance, only=onset.mu):
@@ -181,7 +181,7 @@ class _Search:
         if self._progress is not None:
             self._progress(self._done, max(2 * self.number, self._done))
 
-    def _seed(self, line: Line, onset: Onset) -> Spot | None:
+    def _seed(self, line: OnsetLine, onset: Onset) -> CurvePoint | None:
         kind: Kind = "standstill" if onset.kind == "divergence" else "crossing"
         if kind == "crossing" and onset.growth_slope is None:
             kind = "meeting"
@@ -216,7 +216,7 @@ class _Search:
         """Count where modes that decay at the points so far may grow: where their rates lead, and up to tops."""
         if self.plane.reversible:
             return
-        mesh, seen = 1.0 / (self.number - 1), [Seen.at(self.plane, at.p) for at in self.found.looked]
+        mesh, seen = 1.0 / (self.number - 1), [ModesAtPoint.at(self.plane, at.p) for at in self.found.looked]
         for here in seen:
             self._look_ahead(here, mesh)
         most = self.plane.solves + CLIMBING * len(seen)
@@ -227,7 +227,7 @@ class _Search:
             if p is not None:
                 self._look(p)
 
-    def _look_ahead(self, here: Seen, mesh: float) -> None:
+    def _look_ahead(self, here: ModesAtPoint, mesh: float) -> None:
         """Count where modes would come to the axis within the mesh if they were straight, a little beyond that."""
         rates, growth = here.slopes.real, here.values.real
         size = np.sum(rates**2, axis=0)
@@ -240,7 +240,7 @@ class _Search:
             if all(float(np.hypot(*(p - other.p))) > 0.05 * mesh for other in self.found.looked):
                 self._look(p)
 
-    def _borne_out(self, line: Line) -> Line:
+    def _borne_out(self, line: OnsetLine) -> OnsetLine:
         """A line whose search does not say that it is whole, or which a curve crosses where nothing was found: whole
         where between every two curves that cross it, and at even distances, as many roots grow as these say."""
         passed = crossings(self.found.drawn, *line.ends)
@@ -320,14 +320,14 @@ class _Search:
         return wrong
 
 
-def _place(line: Line, at: float) -> Array:
+def _place(line: OnsetLine, at: float) -> Array:
     p = np.full(2, at)
     p[line.axis] = line.value
     return p
 
 
 def _pairs(
-    line: Line, passed: list[Crossing], tolerance: float, only: float | None = None
+    line: OnsetLine, passed: list[Crossing], tolerance: float, only: float | None = None
 ) -> dict[int, int]:
     """Numbers of onsets of a line → numbers of crossings that are the same, each used once; the nearest first. only:
     nothing but what belongs to the onset at that place."""

@@ -26,7 +26,7 @@ Kind = Literal["crossing", "meeting", "standstill"]
 
 
 @dataclass(frozen=True)
-class Spot:
+class CurvePoint:
     """A point p (2,) of a curve: gradient (2,) of the growth there, ω [1/s] and its gradient (2,), right and left
     vectors (r,), backward error in the matrices that it was solved in."""
 
@@ -47,7 +47,7 @@ class Spot:
 
 def settled(
     plane: Plane, kind: Kind, chord: Chord, omega: float, right: ComplexArray, left: ComplexArray
-) -> Spot | None:
+) -> CurvePoint | None:
     """The point of a curve on a chord, from a guess at its a = 0; None where Newton's method does not settle on it."""
     between = chord.low, chord.high
     try:
@@ -69,7 +69,7 @@ def _root(
     return solve(chord, 0.0, 1j * omega, right, left, between)
 
 
-def _spot(plane: Plane, kind: Kind, chord: Chord, root: Root) -> Spot | None:
+def _spot(plane: Plane, kind: Kind, chord: Chord, root: Root) -> CurvePoint | None:
     p, lam, z, w = chord.point(root.mu), root.lam, root.vector, root.left
     moved = np.zeros(2, dtype=complex)
     for axis, direction in enumerate(np.eye(2)):
@@ -85,4 +85,4 @@ def _spot(plane: Plane, kind: Kind, chord: Chord, root: Root) -> Spot | None:
     if not np.all(np.isfinite(gradient)) or not np.any(gradient):
         return None
     right, left = z / np.linalg.norm(z), w / np.linalg.norm(w)
-    return Spot(kind, p, gradient, abs(lam.imag), turn * np.sign(lam.imag or 1.0), right, left, root.residual)
+    return CurvePoint(kind, p, gradient, abs(lam.imag), turn * np.sign(lam.imag or 1.0), right, left, root.residual)

@@ -29,7 +29,7 @@ from ..results import ComplexModes, Progress, at_each, require_memory
 from .basis import DECAY
 from .family import SystemFamily, family_of
 from .growth import without_rounding
-from .numbers import Numbers, numbered
+from .numbers import BranchNumbers, numbered
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def table_of(
     family: SystemFamily,
     mu: Array,
     found: list[ModesAtFriction],
-    numbers: Numbers,
+    numbers: BranchNumbers,
     *,
     damped: bool,
     vectors: bool | Literal["right"],

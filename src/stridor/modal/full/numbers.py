@@ -24,7 +24,7 @@ NEAR = 1e-4  # of the band: how far from its branch an eigenvalue may lie
 
 
 @dataclass(frozen=True)
-class Numbers:
+class BranchNumbers:
     """Numbers from 1 (k,) of the eigenvalues at each μ, and what is to be said about them."""
 
     of: list[IntArray]
@@ -34,23 +34,24 @@ class Numbers:
 def numbered(
     family: SystemFamily, mu: Array, values: list[ComplexArray], top: float, unfollowed: str = "",
     source: Along | None = None,
-) -> Numbers:  # fmt: skip
+) -> BranchNumbers:  # fmt: skip
     """Numbers of eigenvalues (k,) sorted by frequency at each of the friction coefficients ``mu``; 0 for those that say
     nothing new, of ±ε that rounding makes of a motion as a whole. unfollowed: why nothing is to be followed. source: of
     the eigenpairs that are followed, where there is one."""
     plain = [_by_frequency(v, top) for v in values]
     if not float(mu.max()) > 0:
-        return Numbers(plain, "")
+        return BranchNumbers(plain, "")
     if family.low >= family.high:
-        return Numbers(plain, " Numbers count by frequency: factors have no value at μ = 0.")
+        return BranchNumbers(plain, " Numbers count by frequency: factors have no value at μ = 0.")
     if not family.depends:
-        return Numbers(plain, "")
+        return BranchNumbers(plain, "")
     try:
         if not unfollowed:
             return _followed(family, mu, values, top, source)
     except AnalysisError as error:
         unfollowed = str(error)
-    return Numbers(plain, f" Numbers count by frequency at each μ, since branches were not followed: {unfollowed}.")
+    said = f" Numbers count by frequency at each μ, since branches were not followed: {unfollowed}."
+    return BranchNumbers(plain, said)
 
 
 def _by_frequency(values: ComplexArray, top: float) -> IntArray:
@@ -69,7 +70,7 @@ def at_rest(values: ComplexArray, top: float) -> IntArray:
 @one_thread
 def _followed(
     family: SystemFamily, mu: Array, values: list[ComplexArray], top: float, source: Along | None
-) -> Numbers:
+) -> BranchNumbers:
     source = source or along(family, BEYOND * top)
     if source.whole and len(mu) == 1:
         raise AnalysisError("that takes full solves on the way from μ = 0, worth while for several μ only")
@@ -83,7 +84,7 @@ def _followed(
         state = way.advance(float(mu[k]) - family.low)
         most = max(most, _assign(source, state, own, values[k], of[k], top, most))
     low = f"μ = {family.low:g}"
-    return Numbers(of, f" Numbers are those by frequency at {low}, from where branches were followed.")
+    return BranchNumbers(of, f" Numbers are those by frequency at {low}, from where branches were followed.")
 
 
 def _ranks(start: State, top: float) -> IntArray:

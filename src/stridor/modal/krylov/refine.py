@@ -94,7 +94,7 @@ def _require_all(problem: ContactProblem, squares: Array, top: float) -> None:
 
 
 @dataclass(frozen=True)
-class _Counted:
+class _ModeCount:
     """How many frictionless modes there are below a frequency a little above the band, and how many were found."""
 
     number: int
@@ -102,7 +102,7 @@ class _Counted:
     below_hz: float
 
 
-def _counted(problem: ContactProblem, squares: Array, top: float) -> _Counted | None:
+def _counted(problem: ContactProblem, squares: Array, top: float) -> _ModeCount | None:
     """The number of frictionless modes, known without finding them, beside ω² (k,) found; None where it is not told."""
     above = np.flatnonzero(squares > top**2)
     if len(above) < 2:
@@ -110,7 +110,7 @@ def _counted(problem: ContactProblem, squares: Array, top: float) -> _Counted | 
     # Between the two modes that are furthest apart, so that rounding does not decide which side they are on.
     k = int(above[np.argmax(np.diff(squares[above]))])
     number = modes_below(problem, float(squares[k] + squares[k + 1]) / 2)
-    return None if number is None else _Counted(number, k + 1, float(np.sqrt(squares[k])) / (2 * np.pi))
+    return None if number is None else _ModeCount(number, k + 1, float(np.sqrt(squares[k])) / (2 * np.pi))
 
 
 def wanted(reduced: Reduced, found: Eigenpairs) -> IntArray:

@@ -26,7 +26,7 @@ from ..options import Options
 
 
 @dataclass(frozen=True)
-class Touching:
+class TouchingNodes:
     """Nodes in contact: active (m,), and sense (m, d−1), the unit vector against the slip, zero where there is none;
     stuck (m,): touching nodes that do not slip either way. still: whether some slip at their limit without a motion
     that slides them. words: the same for a reader, "" where every node slides. force (m,): normal forces
@@ -41,7 +41,7 @@ class Touching:
 
 
 @dataclass(frozen=True)
-class ContactRows:
+class TouchingRows:
     """Rows of the touching nodes (m, n) csr, then those that hold stuck ones along their tangents: normal N, slide S
     (zero where a node sticks), compliance c (m,) [m/N]."""
 
@@ -50,7 +50,7 @@ class ContactRows:
     compliance: Array
 
 
-def contact_rows(nodes: ContactNodes, touching: IntArray, sense: Array, stuck: BoolArray) -> ContactRows:
+def contact_rows(nodes: ContactNodes, touching: IntArray, sense: Array, stuck: BoolArray) -> TouchingRows:
     """What the nodes ``touching`` (k,) of all add to small motions: sense (m, d−1) and stuck (m,) are of all nodes.
 
     A node that sticks is held along its tangents as a rigid contact is along its normal: rows with forces of their own.
@@ -58,10 +58,10 @@ def contact_rows(nodes: ContactNodes, touching: IntArray, sense: Array, stuck: B
     chosen = nodes.select(touching)
     slide = chosen.along(sense[touching])
     if not np.any(stuck[touching]):
-        return ContactRows(chosen.normal, slide, chosen.compliance)
+        return TouchingRows(chosen.normal, slide, chosen.compliance)
     sticks = StickRows(chosen)
     held = sticks.rows[sticks.held(np.ones(chosen.count, dtype=bool), stuck[touching])]
-    return ContactRows(
+    return TouchingRows(
         sp.csr_array(sp.vstack([chosen.normal, held])),
         sp.csr_array(sp.vstack([slide, sp.csr_array(held.shape)])),
         np.concatenate([chosen.compliance, np.zeros(held.shape[0])]),
@@ -77,7 +77,7 @@ def refuse_stick(system: System, what: str) -> None:
         )
 
 
-def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver: str | None) -> Touching:
+def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver: str | None) -> TouchingNodes:
     """The nodes that carry load in steady sliding at `System.touching_at`, else at ``mu``, else at the laws' own
     coefficients; all of them where the system has no loads.
 
@@ -90,7 +90,7 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
         require_pressed(system, steady.normal_force)
         if not system.load_steps:
             none = np.zeros(nodes.count, dtype=bool)
-            return Touching(steady.active, steady.sense, none, force=steady.normal_force)
+            return TouchingNodes(steady.active, steady.sense, none, force=steady.normal_force)
         stuck, still = steady.active & (steady.status == STICK), int(steady.slips_still.sum())
         closed, slips = int(steady.active.sum()), int((steady.status == SLIP).sum())
         limit = f" ({still} of them at their limit without a slip velocity, taken as sliding)" if still else ""
@@ -98,7 +98,7 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
             f"{np.count_nonzero(stuck)} contact nodes stick, {slips} slip{limit} and {nodes.count - closed} are open, "
             f"as the static equilibrium at {'their own friction' if mu is None else f'μ = {mu:g}'} has them"
         )
-        return Touching(steady.active, steady.sense, stuck, still > 0, words, steady.normal_force)
+        return TouchingNodes(steady.active, steady.sense, stuck, still > 0, words, steady.normal_force)
     slip = nodes.slip_velocity(full_motion(system))
     speed = np.linalg.norm(slip, axis=1)
     slides = speed > STILL * float(speed.max(initial=0.0))
@@ -109,7 +109,7 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
             "give a support a velocity"
         )
     sense = np.where(slides[:, None], -slip / np.where(slides, speed, 1.0)[:, None], 0.0)
-    return Touching(np.ones(nodes.count, dtype=bool), sense, np.zeros(nodes.count, dtype=bool))
+    return TouchingNodes(np.ones(nodes.count, dtype=bool), sense, np.zeros(nodes.count, dtype=bool))
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ class Steadiness:
     prestress: bool
     solver: str | None
     hardens: bool
-    layer: ContactRows
+    layer: TouchingRows
 
     @property
     def neutral(self) -> bool:
@@ -199,7 +199,7 @@ class Steadiness:
 
 
 def steadiness(
-    system: System, nodes: ContactNodes, touching: IntArray, options: Options, layer: ContactRows
+    system: System, nodes: ContactNodes, touching: IntArray, options: Options, layer: TouchingRows
 ) -> Steadiness:
     """What of the steady state matters here, beside the contact rows of the problem.
 

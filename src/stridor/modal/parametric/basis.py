@@ -21,7 +21,7 @@ class Indefinite(Exception):
     """The metric is not positive definite."""
 
 
-class Basis:
+class ReducedBasis:
     """V (n, r), orthonormal in the symmetric positive definite ``metric`` (n, n), and VᵀA_jV (t, r, r) of all terms.
 
     Damping that is proportional takes mass and stiffness times V, and what of it is not is a term of few freedoms.

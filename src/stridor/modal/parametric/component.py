@@ -17,7 +17,7 @@ from ...direct.lowest import modes_below
 from ...errors import CaseError
 from ...threads import one_thread
 from ...typing import IntArray
-from .basis import Basis, expanded, residual
+from .basis import ReducedBasis, expanded, residual
 from .dense import assembled, dense_modes
 from .greedy import SAFETY, random_points
 from .model import ReducedModel, sketched
@@ -67,7 +67,7 @@ def craig_bampton(
     shapes[inner] = held
     metric = sp.csr_array(stiffness + (SHIFT * frequency) ** 2 * mass)
     scale = 1.0 / np.sqrt(np.abs(metric.diagonal()))
-    basis = Basis(problem, sp.csr_array(sp.diags_array(scale**-2)), embedding_of(problem.size, scale))
+    basis = ReducedBasis(problem, sp.csr_array(sp.diags_array(scale**-2)), embedding_of(problem.size, scale))
     basis.add(np.hstack([static, shapes]), 1e-7)
     projected, sketches = basis.projected, (basis.right_sketch, basis.left_sketch)
     with factorise(metric, symmetric=True, solver=solver) as factor:
@@ -79,7 +79,7 @@ def craig_bampton(
     )  # fmt: skip
 
 
-def _constant(basis: Basis, factor: Factor, frequency: float) -> float:
+def _constant(basis: ReducedBasis, factor: Factor, frequency: float) -> float:
     """The factor of the error estimate: what residuals of both sides make of each other through A₀⁻¹, the second-order
     error of λ but for what A₀ is not, over the product of their lengths."""
     problem = basis.problem

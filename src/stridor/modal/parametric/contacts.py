@@ -27,7 +27,7 @@ from .contacts_rigid import Elimination, eliminate
 from .contacts_sampling import Values
 from .contacts_steady import FRICTION, STIFFNESS, Contacts, contacts_of, steady_terms
 from .factors import ParameterFactor, Product
-from .family import Piece, deviation, interpolated_terms
+from .family import FactoredPart, deviation, interpolated_terms
 from .problem import Parameter, ParametricProblem
 
 SAME = 1e-13  # rows of rigid contact, of their largest entry
@@ -64,7 +64,7 @@ class ParametricSystems:
 
     own: System
     system_at: Callable[[Values], System]
-    structure_at: Callable[[Values], Mapping[str, Piece]]
+    structure_at: Callable[[Values], Mapping[str, FactoredPart]]
     parameters: tuple[Parameter, ...]
     interpolated: tuple[Parameter, ...] = ()
 
@@ -111,7 +111,7 @@ def contacts_problem(
             raise CaseError("box", changed, "changes who is in contact; give numbers that do not")
         return contacts_of(system, touching)
 
-    def pieces_at(values: Values) -> Mapping[str, Piece]:
+    def pieces_at(values: Values) -> Mapping[str, FactoredPart]:
         return {**family.structure_at(values), **_springs(contacts_at(values), varied=FRICTION in names)}
 
     elimination = _elimination(family, contacts_at, rigid) if rigid.any() else None
@@ -125,7 +125,7 @@ def contacts_problem(
     return ContactsProblem(terms, family.parameters, elimination, notes)
 
 
-def _springs(contacts: Contacts, *, varied: bool) -> dict[str, Piece]:
+def _springs(contacts: Contacts, *, varied: bool) -> dict[str, FactoredPart]:
     """Stiffness and friction of contact springs, with factors of contact stiffness and, where it is varied, of μ."""
     soft = contacts.compliance > 0
     if not soft.any():
@@ -137,8 +137,8 @@ def _springs(contacts: Contacts, *, varied: bool) -> dict[str, Piece]:
     if not varied:
         friction, by_friction = sp.csr_array(_friction_of(contacts) * friction), stiffness
     return {
-        "contact": Piece(sp.csr_array(contacts.normal[soft].T @ rows), "stiffness", stiffness),
-        "friction": Piece(friction, "stiffness", by_friction),
+        "contact": FactoredPart(sp.csr_array(contacts.normal[soft].T @ rows), "stiffness", stiffness),
+        "friction": FactoredPart(friction, "stiffness", by_friction),
     }
 
 
@@ -189,9 +189,9 @@ def contact_parameters(
     if stiffness is not None:
         parameters.append(stiffness_range(stiffness))
     pieces = {
-        "mass": Piece(system.mass, "mass"),
-        "damping": Piece(system.damping, "damping"),
-        "stiffness": Piece(system.stiffness, "stiffness"),
+        "mass": FactoredPart(system.mass, "mass"),
+        "damping": FactoredPart(system.damping, "damping"),
+        "stiffness": FactoredPart(system.stiffness, "stiffness"),
     }
     family = ParametricSystems(system, lambda _: system, lambda _: pieces, tuple(parameters))
     return contacts_problem(family, touching_at=touching_at, options=options)

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from ...errors import AnalysisError
 from ...typing import Array, Sparse
-from .factors import CONSTANT, Axis, ParameterFactor, Tabulated
+from .factors import CONSTANT, Axis, ParameterFactor, TabulatedFactor
 from .problem import Parameter
 
 COUNTS = (4, 7, 13, 25)  # of points along a parameter, each among the next
@@ -92,7 +92,7 @@ def directions(axes: tuple[Axis, ...], vectors: Array) -> list[tuple[ParameterFa
         return [(CONSTANT, np.ones(1))] if np.any(vectors) else []
     left, size, _ = np.linalg.svd(vectors, full_matrices=False)
     chosen = np.flatnonzero(size > KEPT * max(float(size[0]), 1e-300))
-    return [(Tabulated(axes, tuple(left[:, k].tolist())), left[:, k]) for k in chosen]
+    return [(TabulatedFactor(axes, tuple(left[:, k].tolist())), left[:, k]) for k in chosen]
 
 
 def combined_matrices(
@@ -110,7 +110,7 @@ def combined_matrices(
     for k in np.flatnonzero(size > KEPT * max(float(size[0]), 1e-300)):
         whole = sp.csr_array((size[k] * right[k], pattern.indices, pattern.indptr), shape=pattern.shape)
         table = left[:, k] @ np.array(tables)
-        result.append((Tabulated(axes, tuple(table.tolist())), sp.csr_array((whole + whole.T) / 2)))
+        result.append((TabulatedFactor(axes, tuple(table.tolist())), sp.csr_array((whole + whole.T) / 2)))
     return result
 
 

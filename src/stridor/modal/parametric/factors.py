@@ -228,7 +228,7 @@ def _weights(axis: Axis, value: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Tabulated:
+class TabulatedFactor:
     """Values on a grid of points of one or more parameters, row by row, and polynomials through them."""
 
     axes: tuple[Axis, ...]
@@ -273,7 +273,7 @@ def factor_from_json(document: Mapping[str, Any]) -> ParameterFactor:
             return Times(tuple(factor_from_json(part) for part in document["parts"]))
         if document["kind"] == "tabulated":
             axes = tuple(Axis(str(n), tuple(float(p) for p in grid), bool(log)) for n, grid, log in document["axes"])
-            return Tabulated(axes, tuple(float(v) for v in document["values"]))
+            return TabulatedFactor(axes, tuple(float(v) for v in document["values"]))
         if document["kind"] == "lagrange":
             return Lagrange(
                 tuple((str(n), tuple(float(g) for g in grid), int(k)) for n, grid, k in document["places"])

@@ -27,7 +27,7 @@ SYMMETRIC = 1e-13
 
 
 @dataclass(frozen=True)
-class Piece:
+class FactoredPart:
     """A part of the mass, damping or stiffness and the factor it is known to have."""
 
     matrix: Sparse
@@ -36,7 +36,7 @@ class Piece:
 
 
 # Values of the parameters that are to be interpolated over → pieces by name, the same names everywhere.
-Pieces = Callable[[Mapping[str, float]], Mapping[str, Piece]]
+Pieces = Callable[[Mapping[str, float]], Mapping[str, FactoredPart]]
 
 
 def interpolated_terms(pieces_at: Pieces, parameters: tuple[Parameter, ...]) -> tuple[Term, ...]:
@@ -45,9 +45,9 @@ def interpolated_terms(pieces_at: Pieces, parameters: tuple[Parameter, ...]) -> 
     Raises AnalysisError where a piece is no polynomial of a low degree in them.
     """
     reference = {p.name: p.value for p in parameters}
-    cache: dict[tuple[float, ...], Mapping[str, Piece]] = {}
+    cache: dict[tuple[float, ...], Mapping[str, FactoredPart]] = {}
 
-    def at(changes: Mapping[str, float]) -> Mapping[str, Piece]:
+    def at(changes: Mapping[str, float]) -> Mapping[str, FactoredPart]:
         values = {**reference, **changes}
         key = tuple(values[p.name] for p in parameters)
         if key not in cache:
@@ -61,7 +61,7 @@ def interpolated_terms(pieces_at: Pieces, parameters: tuple[Parameter, ...]) -> 
 
 
 def _interpolated(
-    piece: Piece, matrix_at: Callable[[Mapping[str, float]], Sparse], parameters: tuple[Parameter, ...]
+    piece: FactoredPart, matrix_at: Callable[[Mapping[str, float]], Sparse], parameters: tuple[Parameter, ...]
 ) -> list[Term]:
     """The terms of one piece."""
     grids = {p.name: grid for p in parameters if (grid := _points(matrix_at, piece.role, p)) is not None}

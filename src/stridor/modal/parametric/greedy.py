@@ -19,7 +19,7 @@ from ...direct import Factor
 from ...errors import AnalysisError
 from ...stages import passing, stage
 from ...typing import Array, ComplexArray, IntArray, Sparse
-from .basis import Basis, real_and_imaginary
+from .basis import ReducedBasis, real_and_imaginary
 from .dense import DenseModes, assembled, dense_modes
 from .model import ReducedModel, product_over_slope, sketched, sketched_rests
 from .problem import ParametricProblem
@@ -49,7 +49,7 @@ Point = Mapping[str, float]
 
 
 @dataclass
-class Work:
+class ReductionCost:
     """What making a model takes, by part."""
 
     seconds: dict[str, float] = field(default_factory=dict[str, float])
@@ -67,12 +67,12 @@ class Work:
 class Greedy:
     """One basis on its way to a model. factor: of the static ``operator`` (n, n)."""
 
-    basis: Basis
+    basis: ReducedBasis
     operator: Sparse
     factor: Factor
     frequency: float
     bound: float
-    work: Work
+    work: ReductionCost
     tried: int = 0  # dense problems solved
     stiff: int = 0  # of these, how many took the whole companion matrix
     passed: list[tuple[Point, DenseModes]] = field(default_factory=list[tuple[Point, DenseModes]])

@@ -35,7 +35,7 @@ class Numbered:
         return np.array([np.einsum("ij,ij->j", left, combined(part, right)) for part in self.model.projected])
 
 
-class Line(OverNumber):
+class ModelAlongLine(OverNumber):
     """Modes of a model from ``start`` (t = 0) to ``end`` (t = 1)."""
 
     def __init__(self, start: Numbered, end: ReducedModes) -> None:
@@ -98,7 +98,7 @@ def numbers_at(start: Numbered, end: ReducedModes) -> IntArray:
     known = np.flatnonzero(stays & (start.numbers > 0))
     if not len(known):
         return found
-    line = Line(start, end)
+    line = ModelAlongLine(start, end)
     follower = Follower.resumed(line, State(line.eigenpairs(0.0), known))
     with contextlib.suppress(AnalysisError):
         found[follower.advance(1.0).index] = start.numbers[known]

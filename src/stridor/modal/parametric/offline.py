@@ -16,9 +16,9 @@ from ...errors import AnalysisError, CaseError
 from ...stages import passing, stage
 from ...threads import one_thread
 from ...typing import Array, IntArray, Sparse
-from .basis import Basis, Indefinite
+from .basis import Indefinite, ReducedBasis
 from .dense import assembled
-from .greedy import MARGIN, SEED, Greedy, Work, grid_points
+from .greedy import MARGIN, SEED, Greedy, ReductionCost, grid_points
 from .model import ReducedModel
 from .problem import ParametricProblem
 
@@ -51,7 +51,7 @@ def reduce(
     if not 1e-13 <= bound < 1:
         raise CaseError("bound", bound, "a relative error from 1e-13 to 1")
     frequency = 2 * np.pi * max_frequency_hz
-    work = Work()
+    work = ReductionCost()
     mass, stiffness = symmetric_parts(problem)
     stage(f"reduced model of {problem.size} freedoms: factors and modes at rest")
     operator, scale = static_operator(mass, stiffness, frequency)
@@ -63,7 +63,7 @@ def reduce(
         # Lengths are energies; where friction in the symmetric part makes some negative, the diagonal's.
         metrics = [operator, sp.csr_array(sp.diags_array(scale**-2))]
         for metric in metrics[1:] if factor.inertia else metrics:
-            basis = Basis(problem, metric, embedding)
+            basis = ReducedBasis(problem, metric, embedding)
             try:
                 basis.add(start, 1e-6)
                 _first_answers(basis, factor, frequency, work)
@@ -109,7 +109,7 @@ def _mostly_symmetric(matrix: Sparse) -> bool:
     return sl.norm(odd.data) <= 0.5 * sl.norm(sp.csr_array(matrix).data) if matrix.nnz else True
 
 
-def _krylov(factor: Factor, mass: Sparse, stiffness: Sparse, frequency: float, work: Work) -> Array:
+def _krylov(factor: Factor, mass: Sparse, stiffness: Sparse, frequency: float, work: ReductionCost) -> Array:
     """Real modes (n, k) up to GUARD times the band: block Krylov space of A₀⁻¹M, orthonormal in the metric, grown until
     they have settled to some digits. They only start the basis."""
     n = mass.shape[0]
@@ -154,7 +154,7 @@ def _krylov(factor: Factor, mass: Sparse, stiffness: Sparse, frequency: float, w
         known = values
 
 
-def _first_answers(basis: Basis, factor: Factor, frequency: float, work: Work) -> None:
+def _first_answers(basis: ReducedBasis, factor: Factor, frequency: float, work: ReductionCost) -> None:
     """What every term that varies or has no part in A₀ makes of the modes of the band, from both sides."""
     problem = basis.problem
     mass, _, stiffness = assembled(basis.projected, problem.factors(problem.reference), problem.powers)

@@ -93,7 +93,7 @@ def find_modes(
     the region holds too many eigenvalues, or some do not reach the tolerance.
     """
     started = time.perf_counter()
-    run = _Run(problem, region.bounded(), left, tolerance, solver, guess)
+    run = _RegionSearch(problem, region.bounded(), left, tolerance, solver, guess)
     run.counting = problem.size <= COUNTED if count is None else count
     if problem.size <= DENSE:
         sides, evidence = run.dense(endless=not math.isfinite(region.re_max))
@@ -141,7 +141,7 @@ class _Site:
 
 
 @dataclass
-class _Run:
+class _RegionSearch:
     """The state of one call."""
 
     problem: Quadratic

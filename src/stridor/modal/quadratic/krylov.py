@@ -26,7 +26,7 @@ WIDTH = 64  # columns allocated at once
 NOTHING = 1e-14  # of a vector's length: what orthogonalisation may leave of one that adds nothing
 
 
-class Columns:
+class OrthonormalColumns:
     """Orthonormal columns of length n, real or complex, kept in pieces so that growing never copies."""
 
     def __init__(self, n: int, kind: type = complex) -> None:
@@ -80,7 +80,7 @@ class Krylov:
         self.radius = radius
         self.solves = 0
         self._solve = solve
-        self._columns = Columns(problem.size, self.kind)
+        self._columns = OrthonormalColumns(problem.size, self.kind)
         self._pairs: Any = np.zeros((2, 0, 0), dtype=self.kind)
         self._image: Any = np.zeros((0, 0), dtype=self.kind)  # one column for each vector S has been applied to
         self._applied = np.zeros(0, dtype=np.int64)
@@ -92,7 +92,7 @@ class Krylov:
 
     def forget(self) -> None:
         """Give the memory of the vectors back."""
-        self._columns = Columns(self.problem.size, self.kind)
+        self._columns = OrthonormalColumns(self.problem.size, self.kind)
 
     def own(self, block: Any) -> Any:
         """A block (n, b) as these vectors are: about a real shift its real part, in which eigenvectors of real matrices

@@ -100,8 +100,8 @@ def defect(cycle: Balanced) -> float:
 def balanced(guess: Balanced, told: Callable[[int, float], None] | None = None) -> Balanced:
     """The cycle near a guess at its μ. Raises AnalysisError where Newton's method does not come to one."""
     at = guess.at
-    z0, turned = at.z, at.z @ at.base.turn.T
-    normal = turned.ravel() / max(float(np.linalg.norm(turned)), 1e-300)
+    z0, shifted = at.z, at.z @ at.base.turn.T
+    normal = shifted.ravel() / max(float(np.linalg.norm(shifted)), 1e-300)
     first = max(guess.amplitude, 1e-300)
     for step in range(STEPS):
         if told is not None:

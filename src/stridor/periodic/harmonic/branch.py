@@ -12,7 +12,7 @@ import scipy.linalg as sl
 from ...direct.dense import lu_factors
 from ...errors import AnalysisError
 from ...typing import Array
-from ..continuation import Spot
+from ..continuation import BranchPoint
 from .balance import Evaluated, evaluated
 from .balanced import CLOSED, ENOUGH, Balanced, balanced, defect
 
@@ -34,7 +34,7 @@ class HarmonicBranch:
         self.tolerance, self.most, self.small = tolerance, most, small
         self._factors: tuple[Balanced, tuple[Array, Array], Array] | None = None
 
-    def ahead(self, spot: Spot[Balanced], length: float) -> Balanced:
+    def ahead(self, spot: BranchPoint[Balanced], length: float) -> Balanced:
         """A guess, a length along the branch."""
         at = spot.point.at
         moved = length * spot.heading * self._scale(at)
@@ -75,12 +75,12 @@ class HarmonicBranch:
         before = float(np.linalg.norm(here.left))
         tries: list[Evaluated] = []
         for share in (1.0, 0.5, 0.25, 0.1):
-            there = (x + share * step) * scale
-            omega, mu = float(there[-2]), float(there[-1])
+            unknowns = (x + share * step) * scale
+            omega, mu = float(unknowns[-2]), float(unknowns[-1])
             low, high = self.between[0] - self.width, self.between[1] + self.width
             if omega <= 0.2 * here.omega or not low <= mu <= high or mu < 0.0:
                 continue
-            tried = evaluated(here.family, there[:-2].reshape(here.z.shape), omega, mu, here.scales)
+            tried = evaluated(here.family, unknowns[:-2].reshape(here.z.shape), omega, mu, here.scales)
             left = float(np.linalg.norm(tried.left))
             if left < before:
                 return tried
@@ -168,5 +168,5 @@ def _vector(at: Evaluated) -> Array:
 
 def _phase(at: Evaluated) -> Array:
     """∂z/∂τ of length one: what moves along the cycle itself."""
-    turned = (at.z @ at.base.turn.T).ravel()
-    return turned / max(float(np.linalg.norm(turned)), 1e-300)
+    shifted = (at.z @ at.base.turn.T).ravel()
+    return shifted / max(float(np.linalg.norm(shifted)), 1e-300)

@@ -54,7 +54,7 @@ def why_not_harmonic(system: System) -> str:
 
 
 @dataclass(frozen=True)
-class Steady:
+class SteadyContact:
     """Steady sliding at ``mu``: normal force (m,), friction (m, d) [N] on the slave and gap (m,) [m]."""
 
     mu: float
@@ -102,7 +102,7 @@ class HarmonicFamily:
             np.zeros(0) if cubic is None else np.zeros(self.springs) + cubic.stretch,
         )  # fmt: skip
         self.piecewise_linear = bool(np.all(constant) and not np.any(nodes.cubic) and not self.springs)
-        self._steady: dict[float, Steady] = {}
+        self._steady: dict[float, SteadyContact] = {}
 
     def _along_normals(self, stiffness: Array) -> Array:
         """κ (m,): that of the contact, of a rigid one that of the structure at the node; what only contact holds would
@@ -115,7 +115,7 @@ class HarmonicFamily:
         local = np.maximum(own, (BETWEEN * 2 * np.pi * self.highest_hz) ** 2 * inert) / np.maximum(squares, 1e-300) ** 2
         return np.where(np.isinf(stiffness), local, stiffness)
 
-    def steady(self, mu: float) -> Steady:
+    def steady(self, mu: float) -> SteadyContact:
         """Steady sliding. Raises AnalysisError where there is none."""
         if not mu >= 0.0:
             raise AnalysisError(f"μ = {mu:g} is no friction coefficient")
@@ -123,7 +123,7 @@ class HarmonicFamily:
             while len(self._steady) > 8:
                 self._steady.pop(next(iter(self._steady)))
             found = steady_nodes(self.system, mu)
-            self._steady[mu] = Steady(mu, found.normal_force, found.friction_force, found.gap)
+            self._steady[mu] = SteadyContact(mu, found.normal_force, found.friction_force, found.gap)
         return self._steady[mu]
 
     def split(self, rows: Any) -> tuple[Any, Any, Any]:

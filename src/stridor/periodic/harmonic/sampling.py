@@ -125,11 +125,11 @@ def _watched(cycle: Balanced, times: Array) -> tuple[Array, Array, Array]:
     )
     lift = np.concatenate([np.zeros((0, len(system.motion.names)))] + [system.points[n].lift[:d] for n in names])
     amplitudes = coordinates(cycle) @ free.T
-    away = system.motion.full_distance
-    still = np.concatenate([np.zeros(0)] + [system.points[n].free[:d] @ (system.motion.lift @ away) for n in names])
+    distance = system.motion.full_distance
+    still = np.concatenate([np.zeros(0)] + [system.points[n].free[:d] @ (system.motion.lift @ distance) for n in names])
     rows, series = at.base.real_of(amplitudes), at.base.at(2 * np.pi * times / cycle.period)
     first = at.omega * rows @ at.base.turn.T
-    moved, speed = lift @ away - still, lift @ family.motion
+    moved, speed = lift @ distance - still, lift @ family.motion
     values = (
         series @ rows.T + moved + np.outer(times, speed), series @ first.T + speed,
         series @ (at.omega * first @ at.base.turn.T).T,

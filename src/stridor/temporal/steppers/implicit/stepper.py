@@ -143,9 +143,9 @@ class ImplicitStepper:
             said += f"; contacts of {solved} steps were solved by Newton's method"
         if self.left_out > TOLD_FROM:
             said += f"; {100 * self.left_out:.2g} % of the initial state, by its mass, has no place in them"
-        turned = self.scheme.step * (self._highest_hz or 0.0)
-        if turned > ROUGH:
-            said += f"; {1 / turned:.3g} steps to the period of {self._highest_hz:g} Hz are few"
+        angle = self.scheme.step * (self._highest_hz or 0.0)
+        if angle > ROUGH:
+            said += f"; {1 / angle:.3g} steps to the period of {self._highest_hz:g} Hz are few"
         if self._highest_hz is not None and self._sampling * self._highest_hz > 0.5:
             said += f"; records every {self._sampling:.3g} s do not resolve {self._highest_hz:g} Hz"
         return said

@@ -43,7 +43,7 @@ def friction_of(systems: Sequence[System]) -> Array:
     return np.array([np.pad(row, ((0, 0), (0, widest - row.shape[1]))) for row in rows])
 
 
-class Batch:
+class MemberBatch:
     """Members that are stepped together: up to ``LANES`` of them, any number on a device (`device`).
 
     states: of `LoopState`, with the members (k, …) in front. lost (k,): the step at which a member was no longer

@@ -1,4 +1,4 @@
-"""Members of an ensemble on a GPU: what `Batch` makes ready, kept and stepped there by `device_kernel`.
+"""Members of an ensemble on a GPU: what `MemberBatch` makes ready, kept and stepped there by `device_kernel`.
 
 Imported only where there is a device.
 """
@@ -16,7 +16,7 @@ from ....system.uncoupled import UncoupledModes
 from ....typing import Array
 from ...columns import CONTACT_RECORD
 from ...legs import Acting
-from .batch import Batch
+from .batch import MemberBatch
 from .batch_kernel import BatchRecord
 from .device_kernel import GROUP, DeviceMembers, DeviceModel, cuda, run_members, shared_bytes
 from .machine import Machine
@@ -35,7 +35,7 @@ def most_members(system: System, watched: int, records: float, free: float) -> i
     return max(1, int(min(HOST_BYTES / max(recorded, 1.0), (0.8 * free - LAUNCH_BYTES) / states, 2**16)))
 
 
-class DeviceBatch(Batch):
+class DeviceBatch(MemberBatch):
     """Any number of members on a device: a thread block for each, and one launch for each call of `advance`.
 
     States stay on the device; of `states` only the counters and the statistics come back, of everything else records
