@@ -6,6 +6,7 @@ Nothing is regularised: at zero speed the tangential force is anything up to `st
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
@@ -126,15 +127,11 @@ class StaticKinetic:
 
 
 @dataclass(frozen=True)
-class Weakening:
-    """Friction that weakens with slip speed: μ(v) = μ_k + (μ_s − μ_k) exp(−|v|/v_c).
-
-    coefficient is μ_k [-], static_coefficient μ_s [-], decay_speed v_c > 0 [m/s].
-    """
+class _Weakens(ABC):
+    """Friction that weakens with slip speed from static_coefficient μ_s to coefficient μ_k [-]."""
 
     coefficient: float
     static_coefficient: float
-    decay_speed: float
 
     @property
     def sticking(self) -> float:
@@ -153,64 +150,52 @@ class Weakening:
     def constant(self) -> bool:
         """Whether the coefficient is the same at every slip speed."""
         return self.static_coefficient == self.coefficient
+
+    @property
+    @abstractmethod
+    def numbers(self) -> tuple[float, ...]:
+        """The law as a row of numbers; see FrictionLaw."""
+
+    def scaled(self, mu: float, speed: float) -> FrictionLaw:
+        """The law scaled to mu at a slip speed [m/s]; see FrictionLaw."""
+        if self.coefficient == 0.0 and self.static_coefficient == 0.0:
+            return Coulomb(mu)
+        factor = _factor(mu, self.sliding(speed))
+        if factor is None:
+            return replace(self, coefficient=mu, static_coefficient=max(mu, self.static_coefficient))
+        return replace(
+            self, coefficient=factor * self.coefficient, static_coefficient=factor * self.static_coefficient
+        )
+
+
+@dataclass(frozen=True)
+class Weakening(_Weakens):
+    """Friction that weakens with slip speed: μ(v) = μ_k + (μ_s − μ_k) exp(−|v|/v_c).
+
+    coefficient is μ_k [-], static_coefficient μ_s [-], decay_speed v_c > 0 [m/s].
+    """
+
+    decay_speed: float
 
     @property
     def numbers(self) -> tuple[float, ...]:
         """The law as a row of numbers; see FrictionLaw."""
         return EXPONENTIAL, self.static_coefficient, self.coefficient, self.decay_speed, 0.0
 
-    def scaled(self, mu: float, speed: float) -> FrictionLaw:
-        """The law scaled to mu at a slip speed [m/s]; see FrictionLaw."""
-        if self.coefficient == 0.0 and self.static_coefficient == 0.0:
-            return Coulomb(mu)
-        factor = _factor(mu, self.sliding(speed))
-        if factor is None:
-            return Weakening(mu, max(mu, self.static_coefficient), self.decay_speed)
-        return Weakening(factor * self.coefficient, factor * self.static_coefficient, self.decay_speed)
-
 
 @dataclass(frozen=True)
-class Hyperbolic:
+class Hyperbolic(_Weakens):
     """Friction that weakens with slip speed: μ(v) = μ_k + (μ_s − μ_k)/(1 + δ|v|).
 
     coefficient is μ_k [-], static_coefficient μ_s [-], delta δ > 0 [s/m].
     """
 
-    coefficient: float
-    static_coefficient: float
     delta: float
-
-    @property
-    def sticking(self) -> float:
-        """The friction coefficient [-] at which sticking ends."""
-        return self.static_coefficient
-
-    def sliding(self, speed: float) -> float:
-        """The friction coefficient [-] at a slip speed [m/s]."""
-        return coefficient_at(self.numbers, abs(speed))[0]
-
-    def slope(self, speed: float) -> float:
-        """The slope dμ/d|v| [s/m] at a slip speed [m/s]."""
-        return coefficient_at(self.numbers, abs(speed))[1]
-
-    @property
-    def constant(self) -> bool:
-        """Whether the coefficient is the same at every slip speed."""
-        return self.static_coefficient == self.coefficient
 
     @property
     def numbers(self) -> tuple[float, ...]:
         """The law as a row of numbers; see FrictionLaw."""
         return HYPERBOLIC, self.static_coefficient, self.coefficient, self.delta, 0.0
-
-    def scaled(self, mu: float, speed: float) -> FrictionLaw:
-        """The law scaled to mu at a slip speed [m/s]; see FrictionLaw."""
-        if self.coefficient == 0.0 and self.static_coefficient == 0.0:
-            return Coulomb(mu)
-        factor = _factor(mu, self.sliding(speed))
-        if factor is None:
-            return Hyperbolic(mu, max(mu, self.static_coefficient), self.delta)
-        return Hyperbolic(factor * self.coefficient, factor * self.static_coefficient, self.delta)
 
 
 @dataclass(frozen=True)
