@@ -14,8 +14,9 @@ from benches import Slave, bench, by_hand, full_eigenvalues, paper_case
 from hidden_modes import HZ_OF_POINTS, MU_OF_BLOCK, MU_OF_POINTS, entering_points, hidden_block
 from matrix_cases import matrix_case
 from rubbing_block import rubbing_block
+from stridor.modal.checked_modes import checked_modes
+from stridor.modal.checked_onsets import checked_onsets
 from stridor.modal.complex_modes import ComplexModes, complex_modes
-from stridor.modal.growing import checked_modes, checked_onsets
 from stridor.modal.krylov import Options
 from stridor.modal.krylov.problem import problem_of
 from stridor.modal.onsets import Onsets, onsets

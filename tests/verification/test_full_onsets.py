@@ -17,9 +17,9 @@ from benches import bench, paper_case
 from matrix_cases import MESHED, TURN, export, exported, matrix_case, rubbing
 from solid_cases import bench_as_solids, case, slider
 from stridor.modal import full
+from stridor.modal.checked_onsets import checked_onsets
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.full.family import Family, Smooth, family_of
-from stridor.modal.growing import checked_onsets
 from stridor.modal.newton import Border
 from stridor.modal.onsets import onsets
 from stridor.modal.options import Options

@@ -60,7 +60,7 @@ def test_modes_that_are_not_borne_out_agree_with_nothing(said: str):
 
 
 def test_the_modal_critical_friction_of_a_comparison_is_checked(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(growing, "growing_modes", failing)
+    monkeypatch.setattr("stridor.modal.checked_onsets.growing_modes", failing)
     monkeypatch.setattr(bisecting, "perturb", lambda system, mu, **_: perturbation(complex(mu - 0.859, 1.0)))
     result = st.compare(entering_block(), only=["critical"])
     # With all four nodes, which touch up to μ = 1; with the two that are left at 1.1 it would be 0.4901.
@@ -79,7 +79,7 @@ def test_sensitivities_are_those_of_the_mode_that_entered_the_band(case: st.Case
 
 
 def test_sensitivities_say_that_modes_were_not_checked(case: st.Case, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(growing, "growing_modes", failing)
+    monkeypatch.setattr("stridor.modal.checked_modes.growing_modes", failing)
     found = st.sensitivities(case, ["mu"])
     assert not len(found.branch)
     assert found.warnings[0] == "modes at μ = 1.1: Not checked: the search does not settle."

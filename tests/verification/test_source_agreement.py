@@ -13,9 +13,9 @@ import stridor as st
 from benches import Slave, bench, paper_case
 from rubbing_block import rubbing_block
 from stridor.case import template_text
+from stridor.modal.checked_onsets import checked_onsets
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.full.basis import DECAY
-from stridor.modal.growing import checked_onsets
 from stridor.modal.options import Options
 from stridor.modal.over_friction import modes_of_band, onsets_of_band
 from stridor.modal.source import SOURCES, sources_for

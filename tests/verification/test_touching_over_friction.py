@@ -16,7 +16,7 @@ import pytest
 import stridor as st
 from rubbing_block import rubbing_block
 from stridor.app.show_modes import by_stretch
-from stridor.modal import growing as growing_module
+from stridor.modal import checked_onsets as checking
 from stridor.modal import krylov as krylov_module
 from stridor.modal import over_friction
 from stridor.modal import source as source_module
@@ -306,13 +306,13 @@ def test_where_an_onset_above_the_band_is_not_found_the_list_is_not_complete() -
 def sought(case: st.Case, monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """At which μ the onsets have what grows sought anew."""
     asked: list[float] = []
-    honest = growing_module.growing_modes
+    honest = checking.growing_modes
 
     def counted(system: System, mu: float, *given: object, **named: object) -> object:
         asked.append(mu)
         return honest(system, mu, *given, **named)
 
-    monkeypatch.setattr(growing_module, "growing_modes", counted)
+    monkeypatch.setattr(checking, "growing_modes", counted)
     st.onsets(case)
     return asked
 

@@ -16,11 +16,13 @@ from ..errors import AnalysisError, FollowingError
 from ..sliding.stretches import Stretch, stretch_words, stretches
 from ..system import System
 from ..typing import Array, ComplexArray, IntArray
+from .checked_modes import checked_modes
+from .checked_onsets import checked_onsets, sought_at_end
 from .complex_modes import complex_modes
 from .from_above import WIDER, with_origins
 from .full import full_onsets
 from .full.basis import WHOLE
-from .growing import UNCHECKED, checked_modes, checked_onsets, growing_modes, sought_at_end
+from .growing import UNCHECKED, growing_modes
 from .joined import TouchingChange, joined_modes, joined_onsets, rows_of
 from .krylov import Carried
 from .onsets import Onsets, onsets

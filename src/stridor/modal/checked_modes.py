@@ -1,0 +1,185 @@
+"""The check of followed modes: what grows in the band is sought anew, and what branches do not lead to is added."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..system import System
+from ..typing import Array, IntArray
+from .complex_modes import complex_modes
+from .growing import SAME, UNCHECKED, WIDER, Growing, affordable, growing_modes, missing, too_large, unconfirmed
+from .krylov.problem import problem_of
+from .options import Options
+from .quadratic import Quadratic
+from .quadratic.inverse_iteration import solved_beside
+from .results import ComplexModes
+from .tolerances import AT_REST
+
+ROWS = 5  # friction coefficients up to which every one is checked, of more the ends and the case's own
+
+
+def checked_modes(
+    system: System,
+    modes: ComplexModes,
+    max_frequency_hz: float,
+    *,
+    own: float | None = None,
+    options: Options | None = None,
+) -> ComplexModes:
+    """The modes of a band with those that came into it from elsewhere, and what was checked in ``completeness``.
+
+    modes: all that start in the band at μ = 0, as `complex_modes` gives them with ``max_frequency_hz``. Up to five
+    friction coefficients are all checked, of more the ends and ``own``. What lacks is followed from further above;
+    what cannot be followed at all gets a column of its own, NaN at other μ.
+    """
+    options = options or Options()
+    if not affordable(system):
+        said = f"{UNCHECKED}: {too_large(system)}."
+        return replace(modes, completeness=(said,) * len(modes.mu))
+    chosen = _rows(modes.mu, own)
+    touching = float(modes.mu.max()) if len(modes.mu) == 1 else None
+    found: dict[int, Growing | str] = {}
+    for row in chosen:
+        try:
+            found[row] = growing_modes(
+                system, float(modes.mu[row]), max_frequency_hz, touching_at=touching, damped=modes.damped,
+                options=options,
+            )  # fmt: skip
+        except AnalysisError as error:
+            found[row] = str(error)
+    began = modes.branch
+    for wider in WIDER:
+        if not _lacking(modes, found):
+            break
+        further = _followed_from(system, modes, wider, max_frequency_hz, options)
+        modes = modes if further is None else further
+    modes, alone = _with_columns(system, modes, found, touching, options)
+    told = tuple(
+        _sentence(modes, row, found.get(row), max_frequency_hz, began, alone.get(row, 0))
+        for row in range(len(modes.mu))
+    )
+    return replace(modes, completeness=told)
+
+
+def _rows(mu: Array, own: float | None) -> list[int]:
+    if len(mu) <= ROWS:
+        return list(range(len(mu)))
+    ends = {int(np.argmin(mu)), int(np.argmax(mu))}
+    if own is not None:
+        nearest = int(np.argmin(np.abs(mu - own)))
+        if abs(mu[nearest] - own) <= 1e-12 * max(own, 1e-12):
+            ends.add(nearest)
+    return sorted(ends)
+
+
+def _lacking(modes: ComplexModes, found: dict[int, Growing | str]) -> bool:
+    return any(
+        len(missing(f, modes.eigenvalues[row], modes.unstable[row]))
+        for row, f in found.items()
+        if isinstance(f, Growing)
+    )
+
+
+def _followed_from(
+    system: System, modes: ComplexModes, wider: float, max_frequency_hz: float, options: Options
+) -> ComplexModes | None:
+    """The same modes and those that start up to ``wider`` times the band and are in it somewhere; None where they are
+    not to be followed."""
+    try:
+        more = complex_modes(
+            system, modes.mu, max_frequency_hz=wider * max_frequency_hz, damped=modes.damped,
+            vectors=False if modes.right is None else True if modes.left is not None else "right",
+            **asdict(options),
+        )  # fmt: skip
+    except AnalysisError:
+        return None
+    inside = np.any(more.frequency_hz <= max_frequency_hz, axis=0)
+    known = np.isin(more.branch, modes.branch)
+    return replace(
+        more.chosen(np.flatnonzero(inside | known)), max_frequency_hz=max_frequency_hz, planned=modes.planned
+    )
+
+
+def _with_columns(
+    system: System, modes: ComplexModes, found: dict[int, Growing | str], touching: float | None, options: Options
+) -> tuple[ComplexModes, dict[int, int]]:
+    """With a column for each growing mode that no branch leads to, and how many those are by row."""
+    alone: dict[int, int] = {}
+    for row, growing in found.items():
+        if isinstance(growing, str):
+            continue
+        indices = missing(growing, modes.eigenvalues[row], modes.unstable[row])
+        if not len(indices):
+            continue
+        alone[row] = len(indices)
+        problem = problem_of(system if modes.damped else system.undamped(), touching, options)
+        whole = problem.pencil(growing.mu).condensed()
+        modes = _widened(modes, row, _sharpened(whole, growing, indices, options.solver), indices)
+    return modes, alone
+
+
+def _sharpened(problem: Quadratic, found: Growing, indices: IntArray, solver: str | None) -> Growing:
+    """With the modes at these places (k,) as good as those that branches lead to: the search ends where backward errors
+    are small, which leaves slow modes of stiff meshes right to eight digits."""
+    values, right, residual = found.values.copy(), found.right.copy(), found.residual.copy()
+    for k in indices:
+        old = complex(values[k])
+        solved = solved_beside(problem, old, None, None, solver=solver)
+        if solved is None or abs(solved.lam - old) > SAME * abs(old):
+            continue
+        lam = solved.lam if old.imag else complex(solved.lam.real)
+        error = float(problem.backward_error(np.array([lam]), solved.right[:, None])[0])
+        if error <= residual[k]:
+            x = solved.right[: len(right)]
+            values[k], right[:, k], residual[k] = lam, x / max(float(np.linalg.norm(x)), 1e-300), error
+    return replace(found, values=values, right=right, residual=residual)
+
+
+def _widened(modes: ComplexModes, row: int, found: Growing, indices: IntArray) -> ComplexModes:
+    """With columns that hold eigenvalues at one μ alone."""
+    shape = (len(modes.mu), len(indices))
+    values, residual = np.full(shape, complex(np.nan, np.nan)), np.full(shape, np.nan)
+    values[row], residual[row] = found.values[indices], found.residual[indices]
+    right = left = None
+    if modes.right is not None:
+        shapes = np.full((*shape, modes.right.shape[2]), complex(np.nan, np.nan))
+        shapes[row] = found.right[:, indices].T
+        right = np.concatenate([modes.right, shapes], axis=1)
+    if modes.left is not None:
+        left = np.concatenate([modes.left, np.full((*shape, modes.left.shape[2]), complex(np.nan, np.nan))], axis=1)
+    most = int(modes.branch.max(initial=0))
+    return replace(
+        modes,
+        eigenvalues=np.concatenate([modes.eigenvalues, values], axis=1),
+        residual=np.concatenate([modes.residual, residual], axis=1),
+        branch=np.concatenate([modes.branch, most + 1 + np.arange(len(indices))]),
+        right=right,
+        left=left,
+    )
+
+
+def _sentence(
+    modes: ComplexModes, row: int, found: Growing | str | None, max_frequency_hz: float, began: IntArray, alone: int
+) -> str:
+    """What was checked at one μ. began: branches that were followed because they start in the band or just above."""
+    if found is None:
+        return f"{UNCHECKED} at this μ: what branches followed from μ = 0 give."
+    if isinstance(found, str):
+        return f"{UNCHECKED}: {found}."
+    unstable = modes.unstable[row] & modes.in_band[row]
+    wrong = unconfirmed(found, modes.eigenvalues[row], unstable)
+    said = f"{found.words} up to {max_frequency_hz:g} Hz"
+    if wrong:
+        return f"NOT CONFIRMED: {said} in the full problem, {wrong} fewer than branches do. {found.sentence}"
+    entered = int(np.count_nonzero(unstable & ~np.isin(modes.branch, began))) - alone
+    if entered > 0:
+        said += f", {entered} of which start{'s' if entered == 1 else ''} above it at μ = 0"
+    if alone:
+        said += f", {alone} of which no branch from μ = 0 was seen to lead to"
+    if slow := int(np.count_nonzero(unstable & (np.abs(modes.eigenvalues[row]) <= AT_REST * found.top))):
+        said += f" (beside {slow} of the list below {AT_REST * found.top / (2 * np.pi):.3g} Hz, not sought there)"
+    lead = "Checked" if found.complete else "NOT COMPLETE"
+    return f"{lead}: {said}, sought anew in the full problem. {found.sentence}"

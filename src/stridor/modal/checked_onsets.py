@@ -1,0 +1,155 @@
+"""The check of onsets: what grows at both ends of the range is sought anew, and must go back to what is listed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from functools import partial
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..system import System
+from ..typing import ComplexArray, IntArray
+from .full.growth import growing_roots
+from .growing import CHECKED, UNCHECKED, WIDER, Growing, affordable, growing_modes, missing, too_large, unconfirmed
+from .joined import matched
+from .krylov import Carried
+from .onsets import Onsets, onsets
+from .options import Options
+from .tolerances import AT_REST
+
+
+def checked_onsets(
+    system: System,
+    found: Onsets,
+    *,
+    damped: bool,
+    options: Options | None = None,
+    follow: Sequence[float] = WIDER,
+    numbered_at: float = 0.0,
+    carried: Carried | None = None,
+    before: Sequence[complex] | None = None,
+) -> Onsets:
+    """The onsets with what grows at both ends of the range sought anew in the full problem.
+
+    found: as `onsets` gives them; where a mode grows in the band at the high end that branches do not lead to, they are
+    solved again with branches from further above, from ``numbered_at`` on and with ``carried`` as in `onsets`. before:
+    what the full problem has at the low end with the nodes that touch below it; where the branches say the same of this
+    side, nothing is sought there again. ``completeness`` says what came of it, ``at_start`` and ``at_end``
+    are what the full problem has.
+    """
+    options = options or Options()
+    if not affordable(system):
+        return replace(found, completeness=f"{UNCHECKED}: {too_large(system)}.")
+    try:
+        low, high = (
+            partial(growing_modes, system, mu, found.max_frequency_hz, touching_at=None, damped=damped, options=options)
+            for mu in found.friction_range
+        )
+        end = high()
+        start = _as_before(found, before, end.top) or low()
+    except AnalysisError as error:
+        return replace(found, completeness=f"{UNCHECKED}: {error}.")
+    for wider in follow:
+        if not len(_unled(found, start, end)[1]) and not found.unexplained:
+            break
+        try:
+            found = onsets(
+                system, found.friction_range, max_frequency_hz=found.max_frequency_hz, damped=damped, follow=wider,
+                numbered_at=numbered_at,
+                carried=carried, **asdict(options),
+            )  # fmt: skip
+        except AnalysisError:
+            break
+    values = (tuple(complex(v) for v in e.values) for e in (start, end))
+    return replace(found, at_start=next(values), at_end=next(values), completeness=_ends_sentence(found, start, end))
+
+
+def _as_before(found: Onsets, before: Sequence[complex] | None, top: float) -> Growing | None:
+    """What the branches say of the low end, where it is what grows in the full problem with the nodes that touch below
+    it; None where they differ, or where that is not known."""
+    values = np.array(found.at_start, dtype=complex)
+    known = np.array(before or (), dtype=complex)
+    if before is None or len(known) != len(values) or len(matched(known, values)) < len(values):
+        return None
+    nothing = np.zeros((0, len(values)), dtype=complex)
+    low = found.friction_range[0]
+    return Growing(low, values, nothing, np.zeros(len(values)), values[:0], True, "", top, sought=False)
+
+
+def sought_at_end(found: Onsets | None, mu: float) -> tuple[complex, ...] | None:
+    """What was found to grow in the full problem where a range with all its onsets ends; None where it does not end at
+    ``mu`` or was not checked."""
+    if found is None or found.friction_range[1] != mu or not found.completeness.startswith(CHECKED):
+        return None
+    return found.at_end
+
+
+def _not_in(found: Growing, known: tuple[complex, ...]) -> IntArray:
+    values = np.array(known, dtype=complex)
+    return missing(found, values, np.ones(len(values), dtype=bool))
+
+
+def _unled(found: Onsets, start: Growing, end: Growing) -> list[ComplexArray]:
+    """Growing modes at both ends that no branch leads to. Of a branch that has fallen apart on the real axis the other
+    half is led to as well, where as many roots grow as the onsets say."""
+    whole = found.followed is not None and not _roots_amiss(found, start, end)
+    result: list[ComplexArray] = []
+    for k, (growing, known) in enumerate(((start, found.at_start), (end, found.at_end))):
+        lacking = growing.values[_not_in(growing, known)]
+        if whole and found.followed is not None:
+            branches = found.followed[k][1]
+            fallen = (branches.imag == 0) & (branches.real > AT_REST * growing.top)
+            if np.count_nonzero(lacking.imag == 0) <= np.count_nonzero(fallen):
+                lacking = lacking[lacking.imag != 0]
+        result.append(lacking)
+    return result
+
+
+def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
+    """What the full problem says of both ends, beside the onsets."""
+    low, high = found.friction_range
+    numbers = f"{start.words} at μ = {low:g} and {end.words} at μ = {high:g}, sought anew in the full problem"
+    if not start.sought:
+        numbers = (
+            f"{end.words} at μ = {high:g}, sought anew in the full problem, and {start.words} at μ = {low:g}, as "
+            "below it"
+        )
+    wrong: list[str] = []
+    sides = zip((start, end), (found.at_start, found.at_end), (low, high), _unled(found, start, end), strict=True)
+    for growing, known, mu, lacking in sides:
+        values = np.array(known, dtype=complex)
+        extra = unconfirmed(growing, values, np.ones(len(values), dtype=bool))
+        if len(lacking):
+            named = ", ".join(f"{v.imag / (2 * np.pi):.6g} Hz (+{v.real:.4g} 1/s)" for v in lacking[:4])
+            wrong.append(f"no branch was seen to lead to {named} at μ = {mu:g}")
+        if extra:
+            wrong.append(f"{extra} of the branches that grow at μ = {mu:g} are not found there")
+    if found.unexplained:
+        wrong.append(f"{found.unexplained} of those at μ = {high:g} go back to no onset that was solved")
+    wrong += _roots_amiss(found, start, end)
+    if wrong:
+        return f"NOT COMPLETE: {numbers}, but {'; '.join(wrong)}. Take a smaller range of μ."
+    if not (start.complete and end.complete):
+        sentence = start.sentence if not start.complete else end.sentence
+        return f"NOT COMPLETE: {numbers}, as the onsets say, but {sentence}"
+    return (
+        f"{CHECKED} {'both ends' if start.sought else 'the high end'}: {numbers}, and each of them goes back to an "
+        f"onset listed or grew from the start. "
+        f"{end.sentence} What grows and ends again between them rests on the branches followed."
+    )
+
+
+def _roots_amiss(found: Onsets, start: Growing, end: Growing) -> list[str]:
+    """What onsets and the growing eigenvalues at both ends say otherwise where motions grow without oscillating: a pair
+    that has fallen apart on the real axis is two of them, and one may go through zero unseen by any branch."""
+    if np.all(start.values.imag) and np.all(end.values.imag):
+        return []
+    more, said = growing_roots(end.values) - growing_roots(start.values), sum(o.roots for o in found.onsets)
+    if more == said:
+        return []
+    return [
+        f"{more:+d} eigenvalues grow from one to the other where the onsets say {said:+d}: a motion that does not "
+        "oscillate begins or ceases to grow, or a mode leaves the band"
+    ]
