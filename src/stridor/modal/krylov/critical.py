@@ -367,9 +367,9 @@ def _quick_crossing(reduced: DenseProblem, passage: Passage) -> tuple[float, com
     index = int(start.index[passage.branch])
     right, left = (reduced.padded(start.found, v[:, [index]])[:, 0] for v in (start.found.right, start.found.left))
     lam, tangent = complex(start.found.values[index]), complex(start.found.tangents[index])
-    with np.errstate(all="ignore"):
-        ahead = -lam.real / tangent.real
     width = passage.high - passage.low
+    # Of a mode that nothing damps yet the growth rate may have no slope at all.
+    ahead = -lam.real / tangent.real if tangent.real else np.inf
     ahead = float(np.clip(ahead, 0.0, width)) if np.isfinite(ahead) else 0.5 * width
     root = on_axis(
         reduced, start.mu + ahead, lam + tangent * ahead, right, left, (passage.low, passage.high)
