@@ -49,9 +49,9 @@ def crossings(old: State, new: State) -> list[Passage]:
         scale = max(abs(old.values[i]), 1e-300)
         if max(abs(start), abs(end)) <= STILL * scale:
             continue
-        if abs(start) <= STILL * scale:
-            # Undamped where the branch begins: stable up to there, whichever sign rounding has given it.
-            start = -STILL * scale
+        # On the axis, as where an undamped branch begins, is stable, whichever sign rounding has given it: growth that
+        # ends on the very value that is looked at ends in the step up to there.
+        start, end = (-STILL * scale if abs(rate) <= STILL * scale else rate for rate in (start, end))
         marks = [0.0, *_turns(start, end, *slopes), 1.0]
         rates = [_cubic(start, end, *slopes, mark) for mark in marks]
         passed = [k for k in range(len(marks) - 1) if rates[k] * rates[k + 1] < 0]
