@@ -85,7 +85,8 @@ def onset_slopes(
     gap = 2 * kappa * abs(mu - point) ** 0.5 if point is not None and kappa is not None else 1e-3 * abs(lam)
     mode = solve_mode(pencil, lam, min(gap, abs(lam)), solver=options.solver)
     by_mu = mode.derivative(_by_friction(work, mu, held, pencil)).real
-    if by_mu == 0.0:
+    # Of growth that opens as a square rounding is all that is left.
+    if by_mu == 0.0 or onset.growth_slope == 0.0:
         raise AnalysisError("growth does not change with friction there")
     return [-_derivative(work, mode, path, mu, held).real / by_mu for path in paths]
 

@@ -7,6 +7,7 @@ Up to 60 freedoms the basis is the unit matrix, beyond that a reduced model over
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ import scipy.sparse as sp
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
 from ..dense_problem import DenseProblem, Eigenpairs, OverNumber
+from ..krylov.follow import FOLLOWED
+from ..options import Options
 from ..parametric import ReducedModel, reduce
 from ..parametric.basis import expanded
 from ..quadratic import Quadratic, Region, find_modes
@@ -22,6 +25,7 @@ from ..quadratic.problem import times
 from ..results import off_rounding
 from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .family import MU, ROLES, Family, Smooth
+from .opening import SIMPLE, Opening, told
 
 DENSE = 60  # unknowns up to which the matrices are their own reduced model
 WHOLE = 6000  # and up to which branches are followed by full solves where there is none
@@ -53,6 +57,48 @@ class Along(OverNumber):
         self.at_rest = least
         if least:
             self._known.clear()
+
+    def searched(self) -> Family:
+        """The problem whose eigenpairs these are."""
+        return self.family
+
+    @cached_property
+    def opened(self) -> tuple[Opening, ...]:
+        """What becomes of simple modes that are on the axis at the low end and are followed, as far as it can be told.
+        One that grows is found where that is more than rounding, and its root in the full problem."""
+        if self.family.reversible:
+            return ()
+        searched, found, result = self.searched(), self.eigenpairs(0.0), list[Opening]()
+        size = np.abs(found.values)
+        still = (found.values.real == 0) & (size > AT_REST * self.frequency) & (size <= FOLLOWED * self.frequency)
+        for k in np.flatnonzero(still):
+            if np.count_nonzero(np.abs(found.values - found.values[k]) <= SIMPLE * size[k]) > 1:
+                continue
+            one = self._told(searched, complex(found.values[k]), found.right[:, [k]], found.left[:, [k]])
+            if one is not None and self._seen(one):
+                result.append(one)
+        return tuple(result)
+
+    def _told(self, searched: Family, lam: complex, right: ComplexArray, left: ComplexArray) -> Opening | None:
+        """What becomes of a mode of the low end, vectors (r, 1), in the problem searched and then in the full one."""
+        one = told(searched, lam, right[:, 0], left[:, 0])
+        if one is None or searched is self.family:
+            return one
+        full = told(self.family, lam, self.vectors(right, 0.0)[:, 0], self.vectors(left, 0.0, left=True)[:, 0])
+        if full is None or (full.root is None) != (one.root is None):
+            return None
+        return replace(one, root=full.root)
+
+    def _seen(self, one: Opening) -> bool:
+        """Whether the mode is where its series leads to, on the way and where its growth or decay is seen."""
+        for t in (0.5 * one.until, one.until):
+            found = self.eigenpairs(t)
+            place = one.among(found.values, t)
+            if place is None:
+                return False
+            if t == one.until and not (found.values[place].real > 0 if one.root else found.values[place].real < 0):
+                return False
+        return True
 
     def vectors(self, z: ComplexArray, mu: float, *, left: bool = False) -> ComplexArray:
         """Vectors (n, k) of the full problem from those found at μ − low."""
@@ -139,6 +185,13 @@ class Projected(OnBasis):
         result: ComplexArray = np.zeros((self.family.size, moved.shape[1]), dtype=complex)
         result[: len(moved)] = moved
         return result
+
+    def searched(self) -> Family:
+        """The problem on the basis."""
+        if self.model is None and self.family.eliminated is None:
+            return self.family
+        low, high = self.family.low, self.family.high
+        return Family((low, high), lambda mu: self.sparse(mu - low), Options())
 
     def sparse(self, mu: float) -> Quadratic:
         """The problem (r, r) at μ − low as any other has it."""

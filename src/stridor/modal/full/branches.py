@@ -28,9 +28,11 @@ from .basis import DECAY, Along, Projected
 from .family import Family
 from .follow import Followed, followed
 from .growth import growing_roots, unstable
+from .opening import Opening
 from .passages import located, quiet
 
 ALIKE = 1e-8  # of |λ|: eigenvalues that are one
+SAME = 1e-6  # of the highest frequency: a mode of the low end as it is found twice
 OPENING = 1e-6  # of the range: passages that close to where growth opens are that
 CLEARLY = 1.02  # times the band: passages beyond it are counted and not solved
 
@@ -81,9 +83,13 @@ def solved(
     """Onsets, and whether what grows at the ends is what they say."""
     family = source.family
     way = followed(source, *between, top, finer)
-    found = _opening(source, ends[0], way.low, top) if between[0] == family.low else []
+    opened, found = dict[int, Opening](), list[BranchOnset]()
+    if between[0] == family.low:
+        opened = _opened(source, way.low)
+        found = _opening(source, ends[0], way.low, top)
     began = {branch - 1 - source.at_rest for f in found for branch in f.onset.branches}
-    balance, lost = 0, list[Passage]()
+    found += [_begins(source, way, branch, o.root, top) for branch, o in opened.items() if o.root is not None]
+    balance, lost, led = 0, list[Passage](), set[int]()
     for passage in way.passages:
         if family.low + passage.high <= between[0]:
             continue
@@ -93,10 +99,20 @@ def solved(
             continue
         if passage.low <= OPENING * (family.high - family.low) and {passage.branch, passage.partner} & began:
             continue
+        told = opened.get(passage.branch) if passage.kind == "crossing" else None
+        if told is not None and passage.low < told.until:
+            if told.root is not None and not passage.stabilising and passage.branch not in led:
+                # Its growth is more than rounding from here on.
+                led.add(passage.branch)
+                continue
+        else:
+            told = None
         root = located(source, passage)
         if root is None:
             lost.append(passage)
             continue
+        if told is not None and root[0].mu - family.low <= told.until:
+            continue  # what it does before is rounding
         one = BranchOnset(_onset(source, passage, *root), passage.branch)
         if enters is not None and abs(root[0].lam.imag) > top:
             entry = min(max(family.low + enters, one.onset.mu), between[1])
@@ -194,13 +210,14 @@ def _opening(source: Along, end: RegionModes, state: State, top: float) -> list[
     values, change = end.values, family.slopes(family.low)
     problem = family.built(family.low)
     on_axis = (np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)) & (np.abs(values) > AT_REST * top)
+    on_axis &= ~unstable(family, values, top)  # what grows already begins nowhere
     indices = np.flatnonzero(on_axis & (values.imag > 0))
     result: list[BranchOnset] = []
     for group in groups(values[indices], ALIKE * top):
         mine = indices[group]
-        if family.reversible and len(mine) < 2:
-            continue
         x, y, lam = end.right[:, mine], end.left[:, mine], values[mine]
+        if len(mine) < 2 and (family.reversible or any(abs(o.series[0] - lam[0]) <= SAME * top for o in source.opened)):
+            continue
         gram = y.T @ problem.slope(lam, x)
         if np.linalg.cond(gram) > 1e8:
             continue
@@ -223,6 +240,28 @@ def _opening(source: Along, end: RegionModes, state: State, top: float) -> list[
             )  # fmt: skip
             result.append(BranchOnset(onset, branch))
     return result
+
+
+def _opened(source: Along, state: State) -> dict[int, Opening]:
+    """Branches from 0, in the state at the low end, and what becomes of those modes that are told."""
+    return {int(np.argmin(np.abs(state.values - o.series[0]))): o for o in source.opened}
+
+
+def _begins(source: Along, way: Followed, branch: int, root: Root, top: float) -> BranchOnset:
+    """An onset at the low end, or so near it that its growth is not seen there."""
+    distance = np.abs(way.low.values - way.low.values[branch])
+    distance[branch] = np.inf
+    partner = int(np.argmin(distance)) if len(distance) > 1 else branch
+    onset = Onset(
+        mu=root.mu, frequency_hz=root.lam.imag / (2 * np.pi), kind="flutter", damped=source.family.dissipates,
+        stabilising=False, branches=_numbers(source, branch, partner), residual=root.residual,
+        square_root_coefficient=None, growth_slope=root.slope,
+    )  # fmt: skip
+    t = root.mu - source.family.low
+    enters = way.entries.after((branch,), t, np.inf) if root.lam.imag > top else None
+    if enters is not None:
+        onset = replace(onset, enters_at=source.family.low + max(enters, t))
+    return BranchOnset(onset, branch)
 
 
 def _onset(source: Along, passage: Passage, root: Root, t: float) -> Onset:

@@ -24,6 +24,7 @@ from ..tolerances import AT_REST, UNSTABLE_RELATIVE
 from .basis import Along
 from .family import Family
 from .growth import growing_roots, unstable
+from .opening import Opening
 
 GRID = {False: 96, True: 24}  # intervals to begin with, on a basis and by full solves
 ON_IT = 1e-6  # of the range: so near an onset growth may be rounding
@@ -33,6 +34,7 @@ SLOWEST = 1e-8  # of the highest frequency: growth slower than that is rounding
 STILL = 1e-3  # of the highest frequency: slower than that may be divergence
 TOGETHER = 0.25  # of the square of half the difference of two modes: what is left of it where they come together
 NEARBY = 0.05  # of |λ|: how far from where slopes lead it to a growing mode may be in the next interval's end
+AWAY = 0.1  # of |λ|, or of the highest frequency: how far a root in the smallest intervals may be from its mode
 EDGE = 1e-3  # of the highest frequency: modes that come in or leave there are no onsets
 ALIKE = 1e-7  # of the highest frequency: onsets at one value whose frequencies are no further apart are one
 
@@ -114,10 +116,29 @@ def counted(source: Along, between: tuple[float, float], top: float) -> Counted:
     return _Search(source, between, top).all()
 
 
-def number_at(source: Along, mu: float, top: float) -> int:
-    """How many roots grow at one value with |λ| up to top."""
-    found = source.eigenpairs(mu - source.family.low)
-    return growing_roots(found.values[_growing(source, found, top)])
+def opened_in(source: Along, low: float, top: float) -> tuple[Opening, ...]:
+    """Modes up to |λ| = top [1/s] that begin to grow at the low end of a range, or so near it that it is not seen
+    there."""
+    if low != source.family.low:
+        return ()
+    return tuple(o for o in source.opened if o.root is not None and abs(o.root.lam) <= top)
+
+
+def number_at(source: Along, mu: float, top: float, opened: Sequence[Opening] = ()) -> int:
+    """How many roots grow at one value with |λ| up to top, those included that have opened and are not yet seen to."""
+    t = mu - source.family.low
+    found = source.eigenpairs(t)
+    begun = [o for o in opened if o.root is not None and o.root.mu < mu]
+    return growing_roots(found.values[_growing(source, found, top) | _hidden(found, t, begun, top)])
+
+
+def _hidden(found: Eigenpairs, t: float, opened: Sequence[Opening], top: float) -> BoolArray:
+    """Which of the eigenpairs (k,) at t are modes that open, each found where its series leads to, as long as that may
+    not be seen."""
+    places = [o.among(found.values, t) for o in opened if t <= o.until]
+    hidden = np.zeros(len(found.values), dtype=bool)
+    hidden[[place for place in places if place is not None]] = True
+    return hidden & (np.abs(found.values) <= top)
 
 
 def _growing(source: Along, found: Eigenpairs, top: float) -> BoolArray:
@@ -134,11 +155,12 @@ class _Search:
         self.start = source.family.low
         self.low, self.high = between[0] - self.start, between[1] - self.start
         self.width = self.high - self.low
+        self.opened = opened_in(source, between[0], top)
 
     def all(self) -> Counted:
         """The grid from end to end, and what changes in it."""
         grid = [self._at(float(t)) for t in np.linspace(self.low, self.high, GRID[self.source.whole] + 1)]
-        onsets, passing = list[Onset](), list[Passing]()
+        onsets, passing = [as_onset(self.source.family, o.root) for o in self.opened if o.root], list[Passing]()
         for before, after in pairwise(grid):
             for low, high in self._changes(before, after):
                 for found in self._explained(low, high):
@@ -146,7 +168,11 @@ class _Search:
                         passing.append(found)
                     elif not any(self._same(found, other) for other in onsets):
                         onsets.append(found)
-        return Counted(tuple((self.start + c.t, c.number) for c in grid), tuple(onsets), tuple(passing))
+        return Counted(tuple((self.start + c.t, self._number(c)) for c in grid), tuple(onsets), tuple(passing))
+
+    def _number(self, count: _Count) -> int:
+        """How many roots grow, without those that open further on."""
+        return number_at(self.source, self.start + count.t, self.top, self.opened)
 
     def _explained(self, low: _Count, high: _Count) -> Iterator[Onset | Passing]:
         """What changes in an interval; where neither is found in it, in its halves: half of a pair that falls apart
@@ -168,7 +194,9 @@ class _Search:
 
     def _at(self, t: float) -> _Count:
         found = self.source.eigenpairs(t)
-        return _Count(t, found, _growing(self.source, found, self.top))
+        # What opens at the low end grows from there on: nothing that is to be found anywhere changes where it is seen.
+        hidden = _hidden(found, t, self.opened, self.top)
+        return _Count(t, found, _growing(self.source, found, self.top) | hidden)
 
     def _changes(self, low: _Count, high: _Count) -> Iterator[tuple[_Count, _Count]]:
         """Intervals in which the growing modes change by one, those that slopes foretell included."""
@@ -276,7 +304,9 @@ class _Search:
             for v, left in ((more.found.right, False), (more.found.left, True))
         )
         between = (self.start + low.t, self.start + high.t)
-        slack = 1e-6 * self.width + 2 * (high.t - low.t)
+        slack, edge = 1e-6 * self.width + 2 * (high.t - low.t), 1e-9 * self.width
+        first = max(between[0] - slack, self.start + self.low - edge)
+        last = min(between[1] + slack, self.start + self.high + edge)
 
         def candidates() -> Iterator[Root | None]:
             if abs(lam.imag) <= STILL * top:
@@ -286,9 +316,10 @@ class _Search:
             yield meeting(family, mu, lam, x, y, between)
 
         for root in candidates():
-            if root is None or not between[0] - slack <= root.mu <= between[1] + slack:
+            # The root of another mode, or one that lies outside of what is searched, is none.
+            if root is None or not first <= root.mu <= last:
                 continue
-            if ends(root) == (more is low):
+            if abs(root.lam.imag - lam.imag) <= AWAY * max(abs(lam), top) and ends(root) == (more is low):
                 return root
         return None
 

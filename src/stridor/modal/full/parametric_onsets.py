@@ -28,6 +28,7 @@ from ..tables import ONSET
 from .branches import ends_of
 from .counted import ends as turns
 from .line import OnTerms, ParameterLine, of_model
+from .opening import told
 from .passages import quiet
 from .search import search
 from .words import sentence
@@ -293,6 +294,10 @@ def _roots(
 ) -> Iterator[Root | None]:
     if onset.kind == "divergence":
         yield standstill(full, s, x, y, between)
+        return
+    if onset.growth_slope == 0.0:
+        opened = told(full, lam, x, y)
+        yield None if opened is None else opened.root
         return
     if not full.reversible:
         yield crossing(full, s, lam, x, y, between)

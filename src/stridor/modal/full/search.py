@@ -18,7 +18,7 @@ from ..quadratic import RegionModes
 from .axis import walked
 from .basis import DENSE, WHOLE, Along, Whole, along
 from .branches import BranchOnset, all_values, solved
-from .counted import ALIKE, ON_IT, Counted, Lack, Passing, as_onset, counted, number_at
+from .counted import ALIKE, ON_IT, Counted, Lack, Passing, as_onset, counted, number_at, opened_in
 from .family import Family
 from .follow import BEYOND, Followed
 from .growth import growing_roots, unstable
@@ -124,7 +124,8 @@ def _borne_out(answer: Answer, between: tuple[float, float], top: float) -> bool
     if source.whole:
         return True  # they were solved in full at every step
     onsets = [o for o in answer.onsets if _in_band(o, top)]
-    grid = [(mu, number_at(source, mu, top)) for mu in _sampled(answer.onsets, between)]
+    opened = opened_in(source, between[0], top)
+    grid = [(mu, number_at(source, mu, top, opened)) for mu in _sampled(answer.onsets, between)]
     return not Counted(tuple(grid), (), ()).lacking(onsets)
 
 
@@ -210,10 +211,11 @@ def _same(one: Onset, other: Onset, width: float, top: float) -> bool:
 def _ends_agree(family: Family, seen: Counted, ends: tuple[RegionModes, RegionModes], top: float) -> bool:
     """Whether as many roots were counted at both ends as the full problem has there."""
     for (mu, number), end in zip((seen.grid[0], seen.grid[-1]), ends, strict=True):
-        if any(abs(o.mu - mu) <= ON_IT for o in seen.onsets):
-            continue
         size = np.abs(end.values)
         slack = 2 * int(np.count_nonzero(np.abs(size - top) <= ON_EDGE * top))
+        # What begins on the very end is within rounding there; what lies beside it may or may not be.
+        beside = (o for o in seen.onsets if abs(o.mu - mu) <= ON_IT and (o.stabilising or o.mu != mu))
+        slack += sum(abs(o.roots) for o in beside)
         if abs(number - growing_roots(end.values[unstable(family, end.values, top) & (size <= top)])) > slack:
             return False
     return True
