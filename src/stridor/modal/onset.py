@@ -26,7 +26,8 @@ class Onset(Shown):
     branches: the two modes that meet, numbered from 1 by frequency at μ = 0; (0, 0) where branches were not followed.
     square_root_coefficient κ [1/s]: beyond an undamped onset growth opens as κ √(μ − μ_c); with
     damping it belongs to the exceptional point at the complex μ ``exceptional_mu`` close by (None if
-    none was found). growth_slope d Re λ/dμ [1/s] (None undamped, where it is infinite).
+    none was found). growth_slope d Re λ/dμ [1/s] (None undamped, where it is infinite; 0 where growth opens at the low
+    end of the range as μ² or a higher power, and is rounding at first).
     residual: componentwise backward error of the eigenpair in the assembled matrices. enters_at: where growth begins
     above the band, the μ (to about a step of following) at which the growing mode comes into it; None of all others.
     """

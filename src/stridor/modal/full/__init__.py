@@ -2,7 +2,8 @@
 along any parameter.
 
 `family` is the problem over μ, `basis` where its eigenpairs come from, `follow` the branches over μ, `newton` the full
-problem solved for onsets, `passages` how guesses for it are found, `onsets` and `modes` the analyses.
+problem solved for onsets, `passages` how guesses for it are found, `opening` growth that begins at the low end of the
+range, `onsets` and `modes` the analyses.
 """
 
 from .modes import full_modes

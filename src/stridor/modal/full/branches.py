@@ -99,14 +99,10 @@ def solved(
             continue
         if passage.low <= OPENING * (family.high - family.low) and {passage.branch, passage.partner} & began:
             continue
-        told = opened.get(passage.branch) if passage.kind == "crossing" else None
-        if told is not None and passage.low < told.until:
-            if told.root is not None and not passage.stabilising and passage.branch not in led:
-                # Its growth is more than rounding from here on.
-                led.add(passage.branch)
-                continue
-        else:
-            told = None
+        told = _told(opened, passage, SAME * top)
+        if told is not None and told.root is not None and not passage.stabilising and passage.branch not in led:
+            led.add(passage.branch)  # its growth is more than rounding from here on
+            continue
         root = located(source, passage)
         if root is None:
             lost.append(passage)
@@ -245,6 +241,15 @@ def _opening(source: Along, end: RegionModes, state: State, top: float) -> list[
 def _opened(source: Along, state: State) -> dict[int, Opening]:
     """Branches from 0, in the state at the low end, and what becomes of those modes that are told."""
     return {int(np.argmin(np.abs(state.values - o.series[0]))): o for o in source.opened}
+
+
+def _told(opened: dict[int, Opening], passage: Passage, near: float) -> Opening | None:
+    """What is told of the mode of a passage, which has not yet been seen to grow or decay; near [1/s]: how far from it
+    the branch may be."""
+    one, old = opened.get(passage.branch), passage.old
+    if one is None or passage.kind != "crossing" or passage.low >= one.until:
+        return None
+    return one if abs(old.values[passage.branch] - one.at(old.mu)) <= near else None
 
 
 def _begins(source: Along, way: Followed, branch: int, root: Root, top: float) -> BranchOnset:

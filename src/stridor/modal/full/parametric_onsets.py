@@ -45,7 +45,8 @@ class ParametricOnset(Shown):
     """A mode becomes unstable (or stable, ``stabilising``, as the parameter grows) at ``value`` of ``parameter``.
 
     point: values of all parameters there. kind: "flutter" or "divergence". growth_slope: dRe λ/dp [1/s per unit], None
-    where two undamped modes meet, whose growth opens as κ √|p − p_c| with κ = square_root_coefficient. residual:
+    where two undamped modes meet, whose growth opens as κ √|p − p_c| with κ = square_root_coefficient, 0 where growth
+    opens at the low end of the range as a square or a higher power. residual:
     backward error in the full problem, None where it was not solved there. reduced_value: what the reduced model alone
     said. enters_at: where growth begins above the model's frequency, the value (to about a step of following) at which
     the growing mode comes below it; None of all others.
