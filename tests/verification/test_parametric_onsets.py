@@ -99,6 +99,23 @@ def test_divergence_that_ends_and_flutter_that_begins():
     assert found.complete
 
 
+@pytest.mark.parametrize(("damping", "begins"), [(0.0, 0.0), (1e-10, np.sqrt(5e-10))])
+def test_growth_that_opens_as_a_square_is_confirmed_where_it_opens(damping: float, begins: float):
+    """Circulatory and gyroscopic forces in proportion to p, P₁₂ = −P₂₁ = p (1 + 0.3 λ): of ω = 1 and 2 the second grows as
+    0.1 p² from p = 0 on, or from where that is more than damping takes; in the full problem too."""
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    terms = [
+        (np.eye(2), "mass", CONSTANT), (np.diag([1.0, 4.0]), "stiffness", CONSTANT), (turn, "stiffness", P),
+        (0.3 * turn, "damping", P),
+    ]  # fmt: skip
+    (onset,) = found = along([*terms, (damping * np.eye(2), "damping", CONSTANT)] if damping else terms, 0.5, 6.0)
+    assert [onset.value, onset.reduced_value, onset.growth_slope] == pytest.approx([begins, begins, 0.2 * begins], rel=1e-6)
+    assert onset.frequency_hz == pytest.approx(1 / np.pi, rel=1e-9)
+    assert onset.residual is not None
+    assert not onset.stabilising
+    assert found.complete
+
+
 def random_problem(seed: int) -> tuple[ParametricProblem, float]:
     rng = np.random.default_rng(seed)
     n, kind = int(rng.integers(6, 24)), KINDS[seed % len(KINDS)]
