@@ -82,12 +82,10 @@ class Along(OverNumber):
     def _told(self, searched: Family, lam: complex, right: ComplexArray, left: ComplexArray) -> Opening | None:
         """What becomes of a mode of the low end, vectors (r, 1), in the problem searched and then in the full one."""
         one = told(searched, lam, right[:, 0], left[:, 0])
-        if one is None or searched is self.family:
+        if one is None or one.root is None or searched is self.family:
             return one
         full = told(self.family, lam, self.vectors(right, 0.0)[:, 0], self.vectors(left, 0.0, left=True)[:, 0])
-        if full is None or (full.root is None) != (one.root is None):
-            return None
-        return replace(one, root=full.root)
+        return None if full is None or full.root is None else replace(one, root=full.root)
 
     def _seen(self, one: Opening) -> bool:
         """Whether the mode is where its series leads to, on the way and where its growth or decay is seen."""

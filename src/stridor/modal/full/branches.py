@@ -32,7 +32,7 @@ from .opening import Opening
 from .passages import located, quiet
 
 ALIKE = 1e-8  # of |λ|: eigenvalues that are one
-SAME = 1e-6  # of the highest frequency: a mode of the low end as it is found twice
+SAME = 1e-5  # of the highest frequency: a mode of the low end as it is found twice, on a basis and in the full problem
 OPENING = 1e-6  # of the range: passages that close to where growth opens are that
 CLEARLY = 1.02  # times the band: passages beyond it are counted and not solved
 
