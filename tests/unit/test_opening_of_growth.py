@@ -13,9 +13,10 @@ import scipy.sparse as sp
 import stridor as st
 from matrix_cases import Term, matrix_case
 from stridor.errors import AnalysisError
-from stridor.modal.full import basis, search
+from stridor.modal.full import basis, counted, search
 from stridor.modal.full.family import Family
 from stridor.modal.full.opening import ORDERS, Opening, _seen, told
+from stridor.modal.newton import Root
 from stridor.modal.options import Options
 from stridor.modal.quadratic import Quadratic
 from stridor.study.damping_full import onset_slopes
@@ -53,10 +54,16 @@ def alone(*terms: Term) -> list[Term]:
 
 @pytest.fixture(params=[True, False], ids=["followed", "counted"])
 def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By branches, and where these lead to nothing."""
+    """By branches alone, and where these lead to nothing."""
+    if request.param:
+        monkeypatch.setattr(search, "counted", None)
+    else:
+        without_branches(monkeypatch)
+
+
+def without_branches(monkeypatch: pytest.MonkeyPatch) -> None:
     solved = search.solved
-    if not request.param:
-        monkeypatch.setattr(search, "solved", lambda *given: ([], solved(*given)[1], False))
+    monkeypatch.setattr(search, "solved", lambda *given: ([], solved(*given)[1], False))
 
 
 # -- that grow from the start on ---------------------------------------------------------------------------------------
@@ -98,8 +105,9 @@ def test_growth_that_opens_and_ends_again(tmp_path: Path) -> None:
     assert [(round(o.mu, 9), o.stabilising) for o in found.onsets] == [(0.0, False), (0.1, True)]
 
 
-def test_on_a_reduced_basis_and_by_full_solves(tmp_path: Path) -> None:
-    """64 freedoms, four of them in the band; a constraint beside them leaves full solves alone."""
+def test_on_a_reduced_basis_and_by_full_solves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """64 freedoms, four of them in the band; a constraint beside them leaves full solves alone. What the reduced model
+    says is held against the full problem."""
     rng = np.random.default_rng(5)
     n, squares = 64, np.concatenate([np.array([1.0, 2.0, 3.0, 4.5]) ** 2, np.linspace(20.0, 200.0, 60) ** 2])
     turn, load = np.linalg.qr(rng.standard_normal((n, n)))[0], 0.05 * rng.standard_normal((n, n))
@@ -130,6 +138,9 @@ def test_on_a_reduced_basis_and_by_full_solves(tmp_path: Path) -> None:
         assert [(o.mu, o.growth_slope) for o in found.onsets] == [(0.0, 0.0)] * len(grown)
         np.testing.assert_allclose([2 * np.pi * o.frequency_hz for o in found.onsets], grown, rtol=1e-2)
         assert all(o.residual < 1e-12 for o in found.onsets)
+    monkeypatch.setattr(basis, "told", lambda family, *given: told(family, *given) if family.size < n else None)
+    found = st.onsets(matrix_case(tmp_path, terms(bound=False), 1.0, (0.0, 0.5)))
+    assert not any(o.growth_slope == 0.0 for o in found.onsets)
 
 
 # -- that do not -------------------------------------------------------------------------------------------------------
@@ -206,6 +217,8 @@ def test_modes_that_are_one_are_not_told(tmp_path: Path) -> None:
     x = np.array([0.0, 1.0 + 0j])
     assert told(family_of(np.eye(2)), 1j, x, x) is None
     assert told(family_of(np.diag([1.0, 1.0 + 1e-12])), 1j, x, x) is None
+    assert basis.along(family_of(np.diag([1.0, 1.0 + 1e-8]), 0.0), 3.0).opened == ()
+    assert len(basis.along(family_of(np.diag([1.0, 1.0 + 1e-3])), 3.0).opened) == 2
     # Two that are one are turned, and grow together with a third as μ²: that is none of their slopes.
     n = np.zeros((3, 3))
     n[:2, 2], n[2, :2] = (1.0, 0.5), (-1.0, -0.5)
@@ -244,7 +257,6 @@ def test_a_mode_is_known_again_where_no_other_may_be_it() -> None:
 
 
 # -- the count ---------------------------------------------------------------------------------------------------------
-@pytest.mark.usefixtures("way")
 @pytest.mark.parametrize("g", [0.3, 1e-7])
 def test_an_opening_that_is_lost_is_missed(g: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(basis.Along, "_seen", lambda *_: False)
@@ -252,7 +264,6 @@ def test_an_opening_that_is_lost_is_missed(g: float, tmp_path: Path, monkeypatch
     assert not found.complete or [o.mu < 1e-3 for o in found.onsets] == [True]
 
 
-@pytest.mark.usefixtures("way")
 @pytest.mark.parametrize("seen", [True, False])
 def test_an_opening_that_is_none_is_noticed(seen: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A mode that decays, said to grow."""
@@ -280,6 +291,23 @@ def test_a_range_that_begins_where_growth_is_still_rounding(tmp_path: Path) -> N
     assert not found.complete
     assert all(0.1 <= o.mu <= 0.5 for o in found.onsets)
     assert onsets_of(tmp_path, circulatory(0.3), low=0.1) == []
+
+
+@pytest.mark.parametrize(("mu", "omega"), [(-1e-5, 2.0), (1e-5, 5.0)])
+def test_a_root_outside_of_the_range_or_of_another_mode_is_none(
+    mu: float, omega: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where growth that opens cannot be told it is counted, and Newton's method may end anywhere."""
+
+    def astray(_: object, __: float, lam: complex, x: np.ndarray, y: np.ndarray, ___: object) -> Root:
+        return Root(mu, 1j * omega, x, 1.0, None, 0.0, y)
+
+    without_branches(monkeypatch)
+    monkeypatch.setattr(basis.Along, "_seen", lambda *_: False)
+    monkeypatch.setattr(counted, "crossing", astray)
+    found = st.onsets(matrix_case(tmp_path, circulatory(0.3), 1.0, (0.0, 0.5)))
+    assert not found.complete
+    assert found.onsets == ()
 
 
 def test_such_an_onset_has_no_slope_over_other_numbers(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ from random_openings import random_opening, rate, wrong
 
 pytestmark = pytest.mark.verification
 
-EACH, SMALL = [k for k in range(36) if k not in (0, 6, 15, 29)], 3  # in each run, of few modes, but for slow ones
+HEAVY = (0, 6, 12, 13, 15, 22, 29)  # take as long as all others: weekly
+EACH, SMALL = [k for k in range(36) if k not in HEAVY], 3  # in each run, of few modes
 UNANSWERED = 0.25  # share at most that is refused: much of what is tried is next to rounding
 LATER = (1e-3, 2e-3)  # of the range: where growth that opens with the slope zero is looked at
 
@@ -46,7 +47,7 @@ def test_some(tmp_path: Path) -> None:
     errors, refused, opened = judged(EACH, tmp_path, SMALL)
     assert not errors, "\n".join(errors)
     assert refused <= UNANSWERED * len(EACH)
-    assert opened >= 10
+    assert opened >= 6
 
 
 @pytest.mark.slow
