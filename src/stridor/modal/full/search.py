@@ -121,10 +121,10 @@ def _borne_out(answer: Answer, between: tuple[float, float], top: float) -> bool
     """Whether as many roots grow between every two of the onsets as they say."""
     assert answer.way is not None, "of followed branches"
     source = answer.way.source
-    if source.whole:
+    opened = opened_in(source, between[0], top)
+    if source.whole and not opened:
         return True  # they were solved in full at every step
     onsets = [o for o in answer.onsets if _in_band(o, top)]
-    opened = opened_in(source, between[0], top)
     grid = [(mu, number_at(source, mu, top, opened)) for mu in _sampled(answer.onsets, between)]
     return not Counted(tuple(grid), (), ()).lacking(onsets)
 
