@@ -218,8 +218,13 @@ def test_modes_that_are_one_are_not_told(tmp_path: Path) -> None:
     x = np.array([0.0, 1.0 + 0j])
     assert told(family_of(np.eye(2)), 1j, x, x) is None
     assert told(family_of(np.diag([1.0, 1.0 + 1e-12])), 1j, x, x) is None
-    assert basis.along(family_of(np.diag([1.0, 1.0 + 1e-8]), 0.0), 3.0).opened == ()
-    assert len(basis.along(family_of(np.diag([1.0, 1.0 + 1e-3])), 3.0).opened) == 2
+    for apart, number in ((1e-7, 0), (1e-3, 2)):
+        stiffness = np.diag([1.0, 1.0 + apart])
+
+        def at(mu: float, stiffness: np.ndarray = stiffness) -> Quadratic:
+            return Quadratic(*(sp.csr_array(m) for m in (UNIT, -2e-3 * mu**2 * UNIT, stiffness)))
+
+        assert len(basis.along(Family((0.0, 0.5), at, Options()), 3.0).opened) == number
     # Two that are one are turned, and grow together with a third as μ²: that is none of their slopes.
     n = np.zeros((3, 3))
     n[:2, 2], n[2, :2] = (1.0, 0.5), (-1.0, -0.5)
