@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from stridor.modal.boundary.climb import Seen, climb, tops
+from stridor.modal.boundary.climb import ModesAtPoint, climb, tops
 from stridor.modal.boundary.plane import Plane
 from stridor.typing import Array
 
@@ -32,8 +32,8 @@ class Hill:
         return self.slope(p).reshape(2, 1).astype(complex)
 
 
-def at(hill: Hill, x: float, y: float) -> Seen:
-    return Seen.at(cast(Plane, hill), np.array([x, y]))
+def at(hill: Hill, x: float, y: float) -> ModesAtPoint:
+    return ModesAtPoint.at(cast(Plane, hill), np.array([x, y]))
 
 
 def mound(height: float, rounding: float = 1.0) -> Hill:
@@ -76,6 +76,6 @@ def test_a_bend_that_is_no_number_ends_the_climb(monkeypatch: pytest.MonkeyPatch
 
 def test_a_mode_without_slope_is_followed_nowhere():
     hill = mound(-1e-3)
-    double = Seen(np.array([0.4, 0.5]), np.array([1j]), np.full((2, 1), np.nan + 0j))
+    double = ModesAtPoint(np.array([0.4, 0.5]), np.array([1j]), np.full((2, 1), np.nan + 0j))
     assert double.follow(0, at(hill, 0.45, 0.5)) is None
     assert at(hill, 0.45, 0.5).follow(0, double) is None

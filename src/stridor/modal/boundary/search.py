@@ -195,7 +195,9 @@ class _CurveSearch:
     # -- counts -------------------------------------------------------------------------------------------------------
     def _look(self, p: Array) -> None:
         """Count at a point (2,), or beside it where a curve runs through it, on which rounding would decide."""
-        for left in reversed(range(TRIED)):
+        left = TRIED
+        while True:
+            left -= 1
             try:
                 found = self.plane.modes(p)
             except AnalysisError:

@@ -25,7 +25,7 @@ import scipy.sparse as sp
 
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
-from ..newton import ON_AXIS, STEPS, Border, BorderedFactor, Point, Root, crossing
+from ..newton import ON_AXIS, STEPS, Border, BorderedFactor, NewtonPoint, Root, crossing
 from ..quadratic.problem import times
 from ..tolerances import CONFIRMED, UNSTABLE_RELATIVE
 from .family import ROLES, Family
@@ -106,7 +106,7 @@ def told(family: Family, lam: complex, x: ComplexArray, y: ComplexArray) -> Open
     return replace(opening, root=root) if near else None
 
 
-def _settled(family: Family, border: Border, lam: complex) -> tuple[complex, Point] | None:
+def _settled(family: Family, border: Border, lam: complex) -> tuple[complex, NewtonPoint] | None:
     """The eigenvalue at the low end near λ and what is known there; None where that does not settle on the axis."""
     lam = 1j * lam.imag
     for _ in range(STEPS):
@@ -149,7 +149,7 @@ def _passed(coefficients: Array, s: Array) -> float:
     return float(low)
 
 
-def _series(family: Family, border: Border, lam: complex, here: Point) -> tuple[ComplexArray, Array]:
+def _series(family: Family, border: Border, lam: complex, here: NewtonPoint) -> tuple[ComplexArray, Array]:
     """Coefficients (ORDERS + 1,) [1/s] of λ over s, and how far the real part of each may be off."""
     terms, problem = _powers(family), family.at(family.low)
     noise = NOISE * DEGREE ** max(max(len(matrices) for matrices in terms) - 2, 0)
