@@ -327,3 +327,24 @@ def test_such_an_onset_has_no_slope_over_other_numbers(tmp_path: Path) -> None:
     assert (onset.mu, onset.growth_slope) == (0.0, 0.0)
     with pytest.raises(AnalysisError, match="growth does not change with friction there"):
         onset_slopes(Workspace(case), onset, ("modal.max_frequency_hz",), (0.0, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("size", "ends", "again", "high", "one"),
+    [(1e-2, 0.002, 0.006, 0.2, False), (1e-2, 0.002, 0.006, 0.2, True), (0.1, 0.001, 0.0019, 0.06, False),
+     (1.0, 0.0005, 0.0025, 0.1, True), (0.1, 0.001, 0.003, 0.1, False)],
+)  # fmt: skip
+def test_growth_that_opens_ends_and_begins_again_in_the_first_step_is_solved_or_missed_aloud(
+    size: float, ends: float, again: float, high: float, one: bool, tmp_path: Path
+) -> None:
+    """D = size (−μ² + (1/a + 1/b) μ³ − μ⁴/ab): growth from 0 to a and from b on, both before a thirtieth of the range."""
+    who = np.diag([1.0, 0.0]) if one else UNIT
+    terms = [
+        (UNIT, "mass", ""), (np.diag([1.0, 2.7]), "stiffness", ""), (0.05 * (UNIT - who), "damping", ""),
+        (-size * who, "damping", "mu**2"), (size * (1 / ends + 1 / again) * who, "damping", "mu**3"),
+        (-size / (ends * again) * who, "damping", "mu**4"),
+    ]  # fmt: skip
+    found = st.onsets(matrix_case(tmp_path, terms, 1.0, (0.0, high)))
+    wanted = sorted([0.0, ends, again] * int(np.trace(who)))
+    assert not found.complete or [o.mu for o in found.onsets] == pytest.approx(wanted, abs=1e-9)
+    assert found.complete == (size > 0.05 and again > 2 * ends)  # others are nowhere seen to grow before they end

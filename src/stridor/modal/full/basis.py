@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ...direct import SingularMatrix
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
 from ..dense_problem import DenseProblem, Eigenpairs, OverNumber
@@ -21,6 +22,7 @@ from ..options import Options
 from ..parametric import ReducedModel, reduce
 from ..parametric.basis import expanded
 from ..quadratic import Quadratic, Region, find_modes
+from ..quadratic.inverse_iteration import two_sided
 from ..quadratic.problem import times
 from ..results import off_rounding
 from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
@@ -75,7 +77,7 @@ class Along(OverNumber):
             if np.count_nonzero(np.abs(found.values - found.values[k]) <= SIMPLE * size[k]) > 1:
                 continue
             one = self._told(searched, complex(found.values[k]), found.right[:, [k]], found.left[:, [k]])
-            if one is not None and self._seen(one):
+            if one is not None and self._seen(one, found.right[:, k], found.left[:, k]):
                 result.append(one)
         return tuple(result)
 
@@ -87,8 +89,10 @@ class Along(OverNumber):
         full = told(self.family, lam, self.vectors(right, 0.0)[:, 0], self.vectors(left, 0.0, left=True)[:, 0])
         return None if full is None or full.root is None else replace(one, root=full.root)
 
-    def _seen(self, one: Opening) -> bool:
-        """Whether the mode is where its series leads to, on the way and where its growth or decay is seen."""
+    def _seen(self, one: Opening, right: ComplexArray, left: ComplexArray) -> bool:
+        """Whether the mode, vectors (r,), is where its series leads to, on the way and where its growth or decay is
+        seen."""
+        del right, left
         for t in (0.5 * one.until, one.until):
             found = self.eigenpairs(t)
             place = one.among(found.values, t)
@@ -254,6 +258,22 @@ class Whole(Along):
             pairs = self.squared(pairs) if self.family.reversible else self.without_rounding(pairs)
             self.remembered(self.moving(pairs))
         return self._known[mu]
+
+    def _seen(self, one: Opening, right: ComplexArray, left: ComplexArray) -> bool:
+        """See `Along`. What decays is looked for alone, as solving for all modes costs as much as a step of the way."""
+        if one.root is not None:
+            return super()._seen(one, right, left)
+        last = 0j
+        for t in (0.5 * one.until, one.until):
+            lam, problem = one.at(t), self.family.at(self.family.low + t)
+            try:
+                found = two_sided(problem, lam, right, left, beside=1e-6 * lam, solver=self.family.options.solver)
+            except SingularMatrix:
+                return False
+            if found is None or abs(found.lam - lam) > 1.5 * UNSTABLE_RELATIVE * abs(lam):
+                return False
+            last = found.lam
+        return last.real < 0
 
 
 def double_zeros(values: ComplexArray) -> int:

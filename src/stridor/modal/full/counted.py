@@ -34,6 +34,7 @@ SLOWEST = 1e-8  # of the highest frequency: growth slower than that is rounding
 STILL = 1e-3  # of the highest frequency: slower than that may be divergence
 TOGETHER = 0.25  # of the square of half the difference of two modes: what is left of it where they come together
 NEARBY = 0.05  # of |λ|: how far from where slopes lead it to a growing mode may be in the next interval's end
+CLOSELY = 1.5  # from one value to the next behind what opens at the low end
 AWAY = 0.1  # of |λ|, or of the highest frequency: how far a root in the smallest intervals may be from its mode
 EDGE = 1e-3  # of the highest frequency: modes that come in or leave there are no onsets
 ALIKE = 1e-7  # of the highest frequency: onsets at one value whose frequencies are no further apart are one
@@ -124,6 +125,18 @@ def opened_in(source: Along, low: float, top: float) -> tuple[Opening, ...]:
     return tuple(o for o in source.opened if o.root is not None and abs(o.root.lam) <= top)
 
 
+def beyond(opened: Sequence[Opening], low: float, first: float) -> list[float]:
+    """Values from where modes that open at the low end are seen to grow up to the first one that is looked at anyway:
+    what opens may end and begin again before that."""
+    found: list[float] = []
+    for one in opened:
+        t = one.until * CLOSELY
+        while low + t < first:
+            found.append(low + t)
+            t *= CLOSELY
+    return found
+
+
 def number_at(source: Along, mu: float, top: float, opened: Sequence[Opening] = ()) -> int:
     """How many roots grow at one value with |λ| up to top, those included that have opened and are not yet seen to."""
     t = mu - source.family.low
@@ -159,7 +172,9 @@ class _Search:
 
     def all(self) -> Counted:
         """The grid from end to end, and what changes in it."""
-        grid = [self._at(float(t)) for t in np.linspace(self.low, self.high, GRID[self.source.whole] + 1)]
+        even = np.linspace(self.low, self.high, GRID[self.source.whole] + 1)
+        early = beyond(self.opened, self.start, self.start + float(even[1]))
+        grid = [self._at(t) for t in sorted({*even.tolist(), *(mu - self.start for mu in early)})]
         onsets, passing = [as_onset(self.source.family, o.root) for o in self.opened if o.root], list[Passing]()
         for before, after in pairwise(grid):
             for low, high in self._changes(before, after):

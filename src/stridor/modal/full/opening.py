@@ -33,7 +33,7 @@ from .family import ROLES, Family
 ORDERS = 24  # of s: what grows so slowly that it is seen late must still be led to
 SIMPLE = 1e-6  # of |λ|: modes that are no further apart are not told
 CLEARLY = 1.2  # times rounding: growth that is counted whoever counts
-TAIL = 0.01  # of rounding: what the last orders may be
+TAIL, LAST = 0.01, 10  # of rounding: what the last orders may be, and how many these are
 NOISE = 1e-15  # of what sums are made of: rounding put in by hand
 DEGREE = 5.0  # and how many times that for each further power of μ in the matrices, which divided differences spoil
 RUNS, SPREAD = 2, 5.0  # how often that is done, and how many times what it changes a coefficient may be off
@@ -124,7 +124,7 @@ def _seen(series: ComplexArray, doubt: Array) -> tuple[float, bool, float, float
     """The s at which Re λ is clearly more than rounding, whether it grows there, and between which two s Re λ passes
     zero last before that; None where the series does not lead so far."""
     least = UNSTABLE_RELATIVE * float(abs(series[0]))
-    orders = np.arange(len(series) - 4, len(series))
+    orders = np.arange(len(series) - LAST, len(series))  # more than four: every other one may be zero
     with np.errstate(all="ignore"):
         reach = float(np.min((TAIL * least / np.abs(series[orders])) ** (1.0 / orders)))
     s = min(reach, 1.0) * FINE

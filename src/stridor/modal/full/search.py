@@ -18,7 +18,7 @@ from ..quadratic import RegionModes
 from .axis import walked
 from .basis import DENSE, WHOLE, Along, Whole, along
 from .branches import BranchOnset, all_values, solved
-from .counted import ALIKE, ON_IT, Counted, Lack, Passing, as_onset, counted, number_at, opened_in
+from .counted import ALIKE, ON_IT, Counted, Lack, Passing, as_onset, beyond, counted, number_at, opened_in
 from .family import Family
 from .follow import BEYOND, Followed
 from .growth import growing_roots, unstable
@@ -125,7 +125,9 @@ def _borne_out(answer: Answer, between: tuple[float, float], top: float) -> bool
     if source.whole and not opened:
         return True  # they were solved in full at every step
     onsets = [o for o in answer.onsets if _in_band(o, top)]
-    grid = [(mu, number_at(source, mu, top, opened)) for mu in _sampled(answer.onsets, between)]
+    sampled = _sampled(answer.onsets, between)
+    sampled = sorted({*sampled, *beyond(opened, between[0], sampled[1])})
+    grid = [(mu, number_at(source, mu, top, opened)) for mu in sampled]
     return not Counted(tuple(grid), (), ()).lacking(onsets)
 
 
@@ -214,7 +216,8 @@ def _ends_agree(family: Family, seen: Counted, ends: tuple[RegionModes, RegionMo
         size = np.abs(end.values)
         slack = 2 * int(np.count_nonzero(np.abs(size - top) <= ON_EDGE * top))
         # What begins on the very end is within rounding there; what lies beside it may or may not be.
-        beside = (o for o in seen.onsets if abs(o.mu - mu) <= ON_IT and (o.stabilising or o.mu != mu))
+        near = ON_IT * (family.high - family.low)
+        beside = (o for o in seen.onsets if abs(o.mu - mu) <= near and (o.stabilising or o.mu != mu))
         slack += sum(abs(o.roots) for o in beside)
         if abs(number - growing_roots(end.values[unstable(family, end.values, top) & (size <= top)])) > slack:
             return False
