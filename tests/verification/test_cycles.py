@@ -246,7 +246,7 @@ def test_what_was_found_is_kept_when_the_search_is_stopped():
 
 def test_a_cycle_is_kept_when_the_motion_to_it_is_stopped(monkeypatch: pytest.MonkeyPatch):
     """The motion goes on behind a cycle that is said to be unstable; stopped there, the cycle is not lost."""
-    closed, going_on = returns._closed, returns._next_change
+    closed, going_on = returns._closed, returns.next_change
     met: list[ClosedShot] = []
 
     def noted(*given) -> ClosedShot:
@@ -259,7 +259,7 @@ def test_a_cycle_is_kept_when_the_motion_to_it_is_stopped(monkeypatch: pytest.Mo
         return going_on(*given)
 
     monkeypatch.setattr(returns, "_closed", noted)
-    monkeypatch.setattr(returns, "_next_change", stopped)
+    monkeypatch.setattr(returns, "next_change", stopped)
     monkeypatch.setattr(returns, "SURE", 0.0)
     monkeypatch.setattr(returns, "multipliers", lambda _: np.array([2.0]))
     kept: list[Cycles] = []

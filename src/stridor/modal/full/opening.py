@@ -95,7 +95,8 @@ def told(family: Family, lam: complex, x: ComplexArray, y: ComplexArray) -> Open
         return opening
     if first <= AT_ONCE and last <= UNSURE * until:
         rate = float(series[1].real)
-        slope = rate / width if rate > doubt[1] else 0.0
+        # What is rounding all over the range is the matrices' own, as on a basis.
+        slope = rate / width if rate > max(float(doubt[1]), TAIL * UNSTABLE_RELATIVE * abs(lam)) else 0.0
         return replace(opening, root=Root(family.low, 1j * lam.imag, here.x, slope, None, residual, here.y))
     if last - first > AT_ONCE:
         return None
