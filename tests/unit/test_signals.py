@@ -100,26 +100,3 @@ def test_a_peak_beside_the_edge_of_what_is_looked_at_stays_between_its_bins() ->
     assert signals.Spectrum(frequency, lone, "hann", 1.0, 2.0).peak()[0] == pytest.approx(6.3)
 
 
-
-
-@pytest.mark.parametrize("periods", [2.0, 2.5, 3.4, 8.0, 8.5])
-@pytest.mark.parametrize("drift", [0.0, 30.0])
-def test_a_line_that_is_too_slow_to_be_told_is_not_told_as_the_edge(periods: float, drift: float) -> None:
-    """Its slope beyond the edge is no line, nor is a small one that a large slow one stands beside. A drift is none."""
-    n, dt = 1000, 1e-3
-    t = np.arange(n) * dt
-    small = 0.01 * np.sin(2 * np.pi * 50.0 * t)
-    signal = np.sin(2 * np.pi * periods * t + 1.0) * (drift == 0.0) + drift * np.exp(-3.0 * t) + small
-    spec = signals.spectrum(signal, dt)
-    found = spec.line(above_hz=4.0)[0]
-    if drift:
-        assert found == pytest.approx(50.0, abs=0.05)
-    elif periods < 4.0:
-        assert found == 0.0
-    else:
-        assert found == pytest.approx(periods, rel=0.02)
-
-
-def test_no_line_is_found_in_what_has_none() -> None:
-    assert signals.spectrum(np.zeros(100), 1e-3).line(above_hz=0.0) == (0.0, 0.0)
-    assert signals.spectrum(np.linspace(0.0, 1.0, 3), 1e-3).line(above_hz=0.0) == (0.0, 0.0)

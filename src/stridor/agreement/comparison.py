@@ -372,11 +372,10 @@ def dominant_line(
     signal: Array, sampling: float, max_frequency_hz: float, share: float = 0.5
 ) -> tuple[float | None, Growth | None]:
     """Frequency [Hz] of the largest line in the last share of a signal (k,) sampled every ``sampling`` [s], and the
-    growth of that line over all of it, as `dominant_response` has them; None for what there is not, or takes less than
-    four periods in that share."""
+    growth of that line over all of it, as `dominant_response` has them; None for what there is not."""
     filtered = low_passed(signal, sampling, max_frequency_hz)
     spec = spectrum(filtered[int(len(filtered) * (1.0 - share)) :], sampling)
-    frequency, amplitude = spec.line(above_hz=2 * spec.bandwidth_hz)
+    frequency, amplitude = spec.peak(above_hz=2 * spec.bandwidth_hz)
     if amplitude == 0.0:
         return None, None
     fitted = growth(filtered, sampling, frequency)

@@ -143,8 +143,7 @@ def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float]
 def of_run(summary: dict[str, Any]) -> Conclusion:
     """What vibrates at the end of a run in time; then both approaches side by side."""
     if summary["dominant_frequency_hz"] is None:
-        why = "too few records for a dominant frequency, nothing vibrates, or too slowly for the phase's length"
-        return Conclusion(f"last phase: {why}", "modes")
+        return Conclusion("last phase: too few records for a dominant frequency, or nothing vibrates", "modes")
     state = "saturated" if summary["saturated"] else "not saturated"
     rate = summary["growth_rate"]
     growth = "nowhere exponential growth" if rate is None else f"growth {measured(rate, 1)} 1/s where exponential"

@@ -50,17 +50,6 @@ class Spectrum:
         found = min(max(_interpolated(self.frequency_hz, self.amplitude, k), here - half), here + half)
         return found, float(self.amplitude[k])
 
-    def line(self, above_hz: float) -> tuple[float, float]:
-        """Frequency [Hz] and amplitude of the largest line above ``above_hz``; zeros where there is none, or a larger
-        one below. What only falls from the lowest bin on is a drift, and no line."""
-        a, f = self.amplitude, self.frequency_hz
-        tops = 1 + np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:]))
-        tops = tops[tops > 1]  # the first bin is the mean's neighbour
-        if not len(tops):
-            return 0.0, 0.0
-        k = int(tops[np.argmax(a[tops])])
-        return (0.0, 0.0) if f[k] <= above_hz else (_interpolated(f, a, k), float(a[k]))
-
 
 def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:
     """Vertex of the parabola through the logarithms of three bins."""
