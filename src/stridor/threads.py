@@ -7,6 +7,7 @@ one; beside other work the clock said 155 s instead of 54. Whole machines are fi
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache, wraps
@@ -61,3 +62,10 @@ def _libraries() -> Any:
     ours = [path for path in paths if any(name in path for name in OURS)]
     # Where all share one library, as in a conda environment, there is nothing to tell apart.
     return found.select(filepath=ours) if ours else found
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -86,7 +86,7 @@ def test_time_loops_take_constant_matrices(tmp_path: Path, call):
         (np.array([[2.0, 0.5], [0.5, 1.0]]), "the mass matrix is not diagonal, and beside unsymmetric matrices the time loop needs that; import a lumped mass matrix"),
         (np.array([[2.0, 0.5], [0.0, 1.0]]), "the mass matrix is not symmetric, and the time loop needs a diagonal one"),
         (np.diag([1.0, 0.0]), "1 freedom has no mass, and the time loop needs one at each"),
-        (np.diag([1.0, -1.0]), "1 freedom has no mass, and the time loop needs one at each"),
+        (np.diag([1.0, -1.0]), "1 freedom has a negative mass, and the time loop needs a positive one at each"),
     ],
 )  # fmt: skip
 def test_masses_that_the_time_loop_does_not_take(tmp_path: Path, call, mass, expected: str):
@@ -143,3 +143,16 @@ def test_the_verbs_say_it_in_one_line(tmp_path: Path):
     assert json.loads(done.stdout)["completeness"].startswith("Complete")
     # Nothing of what happens at exactly singular matrices gets through.
     assert "Warning" not in done.stderr
+
+
+@pytest.mark.parametrize("where", [slice(0, 1), slice(0, 2)])
+def test_negative_masses_are_told_before_what_they_make_grow(tmp_path: Path, where: slice):
+    mass = np.array([1.0, 1.0])
+    mass[where] *= -1
+    case = matrix_case(tmp_path, [(np.diag(mass), "mass", ""), (SPRINGS, "stiffness", ""), (BELT, "stiffness", "mu")], 1.0)
+    (tmp_path / "negative.toml").write_text(case.to_toml())
+    words = "1 freedom has" if where.stop == 1 else "2 freedoms have"
+    for verb in ("check", "modes"):
+        shown = stridor(verb, "negative.toml", cwd=tmp_path)
+        assert f"bodies.matrices: {words} a negative mass, and what grows" in " ".join(shown.stderr.split()), shown
+    assert all("negative mass" not in told for told in st.describe(model(tmp_path)).warnings)

@@ -584,7 +584,7 @@ def test_unsymmetric_matrices_that_time_does_not_take_are_told() -> None:
     mass[0, 1] = 0.5
     assert inputs.unfit_in_time(general(mass=mass)).startswith("the mass matrix is not symmetric, and the time loop needs")
     assert inputs.unfit_in_time(general(mass=np.diag([1.0, 0, 3]))).startswith("1 freedom has no mass, and the time loop")
-    assert inputs.unfit_in_time(general(mass=np.diag([1.0, 0, -3]))).startswith("2 freedoms have no mass")
+    assert inputs.unfit_in_time(general(mass=np.diag([1.0, 0, -3]))).startswith("1 freedom has a negative mass, and")
     for freedom, told in ((0, True), (1, True), (2, False)):
         lift = np.zeros((3, 1))
         lift[freedom] = 1.0

@@ -120,6 +120,12 @@ def test_what_the_file_says_of_itself(form, words):
     assert found.warnings[0].startswith("friction terms seem lost: 1 freedom is internal, as contact makes them,")
 
 
+def test_negative_masses_are_counted():
+    found = report(sp.csr_array(np.diag([1.0, -2.0, 0.0, -1e-9])), None, chain(4, 1.0))
+    assert "2 freedoms have a negative entry on the diagonal of M; is the sign of every factor right?" in found.warnings
+    assert not any("of M" in said for said in report(sp.csr_array(np.eye(4)), None, chain(4, 1.0)).warnings)
+
+
 def test_damping_that_drives_and_turns():
     damping = np.diag([1.0, -2.0, 0.0, 3.0])
     damping[2, 3], damping[3, 2] = 5.0, -5.0

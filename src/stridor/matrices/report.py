@@ -6,7 +6,7 @@ of the units.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -160,7 +160,7 @@ def report(
         warnings=(),
     )
     internal = 0 if kept is None else int(np.sum(kept.node < 0))
-    return replace(found, warnings=tuple(_warnings(found, internal, stored, c, k)))
+    return replace(found, warnings=tuple(_warnings(found, internal, stored, whole)))
 
 
 def single_lines(stored: StoredMatrix) -> list[str]:
@@ -366,8 +366,9 @@ def _eigenvalues(negative: int | None) -> str:
 
 
 def _warnings(
-    found: MatrixReport, internal: int, stored: Sequence[StoredMatrix], damping: Sparse, stiffness: Sparse
+    found: MatrixReport, internal: int, stored: Sequence[StoredMatrix], whole: Mapping[str, Sparse]
 ) -> list[str]:
+    mass, damping, stiffness = whole["mass"], whole["damping"], whole["stiffness"]
     said: list[str] = []
     if found.held:
         many = counted(found.held, "freedom has", "freedoms have")
@@ -384,6 +385,9 @@ def _warnings(
         said.append("the mass is zero; without a mass nothing vibrates")
     elif found.mass == "indefinite":
         said.append("M is indefinite, and energies can be negative; is it the mass?")
+    if lightened := int(np.sum(mass.diagonal() < 0)):
+        many = counted(lightened, "freedom has", "freedoms have")
+        said.append(f"{many} a negative entry on the diagonal of M; is the sign of every factor right?")
     if found.defect["mass"] > ROUNDING:
         said.append(f"M is not symmetric ({found.defect['mass']:.1e}); is it the mass?")
     if drawn := int(np.sum(stiffness.diagonal() < 0)):

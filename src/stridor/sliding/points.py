@@ -161,15 +161,15 @@ def _solve(system: System, force: Array, mu: Array, sense: Array, active: BoolAr
     # Multipliers are scaled to the stiffness so that the bordered matrix is well balanced.
     scale = float(np.abs(system.stiffness).max())
     compliance = np.diag([c.compliance for c in contacts]) if contacts else np.zeros((0, 0))
-    bordered = sp.block_array(
-        [
-            [system.stiffness, sp.csr_array(-push.T * scale)],
-            [sp.csr_array(normals * scale), sp.csr_array(compliance * scale * scale)],
-        ],
-        format="csc",
-    )
     right = np.concatenate([force, [-c.gap * scale for c in contacts]])
     with np.errstate(all="ignore"):
+        bordered = sp.block_array(
+            [
+                [system.stiffness, sp.csr_array(-push.T * scale)],
+                [sp.csr_array(normals * scale), sp.csr_array(compliance * scale * scale)],
+            ],
+            format="csc",
+        )
         try:
             solver = spl.splu(bordered, permc_spec="COLAMD")
             answer = solver.solve(right)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -23,6 +22,7 @@ from ..stages import stage
 from ..study.case_key import files_of
 from ..study.fingerprint import contents
 from ..study.provenance import provenance
+from ..threads import available_cores
 from ..typing import Array, IntArray
 from . import reduced_rows
 from .effect import without_effect
@@ -320,14 +320,7 @@ def unit_of(path: str) -> str:
 
 def _workers(task: Task, count: int | None, scheduler: str | None) -> Workers:
     if scheduler is None:
-        return LocalWorkers(task, count or available())
+        return LocalWorkers(task, count or available_cores())
     from .cluster import ClusterWorkers
 
     return ClusterWorkers(task, scheduler)
-
-
-def available() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

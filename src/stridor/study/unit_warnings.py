@@ -13,6 +13,7 @@ from ..laws import Material
 from ..matrices.report import guessed_units
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths
+from ..system.given_matrices import without_mass
 from ..system.imported import load_terms
 from ..system.meshes import load_mesh
 from ..typing import Array
@@ -20,6 +21,24 @@ from ..typing import Array
 LEAST_PER_WAVE = 4.0  # elements per shear wavelength below which a frequency is not resolved
 MOST_PER_WAVE = 1e5  # above it, lengths are hardly in metres
 MANY_PER_WAVE, SMALL_BODY = 1e3, 2e-3  # nor are they above this in a body smaller than this [m]
+
+
+def modal_warnings(case: Case) -> list[str]:
+    """What makes modes wrong though every problem is solved."""
+    return [*resolution_warnings(case), *mass_warnings(case)]
+
+
+def mass_warnings(case: Case) -> list[str]:
+    """Bodies of imported matrices with negative masses."""
+    found: list[str] = []
+    for name, body in case.bodies.items():
+        without = without_mass(load_terms(case, name, body).mass) if isinstance(body, MatrixBody) else ""
+        if "negative" in without:
+            found.append(
+                f"bodies.{name}: {without}, and what grows for that is no squeal; is the sign of every factor right, "
+                "and is it the mass?"
+            )
+    return found
 
 
 def resolution_warnings(case: Case) -> list[str]:

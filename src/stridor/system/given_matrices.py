@@ -85,10 +85,18 @@ def not_symmetric_definite(mass: Sparse, damping: Sparse, stiffness: Sparse) -> 
     for matrix, what in zip((mass, damping, stiffness), _ROLES, strict=True):
         if not is_symmetric(matrix):
             return f"the {what} matrix is not symmetric"
-    without = int(np.count_nonzero(mass.diagonal() <= 0.0))
-    if without:
-        return f"{without} freedoms have no mass" if without > 1 else "1 freedom has no mass"
+    if without := without_mass(mass):
+        return without
     return "" if definiteness(mass)[0] == "positive definite" else "the mass matrix is not positive definite"
+
+
+def without_mass(mass: Sparse) -> str:
+    """How many freedoms have a negative entry on the diagonal of M (n, n), or else a zero; "" where none has."""
+    diagonal = mass.diagonal()
+    for odd, what in ((diagonal < 0.0, "a negative mass"), (diagonal == 0.0, "no mass")):
+        if many := int(np.count_nonzero(odd)):
+            return f"{counted(many, 'freedom has', 'freedoms have')} {what}"
+    return ""
 
 
 def contacts_given(contacts: object, size: int) -> tuple[tuple[Contact, ...], dict[str, float]]:

@@ -6,7 +6,6 @@ state for a restart are kept. Members that fail do not stop others.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
@@ -16,7 +15,7 @@ from ..errors import AnalysisError, CaseError, StridorError
 from ..interrupts import at_once, held
 from ..stages import passing, stage
 from ..system import System
-from ..threads import one_thread
+from ..threads import available_cores, one_thread
 from .devices import Gpu, first_line, place
 from .inputs import check_inputs
 from .legs import Legs, in_two, leg_phases, legs_of
@@ -92,10 +91,11 @@ def march_all(
             raise AnalysisError(f"{said}; device cpu runs it")
         said = f"on the CPU: {said}"
     stage("time loop of an ensemble; the first one of a version is compiled for up to a minute")
-    blocks = common.cut(_cuts(len(tracks), cores or _all_cores()))
+    blocks = common.cut(_cuts(len(tracks), cores or available_cores()))
     with at_once():  # compiles the loop or loads it, before anybody waits for its end
         blocks[0].warm()
-    return EnsembleOutcome(True, "", _at_the_same_time(blocks, legs, progress, cores or _all_cores()), step, said=said)
+    found = _at_the_same_time(blocks, legs, progress, cores or available_cores())
+    return EnsembleOutcome(True, "", found, step, said=said)
 
 
 def _on(gpu: Gpu, common: Block) -> tuple[list[Block], str]:
@@ -128,13 +128,6 @@ def _shared(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> 
     modes, why = choose_path(system, settings)
     assert modes is not None
     return modal_stepper(system, settings, None, modes, why), ""
-
-
-def _all_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _cuts(count: int, cores: int) -> list[int]:

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from ..errors import CaseError, Problem
 from ..system import System
+from ..system.given_matrices import without_mass
 from ..system.imported import is_symmetric
 from .schedule import PhaseSpec
 
@@ -22,7 +23,6 @@ def unfit_in_time(system: System) -> str:
         return ""
     mass = sp.csr_array(system.mass)
     diagonal = mass.diagonal()
-    without = int(np.count_nonzero(diagonal <= 0.0))
     off = sp.csr_array(mass - sp.diags_array(diagonal))
     if off.nnz and float(np.abs(off.data).max()) > DIAGONAL * float(np.abs(diagonal).max()):
         if not is_symmetric(mass):
@@ -31,9 +31,8 @@ def unfit_in_time(system: System) -> str:
             "the mass matrix is not diagonal, and beside unsymmetric matrices the time loop needs that; import a "
             "lumped mass matrix"
         )
-    if without:
-        words = f"{without} freedoms have" if without > 1 else "1 freedom has"
-        return f"{words} no mass, and the time loop needs one at each"
+    if without := without_mass(mass):
+        return f"{without}, and the time loop needs {'a positive one' if 'negative' in without else 'one'} at each"
     carried = _carried(system)
     if carried:
         return (

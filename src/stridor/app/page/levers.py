@@ -10,7 +10,6 @@ from ...case import Case
 from ...case.overrides import number_at
 from ...errors import CaseError
 
-MU_TOP = 1.0  # of the slider at least
 MOST = 60  # levers
 STEPS = 200  # of a slider, from one end to the other
 

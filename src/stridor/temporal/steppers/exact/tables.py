@@ -14,7 +14,7 @@ from ....kernels import njit
 from ....typing import Array, ComplexArray, IntArray
 from .forms import Forms, planes_of
 from .search import Numbers, Parts, planes
-from .statuses import GAP, Driven, Flow, Row
+from .statuses import Driven, Flow, Row
 
 # Of a leg: rows are on [q; v; p], [Re ζ; Im ζ] (2f,) or on what is slow (S,).
 (
@@ -109,11 +109,3 @@ def option_parts(driven: Driven) -> list[Array]:
         stacked([driven.gap(c) for c in contacts]),
         stacked([driven.opening(c) for c in contacts]),
     ]
-
-
-def code_of(status: Sequence[int]) -> int:
-    """A number for a status, the first contact first."""
-    found = GAP
-    for now in status:
-        found = 4 * found + now
-    return found
