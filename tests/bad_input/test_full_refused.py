@@ -152,7 +152,7 @@ def test_negative_masses_are_told_before_what_they_make_grow(tmp_path: Path, whe
     case = matrix_case(tmp_path, [(np.diag(mass), "mass", ""), (SPRINGS, "stiffness", ""), (BELT, "stiffness", "mu")], 1.0)
     (tmp_path / "negative.toml").write_text(case.to_toml())
     words = "1 freedom has" if where.stop == 1 else "2 freedoms have"
-    for verb in ("check", "modes"):
+    for verb in ("check", "modes", "sensitivities"):
         shown = stridor(verb, "negative.toml", cwd=tmp_path)
         assert f"bodies.matrices: {words} a negative mass, and what grows" in " ".join(shown.stderr.split()), shown
     assert all("negative mass" not in told for told in st.describe(model(tmp_path)).warnings)

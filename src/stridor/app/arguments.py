@@ -108,7 +108,7 @@ class Call:
         case = load(self.path, [*(self.set_ or ()), *own])
         if self.solver is not None and self.solver != "auto":
             os.environ["STRIDOR_SOLVER"] = self.solver
-        self.warn(case.warnings)
+        self.warn_of(case)
         from ..study.workspace import Workspace
         from ..threads import limited
 
@@ -134,6 +134,14 @@ class Call:
             if warning and warning not in self.told:
                 self.told.append(warning)
                 self.say(f"warning: {warning}")
+
+    def warn_of(self, case: Case) -> None:
+        """Say what is odd about a case before anything is computed."""
+        self.warn(case.warnings)
+        if case.imported:
+            from ..study.unit_warnings import mass_warnings
+
+            self.warn(mass_warnings(case))
 
     def warn_of_idle(self) -> None:
         """Say which settings had no effect."""

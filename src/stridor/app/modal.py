@@ -64,13 +64,13 @@ def shapes(
     """Shapes of modes: picture, animated page, ParaView file, and where friction feeds them."""
     work = call.workspace(source, max_frequency, undamped=undamped)
 
-    from ..study.unit_warnings import modal_warnings
+    from ..study.unit_warnings import resolution_warnings
     from .conclusions import of_shapes
     from .pictures import write_shapes
     from .tables import table
 
     friction, chosen = call.one_friction(mu), band_of(band, work.modal.max_frequency_hz, branch)
-    call.warn(modal_warnings(work.case(call.verb)))
+    call.warn(resolution_warnings(work.case(call.verb)))
     documents = write_shapes(work, call.folder, mu=friction, branches=branch or None, band_hz=chosen, gif=gif)
     for document in documents:
         for path in document["files"]:
@@ -109,7 +109,7 @@ def modes(
     work = call.workspace(source, max_frequency, undamped=undamped)
 
     from ..study import analyses
-    from ..study.unit_warnings import modal_warnings
+    from ..study.unit_warnings import resolution_warnings
     from ..view.modal_plots import frequency_branches, root_locus
     from .conclusions import of_modes
     from .output import counting
@@ -118,7 +118,7 @@ def modes(
     values = None if mu is None else numbers(mu, "--mu")
     call.check_friction(values)
     chosen = band_of(band, work.modal.max_frequency_hz)
-    call.warn(modal_warnings(work.case(call.verb)))
+    call.warn(resolution_warnings(work.case(call.verb)))
     order: Literal["frequency", "growth"]
     order = "growth" if one_of(sort, "--sort", ("frequency", "growth")) == "growth" else "frequency"
     with counting("modes, friction coefficients", quiet=call.quiet, worth=len(values or ()) > WORTH_A_BAR) as progress:
@@ -182,7 +182,7 @@ def onsets(
             return
 
     from ..study import analyses
-    from ..study.unit_warnings import modal_warnings
+    from ..study.unit_warnings import resolution_warnings
     from ..view.onset_plots import onset_chart
     from .conclusions import of_onsets
     from .show_modes import show_onsets
@@ -190,7 +190,7 @@ def onsets(
     said = "--range" if along is None else "--between"
     chosen = None if friction_range is None else call.range_of_friction(friction_range, said)
     asked = band_of(band, loaded.modal.max_frequency_hz)
-    call.warn(modal_warnings(loaded))
+    call.warn(resolution_warnings(loaded))
     result = analyses.onsets(work, chosen, band_hz=asked)
     call.keep(result, "onsets.nc")
     call.tabulate(result, "onsets.csv")
@@ -207,11 +207,11 @@ def onsets(
 def _onsets_along(call: Call, case: Case, name: str, between: tuple[float, float] | None) -> None:
     """Onsets along a number of the case: sought on a model reduced over its range, each solved in the full problem."""
     from ..study.along import onsets_along
-    from ..study.unit_warnings import modal_warnings
+    from ..study.unit_warnings import resolution_warnings
     from ..view.onset_plots import onset_chart
     from .conclusions import of_onsets_along
 
-    call.warn(modal_warnings(case))
+    call.warn(resolution_warnings(case))
     chosen = None if call.solver in (None, "auto") else call.solver
     found = onsets_along(case, name, between, solver=chosen, said="--between")
     call.warn(found.warnings)

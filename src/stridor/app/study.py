@@ -52,7 +52,7 @@ def study(
         raise CaseError("--workers", workers, "goes without --scheduler, which has workers of its own")
     one = None if part is None else Part.read(part)
     loaded = Study.load(call.path, call.set_ or [])
-    call.warn(loaded.base().warnings)
+    call.warn_of(loaded.base())
     if merge:
         result = _merged(call)
     else:

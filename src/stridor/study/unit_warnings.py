@@ -23,11 +23,6 @@ MOST_PER_WAVE = 1e5  # above it, lengths are hardly in metres
 MANY_PER_WAVE, SMALL_BODY = 1e3, 2e-3  # nor are they above this in a body smaller than this [m]
 
 
-def modal_warnings(case: Case) -> list[str]:
-    """What makes modes wrong though every problem is solved."""
-    return [*resolution_warnings(case), *mass_warnings(case)]
-
-
 def mass_warnings(case: Case) -> list[str]:
     """Bodies of imported matrices with negative masses."""
     found: list[str] = []
