@@ -20,7 +20,7 @@ from .coupling import PointCoupling
 from .deflation import deflation
 from .receptance import Receptance, wanted_pairs
 from .shift_inverted import companion
-from .single_contact import SingleContact, polish_single
+from .single_contact import NUDGE, SingleContact, polish_single
 
 CONVERGED = 1e-9  # of the step before last: convergence is at least quadratic
 MAX_STEPS = 40
@@ -343,7 +343,10 @@ def polish(
     for _ in range(steps):
         index = np.flatnonzero(active)
         step = _step(spectrum, roots, implied, index, nearby, mu)
-        relative = np.abs(step) / np.maximum(np.abs(roots[index]), 1e-300)
+        # On a pole to the last bit there is no step: a nudge leads off it, which is no sign of convergence.
+        nudged = ~np.isfinite(step)
+        step = np.where(nudged, NUDGE * roots[index], step)
+        relative = np.where(nudged, np.inf, np.abs(step) / np.maximum(np.abs(roots[index]), 1e-300))
         roots[index] = roots[index] - step
         # Beside a coalescence the last digits stagnate above that; no step helps further then.
         done = (relative < CONVERGED) | ((relative < 1e-7) & (relative >= 0.5 * smallest[index]))
@@ -374,9 +377,10 @@ def _step(
         value, by_lambda, _ = spectrum.evaluate(lam, mu)
         single = value.shape[1] == 1
         slope = by_lambda[:, 0, 0] / value[:, 0, 0] if single else _trace_of_quotient(value, by_lambda)
-        step = 1.0 / (slope + deflation(roots, implied, index, poles, spectrum.modes.poles))
-    # On a pole to the last bit there is no step: a nudge leads off it.
-    return np.where(np.isfinite(step), step, 1e-9 * lam)
+        others = deflation(roots, implied, index, poles, spectrum.modes.poles)
+        step = 1.0 / (slope + others)
+    # A root hit exactly stays, unless another one is there already.
+    return np.where((value[:, 0, 0] == 0.0) & np.isfinite(others), 0.0, step) if single else step
 
 
 def _trace_of_quotient(value: ComplexArray, slope: ComplexArray) -> ComplexArray:

@@ -18,6 +18,9 @@ from .receptance import real_mode_sums
 NO_POLES = np.zeros(0, dtype=complex)
 
 
+NUDGE = 1e-9  # of λ: a step off a pole
+
+
 class SingleContact(NamedTuple):
     """T at one μ: damping (n,), stiffness (n,) and products (2, n) of the modes, compliance 1/K_c, and μ s."""
 
@@ -62,10 +65,14 @@ def _polished(
             normal, tangential = sums[k, 0], sums[k, 1]
             value = complex(compliance + normal[0] + friction * tangential[0], normal[1] + friction * tangential[1])
             slope = complex(normal[2] + friction * tangential[2], normal[3] + friction * tangential[3])
-            step = _quotient(complex(1.0, 0.0), _quotient(slope, value) + others[k])
-            if not (np.isfinite(step.real) and np.isfinite(step.imag)):
-                step = 1e-9 * lam[k]  # on a pole to the last bit there is no step: a nudge leads off it
             own = index[k]
+            step = complex(0.0, 0.0)  # where T is zero to the last bit
+            if value != 0.0 or not np.isfinite(others[k]):
+                step = _quotient(complex(1.0, 0.0), _quotient(slope, value) + others[k])
+            if not (np.isfinite(step.real) and np.isfinite(step.imag)):
+                # On a pole to the last bit there is no step: a nudge leads off it, which is no sign of convergence.
+                roots[own] = roots[own] - NUDGE * lam[k]
+                continue
             relative = abs(step) / max(abs(roots[own]), 1e-300)
             roots[own] = roots[own] - step
             # Beside a coalescence the last digits stagnate above that; no step helps further then.
