@@ -5,12 +5,14 @@ from __future__ import annotations
 import gc
 import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import stridor as st
+from matrix_cases import matrix_case
 from stridor.app.page.bench import Bench
 from stridor.app.page.drawing import drawing
 from stridor.app.page.mesh_marks import held_nodes, pushes, slides
@@ -178,3 +180,12 @@ def test_a_load_is_drawn_once_with_its_own_number():
     case = st.Case(**data)
     svg = drawing(case, build_system(case))
     assert [svg.count(f">{words}<") for words in ("20 N", "60 N")] == [1, 1]
+
+
+def test_negative_masses_are_told_beside_what_they_make_grow(tmp_path: Path):
+    springs, belt = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([[0.0, -4 / 3], [0.0, 0.0]])
+    for mass, words in ((-1.0, "bodies.matrices: 1 freedom has a negative mass"), (1.0, "")):
+        terms = [(np.diag([1.0, mass]), "mass", ""), (springs, "stiffness", ""), (belt, "stiffness", "mu")]
+        text = matrix_case(tmp_path, terms, 1.0).to_toml()
+        told = answered(Bench(), first_state(Source("case", text, str(tmp_path))))["model"]["warnings"]
+        assert any(said.startswith(words) for said in told) if words else not any("mass" in said for said in told)

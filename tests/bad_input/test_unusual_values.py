@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import types
+import warnings
 from typing import Annotated, Any, Union, get_args, get_origin
 
 import pytest
@@ -359,6 +360,16 @@ def test_verbs_refuse_an_infinite_friction(verb: str, tmp_path: Any, capsys: pyt
     assert code == 2
     assert err.startswith("stridor: --mu: ")
     assert "inf" in err
+
+
+def test_friction_beyond_all_bounds_ends_in_our_words(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "case.toml").write_text(SHORT.text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        code, _, err = program(["modes", str(tmp_path / "case.toml"), "--mu", "1e308"], capsys)
+    assert code != 0
+    assert "no equilibrium" in err
+    assert "Warning" not in err
 
 
 def test_verbs_warn_of_friction_that_is_asked_for(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:

@@ -122,8 +122,8 @@ def test_what_the_file_says_of_itself(form, words):
 
 def test_negative_masses_are_counted():
     found = report(sp.csr_array(np.diag([1.0, -2.0, 0.0, -1e-9])), None, chain(4, 1.0))
-    assert "2 freedoms have a negative entry on the diagonal of M; is the sign of every factor right?" in found.warnings
-    assert not any("of M" in said for said in report(sp.csr_array(np.eye(4)), None, chain(4, 1.0)).warnings)
+    assert "2 freedoms have a negative mass; is the sign of every factor right?" in found.warnings
+    assert not any("mass" in said for said in report(sp.csr_array(np.eye(4)), None, chain(4, 1.0)).warnings)
 
 
 def test_damping_that_drives_and_turns():

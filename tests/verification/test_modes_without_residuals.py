@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ import pytest
 import stridor as st
 from benches import Slave, bench, paper_case
 from stridor.modal.complex_modes import complex_modes
-from stridor.modal.single_contact import SingleContact, polish_single
+from stridor.modal.roots import CONVERGED, polish
+from stridor.modal.single_contact import NUDGE, SingleContact, polish_single
 
 MU = np.linspace(0.0, 0.6, 7)
 
@@ -35,18 +37,50 @@ def test_eigenvalues_for_pictures_are_those_of_the_answer(seed):
     assert np.max(np.abs(drawn.eigenvalues - judged.eigenvalues) / np.abs(judged.eigenvalues)) < 1e-9
 
 
-@pytest.mark.parametrize("start", ["root", "pole"])
-def test_a_step_off_a_pole_is_no_convergence(start):
-    """1/λ² + 1/(λ² + 2w²) is zero at ±jw, to the last bit for whole w: an iteration ends there, wherever it begins, and
-    not where a nudge left it. Rounding decides for which w the nudge looks smaller than what counts as convergence."""
-    for w in range(1, 400):
-        stiffness = np.array([0.0, 2.0 * w * w])
-        contact = SingleContact(np.zeros(2), stiffness, np.array([[1.0, 1.0], [0.0, 0.0]]), 0.0, 0.0)
-        pole = complex(0.0, w) if start == "root" else complex(0.0, np.sqrt(stiffness[1]))
-        roots = np.array([pole])
-        left = polish_single(roots, np.zeros(1, dtype=bool), contact, (stiffness, np.zeros(2)), 40, 1e-9)
-        assert left == 0
-        assert abs(abs(roots[0]) - w) <= 1e-14 * w, w
+class OneNumber:
+    """T = 1/λ² + 1/(λ² + 2w²), as `polish` has it where there are several contacts; its poles are at 0 and √2 jw."""
+
+    modes = SimpleNamespace(poles=np.zeros(0, dtype=complex))
+    slow_poles = np.zeros(2, dtype=bool), np.zeros(2)
+
+    def __init__(self, w: float) -> None:
+        self.pole_stiffness, self.pole_damping = np.array([0.0, 2.0 * (w * w)]), np.zeros(2)
+
+    def single(self, mu: float) -> None:
+        return None
+
+    def evaluate(self, lam, mu):
+        parts = [lam * lam + k for k in self.pole_stiffness]
+        value, slope = sum(1 / p for p in parts), sum(-2 * lam / p**2 for p in parts)
+        return value[:, None, None], slope[:, None, None], np.zeros_like(value)[:, None, None]
+
+
+def compiled(w: float, start: complex) -> tuple[complex, bool]:
+    stiffness, products = np.array([0.0, 2.0 * (w * w)]), np.array([[1.0, 1.0], [0.0, 0.0]])
+    contact, roots = SingleContact(np.zeros(2), stiffness, products, 0.0, 0.0), np.array([start])
+    left = polish_single(roots, np.zeros(1, dtype=bool), contact, (stiffness, np.zeros(2)), 40, CONVERGED)
+    return roots[0], left == 0
+
+
+def written_out(w: float, start: complex) -> tuple[complex, bool]:
+    roots, converged = polish(OneNumber(w), np.array([start]), np.zeros(1, dtype=bool), 0.0)
+    return roots[0], converged
+
+
+@pytest.mark.parametrize("polished", [compiled, written_out])
+@pytest.mark.parametrize("begin", ["root", "pole"])
+def test_a_step_off_a_pole_is_no_convergence(polished, begin):
+    """1/λ² + 1/(λ² + 2w²) is zero at ±jw to the last bit: an iteration ends there wherever it begins, and not where a
+    nudge left it. Rounding decides for which w a nudge looks smaller than what counts as convergence: for one in some
+    hundred."""
+    every = np.random.default_rng(5).uniform(1.0, 1e4, 20_000)
+    begins = every if begin == "root" else np.sqrt(2.0 * (every * every))
+    looks_so = np.abs(NUDGE * 1j * begins) / begins < CONVERGED
+    assert looks_so.sum() > 5
+    for w, imag in zip(every[looks_so], begins[looks_so], strict=True):
+        root, converged = polished(float(w), complex(0.0, float(imag)))
+        assert converged
+        assert abs(abs(root) - w) <= 1e-14 * w, w
 
 
 def test_whoever_asks_for_residuals_gets_them_whatever_was_asked_before():

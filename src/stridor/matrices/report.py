@@ -192,6 +192,18 @@ def held_freedoms(stiffness: Sparse) -> IntArray:
     return np.flatnonzero(stiffness.diagonal() >= HELD)
 
 
+def negative_mass(mass: Sparse) -> str:
+    """How many freedoms have a negative entry on the diagonal of M (n, n), in words; "" where none has."""
+    negative = int(np.count_nonzero(mass.diagonal() < 0))
+    return f"{counted(negative, 'freedom has', 'freedoms have')} a negative mass" if negative else ""
+
+
+def no_mass(mass: Sparse) -> str:
+    """How many freedoms have no entry on the diagonal of M (n, n), in words; "" where none is without."""
+    without = int(np.count_nonzero(mass.diagonal() == 0))
+    return f"{counted(without, 'freedom has', 'freedoms have')} no mass" if without else ""
+
+
 def definiteness(matrix: Sparse) -> tuple[Definiteness, int | None]:
     """Of the symmetric part of A (n, n), without its empty rows; and how many eigenvalues are negative, if known.
 
@@ -385,9 +397,8 @@ def _warnings(
         said.append("the mass is zero; without a mass nothing vibrates")
     elif found.mass == "indefinite":
         said.append("M is indefinite, and energies can be negative; is it the mass?")
-    if lightened := int(np.sum(mass.diagonal() < 0)):
-        many = counted(lightened, "freedom has", "freedoms have")
-        said.append(f"{many} a negative entry on the diagonal of M; is the sign of every factor right?")
+    if negative := negative_mass(mass):
+        said.append(f"{negative}; is the sign of every factor right?")
     if found.defect["mass"] > ROUNDING:
         said.append(f"M is not symmetric ({found.defect['mass']:.1e}); is it the mass?")
     if drawn := int(np.sum(stiffness.diagonal() < 0)):

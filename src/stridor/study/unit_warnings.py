@@ -10,10 +10,9 @@ from ..case.oddities import in_si_units
 from ..case.usual import LENGTH, USUAL, unusual
 from ..fe.solid import wave_speeds
 from ..laws import Material
-from ..matrices.report import guessed_units
+from ..matrices.report import guessed_units, negative_mass
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths
-from ..system.given_matrices import without_mass
 from ..system.imported import load_terms
 from ..system.meshes import load_mesh
 from ..typing import Array
@@ -27,10 +26,9 @@ def mass_warnings(case: Case) -> list[str]:
     """Bodies of imported matrices with negative masses."""
     found: list[str] = []
     for name, body in case.bodies.items():
-        without = without_mass(load_terms(case, name, body).mass) if isinstance(body, MatrixBody) else ""
-        if "negative" in without:
+        if isinstance(body, MatrixBody) and (negative := negative_mass(load_terms(case, name, body).mass)):
             found.append(
-                f"bodies.{name}: {without}, and what grows for that is no squeal; is the sign of every factor right, "
+                f"bodies.{name}: {negative}, and what grows for that is no squeal; is the sign of every factor right, "
                 "and is it the mass?"
             )
     return found

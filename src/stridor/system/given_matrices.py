@@ -17,7 +17,7 @@ from ..case.schema import Contact as ContactCase
 from ..case.schema import Friction
 from ..contact.interface import Contact, Rows, pair
 from ..errors import CaseError, Problem
-from ..matrices.report import definiteness
+from ..matrices.report import definiteness, negative_mass, no_mass
 from ..matrices.source import counted
 from ..typing import Array, Sparse
 from .imported import cleaned, is_symmetric
@@ -85,18 +85,9 @@ def not_symmetric_definite(mass: Sparse, damping: Sparse, stiffness: Sparse) -> 
     for matrix, what in zip((mass, damping, stiffness), _ROLES, strict=True):
         if not is_symmetric(matrix):
             return f"the {what} matrix is not symmetric"
-    if without := without_mass(mass):
-        return without
+    if odd := negative_mass(mass) or no_mass(mass):
+        return odd
     return "" if definiteness(mass)[0] == "positive definite" else "the mass matrix is not positive definite"
-
-
-def without_mass(mass: Sparse) -> str:
-    """How many freedoms have a negative entry on the diagonal of M (n, n), or else a zero; "" where none has."""
-    diagonal = mass.diagonal()
-    for odd, what in ((diagonal < 0.0, "a negative mass"), (diagonal == 0.0, "no mass")):
-        if many := int(np.count_nonzero(odd)):
-            return f"{counted(many, 'freedom has', 'freedoms have')} {what}"
-    return ""
 
 
 def contacts_given(contacts: object, size: int) -> tuple[tuple[Contact, ...], dict[str, float]]:

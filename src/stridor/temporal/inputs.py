@@ -9,8 +9,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import CaseError, Problem
+from ..matrices.report import negative_mass, no_mass
 from ..system import System
-from ..system.given_matrices import without_mass
 from ..system.imported import is_symmetric
 from .schedule import PhaseSpec
 
@@ -31,8 +31,10 @@ def unfit_in_time(system: System) -> str:
             "the mass matrix is not diagonal, and beside unsymmetric matrices the time loop needs that; import a "
             "lumped mass matrix"
         )
-    if without := without_mass(mass):
-        return f"{without}, and the time loop needs {'a positive one' if 'negative' in without else 'one'} at each"
+    if negative := negative_mass(mass):
+        return f"{negative}, and the time loop needs a positive one at each"
+    if without := no_mass(mass):
+        return f"{without}, and the time loop needs one at each"
     carried = _carried(system)
     if carried:
         return (

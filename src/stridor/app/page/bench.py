@@ -19,6 +19,7 @@ from ...errors import CaseError, StridorError
 from ...modal.complex_modes import ComplexModes
 from ...modal.onsets import Onset, Onsets
 from ...study.analyses import modes, onsets
+from ...study.unit_warnings import mass_warnings
 from ...study.workspace import Workspace
 from ...system import System
 from .drawing import drawing
@@ -257,8 +258,8 @@ def _described(model: _Model) -> dict[str, Any]:
     work = model.work if model.reduced is None else model.reduced.work
     case, system = model.work.case("the page"), work.system()
     return {
-        "title": case.title, "freedoms": system.size, "svg": drawing(case, system), "warnings": case.warnings,
-        "large": system.size > LARGE, "why": model.why,
+        "title": case.title, "freedoms": system.size, "svg": drawing(case, system),
+        "warnings": [*case.warnings, *mass_warnings(case)], "large": system.size > LARGE, "why": model.why,
     }  # fmt: skip
 
 
