@@ -17,9 +17,11 @@ import stridor as st
 from stridor.app.page import bench as bench_module
 from stridor.app.page.bench import Bench
 from stridor.app.page.mode_data import tornado_at
+from stridor.app.page.model_reduced import Reduced
 from stridor.app.page.runs import ENDS, Queue, Run, Wish
 from stridor.app.page.state import Source, State, first_state
 from stridor.case import template_text
+from stridor.modal.parametric import ReducedModes, restricted
 from stridor.study.workspace import Workspace
 
 FINE = template_text("two-beams").replace("elements = 90", "elements = 180").replace("stiffness = 1e-8", "stiffness = 1e-9")
@@ -72,6 +74,36 @@ def test_it_is_made_once_and_the_stiffness_moves_on_it(answered: Callable[[State
     at = [content for part, content in again if part == "at"][-1]
     modes = st.modes(case, mu=0.25, max_frequency_hz=40e3, check=False)
     assert [m["growth_rate"] for m in at["modes"]] == pytest.approx([float(modes.growth_rate[0, b]) for b in modes.order(0)], rel=1e-4, abs=1e-3)
+
+
+def test_moves_of_friction_take_what_the_curves_span_and_nothing_else_does(monkeypatch: pytest.MonkeyPatch):
+    made = Reduced.made(STATE, lambda _: None)
+    for _ in made.sweep(STATE):
+        pass
+    states = [replace(STATE, mu=mu) for mu in (0.017, 0.2, 0.3, 0.433)]
+    whole = [made.here(state) for state in states]
+    made.prepare()
+    assert made._line is None  # of so small a model the curves need all but a few unknowns
+    monkeypatch.setattr(restricted, "WORTH", 1.0)
+    made.prepare()
+    line = made._line
+    assert line is not None
+    assert line.restricted.model.size < made.model.size
+    for state, (wanted, error) in zip(states, whole, strict=True):
+        assert line.modes(made._point(state)) is not None
+        found, estimated = made.here(state)
+        assert found.branch.tolist() == wanted.branch.tolist()
+        assert np.abs(found.eigenvalues - wanted.eigenvalues).max() <= 1e-10 * np.abs(wanted.eigenvalues).max()
+        assert estimated() == pytest.approx(error(), rel=0.5, abs=1e-10)
+    off = replace(STATE.with_change(STIFF, 3e9), mu=0.25)
+    assert line.modes(made._point(off)) is None  # the curves were those of another stiffness
+    assert line.modes({**made._point(STATE), "mu": 1e3}) is None  # beyond them
+    fewer = replace(line, numbered=[replace(one, modes=_without_last(one.modes)) for one in line.numbered])
+    assert fewer.modes(made._point(STATE)) is None  # a mode that none of them has
+
+
+def _without_last(modes: ReducedModes) -> ReducedModes:
+    return replace(modes, values=modes.values[:-1], right=modes.right[:, :-1], left=modes.left[:, :-1])
 
 
 def test_a_mode_of_it_moves_all_of_the_model(answered: Callable[[State], list[tuple[str, Any]]]):

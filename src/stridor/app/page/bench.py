@@ -181,6 +181,7 @@ class Bench:
             found = model.locus
             for found, error in reduced.sweep(state):
                 send("locus", {**locus_of(found), "said": _certified(reduced, error)})
+            reduced.prepare()
             model.locus = found  # of all points: what is given up halfway is drawn anew
             send("model", _described(model))
             here, error_of = reduced.here(state, vectors=state.branch is not None)
