@@ -25,6 +25,9 @@ from .single_contact import NUDGE, SingleContact, polish_single
 CONVERGED = 1e-9  # of the step before last: convergence is at least quadratic
 MAX_STEPS = 40
 UNCOUPLED_TOLERANCE = 1e-12
+APART = 1e-12  # of the largest: squares of poles nearer to each other have no room between them
+HALVINGS = 100  # of the interval between two poles at most
+NEAR_ROOT = 1e-8  # of its square: as near as the iteration wants a start
 
 
 @dataclass(frozen=True)
@@ -256,21 +259,58 @@ def _dense_undamped(spectrum: ReceptanceProblem, limit: float) -> ComplexArray |
     """Undamped coupled roots with damping to first order; None where that is too strong for a start."""
     keep = _coupled_columns(spectrum)
     normal = spectrum.receptance.real[0::2][:, keep]
-    compliance = spectrum.coupling.compliance
-    basis, stiffness = _elastic(normal, compliance, np.diag(spectrum.modes.stiffness[keep]))
-    inertia = np.eye(stiffness.shape[0])
-    # Inverting about a shift gives the low modes to full accuracy whatever K_c is.
-    shift = (limit / 10) ** 2
-    inverse, vectors = sl.eigh(inertia, stiffness + shift * inertia)
-    low = inverse > 1.0 / ((1.3 * limit) ** 2 + shift)
-    squares = np.maximum(1.0 / inverse[low] - shift, 0.0)
-    shapes = basis @ vectors[:, low]
+    compliance, poles = spectrum.coupling.compliance, spectrum.modes.stiffness[keep]
+    found = _between_poles(normal[0], float(compliance[0]), poles, (1.3 * limit) ** 2) if len(normal) == 1 else None
+    squares, shapes = _densely(normal, compliance, poles, limit) if found is None else found
     damping = np.einsum("ij,i,ij->j", shapes, spectrum.modes.damping[keep], shapes) / np.einsum(
         "ij,ij->j", shapes, shapes
     )
     if np.any(damping**2 > 0.04 * squares):
         return None
     return -damping / 2 + 1j * np.sqrt(squares - damping**2 / 4)
+
+
+def _between_poles(normal: Array, compliance: float, poles: Array, top: float) -> tuple[Array, Array] | None:
+    """Squares ω² up to ``top`` and shapes (n, k) on the modes where one contact couples them: the zeros of
+
+        1/K_c + Σ φ²/(ω_i² − x) ,
+
+    which grows from −∞ to ∞ between two poles, so that there is one between each and the next and none below the first.
+    Near enough for `polish`. None where poles coincide, or one is negative.
+    """
+    order = np.argsort(poles)
+    poles, squared = poles[order], normal[order] ** 2
+    # With K_c infinite there is none above the last pole.
+    last = poles[-1:] + squared.sum() / compliance if compliance else poles[:0]
+    low, width = poles[: len(poles) - 1 + len(last)], np.diff(np.append(poles, last))
+    if not len(low) or poles[0] < 0 or np.any(width <= APART * np.abs(poles[-1])):
+        return None
+    low, width = low[low < top], width[: int(np.sum(low < top))]
+    before, after = np.zeros(len(low)), np.ones(len(low))
+    away = poles[:, None] - low
+    for _ in range(HALVINGS):
+        middle = (before + after) / 2
+        above = compliance + squared @ (1.0 / (away - middle * width)) > 0
+        before, after = np.where(above, before, middle), np.where(above, middle, after)
+        if np.all((after - before) * width <= NEAR_ROOT * (low + before * width)):
+            break
+    part = (before + after) / 2
+    shapes = np.empty((len(poles), len(low)))
+    shapes[order] = normal[order, None] / (away - part * width)
+    squares = low + part * width
+    inside = squares < top
+    return squares[inside], shapes[:, inside]
+
+
+def _densely(normal: Array, compliance: Array, poles: Array, limit: float) -> tuple[Array, Array]:
+    """The same for any number of contacts from the dense problem, up to 1.3 ``limit``."""
+    basis, stiffness = _elastic(normal, compliance, np.diag(poles))
+    inertia = np.eye(stiffness.shape[0])
+    # Inverting about a shift gives the low modes to full accuracy whatever K_c is.
+    shift = (limit / 10) ** 2
+    inverse, vectors = sl.eigh(inertia, stiffness + shift * inertia)
+    low = inverse > 1.0 / ((1.3 * limit) ** 2 + shift)
+    return np.maximum(1.0 / inverse[low] - shift, 0.0), basis @ vectors[:, low]
 
 
 def _elastic(normal: Array, compliance: Array, stiffness: Array) -> tuple[Array, Array]:

@@ -53,9 +53,9 @@ class View:
         if body.beam is None:
             return self.pick(body.displacements(np.array([nearest_node(body, at)])).ravel())
         freedoms, values = body.beam.interpolation(at.distance)
-        full = sp.lil_array((3, self.total))
-        full[:, body.offset + freedoms] = values
-        return self.rows(full.tocsr())
+        row, column = np.nonzero(values)
+        where = row, body.offset + freedoms[column]
+        return self.rows(sp.csr_array((values[row, column], where), shape=(len(values), self.total)))
 
     def node_rows(self, body: BuiltBody, nodes: IntArray | None = None) -> Rows:
         """Displacements (k d, n) of nodes in turn, of all nodes if none are given."""
