@@ -12,7 +12,7 @@ stable for Δt² ω² ≤ (2/β2)(1 + (β2 − 1/2) Δt c) (docs/theory-temporal
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -67,8 +67,14 @@ def share_of(system: System) -> float:
 def step_limit(system: System, beta2: float) -> StepLimit:
     """Courant limit √(2/β2)/ω_max of the assembled structure; contacts by multipliers do not lower it.
 
-    Damping can only raise it (equal for β2 = 1/2), so the undamped frequency is used.
+    Damping can only raise it (equal for β2 = 1/2), so the undamped frequency is used. Of the same matrices it is sought
+    once.
     """
+    limit = system.of_matrices.once(("step limit", beta2), lambda: _sought(system, beta2))
+    return replace(limit, share=share_of(system))
+
+
+def _sought(system: System, beta2: float) -> StepLimit:
     worst, body = 0.0, "the system"
     for part in system.components:
         mass = system.mass[part][:, part].toarray()
@@ -86,4 +92,4 @@ def step_limit(system: System, beta2: float) -> StepLimit:
             body = owners[0] if owners else "the system"
     omega = float(np.sqrt(worst))
     step = float(np.sqrt(2.0 / beta2) / omega) if omega > 0 else np.inf
-    return StepLimit(step, omega, body, share_of(system))
+    return StepLimit(step, omega, body)

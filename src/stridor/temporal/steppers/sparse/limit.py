@@ -28,7 +28,7 @@ converge from above.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -60,8 +60,13 @@ class _Mode:
 def step_limit_assembled(system: System, beta2: float) -> StepLimit:
     """Courant limit [s] of the scheme with lagged damping, body by body; contacts by multipliers do not lower it.
 
-    Raises AnalysisError where a freedom has no mass.
+    Of the same matrices it is sought once. Raises AnalysisError where a freedom has no mass.
     """
+    limit = system.of_matrices.once(("lagged step limit", beta2), lambda: _sought(system, beta2))
+    return replace(limit, share=min(share_of(system), limit.share))
+
+
+def _sought(system: System, beta2: float) -> StepLimit:
     mass = system.mass.diagonal()
     if not np.all(mass > 0.0):
         raise AnalysisError("the mass matrix is not positive definite: a freedom has stiffness but no mass")
@@ -81,8 +86,7 @@ def step_limit_assembled(system: System, beta2: float) -> StepLimit:
         step = 0.5 / (beta2 * mode.margin * math.sqrt(max(mode.value, 0.0)))
         if step < best:
             best, body = step, _owner(system, int(np.argmax(np.abs(mode.vector))))
-    share = min(share_of(system), CIRCULATORY_SHARE if parts.circulatory.nnz else np.inf)
-    return StepLimit(best, omega, body, share)
+    return StepLimit(best, omega, body, CIRCULATORY_SHARE if parts.circulatory.nnz else np.inf)
 
 
 def _part_limit(stiffness: Sparse, lagged: Sparse, beta2: float) -> tuple[float, float, Array]:
