@@ -20,7 +20,7 @@ import pytest
 import scipy.sparse as sp
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection, QuadMesh
-from matplotlib.colors import to_rgb, to_rgba
+from matplotlib.colors import to_hex, to_rgb, to_rgba
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -33,10 +33,12 @@ from stridor.laws import Coulomb
 from stridor.system.model import Line, Solid, System
 from stridor.temporal.node_history import NodeHistory
 from stridor.view import field_plots, solid_plots
-from stridor.view.animation import QUANTA, animation_gif, animation_html
+from stridor.view.animation import animation_gif, animation_html
 from stridor.view.depth_picture import Camera, sharp_edges, surface_picture
 from stridor.view.field_plots import MAP_COLOURS, contact_map, contact_snapshot, interface_energy
 from stridor.view.interface_columns import arc_length, columns_along
+from stridor.view.mode_motion import QUANTA
+from stridor.view.mode_page import COLOURS
 from stridor.view.skin import normals, skin_of, surface_facets
 from stridor.view.style import lay_out
 
@@ -389,6 +391,14 @@ def test_page_holds_the_complex_motion():
     turn = motion[0, 2] / (skin.motion[0, 2] / 2e-6)
     assert np.isclose(abs(turn), 1.0, atol=1e-4)
     assert np.allclose(motion, turn * skin.motion / 2e-6, atol=1e-4)  # every phase, so that the wave travels
+
+
+def test_colours_of_the_page_are_those_of_the_figures():
+    shades = mpl.colormaps[solid_plots.AMPLITUDES](np.linspace(0.0, 1.0, len(COLOURS)))
+    assert list(COLOURS) == [to_hex(shade) for shade in shades]
+    data = page_of(animation_html(space_system(), travelling(space_system()), frequency_hz=4321.0))
+    assert data["ramp"] == [[round(255 * v) for v in shade[:3]] for shade in shades]
+    assert data["colours"] == [[round(255 * v) for v in to_rgb(solid_plots.body_colour(k))] for k in range(2)]
 
 
 def test_page_needs_nothing_else_and_says_how_the_mode_grows():

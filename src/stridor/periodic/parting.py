@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import scipy.stats
+from scipy.special import stdtrit
 
 from ..errors import AnalysisError
 from ..temporal.steppers.exact.varied import VariedMotion
@@ -138,7 +138,7 @@ def parting(
     halves = [float(np.sum([g[0] for g in grown[a + 1 : b + 1]])) for a, b in (edges[[0, 8]], edges[[8, 16]])]
     with np.errstate(invalid="ignore"):
         spread = np.std(rates, axis=0, ddof=1) / np.sqrt(PARTS)
-    wide = float(scipy.stats.t.ppf(0.5 + 0.5 * SURE, PARTS - 1))
+    wide = float(stdtrit(PARTS - 1, 0.5 + 0.5 * SURE))
     margins = np.where(np.isfinite(spread), wide * spread, np.inf)
     return Unclosed(
         problem.value, (float(total[0] / lasting), float(total[1] / lasting)),

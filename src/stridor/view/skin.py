@@ -10,8 +10,12 @@ import numpy as np
 from ..errors import CaseError
 from ..system import System
 from ..typing import Array, ComplexArray, IntArray
+from .colours import COLOURS
 
 AMPLITUDE = 0.08  # of the model's extent: how far the largest motion is drawn
+VIEW = (28.0, -58.0)  # elevation and azimuth [degrees]
+EDGES_UP_TO = 6000  # facets; with more of them their edges would cover the colours
+CONCENTRATED = 0.15  # of the largest amplitude: three quarters of the nodes move less where one corner moves
 
 # Corner nodes only: middle nodes bend an edge by less than a drawing shows. Corners turn counter-clockwise seen from
 # outside, triangles repeat their last corner.
@@ -193,6 +197,17 @@ def drawn_scale(skin: Skin, largest: float, scale: float | None) -> float:
             raise CaseError("scale", scale, "a finite number, or nothing for one that suits the drawing")
         return float(scale)
     return AMPLITUDE * skin.extent / largest if largest > 0 else 0.0
+
+
+def concentrated(skin: Skin) -> bool:
+    """Whether the amplitudes of a cycle are small nearly everywhere."""
+    amplitude = np.linalg.norm(np.abs(skin.motion), axis=1)
+    return bool(len(amplitude)) and float(np.quantile(amplitude, 0.75)) < CONCENTRATED * float(amplitude.max())
+
+
+def body_colour(index: int) -> str:
+    """The colour of body number ``index``; after the last one they begin again."""
+    return COLOURS[index % len(COLOURS)]
 
 
 def normals(points: Array, facets: IntArray) -> Array:

@@ -21,16 +21,25 @@ from matplotlib.tri import Triangulation
 from ..errors import CaseError
 from ..system import System
 from ..typing import Array, ComplexArray
-from .colours import COLOURS, GREY, INK
+from .colours import GREY, INK
 from .depth_picture import Camera, sharp_edges, surface_picture
-from .skin import Skin, at_largest, distinct, drawn_scale, facet_edges, mode_title, skin_of
+from .skin import (
+    EDGES_UP_TO,
+    VIEW,
+    Skin,
+    at_largest,
+    body_colour,
+    concentrated,
+    distinct,
+    drawn_scale,
+    facet_edges,
+    mode_title,
+    skin_of,
+)
 from .style import WIDTH, legend_above, new_figure, root_figure, styled
 
-VIEW = (28.0, -58.0)  # elevation and azimuth [degrees]
-EDGES_UP_TO = 6000  # facets; with more of them their edges would cover the colours
 AMPLITUDES = "viridis"
 PIXELS = 1100  # of a solid in space, along the longer side
-CONCENTRATED = 0.15  # of the largest amplitude: three quarters of the nodes move less where one corner moves
 
 
 @styled
@@ -132,12 +141,6 @@ def draw_frame(
     return figure
 
 
-def concentrated(skin: Skin) -> bool:
-    """Whether the amplitudes of a cycle are small nearly everywhere."""
-    amplitude = np.linalg.norm(np.abs(skin.motion), axis=1)
-    return bool(len(amplitude)) and float(np.quantile(amplitude, 0.75)) < CONCENTRATED * float(amplitude.max())
-
-
 def _swept(skin: Skin, scale: float | None) -> list[Array]:
     """Points (k, d) at rest and at the extremes of a cycle."""
     return [skin.points, *(deformed_at(skin, scale=scale, phase=k * np.pi / 4)[0] for k in range(8))]
@@ -149,11 +152,6 @@ def deformed_at(skin: Skin, *, scale: float | None, phase: float) -> tuple[Array
     moved = (rotated * np.exp(1j * phase)).real
     size = np.linalg.norm(moved, axis=1) / (largest or 1.0)
     return skin.points + drawn_scale(skin, largest, scale) * moved, size
-
-
-def body_colour(index: int) -> str:
-    """The colour of body number ``index``; after the last one they begin again."""
-    return COLOURS[index % len(COLOURS)]
 
 
 def _camera(skin: Skin, view: tuple[float, float]) -> Camera | None:

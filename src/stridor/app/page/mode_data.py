@@ -17,7 +17,7 @@ from ...study.countermeasures import default_numbers, whole_matrices
 from ...study.sensitivities import sensitivities
 from ...study.workspace import Workspace
 from ...system import System
-from ...view.animation import growth_in_words, page_data
+from ...view.mode_motion import growth_in_words, page_data
 from ...view.skin import mode_title, skin_of
 
 SAME = 1e-4  # of λ: how far apart one mode may lie in the full problem and in a reduced one

@@ -10,7 +10,7 @@ from typing import Any
 from nicegui import ui
 
 from ...errors import CaseError
-from ...view.animation import animation_shell
+from ...view.mode_page import animation_shell
 from .panel import Panel
 from .runs import Wish
 from .session import Session
