@@ -44,8 +44,9 @@ def serving(*words: str) -> Generator[tuple[subprocess.Popen[str], str]]:
 
 
 @contextmanager
-def page_at(browser: Any, address: str, *, width: int = 1280, height: int = 720, **more: Any) -> Generator[Any]:
-    """A page that has drawn its case; nothing may be asked of another computer, and the script may not fail."""
+def page_at(browser: Any, address: str, *, width: int = 1280, height: int = 720, lost: bool = False, **more: Any) -> Generator[Any]:
+    """A page that has drawn its case; nothing may be asked of another computer, and the script may not fail. lost: at
+    its end the server only hears nothing of it any more; otherwise it is closed as a tab is."""
     context = browser.new_context(viewport={"width": width, "height": height}, **more)
     page = context.new_page()
     failed: list[str] = []
@@ -55,6 +56,9 @@ def page_at(browser: Any, address: str, *, width: int = 1280, height: int = 720,
     page.wait_for_function(f"{SOLVED} && {READY}", timeout=PATIENT)
     try:
         yield page
+        if not lost:
+            with page.expect_event("close", timeout=PATIENT):
+                page.close(run_before_unload=True)
     finally:
         context.close()
     assert not failed

@@ -74,6 +74,7 @@ class Layout:
         panel_map.build(self.panels["map"].classes("st-map"), session)
         self.panels["map"].set_visibility(False)
         ui.on("stridor-hello", lambda event: self._hello(event, charts))
+        ui.on("stridor-bye", session.leave)
         session.on_change(self._follow)
         session.on_picture(self._show)
 

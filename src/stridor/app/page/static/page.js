@@ -411,6 +411,8 @@ const stridor = (() => {
     } else setTimeout(hello, 30);
   };
   setTimeout(hello, 0);
+  // Who closes or reloads the page is gone at once; who is only not heard of has a while to come back.
+  window.addEventListener("pagehide", (event) => { if (!event.persisted && typeof emitEvent === "function") emitEvent("stridor-bye", {}); });
   const copyLink = () => navigator.clipboard?.writeText(location.href).catch(() => problem("the link could not be copied: take the address of the page"));
   return { state, levers, follow, forget, show, problem, start, turnDark, copyLink };
 })();
