@@ -188,18 +188,36 @@ def test_a_row_that_kills_its_workers_fails_and_others_do_not(tmp_path: Path) ->
     assert workers.lost == 4
 
 
+def _own_parent(task: Task, batch: SampleBatch) -> Iterator[tuple[int, Row]]:
+    """Who computes a row, and what it came off."""
+    for place in batch.places:
+        yield place, {"status": 1, "seconds": 0.1, "parent": os.getppid()}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="workers are forked off on Linux only")
+def test_workers_come_off_one_process_and_start_without_it_where_it_was_killed() -> None:
+    parents: list[int] = []
+    for _ in range(3):
+        with LocalWorkers(Task("", "modes", ("mu",), Keep()), 1, _own_parent) as workers:
+            (rows,) = workers.answers(iter([SampleBatch((0,), ((0.0,),), (False,))]))
+        parents.append(rows[0]["parent"])
+        if len(parents) == 2:
+            assert parents[0] == parents[1] != os.getpid()
+            os.kill(parents[1], signal.SIGKILL)
+    assert parents[2] != parents[1]
+
+
 def test_workers_end_with_the_process_that_has_them(case: st.Case, tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
     (tmp_path / "study.toml").write_text(KILLED.replace("points = 40", "points = 4000"), encoding="utf-8")
     words = [sys.executable, "-c", RUN, "study.toml", "out"]
     with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.DEVNULL) as process:
         until = time.monotonic() + 60
-        while not (children := _children(process.pid)) and time.monotonic() < until:
-            time.sleep(0.1)
-        time.sleep(1.5)
-        children |= _children(process.pid)
+        while not (tmp_path / "out/study.zarr/status/c").exists() and time.monotonic() < until:
+            time.sleep(0.1)  # rows are written only once workers have answered
+        children = _children(process.pid)
         process.kill()
-    assert children
+    assert len(children) >= 2
     until = time.monotonic() + 20
     while any(map(_runs, children)) and time.monotonic() < until:
         time.sleep(0.1)
@@ -207,8 +225,10 @@ def test_workers_end_with_the_process_that_has_them(case: st.Case, tmp_path: Pat
 
 
 def _children(number: int) -> set[int]:
+    """Of these as well: workers may be forked off a process that has everything loaded."""
     found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(number)], capture_output=True, text=True, check=False)
-    return {int(word) for word in found.stdout.split()}
+    own = {int(word) for word in found.stdout.split()}
+    return own.union(*map(_children, own))
 
 
 def _runs(number: int) -> bool:

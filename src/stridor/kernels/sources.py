@@ -22,7 +22,7 @@ PACKAGE = __name__.partition(".")[0]
 SUFFIXES = (".py", ".pyc")  # the latter where a package is installed without its sources
 # Layers above all that is compiled, which nothing below may import (the contract of import-linter): no kernel can
 # depend on them, and whoever works on them need not wait for the time loop to be compiled again.
-ABOVE = ("app", "io", "view", "study", "agreement")
+ABOVE = ("app", "studies", "io", "view", "study", "agreement")
 # Settings of numba that change the code it makes.
 _SETTINGS = (
     "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "USING_SVML", "DISABLE_INTEL_SVML", "CPU_NAME",

@@ -6,8 +6,10 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import signal
 import sys
 from collections.abc import Callable, Generator
+from functools import cache
 from typing import Any
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -15,20 +17,80 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_
 
 def spawned(target: Callable[..., object], name: str, *given: Any) -> tuple[Any, Any]:
     """A new process with one BLAS thread, ``target(pipe, *given)`` in it, and our end of the pipe."""
-    context = multiprocessing.get_context("spawn")
+    return _started("spawn", target, name, given)
+
+
+def forked(target: Callable[..., object], name: str, *given: Any, loaded: str) -> tuple[Any, Any]:
+    """As `spawned`, on Linux off a process that has imported the module ``loaded``: each new one costs no imports.
+
+    It lives as long as this process and what came off it. On other systems libraries do not stand being forked.
+    """
+    if sys.platform == "linux":
+        try:
+            with one_thread_each(), main_left_out(), _forked_off(_server(os.getpid(), loaded)):
+                return _started("forkserver", target, name, given)
+        except (EOFError, OSError):
+            pass  # it was killed meanwhile
+    return spawned(target, name, *given)
+
+
+def _started(method: str, target: Callable[..., object], name: str, given: tuple[Any, ...]) -> tuple[Any, Any]:
+    context: Any = multiprocessing.get_context(method)
     ours, theirs = context.Pipe()
-    process = context.Process(target=target, args=(theirs, *given), name=name, daemon=True)
-    with one_thread_each(), main_left_out():
-        process.start()
-    theirs.close()  # so that the pipe ends with the process
+    try:
+        process = context.Process(target=target, args=(theirs, *given), name=name, daemon=True)
+        with one_thread_each(), main_left_out():
+            process.start()
+    finally:
+        theirs.close()  # so that the pipe ends with the process
     return process, ours
 
 
+@cache
+def _server(process: int, loaded: str) -> Any:
+    """The one that processes are forked off, of a process by its number: one that is forked itself has its own.
+
+    It is not Python's own, which others may use and which would have our number of threads.
+    """
+    from multiprocessing.forkserver import ForkServer
+
+    del process
+    server: Any = ForkServer()
+    server.set_forkserver_preload([loaded])
+    return server
+
+
 @contextlib.contextmanager
-def one_thread_each() -> Generator[None]:
+def _forked_off(server: Any) -> Generator[None]:
+    """Let the method "forkserver" fork off this one. It hears no Ctrl-C, which is for the process that has it."""
+    from multiprocessing import forkserver
+
+    module: Any = forkserver
+    path = {"PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path)), "PYTHONSAFEPATH": "1"}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        with _environment(path):  # it is to import what this process would
+            server.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    usual = module.connect_to_new_process
+    module.connect_to_new_process = server.connect_to_new_process
+    try:
+        yield
+    finally:
+        module.connect_to_new_process = usual
+
+
+def one_thread_each() -> contextlib.AbstractContextManager[None]:
     """Processes that start here compute with one thread: there are as many as cores."""
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
+    return _environment(dict.fromkeys(THREADS, "1"))
+
+
+@contextlib.contextmanager
+def _environment(values: dict[str, str]) -> Generator[None]:
+    """Processes that start here have these in their environment."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
     try:
         yield
     finally:

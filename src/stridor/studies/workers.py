@@ -20,12 +20,13 @@ from multiprocessing.connection import wait
 from typing import Any
 
 from ..errors import AnalysisError
-from .processes import spawned
+from .processes import forked
 from .rows import Row
 from .task import SampleBatch, Task, answered, died
 
 TRIES = 3  # of a row by itself, at which a worker dies
 EVERY = 0.25  # seconds between the results that a worker sends
+LOADED = __name__.rpartition(".")[0] + ".loaded"  # what workers need, imported once for all of them
 PATIENCE = 5.0  # seconds that a worker has to end
 
 
@@ -128,7 +129,7 @@ class LocalWorkers:
         return {}
 
     def _started(self) -> _Worker:
-        worker = _Worker(*spawned(_work, "stridor study", self.task, self.answer))
+        worker = _Worker(*forked(_work, "stridor study", self.task, self.answer, loaded=LOADED))
         self._workers.append(worker)
         return worker
 
