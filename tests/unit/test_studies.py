@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,10 +23,11 @@ from program import stridor
 from stridor.case import template_text
 from stridor.studies import reduced_rows
 from stridor.studies.parts import Part
+from stridor.studies.processes import forked
 from stridor.studies.rows import Row, failed, full_row
 from stridor.studies.tables import Keep
 from stridor.studies.task import SampleBatch, Task
-from stridor.studies.workers import LocalWorkers
+from stridor.studies.workers import LOADED, LocalWorkers
 
 FEW = ["bodies.beam1.elements=3", "bodies.beam2.elements=6", "modal.max_frequency_hz=3e3"]
 MASS = "bodies.beam1.damping.mass"
@@ -205,6 +207,22 @@ def test_workers_come_off_one_process_and_start_without_it_where_it_was_killed()
             assert parents[0] == parents[1] != os.getpid()
             os.kill(parents[1], signal.SIGKILL)
     assert parents[2] != parents[1]
+
+
+def _surroundings(pipe: Any) -> None:
+    pipe.send((os.environ.get("STRIDOR_TOLD"), os.environ["OPENBLAS_NUM_THREADS"], os.getcwd()))
+
+
+def test_a_process_has_the_folder_and_the_environment_of_the_moment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for told in ("first", "second"):
+        (tmp_path / told).mkdir()
+        monkeypatch.chdir(tmp_path / told)
+        monkeypatch.setenv("STRIDOR_TOLD", told)
+        process, pipe = forked(_surroundings, "told", loaded=LOADED)
+        assert pipe.recv() == (told, "1", str(tmp_path / told))
+        process.join()
 
 
 def test_workers_end_with_the_process_that_has_them(case: st.Case, tmp_path: Path) -> None:

@@ -8,10 +8,12 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Generator
 from functools import cache
 from typing import Any
 
+_one_at_a_time = threading.Lock()
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -28,10 +30,17 @@ def forked(target: Callable[..., object], name: str, *given: Any, loaded: str) -
     if sys.platform == "linux":
         try:
             with one_thread_each(), main_left_out(), _forked_off(_server(os.getpid(), loaded)):
-                return _started("forkserver", target, name, given)
+                return _started("forkserver", _surrounded, name, (dict(os.environ), target, *given))
         except (EOFError, OSError):
             pass  # it was killed meanwhile
     return spawned(target, name, *given)
+
+
+def _surrounded(pipe: Any, environment: dict[str, str], target: Callable[..., object], *given: Any) -> None:
+    """In the environment that there is now, not that of the time when the first process was forked."""
+    os.environ.clear()
+    os.environ.update(environment)
+    target(pipe, *given)
 
 
 def _started(method: str, target: Callable[..., object], name: str, given: tuple[Any, ...]) -> tuple[Any, Any]:
@@ -73,12 +82,13 @@ def _forked_off(server: Any) -> Generator[None]:
             server.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    usual = module.connect_to_new_process
-    module.connect_to_new_process = server.connect_to_new_process
-    try:
-        yield
-    finally:
-        module.connect_to_new_process = usual
+    with _one_at_a_time:  # what two threads take turns to put back would stay
+        usual = module.connect_to_new_process
+        module.connect_to_new_process = server.connect_to_new_process
+        try:
+            yield
+        finally:
+            module.connect_to_new_process = usual
 
 
 def one_thread_each() -> contextlib.AbstractContextManager[None]:
