@@ -190,6 +190,14 @@ def test_a_row_that_kills_its_workers_fails_and_others_do_not(tmp_path: Path) ->
     assert workers.lost == 4
 
 
+def test_a_row_writes_no_text_of_its_case(case: st.Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> str:
+        raise AssertionError("this takes as long as some rows")
+
+    monkeypatch.setattr(st.Case, "to_toml", refuse)
+    assert full_row(case, "modes", {"mu": 0.2}, Keep())["status"] == 1
+
+
 def _own_parent(task: Task, batch: SampleBatch) -> Iterator[tuple[int, Row]]:
     """Who computes a row, and what it came off."""
     for place in batch.places:

@@ -17,7 +17,7 @@ from ..modal.growing import doubt
 from ..modal.onset import Onsets
 from ..modal.results import grows
 from ..study.analyses import compare, modes, onsets, simulate, steady_sliding, summarise
-from ..study.workspace import Workspace
+from ..study.workspace import Unsaved, Workspace
 from ..typing import ComplexArray, IntArray
 from .checks import FRICTION
 from .tables import Compute, Keep
@@ -51,7 +51,7 @@ def full_row(case: Case, compute: Compute, values: Mapping[str, float], keep: Ke
     started = time.perf_counter()
     try:
         varied = case.with_({path: value for path, value in values.items() if path != FRICTION})
-        row = _COMPUTED[compute](Workspace(varied), values.get(FRICTION), keep)
+        row = _COMPUTED[compute](Unsaved(varied), values.get(FRICTION), keep)
         row |= {"status": 1, "error": "", "source": "full"}
     except StridorError as error:
         row = failed(str(error))

@@ -215,3 +215,13 @@ class Workspace(Shown):
 
 Problem = Case | System | Workspace | str | PathLike[str]
 """What every analysis takes; a text is the path of a case file."""
+
+
+class Unsaved(Workspace):
+    """Of what is drawn, or of which numbers alone are kept: no text of the case goes with its results, which takes as
+    long as some of them."""
+
+    @property
+    def text(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Nothing."""
+        return ""

@@ -20,7 +20,7 @@ from ...modal.complex_modes import ComplexModes
 from ...modal.onsets import Onset, Onsets
 from ...study.analyses import modes, onsets
 from ...study.unit_warnings import mass_warnings
-from ...study.workspace import Workspace
+from ...study.workspace import Unsaved, Workspace
 from ...system import System
 from .drawing import drawing
 from .levers import friction_range
@@ -35,15 +35,6 @@ LARGE = 600  # freedoms, beyond which an answer takes longer than a slider waits
 DIGITS = 6  # of numbers that are drawn only
 
 Send = Callable[[str, Any], None]
-
-
-class _Drawn(Workspace):
-    """Of what is drawn, not saved: no text of the case goes with its results, which takes as long as some of them."""
-
-    @property
-    def text(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Nothing."""
-        return ""
 
 
 @dataclass
@@ -105,7 +96,7 @@ class Bench:
         if self._model is None or self._model.key != state.model:
             self._model = None
             case = state.case()
-            model = _Model(state.model, state.stamp, _Drawn(case))
+            model = _Model(state.model, state.stamp, Unsaved(case))
             if self._reduced is not None and self._reduced.holds(state):
                 model.reduced = self._reduced
             elif _built(model).size > LARGE:
@@ -147,7 +138,7 @@ class Bench:
             self._shape(model, work.system(state.mu), here, state.branch, send, energy=True)
         self._leisure = True
         send(IDLE, None)
-        model.idle = model.idle or _Drawn(work.case("the page"))
+        model.idle = model.idle or Unsaved(work.case("the page"))
         self._at_leisure(state, model, model.idle, send)
 
     def _at_leisure(self, state: State, model: _Model, work: Workspace, send: Send) -> None:
@@ -189,7 +180,7 @@ class Bench:
         model.onsets = model.onsets or reduced.onsets(state)
         send("onsets", model.onsets)
         if state.branch is not None:
-            model.idle = model.idle or _Drawn(model.work.case("the page"))
+            model.idle = model.idle or Unsaved(model.work.case("the page"))
             found = self._shape(model, model.idle.system(), here, state.branch, send, energy=True)
             if found and not offered:  # its number was not known before the curves were
                 send("tornado", _asked_for(state, reduced.seconds))
