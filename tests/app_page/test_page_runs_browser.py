@@ -47,19 +47,17 @@ def endless(tmp_path_factory: pytest.TempPathFactory) -> Generator[tuple[Any, st
         yield found
 
 
-def runs_of(server: Any) -> int:
-    """How many processes of runs the server has, beside the one of the page: children of its fork server."""
-    parents: dict[int, int] = {}
+def processes_of(server: Any) -> int:
+    """How many processes the server has: that of each page, and those of runs."""
+    children = 0
     for status in Path("/proc").glob("[0-9]*/stat"):
         try:
             words = status.read_text().rpartition(")")[2].split()
             command = (status.parent / "cmdline").read_bytes()
         except OSError:
             continue
-        if words[0] != "Z" and b"spawn_main" in command:
-            parents[int(status.parent.name)] = int(words[1])
-    own = [pid for pid, parent in parents.items() if parent == server.pid]
-    return len(own) + sum(parent in own for parent in parents.values()) - 1
+        children += int(words[1]) == server.pid and words[0] != "Z" and b"spawn_main" in command
+    return children
 
 
 def test_a_run_is_drawn_and_heard(browser: Any, shortly: tuple[Any, str]) -> None:
@@ -120,15 +118,15 @@ def test_a_reload_in_the_middle_of_a_run_ends_it_and_the_page_goes_on(browser: A
         page.reload()  # of which the server is told
         wait(page, f"{SOLVED} && {READY}")
         until = time.monotonic() + 20
-        while runs_of(server) > 1 and time.monotonic() < until:
+        while processes_of(server) > 1 and time.monotonic() < until:
             time.sleep(0.1)
-        assert runs_of(server) <= 1
+        assert processes_of(server) <= 1
         page.click("#st-run-go")
         wait(page, "stridorRun.page.picture !== null")
     until = time.monotonic() + 20  # twice as long as a page may be away
-    while runs_of(server) and time.monotonic() < until:
+    while processes_of(server) and time.monotonic() < until:
         time.sleep(0.1)
-    assert runs_of(server) == 0
+    assert processes_of(server) == 0
 
 
 def test_a_page_that_is_left_ends_what_it_has_at_once(browser: Any, endless: tuple[Any, str]) -> None:
@@ -137,12 +135,12 @@ def test_a_page_that_is_left_ends_what_it_has_at_once(browser: Any, endless: tup
         page.evaluate("dispatchEvent(new PageTransitionEvent('pagehide', { persisted: true }))")  # it may come back
         slide(page, "mu", 0.2)
         wait(page, "stridor.state.at.mu === 0.2")
-        assert runs_of(server) > 0
+        assert processes_of(server) > 0
         page.evaluate("dispatchEvent(new PageTransitionEvent('pagehide'))")
         until = time.monotonic() + 60
-        while runs_of(server) and time.monotonic() < until:
+        while processes_of(server) and time.monotonic() < until:
             time.sleep(0.1)
-        assert runs_of(server) == 0
+        assert processes_of(server) == 0
         assert page.evaluate("socket.connected")  # it was not merely lost
 
 
