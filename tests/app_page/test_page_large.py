@@ -94,7 +94,7 @@ def test_moves_of_friction_take_what_the_curves_span_and_nothing_else_does(monke
         found, estimated = made.here(state)
         assert found.branch.tolist() == wanted.branch.tolist()
         assert np.abs(found.eigenvalues - wanted.eigenvalues).max() <= 1e-10 * np.abs(wanted.eigenvalues).max()
-        assert estimated() == pytest.approx(error(), rel=0.5, abs=1e-10)
+        assert abs(estimated() - error()) <= 0.1 * made.model.bound
     off = replace(STATE.with_change(STIFF, 3e9), mu=0.25)
     assert line.modes(made._point(off)) is None  # the curves were those of another stiffness
     assert line.modes({**made._point(STATE), "mu": 1e3}) is None  # beyond them
