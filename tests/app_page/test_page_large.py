@@ -94,7 +94,7 @@ def test_moves_of_friction_take_what_the_curves_span_and_nothing_else_does(monke
         found, estimated = made.here(state)
         assert found.branch.tolist() == wanted.branch.tolist()
         assert np.abs(found.eigenvalues - wanted.eigenvalues).max() <= 1e-10 * np.abs(wanted.eigenvalues).max()
-        assert abs(estimated() - error()) <= 0.1 * made.model.bound
+        assert 1 / 3 <= estimated() / error() <= 3  # what is left out is in it: half as much again as on the whole basis
     off = replace(STATE.with_change(STIFF, 3e9), mu=0.25)
     assert line.modes(made._point(off)) is None  # the curves were those of another stiffness
     assert line.modes({**made._point(STATE), "mu": 1e3}) is None  # beyond them
