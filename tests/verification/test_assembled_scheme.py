@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from stridor.errors import AnalysisError, CaseError
 from stridor.laws import Coulomb, Tabulated, Weakening
 from stridor.system import System
 from stridor.system.model import CubicSprings
-from stridor.temporal.beta2 import step_limit
+from stridor.temporal.beta2 import StepLimit, step_limit
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.march import March
 from stridor.temporal.schedule import PhaseSpec
@@ -205,6 +206,17 @@ def test_limit_of_a_structure():
     beams = two_slaves()
     assert step_limit_assembled(beams, 0.5).step == pytest.approx(step_limit(beams, 0.5).step, rel=1e-12)
     assert step_limit_assembled(beams, 0.5).body == step_limit(beams, 0.5).body
+
+
+@pytest.mark.parametrize("found", [step_limit, step_limit_assembled], ids=["consistent", "lagged"])
+def test_a_limit_is_sought_once_and_is_that_of_its_matrices_and_scheme(found: Callable[[System, float], StepLimit]):
+    system = two_slaves()
+    first, count = found(system, 0.5), system.of_matrices.count
+    assert found(system, 0.5) == first
+    assert system.of_matrices.count == count
+    assert found(system, 1.0).step < first.step
+    softer = replace(system, stiffness=0.25 * system.stiffness)
+    assert found(softer, 0.5).omega_max == pytest.approx(first.omega_max / 2, rel=1e-9)
 
 
 def test_stiffness_damping_decays_as_it_should():

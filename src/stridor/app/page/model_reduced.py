@@ -50,8 +50,10 @@ class _Line:
             return None
         above = int(np.searchsorted([one.modes.point[FRICTION] for one in self.numbered], mu))
         beside = self.numbered[max(above - 1, 0) : above + 1]
+        if len(beside) < 2:
+            return None
         found = self.restricted.modes(point)
-        if len(beside) < 2 or len(found.values) not in {len(one.modes.values) for one in beside}:
+        if len(found.values) not in {len(one.modes.values) for one in beside}:
             return None
         nearest = min(beside, key=lambda one: abs(one.modes.point[FRICTION] - mu))
         return self.restricted.outside(found), numbers_at(nearest, found)
