@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from test_view_plots import agreement, balance, found_onsets, trajectory
 
+import stridor as st
 from benches import paper_case
+from rubbing_block import rubbing_block
 from stridor.view.inputs import NamedFrequencies, ReportInputs
 from stridor.view.modal_tables import body_table, coupled_table, frequency_tables, onset_tables
+from stridor.view.surface_figures import surface_table
 from stridor.view.tables import number, paired, percent, same_as_printed, significant
 from stridor.view.temporal_tables import contact_table, energy_table, values_table
 from stridor.view.windows import regime_window, status_spans
@@ -141,3 +144,11 @@ def test_tables_of_a_run_hold_every_phase_and_close_their_sum():
     last = energy_table(balance(run)).rows[-1]
     assert last.cells[0] == "missing at the end"
     assert last.kind == "good"
+
+
+def test_a_point_in_contact_has_no_columns_of_surfaces() -> None:
+    point = surface_table(ReportInputs(paper_case(), steady=st.steady_sliding(paper_case())))
+    assert point is not None
+    assert point.heads == ("contact", "force on the slave [N]", "moment about the origin [N m]")
+    face = st.loads(rubbing_block("max_frequency_hz = 15e3"))
+    assert surface_table(ReportInputs(face, steady=st.steady_sliding(face))).heads[3:] == ("area [m²]", "largest pressure [MPa]")

@@ -14,7 +14,7 @@ from . import plots
 from .field_plots import contact_energies
 from .figures import ReportFigure
 from .inputs import ReportInputs
-from .tables import Table, TableRow, number, significant
+from .tables import Table, TableRow, drop_empty, number, significant
 
 
 def shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
@@ -111,4 +111,4 @@ def surface_table(inputs: ReportInputs) -> Table | None:
         "largest pressure [MPa]",
     )
     caption = f"The equilibrium of every freedom is solved to {steady.residual:.1e} of the largest force."
-    return Table("steady-surfaces", "Steady sliding", heads, tuple(rows), frozenset({0, 1, 2}), caption)
+    return drop_empty(Table("steady-surfaces", "Steady sliding", heads, tuple(rows), frozenset({0, 1, 2}), caption))
