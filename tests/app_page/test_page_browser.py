@@ -5,6 +5,7 @@ Screenshots of every step lie in the folder that STRIDOR_SCREENSHOTS names (buil
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -177,6 +178,26 @@ def test_two_hundred_moves_in_a_row_make_no_queue(page: Any):
         raise AssertionError(f"not at {last}, {wanted!r}: {page.evaluate(told)}") from error
     number(page, "bodies.beam1.angle_deg", last)
     assert page.evaluate("stridor.state.drawn.locus") < 150  # answers, not two hundred
+
+
+def test_words_that_were_measured_once_are_not_kept(page: Any):
+    measured = """async () => {
+      const { echarts } = await import("nicegui-echart"), widths = [];
+      for (let k = 0; k < 5000; k++) widths.push(echarts.format.getTextRect(`${(k / 7).toFixed(4)} Hz`, "12px sans-serif").width);
+      const context = document.createElement("canvas").getContext("2d");
+      context.font = "12px sans-serif";
+      return [widths.at(-1), context.measureText(`${(4999 / 7).toFixed(4)} Hz`).width];
+    }"""
+    ours, canvas = page.evaluate(measured)
+    assert ours == canvas > 0
+    chunks: list[str] = []
+    counter = page.context.new_cdp_session(page)
+    counter.on("HeapProfiler.addHeapSnapshotChunk", lambda event: chunks.append(event["chunk"]))
+    counter.send("HeapProfiler.takeHeapSnapshot")
+    heap = json.loads("".join(chunks))
+    fields, names = heap["snapshot"]["meta"]["node_fields"], heap["strings"]
+    kept = sum(names[name] == "blink::PlainTextNode" for name in heap["nodes"][fields.index("name") :: len(fields)])
+    assert 0 < kept < 2500  # of 5000 and what the page itself shows
 
 
 def test_friction_of_contacts_that_is_replaced_is_said(page: Any, tmp_path: Path):

@@ -59,7 +59,8 @@ class Layout:
         self.dark = ui.dark_mode(None)
         ui.add_head_html(STORAGE)
         ui.add_css(asset("page.css"))
-        ui.add_body_html(f"<script>{asset('page.js')}</script>")
+        for file in ("measure.js", "page.js"):
+            ui.add_body_html(f"<script>{asset(file)}</script>")
         self._head()
         self.problem = ui.html('<div id="st-problem" class="st-problem" role="alert" hidden></div>', sanitize=False)
         with ui.tabs(on_change=lambda event: self._tab(str(event.value))).classes("st-tabs") as tabs:
