@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from stridor.direct import Nearby, SingularMatrix, nearby
+from stridor.direct import Factor, Nearby, SingularMatrix, factorise, nearby
+from stridor.direct.updated import Updated
 
 COUNT = 400
 
@@ -68,3 +69,39 @@ def test_what_nothing_holds_is_found_behind_a_matrix_that_holds() -> None:
     solved.solve(held, right, kind="held")
     with pytest.raises(SingularMatrix):
         solved.solve(sp.csr_array(free), right - right.mean(), kind="free")
+
+
+@pytest.mark.parametrize(("opened", "rubbing"), [(2, 0.3), (20, 0.0), (0, 0.0)])
+def test_what_differs_in_few_rows_takes_a_solution_for_each_and_two(opened: int, rubbing: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    solved, right = Nearby(), np.linspace(-1.0, 2.0, COUNT)
+    solved.solve(chain(rubbing), right)
+    monkeypatch.setattr(nearby.Nearby, "_by_steps", None)  # is not called
+    columns: list[int] = []
+    solve = Factor.solve
+    monkeypatch.setattr(Factor, "solve", lambda self, right, **how: (columns.append(right.shape[1]), solve(self, right, **how))[1])
+    matrix = chain(rubbing, opened)
+    found = solved.solve(matrix, right, kind=opened)
+    assert found == pytest.approx(np.linalg.solve(matrix.toarray(), right), rel=1e-11, abs=1e-13)
+    assert error(matrix, found, right) <= 1e-14
+    assert columns[:2] == [opened, 2]
+    assert solved.factorisations == 1
+
+
+def test_a_random_change_of_few_rows_is_exact_and_of_many_is_none() -> None:
+    random = np.random.default_rng(8)
+    before = chain()
+    with factorise(before) as factor:
+        for rank in (1, 5, 24):
+            left, right = random.standard_normal((30, rank)), random.standard_normal((rank, 40))
+            change = sp.lil_array((COUNT, COUNT))
+            change[np.ix_(random.choice(COUNT, 30, replace=False), random.choice(COUNT, 40, replace=False))] = left @ right
+            matrix = sp.csr_array(before + change)
+            updated = Updated.of(factor, before, matrix)
+            assert updated is not None
+            assert updated.right.shape[1] == rank
+            sought = random.standard_normal((COUNT, 3))
+            answer, first = updated.solve(matrix @ sought)
+            assert answer == pytest.approx(sought, rel=1e-6, abs=1e-8)
+            assert before @ first == pytest.approx(matrix @ sought, rel=1e-10, abs=1e-10)
+        assert Updated.of(factor, before, sp.csr_array(before + sp.diags_array(np.r_[np.ones(25), np.zeros(COUNT - 25)]))) is None
+        assert Updated.of(factor, before, chain(0.1)) is None

@@ -1,8 +1,9 @@
 """Equations whose matrices change a little from one to the next, with one factorisation for many of them.
 
-The factors of an earlier matrix precondition GMRES on the present one, which begins with the combination of the last
-answers that leaves least: where contacts rub a little more, or a few of them open, a handful of solutions does for a
-factorisation. The answer is as good as a factorisation's, or it is not taken.
+Where little differs from the matrix whose factors are there, as where a few contacts open, its inverse is known
+(`updated`). Else these factors precondition GMRES on the present one, which begins with the combination of the last
+answers that leaves least: where contacts rub a little more a handful of solutions does for a factorisation. The answer
+is as good as a factorisation's, or it is not taken.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 import scipy.sparse.linalg as sla
 
 from ..typing import Array, Sparse
-from .factor import BACKWARD_ERROR, Factor, Sizes, factorise
+from .factor import BACKWARD_ERROR, Factor, SingularMatrix, Sizes, factorise
+from .updated import Updated
 
 LEAST = 3000  # unknowns from which on solving is so much cheaper than factorising that it pays
 LARGEST = 600e6  # bytes of factors that are kept from one matrix to the next
@@ -36,6 +38,7 @@ class Nearby:
     def __init__(self) -> None:
         self.factorisations = 0
         self._factor: Factor | None = None
+        self._matrix: Sparse | None = None
         self._asked: tuple[int, str | None] = (0, None)
         self._length = 0.0
         self._answers: deque[Array] = deque(maxlen=REMEMBERED)
@@ -61,10 +64,7 @@ class Nearby:
             self._answers.clear()
             self._regular.clear()
             self.free()
-        found = self._by_earlier(matrix, right, self._answers) if self._factor is not None else None
-        if found is not None and kind not in self._regular:
-            probe = float(np.linalg.norm(right)) * _start(len(right))
-            found = None if self._by_earlier(matrix, probe, ()) is None else found
+        found = None if self._factor is None else self._by_earlier(matrix, right, probed=kind not in self._regular)
         if found is not None:
             self._answers.append(found)
             self._regular.add(kind)
@@ -77,6 +77,7 @@ class Nearby:
             factor.free()
         else:
             self._factor, self._asked, self._length = factor, asked, float(np.linalg.norm(found))
+            self._matrix = matrix
             self._answers.append(found)
             self._regular.add(kind)
         return found
@@ -85,12 +86,41 @@ class Nearby:
         """Give the memory of the factors back; the next matrix is factorised again."""
         if self._factor is not None:
             self._factor.free()
-            self._factor = None
+            self._factor = self._matrix = None
 
-    def _by_earlier(self, matrix: Sparse, right: Array, known: Sequence[Array]) -> Array | None:
-        """The answer by the factors at hand, from known ones (n,) on; None where they do not lead to it."""
+    def _by_earlier(self, matrix: Sparse, right: Array, *, probed: bool) -> Array | None:
+        """The answer (n,) by the factors at hand; None where they do not lead to it, or, probed, not to that of another
+        right side."""
+        assert self._factor is not None, "asked for where there is one"
+        assert self._matrix is not None
+        probe = float(np.linalg.norm(right)) * _start(len(right))
+        try:
+            updated = Updated.of(self._factor, self._matrix, matrix)
+            if updated is not None:
+                return self._by_update(updated, matrix, np.stack([right, probe][: 2 if probed else 1], axis=1))
+        except (SingularMatrix, np.linalg.LinAlgError):
+            return None
+        found = self._by_steps(matrix, right, self._answers)
+        return None if found is not None and probed and self._by_steps(matrix, probe, ()) is None else found
+
+    def _by_update(self, updated: Updated, matrix: Sparse, rights: Array) -> Array | None:
+        """The answer (n,) to the first of the right sides (n, k), all of which have one that is not too large."""
+        sizes = Sizes.of(matrix)
+        answer, first = updated.solve(rights)
+        longest = GROWN * np.maximum(self._length, np.linalg.norm(first, axis=0))
+        for _ in range(ROUNDS):
+            rest, error = sizes.residual(matrix, rights, answer)
+            if not np.all(np.linalg.norm(answer, axis=0) <= longest):
+                return None
+            if error <= BACKWARD_ERROR:
+                return answer[:, 0]
+            answer = answer + updated.solve(rest)[0]
+        return None
+
+    def _by_steps(self, matrix: Sparse, right: Array, known: Sequence[Array]) -> Array | None:
+        """The answer by GMRES with the factors at hand, from known ones (n,) on; None where they do not lead to it."""
         factor, n = self._factor, len(right)
-        assert factor is not None, "asked for where there is one"
+        assert factor is not None
         before: Any = sla.LinearOperator((n, n), matvec=partial(factor.solve, refine=False), dtype=float)  # type: ignore[call-arg]
         sizes = Sizes.of(matrix)
         longest = GROWN * max(self._length, float(np.linalg.norm(before @ right)))

@@ -76,7 +76,9 @@ def _sought(system: System, beta2: float) -> StepLimit:
     stiffness, lagged = (sp.csr_array(root @ m @ root) for m in (parts.stiffness, rest))
     best, omega, body = np.inf, 0.0, "the system"
     for part in connected_components(stiffness, lagged):
-        step, own, vector = _part_limit(stiffness[part][:, part], lagged[part][:, part], beta2)
+        alone = len(part) < system.size
+        own_stiffness, own_lagged = (m[part][:, part] if alone else m for m in (stiffness, lagged))
+        step, own, vector = _part_limit(own_stiffness, own_lagged, beta2)
         if step < best:
             best, omega = step, own
             body = _owner(system, int(part[int(np.argmax(np.abs(vector)))]))
