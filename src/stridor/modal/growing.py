@@ -19,6 +19,7 @@ from ..system import System
 from ..threads import one_thread
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .krylov.problem import problem_of
+from .krylov.shifted import standing_at
 from .onset import refuted
 from .options import Options
 from .quadratic import Quadratic, band_modes, is_stiff
@@ -86,12 +87,15 @@ def _searched_for(
     system: System, mu: float, max_frequency_hz: float, touching_at: float | None, damped: bool, options: Options
 ) -> Growing:
     stage(f"growing modes sought anew at μ = {mu:.6g}")
-    problem = problem_of(system if damped else system.undamped(), touching_at, options)
+    system = system if damped else system.undamped()
+    problem = problem_of(system, touching_at, options)
     whole = problem.pencil(mu).condensed()
     top = searched(whole, 2 * np.pi * max_frequency_hz)
 
     def stands(rate: float) -> bool:
-        asked = ("stands", rate, touching_at, damped, options)
+        if touching_at is None and standing_at(system, options) <= rate:
+            return True
+        asked = ("stands", rate, touching_at, options)
         return system.once(asked, lambda: is_stiff(problem.pencil(0.0).condensed(), rate, options.solver))
 
     found = band_modes(whole, top / (2 * np.pi), above=-BESIDE * top, stands=stands, solver=options.solver)

@@ -35,7 +35,7 @@ from .passages import Passage, crossings, meetings
 from .problem import problem_of
 from .reduced import Reduced
 from .refine import GUARD, Band, converge_over, projected
-from .shifted import real_columns
+from .shifted import keep_standing, real_columns
 
 FOLLOW = 1.1  # times the band: from where branches are followed
 MOST_ABOVE = 1.25  # times that: onsets above the band are solved for up to there
@@ -80,6 +80,7 @@ def krylov_onsets(
     top = searched(problem.pencil(high).condensed(), 2 * np.pi * max_frequency_hz)
     # Modes that start above the band may meet inside it.
     reduced = projected(problem, Band(1, top * follow), high, carried)
+    keep_standing(system, options or Options(), reduced.shifted)
     converge_over(reduced, numbered_at + samples(high - numbered_at, _count_of_samples(numbered_at, high)))
     if carried is not None:
         carried.take(reduced, GUARD)

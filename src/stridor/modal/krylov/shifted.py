@@ -6,6 +6,7 @@ inverse takes forces to motions that respect the contacts exactly, which is what
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -17,12 +18,15 @@ import scipy.sparse as sp
 from ...direct import factorise, negative_eigenvalues
 from ...errors import AnalysisError
 from ...stages import passing, stage
+from ...system import System
 from ...typing import Array, Sparse
+from ..options import Options
 from .problem import ContactProblem
 
 BLOCK = 24  # right sides solved for at once while modes are sought
 CONVERGED = 1e-11  # of an eigenvalue of the inverse: what a Ritz vector may leave
 MOST_BLOCKS = 200
+RESPECTED = 1e-13  # of what opens and closes a gap: what may be left of it
 NEGATIVE = 1e-9  # of the largest Ritz value of the inverse: one that is negative beyond rounding
 STANDS = 1e-7  # of the shift: a square of a frequency that is negative beyond rounding
 SEED = 20061
@@ -75,15 +79,50 @@ class Shifted:
         matrix, self._scale = _matrix(problem, shift)
         self._factor = factorise(matrix, symmetric=True, saddle=problem.nodes > 0, solver=problem.solver)
 
-    def solve(self, force: Any, opening: Any = None) -> tuple[Any, Any]:
-        """u (n, k), p (m, k) with (K + sM) u − Nᵀp = force (n, k) and N u + c p = opening (m, k), zero by default."""
+    @property
+    def positive(self) -> bool:
+        """Whether xᵀ(K + sM)x > 0 of every motion that respects the contacts; False where the solver does not tell."""
+        return self._factor.inertia == self.problem.nodes
+
+    def solve(self, force: Any, opening: Any = None, *, exact: bool = False) -> tuple[Any, Any]:
+        """u (n, k), p (m, k) with (K + sM) u − Nᵀp = force (n, k) and N u + c p = opening (m, k), zero by default.
+
+        The contacts are always respected to rounding. Forces are balanced to rounding where it has to be ``exact``,
+        else as elimination leaves them, in half the time: enough for shapes that span a space and are judged otherwise.
+        """
         n, m = self.problem.size, self.problem.nodes
         right = np.zeros((n + m, force.shape[1]), dtype=np.result_type(force, 0.0 if opening is None else opening))
         right[:n] = force
         if opening is not None:
             right[n:] = -self._scale * opening
-        answer = self._factor.solve(right)
+        answer = self._factor.solve(right, refine=exact)
+        if not exact and not self._respected(right, answer):
+            answer = self._factor.solve(right)
         return answer[:n], self._scale * answer[n:]
+
+    def _respected(self, right: Any, answer: Any) -> bool:
+        """Whether the rows of contacts hold to RESPECTED of their terms."""
+        n, problem = self.problem.size, self.problem
+        if not problem.nodes:
+            return True
+        rows = sp.csr_array(-self._scale * problem.normal), (-(self._scale**2) * problem.compliance)[:, None]
+        u, p = answer[:n], answer[n:]
+        left = rows[0] @ u + rows[1] * p - right[n:]
+        terms = abs(rows[0]) @ np.abs(u) + np.abs(rows[1] * p) + np.abs(right[n:])
+        return bool(np.all(np.abs(left) <= RESPECTED * np.maximum(terms, terms.max(axis=0) * 1e-3)))
+
+
+def keep_standing(system: System, options: Options, shifted: Shifted) -> None:
+    """Let the system know the rate at which its structure was seen to stand, for `standing_at`."""
+    if shifted.positive and shifted.problem.at(0.0).stiffness is None:
+        system.answers.keep(("stands at", options), math.sqrt(shifted.shift))
+
+
+def standing_at(system: System, options: Options) -> float:
+    """A rate σ [1/s] at which σ²M + K, contacts without friction included, is known to be positive definite, its
+    contacts those of the laws' own sliding; infinite where none is known."""
+    known = system.answers.known(("stands at", options))
+    return math.inf if known is None else float(known)
 
 
 def _matrix(problem: ContactProblem, shift: float) -> tuple[Sparse, float]:
@@ -168,7 +207,7 @@ def _polished(shifted: Shifted, shapes: Array) -> tuple[Array, ForcedShapes]:
     problem = shifted.problem
     if not shapes.shape[1]:
         return np.zeros(0), ForcedShapes(shapes, np.zeros((problem.nodes, 0)))
-    u, p = shifted.solve(problem.mass @ shapes)
+    u, p = shifted.solve(problem.mass @ shapes, exact=True)
     found = ForcedShapes(u, p)
     # The iteration shortens each shape by its ω²: of one length again, and without what only rounding tells apart
     # where all modes of a small problem are found.
