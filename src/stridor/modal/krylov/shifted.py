@@ -44,7 +44,8 @@ class NotPositive(AnalysisError):
 
 @dataclass(frozen=True)
 class ForcedShapes:
-    """Shapes u (n, k) with the contact forces p (m, k) that go with them: N u + c p = 0 for every column."""
+    """Shapes u (n, k), column after column in memory, with the contact forces p (m, k) that go with them: N u + c p = 0
+    for every column."""
 
     u: Array
     p: Array
@@ -56,15 +57,20 @@ class ForcedShapes:
 
     def combined(self, by: Array) -> ForcedShapes:
         """Linear combinations, by (k, l)."""
-        return ForcedShapes(self.u @ by, self.p @ by)
+        return ForcedShapes(tall(self.u, by), self.p @ by)
 
     def less(self, other: ForcedShapes, weights: Array) -> ForcedShapes:
         """Minus the combinations of ``other`` with weights (l, k)."""
-        return ForcedShapes(self.u - other.u @ weights, self.p - other.p @ weights)
+        return ForcedShapes(self.u - tall(other.u, weights), self.p - other.p @ weights)
 
     def with_(self, other: ForcedShapes) -> ForcedShapes:
         """Both side by side."""
-        return ForcedShapes(np.hstack([self.u, other.u]), np.hstack([self.p, other.p]))
+        return ForcedShapes(np.hstack([np.asfortranarray(self.u), np.asfortranarray(other.u)]), np.hstack([self.p, other.p]))
+
+
+def tall(columns: Array, weights: Array) -> Array:
+    """columns (n, k) @ weights (k, l), column after column, which takes BLAS two thirds of the time."""
+    return (weights.T @ columns.T).T
 
 
 class Shifted:
