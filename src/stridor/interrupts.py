@@ -11,8 +11,9 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import sys
 import threading
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
@@ -43,6 +44,7 @@ class _Program:
     installed: bool = False
     pending: bool = False
     leaving: bool = False
+    says: Callable[[sys.UnraisableHookArgs], object] = sys.__unraisablehook__
 
 
 _program = _Program([])
@@ -58,10 +60,21 @@ def install() -> None:
 
 
 def insist() -> None:
-    """Let what `interrupt` raises be raised again until it is `heard`, in a process with a handler of its own."""
+    """Let what `interrupt` raises be raised again until it is `heard`, in a process with a handler of its own.
+
+    Of one that a callback drops there are no words then.
+    """
     if hasattr(signal, "SIGALRM"):
         signal.signal(signal.SIGALRM, _again)
+        if sys.unraisablehook is not _unraisable:
+            _program.says, sys.unraisablehook = sys.unraisablehook, _unraisable
     _program.installed = True
+
+
+def _unraisable(dropped: sys.UnraisableHookArgs) -> None:
+    """What nobody can catch is told, but for an interrupt that will come again."""
+    if not (_program.pending and isinstance(dropped.exc_value, KeyboardInterrupt)):
+        _program.says(dropped)
 
 
 def heard() -> None:

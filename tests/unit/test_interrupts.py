@@ -31,3 +31,10 @@ print("and no more")
 def test_what_a_callback_drops_is_raised_again_and_once_heard_no_more() -> None:
     done = subprocess.run([sys.executable, "-c", DROPPED], capture_output=True, text=True, check=False, timeout=60)
     assert done.stdout.splitlines() == ["dropped", "raised again", "and no more"], done.stderr
+    assert not done.stderr
+
+
+def test_other_things_that_nobody_can_catch_are_told() -> None:
+    told = DROPPED.replace("(interrupts.interrupt)", "(lambda: 1 / 0)").replace("time.sleep(20)", "raise KeyboardInterrupt")
+    done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=False, timeout=60)
+    assert "ZeroDivisionError" in done.stderr

@@ -65,7 +65,8 @@ class ForcedShapes:
 
     def with_(self, other: ForcedShapes) -> ForcedShapes:
         """Both side by side."""
-        return ForcedShapes(np.hstack([np.asfortranarray(self.u), np.asfortranarray(other.u)]), np.hstack([self.p, other.p]))
+        u = np.hstack([np.asfortranarray(self.u), np.asfortranarray(other.u)])
+        return ForcedShapes(u, np.hstack([self.p, other.p]))
 
 
 def tall(columns: Array, weights: Array) -> Array:

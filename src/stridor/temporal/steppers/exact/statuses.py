@@ -168,11 +168,7 @@ class Regime:
         count = int(np.count_nonzero(np.abs(poles) <= slow))
         together, small = np.zeros((len(poles), 0)), np.zeros((0, 0))
         if count:
-
-            def is_slow(real: float, imag: float) -> bool:
-                return bool(np.hypot(real, imag) <= slow)
-
-            schur, turn, count = sl.schur(self.states, sort=is_slow)
+            schur, turn, count = _slow_first(self.states, slow)
             together, small = turn[:, :count], schur[:count, :count]
         fast = np.sort(order[count:])
         inverse = np.linalg.inv(np.hstack([vectors[:, fast], together]))
@@ -199,6 +195,18 @@ class Regime:
     def slower_than(self, rate: float) -> Split:
         """The same with modes slower than a rate [1/s] kept together too."""
         return self.separate if rate <= SLOW * self.fastest else self._split(rate)
+
+
+def _slow_first(matrix: Array, slow: float) -> tuple[Array, Array, int]:
+    """The real Schur form T of a matrix = Q T Qᵀ, Q, and how many eigenvalues are no larger than ``slow``, which come
+    first. Without SciPy's own sorting: it calls back, and an interrupt that comes then is printed and lost."""
+    form, turn = sl.schur(matrix)
+    none = np.zeros(len(matrix), dtype=np.int32)
+    _, _, real, imaginary, *_ = sl.lapack.dtrsen(none, form, turn, job=b"N")
+    form, turn, _, _, count, _, _, failed = sl.lapack.dtrsen(np.hypot(real, imaginary) <= slow, form, turn, job=b"N")
+    if failed:
+        raise AnalysisError("the slow motions of a status of the contacts cannot be told from its fast ones")
+    return form, turn, int(count)
 
 
 @dataclass(frozen=True)
