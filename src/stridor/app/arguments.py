@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Concatenate, ParamSpec
 
 import typer
 
-from .. import interrupts
+from .. import heap, interrupts
 from ..errors import AnalysisError, CaseError, StridorError
 from .heartbeat import beating
 from .option_table import TABLE, Json, Out, Quiet, Set, Solver, Verbose
@@ -338,6 +338,7 @@ def verb(
 
         @wraps(function)
         def called(**given: Any) -> None:
+            heap.keep()
             as_given = dict(given)
             call = replace(
                 _common(**{name: given.pop(name) for name in names}),

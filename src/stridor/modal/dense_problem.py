@@ -180,10 +180,15 @@ class DenseProblem(OverNumber):
 
 
 def combined(basis: Array, weights: Any) -> Any:
-    """basis @ weights in real arithmetic; real where the weights are."""
+    """basis (n, k) @ weights (k, l) in real arithmetic; real where the weights are."""
     if weights.dtype.kind != "c" or not np.any(weights.imag):
         return basis @ np.ascontiguousarray(weights.real)
-    return basis @ np.ascontiguousarray(weights.real) + 1j * (basis @ np.ascontiguousarray(weights.imag))
+    if not basis.flags.f_contiguous:
+        # A row of complex numbers, read as real, has their parts side by side.
+        return (basis @ np.ascontiguousarray(weights).view(np.float64)).view(np.complex128)
+    result = np.empty((basis.shape[0], weights.shape[1]), dtype=complex)
+    result.real, result.imag = ((part.T @ basis.T).T for part in (weights.real, weights.imag))
+    return result
 
 
 def upper_root(squares: ComplexArray) -> ComplexArray:

@@ -193,8 +193,8 @@ class Reduced(DenseProblem):
             if matrix.nnz:
                 self._products[index] = _grown(self._products[index], matrix, *tests)
                 target[:own, :own], target[own:, :own] = self._products[index]
-        normal = np.hstack([problem.normal @ t for t in tests])
-        self._slide = np.hstack([problem.slide @ t for t in tests])
+        normal = np.hstack([_few(problem.normal, t) for t in tests])
+        self._slide = np.hstack([_few(problem.slide, t) for t in tests])
         self._matrices = (mass, damping, stiffness - normal.T @ force, -self._slide.T @ force)
         self._known.clear()
         self._extra.clear()
@@ -307,7 +307,15 @@ def _sandwiched(tests: Array, matrix: Sparse, u: Array) -> Array:
     """tests^T A u of a matrix that is zero but for a few rows."""
     csr = sp.csr_array(matrix)
     rows = np.flatnonzero(np.diff(csr.indptr))
-    return tests[rows].T @ (csr[rows] @ u)
+    return tests[rows].T @ _few(csr[rows], u)
+
+
+def _few(matrix: Sparse, u: Array) -> Array:
+    """A u of a matrix with entries in a few columns alone: SciPy copies all of u, unless its rows lie in memory one
+    after the other."""
+    columns, place = np.unique(matrix.indices, return_inverse=True)
+    narrow = sp.csr_array((matrix.data, place, matrix.indptr), shape=(matrix.shape[0], len(columns)))
+    return narrow @ np.ascontiguousarray(u[columns])
 
 
 def _weighed(terms: list[tuple[Array, Array]], weights: Any) -> tuple[Any, Any]:
