@@ -3,9 +3,10 @@
 python benchmarks/page_memory.py [--minutes 60] [--short]
 Moves, modes, tabs, undo, runs begun, heard and stopped, limit cycles sought, at random. Printed are, after each twelfth
 of the time (five minutes of an hour), the memory of the server with its processes, what of it is their own (the rest
-are files of libraries, whose share is less the more other programs use them), and of the page what is reachable in it:
-the heap, what of that is compiled script, what the browser holds beside it (nodes, styles, pictures), and how many
-nodes and listeners there are. What a page needs at all is there after five minutes: the ratio at the end is to that.
+are files of libraries, whose share is less the more other programs use them), that of the browser's process that shows
+the page, files left out as well, and of this what is reachable: the heap, what of that is script, compiled by the
+browser ever better the longer it runs, what the browser holds beside it (nodes, styles, pictures), and how many nodes
+and listeners there are. What a page needs at all is there after five minutes: the ratio at the end is to that.
 Needs the extra app, playwright, Linux, and Chromium at /usr/bin/chromium; without them it says so and leaves.
 """
 
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import random
 import subprocess
 import sys
@@ -122,14 +124,18 @@ def sample(page: Any, counter: Any, server: int, seconds: float) -> Sample:
     for kind in ("stop", "leave"):
         page.evaluate(PRESS, [f"#st-{BUTTONS[kind]}", 0])
     time.sleep(5)
+    memory, own = resident(server)
+    counter.send("HeapProfiler.collectGarbage")
+    time.sleep(2)
+    shown = page_process()  # before the heap is looked at, which leaves much behind
     sizes = by_type(counter)
     told = {one["name"]: one["value"] for one in counter.send("Performance.getMetrics")["metrics"]}
-    memory, own = resident(server)
     # JSHeapUsedSize of the metrics is not it: it holds megabytes of rubbish, some of which the counting makes.
     script, browser = sizes[SCRIPT] / 1e6, sizes[BROWSER] / 1e6
     heap = sum(sizes.values()) / 1e6 - browser
     counts = {"nodes": int(told["Nodes"]), "listeners": int(told["JSEventListeners"])}
-    mb = {"server": memory, "own": own, "heap": heap, "script": script, "objects": heap - script, "browser": browser}
+    mb = {"server": memory, "own": own, "page": shown, "heap": heap, "script": script, "objects": heap - script}
+    mb["browser"] = browser
     return Sample(seconds, mb, counts)
 
 
@@ -153,25 +159,41 @@ def by_type(counter: Any) -> Counter[str]:
     return found
 
 
+def page_process() -> float:
+    """Memory without files of the processes below this one that show pages [MB]; there is one page."""
+    mine = [one for one in below(os.getpid()) if "--type=renderer" in read(Path(f"/proc/{one}/cmdline"))]
+    return sum(resident(one)[1] for one in mine)
+
+
 def resident(process: int) -> tuple[float, float]:
     """Memory of a process and all below it, what several share divided among them, and that without files [MB]."""
+    total, own = 0.0, 0.0
+    for one in (process, *below(process)):
+        text = read(Path(f"/proc/{one}/smaps_rollup"))
+        if text:
+            total += int(text.split("Pss:")[1].split()[0]) / 1e3
+            own += int(text.split("Pss_Anon:")[1].split()[0]) / 1e3
+    return total, own
+
+
+def below(process: int) -> list[int]:
+    """The processes that a process started, and that they did."""
     parents: dict[int, int] = {}
     for place in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            parents[int(place.parent.name)] = int(place.read_text().rpartition(")")[2].split()[1])
-        except OSError:
-            continue
-    total, own, below = 0.0, 0.0, [process]
-    while below:
-        one = below.pop()
-        below += [child for child, parent in parents.items() if parent == one]
-        try:
-            text = Path(f"/proc/{one}/smaps_rollup").read_text()
-        except OSError:
-            continue
-        total += int(text.split("Pss:")[1].split()[0]) / 1e3
-        own += int(text.split("Pss_Anon:")[1].split()[0]) / 1e3
-    return total, own
+        if text := read(place):
+            parents[int(place.parent.name)] = int(text.rpartition(")")[2].split()[1])
+    found = [process]
+    for one in found:
+        found += [child for child, parent in parents.items() if parent == one]
+    return found[1:]
+
+
+def read(place: Path) -> str:
+    """A file of /proc, empty where its process is gone."""
+    try:
+        return place.read_text()
+    except OSError:
+        return ""
 
 
 if __name__ == "__main__":
