@@ -22,7 +22,7 @@ smaller part of the limit. What gyroscopic forces need is that the passes of `un
 β2 Δt |M^(−1/2) G M^(−1/2)| ≤ 1/2.
 
 The eigenvector of a larger step gives, through its quotients, an upper bound of the limit: a few rounds
-converge from above.
+converge from above. Where C_r is K times a number, one does.
 """
 
 from __future__ import annotations
@@ -70,15 +70,15 @@ def _sought(system: System, beta2: float) -> StepLimit:
     mass = system.mass.diagonal()
     if not np.all(mass > 0.0):
         raise AnalysisError("the mass matrix is not positive definite: a freedom has stiffness but no mass")
-    parts = halves(system)
-    rest = split_damping(system).rest
+    parts, damping = halves(system), split_damping(system)
+    rest = damping.rest
     root = sp.diags_array(1.0 / np.sqrt(mass))
     stiffness, lagged = (sp.csr_array(root @ m @ root) for m in (parts.stiffness, rest))
     best, omega, body = np.inf, 0.0, "the system"
     for part in connected_components(stiffness, lagged):
         alone = len(part) < system.size
         own_stiffness, own_lagged = (m[part][:, part] if alone else m for m in (stiffness, lagged))
-        step, own, vector = _part_limit(own_stiffness, own_lagged, beta2)
+        step, own, vector = _part_limit(own_stiffness, own_lagged, beta2, alike=damping.factor is not None)
         if step < best:
             best, omega = step, own
             body = _owner(system, int(part[int(np.argmax(np.abs(vector)))]))
@@ -91,8 +91,9 @@ def _sought(system: System, beta2: float) -> StepLimit:
     return StepLimit(best, omega, body, CIRCULATORY_SHARE if parts.circulatory.nnz else np.inf)
 
 
-def _part_limit(stiffness: Sparse, lagged: Sparse, beta2: float) -> tuple[float, float, Array]:
-    """Limit [s], undamped circular frequency of the mode that sets it [rad/s], and the mode."""
+def _part_limit(stiffness: Sparse, lagged: Sparse, beta2: float, *, alike: bool) -> tuple[float, float, Array]:
+    """Limit [s], undamped circular frequency of the mode that sets it [rad/s], and the mode; alike: whether the lagged
+    damping is the stiffness times a number, so that both have the same modes."""
     mode = _largest(stiffness, None)
     if mode.value <= 0.0 and lagged.nnz == 0:
         return np.inf, 0.0, mode.vector
@@ -106,7 +107,7 @@ def _part_limit(stiffness: Sparse, lagged: Sparse, beta2: float) -> tuple[float,
         found = 4.0 / beta2 / (drag / beta2 + math.sqrt((drag / beta2) ** 2 + 8.0 * square / beta2))
         converged = found >= step * (1.0 - 1e-6)
         step = min(step, found)
-        if converged or lagged.nnz == 0:
+        if converged or alike or lagged.nnz == 0:
             break
         mode = _largest(plus(stiffness, lagged / (beta2 * step)), mode.vector)
     return step, math.sqrt(max(square, 0.0)), mode.vector
