@@ -3,6 +3,7 @@ saved states that are damaged, and the words of what is refused."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -229,19 +230,19 @@ def test_the_step_matrix_is_that_of_the_scheme(b2: float, damped: bool) -> None:
 def test_the_limit_with_lagged_damping_is_that_of_its_equation(b2: float, lag: float) -> None:
     """ω²Δt² + rΔt/β2 = 2/β2 of the mode that gives the least Δt; r = β ω² where damping is a share of the stiffness."""
     rng = np.random.default_rng(3)
-    for n in (1, 6, 61):
+    for n, alike in itertools.product((1, 6, 61), (False, True)):
         K = rng.normal(size=(n, n))
         K = K @ K.T
         square = float(np.linalg.eigvalsh(K)[-1])
-        step, omega, vector = limit._part_limit(sp.csr_array(K), sp.csr_array(lag * K), b2)
+        step, omega, vector = limit._part_limit(sp.csr_array(K), sp.csr_array(lag * K), b2, alike=alike)
         room = 1.01 if n > 60 else 1.0
         assert step**2 * square * room**2 + lag * square * room**2 * step / b2 == pytest.approx(2 / b2, rel=3e-3 if n > 60 else 1e-6)
         assert omega == pytest.approx(math.sqrt(square) * room, rel=2e-3)
         assert np.linalg.norm(K @ vector - square * vector) < (0.2 if n > 60 else 1e-6) * square
     # Lagged damping alone: rΔt = 2. Nothing at all: no limit.
-    step, omega, _ = limit._part_limit(sp.csr_array((1, 1)), sp.csr_array(np.array([[4.0]])), b2)
+    step, omega, _ = limit._part_limit(sp.csr_array((1, 1)), sp.csr_array(np.array([[4.0]])), b2, alike=False)
     assert (step, omega) == (pytest.approx(0.5), 0.0)
-    assert limit._part_limit(sp.csr_array((2, 2)), sp.csr_array((2, 2)), b2)[:2] == (math.inf, 0.0)
+    assert limit._part_limit(sp.csr_array((2, 2)), sp.csr_array((2, 2)), b2, alike=True)[:2] == (math.inf, 0.0)
 
 
 def test_the_body_that_sets_the_limit_is_named() -> None:
