@@ -93,15 +93,17 @@ class Nearby:
         right side."""
         assert self._factor is not None, "asked for where there is one"
         assert self._matrix is not None
-        probe = float(np.linalg.norm(right)) * _start(len(right))
+        probes = [float(np.linalg.norm(right)) * _start(len(right))] if probed else []
         try:
             updated = Updated.of(self._factor, self._matrix, matrix)
             if updated is not None:
-                return self._by_update(updated, matrix, np.stack([right, probe][: 2 if probed else 1], axis=1))
+                return self._by_update(updated, matrix, np.stack([right, *probes], axis=1))
         except (SingularMatrix, np.linalg.LinAlgError):
             return None
         found = self._by_steps(matrix, right, self._answers)
-        return None if found is not None and probed and self._by_steps(matrix, probe, ()) is None else found
+        if found is None or any(self._by_steps(matrix, probe, ()) is None for probe in probes):
+            return None
+        return found
 
     def _by_update(self, updated: Updated, matrix: Sparse, rights: Array) -> Array | None:
         """The answer (n,) to the first of the right sides (n, k), all of which have one that is not too large."""

@@ -180,10 +180,15 @@ class DenseProblem(OverNumber):
 
 
 def combined(basis: Array, weights: Any) -> Any:
-    """basis (n, k) @ weights (k, l) in real arithmetic; real where the weights are."""
+    """basis (n, k) @ weights (k, l) in real arithmetic; real where the weights are.
+
+    Where columns lie in memory one after the other, they are combined as rows: BLAS takes half the time for tall ones.
+    """
+    columns = basis.flags.f_contiguous
     if weights.dtype.kind != "c" or not np.any(weights.imag):
-        return basis @ np.ascontiguousarray(weights.real)
-    if not basis.flags.f_contiguous:
+        real = np.ascontiguousarray(weights.real)
+        return (real.T @ basis.T).T if columns else basis @ real
+    if not columns:
         # A row of complex numbers, read as real, has their parts side by side.
         return (basis @ np.ascontiguousarray(weights).view(np.float64)).view(np.complex128)
     result = np.empty((basis.shape[0], weights.shape[1]), dtype=complex)

@@ -179,9 +179,14 @@ class Varying:
         self._state, self.grid = state, grid
         self._known: dict[float, Extras] = {}
 
+    @property
+    def rests(self) -> bool:
+        """Whether nothing is added without friction."""
+        return self._state.rests
+
     def __call__(self, mu: float) -> Extras:
         """The terms at ``mu``."""
-        if mu == 0.0 and self._state.rests:
+        if mu == 0.0 and self.rests:
             return NOTHING
         if mu in self._known:
             return self._known[mu]

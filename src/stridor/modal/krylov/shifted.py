@@ -20,6 +20,7 @@ from ...errors import AnalysisError
 from ...stages import passing, stage
 from ...system import System
 from ...typing import Array, Sparse
+from ..dense_problem import combined
 from ..options import Options
 from .problem import ContactProblem
 
@@ -57,21 +58,16 @@ class ForcedShapes:
 
     def combined(self, by: Array) -> ForcedShapes:
         """Linear combinations, by (k, l)."""
-        return ForcedShapes(tall(self.u, by), self.p @ by)
+        return ForcedShapes(combined(self.u, by), self.p @ by)
 
     def less(self, other: ForcedShapes, weights: Array) -> ForcedShapes:
         """Minus the combinations of ``other`` with weights (l, k)."""
-        return ForcedShapes(self.u - tall(other.u, weights), self.p - other.p @ weights)
+        return ForcedShapes(self.u - combined(other.u, weights), self.p - other.p @ weights)
 
     def with_(self, other: ForcedShapes) -> ForcedShapes:
         """Both side by side."""
         u = np.hstack([np.asfortranarray(self.u), np.asfortranarray(other.u)])
         return ForcedShapes(u, np.hstack([self.p, other.p]))
-
-
-def tall(columns: Array, weights: Array) -> Array:
-    """columns (n, k) @ weights (k, l), column after column, which takes BLAS two thirds of the time."""
-    return (weights.T @ columns.T).T
 
 
 class Shifted:
@@ -94,8 +90,8 @@ class Shifted:
     def solve(self, force: Any, opening: Any = None, *, exact: bool = False) -> tuple[Any, Any]:
         """u (n, k), p (m, k) with (K + sM) u − Nᵀp = force (n, k) and N u + c p = opening (m, k), zero by default.
 
-        The contacts are always respected to rounding. Forces are balanced to rounding where it has to be ``exact``,
-        else as elimination leaves them, in half the time: enough for shapes that span a space and are judged otherwise.
+        Both are refined where it has to be ``exact``, or where contacts would not hold to RESPECTED. Else they are as
+        elimination leaves them, in half the time: enough for shapes that span a space and are judged otherwise.
         """
         n, m = self.problem.size, self.problem.nodes
         right = np.zeros((n + m, force.shape[1]), dtype=np.result_type(force, 0.0 if opening is None else opening))
@@ -112,16 +108,18 @@ class Shifted:
         n, problem = self.problem.size, self.problem
         if not problem.nodes:
             return True
-        rows = sp.csr_array(-self._scale * problem.normal), (-(self._scale**2) * problem.compliance)[:, None]
+        normal, closing = sp.csr_array(self._scale * problem.normal), self._scale**2 * problem.compliance[:, None]
         u, p = answer[:n], answer[n:]
-        left = rows[0] @ u + rows[1] * p - right[n:]
-        terms = abs(rows[0]) @ np.abs(u) + np.abs(rows[1] * p) + np.abs(right[n:])
-        return bool(np.all(np.abs(left) <= RESPECTED * np.maximum(terms, terms.max(axis=0) * 1e-3)))
+        left = normal @ u + closing * p + right[n:]
+        terms = abs(normal) @ np.abs(u) + closing * np.abs(p) + np.abs(right[n:])
+        # Where a node hardly moves, its terms are themselves rounding of those of others.
+        return bool(np.all(np.abs(left) <= RESPECTED * np.maximum(terms, 1e-3 * terms.max(axis=0))))
 
 
 def keep_standing(system: System, options: Options, shifted: Shifted) -> None:
     """Let the system know the rate at which its structure was seen to stand, for `standing_at`."""
-    if shifted.positive and shifted.problem.at(0.0).stiffness is None:
+    extras = shifted.problem.extras
+    if shifted.positive and (extras is None or extras.rests):
         system.answers.keep(("stands at", options), math.sqrt(shifted.shift))
 
 

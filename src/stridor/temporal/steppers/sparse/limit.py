@@ -76,8 +76,8 @@ def _sought(system: System, beta2: float) -> StepLimit:
     stiffness, lagged = (sp.csr_array(root @ m @ root) for m in (parts.stiffness, rest))
     best, omega, body = np.inf, 0.0, "the system"
     for part in connected_components(stiffness, lagged):
-        alone = len(part) < system.size
-        own_stiffness, own_lagged = (m[part][:, part] if alone else m for m in (stiffness, lagged))
+        whole = len(part) == system.size
+        own_stiffness, own_lagged = (m if whole else m[part][:, part] for m in (stiffness, lagged))
         step, own, vector = _part_limit(own_stiffness, own_lagged, beta2, alike=damping.factor is not None)
         if step < best:
             best, omega = step, own
