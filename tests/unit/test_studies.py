@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -453,7 +454,12 @@ def test_the_program_prints_the_answer_and_draws(tmp_path: Path) -> None:
     assert {"stability-map.png", "root-locus.png", "over-mu.png", "bands.png"} <= drawn
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "A &lt;b&gt; study" in page
-    assert page.count("<img ") == len(drawn)
+    assert page.count("<img ") == page.count("<figcaption>") == len(drawn)
+    anchors = set(re.findall(r'href="#([^"]+)"', page))
+    assert {"summary", "about", "figure-stability-map"} <= anchors
+    assert anchors <= set(re.findall(r' id="([^"]+)"', page))
+    assert 'parameters.mu]' in page.replace("&#34;", '"')  # the study as it was asked
+    assert st.open_study(folder).data[MASS].attrs["units"] == "1/s"
     heads = (folder / "study.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
     assert heads[:3] == ["number", "mu", MASS]
     for path in folder.glob("*.png"):

@@ -29,7 +29,8 @@ from stridor.temporal.signals import spectrogram
 from stridor.view import FrictionCurve, NamedFrequencies, NamedShape, ReportInputs, write_report
 from stridor.view import report as report_module
 from stridor.view.modal_tables import onset_tables
-from stridor.view.report import sections, tidy
+from stridor.view.page_parts import tidy
+from stridor.view.report import sections
 from stridor.view.tables import quantity
 from stridor.view.words import verdict
 

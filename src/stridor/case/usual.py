@@ -203,6 +203,14 @@ def usual_of(table: type[BaseModel], key: str) -> Usual | None:
     return next((USUAL[name] for base in table.__mro__ if (name := f"{base.__name__}.{key}") in USUAL), None)
 
 
+def usual_at(table: type[BaseModel], key: str, path: str, *, area: bool = False) -> Usual | None:
+    """The usual size of the number at a path, a key of a table. area: whether a contact's stiffness is one per area."""
+    usual = usual_of(table, key)
+    if usual is _CONTACT and area:
+        return _CONTACT_AREA
+    return _TURN if usual is _SPEED and path.endswith(_ROTATION) else usual
+
+
 def unusual(table: BaseModel, where: str, *, scaled: bool, area: bool = False) -> Iterator[str]:
     """One line for each number below a table, at the path ``where``, whose size is unusual.
 
@@ -212,16 +220,13 @@ def unusual(table: BaseModel, where: str, *, scaled: bool, area: bool = False) -
     for key in type(table).model_fields:
         if key not in table.model_fields_set:
             continue
-        usual = usual_of(type(table), key)
-        if usual is _CONTACT and area:
-            usual = _CONTACT_AREA
         for path, value in _leaves(getattr(table, key), dotted_key(where, key)):
             if isinstance(value, BaseModel):
                 yield from unusual(value, path, scaled=scaled)
-            elif usual is not None and (scaled or not usual.scaled):
-                kind = _TURN if usual is _SPEED and path.endswith(_ROTATION) else usual
-                if text := kind.oddity(path, value):
-                    yield text
+                continue
+            usual = usual_at(type(table), key, path, area=area)
+            if usual is not None and (scaled or not usual.scaled) and (text := usual.oddity(path, value)):
+                yield text
 
 
 def friction_oddity(where: str, mu: float) -> str:

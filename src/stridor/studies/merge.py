@@ -5,10 +5,10 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from ..case.units import unit_at
 from ..errors import CaseError
 from .parts import FOLDERS, Part
 from .rows import lengths, variables
-from .run import unit_of
 from .sampling import samples
 from .schema import Study
 from .store import DONE, Head, OpenStore, dataset, head_of
@@ -38,7 +38,8 @@ def merged(folder: Path, path: Path) -> list[str]:
     columns, inner = variables(study.compute), lengths(study.compute, study.keep)
     if path.exists():
         shutil.rmtree(path)  # put together anew from parts, which stay
-    store = OpenStore.made(path, head, values, {name: unit_of(name) for name in study.parameters}, columns, inner)
+    units = {name: unit_at(study.base(), name) for name in study.parameters}
+    store = OpenStore.made(path, head, values, units, columns, inner)
     for location in places:
         data = dataset(location)
         rows = {

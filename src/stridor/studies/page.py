@@ -1,60 +1,88 @@
-"""A study as a page: what was asked, what came out, what of it was confirmed, and its figures."""
+"""A study as a page: what came out, what of it was confirmed, its figures, and what was asked."""
 
 from __future__ import annotations
 
-import base64
-import html
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
-from io import BytesIO
 from pathlib import Path
 
+import tomlkit
 from matplotlib.figure import Figure
 
 from ..io.atomic import write_text
+from ..notebook import counted
+from ..view.page_parts import ReportFigure, data_url, filled, rendered
+from ..view.tables import Table, TableRow
 from .result import StudyResult
 from .summary import Line, answer, failures, tables
+from .tables import Varied
 
-_TITLES = {
-    "stability-map": "Where it squeals",
-    "root-locus": "Modes of all samples",
-    "bands": "How likely a mode grows, by frequency",
-    "sobol-indices": "What decides it",
+# Titles of figures, and what is to be seen in them.
+_FIGURES = {
+    "stability-map": ("Where it squeals", "A mark for each sample; rings: solved in the full problem as well."),
+    "root-locus": ("Modes of all samples", "Growth rate over frequency: above the line a mode grows."),
+    "bands": ("How likely a mode grows, by frequency", "With intervals of 95 %."),
+    "sobol-indices": ("What decides it", "Shares of the variance: of a number alone, and together with others."),
 }
+_OVER = "over-"
 
 
 def write_page(result: StudyResult, figures: Mapping[str, Figure], path: Path) -> Path:
     """Write the page with its figures in it. Raises AnalysisError where it cannot be written."""
-    title = result.study.title or f"Study of {result.compute}"
-    parts = [f"<h1>{html.escape(title)}</h1>", f"<p><strong>{html.escape(answer(result))}</strong></p>"]
-    parts += [f"<p>{html.escape(note)}</p>" for note in result.notes]
-    for heading, heads, rows in tables(result):
-        parts += [f"<h2>{html.escape(heading)}</h2>", _table(heads, rows)]
-    for name, figure in figures.items():
-        words = _TITLES.get(name, "")
-        parts.append(f"<h2>{html.escape(words)}</h2>" if words else "")
-        parts.append(f'<figure><img alt="{html.escape(words or name)}" src="{_inline(figure)}"></figure>')
+    study = result.study
+    drawn = [_figure(name, figure) for name, figure in figures.items()]
+    listed = list(tables(result))
     if bad := failures(result):
-        parts += ["<h2>Rows that failed</h2>", _table(("error", "rows"), bad)]
-    style = (resources.files("stridor.view") / "templates" / "report.css").read_text(encoding="utf-8")
-    own = "figure img { max-width: 100%; height: auto; } body { max-width: 60rem; margin: 0 auto; padding: 1rem; }"
-    body = "\n".join(part for part in parts if part)
-    text = (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{html.escape(title)}</title><style>{style}\n{own}</style></head>\n<body>\n{body}\n</body></html>\n"
+        listed.append(("Rows that failed", ("error", "rows"), bad))
+    varied = [(name, *_words(one)) for name, one in study.parameters.items()]
+    said = answer(result)
+    asked = study.model_dump(mode="json", exclude={"case"}, exclude_none=True, exclude_defaults=True)
+    title = study.title or f"Study of {result.compute}"
+    text = filled(
+        "study.html.j2",
+        title=title,
+        subtitle=f"{result.compute} of {counted(len(result.status), 'sample')} over "
+        f"{counted(len(varied), 'parameter')}, {result.method}",
+        answer=said[:1].upper() + said[1:],
+        notes=result.notes,
+        results=[_table(f"results-{k}", *listing) for k, listing in enumerate(listed)],
+        figures=drawn,
+        numbers={figure.name: k for k, figure in enumerate(drawn, start=1)},
+        drawings={figure.name: data_url(rendered(figure.figure, "png"), "png") for figure in drawn},
+        places={},
+        parameters=_table("parameters", "Parameters", ("parameter", "values", "between"), varied),
+        asked=tomlkit.dumps(asked),  # pyright: ignore[reportUnknownMemberType]
+        case=study.base().to_toml(),
     )
     write_text(path, text)
     return path
 
 
-def _inline(figure: Figure) -> str:
-    held = BytesIO()
-    figure.savefig(held, format="png", dpi=110)
-    return "data:image/png;base64," + base64.b64encode(held.getvalue()).decode()
+def _figure(name: str, figure: Figure) -> ReportFigure:
+    title, caption = _FIGURES.get(name, ("", ""))
+    if name.startswith(_OVER):
+        label = figure.axes[0].get_xlabel()
+        title, caption = f"Over {label}", f"The results of all samples over {label}."
+    return ReportFigure(name, title or name, caption, caption or title or name, figure)
 
 
-def _table(heads: Sequence[str], rows: Iterable[Line]) -> str:
-    head = "".join(f"<th>{html.escape(h)}</th>" for h in heads)
-    body = "".join("<tr>" + "".join(f"<td>{html.escape(str(c))}</td>" for c in row) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+def _table(name: str, title: str, heads: Sequence[str], rows: Iterable[Line]) -> Table:
+    lines = tuple(TableRow(tuple(map(str, row))) for row in rows)
+    return Table(name, title, tuple(heads), lines, frozenset({0}))
+
+
+def _words(varied: Varied) -> tuple[str, str]:
+    """How a number varies, and between what."""
+    if varied.values is not None:
+        return counted(len(varied.values), "value"), _between(min(varied.values), max(varied.values))
+    if varied.range is not None:
+        of = f"{counted(varied.points, 'point')}, " if varied.points else ""
+        return f"{of}{varied.spacing}", _between(*varied.range)
+    assert varied.mean is not None, "the study was checked"
+    assert varied.deviation is not None, "the study was checked"
+    shape = f"{varied.distribution}, mean {varied.mean:g}, deviation {varied.deviation:g}"
+    return shape, _between(varied.low, varied.high)
+
+
+def _between(low: float | None, high: float | None) -> str:
+    ends = ("no limit" if end is None else f"{end:g}" for end in (low, high))
+    return "" if low is None and high is None else " and ".join(ends)

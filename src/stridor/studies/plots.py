@@ -100,7 +100,10 @@ def root_locus(result: StudyResult, *, ax: Axes | None = None) -> Figure:
     ax.axhline(0.0, color=GREY, linewidth=0.8)
     scale = np.abs(growth[flat])
     if scale.size and scale.max() > 100 * max(float(np.median(scale)), 1e-9):
-        ax.set_yscale("symlog", linthresh=max(float(np.median(scale)), 1e-6))
+        linear = max(float(np.median(scale)), 1e-6)
+        ax.set_yscale("symlog", linthresh=linear)
+        # Within the linear part there is room for zero alone.
+        ax.set_yticks([tick for tick in ax.get_yticks() if tick == 0.0 or abs(tick) >= 0.5 * linear])
     ax.set(xlabel="frequency [Hz]", ylabel="growth rate [1/s]")
     legend_above(ax, columns=3)
     return figure

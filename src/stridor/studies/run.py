@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..case import Case
+from ..case.units import unit_at
 from ..errors import AnalysisError, CaseError
 from ..interrupts import held
 from ..io.claims import claimed
@@ -138,7 +139,7 @@ class _Run:
             values = values[numbers]
         made = provenance(case, "study", 0.0) | {"programs": [program()]}
         head = Head(self.study.document(), digest, made, "" if self.part is None else str(self.part))
-        parameters = {name: unit_of(name) for name in self.study.parameters}
+        parameters = {name: unit_at(case, name) for name in self.study.parameters}
         store = OpenStore.made(
             path, head, values, parameters, columns, lengths(self.study.compute, self.study.keep), numbers=numbers
         )
@@ -311,11 +312,6 @@ def _differences(before: Mapping[str, Any], study: Study) -> str:
     names = [n for n in dict.fromkeys([*before, *now]) if n not in ("title", "goal") and before.get(n) != now.get(n)]
     what = ", ".join(names) or "a file that the case names"
     return f"{what} differ{'s' if len(names) < 2 else ''}; remove it, or name another folder (--out)"
-
-
-def unit_of(path: str) -> str:
-    """The unit of a parameter, "" where its name tells none."""
-    return "1" if path == "mu" else ""
 
 
 def _workers(task: Task, count: int | None, scheduler: str | None) -> Workers:

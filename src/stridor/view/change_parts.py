@@ -8,8 +8,8 @@ from ..case import Case
 from ..digits import measured
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset
-from .figures import ReportFigure
 from .inputs import ReportInputs
+from .page_parts import ReportFigure
 from .sensitivity_plots import countermeasure_bars, sensitivity_bars
 from .sensitivity_tables import countermeasure_table, sensitivity_table
 from .tables import Table, TableRow, quantity

@@ -9,8 +9,8 @@ import numpy as np
 from ..digits import hertz, readable
 from ..periodic import Cycle, Cycles
 from .cycle_plots import cycle_branches, cycle_period
-from .figures import ReportFigure
 from .inputs import ReportInputs
+from .page_parts import ReportFigure
 from .tables import Table, TableRow
 
 STABLE = {True: "yes", False: "no", None: "undecided"}

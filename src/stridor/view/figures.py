@@ -3,27 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-
-from matplotlib.figure import Figure
 
 from ..digits import measured
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset
 from . import plots
 from .inputs import ReportInputs
+from .page_parts import ReportFigure
 from .windows import Window
-
-
-@dataclass(frozen=True)
-class ReportFigure:
-    """A figure: name (its file and anchor), title, caption, alternative text, the drawing."""
-
-    name: str
-    title: str
-    caption: str
-    alt: str
-    figure: Figure
 
 
 def model_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import os
-import re
 import tempfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined
-from matplotlib.figure import Figure
-
 from ..stages import passing, stage
 from .body_words import bodies_table
 from .change_parts import change_figures, change_tables, change_words, mechanism_table
 from .cycle_parts import branch_words, cycle_figures, cycle_table, cycle_words
-from .figures import ReportFigure, agreement_figures, modal_figures, model_figures, temporal_figures
+from .figures import agreement_figures, modal_figures, model_figures, temporal_figures
 from .inputs import ReportInputs
 from .modal_tables import frequency_tables, modes_table, onset_tables
-from .page_files import template_text
-from .style import lay_out, styled
+from .page_parts import ReportFigure, data_url, filled, rendered
+from .style import lay_out
 from .surface_figures import contact_figures, shape_figures, surface_table
 from .tables import Table, TableRow, number
 from .temporal_tables import (
@@ -35,9 +29,6 @@ from .temporal_tables import (
 )
 from .windows import Window, regime_window
 from .words import model_in_words, simulation_table, summary_table, verdict
-
-PNG_DPI = 180
-_UNIT = re.compile(r"(\d) (Hz|kHz|N/m|N|m/s²|m/s|1/s|mm|s|GPa|%)(?!\w)")
 
 
 @dataclass(frozen=True)
@@ -72,10 +63,10 @@ def write_report(inputs: ReportInputs, folder: Path) -> Path:
         if isinstance(part, ReportFigure):
             stage(f"figure {part.name}, as SVG and PNG", logged=False)
             lay_out(part.figure)
-            vector = _rendered(part.figure, "svg")
+            vector = rendered(part.figure, "svg")
             _write(figures / f"{part.name}.svg", vector)
-            _write(figures / f"{part.name}.png", _rendered(part.figure, "png"))
-            drawings[part.name] = "data:image/svg+xml;base64," + base64.b64encode(vector).decode("ascii")
+            _write(figures / f"{part.name}.png", rendered(part.figure, "png"))
+            drawings[part.name] = data_url(vector, "svg")
     page = folder / "report.html"
     _write(page, render(inputs, chapters, drawings).encode("utf-8"))
     return page
@@ -91,22 +82,20 @@ def render(inputs: ReportInputs, chapters: list[Chapter], drawings: dict[str, st
             (p for chapter in chapters for p in chapter.parts if isinstance(p, ReportFigure)), start=1
         )
     }
-    return (
-        _environment()
-        .get_template("report.html.j2")
-        .render(
-            inputs=inputs,
-            title=inputs.case.title or "Friction-induced instabilities",
-            verdict=verdict(inputs),
-            summary=summary_table(inputs),
-            sections=chapters,
-            drawings=drawings,
-            numbers=numbers,
-            places={name: place for name, place in places.items() if reference is not None},
-            reference=reference,
-            settings=inputs.case.to_toml(defaults=True),
-            is_table=_is_table,
-        )
+    return filled(
+        "report.html.j2",
+        inputs=inputs,
+        title=inputs.case.title or "Friction-induced instabilities",
+        verdict=verdict(inputs),
+        summary=summary_table(inputs),
+        sections=chapters,
+        drawings=drawings,
+        numbers=numbers,
+        places={name: place for name, place in places.items() if reference is not None},
+        reference=reference,
+        settings=inputs.case.to_toml(defaults=True),
+        is_table=_is_table,
+        about_tables=about_tables(inputs),
     )
 
 
@@ -254,17 +243,6 @@ def about_tables(inputs: ReportInputs) -> list[Table]:
     return tables
 
 
-@styled
-def _rendered(figure: Figure, kind: str) -> bytes:
-    """The figure as a file of that kind, equal for equal figures."""
-    target = io.BytesIO()
-    if kind == "svg":
-        figure.savefig(target, format="svg", metadata={"Date": None})
-    else:
-        figure.savefig(target, format=kind, dpi=PNG_DPI, metadata={"Software": "stridor"})
-    return target.getvalue()
-
-
 def _write(path: Path, content: bytes) -> None:
     """The file with that content, or the one that was there before: never a part of it."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
@@ -284,23 +262,3 @@ def _umask() -> int:
     mask = os.umask(0o022)
     os.umask(mask)
     return mask
-
-
-@cache
-def _environment() -> Environment:
-    environment = Environment(
-        loader=FunctionLoader(template_text),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["tidy"] = tidy
-    environment.globals["about_tables"] = about_tables  # pyright: ignore[reportArgumentType]
-    return environment
-
-
-def tidy(text: str) -> str:
-    """The text with numbers and units that stay on one line."""
-    joined = text.replace("μ = ", "μ\u00a0=\u00a0").replace(" ≤ ", "\u00a0≤\u00a0").replace(" · ", "\u202f·\u202f")
-    return _UNIT.sub("\\1\u00a0\\2", joined)

@@ -12,8 +12,8 @@ from ..system import System
 from ..typing import ComplexArray
 from . import plots
 from .field_plots import contact_energies
-from .figures import ReportFigure
 from .inputs import ReportInputs
+from .page_parts import ReportFigure
 from .tables import Table, TableRow, drop_empty, number, significant
 
 
