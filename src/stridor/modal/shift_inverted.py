@@ -13,6 +13,7 @@ from ..direct.dense import lu_factors
 from ..typing import Array, ComplexArray
 
 Lu = tuple[Any, Any]
+Matrix = Any  # dense (r, r), real or complex
 Factorise = Callable[[Any], Lu]
 Pairs = tuple[ComplexArray, ComplexArray, ComplexArray]
 
@@ -31,7 +32,7 @@ def undamped_pairs(
 
 
 def damped_pairs(
-    mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float, *, upper: bool = True,
+    mass: Matrix, damping: Matrix, stiffness: Matrix, frequency: float, reach: float, *, upper: bool = True,
     factorise: Factorise = lu_factors,
 ) -> Pairs:  # fmt: skip
     """λ (k,) and right and left vectors (r, k) of (λ²M + λD + K) z = 0 with |λ| ≤ reach · frequency, with ``upper``
@@ -48,8 +49,8 @@ def damped_pairs(
 
 
 def companion(
-    mass: Array, damping: Array, stiffness: Array, frequency: float, *, factorise: Factorise = lu_factors
-) -> tuple[Array, Lu]:
+    mass: Matrix, damping: Matrix, stiffness: Matrix, frequency: float, *, factorise: Factorise = lu_factors
+) -> tuple[Matrix, Lu]:
     """The matrix (2r, 2r) whose eigenvalues are θ = 1/(λ/frequency − 1), and the factors of P(frequency)."""
     mass, damping = frequency**2 * mass, frequency * damping
     r = len(mass)

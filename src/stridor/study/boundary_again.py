@@ -7,12 +7,12 @@ import numpy as np
 from ..errors import AnalysisError
 from ..modal.boundary import Found, Plane, StabilityCurve
 from ..modal.boundary.spot import CurvePoint
+from ..modal.dense_problem import combined
 from ..modal.full.line import ParameterLine
 from ..modal.full.passages import quiet
 from ..modal.newton import Root, crossing, meeting, standstill
 from ..modal.options import Options
 from ..modal.parametric import ParametricProblem, ReducedModel
-from ..modal.parametric.basis import expanded
 from ..modal.parametric.model import sketched
 from ..typing import Array
 from .boundary_result import SolvedAgain
@@ -81,7 +81,9 @@ def _again(
     line = ParameterLine(problem, plane.names[axis], values, Options(solver=solver))
     own = line.parameter
     at = (values[own.name] - own.low) / (own.high - own.low)
-    right, left = (v if vectors is None else expanded(vectors, v[:, None])[:, 0] for v in (spot.right, spot.left))
+    right, left = (
+        v if vectors is None else combined(vectors, v[:, None])[:, 0].astype(complex) for v in (spot.right, spot.left)
+    )
     between = max(at - AROUND, 0.0), min(at + AROUND, 1.0)
     root: Root | None
     try:

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from ...threads import one_thread
 from ...typing import Array, ComplexArray
-from ..dense_problem import DenseProblem
+from ..dense_problem import DenseProblem, combined
 from ..full.branches import ends_of
 from ..full.growth import growing_roots
 from ..full.line import OnTerms, ParameterLine
@@ -23,7 +23,6 @@ from ..full.search import Answer, search
 from ..newton import Border, BorderedFactor
 from ..options import Options
 from ..parametric import Parameter, ParametricProblem, Term
-from ..parametric.basis import expanded
 from ..parametric.dense import DenseModes, assembled, dense_modes, made_of
 from ..quadratic import Quadratic
 from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
@@ -105,11 +104,11 @@ class Plane:
         """∇λ (2, k) of modes at a point; not finite where λ is double."""
         lam, z, w = found.values, found.right, found.left
         mass, damping, _ = self.matrices(p)
-        by_lam = np.einsum("ij,ij->j", w, 2 * lam * expanded(mass, z) + expanded(damping, z))
+        by_lam = np.einsum("ij,ij->j", w, 2 * lam * combined(mass, z) + combined(damping, z))
         slopes = np.zeros((2, len(lam)), dtype=complex)
         for axis, direction in enumerate(np.eye(2)):
             a, b, c = self.changes(p, direction)
-            moved = lam**2 * expanded(a, z) + lam * expanded(b, z) + expanded(c, z)
+            moved = lam**2 * combined(a, z) + lam * combined(b, z) + combined(c, z)
             with np.errstate(all="ignore"):
                 slopes[axis] = -np.einsum("ij,ij->j", w, moved) / by_lam
         return slopes

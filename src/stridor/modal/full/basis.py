@@ -16,11 +16,10 @@ import scipy.sparse as sp
 from ...direct import SingularMatrix
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, Sparse
-from ..dense_problem import DenseProblem, Eigenpairs, OverNumber
+from ..dense_problem import DenseProblem, Eigenpairs, OverNumber, combined
 from ..krylov.follow import FOLLOWED
 from ..options import Options
 from ..parametric import ReducedModel, reduce
-from ..parametric.basis import expanded
 from ..quadratic import Quadratic, Region, find_modes
 from ..quadratic.inverse_iteration import two_sided
 from ..quadratic.problem import times
@@ -179,7 +178,7 @@ class Projected(OnBasis):
 
     def vectors(self, z: ComplexArray, mu: float, *, left: bool = False) -> ComplexArray:
         """V z, or z where V is the unit matrix; without the forces of rigid contact."""
-        x = z if self.model is None else expanded(self.model.vectors, z)
+        x = z if self.model is None else combined(self.model.vectors, z).astype(complex)
         if self.family.eliminated is None:
             return x
         elimination = self.family.eliminated[1]

@@ -19,11 +19,11 @@ from ...notebook import Shown, counted, html_table
 from ...tabular import Rows, Tabular, dataset
 from ...threads import one_thread
 from ...typing import ComplexArray
+from ..dense_problem import combined
 from ..newton import Root, crossing, meeting, standstill
 from ..onset import Onset, from_above
 from ..options import Options
 from ..parametric import ReducedModel
-from ..parametric.basis import expanded
 from ..tables import ONSET
 from .branches import ends_of
 from .counted import ends as turns
@@ -280,7 +280,7 @@ def _confirmed(model: ReducedModel, source: OnTerms, full: ParameterLine, onset:
     lam, s = 2j * np.pi * onset.frequency_hz, onset.mu
     with quiet():
         right, left = source.null_vectors(lam, s)
-    x, y = (expanded(model.vectors, v[:, None].astype(complex))[:, 0] for v in (right, left))
+    x, y = (combined(model.vectors, v[:, None])[:, 0].astype(complex) for v in (right, left))
     between = max(s - NEAR, 0.0), min(s + NEAR, 1.0)
     for root in _roots(full, s, lam, x, y, between, onset):
         near = root is not None and abs(root.lam - lam) <= NEAR * max(abs(lam), 1e-3 * model.frequency)

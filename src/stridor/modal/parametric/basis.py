@@ -192,11 +192,6 @@ def residual(
     return total
 
 
-def expanded(vectors: Array, z: Any) -> Any:
-    """vectors @ z in real arithmetic."""
-    return vectors @ np.ascontiguousarray(z.real) + 1j * (vectors @ np.ascontiguousarray(z.imag))
-
-
 def real_and_imaginary(block: Any) -> Array:
     """Real and imaginary parts (n, 2k) side by side."""
     return np.hstack([block.real, block.imag])

@@ -17,7 +17,8 @@ from ...direct.lowest import modes_below
 from ...errors import CaseError
 from ...threads import one_thread
 from ...typing import IntArray
-from .basis import ReducedBasis, expanded, residual
+from ..dense_problem import combined
+from .basis import ReducedBasis, residual
 from .dense import assembled, dense_modes
 from .greedy import SAFETY, random_points
 from .model import ReducedModel, sketched
@@ -88,8 +89,8 @@ def _constant(basis: ReducedBasis, factor: Factor, frequency: float) -> float:
         factors, powers = problem.factors(point), problem.powers
         matrices = assembled(basis.projected, factors, powers)
         found = dense_modes(*matrices, frequency, 1.0)
-        right = residual(problem, factors, found.values, expanded(basis.vectors, found.right))
-        left = residual(problem, factors, found.values, expanded(basis.vectors, found.left), left=True)
+        right = residual(problem, factors, found.values, combined(basis.vectors, found.right))
+        left = residual(problem, factors, found.values, combined(basis.vectors, found.left), left=True)
         through = np.abs(np.einsum("ij,ij->j", left, factor.solve(right, refine=False)))
         lengths = (
             sketched(sketch, factors, powers, found.values, vectors)

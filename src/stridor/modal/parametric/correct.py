@@ -22,8 +22,9 @@ from ...direct import Factor, factorise
 from ...errors import CaseError
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
+from ..dense_problem import combined
 from ..tolerances import UNSTABLE_RELATIVE
-from .basis import expanded, real_and_imaginary, residual
+from .basis import real_and_imaginary, residual
 from .dense import assembled, dense_modes
 from .model import REACH, ReducedModel, product_over_slope
 from .offline import static_operator, symmetric_parts
@@ -103,7 +104,7 @@ class Corrector:
         while True:
             matrices = assembled(projected, factors, powers)
             found = dense_modes(*matrices, model.frequency, REACH, whole=model.whole)
-            right, left = expanded(basis, found.right), expanded(basis, found.left)
+            right, left = combined(basis, found.right), combined(basis, found.left)
             rests = (
                 residual(problem, factors, found.values, right),
                 residual(problem, factors, found.values, left, left=True),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +10,11 @@ import scipy.linalg as sl
 
 from ...direct.dense import DenseFactor
 from ...errors import AnalysisError
-from ...typing import Array, BoolArray, ComplexArray
+from ...typing import Array, BoolArray, ComplexArray, IntArray
+from ..dense_problem import combined
 from ..quadratic.inverse_iteration import iterated
 from ..quadratic.problem import Quadratic
 from ..shift_inverted import damped_pairs, undamped_pairs
-from .basis import expanded
 
 NEAR = (1.2, 4.0)  # modes up to this much above the band are solved for together: first try, second try
 SMALL = 1e-13
@@ -59,10 +60,8 @@ def dense_modes(
         except (ValueError, sl.LinAlgError) as error:
             raise AnalysisError("the reduced problem is singular or not finite; check the parameters") from error
     order = np.lexsort((found.values.real, found.values.imag))
-    right, left = found.right[:, order], found.left[:, order]
-    return DenseModes(
-        found.values[order], right / np.linalg.norm(right, axis=0), left / np.linalg.norm(left, axis=0), found.whole
-    )
+    right, left = _unit(found.right[:, order]), _unit(found.left[:, order])
+    return DenseModes(found.values[order], right, left, found.whole)
 
 
 def _by_undamped(mass: Array, damping: Array, stiffness: Array, frequency: float, reach: float) -> DenseModes | None:
@@ -87,7 +86,6 @@ def _with_damping(
     """The damped modes from all the undamped ones, of which those up to ``nearby`` times the band are solved together
     and all but the close ones answer for what is left; None where the answers do not settle."""
     mass, damping, stiffness = matrices
-    transposed = mass.T, damping.T, stiffness.T
     near = np.abs(squares) <= (nearby * reach * frequency) ** 2
     far, mine = np.flatnonzero(~near), np.flatnonzero(near)
     if not len(mine):
@@ -100,55 +98,104 @@ def _with_damping(
     if not len(lam) or np.any(lam.imag <= 1e-3 * frequency):
         return None
     z, w = inner_right @ z, inner_left @ w
-    z, w = z / np.linalg.norm(z, axis=0), w / np.linalg.norm(w, axis=0)
-    # Answer of the modes further away: (λ²M + K)⁻¹ is a sum over modes.
-    weight = np.einsum("ij,ij->j", left, mass @ right)
+    z, w = _unit(z), _unit(w)
+    weight = np.einsum("ij,ij->j", left, combined(mass, right))
     top = reach * frequency
     scale = 1.0 / (np.sqrt(np.abs(weight)) * np.maximum(np.sqrt(np.abs(squares)), top))
     if top * _coupling(damping, right[:, far] * scale[far], left * scale) > HIDDEN:
         return None
-    ours, theirs = _images(matrices, z), _images(transposed, w)
-    open_modes = watched = np.ones(len(lam), dtype=bool)
-    first, number, answering = lam, len(lam) + 1, _answering(lam, squares, weight, right, left, ours, theirs)
-    answering[far] = True
-    for _ in range(ANSWERS):
-        inverse = np.where(answering, 1.0 / ((lam**2 - squares[:, None]) * weight[:, None]), 0.0)
-        z = z - right @ (inverse * (left.T @ _rest(lam, ours)))
-        w = w - left @ (inverse * (right.T @ _rest(lam, theirs)))
-        ours, theirs = _images(matrices, z), _images(transposed, w)
-        lam = _functional(lam, w, ours)
-        watched = np.abs(lam) <= WATCHED * top
-        before, open_modes = number, watched & _unsettled(lam, w, ours, theirs)
-        number = int(open_modes.sum())
-        if not number or number == before:
-            break
-    if number > FEW or np.any(watched & (np.abs(lam - first) >= MOVED * _apart(first))):
-        return None
-    problem = Quadratic(*matrices)
-    for k in np.flatnonzero(open_modes):
-        # Two modes that are about to meet take the inverse itself.
-        apart, old = _apart(lam)[k], complex(lam[k])
-        found = iterated(problem, DenseFactor.of(problem.at(old * (1 + OFF))), old, z[:, k], w[:, k], fewest=2)
-        if found is None or not abs(found.lam - old) < JUMP * apart:
-            return None
-        lam[k], z[:, k], w[:, k] = found.lam, found.right, found.left
-    if number and np.any(watched & _unsettled(lam, w, _images(matrices, z), _images(transposed, w))):
+    first = lam.copy()
+    rough = _Rough(matrices, squares, weight, right, left, lam, z, w, top)
+    rough.answering[far] = True
+    unsettled = rough.answered(np.arange(len(lam)))
+    if len(unsettled) and rough.recombined(unsettled):
+        unsettled = rough.answered(unsettled)
+    moved = (np.abs(lam) <= WATCHED * top) & (np.abs(lam - first) >= MOVED * _apart(first))
+    if len(unsettled) > FEW or moved.any() or not rough.iterated(unsettled):
         return None
     inside = np.abs(lam) <= top
     return DenseModes(lam[inside], z[:, inside], w[:, inside], whole=False) if inside.any() else None
 
 
-def _answering(
-    lam: ComplexArray, squares: ComplexArray, weight: ComplexArray, right: ComplexArray, left: ComplexArray,
-    ours: Images, theirs: Images,
-) -> BoolArray:  # fmt: skip
-    """Which undamped modes (r, k) answer for what each damped one leaves: all but its own, for which λ answers, and
-    those that damping mixes with it, which the small problem has told apart."""
-    distance = np.abs((lam**2 - squares[:, None]) * weight[:, None])
-    sizes = np.maximum(np.abs(left.T @ ours[1]), np.abs(right.T @ theirs[1])) * np.abs(lam)
-    apart: BoolArray = sizes <= MIXED * distance
-    apart[np.argmin(np.abs(lam**2 - squares[:, None]), axis=0), np.arange(len(lam))] = False
-    return apart
+class _Rough:
+    """Damped modes (lam, z, w) that are not those of the matrices yet, made so in place: other undamped modes
+    (squares, right, left), of ``weight`` in the mass, answer for what each leaves; modes that damping mixes are
+    combined anew; what is left unsettled takes the inverse itself. top [1/s]: the end of the band."""
+
+    def __init__(
+        self, matrices: Matrices, squares: ComplexArray, weight: ComplexArray, right: ComplexArray, left: ComplexArray,
+        lam: ComplexArray, z: ComplexArray, w: ComplexArray, top: float,
+    ) -> None:  # fmt: skip
+        mass, damping, stiffness = matrices
+        self.matrices, self.transposed = matrices, (mass.T, damping.T, stiffness.T)
+        self.squares, self.weight, self.right, self.left = squares[:, None], weight[:, None], right, left
+        self.lam, self.z, self.w, self.top = lam, z, w, top
+        distance = np.abs(lam**2 - self.squares)
+        self.own = np.argmin(distance, axis=0)
+        # Of those that damping mixes with a mode the small problem has told it apart; for its own one λ answers.
+        forced = [left.T @ combined(damping, z), right.T @ combined(damping.T, w)]
+        self.answering = np.abs(lam) * np.abs(forced).max(axis=0) <= MIXED * distance * np.abs(self.weight)
+        self.answering[self.own, np.arange(len(lam))] = False
+
+    def answered(self, at: IntArray) -> IntArray:
+        """Let the others answer for the modes at these places (k,) until they settle or no more of them do; the
+        places of those of them in the band that do not. (λ²M + K)⁻¹ is a sum over modes."""
+        lam, z, w = self.lam, self.z, self.w
+        ours, theirs = _images(self.matrices, z[:, at]), _images(self.transposed, w[:, at])
+        number, watched = len(at) + 1, at
+        for _ in range(ANSWERS):
+            inverse = np.where(self.answering[:, at], 1.0 / ((lam[at] ** 2 - self.squares) * self.weight), 0.0)
+            z[:, at] -= self.right @ (inverse * (self.left.T @ _rest(lam[at], ours)))
+            w[:, at] -= self.left @ (inverse * (self.right.T @ _rest(lam[at], theirs)))
+            ours, theirs = _images(self.matrices, z[:, at]), _images(self.transposed, w[:, at])
+            lam[at] = _functional(lam[at], w[:, at], ours)
+            unsettled = _unsettled(lam[at], w[:, at], ours, theirs)
+            at = at[unsettled]
+            watched = self._watched(at)
+            before, number = number, len(watched)
+            if not number or number == before:
+                break
+            ours, theirs = (_chosen(images, unsettled) for images in (ours, theirs))
+        return watched
+
+    def recombined(self, at: IntArray) -> bool:
+        """Solve for the modes at these places (k,) and all that damping mixes with them on what they span; whether each
+        was found again."""
+        mixed = np.flatnonzero(~self.answering[:, at].all(axis=1))
+        among = np.union1d(at, np.flatnonzero(np.isin(self.own, mixed)))
+        z, w = self.z[:, among], self.w[:, among]
+        mass, damping, stiffness = (w.T @ image for image in _images(self.matrices, z))
+        lam, right, left = damped_pairs(mass, damping, stiffness, self.top, 2 * EDGE)
+        apart = _apart(self.lam)
+        distance = np.abs(self.lam[at, None] - lam)
+        found = distance.argmin(axis=1) if len(lam) else np.zeros(0, dtype=np.int64)
+        if len(set(found.tolist())) < len(at) or np.any(distance.min(axis=1) >= JUMP * apart[at]):
+            return False
+        self.lam[at] = lam[found]
+        self.z[:, at], self.w[:, at] = _unit(z @ right[:, found]), _unit(w @ left[:, found])
+        return True
+
+    def iterated(self, at: IntArray) -> bool:
+        """Inverse iterations from the modes at these places (k,); whether all settle where they are."""
+        problem = Quadratic(*self.matrices)
+        for k in at:
+            apart, old = _apart(self.lam)[k], complex(self.lam[k])
+            factor = DenseFactor.of(problem.at(old * (1 + OFF)))
+            found = iterated(problem, factor, old, self.z[:, k], self.w[:, k], fewest=2)
+            if found is None or not abs(found.lam - old) < JUMP * apart:
+                return False
+            self.lam[k], self.z[:, k], self.w[:, k] = found.lam, found.right, found.left
+        at = self._watched(at)
+        ours, theirs = _images(self.matrices, self.z[:, at]), _images(self.transposed, self.w[:, at])
+        return not _unsettled(self.lam[at], self.w[:, at], ours, theirs).any()
+
+    def _watched(self, at: IntArray) -> IntArray:
+        return at[np.abs(self.lam[at]) <= WATCHED * self.top]
+
+
+def _unit(vectors: ComplexArray) -> ComplexArray:
+    """The columns (r, k) at unit length."""
+    return vectors / np.linalg.norm(vectors, axis=0)
 
 
 def _apart(lam: ComplexArray) -> Array:
@@ -166,9 +213,9 @@ def _coupling(damping: Array, right: ComplexArray, left: ComplexArray) -> float:
     norm = 0.0
     for _ in range(4):
         x = x / np.maximum(np.linalg.norm(x, axis=0), 1e-300)
-        y = left.T @ (damping @ (right @ x))
+        y = left.T @ combined(damping, right @ x)
         norm = max(norm, float(np.linalg.norm(y, axis=0).max(initial=0.0)))
-        x = right.conj().T @ (damping.T @ (left.conj() @ y))
+        x = (right.T @ combined(damping.T, left @ y.conj())).conj()
     return norm
 
 
@@ -183,7 +230,12 @@ def _unsettled(lam: ComplexArray, w: ComplexArray, ours: Images, theirs: Images)
 def _images(matrices: Matrices, z: ComplexArray) -> Images:
     """Mz, Dz and Kz (r, k)."""
     mass, damping, stiffness = matrices
-    return expanded(mass, z), expanded(damping, z), expanded(stiffness, z)
+    return combined(mass, z), combined(damping, z), combined(stiffness, z)
+
+
+def _chosen(images: Images, columns: BoolArray) -> Images:
+    of_mass, of_damping, of_stiffness = (image[:, columns] for image in images)
+    return of_mass, of_damping, of_stiffness
 
 
 def _rest(lam: ComplexArray, images: Images) -> ComplexArray:
@@ -213,9 +265,14 @@ def made_of(projected: Array, factors: Array, powers: Array, lam: complex) -> Ar
     return np.asarray(abs(lam) ** 2 * mass + abs(lam) * damping + stiffness)
 
 
-def assembled(projected: Array, factors: Array, powers: Array) -> tuple[Array, Array, Array]:
+def assembled(projected: Array, factors: Array, powers: Array) -> Matrices:
     """M, D and K (r, s), or what else goes with each power of λ, from projected terms (t, r, s)."""
-    # One pass through the terms, which are more than the cache holds.
-    each = np.where(np.array([[2], [1], [0]]) == powers, factors, 0.0)
-    total = (each @ projected.reshape(len(projected), -1)).reshape(3, *projected.shape[1:])
-    return total[0], total[1], total[2]
+    return assembled_each(projected, (factors,), powers)[0]
+
+
+def assembled_each(projected: Array, chosen: Sequence[Array], powers: Array) -> list[Matrices]:
+    """`assembled` with each of several factors (t,), in one pass through the terms, which are more than the cache
+    holds."""
+    each = [np.where(np.array([[2], [1], [0]]) == powers, factors, 0.0) for factors in chosen]
+    total = (np.vstack(each) @ projected.reshape(len(projected), -1)).reshape(-1, 3, *projected.shape[1:])
+    return [(mass, damping, stiffness) for mass, damping, stiffness in total]

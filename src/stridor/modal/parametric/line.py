@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +13,7 @@ from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, IntArray
 from ..dense_problem import Eigenpairs, OverNumber, combined
 from ..krylov.follow import Follower, State
-from .dense import assembled
+from .dense import assembled_each
 from .model import ReducedModel, ReducedModes
 
 TRIES = 16  # points of a line at most; what needs more is not told
@@ -71,19 +72,23 @@ class ModelAlongLine(OverNumber):
         low, high = max(t - DIFFERENCE, 0.0), min(t + DIFFERENCE, 1.0)
         change = (problem.factors(self.point(high)) - problem.factors(self.point(low))) / (high - low)
         here = problem.factors(self.point(t))
-        moved, sizes = (self._sandwiched(t, modes, factors) for factors in (change, here))
+        moved, sizes = self._sandwiched(t, modes, (change, here))
         by_x = 2 * lam * sizes[0] + sizes[1] if self.damped else sizes[0]
         with np.errstate(all="ignore"):
             slopes: ComplexArray = -(lam**2 * moved[0] + lam * moved[1] + moved[2]) / by_x
         return slopes
 
-    def _sandwiched(self, t: float, modes: ReducedModes, factors: Array) -> ComplexArray:
-        """wᵀAz (3, k) of what the terms on each power of λ add up to, with these factors, M first."""
+    def _sandwiched(self, t: float, modes: ReducedModes, chosen: Sequence[Array]) -> list[ComplexArray]:
+        """Of each of these factors wᵀAz (3, k) of what the terms on each power of λ add up to, M first."""
         powers = self.model.problem.powers
         if t == 0.0:
-            return np.array([factors[powers == p] @ self._begin.shares[powers == p] for p in (2, 1, 0)])
-        parts = assembled(self.model.projected, factors, powers)
-        return np.array([np.einsum("ij,ij->j", modes.left, combined(part, modes.right)) for part in parts])
+            shares = self._begin.shares
+            return [np.array([f[powers == p] @ shares[powers == p] for p in (2, 1, 0)]) for f in chosen]
+        left, right = modes.left, modes.right
+        return [
+            np.array([np.einsum("ij,ij->j", left, combined(part, right)) for part in parts])
+            for parts in assembled_each(self.model.projected, chosen, powers)
+        ]
 
 
 def numbers_at(start: Numbered, end: ReducedModes) -> IntArray:

@@ -23,8 +23,8 @@ from ...notebook import Shown, counted, html_table
 from ...tabular import MODE, Rows, Tabular, mode_cells
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
+from ..dense_problem import combined
 from ..tolerances import UNSTABLE_RELATIVE
-from .basis import expanded
 from .dense import DenseModes, assembled, dense_modes
 from .problem import ParametricProblem
 from .states import States
@@ -147,7 +147,7 @@ class ReducedModel(Shown):
 
     def expand(self, modes: ReducedModes, *, left: bool = False) -> ComplexArray:
         """Right or left vectors (n, k) of unit length."""
-        x: ComplexArray = expanded(self.vectors, modes.left if left else modes.right)
+        x: ComplexArray = combined(self.vectors, modes.left if left else modes.right).astype(complex)
         return x / np.linalg.norm(x, axis=0)
 
     def backward_error(self, modes: ReducedModes) -> Array:
@@ -171,7 +171,7 @@ def sketched_rests(
     sketch: Array, factors: Array, powers: Array, lam: ComplexArray, z: ComplexArray
 ) -> ComplexArray:
     """Sketches (s, k) of scaled residuals of z (r, k): what acts on one power of λ at once."""
-    of_mass, of_damping, of_stiffness = (expanded(matrix, z) for matrix in assembled(sketch, factors, powers))
+    of_mass, of_damping, of_stiffness = (combined(matrix, z) for matrix in assembled(sketch, factors, powers))
     total: ComplexArray = (of_mass * lam + of_damping) * lam + of_stiffness
     return total
 
@@ -182,6 +182,6 @@ def product_over_slope(
     """ρ_right ρ_left / |λ yᵀP'(λ)x| (k,)."""
     mass, damping, _ = matrices
     lam = found.values
-    slope = 2 * lam * expanded(mass, found.right) + expanded(damping, found.right)
+    slope = 2 * lam * combined(mass, found.right) + combined(damping, found.right)
     size = np.abs(lam * np.einsum("ij,ij->j", found.left, slope))
     return right * left / np.maximum(size, 1e-300)
