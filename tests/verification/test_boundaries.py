@@ -212,6 +212,16 @@ def test_branches_that_all_but_meet_are_not_taken_for_one_another(tmp_path: Path
     against_a_grid(*traced(case, "x", (0.0, 1.0), 1.0))
 
 
+def test_a_corner_on_an_edge_is_no_curve_of_its_own(tmp_path: Path) -> None:
+    """|x − 1/2| = μ/10: two straight lines from a point on μ = 0, which is an onset of that line."""
+    case = damped_by(tmp_path, "abs(x - 0.5) - mu*0.1")
+    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0))
+    assert found.agree
+    assert len(found.curves) == 2
+    for curve in found.curves:
+        assert np.abs(curve.x - 0.5) == pytest.approx(0.1 * curve.y, abs=1e-9)
+
+
 def test_branches_that_cross(tmp_path: Path) -> None:
     """Each keeps its frequency through the crossing, and the lower of both is the outer boundary."""
     case = crossing_branches(tmp_path)

@@ -52,11 +52,23 @@ def joined(curves: Sequence[StabilityCurve]) -> list[StabilityCurve]:
     lost = [(k, e) for k, c in enumerate(curves) for e in (0, 1) if c.ends[e] == "lost"]
     ends = [list(c.ends) for c in curves]
     for (k, e), (j, f) in combinations(lost, 2):
-        one, other = curves[k].spots[-e], curves[j].spots[-f]
-        near = one.kind == other.kind and float(np.hypot(*(one.p - other.p))) <= CUSP
-        if near and abs(one.omega - other.omega) <= OMEGA * one.omega:
+        if _same(curves[k].spots[-e], curves[j].spots[-f]):
             ends[k][e] = ends[j][f] = "cusp"
     return [replace(c, ends=(e[0], e[1])) for c, e in zip(curves, ends, strict=True)]
+
+
+def without_points(curves: Sequence[StabilityCurve]) -> list[StabilityCurve]:
+    """The curves without those of one point that is the end of another: the corner of a rectangle's edge in which two
+    end is an onset of its line."""
+    drawn = [c for c in curves if len(c.spots) > 1]
+    ends = [spot for c in drawn for spot in (c.spots[0], c.spots[-1])]
+    return [c for c in curves if len(c.spots) > 1 or not any(_same(c.spots[0], end) for end in ends)]
+
+
+def _same(one: CurvePoint, other: CurvePoint) -> bool:
+    """Whether two points of curves are one, of one kind and frequency."""
+    near = one.kind == other.kind and float(np.hypot(*(one.p - other.p))) <= CUSP
+    return near and abs(one.omega - other.omega) <= OMEGA * one.omega
 
 
 @dataclass

@@ -22,7 +22,7 @@ from ..onset import Onset
 from ..tolerances import UNSTABLE_RELATIVE
 from .climb import ModesAtPoint, climb, tops
 from .curve import Crossing, Drawn, StabilityCurve, crossings
-from .march import joined, traced
+from .march import joined, traced, without_points
 from .plane import Count, Plane
 from .spot import CurvePoint, Kind, settled
 
@@ -149,7 +149,7 @@ class _CurveSearch:
             for axis, value in dict.fromkeys(new):
                 if not self._laid(axis, value):
                     self._lay(axis, value)
-        self.found.curves = joined(self.found.curves)
+        self.found.curves = without_points(joined(self.found.curves))
         self.found.lines = [self._borne_out(line) for line in self.found.lines]
         self.found.wrong = [*self._contradicted(), *self._unmatched()]
         if self.found.passing or any("band" in curve.ends for curve in self.found.curves):
