@@ -100,3 +100,19 @@ def test_a_peak_beside_the_edge_of_what_is_looked_at_stays_between_its_bins() ->
     assert signals.Spectrum(frequency, lone, "hann", 1.0, 2.0).peak()[0] == pytest.approx(6.3)
 
 
+@pytest.mark.parametrize("periods", [3.2, 4.8, 7.5, 40.3])
+def test_a_slow_line_is_found_where_it_is_and_not_on_its_flank(periods: float) -> None:
+    """Of less than four periods the largest bin beyond the fourth lies on the flank of the line."""
+    time = np.linspace(0.0, 1.0, 4096, endpoint=False)
+    swing = np.sin(2 * np.pi * periods * time) + 0.01 * np.sin(2 * np.pi * 300.0 * time)
+    frequency, amplitude = signals.spectrum(swing, float(time[1])).line()
+    assert frequency == pytest.approx(periods, abs=0.15)
+    assert amplitude == pytest.approx(1.0, abs=0.2)
+
+
+def test_what_is_slower_than_that_is_no_line() -> None:
+    time = np.linspace(0.0, 1.0, 4096, endpoint=False)
+    drift = time**2
+    assert signals.spectrum(drift, float(time[1])).line() == (0.0, 0.0)
+    squeal = 1e-3 * np.sin(2 * np.pi * 300.0 * time)
+    assert signals.spectrum(drift + squeal, float(time[1])).line()[0] == pytest.approx(300.0, abs=0.1)

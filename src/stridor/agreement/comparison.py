@@ -375,7 +375,7 @@ def dominant_line(
     growth of that line over all of it, as `dominant_response` has them; None for what there is not."""
     filtered = low_passed(signal, sampling, max_frequency_hz)
     spec = spectrum(filtered[int(len(filtered) * (1.0 - share)) :], sampling)
-    frequency, amplitude = spec.peak(above_hz=2 * spec.bandwidth_hz)
+    frequency, amplitude = spec.line()
     if amplitude == 0.0:
         return None, None
     fitted = growth(filtered, sampling, frequency)

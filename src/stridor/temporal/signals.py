@@ -7,6 +7,7 @@ is a sum of damped exponentials, and the matrix pencil (Hua and Sarkar 1990) tak
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -49,6 +50,18 @@ class Spectrum:
         half, here = 0.5 * float(np.ptp(self.frequency_hz[:2])), float(self.frequency_hz[k])
         found = min(max(_interpolated(self.frequency_hz, self.amplitude, k), here - half), here + half)
         return found, float(self.amplitude[k])
+
+    def line(self) -> tuple[float, float]:
+        """Frequency [Hz], interpolated between bins, and amplitude of the largest line, (0, 0) where there is none: a
+        bin larger than those beside it. The flank of what is slower than a spectrum tells from its mean is no line."""
+        a = self.amplitude
+        higher = np.zeros(len(a), dtype=bool)
+        higher[1:-1] = (a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])
+        higher[: math.ceil(self.bandwidth_hz / self.resolution_hz) + 1] = False
+        if not higher.any():
+            return 0.0, 0.0
+        k = int(np.argmax(np.where(higher, a, -1.0)))
+        return _interpolated(self.frequency_hz, a, k), float(a[k])
 
 
 def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:

@@ -23,6 +23,7 @@ EDGE = 1.2  # times the band: modes up to here are carried along, as damping may
 # away half of HIDDEN is what it may do to their frequency
 WATCHED = 1.1  # times the band: and up to here they must settle
 ANSWERS = 6
+REAL = 1e-3  # of the band: λ with less of an imaginary part may be real
 FEW = 20  # modes that others' answers leave unsettled, solved for one by one
 OFF = 1e-10  # of λ: how far beside it is factorised, so that the matrix is not singular
 JUMP = 0.1  # of the distance to the next mode: what an inverse iteration may move one
@@ -95,7 +96,7 @@ def _with_damping(
         inner_left.T @ (matrix @ inner_right) for matrix in (mass, damping, stiffness)
     )
     lam, z, w = damped_pairs(inner_mass, inner_damping, inner_stiffness, frequency, EDGE * reach)
-    if not len(lam) or np.any(lam.imag <= 1e-3 * frequency):
+    if not len(lam) or np.any(lam.imag <= REAL * frequency):
         return None
     z, w = inner_right @ z, inner_left @ w
     z, w = _unit(z), _unit(w)
@@ -114,6 +115,8 @@ def _with_damping(
     if len(unsettled) > FEW or moved.any() or not rough.iterated(unsettled):
         return None
     inside = np.abs(lam) <= top
+    if np.any(lam[inside].imag <= REAL * frequency):
+        return None  # damped beyond critical after all: where one real λ is there is another
     return DenseModes(lam[inside], z[:, inside], w[:, inside], whole=False) if inside.any() else None
 
 
