@@ -222,6 +222,12 @@ def test_a_corner_on_an_edge_is_no_curve_of_its_own(tmp_path: Path) -> None:
         assert np.abs(curve.x - 0.5) == pytest.approx(0.1 * curve.y, abs=1e-9)
 
 
+def test_a_factor_that_is_not_real_within_the_ranges_is_named_by_its_path(tmp_path: Path) -> None:
+    case = damped_by(tmp_path, "mu*1e-3 + 0.1*sqrt((x - 0.31)*(x - 0.41))")
+    with pytest.raises(st.CaseError, match=r"^bodies\.matrices\.terms\.3\.factor: .*not real at mu = 0, x = 0\.375$"):
+        st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0))
+
+
 def test_branches_that_cross(tmp_path: Path) -> None:
     """Each keeps its frequency through the crossing, and the lower of both is the outer boundary."""
     case = crossing_branches(tmp_path)

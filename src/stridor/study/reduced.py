@@ -172,13 +172,13 @@ class _Numbers:
 
         if not isinstance(share.factor, str):
             return FactoredPart(sp.csr_array(share.factor * share.matrix), share.role)
-        expression = parse_expression(share.factor, (*case.parameters, MU), "factor")
+        expression = parse_expression(share.factor, (*case.parameters, MU), share.where)
         values = case.factor_values()
         varied = tuple(name for name in expression.names if name in self._box)
         if not varied:
-            return FactoredPart(sp.csr_array(expression.value(values, "factor") * share.matrix), share.role)
+            return FactoredPart(sp.csr_array(expression.value(values, share.where) * share.matrix), share.role)
         fixed = tuple((name, values[name]) for name in expression.names if name not in varied)
-        return FactoredPart(share.matrix, share.role, Formula(share.factor, varied, fixed))
+        return FactoredPart(share.matrix, share.role, Formula(share.factor, varied, fixed, share.where))
 
     def _changes(self, values: Mapping[str, float]) -> dict[str, float]:
         """Overrides of the case."""

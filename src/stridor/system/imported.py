@@ -34,11 +34,13 @@ _ROTATIONS = (4, 5, 6)
 
 @dataclass(frozen=True)
 class ImportedTerm:
-    """One term of a body before its factor: its role, its matrix, and the factor, a number or an expression."""
+    """One term of a body before its factor: its role, its matrix, and the factor, a number or an expression; where: the
+    factor's path in the case."""
 
     role: Role
     matrix: Sparse
     factor: float | str
+    where: str = "factor"
 
 
 @dataclass(frozen=True)
@@ -157,9 +159,10 @@ def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None)
     shares: list[ImportedTerm] = []
     values: list[float] = []
     for k, (term, role, matrix) in enumerate(zip(body.terms, roles, matrices, strict=True)):
-        factor = _factor(case, term, mu, f"{where}.terms.{k}.factor")
+        path = f"{where}.terms.{k}.factor"
+        factor = _factor(case, term, mu, path)
         sums[role] = sp.csr_array(sums[role] + factor * matrix)
-        shares.append(ImportedTerm(role, matrix, term.factor))
+        shares.append(ImportedTerm(role, matrix, term.factor, path))
         values.append(factor)
     return Terms(sums["mass"], sums["damping"], sums["stiffness"], labels, tuple(stored), tuple(shares), tuple(values))
 

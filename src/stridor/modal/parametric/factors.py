@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache
 from typing import Any, Protocol, TypeGuard, runtime_checkable
 
@@ -107,24 +107,25 @@ class Lagrange:
 @dataclass(frozen=True)
 class Formula:
     """An arithmetic expression, as factors of imported matrices are, of parameters that vary (names) and others that
-    do not (fixed)."""
+    do not (fixed). where: its path in the case, which errors name."""
 
     text: str
     names: tuple[str, ...]
     fixed: tuple[tuple[str, float], ...] = ()
+    where: str = field(default="factor", compare=False)
 
     @cached_property
     def _expression(self) -> Expression:
-        return parse_expression(self.text, (*self.names, *dict(self.fixed)), "factor")
+        return parse_expression(self.text, (*self.names, *dict(self.fixed)), self.where)
 
     def __call__(self, values: Mapping[str, float], /) -> float:
-        return self._expression.value(self._all(values), "factor")
+        return self._expression.value(self._all(values), self.where)
 
     def slope(self, values: Mapping[str, float], name: str) -> float:
         """Its derivative over one parameter."""
         if name not in self._expression.names or name not in values:
             return 0.0
-        return self._expression.slopes(self._all(values), "factor")[name]
+        return self._expression.slopes(self._all(values), self.where)[name]
 
     def _all(self, values: Mapping[str, float]) -> dict[str, float]:
         every = {**dict(self.fixed), **values}
