@@ -160,9 +160,10 @@ def by_type(counter: Any) -> Counter[str]:
 
 
 def page_process() -> float:
-    """Memory without files of the processes below this one that show pages [MB]; there is one page."""
+    """Memory without files of the process that shows the page [MB]: the largest of its kind, beside which a browser keeps
+    empty ones at hand."""
     mine = [one for one in below(os.getpid()) if "--type=renderer" in read(Path(f"/proc/{one}/cmdline"))]
-    return sum(resident(one)[1] for one in mine)
+    return max((resident(one)[1] for one in mine), default=0.0)
 
 
 def resident(process: int) -> tuple[float, float]:
