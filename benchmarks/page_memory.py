@@ -160,8 +160,8 @@ def by_type(counter: Any) -> Counter[str]:
 
 
 def page_process() -> float:
-    """Memory without files of the process that shows the page [MB]: the largest of its kind, beside which a browser keeps
-    empty ones at hand."""
+    """Memory without files of the process that shows the page [MB]: the largest of its kind, as a browser keeps empty
+    ones at hand beside it."""
     mine = [one for one in below(os.getpid()) if "--type=renderer" in read(Path(f"/proc/{one}/cmdline"))]
     return max((resident(one)[1] for one in mine), default=0.0)
 
