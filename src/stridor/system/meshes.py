@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+from collections import OrderedDict
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -63,8 +66,29 @@ def _material_of(model: AbaqusModel, group: str | None) -> tuple[Material | None
     return None, model.incomplete.get(names[0], f"the file has no *MATERIAL {names[0]}")
 
 
+_KNOWN: OrderedDict[tuple[str, str, str, tuple[int, int]], LoadedMesh] = OrderedDict()
+_KEPT = 4  # meshes: what checks, builds and warns of a case asks for each body's three times
+_HELD = Lock()
+
+
 def load_mesh(name: str, body: SolidBody) -> LoadedMesh:
-    """Mesh of a body. Raises CaseError where a file, a group or an element will not do."""
+    """Mesh of a body, the same one as long as neither it nor its file changes. Raises CaseError where a file, a group
+    or an element will not do."""
+    key = (name, body.model_dump_json(), os.getcwd(), _stamp(body))  # paths may start at the working directory
+    with _HELD:
+        found = _KNOWN.get(key)
+        if found is not None:
+            _KNOWN.move_to_end(key)
+            return found
+    found = _loaded(name, body)
+    with _HELD:
+        _KNOWN[key] = found
+        while len(_KNOWN) > _KEPT:
+            _KNOWN.popitem(last=False)
+    return found
+
+
+def _loaded(name: str, body: SolidBody) -> LoadedMesh:
     where = f"bodies.{name}"
     if body.mesh is not None:
         loaded = LoadedMesh(built_in(body.mesh, f"{where}.mesh"))
@@ -81,6 +105,15 @@ def load_mesh(name: str, body: SolidBody) -> LoadedMesh:
     _refuse_absurd(loaded.mesh, where, body)
     check_mesh(loaded.mesh, where)
     return loaded
+
+
+def _stamp(body: SolidBody) -> tuple[int, int]:
+    """When the file of a body's mesh was written, and its size: one that changed is read again."""
+    try:
+        status = Path(body.file).stat() if body.file else None
+    except OSError:
+        status = None
+    return (0, 0) if status is None else (status.st_mtime_ns, status.st_size)
 
 
 def _refuse_absurd(mesh: Mesh, where: str, body: SolidBody) -> None:
@@ -106,13 +139,7 @@ def _refuse_absurd(mesh: Mesh, where: str, body: SolidBody) -> None:
 
 def _from_file(where: str, body: SolidBody) -> LoadedMesh:
     assert body.file is not None
-    path = Path(body.file)
-    try:
-        status = path.stat()
-        stamp = (status.st_mtime_ns, status.st_size)
-    except OSError:
-        stamp = (0, 0)
-    loaded = _read(str(path), body.scale, body.group, where, stamp)
+    loaded = _read(str(Path(body.file)), body.scale, body.group, where, _stamp(body))
     if body.translation is not None and len(body.translation) == loaded.mesh.dimension:
         loaded = replace(loaded, mesh=replace(loaded.mesh, points=loaded.mesh.points + np.array(body.translation)))
     return loaded
