@@ -21,14 +21,20 @@ from pathlib import Path
 from typing import Any
 
 CHROMIUM = Path("/usr/bin/chromium")
+PICTURES = {"at": "modes at μ", "locus": "branches"}
 MOVE = """([path, share]) => new Promise((done) => {
-  const slider = document.querySelector(`[data-path="${path}"]`), part = path === "mu" ? "at" : "locus";
-  const before = stridor.state.drawn[part] ?? 0, began = performance.now();
+  const slider = document.querySelector(`[data-path="${path}"]`), times = {};
+  const parts = path === "mu" ? ["at"] : ["at", "locus"], began = performance.now();
+  const before = Object.fromEntries(parts.map((part) => [part, stridor.state.drawn[part] ?? 0]));
   const value = Math.round(share * slider.max);
   slider.value = value === Number(slider.value) ? value + 1 : value; // what stays where it is draws nothing
   slider.dispatchEvent(new Event("input", { bubbles: true }));
-  const drawn = () => (stridor.state.drawn[part] ?? 0) > before;
-  const look = () => (drawn() ? done(performance.now() - began) : requestAnimationFrame(look));
+  const look = () => {
+    const now = performance.now() - began;
+    for (const part of parts) if ((stridor.state.drawn[part] ?? 0) > before[part]) times[part] ??= now;
+    if (parts.every((part) => part in times)) done(times);
+    else requestAnimationFrame(look);
+  };
   look();
 })"""
 
@@ -72,7 +78,8 @@ def measure(address: str, moves: int, levers: list[str]) -> None:
         paths: list[str] = page.evaluate("stridor.state.levers.map((lever) => lever.path)")
         for path in levers or paths[:4]:
             each = [moved(page, path, k / moves) for k in range(1, moves)]
-            print(f"{path}: slider to picture, {spread(each)}")
+            for part in (p for p in PICTURES if p in each[0]):
+                print(f"{path}: slider to {PICTURES[part]}, {spread([times[part] for times in each])}", flush=True)
         browser.close()
 
 
@@ -124,10 +131,12 @@ def compute(case: list[str], moves: int, levers: list[str]) -> None:
         print(f"{path}: processor time of a move, {spread(each[1:])}")
 
 
-def moved(page: Any, path: str, turn: float) -> float:
-    """Milliseconds of one move to somewhere near where the lever stood, with a rest before it as a hand has it."""
+def moved(page: Any, path: str, turn: float) -> dict[str, float]:
+    """Milliseconds of one move to somewhere near where the lever stood, with a rest before it as a hand has it, until
+    each part of the picture is there."""
     time.sleep(0.1)
-    return float(page.evaluate(MOVE, [path, 0.4 + 0.2 * turn]))
+    found: dict[str, float] = page.evaluate(MOVE, [path, 0.4 + 0.2 * turn])
+    return found
 
 
 if __name__ == "__main__":
