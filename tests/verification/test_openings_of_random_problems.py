@@ -16,7 +16,8 @@ pytestmark = pytest.mark.verification
 HEAVY = (0, 6, 12, 13, 15, 22, 29)  # take as long as all others: weekly
 EACH, SMALL = [k for k in range(36) if k not in HEAVY], 3  # in each run, of few modes
 UNANSWERED = 0.25  # share at most that is refused: much of what is tried is next to rounding
-LATER = (1e-3, 2e-3)  # of the range: where growth that opens with the slope zero is looked at
+LATER = (1e-3, 2e-3)  # of the range: where growth that opens with the slope zero is looked at,
+EARLIER = (0.1, 0.2)  # or of the way to where growth is told to end, if that is less
 
 
 def judged(seeds: Iterable[int], folder: Path, most: int) -> tuple[list[str], int, int]:
@@ -35,7 +36,9 @@ def judged(seeds: Iterable[int], folder: Path, most: int) -> tuple[list[str], in
             if onset.growth_slope == 0.0:
                 opened += 1
                 omega, width = 2 * np.pi * onset.frequency_hz, problem.high - problem.low
-                rates = [rate(problem, problem.low + part * width, omega) for part in LATER]
+                ends = min((o.mu - problem.low for o in found.onsets if o.stabilising), default=width)
+                steps = [min(part * width, early * ends) for part, early in zip(LATER, EARLIER, strict=True)]
+                rates = [rate(problem, problem.low + step, omega) for step in steps]
                 if not (onset.mu == problem.low and min(rates) > 0):
                     said += f"; growth at {omega} does not open at {onset.mu}: {rates}"
         errors += [f"{seed}: {said}"] if said else []
