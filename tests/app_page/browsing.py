@@ -61,7 +61,7 @@ def page_at(browser: Any, address: str, *, width: int = 1280, height: int = 720,
                 page.close(run_before_unload=True)
     finally:
         context.close()
-    assert not failed
+    assert not failed, failed
 
 
 def shot(page: Any, name: str, **more: Any) -> None:

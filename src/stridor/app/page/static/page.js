@@ -155,7 +155,10 @@ const stridor = (() => {
             backgroundColor: dark() ? "rgba(27,29,34,.85)" : "rgba(255,255,255,.85)", padding: 2 },
           data: onsetPoints(name) },
       ];
-      chart.setOption({
+      // What stays between moves, axes, colours and labels, is not told again: that takes as long as the curves.
+      const drawn = `${state.low} ${state.high} ${dark()}`;
+      if (chart.drawnWith === drawn) chart.setOption({ series: series.map(({ id, type, data }) => ({ id, type, data })) });
+      else chart.setOption({
         animation: false, backgroundColor: "transparent",
         grid: { left: 80, right: 16, top: 10, bottom: 36, outerBoundsMode: "none" },
         xAxis: { type: "value", min: state.low, max: state.high, name: "friction coefficient μ", nameLocation: "middle", nameGap: 22, nameTextStyle: { color: p.text },
@@ -164,6 +167,7 @@ const stridor = (() => {
           axisLabel: { color: p.text, formatter: (v) => shown(v) }, axisLine: { show: true, lineStyle: { color: p.line } }, splitLine: { lineStyle: { color: p.grid } } },
         series,
       });
+      chart.drawnWith = drawn;
       chart.getDom().setAttribute("role", "img");
       chart.getDom().setAttribute("aria-label", described(name));
       line_(name, chart);
@@ -351,7 +355,7 @@ const stridor = (() => {
   // Another case is open: nothing of the one before is shown under its name.
   function forget() {
     Object.assign(state, { locus: null, at: null, onsets: null, shape: null, geometry: null, refused: false });
-    for (const name of Object.keys(KINDS)) chartOf(name)?.clear();
+    for (const chart of Object.keys(KINDS).map(chartOf)) if (chart) { chart.clear(); chart.drawnWith = null; }
     document.querySelectorAll(".st-mu").forEach((e) => { e.hidden = true; });
     for (const id of ["st-model", "st-modes-list", "st-mode-facts", "st-tornado"]) $(id)?.replaceChildren();
     for (const id of ["st-title", "st-modes-said"]) $(id).textContent = "";
