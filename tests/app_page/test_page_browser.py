@@ -100,6 +100,34 @@ def test_a_click_on_a_branch_chooses_its_mode(page: Any):
     assert {point[2] for point in drawn if point[0] != "-"} == {place[2]}
 
 
+ON_CHART = """(name) => {
+  const o = getElement(stridor.state.charts[name]).chart.getOption(), modes = o.series.find((s) => s.id === "modes");
+  return {x: [o.xAxis[0].name, o.xAxis[0].min, o.xAxis[0].max], y: o.yAxis[0].name, colour: modes.lineStyle.color, text: o.xAxis[0].axisLabel.color,
+    points: modes.data.filter((p) => p[0] !== "-").length, all: stridor.state.locus.branches.flatMap((b) => b.frequency_hz).filter((f) => f !== null).length, ids: o.series.map((s) => s.id)};
+}"""
+
+
+def test_axes_and_colours_stay_between_moves_and_follow_what_changes_them(page: Any, tmp_path: Path):
+    """Between moves charts are told their curves alone."""
+    before = page.evaluate(ON_CHART, "frequency")
+    slide(page, "bodies.beam1.angle_deg", 84.0)
+    wait(page, "Math.abs(stridor.state.values['bodies.beam1.angle_deg'] - 84) < 1 && !document.body.classList.contains('st-busy')")
+    moved = page.evaluate(ON_CHART, "frequency")
+    assert moved["x"] == before["x"] == ["friction coefficient μ", 0, 1]
+    assert (moved["y"], moved["colour"], moved["ids"]) == (before["y"], before["colour"], before["ids"])
+    assert moved["points"] == moved["all"] > 100
+    page.get_by_role("button", name="Light/dark").click()
+    wait(page, f"({ON_CHART})('frequency').text !== '{before['text']}'")
+    night = page.evaluate(ON_CHART, "frequency")
+    assert night["colour"] != before["colour"]
+    other = tmp_path / "narrow.toml"
+    other.write_text(st.loads(template_text("two-beams"), ["modal.friction_range=[0.0, 0.5]"]).text, encoding="utf-8")
+    page.set_input_files("input[type=file]", other)
+    wait(page, "stridor.state.high === 0.5 && stridor.state.locus !== null")
+    wait(page, f"({ON_CHART})('frequency').x[2] === 0.5")
+    assert page.evaluate(ON_CHART, "growth")["x"] == ["friction coefficient μ", 0, 0.5]
+
+
 def test_a_broken_file_is_refused_as_on_the_command_line(page: Any, tmp_path: Path):
     path = tmp_path / "broken.toml"
     path.write_text(template_text("two-beams").replace("length = 0.05", "length = -1.0"), encoding="utf-8")
