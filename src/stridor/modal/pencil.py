@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..typing import Array, ComplexArray, IntArray, Sparse
-from .quadratic.problem import CHUNK, Quadratic, times
+from .quadratic.problem import CHUNK, Quadratic, entry_sizes, measured, times
 
 NEGLIGIBLE = 1e-4  # of the largest displacement: gaps that open less than this are not judged more closely
 
@@ -74,14 +74,15 @@ class Pencil:
 
     @cached_property
     def _sizes(self) -> tuple[Sparse, Sparse, Sparse, Sparse, Sparse]:
-        return abs(self.mass), abs(self.damping), abs(self.stiffness), abs(self.normal), abs(self.push)
+        large = (entry_sizes(matrix) for matrix in (self.mass, self.damping, self.stiffness))
+        return (*large, abs(self.normal), abs(self.push))
 
     def _judged(self, lam: ComplexArray, u: ComplexArray, p: ComplexArray, rest: ComplexArray | None) -> Array:
         size, force, rate = np.abs(u), np.abs(p), np.abs(lam)
         mass, damping, stiffness, normal, push = self._sizes
-        scale = rate**2 * (mass @ size) + stiffness @ size + push.T @ force
+        scale = rate**2 * measured(mass, size) + measured(stiffness, size) + push.T @ force
         if damping.nnz:
-            scale += rate * (damping @ size)
+            scale += rate * measured(damping, size)
         if rest is None:
             rest = self.residual(lam, u, p)
         error = np.abs(rest).max(axis=0) / tiny(scale.max(axis=0))
