@@ -13,10 +13,10 @@ const stridorRun = (() => {
     const label = { color: text(), fontSize: 10 };
     return {
       animation: false, backgroundColor: "transparent",
-      grid: { left: 58, right: 12, top: 22, bottom: bottom ? 32 : 8, outerBoundsMode: "none" },
+      grid: { left: 58, right: 12, top: 28, bottom: bottom ? 32 : 8, outerBoundsMode: "none" },
       xAxis: { type: "value", min: least, max: most, name: bottom ? "time [ms]" : "", nameLocation: "middle", nameGap: 18, nameTextStyle: label,
         axisLabel: { ...label, show: bottom, hideOverlap: true }, axisLine: { onZero: false, lineStyle: { color: rule() } }, splitLine: { lineStyle: { color: grid() } } },
-      yAxis: { type: "value", scale: true, name: unit, nameLocation: "end", nameGap: 6, nameTextStyle: { ...label, align: "left", padding: [0, 0, 0, -52] }, splitNumber: 3,
+      yAxis: { type: "value", scale: true, name: unit, nameLocation: "end", nameGap: 12, nameTextStyle: { ...label, align: "left", padding: [0, 0, 0, -52] }, splitNumber: 3,
         axisLabel: { ...label, formatter: shown }, axisLine: { show: true, onZero: false, lineStyle: { color: rule() } }, splitLine: { lineStyle: { color: grid() } } },
     };
   }
@@ -70,7 +70,12 @@ const stridorRun = (() => {
   }
   const phases = (p) => ({ silent: true, symbol: "none", animation: false, lineStyle: { color: rule(), type: "dotted" },
     label: { position: "insideEndTop", rotate: 0, fontSize: 10, color: text(), formatter: (d) => d.name, align: "left", offset: [9, 14] },
-    data: p.phases.map(([name, start]) => ({ name, xAxis: 1e3 * start })) });
+    data: p.phases.map(([name, start], k) => ({ name: room(p, k) ? name : "", xAxis: 1e3 * start })) });
+  // Whether the name of a phase has room before the next one begins.
+  const room = (p, k) => {
+    const [least, most] = span(), end = k + 1 < p.phases.length ? 1e3 * p.phases[k + 1][1] : most;
+    return (end - 1e3 * p.phases[k][1]) / (most - least) > 0.025 * p.phases[k][0].length;
+  };
   const strips = () => (dark() ? { separation: "#b8672a", stick: "#3f78a8", slip: "#8d8353" } : page.colours);
   function status(p, contact) {
     const t = ms(p), o = axes(true, ""), names = ["separation", "stick", "slip"], shares = p.status[contact];
