@@ -60,9 +60,13 @@ def joined(curves: Sequence[StabilityCurve]) -> list[StabilityCurve]:
 def without_points(curves: Sequence[StabilityCurve]) -> list[StabilityCurve]:
     """The curves without those of one point that is the end of another: the corner of a rectangle's edge in which two
     end is an onset of its line."""
-    drawn = [c for c in curves if len(c.spots) > 1]
-    ends = [spot for c in drawn for spot in (c.spots[0], c.spots[-1])]
-    return [c for c in curves if len(c.spots) > 1 or not any(_same(c.spots[0], end) for end in ends)]
+    ends = [spot for c in curves if len(c.spots) > 1 for spot in (c.spots[0], c.spots[-1])]
+
+    def corner(curve: StabilityCurve) -> bool:
+        first, *others = curve.spots
+        return not others and any(_same(first, end) for end in ends)
+
+    return [c for c in curves if not corner(c)]
 
 
 def _same(one: CurvePoint, other: CurvePoint) -> bool:
