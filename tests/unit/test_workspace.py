@@ -61,7 +61,7 @@ def test_a_run_computes_each_thing_once_and_its_document_nothing(
 ) -> None:
     counts = Counts(monkeypatch)
     # The report's figures are made, which may compute; files of them compute nothing.
-    monkeypatch.setattr(report, "_rendered", lambda *_: b"")
+    monkeypatch.setattr(report, "rendered", lambda *_: b"")
     monkeypatch.setattr(report, "lay_out", lambda _: None)
     outcome = st.run(case, tmp_path)
     counts.check()

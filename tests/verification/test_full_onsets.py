@@ -287,7 +287,8 @@ def test_the_bench_as_solids(tmp_path: Path, damped: bool, monkeypatch: pytest.M
     bench = case(bench_as_solids(across=(1, 1), along=(6, 12)))
     found = st.onsets(export(tmp_path, bench), damped=damped)
     assert_same_onsets(st.onsets(bench, damped=damped), found)
-    assert len(steps) <= 4 * len(found.onsets)
+    # Two or three to where rounding begins, and one or two more until it shows that it is that.
+    assert len(steps) <= 5 * len(found.onsets)
 
 
 def held(block: st.Case, damped: bool = True) -> st.Onsets:
