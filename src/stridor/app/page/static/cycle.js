@@ -50,7 +50,7 @@ const stridorCycle = (() => {
   // -- one period ----------------------------------------------------------------------------------------------------
   function put(name, option, words) {
     const chart = chartOf(name);
-    chart.setOption(option, { replaceMerge: ["series"], lazyUpdate: true }); // what stays is not made again
+    chart.setOption(option, { notMerge: true, lazyUpdate: true });
     chart.getDom().setAttribute("role", "img");
     chart.getDom().setAttribute("aria-label", words);
   }

@@ -35,7 +35,7 @@ const stridorRun = (() => {
   function put(name, option, words) {
     const chart = chartOf(name);
     if (!chart) return;
-    chart.setOption(option, { replaceMerge: ["series"], lazyUpdate: true }); // what stays is not made again
+    chart.setOption(option, { notMerge: true, lazyUpdate: true });
     chart.getDom().setAttribute("role", "img");
     chart.getDom().setAttribute("aria-label", words);
   }
