@@ -465,7 +465,10 @@ def test_the_program_prints_the_answer_and_draws(tmp_path: Path) -> None:
     for path in folder.glob("*.png"):
         path.unlink()
     (tmp_path / "case.toml").unlink()  # the store is enough
-    assert stridor("plot", "study.out", cwd=tmp_path).returncode == 0
+    plotted = stridor("plot", "study.out", cwd=tmp_path)
+    assert plotted.returncode == 0
+    for note in st.open_study(folder).notes:
+        assert " ".join(note.split()) in " ".join(plotted.stdout.split())
     assert {path.name for path in folder.glob("*.png")} == drawn
     assert stridor("plot", "study.out/study.zarr", "--out", "elsewhere", cwd=tmp_path).returncode == 0
     assert {path.name for path in (tmp_path / "elsewhere").glob("*.png")} == drawn

@@ -185,7 +185,10 @@ def plot(call: Call) -> None:
         call.document({"files": [str(f) for f in files]})
     else:
         from ..studies.summary import answer
+        from .output import stdout
 
+        for note in result.notes:  # what is not computed, failed, or not to be trusted
+            stdout.print(note)
         call.conclude(Conclusion(answer(result)))
 
 
