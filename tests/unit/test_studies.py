@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -472,6 +473,34 @@ def test_the_program_prints_the_answer_and_draws(tmp_path: Path) -> None:
     assert {path.name for path in folder.glob("*.png")} == drawn
     assert stridor("plot", "study.out/study.zarr", "--out", "elsewhere", cwd=tmp_path).returncode == 0
     assert {path.name for path in (tmp_path / "elsewhere").glob("*.png")} == drawn
+
+
+def test_what_is_gone_of_a_store_is_not_taken_for_zeros(case: st.Case, tmp_path: Path) -> None:
+    """Without its chunk no mode of any row grew, and the probability was 0."""
+    study = st.Study(case=case, parameters=SCATTER, sampling={"method": "sobol", "samples": 16}, answers={"source": "full"})
+    whole = st.run_study(study, tmp_path / "whole", workers=2)
+    names = [str(n) for n in whole.data.data_vars if n != "status"]
+    assert {"unstable_modes", "growth_rate", "note"} <= set(names)
+
+    def spoilt(name: str, what: str) -> Path:
+        folder = tmp_path / f"{name}-{what}".replace("/", "-")
+        shutil.copytree(tmp_path / "whole", folder)
+        gone = folder / "study.zarr" / name / what
+        shutil.rmtree(gone) if gone.is_dir() else gone.unlink()
+        return folder
+
+    for name in names:
+        with pytest.raises(st.CaseError, match=rf"chunk 0 of {name} is gone; remove the folder .*status"):
+            st.open_study(spoilt(name, "c"))
+    with pytest.raises(st.CaseError, match="chunk 0 of mu is gone; which samples its rows are of is not known"):
+        st.open_study(spoilt("mu", "c"))
+    with pytest.raises(st.CaseError, match="a damaged store: branch missing"):
+        st.open_study(spoilt("branch", "zarr.json"))
+    # What the message says helps.
+    folder = spoilt("unstable_modes", "c/0")
+    shutil.rmtree(folder / "study.zarr" / "status" / "c")
+    again = st.run_study(study, folder, workers=2)
+    assert again.data["unstable_modes"].values.tolist() == whole.data["unstable_modes"].values.tolist()
 
 
 def test_a_study_of_one_value_gives_its_answer(tmp_path: Path) -> None:

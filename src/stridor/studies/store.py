@@ -2,7 +2,7 @@
 
 Every chunk is written beside its place and renamed. Of a block of rows the results go first and ``status`` last, so
 that a row counts as computed only when all of it is there: a study that is killed at any moment goes on where it was.
-Each chunk carries a checksum.
+Each chunk carries a checksum, and is written whatever is in it: one that is gone is not taken for one of nothing.
 """
 
 from __future__ import annotations
@@ -21,11 +21,13 @@ import numpy as np
 from ..errors import AnalysisError, CaseError
 from ..typing import Array, IntArray
 from .rows import Row, StoreColumn
+from .rows import variables as variables_of
 
 FORMAT = 1  # of the store; one with a larger number was written by a newer stridor
 KIND = "stridor study"
 MARKS = ("zarr.json", ".zgroup")  # of a folder that zarr has written, or an earlier one
 CHUNK = 512  # rows of a chunk at most
+WHOLE = "every_chunk_written"  # of the attributes: what of computed rows is not there is lost
 PENDING, DONE, FAILED = 0, 1, 2
 _FILL: Mapping[str, Any] = {"f8": np.nan, "i8": 0, "i1": 0, "str": ""}
 
@@ -62,16 +64,10 @@ class OpenStore:
         temporary = path.with_name(f".{path.name}.new")
         try:
             shutil.rmtree(temporary, ignore_errors=True)
-            group = _zarr().create_group(temporary, attributes=_attributes(head, parameters))
-            chunk = max(1, min(CHUNK, len(samples)))
-            for k, (name, units) in enumerate(parameters.items()):
-                array = _array(group, StoreColumn(name, "f8", units, "parameter of the study"), len(samples), chunk, {})
-                array[:] = samples[:, k]
-            number = np.arange(len(samples)) if numbers is None else numbers
-            words = StoreColumn("number", "i8", "", "number of the sample in the study")
-            _array(group, words, len(samples), chunk, {})[:] = number
-            for variable in variables:
-                _array(group, variable, len(samples), chunk, lengths)
+            with _every_chunk():
+                group = _zarr().create_group(temporary, attributes=_attributes(head, parameters))
+                number = np.arange(len(samples)) if numbers is None else numbers
+                _fill_new(group, samples, parameters, variables, lengths, number)
             temporary.rename(path)
         except OSError as error:
             shutil.rmtree(temporary, ignore_errors=True)
@@ -82,9 +78,7 @@ class OpenStore:
     def opened(path: Path, variables: Sequence[StoreColumn]) -> OpenStore:
         """One that is there. Raises CaseError for what is none, and for one of a newer stridor."""
         group = _group(path, "r+")
-        missing = [v.name for v in variables if v.name not in group]
-        if missing:
-            raise CaseError(str(path), None, f"a damaged store: {', '.join(missing)} missing; name another (--out)")
+        _require(path, group, [v.name for v in variables])
         return OpenStore(path, group, variables)
 
     @property
@@ -108,7 +102,7 @@ class OpenStore:
             return
         places = np.array(sorted(rows))
         ordered = sorted(self.variables, key=lambda v: v.name == "status")
-        with self._disk_told():
+        with self._disk_told(), _every_chunk():
             for chosen in _by_chunk(places, self._group["status"].chunks[0]):
                 for variable in ordered:
                     self._put(variable, chosen, rows)
@@ -154,7 +148,7 @@ class OpenStore:
             return
         parameters = json.loads(self._group.attrs["parameters"])
         # The status last: a store that was cut off here has a `status` no longer than its parameters.
-        with self._disk_told():
+        with self._disk_told(), _every_chunk():
             for name in sorted(self._group.array_keys(), key=lambda name: name == "status"):
                 array = self._group[name]
                 array.resize((len(samples), *array.shape[1:]))
@@ -175,6 +169,52 @@ class OpenStore:
 
     def _read(self, name: str) -> Any:
         return read(self.path, self._group, name)
+
+
+def _fill_new(
+    group: Any, samples: Array, parameters: Mapping[str, str], variables: Sequence[StoreColumn],
+    lengths: Mapping[str, int], number: IntArray,
+) -> None:  # fmt: skip
+    """The arrays of a new store, those of the parameters and the numbers of the samples written."""
+    chunk = max(1, min(CHUNK, len(samples)))
+    for k, (name, units) in enumerate(parameters.items()):
+        array = _array(group, StoreColumn(name, "f8", units, "parameter of the study"), len(samples), chunk, {})
+        array[:] = samples[:, k]
+    words = StoreColumn("number", "i8", "", "number of the sample in the study")
+    _array(group, words, len(samples), chunk, {})[:] = number
+    for variable in variables:
+        _array(group, variable, len(samples), chunk, lengths)
+
+
+def _every_chunk() -> Any:
+    """Within, arrays that are opened write chunks of nothing but zeros, too."""
+    return _zarr().config.set({"array.write_empty_chunks": True})
+
+
+def _require(path: Path, group: Any, names: Sequence[str]) -> None:
+    """Raises CaseError where an array is gone, or a chunk: of a row that counts as computed, or of the parameters."""
+    wanted = [*json.loads(group.attrs["parameters"]), "number", *names]
+    if missing := [name for name in wanted if name not in group]:
+        raise CaseError(str(path), None, f"a damaged store: {', '.join(missing)} missing; name another (--out)")
+    if not group.attrs.get(WHOLE, False):
+        return  # by an earlier version, which left out chunks of nothing but zeros
+    status = group["status"]
+    rows, size = np.asarray(read(path, group, "status")), status.chunks[0]
+    begun = np.unique(np.flatnonzero(rows != PENDING) // size)
+    every = np.arange(-(-len(rows) // size))
+    for name in wanted:
+        own = begun if name in names else every
+        inner = "/0" * (len(group[name].shape) - 1)
+        if gone := [k for k in own.tolist() if not (path / name / f"c/{k}{inner}").exists()]:
+            raise CaseError(str(path), None, f"chunk {gone[0]} of {name} is gone; {_again(path, group, name)}")
+
+
+def _again(path: Path, group: Any, name: str) -> str:
+    """What makes whole what of an array is damaged."""
+    if name == "number" or name in json.loads(group.attrs["parameters"]):
+        return "which samples its rows are of is not known any more; remove it, or name another (--out)"
+    places = dict.fromkeys((path / name / "c", path / "status" / "c"))
+    return f"remove the folder {' and '.join(map(str, places))}, and the study computes again what is missing"
 
 
 def _by_chunk(places: IntArray, chunk: int) -> list[IntArray]:
@@ -201,6 +241,7 @@ def _attributes(head: Head, parameters: Mapping[str, str]) -> dict[str, Any]:
     return {
         "kind": KIND,
         "format": FORMAT,
+        WHOLE: True,
         "digest": head.digest,
         "study": json.dumps(head.study),
         "provenance": json.dumps(head.provenance),
@@ -250,8 +291,7 @@ def read(path: Path, group: Any, name: str) -> Any:
     except Exception as error:  # of the file system, of the checksum, of the decompressor
         raise CaseError(
             str(path), None,
-            f"a chunk of {name} is damaged ({_short(error)}); remove the folder {path / name / 'c'} and "
-            f"{path / 'status' / 'c'}, and the study computes again what is missing",
+            f"a chunk of {name} is damaged ({_short(error)}); {_again(path, group, name)}",
         ) from None  # fmt: skip
 
 
@@ -260,6 +300,11 @@ def dataset(path: Path) -> Any:
     import xarray as xr
 
     group = _group(path, "r")
+    try:
+        names = [v.name for v in variables_of(head_of(path, group).study["compute"])]
+    except KeyError:
+        raise CaseError(str(path), None, "a damaged store: it does not say what was computed") from None
+    _require(path, group, names)
     parameters = json.loads(group.attrs["parameters"])
     rows = group["status"].shape[0]  # others are longer where a study was stopped while samples were added
     variables: dict[str, Any] = {}
