@@ -27,6 +27,7 @@ from stridor.studies import reduced_rows
 from stridor.studies.parts import Part
 from stridor.studies.processes import forked
 from stridor.studies.rows import Row, failed, full_row
+from stridor.studies.summary import answer
 from stridor.studies.tables import Keep
 from stridor.studies.task import SampleBatch, Task
 from stridor.studies.workers import LOADED, LocalWorkers
@@ -536,3 +537,9 @@ def test_other_analyses_have_rows_too(case: st.Case, tmp_path: Path, compute: st
     assert found.done.all(), found.data["error"].values
     column = {"steady": "normal_force", "simulate": "steps", "compare": "modal_frequency_hz"}[compute]
     assert np.all(found.data[column].values > 0)
+    if compute == "compare":
+        agree = found.data["agree"].values
+        assert answer(found) == f"both approaches agree in {int(np.sum(agree == 1))} of 2 samples"
+        assert all("against the result" not in note for note in found.notes)
+        assert any("do not agree" in note for note in found.notes) == bool(np.any(agree == 0))
+        assert any("not decided" in note for note in found.notes) == bool(np.any(agree < 0))

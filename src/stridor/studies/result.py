@@ -183,7 +183,13 @@ class StudyResult(Tabular, Shown):
             told.append(f"{counted(len(self.failed), 'row')} failed, the first: {why}")
         told += self._confirmed()
         noted = int(np.count_nonzero(self.data["note"].values != ""))
-        if noted:
+        if self.compute == "compare":  # whose note is its verdict
+            agree = np.asarray(self.data["agree"].values)[self.done]
+            if unlike := int(np.count_nonzero(agree == 0)):
+                told.append(f"in {counted(unlike, 'row')} both approaches do not agree (`note` says in what)")
+            if open_ := int(np.count_nonzero(agree < 0)):
+                told.append(f"in {counted(open_, 'row')} it is not decided whether they do (`note` says why)")
+        elif noted:
             told.append(f"{counted(noted, 'row')} with something against the result (`note`)")
         told += self._told("without_effect") or []
         return tuple(told)

@@ -29,6 +29,9 @@ def answer(result: StudyResult) -> str:
     done = int(result.done.sum())
     if not done:
         return f"none of {len(result.status)} samples has a result"
+    if result.compute == "compare":
+        agree = int(np.count_nonzero(np.asarray(result.data["agree"].values)[result.done] == 1))
+        return f"both approaches agree in {agree} of {counted(done, 'sample')}"
     if result.compute not in ("modes", "onsets"):
         return f"{counted(done, 'sample')} of {result.compute}"
     grows = int(result.unstable.sum())

@@ -168,7 +168,10 @@ class _Rough:
         among = np.union1d(at, np.flatnonzero(np.isin(self.own, mixed)))
         z, w = self.z[:, among], self.w[:, among]
         mass, damping, stiffness = (w.T @ image for image in _images(self.matrices, z))
-        lam, right, left = damped_pairs(mass, damping, stiffness, self.top, 2 * EDGE)
+        try:
+            lam, right, left = damped_pairs(mass, damping, stiffness, self.top, 2 * EDGE)
+        except (ValueError, sl.LinAlgError):  # vectors that all but coincide span too little
+            return False
         apart = _apart(self.lam)
         distance = np.abs(self.lam[at, None] - lam)
         found = distance.argmin(axis=1) if len(lam) else np.zeros(0, dtype=np.int64)
