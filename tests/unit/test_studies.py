@@ -529,6 +529,24 @@ def test_the_document_holds_no_more_than_plain_values(case: st.Case, tmp_path: P
     assert [item["parameter"] for item in told["sobol"]["indices"]] == [MASS, "bodies.beam2.damping.mass"]
 
 
+def test_what_grows_at_the_low_end_has_its_critical_friction_there(tmp_path: Path) -> None:
+    """At μ = 0.1 a mode grows already; the next onset in the range is another one's."""
+    coarse = ["bodies.beam1.elements=10", "bodies.beam2.elements=20", "modal.max_frequency_hz=20e3"]
+    late = st.loads(template_text("two-beams"), [*coarse, "modal.friction_range=[0.1, 0.3]"])
+    sampling = {"method": "saltelli", "samples": 2}
+    parameters = {MASS: {"range": (5.0, 50.0)}, "bodies.beam1.thickness": {"range": (0.00149, 0.00151)}}
+    study = st.Study(case=late, compute="onsets", parameters=parameters, sampling=sampling, answers={"source": "full"})
+    found = st.run_study(study, tmp_path, workers=2)
+    grows = found.data["growing_at_start"].values > 0
+    assert grows.all()
+    assert found.unstable.all()
+    assert np.all(found.data["onset_mu"].values[:, 0] > 0.1)
+    assert found.data["critical_mu"].values.tolist() == [0.1] * len(grows)
+    assert np.isnan(found.data["critical_frequency_hz"].values).all()
+    with pytest.raises(st.AnalysisError):
+        found.indices()  # of a number that does not vary
+
+
 @pytest.mark.parametrize("compute", ["steady", "simulate", "compare"])
 def test_other_analyses_have_rows_too(case: st.Case, tmp_path: Path, compute: str) -> None:
     short = case.with_({"phases": [{"name": "go", "duration": 2e-4}], "comparison.critical": False, "temporal.record_every": 1})

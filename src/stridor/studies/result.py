@@ -159,12 +159,17 @@ class StudyResult(Tabular, Shown):
             raise CaseError("of", of, f"a result with one number a row: {known}")
         values, note = np.array(self.data[name].values, dtype=float), ""
         if name == "critical_mu":
-            # A row without onset is stable up to the end of the range: its onset lies there at least.
+            # A row without onset is stable up to the end of the range: its onset lies there at least. One that grows at
+            # the low end has its own there at most.
             none = self.done & ~np.isfinite(values)
-            top = float(self.study.base().modal.friction_range[1])
+            low, top = (float(end) for end in self.study.base().modal.friction_range)
             values[none] = top
+            early = int(np.count_nonzero(self.done & (self.data["growing_at_start"].values > 0)))
             if none.any():
                 note = f"{int(none.sum())} rows without an onset count with the end of the range of friction, {top:g}"
+            if early:
+                also = f"{early} rows that grow at the low end of that range count with it, {low:g}"
+                note = f"{note}; {also}" if note else also
         return sobol_indices(name, self.parameters, values, note=note)
 
     @property

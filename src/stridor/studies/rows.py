@@ -105,7 +105,8 @@ def _modes(work: Workspace, mu: float | None, keep: Keep) -> Row:
 
 
 def onsets_row(found: Onsets | ParametricOnsets, keep: int, *, complete: bool, growing_at_start: int) -> Row:
-    """Onsets of a row, by friction coefficient; the first from which on something grows apart."""
+    """Onsets of a row, by friction coefficient; the first from which on something grows apart: where something does at
+    the low end of the range, that end."""
     listed = list(found)[:keep]
     values = [o.mu if isinstance(found, Onsets) else o.value for o in listed]  # type: ignore[union-attr]
     begins = [k for k, o in enumerate(listed) if not o.stabilising]
@@ -117,7 +118,9 @@ def onsets_row(found: Onsets | ParametricOnsets, keep: int, *, complete: bool, g
         "complete": int(complete),
         "growing_at_start": growing_at_start,
     }
-    if begins:
+    if growing_at_start:
+        row["critical_mu"] = float((found.friction_range if isinstance(found, Onsets) else found.between)[0])
+    elif begins:
         row["critical_mu"] = values[begins[0]]
         row["critical_frequency_hz"] = float(listed[begins[0]].frequency_hz)
     return row
@@ -211,7 +214,7 @@ _VARIABLES: dict[str, tuple[StoreColumn, ...]] = {
         *_ESTIMATED,
     ),
     "onsets": (
-        StoreColumn("critical_mu", "f8", "1", "least friction coefficient from which on a mode grows"),
+        StoreColumn("critical_mu", "f8", "1", "least friction coefficient of the range at which a mode grows"),
         StoreColumn("critical_frequency_hz", "f8", "Hz", "frequency of that mode there"),
         StoreColumn("onset_mu", "f8", "1", "friction coefficients where growth begins or ends", "onset"),
         StoreColumn("onset_frequency_hz", "f8", "Hz", "frequency there", "onset"),
