@@ -410,8 +410,12 @@ def test_a_goal_that_is_narrower_on_a_restart_adds_samples(case: st.Case, tmp_pa
     parts = {"case": case, "parameters": SCATTER, "sampling": {"method": "sobol", "samples": 64}, "answers": {"source": "full"}}
     first = st.run_study(st.Study(**parts, goal={"half_width": 0.5}), tmp_path, workers=2)
     assert len(first.status) == 64
-    again = st.run_study(st.Study(**parts, goal={"half_width": 0.02, "most": 128}), tmp_path, workers=2)
+    told: list[str] = []
+    again = st.run_study(st.Study(**parts, goal={"half_width": 0.02, "most": 128}), tmp_path, workers=2, say=told.append)
     assert (len(again.status), again.pending) == (128, 0)
+    (missed,) = (line for line in told if line.startswith("the goal is not reached"))
+    assert f"± {100 * again.probability().half_width:.3g} % with the 128 samples" in missed
+    assert missed.endswith("not ± 2 %")
     assert np.array_equal(again.data["seconds"].values[:64], first.data["seconds"].values)
 
 

@@ -289,6 +289,10 @@ class _Run:
         if self.study.sampling.method == "sobol":
             wanted = min(1 << (wanted - 1).bit_length(), goal.most)
         if wanted <= have:
+            self.say(
+                f"the goal is not reached: the interval at {100 * goal.confidence:g} % is ± {100 * known.half_width:.3g} % "
+                f"with the {have} samples that goal.most allows, not ± {100 * goal.half_width:g} %"
+            )
             return False
         self.say(f"{known.words}; {wanted - have} samples more")
         store.extend(samples(self.study, wanted))

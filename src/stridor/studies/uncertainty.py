@@ -63,7 +63,10 @@ def probability(happened: BoolArray, confidence: float = 0.95) -> Probability:
     z, p = _score(confidence), k / n
     middle, spread = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
     scale = 1 + z * z / n
-    return Probability(p, max((middle - spread) / scale, 0.0), min((middle + spread) / scale, 1.0), k, n, confidence)
+    # Of none and of all one end is exact, but for rounding.
+    low = max((middle - spread) / scale, 0.0) if k else 0.0
+    high = min((middle + spread) / scale, 1.0) if k < n else 1.0
+    return Probability(p, low, high, k, n, confidence)
 
 
 def missing_samples(known: Probability, half_width: float) -> int:
