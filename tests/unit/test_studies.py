@@ -533,6 +533,17 @@ def test_the_document_holds_no_more_than_plain_values(case: st.Case, tmp_path: P
     assert [item["parameter"] for item in told["sobol"]["indices"]] == [MASS, "bodies.beam2.damping.mass"]
 
 
+def test_a_part_of_a_grid_has_the_model_of_the_whole(case: st.Case, tmp_path: Path) -> None:
+    """In each part the first parameter has one value; a model of its own would be over the other alone."""
+    parameters = {"mu": {"values": (0.05, 0.2)}, MASS: {"range": (1.0, 20.0), "points": 60}}
+    study = st.Study(case=case, parameters=parameters)
+    for number in (1, 2):
+        told: list[str] = []
+        st.run_study(study, tmp_path, workers=1, part=Part(number, 2), say=told.append)
+        assert not any("has the one value" in line for line in told), told
+        assert any(line.startswith("samples are answered by a reduced model") for line in told), told
+
+
 def test_what_grows_at_the_low_end_has_its_critical_friction_there(tmp_path: Path) -> None:
     """At μ = 0.1 a mode grows already; the next onset in the range is another one's."""
     coarse = ["bodies.beam1.elements=10", "bodies.beam2.elements=20", "modal.max_frequency_hz=20e3"]

@@ -133,16 +133,14 @@ class _Run:
             self._check(store, digest)
             return store
         values = samples(self.study)
-        numbers = np.arange(len(values))
-        if self.part is not None:
-            numbers = self.part.numbers(len(values))
-            values = values[numbers]
+        numbers = np.arange(len(values)) if self.part is None else self.part.numbers(len(values))
         made = provenance(case, "study", 0.0) | {"programs": [program()]}
         head = Head(self.study.document(), digest, made, "" if self.part is None else str(self.part))
         parameters = {name: unit_at(case, name) for name in self.study.parameters}
         store = OpenStore.made(
-            path, head, values, parameters, columns, lengths(self.study.compute, self.study.keep), numbers=numbers
-        )
+            path, head, values[numbers], parameters, columns, lengths(self.study.compute, self.study.keep),
+            numbers=numbers,
+        )  # fmt: skip
         store.note(without_effect=without_effect(self.study, case, values))
         return store
 
@@ -174,7 +172,7 @@ class _Run:
         path = (self.folder / f"reduced-{self.study.compute}").resolve()
         answers = store.told("answers")
         if answers is None:
-            why = self._reduced(case, store.samples, path)
+            why = self._reduced(case, store, path)
             models = 0 if why else len(list(path.glob("*.npz")))
             answers = {"source": "full" if why else "reduced", "why": why, "models": models}
             store.note(answers=answers)
@@ -182,14 +180,19 @@ class _Run:
             self.say(f"every sample is solved in full: {answers['why']}")
             return plain
         if len(list(path.glob("*.npz"))) != answers["models"]:
-            reduced_rows.made(self.study, case, store.samples, path)
+            reduced_rows.made(self.study, case, self._whole(store), path)
         self.say("samples are answered by a reduced model; a share of them is solved in full as well")
         return Task(plain.case, plain.compute, plain.names, plain.keep, str(path), plain.program)
 
-    def _reduced(self, case: Case, values: Array, path: Path) -> str:
+    def _whole(self, store: OpenStore) -> Array:
+        """All samples of the study, of a part those of the others, too: models are over the same ranges in each."""
+        return store.samples if self.part is None else samples(self.study)
+
+    def _reduced(self, case: Case, store: OpenStore, path: Path) -> str:
         """Make a reduced model and prove it on some samples; why there is none, "" where there is."""
-        if why := reduced_rows.unfit(self.study, case, len(values)):
+        if why := reduced_rows.unfit(self.study, case, len(store.status)):
             return why
+        values = self._whole(store)
         asked = self.study.answers.source == "reduced"
         stage("reduced model over all samples")
         try:
@@ -290,8 +293,9 @@ class _Run:
             wanted = min(1 << (wanted - 1).bit_length(), goal.most)
         if wanted <= have:
             self.say(
-                f"the goal is not reached: the interval at {100 * goal.confidence:g} % is ± {100 * known.half_width:.3g} % "
-                f"with the {have} samples that goal.most allows, not ± {100 * goal.half_width:g} %"
+                f"the goal is not reached: the interval at {100 * goal.confidence:g} % is "
+                f"± {100 * known.half_width:.3g} % with the {have} samples that goal.most allows, "
+                f"not ± {100 * goal.half_width:g} %"
             )
             return False
         self.say(f"{known.words}; {wanted - have} samples more")
