@@ -47,7 +47,7 @@ def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True, onsets
         sentence = f"unstable modes at {int(some.sum()) or 'none'} of {len(result.mu)} friction coefficients"
         if some.any():
             row, b = (int(k) for k in np.unravel_index(int(rate.argmax()), rate.shape))
-            first = float(result.mu[int(np.argmax(some))])
+            first = float(result.mu[some].min())
             top = fastest(float(result.frequency_hz[row, b]), float(rate[row, b]))
             sentence += f", the lowest {first:g}; the fastest at μ = {result.mu[row]:g}: {top}"
         return Conclusion(sentence + caution, "onsets" if onsets else "report")

@@ -181,5 +181,7 @@ def _sentence(
         said += f", {alone} of which no branch from μ = 0 was seen to lead to"
     if slow := int(np.count_nonzero(unstable & (np.abs(modes.eigenvalues[row]) <= AT_REST * found.top))):
         said += f" (beside {slow} of the list below {AT_REST * found.top / (2 * np.pi):.3g} Hz, not sought there)"
+    if fast := int(np.count_nonzero(unstable & (modes.growth_rate[row] > found.fastest))):
+        said += f" (beside {fast} of the list with a growth above {found.fastest:.6g} 1/s, not sought there)"
     lead = "Checked" if found.complete else "NOT COMPLETE"
     return f"{lead}: {said}, sought anew in the full problem. {found.sentence}"

@@ -43,7 +43,8 @@ class Growing:
 
     beside (l,): eigenvalues within rounding and a little below of the axis. complete: whether the search vouches for
     there being no other; sentence: what speaks for that. top [1/s]: how far the band had to be searched.
-    sought: whether it was; else these are branches, which agree with what was found beside them.
+    fastest [1/s]: up to which growth it was. sought: whether it was; else these are branches, which agree with what
+    was found beside them.
     """
 
     mu: float
@@ -55,6 +56,7 @@ class Growing:
     sentence: str
     top: float
     sought: bool = True
+    fastest: float = np.inf
 
     @property
     def words(self) -> str:
@@ -114,6 +116,7 @@ def _searched_for(
         found.completeness.complete,
         found.completeness.sentence,
         top,
+        fastest=found.completeness.searched.re_max,
     )
 
 
@@ -155,8 +158,8 @@ def unconfirmed(found: Growing, listed: ComplexArray, unstable: BoolArray) -> in
     """How many of the modes listed as unstable are none in the full problem."""
     mine, top = listed[unstable], found.top
     mine = mine[(mine.real > SAME * np.abs(mine)) & (np.abs(mine) > AT_REST * top)]
-    # On the very border of the band a mode may count on one side only.
-    mine = mine[mine.imag <= top * (1 - SAME)]
+    # On the very border of what was searched a mode may count on one side only.
+    mine = mine[(mine.imag <= top * (1 - SAME)) & (mine.real <= found.fastest * (1 - SAME))]
     ours, _ = pairs(mine, found.values, NEAR * top)
     return len(mine) - len(ours)
 

@@ -79,6 +79,12 @@ def rank_countermeasures(
         raise CaseError("target", target, accepted)
     band = linear.columns("all") if watch == "all" else unstable
     ranking = Ranking(linear, [b for b in band if linear.mode(b) is not None], target, percent, margin)
+    if not ranking.aimed.any():
+        what = "the unstable modes have" if target == "sum" else f"mode {target} has"
+        told = (*linear.warnings, f"{what} no derivatives, and changes are ranked by them: nothing is ranked")
+        source = provenance(work, "countermeasures", time.perf_counter() - started, mu=linear.mu)
+        columns = linear.modes.branch[ranking.columns]
+        return Countermeasures(linear.mu, target, columns, ranking.eigenvalues, (), margin, told, source)
     left = whole_matrices(case, linear.mu) if numbers is None else []
     found = ranking.numbers(default_numbers(case, left) if numbers is None else names_of(numbers))
     if added_mass:

@@ -10,7 +10,7 @@ from ..quadratic import RegionModes
 from .basis import Projected
 from .counted import Passing
 from .family import Family
-from .growth import unstable
+from .growth import growing_roots, unstable
 from .search import Answer
 
 MOST = 4  # places that are named one by one
@@ -44,8 +44,7 @@ def sentence(
             f"{how}: {numbers}.{passing} Onsets were enclosed by that count, and branches not followed{why}; growth "
             "that begins and ends again between two of these values may be missing."
         )
-    begins = sum(not o.stabilising for o in answer.onsets)
-    said = f"as the onsets say{_across(last - first - 2 * begins + len(answer.onsets), top)}"
+    said = f"as the onsets say{_across(family, answer, ends, top)}"
     told = _followed(answer, name, value, where)
     both = all(end.completeness.complete for end in ends)
     if not both:
@@ -110,14 +109,23 @@ def _passing(passing: tuple[Passing, ...], name: str, value: Callable[[float], f
     return f" Of the growing modes {'; '.join(told)}{more}."
 
 
-def _across(count: int, top: float) -> str:
-    """Words for modes that cross the border of the band while they grow."""
-    if not count:
+def _across(family: Family, answer: Answer, ends: tuple[RegionModes, RegionModes], top: float) -> str:
+    """Words for what changes the number of growing modes beside the onsets: modes that cross the border of the band
+    while they grow, and pairs that become two real roots."""
+    first, last = (end.values[unstable(family, end.values, top)] for end in ends)
+    signs = [-1 if o.stabilising else 1 for o in answer.onsets]
+    roots = [2 if o.frequency_hz > 0.0 else 1 for o in answer.onsets]
+    across = growing_roots(last) - growing_roots(first) - sum(s * r for s, r in zip(signs, roots, strict=True))
+    if across:
+        limit, count = f"{top / (2 * np.pi):g} Hz", (abs(across) + 1) // 2
+        how = "whose growth began above" if across > 0 else "that went on growing above"
+        return f" but for {count} {how} {limit}"
+    more = len(last) - len(first) - sum(signs)
+    if not more:
         return ""
-    limit = f"{top / (2 * np.pi):g} Hz"
-    if count > 0:
-        return f" but for {count} whose growth began above {limit}"
-    return f" but for {-count} that went on growing above {limit}"
+    pairs = "a growing pair" if abs(more) == 1 else f"{abs(more)} growing pairs"
+    how, each = "parted into" if more > 0 else "came of", " each" if abs(more) > 1 else ""
+    return f" ({pairs} {how} two growing motions without oscillation{each})"
 
 
 def _modes(count: int) -> str:

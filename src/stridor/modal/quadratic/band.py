@@ -35,13 +35,14 @@ def band_modes(
 
     `find_modes` cuts an endless region off at the size of its frequencies, which holds all where stiffness is positive.
     A negative one lets motions diverge at any rate, at frequency zero and so in every band. stands: whether the problem
-    at the least friction diverges at no more than a rate [1/s] (`is_stiff`); where it may, rates up to 64 times
-    2π max_hz are searched too, with one more factorisation for each factor of eight. Small problems are solved whole.
+    at the least friction diverges at no more than a rate [1/s] (`is_stiff`); where it may, or where a negative damping,
+    such as that of falling friction, may drive it faster, rates up to 64 times 2π max_hz are searched too, with one more
+    factorisation for each factor of eight. Small problems are solved whole.
     What was not searched the completeness says.
     """
     found = find_modes(problem, Region.band(0.0, max_hz, above=above), left=left, solver=solver)
     top = 2 * np.pi * max_hz
-    if problem.size <= DENSE or stands(QUIET * top):
+    if problem.size <= DENSE or (stands(QUIET * top) and not driven(problem, QUIET * top, solver)):
         return found
     cut = f" Growth rates above {found.completeness.searched.re_max:.6g} 1/s were not searched."
     for low, high in pairwise(FASTER):
@@ -49,7 +50,21 @@ def band_modes(
         found = _joined(found, find_modes(problem, region, left=left, solver=solver, count=False), SAME * top)
     told = found.completeness
     last = f" Growth rates above {FASTER[-1] * top:.6g} 1/s were not searched."
-    return replace(found, completeness=replace(told, sentence=told.sentence.replace(cut, last)))
+    reached = replace(told.searched, re_max=FASTER[-1] * top)
+    return replace(found, completeness=replace(told, searched=reached, sentence=told.sentence.replace(cut, last)))
+
+
+def driven(problem: Quadratic, rate: float, solver: str | None = None) -> bool:
+    """Whether a negative damping may drive real motions faster than ``rate`` [1/s]: xᵀ(rate M/2 + D)x > 0 of all is not
+    known. Looked at where D has negative numbers on its diagonal, as falling friction on light nodes leaves them."""
+    if not np.any(problem.damping.diagonal() < 0.0):
+        return False
+    moving = np.flatnonzero(problem.mass.diagonal() > 0.0)
+    part = sp.csr_array(0.5 * rate * problem.mass + problem.damping)[moving][:, moving]
+    try:
+        return negative_eigenvalues(sp.csr_array(0.5 * (part + part.T)), solver=solver) > 0
+    except AnalysisError:
+        return True
 
 
 def is_stiff(problem: Quadratic, rate: float, solver: str | None = None) -> bool:
