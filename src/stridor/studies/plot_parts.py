@@ -77,6 +77,12 @@ def two(result: StudyResult, x: str | None, y: str | None) -> tuple[str, str]:
     return first, second
 
 
+def friction_range(result: StudyResult) -> tuple[float, float]:
+    """Where onsets were sought."""
+    low, high = result.study.base().modal.friction_range
+    return float(low), float(high)
+
+
 def key(marker: str, label: str, colour: str = INK, *, filled: bool = True) -> Line2D:
     """A mark in a legend."""
     return Line2D([], [], color=colour, marker=marker, mfc=colour if filled else "none", linestyle="none", label=label)

@@ -6,18 +6,21 @@ import contextlib
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import AnalysisError
+from ..typing import Array
 from ..view.colours import BLUE, GREY, INK, ORANGE, VERMILION
 from ..view.style import legend_above, panel, styled
-from .maps import stability_map
-from .plot_parts import along, file_name, varied
+from .maps import critical_map, growth_map, stability_map
+from .plot_parts import along, file_name, friction_range, key, varied
 from .result import StudyResult, numbers
 from .uncertainty import Indices, grows
 
 MOST_POINTS = 20_000  # of a cloud
+MANY = 500  # samples, whose marks are small
 MARGIN = 1.6  # of a logarithmic axis, times its ends
 
 
@@ -59,9 +62,36 @@ def root_locus(result: StudyResult, *, ax: Axes | None = None) -> Figure:
 
 
 @styled
+def onset_cloud(result: StudyResult, *, ax: Axes | None = None) -> Figure:
+    """Every onset kept of every row at its friction coefficient and frequency: where a mode begins to grow, and where
+    one ceases to. Ringed: the first of a row, its critical one."""
+    if result.compute != "onsets":
+        raise AnalysisError("a figure of onsets is that of onsets; the study computed others")
+    figure, ax = panel(ax, 4.2)
+    mu, frequency, ends = (
+        np.asarray(result.data[n].values)[result.done] for n in ("onset_mu", "onset_frequency_hz", "onset_ends_growth")
+    )
+    for chosen, fill, label in ((ends == 0, VERMILION, "growth begins"), (ends == 1, "none", "growth ends")):
+        shown = chosen & np.isfinite(mu)
+        if shown.any():
+            (drawn,) = ax.plot(mu[shown], frequency[shown], "o", mfc=fill, mec=VERMILION, ms=3.5, mew=0.7, label=label)
+            drawn.set_clip_on(False)
+    first = numbers(result, "critical_frequency_hz")
+    if np.isfinite(first).any():
+        at = numbers(result, "critical_mu")
+        words = "the critical one of its sample"
+        ax.plot(at, first, "o", mfc="none", mec=INK, ms=6, mew=0.6, label=words, clip_on=False)
+    ax.set(xlim=friction_range(result), ylim=(0.0, None), xlabel="friction coefficient μ", ylabel="frequency [Hz]")
+    if not np.isfinite(mu).any():
+        ax.text(0.5, 0.5, "no onset found", transform=ax.transAxes, ha="center", va="center", color=GREY)
+    legend_above(ax, columns=3)
+    return figure
+
+
+@styled
 def growth_over(result: StudyResult, x: str | None = None, *, ax: Axes | None = None) -> Figure:
     """The largest growth rate over one parameter (default: the first that varies), or the critical friction
-    coefficient of a study of onsets."""
+    coefficient of a study of onsets; samples without onset at the end of the range, where it lies at least."""
     name = x or next(iter(varied(result)), None)
     if name is None:
         raise AnalysisError("no parameter has more than one value among the samples")
@@ -72,13 +102,32 @@ def growth_over(result: StudyResult, x: str | None = None, *, ax: Axes | None = 
     at, values = numbers(result, name), numbers(result, what)
     order = np.argsort(at)
     alone = len(varied(result)) == 1
-    ax.plot(at[order], values[order], "-o" if alone else ".", ms=3, color=BLUE, alpha=1.0 if alone else 0.5)
+    size = 3 if alone or len(at) > MANY else 5
+    ax.plot(at[order], values[order], "-o" if alone else ".", ms=size, color=BLUE, alpha=1.0 if alone else 0.5)
     if result.compute == "modes":
         ax.axhline(0.0, color=GREY, linewidth=0.8)
+    else:
+        legend_above(ax, _beyond(result, ax, at, values))
     label = "largest growth rate [1/s]" if result.compute == "modes" else "critical friction coefficient"
     along(result, ax, name)
     ax.set_ylabel(label)
     return figure
+
+
+def _beyond(result: StudyResult, ax: Axes, at: Array, critical: Array) -> list[Artist]:
+    """Marks of what is known by an end of the range of friction alone: the critical coefficient lies there or above,
+    there or below."""
+    low, high = friction_range(result)
+    early = numbers(result, "growing_at_start") > 0
+    handles: list[Artist] = []
+    for chosen, end, marker, label in (
+        (~np.isfinite(critical), high, "^", f"no onset up to μ = {high:g}"),
+        (early, low, "v", f"grows at μ = {low:g} already"),
+    ):
+        if chosen.any():
+            ax.plot(at[chosen], np.full(np.count_nonzero(chosen), end), marker, color=GREY, ms=5, mfc="none")
+            handles.append(key(marker, label, GREY, filled=False))
+    return handles
 
 
 @styled
@@ -124,14 +173,18 @@ def study_figures(result: StudyResult) -> dict[str, Figure]:
     if not result.done.any() or result.compute not in ("modes", "onsets"):
         return drawn
     names = varied(result)
-    if len(names) >= 2:
-        drawn["stability-map"] = stability_map(result)
+    if len(names) >= 2 and result.compute == "modes":
+        drawn |= {"stability-map": stability_map(result), "growth-map": growth_map(result)}
+    elif len(names) >= 2:
+        drawn["critical-map"] = critical_map(result)
     for name in names[:4]:
         drawn[f"over-{file_name(name)}"] = growth_over(result, name)
     if result.compute == "modes":
         drawn["root-locus"] = root_locus(result)
         if result.method not in ("grid", "saltelli") and result.unstable.any():
             drawn["bands"] = band_probability(result)
+    else:
+        drawn["onsets"] = onset_cloud(result)
     if result.method == "saltelli":
         with contextlib.suppress(AnalysisError):  # the summary says why there are none
             drawn["sobol-indices"] = tornado(result.indices())
