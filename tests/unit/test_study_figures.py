@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 import stridor as st
+from drawn_words import clashes, cut_off
 from stridor.case import template_text
 from stridor.case.units import unit_at
+from stridor.studies.analysis_plots import agreement, agreement_map, maps, results_over
 from stridor.studies.maps import critical_map, growth_map, stability_map
 from stridor.studies.plots import growth_over, onset_cloud, root_locus
 from stridor.studies.result import StudyResult
@@ -275,3 +278,204 @@ def test_maps_are_of_what_was_computed() -> None:
             draw(result)
     with pytest.raises(st.AnalysisError, match="a map needs two parameters that vary"):
         stability_map(result_of(study_of({"mu": FRICTION}), growing))
+
+
+# -- steady sliding, runs, comparisons ---------------------------------------------------------------------------------
+ONE = {"mu": {"range": (0.0, 0.3), "points": 4}}
+TWO = {**ONE, MASS: {"range": (1.0, 1e4), "points": 3, "spacing": "logarithmic"}}
+
+
+def pressed(at: dict) -> dict:
+    """Ten nodes, of which one more opens at each step of friction."""
+    opened = np.round(at["mu"] * 10).astype(int)
+    return {
+        "normal_force": 20.0 + 10.0 * at["mu"], "largest_node_force": 3.0 + at["mu"], "open_nodes": opened,
+        "sticking_nodes": np.full(len(opened), 2), "slipping_nodes": 8 - opened,
+    }  # fmt: skip
+
+
+def in_time(at: dict) -> dict:
+    """A run that has not stopped growing at the first friction coefficient."""
+    return {
+        "velocity_rms": 0.02 + at["mu"], "dominant_frequency_hz": 8e3 + at["mu"], "saturated": np.where(at["mu"] > 0, 1, -1),
+        "stick_fraction": at["mu"], "slip_fraction": 0.5 - at["mu"], "separation_fraction": np.full(len(at["mu"]), 0.5),
+    }  # fmt: skip
+
+
+def compared(at: dict) -> dict:
+    """Both approaches agree, do not, and it is not decided, in turn; where it is not there is no rate in time."""
+    agree = np.resize([1, 0, -1], len(at["mu"]))
+    off = np.select([agree == 1, agree == 0], [1.0, 1.5], np.nan)
+    growth, frequency = 100.0 * (at["mu"] - 0.1), 8e3 + at["mu"]
+    return {
+        "modal_growth_rate": growth, "growth_rate_in_time": growth * off, "modal_frequency_hz": frequency,
+        "frequency_in_time_hz": frequency * off, "agree": agree,
+    }  # fmt: skip
+
+
+RESULTS = {"steady": pressed, "simulate": in_time, "compare": compared}
+
+
+def ordinates(ax: Axes, label: str) -> list[float]:
+    """Finite ordinates of the marks with the look that a legend has for these words, by the parameter."""
+    legend = ax.get_legend()
+    shown = dict(zip([t.get_text() for t in legend.get_texts()], legend.legend_handles, strict=True)) if legend else {}
+    handle = shown.get(label)
+    points: list[tuple[float, float]] = []
+    for line in ax.get_lines():
+        same = handle is None or (line.get_marker(), line.get_markeredgecolor(), line.get_markerfacecolor() == "none") == (
+            handle.get_marker(), handle.get_markeredgecolor(), handle.get_markerfacecolor() == "none"
+        )  # fmt: skip
+        if same and line.get_marker() != "None":
+            points += [(x, y) for x, y in line.get_xydata().tolist() if np.isfinite(y)]
+    return [y for _, y in sorted(points)]
+
+
+def test_a_study_of_steady_sliding_shows_forces_and_what_nodes_do() -> None:
+    figure = st.study_figures(result_of(study_of(ONE, compute="steady"), pressed))["over-mu"]
+    force, largest, share = figure.axes
+    assert [ax.get_ylabel() for ax in figure.axes] == ["normal force [N]", "largest of a node [N]", "share of contact nodes"]
+    assert ordinates(force, "sum of all contacts") == pytest.approx([20.0, 21.0, 22.0, 23.0])
+    assert ordinates(largest, "") == pytest.approx([3.0, 3.1, 3.2, 3.3])
+    assert ordinates(share, "open") == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert ordinates(share, "stick") == pytest.approx([0.2] * 4)
+    assert ordinates(share, "slip") == pytest.approx([0.8, 0.7, 0.6, 0.5])
+    assert share.get_xlabel() == "friction coefficient μ"
+
+
+def test_of_one_contact_node_the_largest_force_is_not_drawn_twice() -> None:
+    def point(at: dict) -> dict:
+        rows = len(at["mu"])
+        return {"normal_force": np.full(rows, 20.0), "largest_node_force": np.full(rows, 20.0), "slipping_nodes": np.ones(rows, dtype=int)}
+
+    result = result_of(study_of(TWO, compute="steady"), point)
+    assert [ax.get_ylabel() for ax in results_over(result, "mu").axes] == ["normal force [N]", "share of contact nodes"]
+    even = maps(result)
+    titles = [ax.get_title(loc="left") for ax in even.axes if ax.get_visible() and ax.get_label() != "<colorbar>"]
+    assert titles == ["normal force of all contacts [N]", "share of contact nodes open", "share of contact nodes in stick"]
+    # Whatever has nothing below it has the numbers of the axis, and its label.
+    panels = even.axes[:3]
+    assert [ax.get_xlabel() != "" for ax in panels] == [ax.xaxis.get_tick_params()["labelbottom"] for ax in panels] == [False, True, True]
+    # Forces that are even but for rounding have no colours of 1e-9 N.
+    assert even.axes[0].collections[0].get_clim() == pytest.approx((19.8, 20.2))
+
+
+def test_a_study_of_runs_shows_how_strong_how_high_and_what_contacts_do() -> None:
+    figure = st.study_figures(result_of(study_of(ONE, compute="simulate"), in_time))["over-mu"]
+    strength, frequency, share = figure.axes
+    assert [ax.get_ylabel() for ax in figure.axes] == ["velocity, rms [m/s]", "dominant frequency [Hz]", "share of time"]
+    assert ordinates(strength, "growth has ended") == pytest.approx([0.12, 0.22, 0.32])
+    assert ordinates(strength, "not ended, or not known") == pytest.approx([0.02])
+    assert ordinates(frequency, "") == pytest.approx([8e3, 8000.1, 8000.2, 8000.3])
+    assert ordinates(share, "stick") == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert ordinates(share, "slip") == pytest.approx([0.5, 0.4, 0.3, 0.2])
+    assert ordinates(share, "separation") == pytest.approx([0.5] * 4)
+
+
+def test_runs_of_a_store_without_their_strength_are_drawn_without_it() -> None:
+    result = result_of(study_of(TWO, compute="simulate"), in_time)
+    older = StudyResult(result.path, result.data.drop_vars("velocity_rms"))
+    assert [ax.get_ylabel() for ax in results_over(older, "mu").axes] == ["dominant frequency [Hz]", "share of time"]
+    assert len([ax for ax in maps(older).axes if ax.get_visible() and ax.get_label() != "<colorbar>"]) == 3
+
+
+def test_a_study_of_comparisons_shows_where_both_agree() -> None:
+    figure = st.study_figures(result_of(study_of(ONE, compute="compare"), compared))["agreement"]
+    growth, frequency = figure.axes
+    assert (growth.get_title(loc="left"), frequency.get_title(loc="left")) == ("growth rate [1/s]", "frequency [Hz]")
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert told == ["agree (2)", "do not agree (1)", "not decided (1)", "equal", "1 without a rate in time"]
+    agree, differ, undecided, equal = growth.get_lines()
+    assert agree.get_xydata().tolist() == [pytest.approx([-10.0, -10.0]), pytest.approx([20.0, 20.0])]
+    assert differ.get_xydata()[0] == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert not np.isfinite(undecided.get_ydata()).any()
+    assert equal.get_xdata().tolist() == equal.get_ydata().tolist()
+    assert len({agree.get_marker() + str(agree.get_markerfacecolor()), differ.get_marker(), "o" + str(undecided.get_markerfacecolor())}) == 3
+
+
+def test_comparisons_over_a_parameter_have_both_approaches() -> None:
+    figure = results_over(result_of(study_of(ONE, compute="compare"), compared), "mu")
+    growth, frequency = figure.axes
+    assert (growth.get_ylabel(), frequency.get_ylabel()) == ("growth rate [1/s]", "frequency [Hz]")
+    assert ordinates(growth, "mode") == pytest.approx([-10.0, 0.0, 10.0, 20.0], abs=1e-9)
+    assert ordinates(growth, "in time: agree") == pytest.approx([-10.0, 20.0])
+    assert ordinates(frequency, "in time: do not agree") == pytest.approx([1.5 * 8000.1])
+    assert "in time: not decided" not in words(figure)  # none of them has a rate
+
+
+def test_a_map_of_comparisons_marks_their_verdicts() -> None:
+    figure = agreement_map(result_of(study_of(TWO, compute="compare"), compared))
+    ax = figure.axes[0]
+    assert words(figure) == ["agree", "do not agree", "not decided"]
+    assert [len(c.get_offsets()) for c in ax.collections] == [4, 4, 4]
+    assert (ax.get_xscale(), ax.get_yscale(), ax.get_ylabel()) == ("linear", "log", f"{MASS} [1/s]")
+
+
+@pytest.mark.parametrize(
+    ("compute", "titles"),
+    [
+        (
+            "steady",
+            ["normal force of all contacts [N]", "largest force of a node [N]", "share of contact nodes open", "share of contact nodes in stick"],
+        ),
+        ("simulate", ["velocity, rms [m/s]", "dominant frequency [Hz]", "share of time in stick", "share of time in separation"]),
+    ],
+)
+def test_maps_have_a_panel_for_each_result(compute: str, titles: list[str]) -> None:
+    result = result_of(study_of(TWO, compute=compute), RESULTS[compute])
+    figure = maps(result)
+    panels = [ax for ax in figure.axes if ax.get_label() != "<colorbar>"]
+    assert [ax.get_title(loc="left") for ax in panels] == titles
+    column = {"steady": "normal_force", "simulate": "velocity_rms"}[compute]
+    assert np.asarray(panels[0].collections[0].get_array()) == pytest.approx(result.data[column].values)
+    assert all(ax.collections[0].get_clim() == (0.0, 1.0) for ax in panels[2:])
+    assert all(ax.get_yscale() == "log" for ax in panels)
+
+
+@pytest.mark.parametrize("compute", list(RESULTS))
+def test_each_analysis_has_its_figures(compute: str) -> None:
+    one = st.study_figures(result_of(study_of(ONE, compute=compute), RESULTS[compute]))
+    two = st.study_figures(result_of(study_of(TWO, compute=compute), RESULTS[compute]))
+    over = {"over-mu", "over-bodies-beam1-damping-mass"}
+    assert set(one) == {"over-mu"} | ({"agreement"} if compute == "compare" else set())
+    assert set(two) == over | ({"agreement", "agreement-map"} if compute == "compare" else {"maps"})
+
+
+def test_figures_of_an_analysis_are_of_it_alone() -> None:
+    result = result_of(study_of(TWO), growing)
+    for draw in (agreement, agreement_map, maps):
+        with pytest.raises(st.AnalysisError, match="and the study computed modes"):
+            draw(result)
+
+
+WHOLE = {
+    "modes": (TWO, growing), "onsets": (ONSETS, ladder), "steady": (TWO, pressed), "simulate": (TWO, in_time),
+    "compare": (TWO, compared),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("compute", list(WHOLE))
+@pytest.mark.parametrize("beside", [False, True], ids=["two vary", "three vary"])
+def test_no_words_of_a_figure_lie_on_others(compute: str, beside: bool) -> None:
+    parameters, columns = WHOLE[compute]
+    if beside:
+        parameters = parameters | {"bodies.beam2.damping.stiffness": {"values": (1e-8, 2e-8)}, "materials.steel.young_modulus": {"values": (2e11, 2.1e11)}}
+    study = onset_study() if compute == "onsets" and not beside else study_of(parameters, compute=compute)
+    for name, figure in st.study_figures(result_of(study, columns)).items():
+        assert clashes(figure) == [], name
+        assert cut_off(figure) == [], name
+
+
+def test_a_page_has_every_figure_with_its_words(tmp_path: Path) -> None:
+    from stridor.studies.page import write_page
+
+    for compute, (parameters, columns) in WHOLE.items():
+        result = result_of(onset_study() if compute == "onsets" else study_of(parameters, compute=compute), columns)
+        drawn = st.study_figures(result)
+        page = write_page(result, drawn, tmp_path / f"{compute}.html").read_text(encoding="utf-8")
+        assert page.count("<img ") == page.count("<figcaption>") == len(drawn)
+        for name in drawn:
+            assert f'id="figure-{name}"' in page
+            title = "Over friction coefficient μ" if name == "over-mu" else ""
+            assert re.search(rf'<li><a href="#figure-{name}">{title}', page)
+            assert f'<a href="#figure-{name}">{name}<' not in page  # a title in words, not the name of the file

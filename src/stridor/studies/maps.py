@@ -34,10 +34,10 @@ def stability_map(result: StudyResult, x: str | None = None, y: str | None = Non
     shown, unstable = numbers(result, "largest_growth_frequency_hz"), result.unstable
     handles: list[Artist] = []
     if not unstable.all():
-        _marks(ax, at, ~unstable, color=STABLE)
+        marks(ax, at, ~unstable, color=STABLE)
         handles.append(key("s", "nothing grows", STABLE))
     if unstable.any():
-        drawn = _marks(ax, at, unstable, c=shown[unstable], cmap="viridis")
+        drawn = marks(ax, at, unstable, c=shown[unstable], cmap="viridis")
         figure.colorbar(drawn, ax=ax, label="frequency of the fastest growing mode [Hz]", pad=0.02)
     handles += boundary(result, ax, x, y) + rings(result, ax, at)
     legend_above(ax, handles, columns=3)
@@ -60,7 +60,7 @@ def growth_map(result: StudyResult, x: str | None = None, y: str | None = None, 
         for of, marker, label in ((~unstable, "o", "nothing grows"), (unstable, "s", "a mode grows")):
             if (chosen := known & of).any():
                 # With an edge: rates near zero are white.
-                drawn = _marks(ax, at, chosen, c=growth[chosen], marker=marker, edgecolors=GREY, lw=0.5, **scale)
+                drawn = marks(ax, at, chosen, c=growth[chosen], marker=marker, edgecolors=GREY, lw=0.5, **scale)
                 handles.append(key(marker, label, GREY, filled=False))
         assert drawn is not None, "a row is one of both"
         ends = drawn.get_clim()
@@ -96,12 +96,12 @@ def critical_map(result: StudyResult, x: str | None = None, y: str | None = None
     low, high = friction_range(result)
     handles: list[Artist] = []
     if none.any():
-        _marks(ax, at, none, color=STABLE)
+        marks(ax, at, none, color=STABLE)
         handles.append(key("s", f"no onset up to μ = {high:g}", STABLE))
     drawn, scale = None, Normalize(*_ends(critical[~none])) if not none.all() else None
     for chosen, marker in ((late, "s"), (early & ~none, "v")):
         if chosen.any():
-            drawn = _marks(ax, at, chosen, c=critical[chosen], marker=marker, cmap="viridis", norm=scale)
+            drawn = marks(ax, at, chosen, c=critical[chosen], marker=marker, cmap="viridis", norm=scale)
     if drawn is not None:
         figure.colorbar(drawn, ax=ax, label="critical friction coefficient", pad=0.02)
     if early.any():
@@ -126,7 +126,7 @@ def _map(
     return figure, ax, x, y, [numbers(result, name) for name in (x, y)]
 
 
-def _marks(ax: Axes, at: Sequence[Array], chosen: BoolArray, **look: Any) -> PathCollection:
+def marks(ax: Axes, at: Sequence[Array], chosen: BoolArray, **look: Any) -> PathCollection:
     """Marks at the rows chosen, the smaller the more rows there are."""
     size = float(np.clip(6000 / max(len(chosen), 1), 4, 60))
     drawn: dict[str, Any] = {"marker": "s", "lw": 0, **look}

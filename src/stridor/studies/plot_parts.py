@@ -55,13 +55,18 @@ def along(result: StudyResult, ax: Axes, name: str, which: str = "x") -> None:
 
 
 def over_two(result: StudyResult, ax: Axes, x: str, y: str) -> None:
-    """Both axes of a map, and below them what varies beside: marks that lie near each other may differ in it."""
+    """Both axes of a map, and below them what varies beside."""
     along(result, ax, x, "x")
     along(result, ax, y, "y")
+    if others := beside(result, x, y):
+        ax.set_xlabel(f"{ax.get_xlabel()}\n{others}")
+
+
+def beside(result: StudyResult, x: str, y: str) -> str:
+    """What varies but for the parameters of a map, in words: marks that lie near each other may differ in it."""
     others = [name for name in varied(result) if name not in (x, y)]
-    if others:
-        more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
-        ax.set_xlabel(f"{ax.get_xlabel()}\nvaried beside: {', '.join(others[:MOST_NAMED])}{more}")
+    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
+    return f"varied beside: {', '.join(others[:MOST_NAMED])}{more}" if others else ""
 
 
 def two(result: StudyResult, x: str | None, y: str | None) -> tuple[str, str]:

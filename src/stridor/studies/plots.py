@@ -14,6 +14,7 @@ from ..errors import AnalysisError
 from ..typing import Array
 from ..view.colours import BLUE, GREY, INK, ORANGE, VERMILION
 from ..view.style import legend_above, panel, styled
+from .analysis_plots import analysis_figures
 from .maps import critical_map, growth_map, stability_map
 from .plot_parts import along, file_name, friction_range, key, varied
 from .result import StudyResult, numbers
@@ -170,8 +171,10 @@ def band_probability(result: StudyResult, edges: Sequence[float] | None = None, 
 def study_figures(result: StudyResult) -> dict[str, Figure]:
     """Every figure that a study has something for, by the name of its file."""
     drawn: dict[str, Figure] = {}
-    if not result.done.any() or result.compute not in ("modes", "onsets"):
+    if not result.done.any():
         return drawn
+    if result.compute not in ("modes", "onsets"):
+        return analysis_figures(result)
     names = varied(result)
     if len(names) >= 2 and result.compute == "modes":
         drawn |= {"stability-map": stability_map(result), "growth-map": growth_map(result)}
