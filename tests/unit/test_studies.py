@@ -570,9 +570,41 @@ def test_other_analyses_have_rows_too(case: st.Case, tmp_path: Path, compute: st
     assert found.done.all(), found.data["error"].values
     column = {"steady": "normal_force", "simulate": "steps", "compare": "modal_frequency_hz"}[compute]
     assert np.all(found.data[column].values > 0)
+    drawn = stridor("plot", ".", cwd=tmp_path)
+    assert drawn.returncode == 0, drawn.stderr
+    expected = {"over-mu.png"} | ({"agreement.png"} if compute == "compare" else set())
+    assert {path.name for path in tmp_path.glob("*.png")} == expected
+    assert (tmp_path / "report.html").read_text(encoding="utf-8").count("<img ") == len(expected)
     if compute == "compare":
         agree = found.data["agree"].values
         assert answer(found) == f"both approaches agree in {int(np.sum(agree == 1))} of 2 samples"
         assert all("against the result" not in note for note in found.notes)
         assert any("do not agree" in note for note in found.notes) == bool(np.any(agree == 0))
         assert any("not decided" in note for note in found.notes) == bool(np.any(agree < 0))
+
+
+def test_a_run_of_a_study_vibrates_as_strongly_as_that_of_an_ensemble(case: st.Case, tmp_path: Path) -> None:
+    short = case.with_({"phases": [{"name": "go", "duration": 2e-3}], "temporal.record_every": 5, "temporal.initial": "steady-sliding", "temporal.perturbation": 1e-4})
+    found = st.run_study(st.Study(case=short, compute="simulate", parameters={"mu": {"values": (0.1, 0.3)}}), tmp_path, workers=2)
+    beside = st.ensemble(short, mu=[0.1, 0.3], modes=False)
+    assert np.all(beside.rms > 0)
+    assert found.data["velocity_rms"].values == pytest.approx(beside.rms, rel=2e-2)  # windows differ by a record
+    assert found.data["velocity_rms"].attrs["units"] == "m/s"
+
+
+def test_a_store_that_never_had_a_later_result_is_not_damaged(case: st.Case, tmp_path: Path) -> None:
+    short = case.with_({"phases": [{"name": "go", "duration": 2e-4}], "temporal.record_every": 1})
+    study = st.Study(case=short, compute="simulate", parameters={"mu": {"values": (0.1, 0.3)}})
+    st.run_study(study, tmp_path / "now", workers=1)
+    shutil.rmtree(tmp_path / "now" / "study.zarr" / "velocity_rms")
+    with pytest.raises(st.CaseError, match="a damaged store: velocity_rms missing"):
+        st.open_study(tmp_path / "now")
+    head = tmp_path / "now" / "study.zarr" / "zarr.json"
+    written = json.loads(head.read_text(encoding="utf-8"))
+    del written["attributes"]["columns"]  # as one that was written before
+    head.write_text(json.dumps(written), encoding="utf-8")
+    older = st.open_study(tmp_path / "now")
+    assert "velocity_rms" not in older.data
+    assert set(st.study_figures(older)) == {"over-mu"}
+    assert "2 samples of simulate" in answer(older)
+    assert stridor("plot", "now", cwd=tmp_path).returncode == 0

@@ -18,7 +18,29 @@ from .tables import Varied
 
 # Titles of figures, and what is to be seen in them.
 _FIGURES = {
-    "stability-map": ("Where it squeals", "A mark for each sample; rings: solved in the full problem as well."),
+    "stability-map": (
+        "Where it squeals",
+        "A mark for each sample; rings: solved in the full problem as well. The line of no growth, of a grid alone, is "
+        "interpolated between its points.",
+    ),
+    "growth-map": (
+        "How fast it grows",
+        "The largest growth rate of each sample. Decay and growth have a half of the colours each, up to their own "
+        "ends. The line of no growth, of a grid alone, is interpolated between its points.",
+    ),
+    "critical-map": (
+        "From which friction on it squeals",
+        "The critical friction coefficient of each sample, solved for; nothing is interpolated between samples.",
+    ),
+    "onsets": (
+        "Onsets of all samples", "Friction coefficient and frequency at which a mode begins or ceases to grow."
+    ),
+    "agreement": (
+        "Modes against runs in time",
+        "Growth rate and frequency of the mode compared, and of the perturbation in time: on the line both are equal.",
+    ),
+    "agreement-map": ("Where both approaches agree", "A mark for each sample: whether its comparison agrees."),
+    "maps": ("Over two parameters", "A mark for each sample; nothing is interpolated between samples."),
     "root-locus": ("Modes of all samples", "Growth rate over frequency: above the line a mode grows."),
     "bands": ("How likely a mode grows, by frequency", "With intervals of 95 %."),
     "sobol-indices": ("What decides it", "Shares of the variance: of a number alone, and together with others."),
@@ -60,7 +82,7 @@ def write_page(result: StudyResult, figures: Mapping[str, Figure], path: Path) -
 def _figure(name: str, figure: Figure) -> ReportFigure:
     title, caption = _FIGURES.get(name, ("", ""))
     if name.startswith(_OVER):
-        label = figure.axes[0].get_xlabel()
+        label = next(label for ax in figure.axes if (label := ax.get_xlabel()))
         title, caption = f"Over {label}", f"The results of all samples over {label}."
     return ReportFigure(name, title or name, caption, caption or title or name, figure)
 

@@ -6,72 +6,23 @@ import contextlib
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from ..errors import AnalysisError
 from ..typing import Array
 from ..view.colours import BLUE, GREY, INK, ORANGE, VERMILION
 from ..view.style import legend_above, panel, styled
+from .analysis_plots import analysis_figures
+from .maps import critical_map, growth_map, stability_map
+from .plot_parts import along, file_name, friction_range, key, varied
 from .result import StudyResult, numbers
 from .uncertainty import Indices, grows
 
-STABLE = "#DDDDDD"
 MOST_POINTS = 20_000  # of a cloud
-
-
-@styled
-def stability_map(result: StudyResult, x: str | None = None, y: str | None = None, *, ax: Axes | None = None) -> Figure:
-    """Samples over two parameters (default: the first two that vary): frequency of the fastest growing mode as colour,
-    grey where nothing grows; over a grid of these two with the line where growth begins. Of onsets: the critical
-    friction coefficient as colour. Rings: solved in the full problem as well. Raises AnalysisError with fewer than two
-    parameters."""
-    x, y = _two(result, x, y)
-    figure, ax = panel(ax, 4.6)
-    at = [numbers(result, name) for name in (x, y)]
-    onsets = result.compute == "onsets"
-    shown = numbers(result, "critical_mu" if onsets else "largest_growth_frequency_hz")
-    unstable = result.unstable
-    known = unstable & np.isfinite(shown)
-    label = "critical friction coefficient" if onsets else "frequency of the fastest growing mode [Hz]"
-    size = float(np.clip(6000 / max(len(shown), 1), 4, 60))
-    ax.scatter(at[0][~unstable], at[1][~unstable], s=size, c=STABLE, marker="s", linewidths=0)
-    if known.any():
-        drawn = ax.scatter(at[0][known], at[1][known], s=size, c=shown[known], cmap="viridis", marker="s", linewidths=0)
-        figure.colorbar(drawn, ax=ax, label=label, pad=0.02)
-    stable = Line2D([], [], color=STABLE, marker="s", linestyle="none", label="nothing grows")
-    handles = [stable] if (~unstable).any() else []
-    if not onsets:
-        handles += _boundary(result, ax, x, y)
-    handles += _rings(result, ax, at)
-    ax.set(xlabel=_named(result, x), ylabel=_named(result, y))
-    legend_above(ax, handles, columns=3)
-    return figure
-
-
-def _boundary(result: StudyResult, ax: Axes, x: str, y: str) -> list[Line2D]:
-    """The line of no growth over a grid of two parameters alone."""
-    axes = [np.unique(result.data[name].values) for name in (x, y)]
-    values = np.asarray(result.data["largest_growth_rate"].values, dtype=float)
-    whole = len(values) == len(axes[0]) * len(axes[1]) and min(map(len, axes)) > 1
-    if result.method != "grid" or not whole or not np.any(values > 0) or not np.any(values < 0):
-        return []
-    table = np.full((len(axes[1]), len(axes[0])), np.nan)
-    places = [np.searchsorted(axis, result.data[name].values) for axis, name in zip(axes, (x, y), strict=True)]
-    table[places[1], places[0]] = values
-    ax.contour(axes[0], axes[1], table, levels=[0.0], colors=VERMILION, linewidths=1.8)
-    return [Line2D([], [], color=VERMILION, label="no growth (between points of the grid)")]
-
-
-def _rings(result: StudyResult, ax: Axes, at: Sequence[Array]) -> list[Line2D]:
-    if "confirmed" not in result.data:
-        return []
-    confirmed = numbers(result, "confirmed") > 0
-    if not confirmed.any():
-        return []
-    ax.plot(at[0][confirmed], at[1][confirmed], "o", mfc="none", mec=INK, ms=5, mew=0.7)
-    return [Line2D([], [], color=INK, marker="o", mfc="none", linestyle="none", label="solved in full as well")]
+MANY = 500  # samples, whose marks are small
+MARGIN = 1.6  # of a logarithmic axis, times its ends
 
 
 @styled
@@ -101,7 +52,9 @@ def root_locus(result: StudyResult, *, ax: Axes | None = None) -> Figure:
     scale = np.abs(growth[flat])
     if scale.size and scale.max() > 100 * max(float(np.median(scale)), 1e-9):
         linear = max(float(np.median(scale)), 1e-6)
+        low, high = min(float(growth[flat].min()), 0.0), max(float(growth[flat].max()), 0.0)
         ax.set_yscale("symlog", linthresh=linear)
+        ax.set_ylim(MARGIN * low - 0.1 * linear, MARGIN * high + 0.1 * linear)  # its own cut marks at the ends
         # Within the linear part there is room for zero alone.
         ax.set_yticks([tick for tick in ax.get_yticks() if tick == 0.0 or abs(tick) >= 0.5 * linear])
     ax.set(xlabel="frequency [Hz]", ylabel="growth rate [1/s]")
@@ -110,10 +63,37 @@ def root_locus(result: StudyResult, *, ax: Axes | None = None) -> Figure:
 
 
 @styled
+def onset_cloud(result: StudyResult, *, ax: Axes | None = None) -> Figure:
+    """Every onset kept of every row at its friction coefficient and frequency: where a mode begins to grow, and where
+    one ceases to. Ringed: the first of a row, its critical one."""
+    if result.compute != "onsets":
+        raise AnalysisError("a figure of onsets is that of onsets; the study computed others")
+    figure, ax = panel(ax, 4.2)
+    mu, frequency, ends = (
+        np.asarray(result.data[n].values)[result.done] for n in ("onset_mu", "onset_frequency_hz", "onset_ends_growth")
+    )
+    for chosen, fill, label in ((ends == 0, VERMILION, "growth begins"), (ends == 1, "none", "growth ends")):
+        shown = chosen & np.isfinite(mu)
+        if shown.any():
+            (drawn,) = ax.plot(mu[shown], frequency[shown], "o", mfc=fill, mec=VERMILION, ms=3.5, mew=0.7, label=label)
+            drawn.set_clip_on(False)
+    first = numbers(result, "critical_frequency_hz")
+    if np.isfinite(first).any():
+        at = numbers(result, "critical_mu")
+        words = "the critical one of its sample"
+        ax.plot(at, first, "o", mfc="none", mec=INK, ms=6, mew=0.6, label=words, clip_on=False)
+    ax.set(xlim=friction_range(result), ylim=(0.0, None), xlabel="friction coefficient μ", ylabel="frequency [Hz]")
+    if not np.isfinite(mu).any():
+        ax.text(0.5, 0.5, "no onset found", transform=ax.transAxes, ha="center", va="center", color=GREY)
+    legend_above(ax, columns=3)
+    return figure
+
+
+@styled
 def growth_over(result: StudyResult, x: str | None = None, *, ax: Axes | None = None) -> Figure:
     """The largest growth rate over one parameter (default: the first that varies), or the critical friction
-    coefficient of a study of onsets."""
-    name = x or next(iter(_varied(result)), None)
+    coefficient of a study of onsets; samples without onset at the end of the range, where it lies at least."""
+    name = x or next(iter(varied(result)), None)
     if name is None:
         raise AnalysisError("no parameter has more than one value among the samples")
     what = {"modes": "largest_growth_rate", "onsets": "critical_mu"}.get(result.compute)
@@ -122,13 +102,33 @@ def growth_over(result: StudyResult, x: str | None = None, *, ax: Axes | None = 
     figure, ax = panel(ax, 3.6)
     at, values = numbers(result, name), numbers(result, what)
     order = np.argsort(at)
-    alone = len(_varied(result)) == 1
-    ax.plot(at[order], values[order], "-o" if alone else ".", ms=3, color=BLUE, alpha=1.0 if alone else 0.5)
+    alone = len(varied(result)) == 1
+    size = 3 if alone or len(at) > MANY else 5
+    ax.plot(at[order], values[order], "-o" if alone else ".", ms=size, color=BLUE, alpha=1.0 if alone else 0.5)
     if result.compute == "modes":
         ax.axhline(0.0, color=GREY, linewidth=0.8)
+    else:
+        legend_above(ax, _beyond(result, ax, at, values))
     label = "largest growth rate [1/s]" if result.compute == "modes" else "critical friction coefficient"
-    ax.set(xlabel=_named(result, name), ylabel=label)
+    along(result, ax, name)
+    ax.set_ylabel(label)
     return figure
+
+
+def _beyond(result: StudyResult, ax: Axes, at: Array, critical: Array) -> list[Artist]:
+    """Marks of what is known by an end of the range of friction alone: the critical coefficient lies there or above,
+    there or below."""
+    low, high = friction_range(result)
+    early = numbers(result, "growing_at_start") > 0
+    handles: list[Artist] = []
+    for chosen, end, marker, label in (
+        (~np.isfinite(critical), high, "^", f"no onset up to μ = {high:g}"),
+        (early, low, "v", f"grows at μ = {low:g} already"),
+    ):
+        if chosen.any():
+            ax.plot(at[chosen], np.full(np.count_nonzero(chosen), end), marker, color=GREY, ms=5, mfc="none")
+            handles.append(key(marker, label, GREY, filled=False))
+    return handles
 
 
 @styled
@@ -171,47 +171,24 @@ def band_probability(result: StudyResult, edges: Sequence[float] | None = None, 
 def study_figures(result: StudyResult) -> dict[str, Figure]:
     """Every figure that a study has something for, by the name of its file."""
     drawn: dict[str, Figure] = {}
-    if not result.done.any() or result.compute not in ("modes", "onsets"):
+    if not result.done.any():
         return drawn
-    varied = _varied(result)
-    if len(varied) >= 2:
-        drawn["stability-map"] = stability_map(result)
-    for name in varied[:4]:
-        drawn[f"over-{_file(name)}"] = growth_over(result, name)
+    if result.compute not in ("modes", "onsets"):
+        return analysis_figures(result)
+    names = varied(result)
+    if len(names) >= 2 and result.compute == "modes":
+        drawn |= {"stability-map": stability_map(result), "growth-map": growth_map(result)}
+    elif len(names) >= 2:
+        drawn["critical-map"] = critical_map(result)
+    for name in names[:4]:
+        drawn[f"over-{file_name(name)}"] = growth_over(result, name)
     if result.compute == "modes":
         drawn["root-locus"] = root_locus(result)
         if result.method not in ("grid", "saltelli") and result.unstable.any():
             drawn["bands"] = band_probability(result)
+    else:
+        drawn["onsets"] = onset_cloud(result)
     if result.method == "saltelli":
         with contextlib.suppress(AnalysisError):  # the summary says why there are none
             drawn["sobol-indices"] = tornado(result.indices())
     return drawn
-
-
-def _varied(result: StudyResult) -> list[str]:
-    """Parameters with more than one value among the samples."""
-    return [name for name in result.parameters if len(np.unique(result.data[name].values)) > 1]
-
-
-def _two(result: StudyResult, x: str | None, y: str | None) -> tuple[str, str]:
-    if result.compute not in ("modes", "onsets"):
-        raise AnalysisError(f"{result.compute} has neither growth rates nor onsets; a map is of modes or onsets")
-    for name in (x, y):
-        if name is not None and name not in result.parameters:
-            raise AnalysisError(f"{name} is no parameter of the study; there are {', '.join(result.parameters)}")
-    varied = [name for name in _varied(result) if name not in (x, y)]
-    first = x or (varied.pop(0) if varied else "")
-    second = y or (varied.pop(0) if varied else "")
-    if not first or not second:
-        raise AnalysisError("a map needs two parameters that vary")
-    return first, second
-
-
-def _named(result: StudyResult, name: str) -> str:
-    unit = result.data[name].attrs.get("units", "")
-    return f"{name} [{unit}]" if unit not in ("", "1") else "friction coefficient μ" if name == "mu" else name
-
-
-def _file(name: str) -> str:
-    return "".join(c if c.isalnum() else "-" for c in name)
-

@@ -18,6 +18,7 @@ from ..modal.onset import Onsets
 from ..modal.results import grows
 from ..study.analyses import compare, modes, onsets, simulate, steady_sliding, summarise
 from ..study.workspace import Unsaved, Workspace
+from ..temporal.trajectory import Trajectory
 from ..typing import ComplexArray, IntArray
 from .checks import FRICTION
 from .tables import Compute, Keep
@@ -154,6 +155,7 @@ def _simulate(work: Workspace, mu: float | None, keep: Keep) -> Row:
     found = summarise(work, run)
     row: Row = {
         "dominant_frequency_hz": _number(found.dominant_frequency_hz),
+        "velocity_rms": _velocity_rms(run),
         "growth_rate_in_time": _number(found.growth_rate),
         "saturated": -1 if found.growth is None else int(found.growth.saturated),
         "energy_error": float(found.energy.error),
@@ -164,6 +166,17 @@ def _simulate(work: Workspace, mu: float | None, keep: Keep) -> Row:
         for name in ("stick_fraction", "slip_fraction", "separation_fraction"):
             row[name] = float(np.mean([getattr(c, name) for c in last.contacts.values()]))
     return row
+
+
+def _velocity_rms(run: Trajectory) -> float:
+    """How strongly a run vibrates in the end: rms about its mean [m/s] of the velocity that has the dominant frequency,
+    over the second half of the last phase, as an ensemble has it; NaN where there is none."""
+    if not run.phases or not len(run.time):
+        return np.nan
+    part = run.phase_slice()
+    end = slice((part.start + part.stop) // 2, part.stop)
+    seen = run.velocity[end, 0] if run.watch_names else run.slip_speed[end, :1]
+    return float(np.sqrt(seen.var(axis=0).sum())) if seen.size else np.nan
 
 
 def _compare(work: Workspace, mu: float | None, keep: Keep) -> Row:
@@ -236,6 +249,9 @@ _VARIABLES: dict[str, tuple[StoreColumn, ...]] = {
     ),
     "simulate": (
         StoreColumn("dominant_frequency_hz", "f8", "Hz", "loudest frequency of the last phase"),
+        StoreColumn(
+            "velocity_rms", "f8", "m/s", "rms of the velocity that has it about its mean, second half of the last phase"
+        ),
         StoreColumn("growth_rate_in_time", "f8", "1/s", "growth rate of the run, where it grows exponentially"),
         StoreColumn("saturated", "i1", "", "1 where growth has ended in the run, 0 where not, -1 unknown"),
         StoreColumn("stick_fraction", "f8", "1", "share of the last phase in stick, mean of the contacts"),

@@ -28,6 +28,8 @@ KIND = "stridor study"
 MARKS = ("zarr.json", ".zgroup")  # of a folder that zarr has written, or an earlier one
 CHUNK = 512  # rows of a chunk at most
 WHOLE = "every_chunk_written"  # of the attributes: what of computed rows is not there is lost
+COLUMNS = "columns"  # of the attributes: the results that it has
+LATER = ("velocity_rms",)  # results that stores without these attributes may lack: an earlier version wrote none
 PENDING, DONE, FAILED = 0, 1, 2
 _FILL: Mapping[str, Any] = {"f8": np.nan, "i8": 0, "i1": 0, "str": ""}
 
@@ -65,7 +67,8 @@ class OpenStore:
         try:
             shutil.rmtree(temporary, ignore_errors=True)
             with _every_chunk():
-                group = _zarr().create_group(temporary, attributes=_attributes(head, parameters))
+                attributes = _attributes(head, parameters) | {COLUMNS: json.dumps([v.name for v in variables])}
+                group = _zarr().create_group(temporary, attributes=attributes)
                 number = np.arange(len(samples)) if numbers is None else numbers
                 _fill_new(group, samples, parameters, variables, lengths, number)
             temporary.rename(path)
@@ -302,6 +305,7 @@ def dataset(path: Path) -> Any:
     group = _group(path, "r")
     try:
         names = [v.name for v in variables_of(head_of(path, group).study["compute"])]
+        names = json.loads(group.attrs.get(COLUMNS, json.dumps([name for name in names if name not in LATER])))
     except KeyError:
         raise CaseError(str(path), None, "a damaged store: it does not say what was computed") from None
     _require(path, group, names)

@@ -19,7 +19,7 @@ _NUMBERS = {
     "modes": ("largest_growth_rate", "largest_growth_frequency_hz", "unstable_modes"),
     "onsets": ("critical_mu", "critical_frequency_hz", "onsets"),
     "steady": ("normal_force", "largest_node_force", "open_nodes", "sticking_nodes", "slipping_nodes"),
-    "simulate": ("dominant_frequency_hz", "stick_fraction", "slip_fraction", "separation_fraction"),
+    "simulate": ("velocity_rms", "dominant_frequency_hz", "stick_fraction", "slip_fraction", "separation_fraction"),
     "compare": ("modal_frequency_hz", "modal_growth_rate", "growth_rate_in_time", "agree"),
 }
 
@@ -50,7 +50,8 @@ def tables(result: StudyResult) -> list[Listing]:
     found: list[Listing] = []
     if not result.done.any():
         return found
-    rows = [row for name in _NUMBERS[result.compute] if (row := _spread(result, name)) is not None]
+    names = [name for name in _NUMBERS[result.compute] if name in result.data]
+    rows = [row for name in names if (row := _spread(result, name)) is not None]
     found.append(("Over all samples", ("result", "least", "5 %", "median", "95 %", "largest", "samples"), rows))
     if result.compute == "modes" and result.method not in ("grid", "saltelli") and result.unstable.any():
         bands = [

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.ndimage as ndi
 from matplotlib.artist import Artist
@@ -10,25 +13,31 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, Stroke
 
+from ..case import loads
+from ..case.units import FRICTION, unit_at
+from ..errors import CaseError
 from ..study.boundary_result import Boundary
-from ..typing import Array, IntArray
-from .colours import INK
-from .style import legend_above, panel, styled
+from ..typing import Array, BoolArray
+from .colours import FAINT, INK
+from .modal_plots import MU
+from .style import legend_above, panel, root_figure, styled
 
 RASTER = 240  # points along each number in which regions are shaded
-LEAST = 0.004  # of the rectangle: regions smaller than that bear no number
+CLEAR = 7.0  # [pt] about the middle of a number: half of two digits, and of the line beside them
+RING = 3.0  # [pt]: radius of a ring
 SHADES = ("#FFFFFF", "#F7E3D4", "#EFC9AE", "#E4AA86", "#D58A63", "#C26C46")
 
 
 @styled
 def stability_boundary(result: Boundary, *, ax: Axes | None = None) -> Figure:
     """Curves on which modes begin to grow, coloured by frequency, thick where nothing grows on one side. Regions are
-    shaded by how many modes grow in them, which is written there. Rings: solved again in the full problem."""
+    shaded by how many modes grow in them, which is written where there is room for it, else in the legend. Rings:
+    solved again in the full problem."""
     figure, ax = panel(ax, 4.8)
     ax.grid(False)
-    _regions(ax, result)
     handles: list[Artist] = []
     pieces, values, widths = _pieces(result)
     if pieces:
@@ -48,7 +57,8 @@ def stability_boundary(result: Boundary, *, ax: Axes | None = None) -> Figure:
         (rings,) = ax.plot(*points, "o", mfc="white", mec=INK, ms=5, clip_on=False, zorder=5)
         rings.set_label("solved again in the full problem")
         handles.append(rings)
-    ax.set(xlabel=result.x, ylabel=result.y, xlim=result.x_range, ylim=result.y_range)
+    handles += _regions(ax, result)
+    ax.set(xlabel=_label(result, result.x), ylabel=_label(result, result.y), xlim=result.x_range, ylim=result.y_range)
     for axis in (ax.xaxis, ax.yaxis):
         # A common power of ten would stand where the legend does.
         axis.set_major_formatter("{x:.4g}")
@@ -69,28 +79,75 @@ def _pieces(result: Boundary) -> tuple[list[Array], Array, Array]:
     return pieces, np.concatenate(values) if values else np.zeros(0), np.concatenate(widths) if widths else np.zeros(0)
 
 
-def _regions(ax: Axes, result: Boundary) -> None:
-    """Shade what grows, and write how many modes do."""
+def _regions(ax: Axes, result: Boundary) -> list[Artist]:
+    """Shade what grows, and write how many modes do where there is room for it; keys of the shades that nowhere have
+    their number."""
     if not result.counted:
-        return
+        return []
     edges = [np.linspace(*ends, RASTER + 1) for ends in (result.x_range, result.y_range)]
     xs, ys = (0.5 * (e[1:] + e[:-1]) for e in edges)
     table = result.unstable_modes_over(xs, ys)
     most = min(max(int(table.max()), 1), len(SHADES) - 1)
     shades = BoundaryNorm(np.arange(-0.5, most + 1), most + 1), ListedColormap(SHADES[: most + 1])
     ax.pcolormesh(*edges, np.minimum(table.T, most), norm=shades[0], cmap=shades[1], rasterized=True, zorder=1)
-    for number in np.unique(table).tolist():
-        _numbered(ax, (xs, ys), table == number, number)
+    paper = _paper(ax, (xs, ys), result)
+    bare = [number for number in np.unique(table).tolist() if not _numbered(ax, paper, table == number, number)]
+    return [
+        Patch(facecolor=SHADES[min(max(number, 0), most)], edgecolor=FAINT, label=f"{number} grow{'s' * (number == 1)}")
+        for number in bare
+    ]
 
 
-def _numbered(ax: Axes, grid: tuple[Array, Array], where: Array, number: int) -> None:
-    """The number in each region (nx, ny), where that is widest."""
+@dataclass(frozen=True)
+class _Paper:
+    """Points xs (nx,), ys (ny,) of a raster, the steps between them on paper [pt], and how far from each (nx, ny) it
+    is to the nearest ring."""
+
+    xs: Array
+    ys: Array
+    steps: tuple[float, float]
+    free: Array
+
+    def room(self, region: BoolArray) -> Array:
+        """How far (nx, ny) it is [pt] from each point of a region to what lies about it: its edge, and rings in it."""
+        # A frame of other regions: letters must not lie across the axes either.
+        far = ndi.distance_transform_edt(np.pad(region, 1), sampling=self.steps)[1:-1, 1:-1]
+        return np.minimum(far, self.free)
+
+
+def _paper(ax: Axes, grid: tuple[Array, Array], result: Boundary) -> _Paper:
+    frame = ax.get_position()
+    width, height = (72 * root_figure(ax).get_size_inches() * (frame.width, frame.height)).tolist()
+    steps = width / len(grid[0]), height / len(grid[1])
+    free = np.full((len(grid[0]), len(grid[1])), np.inf)
+    for ring in result.confirmed:
+        across = width * (grid[0] - ring.x) / (result.x_range[1] - result.x_range[0])
+        up = height * (grid[1] - ring.y) / (result.y_range[1] - result.y_range[0])
+        free = np.minimum(free, np.maximum(np.hypot(across[:, None], up[None, :]) - RING, 0.0))
+    return _Paper(*grid, steps, free)
+
+
+def _numbered(ax: Axes, paper: _Paper, where: BoolArray, number: int) -> bool:
+    """The number in each region (nx, ny) that is wide enough for it, where that is widest; whether one is."""
     names, count = ndi.label(where)
+    written = False
     for name in range(1, count + 1):
-        region: IntArray = np.asarray(names == name)
-        if region.mean() < LEAST:
+        room = paper.room(np.asarray(names == name))
+        i, j = (int(k) for k in np.unravel_index(int(np.argmax(room)), room.shape))
+        if room[i, j] < CLEAR:
             continue
-        depth = ndi.distance_transform_edt(np.pad(region, 1))[1:-1, 1:-1]
-        i, j = (int(k) for k in np.unravel_index(int(np.argmax(depth)), depth.shape))
-        text = ax.text(grid[0][i], grid[1][j], f"{number}", ha="center", va="center", color=INK, fontsize=11, zorder=6)
+        at = float(paper.xs[i]), float(paper.ys[j])
+        text = ax.text(*at, f"{number}", ha="center", va="center", color=INK, fontsize=11, zorder=6)
         text.set_path_effects([Stroke(linewidth=2.5, foreground="white"), Normal()])
+        written = True
+    return written
+
+
+def _label(result: Boundary, path: str) -> str:
+    """A number of the case with its unit, which the case that the result keeps tells."""
+    text = result.provenance.get("case", "")
+    unit = ""
+    if text:
+        with suppress(CaseError):
+            unit = unit_at(loads(text), path)
+    return f"{path} [{unit}]" if unit not in ("", "1") else MU if path == FRICTION else path

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,14 +14,19 @@ from matplotlib.ticker import MaxNLocator
 
 from ..study.ensemble_result import AXES, Ensemble
 from ..typing import Array, IntArray
-from .colours import COLOURS, GREY, INK
-from .style import new_figure, styled
+from .colours import COLOURS, INK
+from .style import new_figure, root_figure, styled
 
 NAMES = {"mu": "friction coefficient μ", "load": "factor of loads", "speed": "factor of speeds",
          "perturbation": "perturbation [m/s]"}  # fmt: skip
 MARKS = {"up": "^", "down": "v", "": "o"}
 # White on the dark end of the colours, and still seen on the light one.
 _OUTLINED: list[AbstractPathEffect] = [Stroke(linewidth=2.6, foreground=INK), Normal()]
+_HALO: list[AbstractPathEffect] = [Stroke(linewidth=2.0, foreground="white"), Normal()]  # letters on lines
+PANEL = np.array([0.75, 0.62])  # of a row and a column of the figure: what the frame of a panel takes, at least
+LETTER = 0.64  # width of a digit, of its size
+LINE = 90  # letters of a line above the panels
+LEAST_LETTERS = 4.5  # [pt] that can be read
 
 
 @dataclass(frozen=True)
@@ -56,43 +63,51 @@ def _shown(result: Ensemble) -> _Shown:
 def ensemble_map(result: Ensemble) -> Figure:
     """Amplitude, dominant frequency, shares of stick and of separation over the numbers that vary, and below over μ how
     many modes grow and the frequency of the fastest. Members without a ring in their amplitude are not steady; a
-    number at the frequency is that of the unstable mode that responds."""
+    number at the frequency is that of the unstable mode that responds, left out where cells are too small for it."""
     shown = _shown(result)
     pages = shown.branches if len(shown.names) == 2 else ("",)
     modal = result.modal is not None
     rows = 2 * len(pages) + modal
     figure = new_figure(0.5 + 2.3 * rows)
     panels = figure.subplots(rows, 2, squeeze=False)
-    figure.suptitle(f"{result.observable}, {_window(result)}" + (f"; {shown.fixed}" if shown.fixed else ""))
-    most = ", most of all contacts" if len(result.contact_names) > 1 else ""
     tables = (
         (result.rms, f"rms [{result.unit}]"), (result.frequency_hz / 1e3, "dominant frequency [kHz]"),
-        (result.stick.max(axis=1, initial=0.0), f"share of time in stick{most}"),
-        (result.separation.max(axis=1, initial=0.0), f"share of time in separation{most}"),
+        (result.stick.max(axis=1, initial=0.0), "share of time in stick"),
+        (result.separation.max(axis=1, initial=0.0), "share of time in separation"),
     )  # fmt: skip
+    marks: list[str] = []
     for number, branch in enumerate(pages):
         for k, (table, label) in enumerate(tables):
             ax = panels[2 * number + k // 2, k % 2]
+            # Above, not along the side: there it is longer than its panel, and runs into the one beside it.
+            ax.set_title(f"{label}, {branch}" if branch else label)
             if len(shown.names) == 2:
-                _map(figure, ax, shown, number, table, f"{label}, {branch}" if branch else label, share=k > 1)
+                _map(figure, ax, shown, number, table, share=k > 1)
             else:
-                _lines(ax, shown, table, label, share=k > 1)
-            if k == 0:
-                _rings(ax, shown, number)
-            if k == 1:
-                _numbers(ax, shown, number)
+                _lines(ax, shown, table, share=k > 1)
+            if k < 2:
+                marks.append((_rings, _numbers)[k](ax, shown, number))
     if modal:
         _modal(panels[-1, 0], panels[-1, 1], result)
+    _headed(figure, shown, marks)
     return figure
+
+
+def _headed(figure: Figure, shown: _Shown, marks: Sequence[str]) -> None:
+    """What is looked at, what is at its first value, and what the marks mean."""
+    result = shown.result
+    head = f"{result.observable}, {_window(result)}" + (f"; {shown.fixed}" if shown.fixed else "")
+    told = [words for words in dict.fromkeys(marks) if words]
+    if len(result.contact_names) > 1:
+        told.append("shares: the largest of all contacts")
+    figure.suptitle("\n".join([head, *textwrap.wrap("; ".join(told), LINE)]), fontsize=10)
 
 
 def _window(result: Ensemble) -> str:
     return f"{1e3 * result.window[0]:.4g} … {1e3 * result.window[1]:.4g} ms"
 
 
-def _map(
-    figure: Figure, ax: Axes, shown: _Shown, branch: int, table: Array, label: str, *, share: bool
-) -> None:  # fmt: skip
+def _map(figure: Figure, ax: Axes, shown: _Shown, branch: int, table: Array, *, share: bool) -> None:
     """Colours over two numbers, a cell for each member."""
     values = np.ma.masked_invalid(shown.of(table)[branch].T)
     ax.set_facecolor("#E6E6E6")
@@ -102,7 +117,7 @@ def _map(
     mesh = ax.pcolormesh(_edges(x[order[0]]), _edges(y[order[1]]), values[np.ix_(order[1], order[0])], cmap="viridis")
     if share:
         mesh.set_clim(0.0, 1.0)
-    figure.colorbar(mesh, ax=ax, label=label)
+    figure.colorbar(mesh, ax=ax)
     ax.set(xlabel=NAMES[shown.names[0]], ylabel=NAMES[shown.names[1]])
 
 
@@ -112,19 +127,23 @@ def _edges(values: Array) -> Array:
     return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
 
 
-def _lines(ax: Axes, shown: _Shown, table: Array, label: str, *, share: bool) -> None:
+def _lines(ax: Axes, shown: _Shown, table: Array, *, share: bool) -> None:
     """A line for each branch over one number."""
     for k, branch in enumerate(shown.branches):
         values, order = shown.of(table)[k], np.argsort(shown.values[0])
         colour, mark = COLOURS[k], MARKS[branch]
         ax.plot(shown.values[0][order], values[order], mark + "-", color=colour, ms=4, label=branch or None)
-    ax.set(xlabel=NAMES.get(shown.names[0], shown.names[0]), ylabel=label)
+    ax.set_xlabel(NAMES.get(shown.names[0], shown.names[0]))
+    # Room for a number above the largest value, and for one below the least.
+    ax.margins(x=0.07)
     if share:
         ax.set_ylim(-0.03, 1.03)
     else:
-        ax.set_ylim(bottom=0.0)
+        values = shown.of(table)
+        largest = float(np.max(values[np.isfinite(values)], initial=0.0)) or 1.0
+        ax.set_ylim((-0.03 if len(shown.branches) == 1 else -0.12) * largest, 1.2 * largest)
     if len(shown.branches) > 1:
-        ax.legend()
+        ax.legend(framealpha=0.7)
 
 
 def _at(shown: _Shown, where: tuple[int, ...], table: Array) -> tuple[float, float]:
@@ -133,33 +152,54 @@ def _at(shown: _Shown, where: tuple[int, ...], table: Array) -> tuple[float, flo
     return x, float(shown.values[1][where[1]]) if len(where) == 2 else float(table)
 
 
-def _rings(ax: Axes, shown: _Shown, page: int) -> None:
-    """A ring about each member that is steady."""
+def _room(ax: Axes, shown: _Shown) -> float:
+    """How much of a panel [pt] each member has, in the direction in which it has least."""
+    spec = ax.get_subplotspec()
+    assert spec is not None, "panels are made in rows and columns"
+    rows, columns = spec.get_gridspec().get_geometry()
+    sizes = PANEL * 72 * root_figure(ax).get_size_inches() / np.array([columns, rows])
+    return min(float(size) / len(values) for size, values in zip(sizes, shown.values, strict=False))
+
+
+def _rings(ax: Axes, shown: _Shown, page: int) -> str:
+    """A ring about each member that is steady, no larger than its cell; what it means, "" where there is none."""
     two = len(shown.names) == 2
+    size, words = min(9.0, max(0.6 * _room(ax, shown), 0.0 if two else 6.0)), ""
     for branch in [page] if two else range(len(shown.branches)):
         for where in np.ndindex(shown.members[branch].shape):
             k = int(shown.members[branch][where])
             if shown.result.regime[k] == "steady":
                 x, y = _at(shown, where, shown.result.rms[k])
-                (ring,) = ax.plot(x, y, "o", mfc="none", mec="white" if two else INK, ms=9, mew=1.2)
-                ring.set_path_effects(_OUTLINED if two else [])
-    ax.set_title("ring: steady", color=GREY, fontsize=8, fontweight="normal")
+                edge = 1.2 * size / 9.0
+                (ring,) = ax.plot(x, y, "o", mfc="none", mec="white" if two else INK, ms=size, mew=edge)
+                ring.set_path_effects([Stroke(linewidth=2.2 * edge, foreground=INK), Normal()] if two else [])
+                words = "ring: steady"
+    return words
 
 
-def _numbers(ax: Axes, shown: _Shown, page: int) -> None:
-    """The number of the mode that responds."""
+def _numbers(ax: Axes, shown: _Shown, page: int) -> str:
+    """The number of the mode that responds, where there is room for it; what it means, "" where there is none."""
     two = len(shown.names) == 2
+    modes = shown.result.mode
+    if not modes.any():
+        return ""
+    size = min(8.0, _room(ax, shown) / (LETTER * len(str(int(modes.max()))) + 0.4))
+    if size < LEAST_LETTERS:
+        return "no room for the numbers of the modes that respond: see the table"
     for branch in [page] if two else range(len(shown.branches)):
         for where in np.ndindex(shown.members[branch].shape):
             k = int(shown.members[branch][where])
-            if shown.result.mode[k]:
+            if modes[k]:
                 at = _at(shown, where, shown.result.frequency_hz[k] / 1e3)
-                text = ax.annotate(str(shown.result.mode[k]), at, fontsize=8, color="white" if two else INK)
-                text.set_horizontalalignment("center" if two else "left")
-                text.set_verticalalignment("center" if two else "bottom")
-                text.set_path_effects(_OUTLINED if two else [])
-    if shown.result.modal is not None:
-        ax.set_title("number: unstable mode within 5 %", color=GREY, fontsize=8, fontweight="normal")
+                # Over one number away from the other branch.
+                others = shown.of(shown.result.frequency_hz)[:, where[0]] if not two else []
+                below = not two and bool(shown.result.frequency_hz[k] < np.nanmax(others))
+                offset = (0, 0) if two else (0, -5 if below else 5)
+                text = ax.annotate(str(modes[k]), at, offset, textcoords="offset points", ha="center", fontsize=size)
+                text.set_color("white" if two else COLOURS[branch])
+                text.set_verticalalignment("center" if two else "top" if below else "bottom")
+                text.set_path_effects(_OUTLINED if two else _HALO)
+    return "number: unstable mode within 5 % of the frequency"
 
 
 def _modal(left: Axes, right: Axes, result: Ensemble) -> None:
@@ -171,10 +211,12 @@ def _modal(left: Axes, right: Axes, result: Ensemble) -> None:
         colour = COLOURS[j % len(COLOURS)]
         left.plot(modal.mu, modal.unstable[:, j], "o-", color=colour, ms=4, label=label, drawstyle="steps-mid")
         right.plot(modal.mu, modal.frequency_hz[:, j] / 1e3, "o", color=colour, ms=4, label=label)
-    left.set(xlabel=NAMES["mu"], ylabel="modes that grow")
+    left.set_title("modes that grow")
+    left.set_xlabel(NAMES["mu"])
     left.set_ylim(bottom=-0.1)
     left.yaxis.set_major_locator(MaxNLocator(integer=True))
-    right.set(xlabel=NAMES["mu"], ylabel="the fastest of them [kHz]")
+    right.set_title("frequency of the fastest of them [kHz]")
+    right.set_xlabel(NAMES["mu"])
     right.set(xlim=left.get_xlim(), ylim=(0.0, right.get_ylim()[1]))
     if len(modal.speed) > 1:
         left.legend()
