@@ -107,7 +107,8 @@ class BackwardError:
         )
         error, scale = out[0] + 1j * out[1], out[2]
         if not self.coupling.contacts:
-            return np.abs(error).max(axis=0) / scale.max(axis=0)
+            # A motion as a whole at λ = 0 is answered by no force at all: exact.
+            return np.abs(error).max(axis=0) / np.maximum(scale.max(axis=0), np.finfo(float).tiny)
         coupling, friction = self.coupling, self.coupling.sense[:, None] * mu
         touched = self._touched
         near, near_size = u[touched], size[touched]
@@ -127,7 +128,8 @@ class BackwardError:
         most = np.array([near_size[own].max(axis=0, initial=0.0) for own in self._own])
         reach = self._length[:, None] * most + coupling.compliance[:, None] * np.abs(force)
         contact = (closure / np.maximum(reach, 1e-300)).max(axis=0)
-        return np.maximum(np.abs(error).max(axis=0) / scale.max(axis=0), contact)
+        largest = np.maximum(scale.max(axis=0), np.finfo(float).tiny)
+        return np.maximum(np.abs(error).max(axis=0) / largest, contact)
 
     def _forces(self, gap: ComplexArray, error: ComplexArray, friction: Array, left: bool) -> ComplexArray:
         """−K_c times the gap; where the contact is rigid, the force that fits the equations best."""

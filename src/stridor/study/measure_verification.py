@@ -16,7 +16,7 @@ from ..typing import ComplexArray
 from .contact_edges import edge_rows
 from .measure_ranking import Ranking, drawn_bodies
 from .measures import Measure, Verified, growth
-from .sensitivities import Linearised, number_at
+from .sensitivities import Linearised
 
 
 def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequency_hz: float | None) -> Measure:
@@ -26,7 +26,9 @@ def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequenc
     lowest = None if max_frequency_hz is not None else linear.case.modal.modes if count is None else count
     # Which modes are the lowest at μ = 0 matters where not all are looked at.
     numbered = lowest is not None and lowest <= len(linear.modes.branch)
-    modes = _solved(_changed(linear, measure), linear, band, 0.0 if numbered else linear.mu)
+    system = _changed(linear, measure)
+    mu = linear.friction(system)
+    modes = _solved(system, linear, mu, band, 0.0 if numbered else mu)
     if lowest is not None:
         modes = modes.lowest(lowest)
     modes = modes.chosen(np.flatnonzero(modes.in_band[0]))
@@ -50,21 +52,21 @@ def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequenc
     return replace(measure, verified=result)
 
 
-def _solved(system: System, linear: Linearised, band: float, numbered_at: float) -> ComplexModes:
+def _solved(system: System, linear: Linearised, mu: float, band: float, numbered_at: float) -> ComplexModes:
     """The modes of the band of a changed system, and what was checked of them."""
     damped, options = linear.damped, linear.options
     if options.source is None and system.symmetric_definite:
         # Sparse matrices for small systems too: a mass at one node leaves their complete basis no proportional damping.
         with suppress(Unfit):
             krylov = replace(options, source="krylov")
-            return modes_of_band(system, linear.mu, band, damped=damped, options=krylov, numbered_at=numbered_at)
-    return modes_of_band(system, linear.mu, band, damped=damped, options=options, numbered_at=numbered_at)
+            return modes_of_band(system, mu, band, damped=damped, options=krylov, numbered_at=numbered_at)
+    return modes_of_band(system, mu, band, damped=damped, options=options, numbered_at=numbered_at)
 
 
 def _changed(linear: Linearised, measure: Measure) -> System:
     """The system with the change made."""
     if measure.kind == "number":
-        value = number_at(linear.case, measure.name) if measure.name != "mu" else linear.mu
+        value = linear.value(measure.name)
         factor = 1 + 0.01 * measure.direction * measure.percent
         return linear.varied(measure.name, factor * value)
     if measure.kind == "added mass":

@@ -30,7 +30,7 @@ from .analyses import modes as modes_at
 from .asked import names_of, require_band
 from .provenance import provenance
 from .sensitivity_result import Sensitivities
-from .workspace import Problem, Workspace
+from .workspace import Problem, Workspace, friction_in_sliding
 
 NEAR = 0.05  # relative change of a number within which an exceptional point is told of
 BENT = 2.0  # condition number from which two close modes are on their way to an exceptional point
@@ -65,9 +65,10 @@ def sensitivities(
     steps: by how much a number is changed to see what the matrices do, where a thousandth of it will not do.
 
     The touching nodes and the directions of sliding stay as they are at the case itself: what a number does by opening
-    or closing contact is not in the derivative. Raises CaseError for paths that lead to no number and for "mu" where
-    nothing depends on it, AnalysisError where steady sliding does not exist. A mode without derivatives is left out,
-    and a warning says so.
+    or closing contact is not in the derivative. Numbers of friction laws and speeds change the coefficient, too, where
+    mu is the case's own; another mu is held, and a warning says so. Raises CaseError for paths that lead to no number
+    and for "mu" where nothing depends on it, AnalysisError where steady sliding does not exist. A mode without
+    derivatives is left out, and a warning says so.
     """
     started, parameters = time.perf_counter(), names_of(parameters)
     work = Workspace.of(problem)
@@ -169,6 +170,10 @@ class Linearised:
         doubtful = doubt(modes.completeness[0]) if modes.completeness else ""
         self.warnings: list[str] = [f"modes at μ = {mu:g}: {doubtful}"] if doubtful else []
         self._solved: dict[int, Mode | None] = {}
+        # At the case's own friction a number of its laws, or what slides faster, changes that friction, too.
+        self.by_law = any(c.friction.law != "coulomb" for c in self.case.contacts.values())
+        own = work.own_friction if self.by_law else None
+        self.follows_law = own is not None and bool(np.isclose(mu, own, 1e-9, 0.0))
         # What systems in which one number is another have in common.
         self._bodies, self._factors = KnownBodies(), Nearby()
 
@@ -194,7 +199,7 @@ class Linearised:
     def value(self, path: str) -> float:
         """The number at a path. Raises CaseError where there is none."""
         contact = _contact_of(self.case, path)
-        if path in _FRICTION or (contact and path.endswith(".friction.coefficient")):
+        if path in _FRICTION or (contact and self._is_friction(path)):
             return self.mu
         if contact and path.endswith(".compliance"):
             stiffness = self.case.contacts[contact].stiffness
@@ -209,19 +214,40 @@ class Linearised:
         contact = _contact_of(self.case, path)
         if path in _FRICTION:
             return self._by_friction(path)
-        if contact and path.endswith(".friction.coefficient"):
+        if contact and self._is_friction(path):
             return by_friction(self.system, self.mu, self.held, self.options, contact=contact)
         if contact and path.endswith(".compliance"):
             return by_compliance(self.system, self.held, contact)
 
+        moved: list[float | None] = []
+
         def at(value: float) -> Pencil:
-            return pencil_of(self.varied(path, value), self.mu, self.held, self.options)
+            system = self.varied(path, value)
+            if self.by_law and not self.follows_law:
+                moved.append(friction_in_sliding(system))
+            return pencil_of(system, self.friction(system), self.held, self.options)
 
         try:
-            return rate_of(at, self.value(path), step, base=self.pencil)[0]
+            found = rate_of(at, self.value(path), step, base=self.pencil)[0]
         except CaseError as error:
             accepted = f"a number that can be varied a little ({error.problems[0].accepted})"
             raise CaseError(path, self.value(path), accepted) from error
+        if len(set(moved)) > 1:
+            self.warnings.append(
+                f"{path}: friction is held at μ = {self.mu:g}, as asked for; what it does to the coefficient of the "
+                "law is not in the derivative (it is at the case's own friction, without --mu)"
+            )
+        return found
+
+    def _is_friction(self, path: str) -> bool:
+        """Whether a number of a contact is its friction coefficient: of a law of speed it is but one of its numbers."""
+        return path.endswith(".friction.coefficient") and not self.follows_law
+
+    def friction(self, system: System) -> float:
+        """The friction coefficient of this case with another number in it: what its laws give where this one's is that
+        of its laws, else the one asked for."""
+        own = friction_in_sliding(system) if self.follows_law else None
+        return self.mu if own is None else own
 
     def varied(self, path: str, value: float) -> System:
         """The system with another number at a path, with or without damping as this one. Raises CaseError."""

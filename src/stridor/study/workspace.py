@@ -156,14 +156,7 @@ class Workspace(Shown):
             return self._case.parameters[MU].value
         if not self.has_contacts:
             return 0.0
-        nodes = self.system().contact_nodes()
-        speeds = np.linalg.norm(nodes.slip_velocity(full_motion(self.system())), axis=1)
-        # The centre of a turning surface slides at no speed and has no say.
-        moving = speeds > 1e-9 * speeds.max(initial=0.0)
-        found = nodes.friction_coefficients(speeds)[moving] if moving.any() else nodes.friction_coefficients(speeds)
-        if not len(found):
-            return 0.0
-        return float(found[0]) if np.ptp(found) <= 1e-12 * np.max(np.abs(found)) else None
+        return friction_in_sliding(self.system())
 
     def one_friction(self) -> float:
         """The same; raises CaseError where contacts differ."""
@@ -225,3 +218,15 @@ class Unsaved(Workspace):
     def text(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Nothing."""
         return ""
+
+
+def friction_in_sliding(system: System) -> float | None:
+    """The coefficient of all contacts of a system at their slip speeds in steady sliding; None where they differ."""
+    nodes = system.contact_nodes()
+    speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
+    # The centre of a turning surface slides at no speed and has no say.
+    moving = speeds > 1e-9 * speeds.max(initial=0.0)
+    found = nodes.friction_coefficients(speeds)[moving] if moving.any() else nodes.friction_coefficients(speeds)
+    if not len(found):
+        return 0.0
+    return float(found[0]) if np.ptp(found) <= 1e-12 * np.max(np.abs(found)) else None

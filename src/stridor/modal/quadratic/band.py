@@ -36,8 +36,7 @@ def band_modes(
     `find_modes` cuts an endless region off at the size of its frequencies, which holds all where stiffness is positive.
     A negative one lets motions diverge at any rate, at frequency zero and so in every band. stands: whether the problem
     at the least friction diverges at no more than a rate [1/s] (`is_stiff`); where it may, or where a negative damping,
-    such as that of falling friction, may drive it faster, rates up to 64 times 2π max_hz are searched too, with one more
-    factorisation for each factor of eight. Small problems are solved whole.
+    XX for each factor of eight. Small problems are solved whole.
     What was not searched the completeness says.
     """
     found = find_modes(problem, Region.band(0.0, max_hz, above=above), left=left, solver=solver)

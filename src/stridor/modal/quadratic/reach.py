@@ -39,15 +39,17 @@ def fastest(problem: Quadratic) -> float:
     if not len(moving) or np.any(diagonal < 0.0):
         return np.inf
     unit = sp.diags_array(1.0 / np.sqrt(diagonal[moving]))
-    mass, damping, stiffness = (
-        sp.csr_array(unit @ sp.csr_array(matrix)[moving][:, moving] @ unit)
-        for matrix in (problem.mass, problem.damping, problem.stiffness)
-    )
-    least = _least(mass)
-    if not least >= LEAST:
-        return np.inf
-    rate, square = _norm(damping) / least, _norm(stiffness) / least
-    return float(rate + np.sqrt(rate**2 + 4 * square)) / 2
+    with np.errstate(over="ignore", invalid="ignore"):  # next to no mass: what it carries is as fast as anything
+        mass, damping, stiffness = (
+            sp.csr_array(unit @ sp.csr_array(matrix)[moving][:, moving] @ unit)
+            for matrix in (problem.mass, problem.damping, problem.stiffness)
+        )
+        least = _least(mass)
+        if not least >= LEAST:
+            return np.inf
+        rate, square = _norm(damping) / least, _norm(stiffness) / least
+        bound = float(rate + np.sqrt(rate**2 + 4 * square)) / 2
+    return bound if np.isfinite(bound) else np.inf
 
 
 def _least(mass: Sparse) -> float:

@@ -1,0 +1,111 @@
+"""Numbers of falling friction laws and speeds: derivatives, counter-measures and what is said of fast divergence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_sensitivities import MINIMAL
+
+from benches import paper_case
+from matrix_cases import matrix_case
+from stridor.case import Case, loads
+from stridor.study.analyses import modes, onsets
+from stridor.study.countermeasures import rank_countermeasures
+from stridor.study.sensitivities import sensitivities
+
+pytestmark = pytest.mark.verification
+
+LAW = {"law": "weakening", "coefficient": 0.1, "static_coefficient": 0.3, "decay_speed": 0.02}
+SMALL = {"bodies.beam1.elements": 6, "bodies.beam2.elements": 18, "contacts.A.friction": LAW}
+
+
+@pytest.fixture(scope="module")
+def falling():
+    return paper_case().with_(SMALL)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "contacts.A.friction.decay_speed",
+        "contacts.A.friction.static_coefficient",
+        "contacts.A.friction.coefficient",
+        "supports.clamp.velocity.x",
+        "materials.steel.density",
+    ],
+)
+def test_what_changes_the_coefficient_of_a_law_does_so_in_the_derivative(falling, path: str):
+    found = sensitivities(falling, path)
+    assert len(found.branch) > 3
+    value, step = float(found.values[0]), 1e-4
+    above, below = (modes(falling.with_({path: value * (1 + sign * step)})) for sign in (1, -1))
+    for lam, derivative in zip(found.eigenvalues, found.derivative[0], strict=True):
+        high, low = (e[np.nanargmin(np.abs(e - lam))] for e in (above.eigenvalues[0], below.eigenvalues[0]))
+        assert derivative * value == pytest.approx((high - low) / (2 * step), rel=2e-4, abs=1e-5 * abs(lam))
+    assert not any("held" in line for line in found.warnings)
+
+
+def test_a_friction_that_was_asked_for_is_held_and_told(falling):
+    found = sensitivities(falling, ["contacts.A.friction.decay_speed", "materials.steel.density"], mu=0.12)
+    held = [line for line in found.warnings if "friction is held at μ = 0.12" in line]
+    assert len(held) == 1
+    assert held[0].startswith("contacts.A.friction.decay_speed")
+
+
+def test_a_changed_law_is_solved_again_with_its_own_friction(falling):
+    path = "contacts.A.friction.decay_speed"
+    found = rank_countermeasures(falling, numbers=[path], added_mass=False, chamfers=0, verify=1)
+    (measure,) = found.measures
+    changed = falling.with_({path: 0.02 * (1 + 0.01 * measure.direction * measure.percent)})
+    again = modes(changed)
+    growing = again.eigenvalues[0][again.unstable[0] & again.in_band[0]].real.sum()
+    before = modes(falling)
+    had = before.eigenvalues[0][before.unstable[0] & before.in_band[0]].real.sum()
+    assert measure.verified.removed == pytest.approx(had - growing, rel=1e-6, abs=1e-6 * had)
+
+
+def test_modes_that_diverge_faster_than_the_band_are_sought_there_too(falling):
+    """Falling friction of a light node drives a motion faster than anything oscillates in the band."""
+    found = modes(falling)
+    fastest = found.growth_rate[0].max()
+    assert fastest > 2 * np.pi * falling.modal.max_frequency_hz
+    (said,) = found.completeness
+    assert said.startswith("Checked: 6 modes grow, 2 of them without oscillating")
+
+
+def test_unstable_modes_that_are_all_repeated_rank_nothing_and_say_so():
+    """Two equal sliders beside each other: every mode is double, and derivatives belong to neither of two."""
+    one = loads(MINIMAL)
+    twin = one.model_dump(mode="json", exclude_none=True)
+    for table, name in (("bodies", "m"), ("loads", "weight"), ("contacts", "rub")):
+        twin[table] |= {f"{name}2": dict(twin[table][name])}
+    for table in ("springs", "dashpots"):
+        twin[table] |= {
+            f"{name}2": spring | {"between": ["m2", "ground"]} for name, spring in list(twin[table].items())
+        }
+    twin["bodies"]["m2"]["position"] = [5.0, 0.0]
+    twin["loads"]["weight2"]["at"] = twin["contacts"]["rub2"]["slave"] = "m2"
+    case = Case.model_validate(twin)
+    found = rank_countermeasures(case, mu=0.9)
+    assert not found.measures
+    assert found.warnings[-1].startswith("the unstable modes have no derivatives")
+    alone = rank_countermeasures(one, mu=0.9)
+    assert alone.measures
+
+
+def test_a_growing_pair_that_parts_on_the_real_axis_did_not_begin_above_the_band(tmp_path):
+    """λ² + (0.05 − 3μ)λ + 1: unstable from μ = 1/60 on, and two real roots from μ = 2.05/3 on."""
+    damping = 0.05 * np.eye(4)
+    falling, turning = np.diag([-3.0, 0.0, 0.0, 0.0]), np.zeros((4, 4))
+    turning[1, 2], turning[2, 1] = 3.0, -3.0
+    terms = [
+        (np.eye(4), "mass", ""),
+        (np.diag([1.0, 4.0, 9.0, 16.0]), "stiffness", ""),
+        (damping, "damping", ""),
+        (falling, "damping", "mu"),
+        (turning, "stiffness", "mu"),
+    ]
+    found = onsets(matrix_case(tmp_path, terms, 2.0))
+    assert found.complete
+    assert "above 2 Hz" not in found.completeness
+    assert "as the onsets say (a growing pair parted into two growing motions without oscillation)" in found.completeness
