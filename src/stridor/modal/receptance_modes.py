@@ -92,7 +92,10 @@ def modes_by_receptance(
         for row, m in enumerate(values):
             shapes[1][row, still] = _left_of_fixed(coupling, eigenvalues[0, still], constant, float(m)).T
     if vectors or residuals:
-        part = _pairs(spectrum, judge, eigenvalues[:, moving], values, shapes if vectors else None, moving)
+        try:
+            part = _pairs(spectrum, judge, eigenvalues[:, moving], values, shapes if vectors else None, moving)
+        except Unfit as error:
+            raise Unfit(str(error), max_frequency_hz or limit / (2 * np.pi)) from error
         eigenvalues[:, moving], residual[:, moving] = part
     else:
         residual[:, moving] = np.nan

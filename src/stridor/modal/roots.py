@@ -21,6 +21,7 @@ from .deflation import deflation
 from .receptance import Receptance, wanted_pairs
 from .shift_inverted import companion
 from .single_contact import NUDGE, SingleContact, polish_single
+from .unfit import Unfit
 
 CONVERGED = 1e-9  # of the step before last: convergence is at least quadratic
 MAX_STEPS = 40
@@ -108,6 +109,9 @@ class ReceptanceProblem:
 
 
 def _null_vectors(value: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    if not np.all(np.isfinite(value)):
+        # Without friction a mode that a law of speed sees and no normal force moves is a root on its own pole.
+        raise Unfit("a mode stays where contacts do not move it, and the receptance is infinite there")
     u, _, vh = np.linalg.svd(value)
     return u[:, :, -1].conj(), vh[:, -1, :].conj()
 

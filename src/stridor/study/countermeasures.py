@@ -11,7 +11,7 @@ import numpy as np
 from ..case import Case
 from ..case.bodies import BeamBody, SolidBody
 from ..case.matrix_checks import MU
-from ..errors import CaseError
+from ..errors import AnalysisError, CaseError
 from ..modal.krylov.steady import refuse_stick
 from ..system.imported import ImportedTerm, load_terms
 from .asked import names_of, require_count, require_frequency
@@ -94,17 +94,35 @@ def rank_countermeasures(
     helping = sorted((m for m in found if m.removed_per_percent > 0), key=lambda m: -m.removed_per_percent)
     told = [] if helping else [_none_helps(case, len(found), left)]
     told += [_left_out(left)] if left else []
-    checked = [verified(ranking, m, count, max_frequency_hz) for m in helping[:verify]]
+    checked, left_over, lost = _solved_again(ranking, helping, verify, count, max_frequency_hz)
+    told += lost
     return Countermeasures(
         linear.mu,
         target,
         linear.modes.branch[ranking.columns],
         ranking.eigenvalues,
-        tuple(checked + helping[verify:]),
+        (*checked, *left_over),
         margin,
         (*linear.warnings, *told),
         provenance(work, "countermeasures", time.perf_counter() - started, mu=linear.mu),
     )
+
+
+def _solved_again(
+    ranking: Ranking, helping: list[Measure], verify: int, count: int | None, max_frequency_hz: float | None
+) -> tuple[list[Measure], list[Measure], list[str]]:
+    """The first ``verify`` measures with which there is an answer, solved again; the others; sentences about those that
+    are left out because there is none."""
+    checked: list[Measure] = []
+    told: list[str] = []
+    rest = list(helping)
+    while rest and len(checked) < verify:
+        measure = rest.pop(0)
+        try:
+            checked.append(verified(ranking, measure, count, max_frequency_hz))
+        except (AnalysisError, CaseError) as error:
+            told.append(f"{measure.words}: left out, since with that change {error}")
+    return checked, rest, told
 
 
 def default_numbers(case: Case, left: Sequence[str]) -> list[str]:
