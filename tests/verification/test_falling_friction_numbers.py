@@ -9,6 +9,7 @@ from test_sensitivities import MINIMAL
 from benches import paper_case
 from matrix_cases import matrix_case
 from stridor.case import Case, loads
+from stridor.errors import AnalysisError
 from stridor.study.analyses import modes, onsets
 from stridor.study.countermeasures import rank_countermeasures
 from stridor.study.sensitivities import sensitivities
@@ -109,3 +110,44 @@ def test_a_growing_pair_that_parts_on_the_real_axis_did_not_begin_above_the_band
     assert found.complete
     assert "above 2 Hz" not in found.completeness
     assert "as the onsets say (a growing pair parted into two growing motions without oscillation)" in found.completeness
+
+
+def test_modes_without_friction_of_a_law_of_speed_are_those_of_constant_friction(falling):
+    """At μ = 0 nothing of the law is left; traction modes then stand on poles of the receptance that speeds see."""
+    plain = falling.with_({"contacts.A.friction": {"law": "coulomb", "coefficient": 0.1}})
+    found, expected = (modes(case, 0.0, damped=False) for case in (falling, plain))
+    np.testing.assert_allclose(found.frequency_hz[0], expected.frequency_hz[0], rtol=1e-9)
+    swept = modes(falling, [0.0, 0.1], damped=False)
+    np.testing.assert_allclose(swept.frequency_hz[0, :19], expected.frequency_hz[0], rtol=1e-9)
+
+
+def test_onsets_without_damping_of_the_structure_keep_the_slope_of_friction():
+    """A slider on falling friction, without a dashpot: it grows from no friction on."""
+    slider = loads(MINIMAL).model_dump(mode="json", exclude_none=True)
+    slider["contacts"]["rub"]["friction"] = LAW | {"static_coefficient": 0.15, "decay_speed": 1.0}
+    case = Case.model_validate(slider)
+    found = onsets(case, damped=False, friction_range=(0.0, 0.3))
+    assert found.complete
+    for mu in (0.05, 0.29):
+        grows = int(np.count_nonzero(modes(case, mu, damped=False).unstable[0]))
+        assert grows == sum(-1 if o.stabilising else 1 for o in found if o.mu < mu)
+        assert grows > 0
+
+
+def test_a_change_that_leaves_no_equilibrium_leaves_the_ranking_and_is_told(falling, monkeypatch):
+    from stridor.study import countermeasures as module
+
+    solve, refused = module.verified, []
+
+    def loose(ranking, measure, *rest):
+        if not refused:
+            refused.append(measure.words)
+            raise AnalysisError("steady sliding has no equilibrium")
+        return solve(ranking, measure, *rest)
+
+    monkeypatch.setattr(module, "verified", loose)
+    paths = ["materials.steel.density", "contacts.A.friction.decay_speed", "supports.clamp.velocity.x"]
+    found = rank_countermeasures(falling, numbers=paths, added_mass=False, chamfers=0, verify=1)
+    assert refused[0] not in [m.words for m in found.measures]
+    assert any(line.startswith(f"{refused[0]}: left out") for line in found.warnings)
+    assert found.measures[0].verified is not None

@@ -33,9 +33,9 @@ def _is_are(count: int, of: str) -> str:
     return f"{count or 'none'} of {of} {'are' if count > 1 else 'is'} unstable"
 
 
-def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True, onsets: bool = True) -> Conclusion:
+def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True, rubs: bool = True) -> Conclusion:
     """How many are unstable and which is the fastest; then its shape (the report, where the model has none to be
-    drawn), or where growth begins (the report, where nothing depends on friction). mu: as the user gave it."""
+    drawn), or where growth begins (the report, where nothing depends on friction: rubs). mu: as the user gave it."""
     from ..modal.growing import doubt
 
     growing = result.unstable & result.in_band
@@ -50,12 +50,13 @@ def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True, onsets
             first = float(result.mu[some].min())
             top = fastest(float(result.frequency_hz[row, b]), float(rate[row, b]))
             sentence += f", the lowest {first:g}; the fastest at μ = {result.mu[row]:g}: {top}"
-        return Conclusion(sentence + caution, "onsets" if onsets else "report")
+        return Conclusion(sentence + caution, "onsets" if rubs else "report")
     band = "" if result.max_frequency_hz is None else f" up to {result.max_frequency_hz:g} Hz"
     band = " from {:g} to {:g} Hz".format(*result.band_hz) if result.band_hz is not None else band
-    sentence = f"{_is_are(int(growing.sum()), f'{result.total[0]} modes{band}')} at μ = {result.mu[0]:g}"
+    sentence = _is_are(int(growing.sum()), f"{result.total[0]} modes{band}")
+    sentence += f" at μ = {result.mu[0]:g}" if rubs else ", and no friction coefficient of the case has a say in it"
     if not growing.any():
-        return Conclusion(sentence + caution, "onsets" if onsets else "report")
+        return Conclusion(sentence + caution, "onsets" if rubs else "report")
     b = int(rate[0].argmax())
     sentence += f"; the fastest {fastest(float(result.frequency_hz[0, b]), float(rate[0, b]))}"
     own = ("--mu", mu) if mu is not None else ()
@@ -72,7 +73,9 @@ def of_onsets(result: Onsets) -> Conclusion:
         return Conclusion(f"unstable from the start of the range, μ = {low:g}", "modes", ("--mu", f"{low:g}"))
     first = result.first
     if first is None:
-        return Conclusion(f"no onset {over}" + ("" if result.complete else ", but see above"), "modes")
+        ends = len(result)
+        what = "no onset" if not ends else f"growth only ends, {counted(ends, 'time')},"
+        return Conclusion(f"{what} {over}" + ("" if result.complete else ", but see above"), "modes")
     count = f"{len(result.onsets)} onsets" if len(result.onsets) > 1 else "1 onset"
     said = f"{count} {over}; growth begins at μ = {fixed(first.mu, 6)}, {readable(first.frequency_hz)} Hz"
     return Conclusion(said, "modes", ("--mu", f"{min(BEYOND * first.mu, high):.3g}"))

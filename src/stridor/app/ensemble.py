@@ -147,6 +147,9 @@ def _conclusion(result: Ensemble) -> Conclusion:
     if not np.isfinite(result.rms).any():
         return Conclusion(said)
     strongest = int(np.nanargmax(result.rms))
+    plain = result.load[strongest] == result.speed[strongest] == 1.0 and not result.sweep[strongest]
+    if not plain or np.ptp(result.perturbation) > 0.0:
+        return Conclusion(said)  # factors and sweeps are options of the ensemble alone
     own = () if np.isnan(result.mu[strongest]) else ("--mu", f"{result.mu[strongest]:.6g}")
     return Conclusion(said, "simulate", own)
 

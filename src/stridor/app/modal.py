@@ -133,7 +133,7 @@ def modes(
         call.document(result.to_json(sort=order, unstable=unstable))
     else:
         show_modes(result, sort=order, unstable=unstable, say=call.say)
-        call.conclude(of_modes(result, mu, drawn=work.has_places, onsets=work.rubs))
+        call.conclude(of_modes(result, mu, drawn=work.has_shapes, rubs=work.rubs))
     if result.interrupted:
         raise typer.Exit(INTERRUPTED)
 

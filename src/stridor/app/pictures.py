@@ -41,6 +41,9 @@ def write_shapes(
     work = Workspace.of(problem)
     system = work.system(mu)
     _require_places(system)
+    if not work.has_shapes:
+        raise CaseError("bodies", None, "point masses alone, which have no shape to draw; `stridor modes` and `stridor "
+                        "report` need none")
     modes = analyses.modes(work, mu, max_frequency_hz=work.modal.max_frequency_hz, vectors="right")
     if band_hz is not None and branches is None:
         modes = modes.between(*band_hz)

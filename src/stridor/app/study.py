@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,6 +17,8 @@ from .closing import Conclusion
 if TYPE_CHECKING:
     from ..studies.parts import Part
     from ..studies.result import StudyResult
+
+_ADDRESS = re.compile(r"(\w+://)?[^\s/]+:\d{1,5}/?")
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)]
 StoreFolder = Annotated[
@@ -50,6 +53,8 @@ def study(
         raise CaseError("--merge", None, f"goes without {given[0]}")
     if scheduler is not None and workers is not None:
         raise CaseError("--workers", workers, "goes without --scheduler, which has workers of its own")
+    if scheduler is not None and not _ADDRESS.fullmatch(scheduler):
+        raise CaseError("--scheduler", scheduler, "an address with a port, such as tcp://host:8786")
     one = None if part is None else Part.read(part)
     loaded = Study.load(call.path, call.set_ or [])
     call.warn_of(loaded.base())

@@ -283,7 +283,7 @@ def _told(call: Call, outcome: Outcome, work: Workspace) -> None:
             stdout.print(f"report: {outcome.report}")
         stdout.print(outcome.verdict)
         if not outcome.interrupted:
-            call.suggest("shapes" if work.has_places else "countermeasures")
+            call.suggest("shapes" if work.has_shapes else "countermeasures")
     if outcome.interrupted:
         raise typer.Exit(130)
 

@@ -36,6 +36,9 @@ def load(path: str | PathLike[str], overrides: Sequence[str] = ()) -> Case:
     except FileNotFoundError:
         raise CaseError(source, None, "no such file") from None
     except UnicodeDecodeError as error:
+        if source.endswith((".npz", ".nc", ".zarr")):
+            told = "no case file but a result; `stridor plot` draws what analyses wrote, `stridor reduce` takes models"
+            raise CaseError(source, None, told) from None
         raise CaseError(
             source, None, f"not UTF-8 text (byte {error.start}); save the file as UTF-8"
         ) from None

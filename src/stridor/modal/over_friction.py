@@ -196,13 +196,16 @@ def _solved_onsets(
             )  # fmt: skip
         if found.complete or held.size > WHOLE or options.source is not None:
             return found
-        try:
-            other = unfollowed(held, between, "")
-        except AnalysisError:
-            return found
-        return other if other.complete else found
+        for why in ("", None):  # counted, and followed in the full problem: many that begin at once are not counted
+            try:
+                other = unfollowed(held, between, why)
+            except AnalysisError:
+                continue
+            if other.complete:
+                return other
+        return found
 
-    def unfollowed(held: System, between: tuple[float, float], why: str) -> Onsets:
+    def unfollowed(held: System, between: tuple[float, float], why: str | None) -> Onsets:
         found = full_onsets(
             lambda _: held, between, max_frequency_hz=max_frequency_hz, damped=damped, options=options, unfollowed=why
         )

@@ -29,6 +29,7 @@ def problems_within(study: Study) -> list[Problem]:
         found += _of_values(path, varied)
         found += _of_sampling(study, path, varied)
     found += _of_samples(study)
+    found += _of_compared(study, case)
     found += _of_correlation(study)
     return found
 
@@ -133,6 +134,13 @@ def _of_samples(study: Study) -> Iterator[Problem]:
             yield Problem("goal", method, accepted)
         if study.compute != "modes":
             yield Problem("goal", study.compute, 'goes with compute = "modes": how likely a mode grows is its subject')
+
+
+def _of_compared(study: Study, case: Case) -> Iterator[Problem]:
+    mu = case.comparison.mu
+    if study.compute == "compare" and FRICTION not in study.parameters and mu is not None and len(mu) > 1:
+        accepted = "one friction coefficient, since a row is one comparison; or mu as a parameter of the study"
+        yield Problem("comparison.mu", list(mu), accepted)
 
 
 def _of_correlation(study: Study) -> Iterator[Problem]:

@@ -1,4 +1,4 @@
-"""Which parameters of a study change nothing of the model."""
+"""Which parameters of a study change nothing of the model, or nothing of what its modes follow from."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ import scipy.sparse as sp
 
 from ..case import Case
 from ..errors import StridorError
+from ..modal.full.family import deviation
+from ..modal.krylov.problem import problem_of
+from ..modal.quadratic import Quadratic
+from ..study.workspace import Unsaved
 from ..system import System, build_system
 from ..typing import Array
 from .checks import FRICTION
@@ -18,13 +22,15 @@ from .schema import Study
 
 SETTINGS = ("modal", "temporal", "comparison", "phases", "steady")  # change what is computed, not the model
 IN_TIME = ("simulate", "compare")
+SAME = 1e-12  # of the largest of a row and a column: matrices no further apart are the same
 _SKIPPED = {"answers", "of_matrices", "stress_stiffness", "line_rows"}
 
 
 def without_effect(study: Study, case: Case, samples: Array) -> list[str]:
     """Sentences about parameters that leave mass, damping, stiffness, contacts, loads and motions as they are, and so
-    every row. None where a model cannot be built: its rows say so."""
+    every row, or that leave the matrices of the modes so. None where a model cannot be built: its rows say so."""
     told: list[str] = []
+    friction = float(samples[0, list(study.parameters).index(FRICTION)]) if FRICTION in study.parameters else None
     for k, path in enumerate(study.parameters):
         table = path.split(".", 1)[0]
         values = np.unique(samples[:, k])
@@ -35,7 +41,39 @@ def without_effect(study: Study, case: Case, samples: Array) -> list[str]:
             continue
         if table in SETTINGS or _same_model(case, path, float(values[0]), float(values[-1])):
             told.append(f"{path} has no effect on {study.compute}: it changes nothing of the model")
+        elif study.compute in ("modes", "onsets") and _same_modes(study, case, path, values, friction):
+            told.append(f"{path} has no effect on {study.compute}: the matrices of the modes are the same all over it")
     return told
+
+
+def _same_modes(study: Study, case: Case, path: str, values: Array, friction: float | None) -> bool:
+    """Whether the matrices that modes follow from are the same at the least, a middle and the largest value."""
+    tried = [float(values[k]) for k in sorted({0, len(values) // 2, len(values) - 1})]
+    try:
+        first, *others = (_matrices(study, case.with_({path: value}), friction) for value in tried)
+    except StridorError:
+        return False
+    roles = ("mass", "damping", "stiffness")
+    return all(
+        getattr(one, role).shape == getattr(two, role).shape and deviation(getattr(one, role), getattr(two, role)) <= SAME
+        for other in others
+        for one, two in zip(first, other, strict=True)
+        for role in roles
+    )
+
+
+def _matrices(study: Study, case: Case, friction: float | None) -> list[Quadratic]:
+    """M, D, K with what contacts and friction add, at the friction coefficients that count."""
+    work = Unsaved(case)
+    mu = work.own_friction if friction is None else friction
+    low, high = case.modal.friction_range
+    at = [low, (low + high) / 2, high] if study.compute == "onsets" else [work.one_friction() if mu is None else mu]
+    found: list[Quadratic] = []
+    for one in at:
+        system = work.system(one)
+        system = system if case.modal.damped or not system.symmetric_definite else system.undamped()
+        found.append(problem_of(system, one, work.options).pencil(one).condensed())
+    return found
 
 
 def _idle(table: str, study: Study) -> bool:

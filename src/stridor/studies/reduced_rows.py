@@ -18,14 +18,14 @@ from ..errors import AnalysisError, CaseError
 from ..io.reduced_models import load_reduced, save_reduced
 from ..modal.full import onsets_along
 from ..modal.parametric import ReducedModel
-from ..modal.parametric.line import Numbered
+from ..modal.parametric.line import Numbered, matched_numbers
 from ..modal.tolerances import UNSTABLE_RELATIVE
 from ..notebook import counted
 from ..sliding.stretches import stretches
 from ..study.options import options_of
 from ..study.reduced import reduced_model
 from ..system import build_system
-from ..typing import Array
+from ..typing import Array, ComplexArray
 from .checks import FRICTION
 from .followed import anchors_noted, anchors_read, numbered
 from .rows import Row, modes_row, onsets_row
@@ -113,7 +113,16 @@ class FrictionModels:
             allowed = max(allowed, OF_ONSETS)
         agrees = off <= allowed and _same_counts(row, full, self.compute)
         told = {"estimated_error": row["estimated_error"], "difference": off, "confirmed": 1 if agrees else 2}
+        if self.compute == "modes":
+            # One numbering throughout: that of the branches of the models.
+            near = max(allowed, ROUNDING)
+            told["branch"] = matched_numbers(_eigenvalues(row), row["branch"], _eigenvalues(full), near)
         return full | told
+
+    @staticmethod
+    def outside(full: Row) -> Row:
+        """A row of the full problem where no model holds: numbers of its own would be others than those of the rest."""
+        return full | {"branch": np.zeros_like(full["branch"])} if "branch" in full else full
 
 
 def difference(row: Row, full: Row, compute: Compute) -> float:
@@ -127,12 +136,17 @@ def difference(row: Row, full: Row, compute: Compute) -> float:
         if len(one) != len(other):
             return float("inf")
         return float((np.abs(one - other) / np.maximum(np.abs(other), 1e-3)).max(initial=0.0))
-    ours, theirs = (r["growth_rate"] + 2j * np.pi * r["frequency_hz"] for r in (row, full))
+    ours, theirs = _eigenvalues(row), _eigenvalues(full)
     if not len(ours) or not len(theirs):
         return 0.0 if len(ours) == len(theirs) else float("inf")
     size = np.maximum(np.abs(theirs), max(SLOW * float(np.abs(theirs).max()), 1e-300))
     apart: Array = np.abs(theirs[:, None] - ours[None, :]).min(axis=1) / size
     return float(apart.max())
+
+
+def _eigenvalues(row: Row) -> ComplexArray:
+    """λ (k,) [1/s] of the modes kept in a row."""
+    return row["growth_rate"] + 2j * np.pi * row["frequency_hz"]
 
 
 def _same_counts(row: Row, full: Row, compute: Compute) -> bool:

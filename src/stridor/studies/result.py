@@ -95,10 +95,11 @@ class StudyResult(Tabular, Shown):
         raise AnalysisError(f"{self.compute} says nothing about modes that grow; compute modes or onsets")
 
     def probability(self, confidence: float = 0.95) -> Probability:
-        """How likely something grows. Raises AnalysisError for a grid, whose points are none of a distribution, and
-        where modes were not computed."""
+        """How likely something grows. Of the method "saltelli" the samples that are drawn by themselves count, not the
+        others, in which one number is exchanged. Raises AnalysisError for a grid, whose points are none of a
+        distribution, and where modes were not computed."""
         self._random("a probability")
-        return probability(self.unstable, confidence)
+        return probability(self.unstable[self._drawn[self.done]], confidence)
 
     def probability_in_bands(self, edges: Sequence[float] | None = None, confidence: float = 0.95) -> list[
         tuple[float, float, Probability]
@@ -112,8 +113,18 @@ class StudyResult(Tabular, Shown):
         low, high = (growing.min(), growing.max()) if growing.size else (0.0, 1.0)
         ends: list[float] = np.linspace(0.999 * low, 1.001 * high, BANDS + 1).tolist() if edges is None else [*edges]
         happened = in_bands(frequency, growth, ends)
+        happened = happened[self._drawn[self.done]]
         shares = [probability(happened[:, k], confidence) for k in range(happened.shape[1])]
         return [(ends[k], ends[k + 1], share) for k, share in enumerate(shares)]
+
+    @property
+    def _drawn(self) -> BoolArray:
+        """Which samples (n,) are drawn by themselves: of "saltelli" the first and the last of each p + 2."""
+        count = len(self.status)
+        if self.method != "saltelli":
+            return np.ones(count, dtype=bool)
+        place, size = self.data["number"].values % (len(self.parameters) + 2), len(self.parameters) + 2
+        return (place == 0) | (place == size - 1)
 
     @cached_property
     def _followed(self) -> bool:

@@ -219,7 +219,12 @@ _VARIABLES: dict[str, tuple[StoreColumn, ...]] = {
     "modes": (
         StoreColumn("frequency_hz", "f8", "Hz", "frequency Im λ / 2π", "mode"),
         StoreColumn("growth_rate", "f8", "1/s", "growth rate Re λ", "mode"),
-        StoreColumn("branch", "i8", "", "number of the mode by frequency at μ = 0; 0 where not followed", "mode"),
+        StoreColumn(
+            "branch", "i8", "",
+            "number of the mode by frequency at μ = 0, of the sample itself where all are solved in full, else in the "
+            "middle of the ranges, from where it was followed; 0 where it was not",
+            "mode",
+        ),
         StoreColumn("unstable_modes", "i8", "", "how many modes of the band grow"),
         StoreColumn("modes_of_band", "i8", "", "how many modes there are in the band, kept or not"),
         StoreColumn("largest_growth_rate", "f8", "1/s", "largest growth rate of the band"),

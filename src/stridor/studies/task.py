@@ -81,7 +81,7 @@ def _row(task: Task, case: Case, reduced: FrictionModels | None, values: Mapping
     started = time.perf_counter()
     row = reduced.row(values, task.keep)
     if row is None:
-        return full_row(case, task.compute, values, task.keep)
+        return reduced.outside(full_row(case, task.compute, values, task.keep))
     row["seconds"] = time.perf_counter() - started
     if confirm or reduced.doubtful(row):
         full = full_row(case, task.compute, values, task.keep)

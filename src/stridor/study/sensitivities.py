@@ -291,7 +291,7 @@ class Linearised:
         missing = [number for number in choice if number not in where]
         if missing or isinstance(choice, str):
             accepted = f'"unstable", "all" or numbers of branches from 1 to {len(where)}'
-            raise CaseError("modes", missing or choice, accepted)
+            raise CaseError("modes (--branch)", missing or choice, accepted)
         return [where[number] for number in choice]
 
     def gap(self, column: int) -> float:

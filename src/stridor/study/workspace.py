@@ -146,6 +146,12 @@ class Workspace(Shown):
         system = self.system()
         return bool(system.solids or system.lines)
 
+    @property
+    def has_shapes(self) -> bool:
+        """Whether there are beams or meshes whose shapes can be drawn: point masses have none."""
+        system = self.system()
+        return bool(system.lines) or any(solid.cells.keys() - {"vertex"} for solid in system.solids)
+
     @cached_property
     def own_friction(self) -> float | None:
         """The coefficient of all contacts at their slip speeds in steady sliding; None where they differ.

@@ -306,8 +306,8 @@ class SystemFamily(Family):
     """The quadratic problem of a system over μ in [low, high].
 
     system_at: the system at a μ, the same object where its matrices do not depend on μ. damped: with all of D, else
-    with its gyroscopic part alone. touching_at: μ of the steady sliding that says which nodes touch; None takes the
-    laws' own coefficients, with the matrices at ``own``.
+    with its gyroscopic part alone and what friction adds to it. touching_at: μ of the steady sliding that says which
+    nodes touch; None takes the laws' own coefficients, with the matrices at ``own``.
     """
 
     def __init__(
@@ -320,14 +320,14 @@ class SystemFamily(Family):
         own: float,
         touching_at: float | None = None,
     ) -> None:
-        super().__init__(between, lambda mu: self._damped(self._problem(mu).pencil(mu).condensed()), options)
+        super().__init__(between, lambda mu: self._problem(mu).pencil(mu).condensed(), options)
         self._whole_damping = damped
         self._system_at = system_at
         first = system_at(own)
         # Contacts alone depend on μ by themselves; nothing needs to be built again.
         self.varies = system_at(self.high if own != self.high else self.low) is not first
         grid = np.linspace(0.0, self.high, 50) if self.high > 0 else None
-        self.contacts = problem_of(first, touching_at, options, frictions=grid)
+        self.contacts = self._as_asked(problem_of(first, touching_at, options, frictions=grid))
 
     @property
     def freedoms(self) -> int:
@@ -360,28 +360,30 @@ class SystemFamily(Family):
         found = eliminate(self.contacts.normal[rigid], self.contacts.slide[rigid], friction)
 
         def make(mu: float) -> Quadratic:
-            whole = self._damped(self._problem(mu).pencil(mu).condensed(rigid=False))
+            whole = self._problem(mu).pencil(mu).condensed(rigid=False)
             tests = found.tests({MU: mu}).T
             return Quadratic(*(sp.csr_array(tests @ getattr(whole, role) @ found.motion) for role in ROLES))
 
         return Smooth((self.low, self.high), make), found
 
-    def _damped(self, found: Quadratic) -> Quadratic:
+    def _as_asked(self, problem: ContactProblem) -> ContactProblem:
+        """With all damping of the structure, or without. Gyroscopic forces do no work and are none of it; nor is what
+        friction adds, with a slope of its law or across the sliding."""
         if self._whole_damping:
-            return found
-        # Gyroscopic forces do no work and are no damping; what turning beams leaves of symmetry is none of either.
-        damping = found.damping
-        if deviation(damping, sp.csr_array(damping.T)) <= EXACT:
-            return replace(found, damping=sp.csr_array(damping.shape))
-        return replace(found, damping=sp.csr_array((damping - damping.T) / 2))
+            return problem
+        damping = problem.damping
+        if deviation(damping, sp.csr_array(damping.T)) <= EXACT:  # what turning beams leaves of symmetry is neither
+            return replace(problem, damping=sp.csr_array(damping.shape))
+        return replace(problem, damping=sp.csr_array((damping - damping.T) / 2))
 
     def _problem(self, mu: float) -> ContactProblem:
         if not self.varies:
             return self.contacts
         system = self._system_at(mu)
         if self.contacts.extras is None:
-            return replace(self.contacts, mass=system.mass, damping=system.damping, stiffness=system.stiffness)
-        found = problem_of(system, None, self.options)
+            own = replace(self.contacts, mass=system.mass, damping=system.damping, stiffness=system.stiffness)
+            return self._as_asked(own)
+        found = self._as_asked(problem_of(system, None, self.options))
         if not np.array_equal(found.touching, self.contacts.touching):
             raise AnalysisError("the nodes in contact change with mu, since matrices do; take a smaller range of mu")
         return found
