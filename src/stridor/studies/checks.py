@@ -138,7 +138,7 @@ def _of_samples(study: Study) -> Iterator[Problem]:
 
 def _of_compared(study: Study, case: Case) -> Iterator[Problem]:
     mu = case.comparison.mu
-    if study.compute == "compare" and FRICTION not in study.parameters and mu is not None and len(mu) > 1:
+    if study.compute == "compare" and FRICTION not in study.parameters and len(mu) > 1:
         accepted = "one friction coefficient, since a row is one comparison; or mu as a parameter of the study"
         yield Problem("comparison.mu", list(mu), accepted)
 

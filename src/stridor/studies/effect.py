@@ -54,12 +54,13 @@ def _same_modes(study: Study, case: Case, path: str, values: Array, friction: fl
     except StridorError:
         return False
     roles = ("mass", "damping", "stiffness")
-    return all(
-        getattr(one, role).shape == getattr(two, role).shape and deviation(getattr(one, role), getattr(two, role)) <= SAME
+    pairs = [
+        (getattr(one, role), getattr(two, role))
         for other in others
         for one, two in zip(first, other, strict=True)
         for role in roles
-    )
+    ]
+    return all(one.shape == two.shape and deviation(one, two) <= SAME for one, two in pairs)
 
 
 def _matrices(study: Study, case: Case, friction: float | None) -> list[Quadratic]:

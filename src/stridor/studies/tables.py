@@ -29,7 +29,9 @@ class Varied(Table):
         default=None, description="a list of numbers, each of them a point of the grid"
     )
     range: tuple[Number, Number] | None = Field(default=None, description="[low, high] with low < high")
-    points: Samples | None = Field(default=None, description="how many points of a grid the range has, a whole number from 1 on")
+    points: Samples | None = Field(
+        default=None, description="how many points of a grid the range has, a whole number from 1 on"
+    )
     spacing: Literal["linear", "logarithmic"] = Field(
         default="linear", description='"linear" or "logarithmic", of the points of a range'
     )
@@ -48,7 +50,9 @@ class Sampling(Table):
     method: Method = Field(
         default="grid", description='"grid", "random", "latin-hypercube", "sobol" or "saltelli"'
     )
-    samples: Samples | None = Field(default=None, description="how many, a whole number from 1 to 10 million; a grid has its own")
+    samples: Samples | None = Field(
+        default=None, description="how many, a whole number from 1 to 10 million; a grid has its own"
+    )
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**32)] = Field(
         default=0, description="a whole number ≥ 0: the same seed gives the same samples"
     )
@@ -66,7 +70,9 @@ class Correlation(Table):
 class Keep(Table):
     """How much of a row is kept."""
 
-    modes: Few = Field(default=40, description="how many modes of a row are kept, 1 to 1000: unstable ones first, then the lowest")
+    modes: Few = Field(
+        default=40, description="how many modes of a row are kept, 1 to 1000: unstable ones first, then the lowest"
+    )
     onsets: Few = Field(default=8, description="how many onsets of a row are kept, 1 to 1000: the lowest")
 
 

@@ -61,7 +61,7 @@ def driven(problem: Quadratic, rate: float, solver: str | None = None) -> bool:
     moving = np.flatnonzero(problem.mass.diagonal() > 0.0)
     part = sp.csr_array(0.5 * rate * problem.mass + problem.damping)[moving][:, moving]
     try:
-        return negative_eigenvalues(sp.csr_array(0.5 * (part + part.T)), solver=solver) > 0
+        return negative_eigenvalues(sp.csr_array(0.5 * (part + part.T)), solver=solver) != 0
     except AnalysisError:
         return True
 
