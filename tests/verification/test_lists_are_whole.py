@@ -107,6 +107,6 @@ def test_verdicts_on_nondimensional_models_can_be_read():
     here = 1e-3 + 1.0j
     sentence = judge(0.1, True, here, perturbation(1.01e-3 + 1.0j), 0.0, 0.01)[1]
     assert sentence == "μ = 0.1: both unstable at 0.15915 Hz, growth 0.001000 against 0.001010 1/s (1 %)"
-    assert likeness("a", 0.159155, 0.9) == "a; the full run answers at 0.1592 Hz in its shape"
+    assert likeness("a", 0.159155, 0.9, unstable=True) == "a; the full run answers at 0.1592 Hz in its shape"
     bench = judge(0.1, True, 637.84 + 54324.6j, perturbation(637.1 + 54324.6j), 0.0, 0.0012)[1]
     assert bench == "μ = 0.1: both unstable at 8646.0 Hz, growth 637.8 against 637.1 1/s (0.12 %)"

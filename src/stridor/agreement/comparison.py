@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..digits import readable
 from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.growing import doubt
@@ -24,18 +25,20 @@ from ..temporal.signals import Components, Growth, growth, low_passed, spectrum
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..threads import one_thread
-from ..typing import Array, IntArray
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .critical import compare_critical
 from .kept import PartStore, Plain, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
-from .perturbation import modes_as_in_time, perturb
+from .perturbation import modes_as_in_time, perturb, perturbation_step
 from .result import Agreement, Comparison, Critical, judge, likeness, overall
 from .settled import SettledVelocity, settled, settled_of
-from .shapes import by_body, modal_assurance, mode_shape
+from .shapes import by_body, mode_shape, span_assurance
 from .small_motion import Perturbation, whole
 
 T = TypeVar("T")
 PARTS = ("growth", "run", "critical")
 LEAST_PERIODS = 4.0  # of the dominant line, over which growth is fitted
+TOGETHER = 1e-4  # of |λ|: modes that no signal in time tells apart
+HALVED = 0.5  # of a difference: what half the step may leave of it where it comes of the step
 NEAR = 0.05  # of the frequency: within it an unstable mode responds
 
 
@@ -183,7 +186,7 @@ class _At:
                     return replace(found, verdict=f"{found.verdict}; no full run: {error}")
             answered = self._answer(mu, run, self._modes(mu) if modes is None else modes)
             self._keep("run", mu, _run_data(answered))
-        verdict = likeness(found.verdict, answered.dominant, answered.mac)
+        verdict = likeness(found.verdict, answered.dominant, answered.mac, unstable=bool(found.unstable_hz))
         return replace(
             found,
             dominant_frequency_hz=answered.dominant,
@@ -200,12 +203,12 @@ class _At:
 
     def _growth(self, mu: float, modes: ComplexModes) -> Comparison:
         unstable = _unstable(modes, self.limit)
+        own = modes if self.settings.system(self.system) is self.system else None
         diverges = bool(np.any(modes.eigenvalues[0][unstable].imag == 0.0))
         if diverges:
             # Nothing vibrates about what runs away: a march tells no rate to hold against the mode's.
             perturbation = Perturbation(mu, 0j, np.zeros(0), 1.0, Components(np.zeros(0, dtype=complex), np.zeros(0)))
         else:
-            own = modes if self.settings.system(self.system) is self.system else None
             perturbation = perturb(
                 self.system, mu, settings=self.settings, max_frequency_hz=self.limit, modes=own, shape=True
             )
@@ -218,9 +221,12 @@ class _At:
         frequency = abs(perturbation.eigenvalue.imag - here.imag) / max(abs(here.imag), 1e-300)
         rate = abs(perturbation.eigenvalue.real - here.real) / max(abs(here.real), 1e-300)
         told = modes.completeness[0]
-        agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate, told)
         assert modes.right is not None, "asked for with vectors"
-        shape = perturbation.shape
+        alike = np.flatnonzero(_alike(lam, here))
+        shape = None if perturbation.shape is None else perturbation.shape.likeness(modes.right[0, alike])
+        agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate, told, shape)
+        if agrees is False and not diverges:
+            verdict, agrees = self._resolved(mu, here, perturbation, verdict, own)
         return Comparison(
             mu=mu,
             modal_eigenvalue=here,
@@ -235,9 +241,27 @@ class _At:
             responding=None,
             agrees=agrees,
             verdict=verdict,
-            growth_mac=None if shape is None else shape.likeness(modes.right[0, partner]),
+            growth_mac=shape,
             completeness=told,
         )
+
+    def _resolved(
+        self, mu: float, here: complex, coarse: Perturbation, verdict: str, modes: ComplexModes | None
+    ) -> tuple[str, bool | None]:
+        """A verdict that both disagree, held against half the time step: where that takes half of the difference away,
+        the step parts them, and nothing is decided."""
+        step = perturbation_step(self.system, self.settings)
+        finer = replace(self.settings, step=step / 2)
+        try:
+            fine = perturb(self.system, mu, settings=finer, max_frequency_hz=self.limit, modes=modes)
+        except AnalysisError:
+            return verdict, False
+        if not fine.shows or abs(fine.eigenvalue - here) > HALVED * abs(coarse.eigenvalue - here):
+            return verdict, False
+        return (
+            f"{verdict}; with half the step of {step:.4g} s growth in time is {readable(fine.growth_rate, 4)} 1/s of "
+            f"{readable(here.real, 4)}: the step parts them, take temporal.step = {step / 8:.2g} or less"
+        ), None
 
     def _answer(self, mu: float, run: Trajectory, modes: ComplexModes) -> _Answer:
         dominant, fitted = dominant_response(run, self.limit)
@@ -249,8 +273,11 @@ class _At:
             return _Answer(dominant, fitted, responding, None, found, why)
         assert modes.right is not None, "asked for with vectors"
         shape = operating_shape(self.system, self.phases, self.settings, run, dominant, mu=mu)
-        expected = mode_shape(self.system, modes.right[0, int(unstable[responding])])
-        mac = modal_assurance(by_body(shape), by_body({name: expected[name] for name in shape}))
+        lam = modes.eigenvalues[0]
+        here = lam[unstable[responding]]
+        alike = [mode_shape(self.system, modes.right[0, k]) for k in np.flatnonzero(_alike(lam, here))]
+        spanned = np.stack([by_body({name: one[name] for name in shape}) for one in alike], axis=1)
+        mac = span_assurance(by_body(shape), spanned)
         return _Answer(dominant, fitted, responding, mac, found, why)
 
     def _recall(self, part: str, mu: float, read: Callable[[float, Plain], T]) -> T | None:
@@ -283,6 +310,11 @@ class _Answer:
     unsettled: str
 
 
+def _alike(lam: ComplexArray, here: complex) -> BoolArray:
+    """Which modes are one to the digits of a signal in time: any combination of them may grow."""
+    return np.abs(lam - here) <= TOGETHER * abs(here)
+
+
 def _unstable(modes: ComplexModes, limit: float) -> IntArray:
     """Columns of the unstable modes up to the limit [Hz], the fastest first."""
     columns = np.flatnonzero(modes.unstable[0] & (modes.frequency_hz[0] <= limit))
@@ -299,6 +331,8 @@ def _growth_data(c: Comparison) -> Plain:
         "growth_rate_error": c.growth_rate_error,
         "growth_mac": c.growth_mac,
         "completeness": c.completeness,
+        "agrees": c.agrees,
+        "verdict": c.verdict,
     }
 
 
@@ -306,8 +340,7 @@ def _growth_of(mu: float, data: Plain) -> Comparison:
     here, perturbation = complex(*data["modal"]), perturbation_of(mu, data["perturbation"])
     frequency, rate = float(data["frequency_error"]), float(data["growth_rate_error"])
     unstable = tuple(float(f) for f in data["unstable_hz"])
-    told = str(data["completeness"])
-    agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate, told)
+    told, agrees, verdict = str(data["completeness"]), data["agrees"], str(data["verdict"])
     return Comparison(
         mu, here, unstable, tuple(float(g) for g in data["unstable_growth"]), perturbation, None, None, frequency, rate,
         None, None, agrees, verdict, float_of(data, "growth_mac"), told,

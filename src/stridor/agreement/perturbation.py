@@ -91,8 +91,7 @@ def perturb(
     speed = np.linalg.norm(slip, axis=1)
     start, moved = _in_equal_measure(nodes, lam, vectors)
     start *= PERTURBATION * speed[speed > 0.0].min() / len(chosen)
-    _, _, limit = plan(system, settings)
-    step = settings.step or choose_step(limit, settings)
+    step = perturbation_step(system, settings)
     every = max(1, int(1.0 / (SAMPLES * max_frequency_hz * step)))
     # One node of each contact, of those that slide: the one that moves most.
     leaders = _leaders(nodes, speed, moved)
@@ -110,6 +109,14 @@ def perturb(
         motion = run.velocity[part, len(leaders) :].reshape(-1, bodies.shape[0])
         form = component_shape(bodies, run.time[part], motion, band.eigenvalues, band.fastest, max_frequency_hz)
     return Perturbation(mu, band.fastest, signal, run.sampling, band, form)
+
+
+def perturbation_step(system: System, settings: Settings) -> float:
+    """Step [s] of the march of a perturbation of a system as it is in time."""
+    if settings.step:
+        return settings.step
+    _, _, limit = plan(settings.system(system).in_reference(), settings)
+    return choose_step(limit, settings)
 
 
 def _started(nodes: ContactNodes, modes: ComplexModes, max_frequency_hz: float) -> tuple[IntArray, float]:

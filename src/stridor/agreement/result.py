@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 # Within which decay in time is that of a mode: to be stable it need not be as near as growth, which is the answer.
 SAME_DECAY = 0.25
+TURNS = 3.0  # periods of a mode that a signal must hold to tell its rate
 GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
 AGREE, DISAGREE, UNDECIDED = "agree: ", "disagree: ", "not decided: "
 
@@ -62,9 +63,14 @@ class Comparison(Shown):
     def _line(self) -> str:
         return self.verdict
 
+    @property
+    def marched(self) -> bool:
+        """Whether a small perturbation was marched: not about what diverges without oscillating."""
+        return not (self.unstable_hz and self.modal_eigenvalue.imag == 0.0)
+
     def to_json(self) -> dict[str, Any]:
         """Plain values of one comparison."""
-        modal, temporal = self.modal_eigenvalue, self.perturbation.eigenvalue
+        modal, temporal, marched = self.modal_eigenvalue, self.perturbation.eigenvalue, self.marched
         return {
             "mu": self.mu,
             "modal": {
@@ -75,14 +81,14 @@ class Comparison(Shown):
                 "completeness": self.completeness,
             },
             "temporal": {
-                "frequency_hz": temporal.imag / (2 * np.pi),
-                "growth_rate": temporal.real,
+                "frequency_hz": temporal.imag / (2 * np.pi) if marched else None,
+                "growth_rate": temporal.real if marched else None,
                 "dominant_frequency_hz": self.dominant_frequency_hz,
                 "saturated": None if self.run_growth is None else self.run_growth.saturated,
                 "responding_mode_hz": None if self.responding is None else self.unstable_hz[self.responding],
             },
-            "frequency_error": self.frequency_error,
-            "growth_rate_error": self.growth_rate_error,
+            "frequency_error": self.frequency_error if marched else None,
+            "growth_rate_error": self.growth_rate_error if marched else None,
             "growth_mac": self.growth_mac,
             "mac": self.mac,
             "agrees": self.agrees,
@@ -127,8 +133,10 @@ class Agreement(Tabular):
         )  # fmt: skip
         rows: list[tuple[Cell, ...]] = []
         for c in self.comparisons:
-            ends = [(lam.imag / (2 * np.pi), lam.real) for lam in (c.modal_eigenvalue, c.perturbation.eigenvalue)]
-            errors = c.frequency_error, c.growth_rate_error, c.growth_mac, c.dominant_frequency_hz, c.mac
+            seen = c.perturbation.eigenvalue if c.marched else complex(np.nan, np.nan)
+            ends = [(lam.imag / (2 * np.pi), lam.real) for lam in (c.modal_eigenvalue, seen)]
+            both = (c.frequency_error, c.growth_rate_error) if c.marched else (None, None)
+            errors = *both, c.growth_mac, c.dominant_frequency_hz, c.mac
             rows.append((c.mu, *ends[0], *ends[1], *errors, c.agrees, c.verdict))
         if self.answers:
             heads = (*heads, *self.answers[0].heads)
@@ -214,10 +222,14 @@ def judge(
     frequency: float,
     rate: float,
     completeness: str = "",
+    shape: float | None = None,
 ) -> tuple[bool | None, str]:
-    """Whether both approaches agree at one μ, None where the signal shows nothing or the modes are not borne out
-    (``completeness``), and the sentence that says it."""
+    """Whether both approaches agree at one μ, None where the signal shows nothing, where what grows has another shape
+    (MAC, None where it was not taken) and where the modes are not borne out (``completeness``), and the sentence that
+    says it."""
     agrees, sentence = _judged(mu, unstable, here, perturbation, frequency, rate)
+    if agrees and unstable and shape is not None and not shape >= GOOD_MAC:
+        agrees, sentence = None, f"{sentence}, but it grows in another shape than the mode, MAC {shape:.2f}"
     if not refuted(completeness):
         return agrees, sentence
     return (None if agrees else agrees), f"{sentence}; but which modes there are is not certain"
@@ -235,6 +247,12 @@ def _judged(
     said = "unstable" if unstable else "stable"
     if not perturbation.shows:
         return None, f"μ = {mu:g}: modal says {said}, but the signal in time shows no vibration to compare with"
+    turns = len(perturbation.signal) * perturbation.sampling * here.imag / (2 * np.pi)
+    if unstable and 0.0 < turns < TURNS:
+        return None, (
+            f"μ = {mu:g}: the mode grows so fast, {_vibration(here)}, that a motion in time stays small for {turns:.2g} "
+            "periods only, too few to take a rate from"
+        )
     seen = perturbation.eigenvalue
     # Without damping both rates are zero but for rounding, and a share of nothing says nothing.
     still = max(abs(seen.real), abs(here.real)) <= 2 * LEVEL * abs(here)
@@ -271,8 +289,11 @@ def _vibration(lam: complex) -> str:
     return f"{readable(lam.imag / (2 * np.pi), 5)} Hz with {readable(lam.real, 4)} 1/s"
 
 
-def likeness(verdict: str, dominant: float | None, mac: float | None) -> str:
-    """The verdict of one μ with what the full run answers, where an unstable mode does."""
+def likeness(verdict: str, dominant: float | None, mac: float | None, *, unstable: bool) -> str:
+    """The verdict of one μ with what the full run answers, in the shape of an unstable mode, or at the frequency of
+    none of those there are."""
+    if dominant is not None and mac is None and unstable:
+        return f"{verdict}; the full run answers at {readable(dominant, 4)} Hz, which none of the unstable modes has"
     if dominant is None or mac is None:
         return verdict
     how = "in its shape" if mac >= GOOD_MAC else f"in a shape that is no longer linear, MAC {mac:.2f}"

@@ -24,9 +24,9 @@ class TimeShape:
     rows: Sparse
     values: ComplexArray
 
-    def likeness(self, vector: ComplexArray) -> float:
-        """MAC with a mode (n,)."""
-        return modal_assurance(self.values, self.rows @ vector)
+    def likeness(self, vectors: ComplexArray) -> float:
+        """MAC with a mode (n,); with what modes (k, n) span, the share of the shape that lies in it."""
+        return span_assurance(self.values, np.asarray(self.rows @ np.atleast_2d(vectors).T))
 
 
 def modal_assurance(first: ComplexArray, second: ComplexArray) -> float:
@@ -34,6 +34,13 @@ def modal_assurance(first: ComplexArray, second: ComplexArray) -> float:
     a, b = np.ravel(first), np.ravel(second)
     size = float(np.vdot(a, a).real * np.vdot(b, b).real)
     return float(abs(np.vdot(a, b)) ** 2 / size) if size > 0 else 0.0
+
+
+def span_assurance(shape: ComplexArray, vectors: ComplexArray) -> float:
+    """The share of a complex shape (r,) that lies in what shapes (r, k) span: MAC, of one."""
+    basis = np.linalg.qr(vectors)[0]
+    size = float(np.vdot(shape, shape).real)
+    return float(np.sum(np.abs(basis.conj().T @ shape) ** 2)) / size if size > 0.0 else 0.0
 
 
 def mode_shape(system: System, vector: ComplexArray) -> dict[str, ComplexArray]:

@@ -122,7 +122,7 @@ def show_agreement(document: dict[str, Any]) -> None:
             shown(c["temporal"]["frequency_hz"], 2),
             shown(c["modal"]["growth_rate"], 2),
             shown(c["temporal"]["growth_rate"], 2),
-            f"{100 * c['growth_rate_error']:.2f}",
+            "–" if c["growth_rate_error"] is None else f"{100 * c['growth_rate_error']:.2f}",
             shown(c["growth_mac"], 3),
             shown(c["temporal"]["dominant_frequency_hz"], 1),
             shown(c["mac"], 3),

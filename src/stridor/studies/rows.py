@@ -185,8 +185,8 @@ def _compare(work: Workspace, mu: float | None, keep: Keep) -> Row:
     return {
         "modal_frequency_hz": one.modal_eigenvalue.imag / (2 * np.pi),
         "modal_growth_rate": one.modal_eigenvalue.real,
-        "frequency_in_time_hz": one.perturbation.eigenvalue.imag / (2 * np.pi),
-        "growth_rate_in_time": one.perturbation.eigenvalue.real,
+        "frequency_in_time_hz": one.perturbation.eigenvalue.imag / (2 * np.pi) if one.marched else np.nan,
+        "growth_rate_in_time": one.perturbation.eigenvalue.real if one.marched else np.nan,
         "dominant_frequency_hz": _number(one.dominant_frequency_hz),
         "agree": -1 if one.agrees is None else int(one.agrees),
         "note": _printable(one.verdict),

@@ -350,7 +350,7 @@ def check_extent(work: Workspace, system: System) -> None:
 
 def compare(
     problem: Problem,
-    mus: Sequence[float] | None = None,
+    mus: float | Sequence[float] | None = None,
     *,
     critical: bool | None = None,
     runs: dict[float, Trajectory] | None = None,
@@ -370,7 +370,7 @@ def compare(
     work = Workspace.of(problem)
     settings, system = work.comparison, work.structured("compare")
     require_pressed_in_time(work, system, "compare", steady=True)
-    chosen = list(mus if mus is not None else settings.mu) or [work.one_friction()]
+    chosen = np.atleast_1d(mus if mus is not None else settings.mu).tolist() or [work.one_friction()]
     result = compare_system(
         system,
         phases_of(work),

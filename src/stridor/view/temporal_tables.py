@@ -148,8 +148,8 @@ def agreement_table(comparison: Comparison) -> Table:
     same = unstable == temporal.grows and not undecided
     seen = names[temporal.grows] if temporal.shows else "not seen"
     judged = "not decided" if undecided else _judged(same)
-    rows = [
-        TableRow(("steady sliding is", names[unstable], seen, "", judged), _kind(same)),
+    rows = [TableRow(("steady sliding is", names[unstable], seen, "", judged), _kind(same))]
+    rows += [] if not comparison.marched else [
         agreed("frequency [Hz]", modal.imag / (2 * np.pi), temporal.frequency_hz, GOOD_FREQUENCY),
         agreed("growth rate [1/s]", modal.real, temporal.growth_rate, GOOD_GROWTH if unstable else SAME_DECAY),
     ]
