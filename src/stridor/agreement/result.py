@@ -250,8 +250,8 @@ def _judged(
     turns = len(perturbation.signal) * perturbation.sampling * here.imag / (2 * np.pi)
     if unstable and 0.0 < turns < TURNS:
         return None, (
-            f"μ = {mu:g}: the mode grows so fast, {_vibration(here)}, that a motion in time stays small for {turns:.2g} "
-            "periods only, too few to take a rate from"
+            f"μ = {mu:g}: the mode grows so fast, {_vibration(here)}, that a motion in time stays small for "
+            f"{turns:.2g} periods only, too few to take a rate from"
         )
     seen = perturbation.eigenvalue
     # Without damping both rates are zero but for rounding, and a share of nothing says nothing.
