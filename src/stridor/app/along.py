@@ -22,8 +22,8 @@ def onset_document(onset: ParametricOnset) -> dict[str, Any]:
     }
 
 
-def show_onsets_along(onsets: ParametricOnsets, *, confirmed: bool) -> None:
-    """A table, and what was checked."""
+def show_onsets_along(onsets: ParametricOnsets, *, confirmed: bool, held: bool = False) -> None:
+    """A table, and what was checked. held: whether the model holds the nodes that touch at the case's own friction."""
     from .output import stdout
     from .tables import table
 
@@ -32,6 +32,7 @@ def show_onsets_along(onsets: ParametricOnsets, *, confirmed: bool) -> None:
         stdout.print(f"  {onsets.sentence}")
         return
     how = "confirmed in the full model" if confirmed else "of the reduced model alone: its file has no full matrices"
+    how += ", with the nodes held that touch at the case's own friction" if held else ""
     rows = [
         [
             f"{o.value:.9g}",

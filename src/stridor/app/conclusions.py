@@ -145,12 +145,17 @@ def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float]
 
 def of_run(summary: dict[str, Any]) -> Conclusion:
     """What vibrates at the end of a run in time; then both approaches side by side."""
+    from ..temporal.signals import state_of
+
     if summary["dominant_frequency_hz"] is None:
         return Conclusion("last phase: too few records for a dominant frequency, or nothing vibrates", "modes")
-    state = "saturated" if summary["saturated"] else "not saturated"
-    rate = summary["growth_rate"]
-    growth = "nowhere exponential growth" if rate is None else f"growth {measured(rate, 1)} 1/s where exponential"
-    said = f"last phase: {measured(summary['dominant_frequency_hz'], 1)} Hz dominates, {growth}, {state}"
+    rate, fit = summary["growth_rate"], summary["growth_fit"]
+    state, growth = "not saturated", "nowhere exponential growth"
+    if rate is not None:
+        state = state_of(rate, fit["end"] - fit["start"], saturated=bool(summary["saturated"]))
+        growth = f"growth {measured(rate, 1)} 1/s where exponential"
+    growth = "" if state == "of constant amplitude" else f"{growth}, "
+    said = f"last phase: {measured(summary['dominant_frequency_hz'], 1)} Hz dominates, {growth}{state}"
     return Conclusion(said, "compare")
 
 

@@ -90,8 +90,8 @@ def reduce(
     from ..view.onset_plots import modes_at_points, onset_chart
     from .conclusions import of_reduced
 
-    for note in getattr(model.problem, "notes", ()):
-        call.say(f"note: {note}")
+    notes = list(getattr(model.problem, "notes", ()))  # that what touches is held: what is found is of that alone
+    call.warn(notes)
     call.warn(model.problem.idle_words)
     files = [] if save is None else [_saved(model, save, origin, keep)]
     chosen = None if call.solver in (None, "auto") else call.solver
@@ -117,13 +117,13 @@ def reduce(
     if call.json:
         document = _about(model) | {"modes": points, "onsets": [onset_document(o) for o in onsets or ()]}
         if onsets is not None:
-            document |= {"completeness": onsets.sentence, "complete": onsets.complete}
+            document |= {"notes": notes, "completeness": onsets.sentence, "complete": onsets.complete}
         call.document(document | {"files": [str(f) for f in files]})
     else:
         if points:
             _show_modes(model, points)
         if along is not None and onsets is not None:
-            show_onsets_along(onsets, confirmed=confirm)
+            show_onsets_along(onsets, confirmed=confirm, held=bool(notes))
         call.conclude(of_reduced(points, onsets, {p.name: f"{p.low:g}:{p.high:g}:5" for p in model.problem.parameters}))
     if onsets is not None and not onsets.complete:
         raise typer.Exit(INCOMPLETE)

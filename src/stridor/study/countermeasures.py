@@ -126,13 +126,15 @@ def _solved_again(
 
 
 def default_numbers(case: Case, left: Sequence[str]) -> list[str]:
-    """Paths of the numbers that changes are tried on: of materials, damping, factors but for those left out, contact
-    stiffnesses."""
+    """Paths of the numbers that changes are tried on: of materials, damping, springs, dashpots, factors but for those
+    left out, contact stiffnesses."""
     used = dict.fromkeys(getattr(body, "material", None) for body in case.bodies.values())
     paths = [f"materials.{m}.{n}" for m in used if m in case.materials for n in ("young_modulus", "density")]
     for name, body in case.bodies.items():
         if isinstance(body, BeamBody | SolidBody):
             paths += [f"bodies.{name}.damping.{n}" for n in ("mass", "stiffness") if getattr(body.damping, n) > 0]
+    paths += [f"springs.{name}.stiffness" for name, spring in case.springs.items() if spring.stiffness]
+    paths += [f"dashpots.{name}.damping" for name in case.dashpots]
     paths += [path for path in _factors(case) if path not in left]
     # Friction is what makes it squeal, and no change of the structure.
     paths += [f"parameters.{name}.value" for name in case.parameters if name in case.factor_names and name != MU]

@@ -18,6 +18,7 @@ import scipy.linalg as sl
 
 from ..typing import Array, ComplexArray
 
+CONSTANT = 0.02  # share of an amplitude by which it may change over the whole fit
 PENCIL_TOLERANCE = 1e-9
 # A line outside the band may have grown millions of times larger than what is sought in it; this window
 # keeps 170 dB away.
@@ -169,6 +170,18 @@ class Growth:
     spread: float
     saturated: bool
     amplitude: float
+
+    @property
+    def state(self) -> str:
+        """In words: a constant amplitude neither grows nor was seen to stop growing."""
+        return state_of(self.rate, self.end - self.start, saturated=self.saturated)
+
+
+def state_of(rate: float, length: float, *, saturated: bool) -> str:
+    """What a line is said to do whose growth [1/s] was fitted over a length [s]."""
+    if saturated:
+        return "saturated"
+    return "of constant amplitude" if abs(rate) * length < CONSTANT else "not saturated"
 
 
 def growth(signal: Array, sampling: float, frequency_hz: float) -> Growth:

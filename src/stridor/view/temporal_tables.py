@@ -174,8 +174,7 @@ def agreement_table(comparison: Comparison) -> Table:
         )
     if comparison.run_growth is not None:
         fitted = comparison.run_growth
-        state = "saturated" if fitted.saturated else "not saturated"
-        rows.append(TableRow(("growth fitted in the full run [1/s]", "", quantity(fitted.rate, 1), "", state)))
+        rows.append(TableRow(("growth fitted in the full run [1/s]", "", quantity(fitted.rate, 1), "", fitted.state)))
     if comparison.mac is not None and comparison.responding is not None:
         rows.append(
             TableRow(
