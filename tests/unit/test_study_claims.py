@@ -107,3 +107,14 @@ def test_an_address_without_a_port_is_refused_before_anything_else(case: st.Case
         assert done.returncode == 2, done.stderr
         assert done.stderr.strip() == f"stridor: --scheduler: '{address}' – an address with a port, such as tcp://host:8786"
     assert not (tmp_path / "study.out").exists()
+
+
+def test_of_few_rows_one_at_least_is_confirmed(case: st.Case, tmp_path: Path) -> None:
+    parameters = {"mu": {"range": (0.2, 0.4), "points": 5}, "bodies.beam1.damping.mass": {"range": (5.0, 20.0), "points": 2}}
+    for share, expected in ((1e-6, 1), (0.0, 0)):
+        study = st.Study(case=case, parameters=parameters, answers={"source": "reduced", "confirm": share})
+        found = st.run_study(study, tmp_path / str(share), workers=1)
+        assert found.done.all()
+        assert int(np.count_nonzero(found.data["confirmed"].values > 0)) >= expected
+        if not expected:
+            assert not np.any(found.data["confirmed"].values[found.data["source"].values == "reduced"] > 0)

@@ -264,7 +264,11 @@ class _Run:
     def _batches(self, store: OpenStore, places: IntArray, workers: int) -> Iterator[SampleBatch]:
         """Open rows in batches of about a second, smaller towards the end so that all workers end together."""
         values = store.samples
-        chosen = np.random.default_rng(self.study.sampling.seed + 1).random(len(values)) < self.study.answers.confirm
+        draws = np.random.default_rng(self.study.sampling.seed + 1).random(len(values))
+        share = self.study.answers.confirm
+        chosen = draws < share
+        if share > 0.0 and not chosen.any():
+            chosen = draws == draws.min()  # of few rows one at least
         at = 0
         while at < len(places):
             # A scheduler hands out some hundred tasks a second: with more workers they are longer.
