@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,59 @@ def _beams(name: str, rng: np.random.Generator) -> Problem:
     system = replace(bench(*slaves, elements=elements, damping=damping, length=0.05 + 0.05 * count), loads={})
     damped = bool(rng.random() < 0.8)
     return _of_system(name, system, float(rng.uniform(0.3, 0.9)), 2 * np.pi * float(rng.uniform(10e3, 60e3)), damped=damped)
+
+
+def falling_problem(seed: int) -> Problem:
+    """Slaves pressed on a clamped master whose friction falls with the slip speed: gently, or so steeply that motions
+    diverge; with damping of the structure or without. All of them touch all over the range."""
+    rng = np.random.default_rng([seed, 11])
+    while True:
+        count, elements = int(rng.integers(1, 3)), int(rng.integers(6, 10))
+        high, velocity = float(rng.uniform(0.2, 0.9)), float(10 ** rng.uniform(-3, -1))
+        kinetic = float(rng.uniform(0.05, 0.3))
+        static = kinetic * float(1 + 10 ** rng.uniform(-2, 0.3))
+        laws = (
+            {"law": "weakening", "decay_speed": velocity * float(10 ** rng.uniform(-0.5, 1))},
+            {"law": "hyperbolic", "delta": float(10 ** rng.uniform(-0.5, 1)) / velocity},
+        )
+        law = laws[int(rng.integers(2))] | {"coefficient": kinetic, "static_coefficient": static}
+        damping = (float(rng.choice([0.0, 50.0, 300.0])), float(rng.choice([0.0, 1e-8, 1e-6])))
+        slaves = [
+            Slave(
+                place=(k + float(rng.uniform(0.3, 0.9))) / count, lean_deg=float(rng.uniform(-15, 15)),
+                length=float(rng.uniform(0.03, 0.07)), elements=3, damping=damping, end="clamped", friction=law,
+                stiffness="rigid" if rng.random() < 0.3 else float(10 ** rng.uniform(6, 10)),
+                force=float(10 ** rng.uniform(0, 2)),
+            )
+            for k in range(count)
+        ]  # fmt: skip
+        system = bench(*slaves, elements=elements, damping=damping, length=0.05 + 0.05 * count, velocity=velocity)
+        forces = partial(_pressed, system)
+        if all(np.all(forces(mu) > 0.0) for mu in np.linspace(0.0, high, GRID + 1)):
+            break
+    damped = bool(rng.random() < 0.7)
+    truth, top = system if damped else system.undamped(), 2 * np.pi * float(rng.uniform(10e3, 60e3))
+    # By hand: μ = μ_k + (μ_s − μ_k) e^(−v/d), or μ_k + (μ_s − μ_k)/(1 + δv); the master moves along itself.
+    fall = np.exp(-velocity / law["decay_speed"]) if "decay_speed" in law else 1.0 / (1.0 + law["delta"] * velocity)
+    slope = -fall / law["decay_speed"] if "decay_speed" in law else -law["delta"] * fall**2
+    falls = (static - kinetic) * slope / (kinetic + (static - kinetic) * fall)
+    return Problem(
+        f"falling {seed}", 0.0, high, top,
+        lambda _: onsets_of_band(system, (0.0, high), top / (2 * np.pi), damped=damped),
+        lambda mu: full_eigenvalues(truth, mu, slopes=forces(mu) * mu * falls),
+    )  # fmt: skip
+
+
+def _pressed(system: System, mu: float) -> np.ndarray:
+    """Normal forces (m,) of steady sliding, all contacts closed: K u = f + Σ p (n + μ s t), p = −K_c nᵀu or nᵀu = 0."""
+    stiffness, load = system.stiffness.toarray(), sum(system.loads.values())
+    normals = np.array([c.normal_row for c in system.contacts])
+    tangents = np.array([c.tangent_row for c in system.contacts])
+    sense = np.array([-np.sign(c.tangent_lift.sum()) for c in system.contacts])
+    compliance = np.diag([0.0 if not np.isfinite(c.stiffness) else 1.0 / c.stiffness for c in system.contacts])
+    pushes = normals + mu * sense[:, None] * tangents
+    whole = np.block([[stiffness, -pushes.T], [normals, compliance]])
+    return np.linalg.solve(whole, np.concatenate([np.asarray(load, dtype=float), np.zeros(len(normals))]))[len(stiffness) :]
 
 
 def _belt(name: str, rng: np.random.Generator) -> Problem:

@@ -261,7 +261,7 @@ def test_the_body_that_sets_the_limit_is_named() -> None:
 @pytest.mark.parametrize(
     ("lines", "cells", "size", "share"),
     [
-        ((), ({"vertex"}, {"vertex"}), 60, 0.157), ((), ({"vertex"},), 61, 0.9), ((), (), 10, 0.9),
+        ((), ({"vertex"}, {"vertex"}), 60, 0.0393), ((), ({"vertex"},), 61, 0.9), ((), (), 10, 0.9),
         ((1,), ({"vertex"},), 10, 0.9), ((), ({"vertex"}, {"vertex", "line"}), 10, 0.9),
     ],
 )  # fmt: skip

@@ -94,7 +94,7 @@ ENDS = {
         f"modes two-beams.toml --set {DAMPING[0]}=1e-09 --mu 0.0766642",
     ),
     "ensemble two-beams.toml --mu 0.3 --load 0.5,0.5 COARSE": (
-        "2 members: ", "simulate two-beams.toml --mu 0.3 COARSE"
+        "2 members: ", "modes two-beams.toml --mu 0.3 COARSE"
     ),
     "cycles rub.toml --mu 1.0": (
         "1 limit cycle at μ = 1: 1 stable", "simulate rub.toml --stepper exact --mu 1"

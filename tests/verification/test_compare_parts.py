@@ -219,5 +219,5 @@ def test_a_signal_that_shows_nothing_is_not_called_stable(case: st.Case) -> None
     agrees, verdict = judge(0.05, False, -25 + 600j, seen, 1.0, 1.0)
     assert agrees is None
     assert verdict == "μ = 0.05: modal says stable, but the signal in time shows no vibration to compare with"
-    nan = replace(seen, eigenvalue=10 + 600j)
+    nan = replace(seen, eigenvalue=10 + 600j, signal=np.zeros(0))
     assert judge(0.05, True, 10 + 600j, nan, float("nan"), 0.0)[0] is False

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import random_onsets
-from random_onsets import KINDS, disagreement, random_problem
+from random_onsets import KINDS, disagreement, falling_problem, random_problem
 from stridor.modal.full import branches, counted, full_onsets, search
 from stridor.modal.full.axis import _Walk
 from stridor.modal.onset import Onset, Onsets
@@ -142,6 +142,23 @@ def test_many(first: int, tmp_path: Path) -> None:
     wrong, said = judged(range(first, first + 100), tmp_path)
     assert not wrong, "\n".join(wrong)
     assert len(said) <= UNANSWERED * 100, "\n".join(said)
+
+
+# Where nothing damps, friction that falls makes everything grow from no friction on: some of that is not answered whole.
+FALLING = [0, 1, 2, 3, 4, 7, 8]
+MORE_FALLING = [pytest.param(range(k, k + 20), marks=pytest.mark.slow) for k in range(9, 209, 20)]
+
+
+@pytest.mark.parametrize("seeds", [FALLING, *MORE_FALLING], ids=lambda seeds: f"from {seeds[0]}")
+def test_of_friction_that_falls_with_speed(seeds: Iterable[int], tmp_path: Path) -> None:
+    """Against slopes, forces and eigenvalues by hand."""
+    wrong, said = list[str](), list[str]()
+    for seed in seeds:
+        words, refused = disagreement(falling_problem(seed), tmp_path)
+        wrong += [words] if words else []
+        said += [refused] if refused else []
+    assert not wrong, "\n".join(wrong)
+    assert len(said) <= (0 if seeds is FALLING else 8), "\n".join(said)
 
 
 def along_the_axis(system: System, between: tuple[float, float], hz: float, *, damped: bool = True) -> Onsets:

@@ -58,14 +58,14 @@ def test_flutter_of_a_mass_grows_in_time_as_its_mode_does() -> None:
     small = found.comparisons[0].perturbation
     assert small is not None
     assert abs(small.eigenvalue.imag) == pytest.approx(abs(exact.imag), rel=5e-3)
-    assert small.eigenvalue.real == pytest.approx(exact.real, rel=0.04)
+    assert small.eigenvalue.real == pytest.approx(exact.real, rel=0.003)
 
 
 def test_the_step_is_a_share_of_the_limit() -> None:
     masses = st.build_system(st.loads(CASE))
     limit = step_limit(masses, 0.5)
     assert limit.share == RESOLVED
-    assert 2 * np.pi / limit.omega_max / (limit.share * limit.step) == pytest.approx(20.0, rel=1e-3)
+    assert 2 * np.pi / limit.omega_max / (limit.share * limit.step) == pytest.approx(80.0, rel=1e-3)
     assert st.simulate(st.loads(CASE)).step == pytest.approx(RESOLVED * limit.step)
     meshed = st.loads(CASE.replace("[springs.a]", BEAM + "[springs.a]", 1))
     assert step_limit(st.build_system(meshed), 0.5).share == SAFE_FRACTION

@@ -148,10 +148,10 @@ def _conclusion(result: Ensemble) -> Conclusion:
         return Conclusion(said)
     strongest = int(np.nanargmax(result.rms))
     plain = result.load[strongest] == result.speed[strongest] == 1.0 and not result.sweep[strongest]
-    if not plain or np.ptp(result.perturbation) > 0.0:
-        return Conclusion(said)  # factors and sweeps are options of the ensemble alone
     own = () if np.isnan(result.mu[strongest]) else ("--mu", f"{result.mu[strongest]:.6g}")
-    return Conclusion(said, "simulate", own)
+    # Factors and sweeps are options of the ensemble alone: a run without them would be another one.
+    plain = plain and np.ptp(result.perturbation) == 0.0
+    return Conclusion(said, "simulate" if plain else "modes", own)
 
 
 VERBS = {"ensemble": ensemble}

@@ -189,7 +189,7 @@ Set = Annotated[
     list[str] | None,
     _option(
         "--set",
-        "Change a value of the case, e.g. contacts.A.friction.coefficient=0.3. Repeatable.",
+        "Change a value of the case, or of the study, e.g. contacts.A.friction.coefficient=0.3. Repeatable.",
         metavar="KEY=VALUE",
         on=" ".join((*CHANGING, *PAGES)),
     ),

@@ -32,6 +32,9 @@ from .unfit import Unfit
 
 NARROWINGS = 8
 ASTRAY = 0.1  # of μ
+FIRST = 1e-5  # μ at which branches are begun with at most, beside the poles
+OPENS = 1e-3  # of what has opened there: growth that began without friction
+STANDS = 1e-13  # of |λ|: on the axis, but for rounding
 STILL = 1e-6  # of |λ|: what swings slower diverges
 
 
@@ -72,6 +75,7 @@ def onsets_by_receptance(
         fixed = _growing(spectrum.fixed, top)
         return Onsets((), (low, high), max_frequency_hz, has_damping, open_contacts, at_start=fixed, at_end=fixed)
     events: list[_Event] = []
+    grown: set[int] = set()
     entries = Entries(top)
     # Roots that start above the band may meet inside it; follow some beyond.
     tracker = Tracker(spectrum, top * follow)
@@ -79,6 +83,7 @@ def onsets_by_receptance(
     def watch(old: RootState, new: RootState) -> None:
         count = len(old.roots)
         events.extend(_passages(old, new, has_damping))
+        grown.update(new.branch[grows(new.roots, 0.0)].tolist())
         entries.watch((old.mu, new.mu), old.roots, new.roots[:count], new.branch[:count])
 
     tracker.watch = watch
@@ -89,6 +94,7 @@ def onsets_by_receptance(
     changes = [
         StabilityChange(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping))
         for event in events
+        if event.mu > 0.0 or event.branch in grown  # growth that stays within rounding all over the range is none
     ]
     return Onsets(
         tuple(reported(changes, entries, (low, high), max_frequency_hz)),
@@ -100,8 +106,8 @@ def onsets_by_receptance(
         at_end=_growing(np.concatenate([end.roots, spectrum.fixed]), top),
         unexplained=unexplained(
             end.branch[_inside(end.roots, top)].tolist(),
-            np.flatnonzero(_inside(tracker.origin, np.inf)).tolist(),
-            changes,
+            start.branch[_inside(start.roots, np.inf)].tolist(),
+            [c for c in changes if c.onset is not None and c.onset.mu >= low],
         ),
         followed=(_numbered(start, spectrum, order), _numbered(end, spectrum, order)),
     )
@@ -166,10 +172,16 @@ def _passages(old: RootState, new: RootState, has_damping: bool) -> list[_Event]
     for i in range(len(old.roots)):
         a, b = old.roots[i], new.roots[i]
         if has_damping:
-            for fraction, stabilising in _axis_crossings(
-                a.real, b.real, old.tangents[i].real * step, new.tangents[i].real * step
-            ):
-                mu = old.mu + fraction * step
+            first, second = old.tangents[i].real * step, new.tangents[i].real * step
+            crossings = _axis_crossings(a.real, b.real, first, second)
+            opened = old.tangents[i].real * old.mu
+            if old.mu <= FIRST and abs(a.real - opened) <= max(OPENS * opened, STANDS * abs(a)):
+                # What nothing damps stands on the axis without friction, and may leave it with the least.
+                begins = old.tangents[i].real > STANDS * abs(a) and b.real > 0.0
+                later = _axis_crossings(0.0, b.real, first, second)
+                crossings = [*([(-old.mu / step, False)] if begins else []), *(c for c in later if c[0] > OPENS)]
+            for fraction, stabilising in crossings:
+                mu = max(old.mu + fraction * step, 0.0) if fraction >= 0.0 else 0.0
                 events.append(
                     _Event(
                         mu,
@@ -322,7 +334,7 @@ def _solve(
     shape = root.vector[: family.freedoms]
     residual = float(judge(np.array([root.lam]), (shape / np.linalg.norm(shape))[:, None], root.mu)[0])
     return Onset(
-        mu=root.mu,
+        mu=0.0 if event.mu == 0.0 and abs(root.mu) <= OPENS * OPENS else root.mu,
         frequency_hz=abs(root.lam.imag) / (2 * np.pi),
         kind="flutter" if root.lam else "divergence",
         damped=has_damping,

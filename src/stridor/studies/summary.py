@@ -25,7 +25,13 @@ _NUMBERS = {
 
 
 def answer(result: StudyResult) -> str:
-    """The result in a sentence."""
+    """The result in a sentence; how many samples have none belongs to it."""
+    left = [f"{len(result.failed)} failed"] if len(result.failed) else []
+    left += [f"{result.pending} not computed yet"] if result.pending else []
+    return _answer(result) + (f"; of the other samples {', '.join(left)}" if left and result.done.any() else "")
+
+
+def _answer(result: StudyResult) -> str:
     done = int(result.done.sum())
     if not done:
         return f"none of {len(result.status)} samples has a result"

@@ -30,7 +30,7 @@ from .analyses import modes as modes_at
 from .asked import names_of, require_band
 from .provenance import provenance
 from .sensitivity_result import Sensitivities
-from .workspace import Problem, Workspace, friction_in_sliding
+from .workspace import Problem, Workspace, friction_in_sliding, frictions_in_sliding
 
 NEAR = 0.05  # relative change of a number within which an exceptional point is told of
 BENT = 2.0  # condition number from which two close modes are on their way to an exceptional point
@@ -219,12 +219,12 @@ class Linearised:
         if contact and path.endswith(".compliance"):
             return by_compliance(self.system, self.held, contact)
 
-        moved: list[float | None] = []
+        moved: list[Array] = []
 
         def at(value: float) -> Pencil:
             system = self.varied(path, value)
             if self.by_law and not self.follows_law:
-                moved.append(friction_in_sliding(system))
+                moved.append(frictions_in_sliding(system))
             return pencil_of(system, self.friction(system), self.held, self.options)
 
         try:
@@ -232,7 +232,7 @@ class Linearised:
         except CaseError as error:
             accepted = f"a number that can be varied a little ({error.problems[0].accepted})"
             raise CaseError(path, self.value(path), accepted) from error
-        if len(set(moved)) > 1:
+        if any(not np.array_equal(one, moved[0]) for one in moved[1:]):
             self.warnings.append(
                 f"{path}: friction is held at μ = {self.mu:g}, as asked for; what it does to the coefficient of the "
                 "law is not in the derivative (it is at the case's own friction, without --mu)"

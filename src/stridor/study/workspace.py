@@ -28,6 +28,7 @@ from ..sliding.surfaces import SurfaceSliding, steady_nodes
 from ..system import System, build_system
 from ..system.model import AnswerCache
 from ..temporal.inputs import unfit_in_time
+from ..typing import Array
 from .case_key import case_key
 from .options import options_of
 
@@ -228,11 +229,16 @@ class Unsaved(Workspace):
 
 def friction_in_sliding(system: System) -> float | None:
     """The coefficient of all contacts of a system at their slip speeds in steady sliding; None where they differ."""
+    found = frictions_in_sliding(system)
+    if not len(found):
+        return 0.0
+    return float(found[0]) if np.ptp(found) <= 1e-12 * np.max(np.abs(found)) else None
+
+
+def frictions_in_sliding(system: System) -> Array:
+    """The coefficient of each contact node (m,) of a system at its slip speed in steady sliding."""
     nodes = system.contact_nodes()
     speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
     # The centre of a turning surface slides at no speed and has no say.
     moving = speeds > 1e-9 * speeds.max(initial=0.0)
-    found = nodes.friction_coefficients(speeds)[moving] if moving.any() else nodes.friction_coefficients(speeds)
-    if not len(found):
-        return 0.0
-    return float(found[0]) if np.ptp(found) <= 1e-12 * np.max(np.abs(found)) else None
+    return nodes.friction_coefficients(speeds)[moving] if moving.any() else nodes.friction_coefficients(speeds)

@@ -136,8 +136,6 @@ def surface_facets(cells: Mapping[str, IntArray], dimension: int) -> IntArray:
     flat: list[IntArray] = []
     solid: list[IntArray] = []
     for kind, nodes in cells.items():
-        if kind == "vertex":
-            continue  # a point mass has no surface
         if kind in FLAT:
             flat.append(np.asarray(nodes)[:, FLAT[kind]].reshape(-1, 4))
         elif kind in SOLID and dimension == 3:
