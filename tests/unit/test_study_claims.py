@@ -118,3 +118,16 @@ def test_of_few_rows_one_at_least_is_confirmed(case: st.Case, tmp_path: Path) ->
         assert int(np.count_nonzero(found.data["confirmed"].values > 0)) >= expected
         if not expected:
             assert not np.any(found.data["confirmed"].values[found.data["source"].values == "reduced"] > 0)
+
+
+def test_onsets_of_a_model_that_holds_its_contact_nodes_are_headed_so(capsys: pytest.CaptureFixture[str]) -> None:
+    from stridor.app.along import show_onsets_along
+    from stridor.modal.full import onsets_along
+    from stridor.study.reduced import reduced_model
+
+    few = st.loads(template_text("two-beams"), [*FEW, "modal.max_frequency_hz=9e3"])
+    found = onsets_along(reduced_model(few, {"mu": (0.0, 0.9)}), "mu", {})
+    for held in (True, False):
+        show_onsets_along(found, confirmed=True, held=held)
+        title = " ".join(capsys.readouterr().out.split())
+        assert ("confirmed in the full model, with the nodes held that touch at the case's own friction" in title) == held

@@ -87,11 +87,13 @@ def reduce(
     from ..io.left_out import kept_in
     from ..modal.full import onsets_along
     from ..modal.parametric import ModesAtPoints
+    from ..sliding.stretches import HELD
     from ..view.onset_plots import modes_at_points, onset_chart
     from .conclusions import of_reduced
 
-    notes = list(getattr(model.problem, "notes", ()))  # that what touches is held: what is found is of that alone
-    call.warn(notes)
+    notes = list(getattr(model.problem, "notes", ()))
+    for note in notes:
+        call.say(f"note: {note}")
     call.warn(model.problem.idle_words)
     files = [] if save is None else [_saved(model, save, origin, keep)]
     chosen = None if call.solver in (None, "auto") else call.solver
@@ -123,7 +125,7 @@ def reduce(
         if points:
             _show_modes(model, points)
         if along is not None and onsets is not None:
-            show_onsets_along(onsets, confirmed=confirm, held=bool(notes))
+            show_onsets_along(onsets, confirmed=confirm, held=any(HELD in note for note in notes))
         call.conclude(of_reduced(points, onsets, {p.name: f"{p.low:g}:{p.high:g}:5" for p in model.problem.parameters}))
     if onsets is not None and not onsets.complete:
         raise typer.Exit(INCOMPLETE)

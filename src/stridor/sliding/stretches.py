@@ -18,6 +18,7 @@ from ..system import System
 from ..typing import Array, BoolArray
 from .surfaces import STEADY, SurfaceSliding, steady_sliding_nodes
 
+HELD = "are held at every μ of the model"  # nodes of one friction coefficient
 LOOKS = 9  # equilibria over a range, of small models
 FEWER = 3  # of larger ones
 SMALL = 8000  # freedoms
@@ -142,7 +143,7 @@ def elsewhere_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
         f"{s.low:.4g} to {s.high:.4g} ({'no steady sliding' if s.reason else f'{s.touching} touch'})" for s in others
     )
     return (
-        f"{held} that touch at the case's own friction are held at every μ of the model; steady sliding has others at "
+        f"{held} that touch at the case's own friction {HELD}; steady sliding has others at "
         f"μ = {where}. Modes there are other ones: `stridor modes` and `stridor onsets` have them.",
     )
 
