@@ -126,12 +126,19 @@ def test_onsets_without_damping_of_the_structure_keep_the_slope_of_friction():
     slider = loads(MINIMAL).model_dump(mode="json", exclude_none=True)
     slider["contacts"]["rub"]["friction"] = LAW | {"static_coefficient": 0.15, "decay_speed": 1.0}
     case = Case.model_validate(slider)
-    found = onsets(case, damped=False, friction_range=(0.0, 0.3))
+    found, whole = (
+        onsets(case.with_({"modal.source": source}), damped=False, friction_range=(0.0, 0.3)) for source in ("auto", "full")
+    )
     assert found.complete
+    assert whole.complete
     for mu in (0.05, 0.29):
-        grows = int(np.count_nonzero(modes(case, mu, damped=False).unstable[0]))
-        assert grows == sum(-1 if o.stabilising else 1 for o in found if o.mu < mu)
-        assert grows > 0
+        grown = [modes(case.with_({"modal.source": s}), mu, damped=False) for s in ("auto", "krylov", "full")]
+        assert grown[0].growth_rate[0].max() > 1e-3
+        for other in grown[1:]:
+            assert other.growth_rate[0].max() == pytest.approx(grown[0].growth_rate[0].max(), rel=1e-8)
+        grows = int(np.count_nonzero(grown[0].unstable[0]))
+        for said in (found, whole):
+            assert grows == sum(-1 if o.stabilising else 1 for o in said if o.mu < mu)
 
 
 def test_a_change_that_leaves_no_equilibrium_leaves_the_ranking_and_is_told(falling, monkeypatch):
