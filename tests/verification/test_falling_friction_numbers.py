@@ -53,14 +53,20 @@ def test_a_friction_that_was_asked_for_is_held_and_told(falling):
     assert held[0].startswith("contacts.A.friction.decay_speed")
 
 
-def test_a_changed_law_is_solved_again_with_its_own_friction(falling):
+@pytest.fixture(scope="module")
+def few():
+    """Of fewer modes."""
+    return paper_case().with_(SMALL | {"bodies.beam2.elements": 9, "modal.max_frequency_hz": 10e3})
+
+
+def test_a_changed_law_is_solved_again_with_its_own_friction(few):
     path = "contacts.A.friction.decay_speed"
-    found = rank_countermeasures(falling, numbers=[path], added_mass=False, chamfers=0, verify=1)
+    found = rank_countermeasures(few, numbers=[path], added_mass=False, chamfers=0, verify=1)
     (measure,) = found.measures
-    changed = falling.with_({path: 0.02 * (1 + 0.01 * measure.direction * measure.percent)})
+    changed = few.with_({path: 0.02 * (1 + 0.01 * measure.direction * measure.percent)})
     again = modes(changed)
     growing = again.eigenvalues[0][again.unstable[0] & again.in_band[0]].real.sum()
-    before = modes(falling)
+    before = modes(few)
     had = before.eigenvalues[0][before.unstable[0] & before.in_band[0]].real.sum()
     assert measure.verified.removed == pytest.approx(had - growing, rel=1e-6, abs=1e-6 * had)
 
@@ -141,7 +147,7 @@ def test_onsets_without_damping_of_the_structure_keep_the_slope_of_friction():
             assert grows == sum(-1 if o.stabilising else 1 for o in said if o.mu < mu)
 
 
-def test_a_change_that_leaves_no_equilibrium_leaves_the_ranking_and_is_told(falling, monkeypatch):
+def test_a_change_that_leaves_no_equilibrium_leaves_the_ranking_and_is_told(few, monkeypatch):
     from stridor.study import countermeasures as module
 
     solve, refused = module.verified, []
@@ -154,7 +160,7 @@ def test_a_change_that_leaves_no_equilibrium_leaves_the_ranking_and_is_told(fall
 
     monkeypatch.setattr(module, "verified", loose)
     paths = ["materials.steel.density", "contacts.A.friction.decay_speed", "supports.clamp.velocity.x"]
-    found = rank_countermeasures(falling, numbers=paths, added_mass=False, chamfers=0, verify=1)
+    found = rank_countermeasures(few, numbers=paths, added_mass=False, chamfers=0, verify=1)
     assert refused[0] not in [m.words for m in found.measures]
     assert any(line.startswith(f"{refused[0]}: left out") for line in found.warnings)
     assert found.measures[0].verified is not None
