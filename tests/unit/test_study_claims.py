@@ -46,6 +46,7 @@ def test_parameters_that_leave_the_matrices_of_the_modes_are_told(case: st.Case)
 def test_speeds_and_numbers_of_a_falling_law_have_an_effect(case: st.Case) -> None:
     law = {"law": "weakening", "coefficient": 0.1, "static_coefficient": 0.3, "decay_speed": 0.02}
     assert told(case, "modes", law) == []
+    assert told(case, "modes", law, mu={"values": (0.0, 0.3)}) == []
     assert told(case, "onsets", law) == []
 
 

@@ -30,7 +30,10 @@ def without_effect(study: Study, case: Case, samples: Array) -> list[str]:
     """Sentences about parameters that leave mass, damping, stiffness, contacts, loads and motions as they are, and so
     every row, or that leave the matrices of the modes so. None where a model cannot be built: its rows say so."""
     told: list[str] = []
-    friction = float(samples[0, list(study.parameters).index(FRICTION)]) if FRICTION in study.parameters else None
+    friction: float | None = None
+    if FRICTION in study.parameters:
+        # The largest: without friction nothing of its laws is left, and neither would be an effect.
+        friction = float(samples[:, list(study.parameters).index(FRICTION)].max())
     for k, path in enumerate(study.parameters):
         table = path.split(".", 1)[0]
         values = np.unique(samples[:, k])
@@ -42,7 +45,8 @@ def without_effect(study: Study, case: Case, samples: Array) -> list[str]:
         if table in SETTINGS or _same_model(case, path, float(values[0]), float(values[-1])):
             told.append(f"{path} has no effect on {study.compute}: it changes nothing of the model")
         elif study.compute in ("modes", "onsets") and _same_modes(study, case, path, values, friction):
-            told.append(f"{path} has no effect on {study.compute}: the matrices of the modes are the same all over it")
+            same_there = "the matrices of the modes are the same at both ends and in the middle"
+            told.append(f"{path} has no effect on {study.compute}: {same_there}")
     return told
 
 
