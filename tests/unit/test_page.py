@@ -49,7 +49,7 @@ ENDS = {
         "shapes two-beams.toml --mu 0.2 --branch 8",
     ),
     "modes two-beams.toml --mu 0.01 --max-frequency 9e3": (
-        "none of 10 modes up to 9000 Hz is unstable at μ = 0.01", "onsets two-beams.toml --max-frequency 9000.0"
+        "none of 10 modes up to 9000 Hz is unstable at μ = 0.01", "onsets two-beams.toml --max-frequency 9000"
     ),
     "modes two-beams.toml --mu 0:0.2:11": (
         "unstable modes at 7 of 11 friction coefficients, the lowest 0.08; the fastest at μ = 0.2: ",
@@ -161,11 +161,21 @@ def test_what_was_asked_for_goes_into_the_next_command(folder: Path) -> None:
     done = stridor("modes", "two-beams.toml", "--mu", "0.2", *asked, cwd=folder)
     hint = shlex.split(done.stdout.partition("Next: ")[2].replace("\\\n", " "))
     assert hint[:4] == ["stridor", "shapes", "two-beams.toml", "--mu"]
-    assert {"--undamped", "--source", "receptance", "--max-frequency", "9000.0", "title='a, b'", "x y"} <= set(hint)
+    assert {"--undamped", "--source", "receptance", "--max-frequency", "9000", "title='a, b'", "x y"} <= set(hint)
     assert stridor(*hint[1:], "--quiet", cwd=folder).returncode == 0
     # What the next verb does not take is left out.
     steady = stridor("onsets", "two-beams.toml", "--range", "0:0.05", cwd=folder).stdout
     assert "--range" not in steady.partition("Next: ")[2]
+
+
+def test_what_does_not_slide_is_sent_to_nothing_that_needs_sliding(folder: Path) -> None:
+    text = (folder / "two-beams.toml").read_text()
+    (folder / "still.toml").write_text(text.replace("velocity = { x = 0.02 }", "velocity = { x = 0.0 }"))
+    checked = stridor("check", "still.toml", cwd=folder)
+    assert "no steady sliding: contact A does not slide" in " ".join(checked.stdout.split())
+    assert checked.stdout.splitlines()[-1] == "Next: stridor simulate still.toml"
+    marched = stridor("simulate", "still.toml", *COARSE, cwd=folder)
+    assert (marched.returncode, "Next" in marched.stdout) == (0, False)
 
 
 def test_a_command_breaks_between_options_only() -> None:

@@ -8,6 +8,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 import stridor as st
+from benches import paper_case
 from stridor.modal.krylov import refine
 from stridor.modal.quadratic import Quadratic
 from stridor.modal.quadratic.reach import fastest, searched
@@ -102,6 +103,13 @@ def test_a_heavy_mass_on_a_rigid_floor(band: float) -> None:
     # N = press + K₂₁ x pushes down on the floor, which moves in +x and drags by μN.
     omega = np.sqrt((k[0, 0] - 0.5 * k[1, 0]) / 1e4)
     assert found.frequency_hz[0] == pytest.approx([omega / (2 * np.pi)], rel=1e-6)
+
+
+def test_a_band_of_many_decades_has_the_onsets_of_one_that_ends_with_the_model() -> None:
+    """By receptance: its dense problems are scaled by the band, where they would lose the digits of what is slow."""
+    found, wide = (st.onsets(paper_case(), max_frequency_hz=band) for band in (1e8, 1e12))
+    assert len(found) == len(wide) > 2
+    assert [o.mu for o in wide.onsets] == pytest.approx([o.mu for o in found.onsets], rel=1e-10)
 
 
 def test_what_does_not_settle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,6 +65,10 @@ def check(call: Call) -> None:
         return
     for line in description.lines:
         stdout.print(line)
+    if work.has_contacts and not work.slides:  # there is nothing that modes and onsets could be about
+        if work.given is not None and work.given.phases:
+            call.suggest("simulate")
+        return
     call.suggest("onsets" if work.has_contacts else "modes")
 
 

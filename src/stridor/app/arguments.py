@@ -91,7 +91,7 @@ class Call:
 
         named = {"solver": self.solver, "source": source}
         given = {"--source": source, "--max-frequency": max_frequency, "--range": friction_range}
-        self.asked.extend((name, str(value)) for name, value in given.items() if value is not None)
+        self.asked.extend((name, _as_typed(value)) for name, value in given.items() if value is not None)
         self.asked.extend([("--undamped",)] if undamped else [])
         self.asked.extend([] if stepper is None else [("--set", f"temporal.stepper={stepper}")])
         own = [f"modal.{key}={json.dumps(name)}" for key, name in named.items() if name is not None]
@@ -301,6 +301,11 @@ def by_option(error: CaseError, options: Mapping[str, str], given: Mapping[str, 
         return options[own]
 
     return CaseError.many([replace(problem, where=where(problem.where)) for problem in error.problems])
+
+
+def _as_typed(value: object) -> str:
+    """A value of an option as one would type it: 10000, not 10000.0."""
+    return f"{value:.15g}" if isinstance(value, float) and float(f"{value:.15g}") == value else str(value)
 
 
 def _options(parameters: Iterable[inspect.Parameter]) -> dict[str, str]:

@@ -143,12 +143,13 @@ def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float]
     return Conclusion(said, "modes", (*own, "--set", f"{number.name}={new:.6g}"))
 
 
-def of_run(summary: dict[str, Any]) -> Conclusion:
-    """What vibrates at the end of a run in time; then both approaches side by side."""
+def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
+    """What vibrates at the end of a run in time; then both approaches side by side, where bodies slide steadily."""
     from ..temporal.signals import state_of
 
     if summary["dominant_frequency_hz"] is None:
-        return Conclusion("last phase: too few records for a dominant frequency, or nothing vibrates", "modes")
+        said = "last phase: too few records for a dominant frequency, or nothing vibrates"
+        return Conclusion(said, "modes" if slides else "")
     rate, fit = summary["growth_rate"], summary["growth_fit"]
     state, growth = "not saturated", "nowhere exponential growth"
     if rate is not None:
@@ -156,7 +157,7 @@ def of_run(summary: dict[str, Any]) -> Conclusion:
         growth = f"growth {measured(rate, 1)} 1/s where exponential"
     growth = "" if state == "of constant amplitude" else f"{growth}, "
     said = f"last phase: {measured(summary['dominant_frequency_hz'], 1)} Hz dominates, {growth}{state}"
-    return Conclusion(said, "compare")
+    return Conclusion(said, "compare" if slides else "")
 
 
 def of_reduced(

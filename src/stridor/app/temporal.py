@@ -127,7 +127,7 @@ def simulate(
         show_run(document)
         done = f"interrupted after {run.steps} of {run.planned_steps} steps"
         told = Conclusion(done, "simulate", ("--restart", str(path)))
-        call.conclude(told if run.interrupted else of_run(document))
+        call.conclude(told if run.interrupted else of_run(document, slides=work.slides or not work.has_contacts))
     if run.interrupted:
         raise typer.Exit(130)
 

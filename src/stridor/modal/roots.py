@@ -7,6 +7,7 @@ the simultaneous iteration of Ehrlich and Aberth with the known poles multiplied
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -216,6 +217,7 @@ def frictionless_roots(spectrum: ReceptanceProblem, limit: float) -> ComplexArra
     spectrum, own = _without_tangential(spectrum)
     starts: ComplexArray | None = None
     if spectrum.modes.proportional:
+        limit = min(limit, _beyond(spectrum))  # the dense problems are scaled by it
         starts = _dense_undamped(spectrum, limit)
     if starts is None:
         starts = dense_roots(spectrum, 0.0, 1.3 * limit)
@@ -232,6 +234,17 @@ def frictionless_roots(spectrum: ReceptanceProblem, limit: float) -> ComplexArra
         )
     roots = np.concatenate([roots, own])
     return roots[np.argsort(np.abs(roots), kind="stable")]
+
+
+def _beyond(spectrum: ReceptanceProblem) -> float:
+    """A rate [1/s] that no coupled eigenvalue of proportionally damped components exceeds at μ = 0: in modal
+    coordinates |λ|² ≤ |C| |λ| + |K| with the contacts' stiffness in K."""
+    compliance = spectrum.coupling.compliance
+    normal = spectrum.projections[0::2]
+    stiffness = float(np.abs(spectrum.modes.stiffness).max(initial=0.0))
+    elastic = compliance > 0
+    stiffness += float((normal[elastic] ** 2).sum(axis=1) @ (1.0 / compliance[elastic]))
+    return float(np.abs(spectrum.modes.damping).max(initial=0.0)) + math.sqrt(stiffness)
 
 
 def _without_tangential(spectrum: ReceptanceProblem) -> tuple[ReceptanceProblem, ComplexArray]:

@@ -154,6 +154,17 @@ class Workspace(Shown):
         return bool(system.lines) or any(solid.cells.keys() - {"vertex"} for solid in system.solids)
 
     @cached_property
+    def slides(self) -> bool:
+        """Whether contacts have a state of steady sliding, about which modes, onsets and a comparison are computed."""
+        if not self.has_contacts:
+            return False
+        try:
+            self.steady()
+        except AnalysisError:
+            return False
+        return True
+
+    @cached_property
     def own_friction(self) -> float | None:
         """The coefficient of all contacts at their slip speeds in steady sliding; None where they differ.
 
