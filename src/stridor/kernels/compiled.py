@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numba
-from numba.core import config
+from numba.core import config, types
 
 from .folder import kernel_folder
 from .linking import Closed
@@ -26,6 +27,7 @@ def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **o
         # Nobody calls them from C: an entry for that takes a sixth of the time to compile.
         chosen: dict[str, Any] = {"no_cfunc_wrapper": True, **options}
         dispatcher: Any = numba.njit(pipeline_class=Closed, **chosen)(plain)
+        dispatcher.get_call_template = partial(_without_literals, dispatcher.get_call_template)
         if cache and not _settings.DISABLE_JIT:  # which gives the plain function back
             folder = kernel_folder()
             if folder is not None:
@@ -33,3 +35,12 @@ def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **o
         return dispatcher
 
     return made if function is None else made(function)
+
+
+def _without_literals(template_of: Callable[..., Any], args: Any, keywords: Any) -> Any:
+    """How compiled code calls a function: one form for all whole numbers, where numba makes one for each constant."""
+
+    def kind(of: Any) -> Any:
+        return types.int64 if isinstance(of, types.IntegerLiteral) else of
+
+    return template_of(tuple(map(kind, args)), {key: kind(of) for key, of in keywords.items()})
