@@ -89,9 +89,10 @@ class Unclosed:
         )  # fmt: skip
 
 
-def next_change(motion: VariedMotion, until: float) -> tuple[str, int] | None:
-    """Go through the next change of contact, None where there is none for long."""
-    while motion.reach(until) < until:
+def next_change(motion: VariedMotion, until: float, stop: float = np.inf) -> tuple[str, int] | None:
+    """Go through the next change of contact, None where there is none before a time ``until``, or before ``stop`` [s of
+    processor time]."""
+    while motion.reach(until) < until and clock.process_time() < stop:
         assert motion.next is not None
         meaning, c = motion.next[1:]
         motion.passed()

@@ -16,6 +16,7 @@ from .chart import Chart
 from .parting import Unclosed, next_change, parting
 from .problem import SlidingProblem
 from .shooting import ClosedShot, close, distance, multipliers
+from .waiting import later_change, outcome
 
 NEAR = 0.02  # of the amplitude: returns so close are tried
 CLOSER = 0.3  # of the last one tried: what is tried next
@@ -24,7 +25,7 @@ ROUND = 1e-5  # of the amplitude: a cycle that goes round several times, and onc
 CHANGES = 4000
 LONGEST = 200  # changes in a period that returns are looked for over
 SECONDS = 120.0
-QUIET = 2000.0  # rad of the slowest mode without any change: the motion has come to rest, or sticks for good
+QUIET = 2000.0  # rad of the slowest mode without any change, before it is asked what the motion heads for
 GROWN = 1.2  # of the amplitude at which a mode would first change a contact
 
 
@@ -118,14 +119,18 @@ def cycles_reached(
     quiet = QUIET / float(moving.min(initial=1.0) if len(moving) else 1.0)  # [s]
     until = clock.process_time() + seconds  # so that what is found does not hang on what runs beside
     amplitude, last = 0.0, ""
+    away = distance(problem, motion.q, motion.v)  # from steady sliding, at the last change
     while len(passed) < CHANGES and clock.process_time() < until:
-        change = next_change(motion, (passed[-1].time if passed else 0.0) + quiet)
+        since = passed[-1].time if passed else 0.0
+        change = next_change(motion, since + quiet) or later_change(problem, motion, quiet, until)
         if change is None:
             if found:
                 return found
-            raise _at_rest(problem, motion, amplitude)
+            words, steady = outcome(problem, motion, away, since)
+            raise NoReturn(words, steady=steady)
         passed.append(_Met((*change, motion.status), motion.time, np.concatenate([scale * motion.q, motion.v])))
-        amplitude = max(amplitude, distance(problem, motion.q, motion.v))
+        away = distance(problem, motion.q, motion.v)
+        amplitude = max(amplitude, away)
         lag, off = _return(passed, amplitude)
         nearest = min(nearest, off)
         if not lag or off >= CLOSER * tried:
@@ -165,19 +170,6 @@ def same(one: ClosedShot, other: ClosedShot) -> bool:
         return False
     twice = other.word * 2
     return not one.word or any(twice[k : k + len(one.word)] == one.word for k in range(len(other.word)))
-
-
-def _at_rest(problem: SlidingProblem, motion: VariedMotion, before: float) -> NoReturn:
-    """What a motion ends in whose contacts do not change any more."""
-    assert motion.anchor is not None
-    if STICK in motion.status:
-        return NoReturn("contacts come to stick and stay so")
-    if motion.status != problem.status:
-        return NoReturn("contacts come to open or to turn, and stay so")
-    left = distance(problem, *motion.anchor.state(motion.anchor.time))
-    if left > 0.5 * before > 0.0:
-        return NoReturn("the motion swings on without any change of contact, neither growing nor dying out")
-    return NoReturn("the motion dies out: it comes to steady sliding", steady=True)
 
 
 def _return(met: list[_Met], amplitude: float) -> tuple[int, float]:
