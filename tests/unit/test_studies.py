@@ -26,7 +26,8 @@ from stridor.case import template_text
 from stridor.studies import reduced_rows
 from stridor.studies.parts import Part
 from stridor.studies.processes import forked
-from stridor.studies.rows import Row, failed, full_row
+from stridor.studies.rows import Row, failed, full_row, variables
+from stridor.studies.store import LATER, PENDING, OpenStore
 from stridor.studies.summary import answer
 from stridor.studies.tables import Keep
 from stridor.studies.task import SampleBatch, Task
@@ -608,3 +609,45 @@ def test_a_store_that_never_had_a_later_result_is_not_damaged(case: st.Case, tmp
     assert set(st.study_figures(older)) == {"over-mu"}
     assert "2 samples of simulate" in answer(older)
     assert stridor("plot", "now", cwd=tmp_path).returncode == 0
+
+
+def as_before(folder: Path, lacks: str) -> None:
+    """Make a store one that an earlier version began, which wrote no such result and no list of results."""
+    head = folder / "study.zarr" / "zarr.json"
+    shutil.rmtree(folder / "study.zarr" / lacks)
+    written = json.loads(head.read_text(encoding="utf-8"))
+    names = json.loads(written["attributes"].pop("columns"))
+    if lacks not in LATER:
+        written["attributes"]["columns"] = json.dumps([name for name in names if name != lacks])
+    made = json.loads(written["attributes"]["provenance"]) | {"programs": ["0.0.9 abc"]}
+    written["attributes"]["provenance"] = json.dumps(made)
+    head.write_text(json.dumps(written), encoding="utf-8")
+
+
+def test_a_store_without_a_later_result_is_gone_on_with(case: st.Case, tmp_path: Path) -> None:
+    short = case.with_({"phases": [{"name": "go", "duration": 2e-4}], "temporal.record_every": 1})
+    study = st.Study(case=short, compute="simulate", parameters={"mu": {"values": (0.1, 0.3)}})
+    st.run_study(study, tmp_path, workers=1)
+    as_before(tmp_path, "velocity_rms")
+    store = OpenStore.opened(tmp_path / "study.zarr", variables("simulate"))
+    store._put(next(v for v in store.variables if v.name == "status"), np.array([1]), {1: {"status": PENDING}})
+    with pytest.raises(st.CaseError, match=r"was begun by another stridor \(0.0.9 abc; .*--go-on"):
+        st.run_study(study, tmp_path, workers=1)
+    told: list[str] = []
+    found = st.run_study(study, tmp_path, workers=1, go_on=True, say=told.append)
+    assert np.isfinite(found.data["velocity_rms"].values).tolist() == [False, True]
+    line = "velocity_rms: not known of 1 row of an earlier stridor (NaN)"
+    assert f"warning: {line}" in told
+    assert line in found.notes
+    told.clear()
+    again = st.run_study(study, tmp_path, workers=1, say=told.append)
+    assert not [words for words in told if "velocity_rms" in words]
+    assert line in again.notes
+
+
+def test_a_store_that_cannot_be_completed_is_refused_with_the_reason(case: st.Case, tmp_path: Path) -> None:
+    study = st.Study(case=case, compute="modes", parameters={"mu": {"values": (0.1, 0.3)}})
+    st.run_study(study, tmp_path, workers=1)
+    as_before(tmp_path, "branch")
+    with pytest.raises(st.CaseError, match=r"an earlier stridor, which wrote no branch: .*--out"):
+        st.run_study(study, tmp_path, workers=1, go_on=True)
