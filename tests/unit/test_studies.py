@@ -522,6 +522,32 @@ def test_a_study_of_one_value_gives_its_answer(tmp_path: Path) -> None:
     assert not any("over-mu" in name for name in json.loads(again.stdout)["files"])
 
 
+def plotted(folder: Path, *options: str) -> tuple[int, str]:
+    done = stridor("plot", ".", *options, cwd=folder)
+    return done.returncode, " ".join(done.stdout.split())
+
+
+def test_that_there_is_nothing_to_draw_is_said_last(case: st.Case, tmp_path: Path) -> None:
+    st.run_study(st.Study(case=case, compute="steady", parameters={"mu": {"values": (0.1,)}}), tmp_path, workers=1)
+    code, said = plotted(tmp_path)
+    assert code == 0
+    assert said.endswith("1 sample of steady; no figure: no parameter has more than one value; results of the one sample "
+                         "are in the table of report.html")  # fmt: skip
+
+
+def test_what_figures_do_not_show_is_said_last(case: st.Case, tmp_path: Path) -> None:
+    study = st.Study(case=case, compute="steady", parameters={"mu": {"values": (0.1, 0.2, -0.3)}})
+    st.run_study(study, tmp_path, workers=1)
+    code, said = plotted(tmp_path)
+    assert code == 3
+    assert said.endswith("2 samples of steady; of the other samples 1 failed; the figures do not show these")
+    code, said = plotted(tmp_path, "--json")
+    told = json.loads(said)
+    assert (code, told["failed"], told["pending"], told["undrawn"]) == (3, 1, 0, "the figures do not show these")
+    assert told["notes"][0].startswith("1 row failed, the first: mu: -0.3")
+    assert [Path(name).name for name in told["files"]] == ["over-mu.png", "report.html"]
+
+
 def test_the_document_holds_no_more_than_plain_values(case: st.Case, tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
     text = 'case = "case.toml"\ncompute = "onsets"\nsampling = { method = "saltelli", samples = 4 }\nset = { "modal.friction_range" = [0.0, 2.0] }\n'
