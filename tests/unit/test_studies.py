@@ -21,12 +21,15 @@ import pytest
 import xarray as xr
 
 import stridor as st
+from matrix_cases import matrix_case
 from program import stridor
 from stridor.case import template_text
 from stridor.studies import reduced_rows
+from stridor.studies.effect import without_effect
 from stridor.studies.parts import Part
 from stridor.studies.processes import forked
 from stridor.studies.rows import Row, failed, full_row, variables
+from stridor.studies.sampling import samples
 from stridor.studies.store import LATER, PENDING, OpenStore
 from stridor.studies.summary import answer
 from stridor.studies.tables import Keep
@@ -115,6 +118,20 @@ def test_parameters_without_effect_are_told(case: st.Case, tmp_path: Path) -> No
         "warning: mu has the one value 0.1 in all samples",
         "warning: temporal.perturbation has no effect on modes: it changes nothing of the model",
     ]
+
+
+def test_a_number_that_counts_at_samples_alone_is_not_told_to_have_no_effect(tmp_path: Path) -> None:
+    """K grows by a · b, and b is 0 in the case: there, a changes nothing. c has a part in nothing."""
+    eye = np.eye(2)
+    terms = [(eye, "mass", ""), (np.diag([1.0, 4.0]), "stiffness", ""), (eye, "stiffness", "a*b")]
+    more = "[parameters]\na = { value = 1.0, range = [0.0, 2.0] }\nb = { value = 0.0, range = [0.0, 2.0] }\nc = { value = 0.0, range = [0.0, 2.0] }"
+    case = matrix_case(tmp_path, terms, 0.6, more=more)
+    varied = {f"parameters.{name}.value": {"range": (0.0, 2.0)} for name in "abc"}
+    study = st.Study(case=case, parameters=varied, sampling={"method": "sobol", "samples": 8})
+    told = without_effect(study, case, samples(study))
+    assert [line.partition(" ")[0] for line in told] == ["parameters.c.value"]
+    alone = st.Study(case=case, parameters={"parameters.a.value": {"values": (0.0, 2.0)}})
+    assert [line.partition(" ")[0] for line in without_effect(alone, case, samples(alone))] == ["parameters.a.value"]
 
 
 # -- who is killed -----------------------------------------------------------------------------------------------------
