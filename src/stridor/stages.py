@@ -32,6 +32,11 @@ def stage(what: str, *, logged: bool = True) -> None:
     _tell(Stage(what, time.monotonic()))
 
 
+def going_on(what: str) -> None:
+    """The stage that is under way in other words, such as how far it is; it began when it did."""
+    _tell(Stage(what, _now.began if _now is not None else time.monotonic()))
+
+
 @contextmanager
 def passing() -> Generator[None, None, None]:
     """Stages that begin within end with it, and what was under way before goes on. Also a decorator: a function that

@@ -12,6 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 import stridor
+import stridor as st
+from mode_coupling import mode_coupling
 from stridor.app import heartbeat, output
 from stridor.app.cli import app
 from stridor.app.heartbeat import ERASED, Heartbeat, beating, hush, silent
@@ -167,3 +169,13 @@ def test_verbose_says_what_was_chosen_and_stages_once(
     assert capsys.readouterr().err.splitlines()[-2:] == ["branches at 0.1", "modes"]
     with pytest.raises(CaseError, match="--verbose: says what --quiet leaves out; take one of them"):
         CliRunner().invoke(app, [*words, "--quiet"], catch_exceptions=False)
+
+
+def test_a_time_loop_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stridor.temporal.march.TOLD_SECONDS", 0.0)
+    told: list[Stage] = []
+    with heard(lambda now: told.append(now) if now is not None else None):
+        st.simulate(mode_coupling(0.02, 0.1).with_({"phases.0.duration": 5.0, "temporal.stepper": "explicit"}))
+    said = [now for now in told if now.what.startswith("time loop, ")]
+    assert said[-1].what == "time loop, 100 of 100 steps"
+    assert {now.began for now in said} == {next(n.began for n in told if n.what.startswith("time loop; "))}

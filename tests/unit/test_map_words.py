@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -85,6 +86,24 @@ def test_counts_lie_clear_of_rings():
     box = figure.axes[0].texts[1].get_window_extent()
     x, y = figure.axes[0].transData.transform(there)
     assert not (box.x0 - 2 < x < box.x1 + 2 and box.y0 - 2 < y < box.y1 + 2)
+
+
+def test_what_is_not_known_is_hatched():
+    """Of two modes that grow one leaves the band between x = 0.55 and 0.65; no curve tells where."""
+    columns = [(0.001, 1), (0.25, 1), (0.55, 1), (0.65, 0), (0.999, 0)]
+    counts_at = tuple(CountedAt(x, y, n + (y > 0.5)) for x, n in columns for y in (0.001, 0.25, 0.75, 0.999))
+    known = replace(boundary([0.5]), counted=counts_at)
+    middles = (np.arange(40) + 0.5) / 40
+    table, sure = known.shading(middles, middles)
+    inside = np.abs(middles - 0.6) < 0.05
+    assert np.array_equal(sure, np.repeat(~inside[:, None], 40, axis=1))
+    true = 1 * (middles < 0.6)[:, None] + (middles > 0.5)
+    assert np.array_equal(table[sure], true[sure])
+    figure = st.plot.stability_boundary(known)
+    assert counts(figure) == ["0", "1", "1", "2"]
+    assert keys(figure)[-1] == "how many grow is not known"
+    assert not clashes(figure)
+    assert "how many grow is not known" not in keys(st.plot.stability_boundary(boundary([0.5])))
 
 
 def test_numbers_of_a_boundary_have_their_units():

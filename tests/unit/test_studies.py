@@ -21,12 +21,16 @@ import pytest
 import xarray as xr
 
 import stridor as st
+from matrix_cases import matrix_case
 from program import stridor
 from stridor.case import template_text
 from stridor.studies import reduced_rows
+from stridor.studies.effect import without_effect
 from stridor.studies.parts import Part
 from stridor.studies.processes import forked
-from stridor.studies.rows import Row, failed, full_row
+from stridor.studies.rows import Row, failed, full_row, variables
+from stridor.studies.sampling import samples
+from stridor.studies.store import LATER, PENDING, OpenStore
 from stridor.studies.summary import answer
 from stridor.studies.tables import Keep
 from stridor.studies.task import SampleBatch, Task
@@ -114,6 +118,20 @@ def test_parameters_without_effect_are_told(case: st.Case, tmp_path: Path) -> No
         "warning: mu has the one value 0.1 in all samples",
         "warning: temporal.perturbation has no effect on modes: it changes nothing of the model",
     ]
+
+
+def test_a_number_that_counts_at_samples_alone_is_not_told_to_have_no_effect(tmp_path: Path) -> None:
+    """K grows by a · b, and b is 0 in the case: there, a changes nothing. c has a part in nothing."""
+    eye = np.eye(2)
+    terms = [(eye, "mass", ""), (np.diag([1.0, 4.0]), "stiffness", ""), (eye, "stiffness", "a*b")]
+    more = "[parameters]\na = { value = 1.0, range = [0.0, 2.0] }\nb = { value = 0.0, range = [0.0, 2.0] }\nc = { value = 0.0, range = [0.0, 2.0] }"
+    case = matrix_case(tmp_path, terms, 0.6, more=more)
+    varied = {f"parameters.{name}.value": {"range": (0.0, 2.0)} for name in "abc"}
+    study = st.Study(case=case, parameters=varied, sampling={"method": "sobol", "samples": 8})
+    told = without_effect(study, case, samples(study))
+    assert [line.partition(" ")[0] for line in told] == ["parameters.c.value"]
+    alone = st.Study(case=case, parameters={"parameters.a.value": {"values": (0.0, 2.0)}})
+    assert [line.partition(" ")[0] for line in without_effect(alone, case, samples(alone))] == ["parameters.a.value"]
 
 
 # -- who is killed -----------------------------------------------------------------------------------------------------
@@ -521,6 +539,32 @@ def test_a_study_of_one_value_gives_its_answer(tmp_path: Path) -> None:
     assert not any("over-mu" in name for name in json.loads(again.stdout)["files"])
 
 
+def plotted(folder: Path, *options: str) -> tuple[int, str]:
+    done = stridor("plot", ".", *options, cwd=folder)
+    return done.returncode, " ".join(done.stdout.split())
+
+
+def test_that_there_is_nothing_to_draw_is_said_last(case: st.Case, tmp_path: Path) -> None:
+    st.run_study(st.Study(case=case, compute="steady", parameters={"mu": {"values": (0.1,)}}), tmp_path, workers=1)
+    code, said = plotted(tmp_path)
+    assert code == 0
+    assert said.endswith("1 sample of steady; no figure: no parameter has more than one value; results of the one sample "
+                         "are in the table of report.html")  # fmt: skip
+
+
+def test_what_figures_do_not_show_is_said_last(case: st.Case, tmp_path: Path) -> None:
+    study = st.Study(case=case, compute="steady", parameters={"mu": {"values": (0.1, 0.2, -0.3)}})
+    st.run_study(study, tmp_path, workers=1)
+    code, said = plotted(tmp_path)
+    assert code == 3
+    assert said.endswith("2 samples of steady; of the other samples 1 failed; the figures do not show these")
+    code, said = plotted(tmp_path, "--json")
+    told = json.loads(said)
+    assert (code, told["failed"], told["pending"], told["undrawn"]) == (3, 1, 0, "the figures do not show these")
+    assert told["notes"][0].startswith("1 row failed, the first: mu: -0.3")
+    assert [Path(name).name for name in told["files"]] == ["over-mu.png", "report.html"]
+
+
 def test_the_document_holds_no_more_than_plain_values(case: st.Case, tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
     text = 'case = "case.toml"\ncompute = "onsets"\nsampling = { method = "saltelli", samples = 4 }\nset = { "modal.friction_range" = [0.0, 2.0] }\n'
@@ -608,3 +652,45 @@ def test_a_store_that_never_had_a_later_result_is_not_damaged(case: st.Case, tmp
     assert set(st.study_figures(older)) == {"over-mu"}
     assert "2 samples of simulate" in answer(older)
     assert stridor("plot", "now", cwd=tmp_path).returncode == 0
+
+
+def as_before(folder: Path, lacks: str) -> None:
+    """Make a store one that an earlier version began, which wrote no such result and no list of results."""
+    head = folder / "study.zarr" / "zarr.json"
+    shutil.rmtree(folder / "study.zarr" / lacks)
+    written = json.loads(head.read_text(encoding="utf-8"))
+    names = json.loads(written["attributes"].pop("columns"))
+    if lacks not in LATER:
+        written["attributes"]["columns"] = json.dumps([name for name in names if name != lacks])
+    made = json.loads(written["attributes"]["provenance"]) | {"programs": ["0.0.9 abc"]}
+    written["attributes"]["provenance"] = json.dumps(made)
+    head.write_text(json.dumps(written), encoding="utf-8")
+
+
+def test_a_store_without_a_later_result_is_gone_on_with(case: st.Case, tmp_path: Path) -> None:
+    short = case.with_({"phases": [{"name": "go", "duration": 2e-4}], "temporal.record_every": 1})
+    study = st.Study(case=short, compute="simulate", parameters={"mu": {"values": (0.1, 0.3)}})
+    st.run_study(study, tmp_path, workers=1)
+    as_before(tmp_path, "velocity_rms")
+    store = OpenStore.opened(tmp_path / "study.zarr", variables("simulate"))
+    store._put(next(v for v in store.variables if v.name == "status"), np.array([1]), {1: {"status": PENDING}})
+    with pytest.raises(st.CaseError, match=r"was begun by another stridor \(0.0.9 abc; .*--go-on"):
+        st.run_study(study, tmp_path, workers=1)
+    told: list[str] = []
+    found = st.run_study(study, tmp_path, workers=1, go_on=True, say=told.append)
+    assert np.isfinite(found.data["velocity_rms"].values).tolist() == [False, True]
+    line = "velocity_rms: not known of 1 row of an earlier stridor (NaN)"
+    assert f"warning: {line}" in told
+    assert line in found.notes
+    told.clear()
+    again = st.run_study(study, tmp_path, workers=1, say=told.append)
+    assert not [words for words in told if "velocity_rms" in words]
+    assert line in again.notes
+
+
+def test_a_store_that_cannot_be_completed_is_refused_with_the_reason(case: st.Case, tmp_path: Path) -> None:
+    study = st.Study(case=case, compute="modes", parameters={"mu": {"values": (0.1, 0.3)}})
+    st.run_study(study, tmp_path, workers=1)
+    as_before(tmp_path, "branch")
+    with pytest.raises(st.CaseError, match=r"an earlier stridor, which wrote no branch: .*--out"):
+        st.run_study(study, tmp_path, workers=1, go_on=True)

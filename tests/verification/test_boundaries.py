@@ -200,6 +200,37 @@ def test_of_many_small_islands_next_to_none_is_missed(tmp_path: Path) -> None:
     assert told[:, 0].sum() <= 0.02 * told[:, 1].sum()
 
 
+def test_shading_is_true_where_growing_modes_pass_the_highest_frequency(tmp_path: Path) -> None:
+    """Against the eigenvalues of a dense grid. The curve ends in the band; from there on growing modes leave it where no
+    curve is: what is not known there is a narrow strip, and all else is true."""
+    top = np.sqrt(2.265) / (2 * np.pi)  # ω on the curve at x = 0.53
+    found = st.stability_boundary(
+        flutter(tmp_path), "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0), max_frequency_hz=top
+    )
+    assert found.agree
+    assert any("growing modes pass the highest frequency" in note for note in found.notes)
+    assert any("band" in curve.ends for curve in found.curves)
+    middles = (np.arange(90) + 0.5) / 90
+    xs, ys = 3 * middles - 1, 3 * middles
+    table, known = found.shading(xs, ys)
+    x, mu = np.meshgrid(xs, ys, indexing="ij")
+    kappa = 2 + x / 2 + np.array([[[1]], [[-1]]]) * np.sqrt((x**2 / 4 + 1 - mu).astype(complex))
+    values = -C / 2 + np.array([1, -1])[:, None, None, None] * np.sqrt(C**2 / 4 - kappa)
+    grows = (values.real > 0) & (np.abs(values) <= 2 * np.pi * top)
+    true = np.count_nonzero(grows & (values.imag > 0), axis=(0, 1))
+    assert set(np.unique(true)) == {0, 1}
+    assert np.array_equal(table[known], true[known])
+    assert np.array_equal(found.unstable_modes_over(xs, ys), table)
+    strip = np.count_nonzero(~known, axis=0)
+    assert np.all(strip[60:] <= 2)
+    assert np.mean(strip[60:]) >= 0.5
+    assert not known.all()
+    assert np.mean(known) >= 0.99
+    clear = known[::7, ::7]
+    said = np.array([[found.unstable_modes(a, b) for b in ys[::7].tolist()] for a in xs[::7].tolist()])
+    assert np.array_equal(said[clear], true[::7, ::7][clear])
+
+
 def test_branches_that_all_but_meet_are_not_taken_for_one_another(tmp_path: Path) -> None:
     """(x − 1/2)(μ − 1/2) = 1e-4: two branches 1 % of the ranges from the saddle between them."""
     case = damped_by(tmp_path, "(x - 0.5)*(mu - 0.5) - 1e-4")

@@ -67,6 +67,64 @@ def test_mass_on_a_belt_sticks_and_slips():
                                                ["stops", "slips forward"], ["slips forward", "stops"])  # fmt: skip
 
 
+@pytest.mark.parametrize("speed", [2e-4, 2e-5, 2e-7])
+def test_a_mass_that_sticks_for_ages_lets_go_all_the_same(speed: float):
+    """It sticks for 2 (μs − μk) N / (k v), up to 160 000 periods of its own."""
+    (cycle,) = st.cycles(block_on_belt(law=StaticKinetic(0.3, 0.4), speed=speed), 0.3, push=0.3).cycles
+    stick, slip = 0.2 / speed, 2 * math.pi - 2 * math.atan(0.1 / speed)
+    assert cycle.period == pytest.approx(stick + slip, rel=1e-9)
+    assert cycle.shares[0, 1] == pytest.approx(stick / (stick + slip), rel=1e-9)
+
+
+def test_what_changes_no_contact_dies_out_only_where_it_does():
+    """Without damping it swings for ever; beyond its onset it grows, however slowly and from whatever is left of a push."""
+    still = block_on_belt(law=Coulomb(0.3), speed=1.0)
+    assert "swings on without any change of contact" in st.cycles(still, 0.3, push=0.1).missing[0]
+    case = mode_coupling(DAMPED, 0.1)
+    (onset,) = st.onsets(case, friction_range=(0.0, 1.0)).onsets
+    below = Family(st.Workspace(case).system()).at(0.9 * onset.mu)
+    with pytest.raises(NoReturn, match="it comes to steady sliding") as told:
+        cycles_reached(below, pushed(below, 1e-9))
+    assert told.value.steady
+    for beyond, push in ((1.0002, 1e-3), (1.002, 1e-9)):
+        problem = Family(st.Workspace(case).system()).at(beyond * onset.mu)
+        (closed,) = cycles_reached(problem, pushed(problem, push))[-1:]
+        assert closed.period == pytest.approx(1.0 / onset.frequency_hz, rel=0.1)
+
+
+def test_where_steady_sliding_is_not_found_the_other_frictions_are_answered(monkeypatch: pytest.MonkeyPatch):
+    at = Family.at
+
+    def lost(family: Family, mu: float):
+        if mu > 0.5:
+            raise st.AnalysisError("steady sliding: the set of touching nodes does not settle")
+        return at(family, mu)
+
+    monkeypatch.setattr(Family, "at", lost)
+    system = block_on_belt(law=StaticKinetic(0.3, 0.4), speed=0.2)
+    found = st.cycles(system, [0.3, 0.6], push=0.3)
+    assert [c.mu for c in found.cycles] == [0.3]
+    assert found.missing == ("μ = 0.6: steady sliding: the set of touching nodes does not settle",)
+    with pytest.raises(st.AnalysisError, match="does not settle"):
+        st.cycles(system, 0.6, push=0.3)
+
+
+def test_contacts_that_never_touch_have_no_slip_amplitude():
+    (cycle,) = st.cycles(block_on_belt(law=StaticKinetic(0.3, 0.4), speed=0.2), 0.3, push=0.3).cycles
+    beside = {
+        "slip_velocity": np.hstack([cycle.slip_velocity, 9.0 * cycle.slip_velocity]),
+        "status": np.hstack([cycle.status, np.zeros_like(cycle.status)]),
+        "shares": np.vstack([cycle.shares, [1.0, 0.0, 0.0]]),
+        "slip_range": np.vstack([cycle.slip_range, 9.0 * cycle.slip_range]),
+    }
+    assert replace(cycle, **beside).slip_amplitude == cycle.slip_amplitude > 0.0
+    assert replace(cycle, **beside).slip_amplitudes[1] == 0.0
+    # Of one that is open for a while, only what it does while it is closed counts.
+    closed = np.abs(cycle.slip_velocity[:, 0]) < 0.1 * np.abs(cycle.slip_range).max()
+    parted = replace(cycle, status=np.where(closed[:, None], cycle.status, 0), shares=np.array([[0.5, 0.2, 0.3]]))
+    assert parted.slip_amplitude < 0.3 * cycle.slip_amplitude
+
+
 @pytest.mark.parametrize("seeds", [range(8), pytest.param(range(8, 200), marks=pytest.mark.slow)], ids=["few", "many"])
 def test_the_variation_is_the_difference_of_two_motions(seeds: range):
     """Through sticking, slipping, parting and impacts of one or two contacts."""

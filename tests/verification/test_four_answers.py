@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 import stridor as st
+from marching import block_on_belt
 from mode_coupling import mode_coupling
 from program import stridor
 from stridor.agreement import GOOD_AMPLITUDE, Agreement, SettledVelocity
 from stridor.agreement.four_answers import FourAnswers, four_answers, with_answers
+from stridor.laws import StaticKinetic
 from stridor.temporal.signals import line_frequency
 
 pytestmark = pytest.mark.verification
@@ -197,3 +199,35 @@ def test_table_rows_and_document(compared: Agreement, tmp_path: Path):
     without = replace(compared, answers=())
     assert "answers" not in without.to_json()
     assert without.table()[0][-1] == "verdict"
+
+
+def test_a_run_beside_stable_sliding_has_settled_to_its_cycle():
+    """Stick–slip from a start far off, where every mode decays: two states at one friction."""
+    system = block_on_belt(law=StaticKinetic(0.25, 0.45), speed=0.3, stiffness=5.0, mass=2.0, damping=0.15, press=3.0)
+    case = st.Case(
+        units="nondimensional",
+        bodies={
+            "m": {"type": "mass", "mass": 2.0, "position": (0, 0), "initial_velocity": (0.5, 0.0)},
+            "belt": {
+                "type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (0, 1), "sliding": {"velocity": (0.3, 0)}
+            },
+        },
+        springs={"k": {"between": ("m", "ground"), "direction": (1, 0), "stiffness": 5.0}},
+        dashpots={"c": {"between": ("m", "ground"), "direction": (1, 0), "damping": 0.15}},
+        loads={"press": {"at": "m", "force": (0, -3)}},
+        contacts={
+            "rub": {
+                "slave": "m", "master": "belt", "stiffness": "rigid",
+                "friction": {"law": "static-kinetic", "coefficient": 0.25, "static_coefficient": 0.45},
+            }
+        },
+        modal={"max_frequency_hz": 2.0},
+        phases=[{"name": "slide", "duration": 400.0}],
+        temporal={"stepper": "exact", "step": 0.01, "record_every": 5, "watch": ["m"]},
+    )  # fmt: skip
+    (answer,) = st.compare(case, 0.25, critical=False, cycles=True).answers
+    (cycle,) = st.cycles(system, 0.25, push=0.5).cycles
+    assert answer.comparison.modal_eigenvalue.real < 0.0
+    assert answer.comparison.settled is not None
+    assert answer.comparison.settled.frequency_hz == pytest.approx(cycle.frequency_hz, rel=1e-6)
+    assert answer.agree is True

@@ -6,7 +6,7 @@ from .four_answers import GOOD_AMPLITUDE, CycleSeen, FourAnswers
 from .kept import PartStore
 from .perturbation import perturb
 from .result import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, SAME_DECAY, Agreement, Comparison
-from .settled import SettledVelocity, settled
+from .settled import SettledVelocity, last_rate, settled
 from .shapes import modal_assurance, mode_shape
 from .small_motion import LINEAR, PERTURBATION, Perturbation, linear_part
 
@@ -30,6 +30,7 @@ __all__ = [
     "compare",
     "critical_friction",
     "dominant_response",
+    "last_rate",
     "linear_part",
     "modal_assurance",
     "mode_shape",

@@ -30,7 +30,7 @@ from .critical import compare_critical
 from .kept import PartStore, Plain, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
 from .perturbation import modes_as_in_time, perturb, perturbation_step
 from .result import Agreement, Comparison, Critical, judge, likeness, overall
-from .settled import SettledVelocity, settled, settled_of
+from .settled import SettledVelocity, last_rate, settled, settled_of
 from .shapes import by_body, mode_shape, span_assurance
 from .small_motion import Perturbation, whole
 
@@ -265,7 +265,7 @@ class _At:
 
     def _answer(self, mu: float, run: Trajectory, modes: ComplexModes) -> _Answer:
         dominant, fitted = dominant_response(run, self.limit)
-        found, why = settled(run, dominant, fitted, float(modes.growth_rate[0].max(initial=0.0)))
+        found, why = settled(run, dominant, fitted, last_rate(modes))
         unstable = _unstable(modes, self.limit)
         responding = _responding(modes, unstable, dominant) if dominant else None
         if dominant is None or responding is None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..modal.results import ComplexModes
 from ..temporal.signals import Growth, line_frequency
 from ..temporal.trajectory import Trajectory
 from .kept import Plain
@@ -34,6 +35,12 @@ class SettledVelocity:
     def data(self) -> Plain:
         """Plain values, as they are kept."""
         return dict(vars(self))
+
+
+def last_rate(modes: ComplexModes) -> float:
+    """The growth rate [1/s] at the first μ of the mode that grows fastest, or dies out last; 0 where there is none."""
+    rates = modes.growth_rate[0]
+    return float(rates.max()) if rates.size else 0.0
 
 
 def settled(

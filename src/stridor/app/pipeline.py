@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..agreement import PartStore, dominant_response, modal_assurance, settled
+from ..agreement import PartStore, dominant_response, last_rate, modal_assurance, settled
 from ..digits import measured
 from ..errors import CaseError, StridorError
 from ..io.atomic import write_text
@@ -233,7 +233,7 @@ def _beside(inputs: ReportInputs, work: Workspace) -> str:
         return "it still grows"
     if other := other_in_time(work):
         return other
-    rate = 0.0 if inputs.modes is None else float(inputs.modes.growth_rate.max(initial=0.0))
+    rate = 0.0 if inputs.modes is None else last_rate(inputs.modes)
     found, why = settled(run, *dominant_response(run, work.modal.max_frequency_hz), rate)
     return "" if found is not None else why
 

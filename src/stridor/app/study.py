@@ -92,11 +92,12 @@ def _merged(call: Call) -> StudyResult:
 
 def _finish(call: Call, result: StudyResult, *, draw: bool) -> None:
     """Write the table, the figures and the page; say what came out."""
-    files = [result.path]
+    files, left = [result.path], ""
     call.say(f"written: {result.path}")
     if draw:
-        files += [call.tabulate(result, "study.csv"), *_drawn(call, result)]
-    _show(call, result, files)
+        drawn, left = _drawn(call, result)
+        files += [call.tabulate(result, "study.csv"), *drawn]
+    _show(call, result, files, left)
     if result.interrupted:
         heard()
         call.say("interrupted; the same command goes on from there")
@@ -105,10 +106,11 @@ def _finish(call: Call, result: StudyResult, *, draw: bool) -> None:
         raise typer.Exit(INCOMPLETE)
 
 
-def _drawn(call: Call, result: StudyResult) -> list[Path]:
-    """Figures and the page, beside the store."""
+def _drawn(call: Call, result: StudyResult) -> tuple[list[Path], str]:
+    """Figures and the page, beside the store; what they do not show."""
     from ..studies.page import write_page
     from ..studies.plots import study_figures
+    from ..studies.summary import undrawn
     from ..view.style import lay_out
 
     drawn = study_figures(result)
@@ -118,10 +120,10 @@ def _drawn(call: Call, result: StudyResult) -> list[Path]:
         files.append(call.draw(figure, f"{name}.png"))
     files.append(write_page(result, drawn, call.folder / "report.html"))
     call.say(f"written: {files[-1]}")
-    return files
+    return files, undrawn(result, len(drawn))
 
 
-def _show(call: Call, result: StudyResult, files: list[Path]) -> None:
+def _show(call: Call, result: StudyResult, files: list[Path], left: str) -> None:
     from ..studies.summary import answer, failures, tables
     from .output import stdout
     from .tables import table
@@ -138,7 +140,7 @@ def _show(call: Call, result: StudyResult, files: list[Path]) -> None:
         stdout.print(f"failed, {number} of {len(result.status)} rows: {text}")
     for note in result.notes:
         stdout.print(note)
-    call.conclude(Conclusion(answer(result)))
+    call.conclude(Conclusion("; ".join(filter(None, (answer(result), left if left.startswith("no figure") else "")))))
 
 
 def document(result: StudyResult) -> dict[str, Any]:
@@ -180,21 +182,24 @@ def document(result: StudyResult) -> dict[str, Any]:
 def plot(call: Call) -> None:
     """The figures of a study again, from its store alone."""
     from ..studies.result import open_study
+    from ..studies.summary import answer
 
     result = open_study(call.path)
     if call.out is None:
         call = replace(call, out=result.path.parent)
     call.claim()
-    files = _drawn(call, result)
+    files, left = _drawn(call, result)
     if call.json:
-        call.document({"files": [str(f) for f in files]})
+        told = {"answer": answer(result), "failed": len(result.failed), "pending": result.pending, "undrawn": left}
+        call.document({**told, "notes": list(result.notes), "files": [str(f) for f in files]})
     else:
-        from ..studies.summary import answer
         from .output import stdout
 
         for note in result.notes:  # what is not computed, failed, or not to be trusted
             stdout.print(note)
-        call.conclude(Conclusion(answer(result)))
+        call.conclude(Conclusion("; ".join(filter(None, (answer(result), left)))))
+    if len(result.failed) or result.pending:
+        raise typer.Exit(INCOMPLETE)
 
 
 VERBS = {"study": study, "plot": plot}

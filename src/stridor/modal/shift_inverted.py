@@ -66,4 +66,7 @@ def transposed_solve(factor: Lu, right: Any) -> Any:
     """A⁻ᵀ right; for a real matrix and complex right sides in real arithmetic."""
     if factor[0].dtype.kind == "c" or right.dtype.kind != "c":
         return sl.lu_solve(factor, right, trans=1)
-    return sl.lu_solve(factor, right.real, trans=1) + 1j * sl.lu_solve(factor, right.imag, trans=1)
+    solved = sl.lu_solve(factor, right.real, trans=1).astype(complex)
+    few = np.flatnonzero(np.any(right.imag, axis=0)) if right.ndim > 1 else slice(None)  # of real problems
+    solved.imag[..., few] = sl.lu_solve(factor, right.imag[..., few], trans=1)
+    return solved

@@ -112,9 +112,19 @@ class Cycle(Shown):
         return self.own_off > OWN
 
     @property
+    def slip_amplitudes(self) -> Array:
+        """Half the range (m,) of the slip velocity [m/s] of each contact while it is closed; 0 where it never is."""
+        whole = 0.5 * (self.slip_range[:, 1] - self.slip_range[:, 0])
+        closed = self.status != OPEN
+        highest = np.where(closed, self.slip_velocity, -np.inf).max(axis=0)
+        lowest = np.where(closed, self.slip_velocity, np.inf).min(axis=0)
+        rubbed = 0.5 * np.where(closed.any(axis=0), highest - lowest, 0.0)
+        return np.where(closed.all(axis=0) & (self.shares[:, 0] == 0.0), whole, rubbed)
+
+    @property
     def slip_amplitude(self) -> float:
-        """Half the range of the slip velocity [m/s], of the contact where it is largest."""
-        return 0.5 * float((self.slip_range[:, 1] - self.slip_range[:, 0]).max())
+        """Half the range of the slip velocity [m/s] while it is closed, of the contact where it is largest."""
+        return float(self.slip_amplitudes.max(initial=0.0))
 
     def amplitude(self, quantity: str = "acceleration") -> dict[str, tuple[float, ...]]:
         """Half the range of each watched point's x, y (and z), of "displacement", "velocity" or "acceleration"."""

@@ -18,7 +18,7 @@ from ..temporal.steppers.exact.varied import VariedMotion
 from ..temporal.steppers.sparse.stepper import with_friction
 from ..typing import Array
 
-HORIZON = 1e5  # rad of the slowest mode: longer than a motion is ever followed
+HORIZON = 1e9  # rad of the slowest mode: longer than a motion is ever followed
 
 
 @dataclass(frozen=True)

@@ -30,14 +30,13 @@ def later_change(problem: SlidingProblem, motion: VariedMotion, quiet: float, un
     reached = motion.time
     for _ in range(ROUNDS):
         anchor = _anchor(motion)
-        reached = max(reached, anchor.time)
-        if _kept(anchor) or clock.process_time() > until:
+        if anchor is None or _kept(anchor, problem.piece.end) or clock.process_time() > until:
             return None
         ahead = _expected(anchor)
-        change = next_change(motion, reached + (LATER * ahead if np.isfinite(ahead) else quiet), until)
+        reached = max(reached, anchor.time) + (LATER * ahead if np.isfinite(ahead) else quiet)
+        change = next_change(motion, reached, until)
         if change is not None:
             return change
-        reached += LATER * ahead if np.isfinite(ahead) else quiet
     return None
 
 
@@ -45,23 +44,23 @@ def outcome(problem: SlidingProblem, motion: VariedMotion, begun: float, since: 
     """What a motion without further changes since a time [s] ends in, and whether that is steady sliding; begun: how
     far it was from that then."""
     anchor = _anchor(motion)
-    kept, lasting = _kept(anchor), f"no contact changes within {anchor.time - since:.3g} s"
+    kept = anchor is not None and _kept(anchor, problem.piece.end)
+    lasting = f"no contact changes within {motion.time - since:.3g} s"
     more = "" if kept else f" as far as it was followed: {lasting}"
     if STICK in motion.status:
         return f"contacts come to stick and stay so{more}", False
     if motion.status != problem.status:
         return f"contacts come to open or to turn, and stay so{more}", False
-    grows, decays = _growing(anchor), _decaying(anchor)
-    left = np.abs(anchor.zeta) > STEADY * max(begun, 1e-300)
-    if np.any(grows):
+    if anchor is not None and np.any(_growing(anchor)):
         return f"steady sliding is unstable, but {lasting}: growth takes longer than it was followed", False
-    if not kept or np.any(left & ~decays):
+    if not kept or anchor is None or np.any(~_decaying(anchor) & (np.abs(anchor.zeta) > STEADY * max(begun, 1e-300))):
         return f"the motion swings on without any change of contact, neither growing nor dying out ({lasting})", False
     return "the motion dies out: it comes to steady sliding", True
 
 
-def _anchor(motion: VariedMotion) -> Anchor:
-    assert motion.anchor is not None
+def _anchor(motion: VariedMotion) -> Anchor | None:
+    """The modes that a motion is in; None at the end of all times."""
+    motion.reach(motion.time)
     return motion.anchor
 
 
@@ -80,12 +79,14 @@ def _numbers(anchor: Anchor) -> Array:
     return anchor.watched.slow @ anchor.terms.T
 
 
-def _kept(anchor: Anchor) -> bool:
-    """Whether no number of the status can come to zero any more."""
+def _kept(anchor: Anchor, end: float) -> bool:
+    """Whether no number of the status can come to zero any more, up to a time [s]."""
     slow = _numbers(anchor)
+    powers = (end - anchor.time) ** np.arange(slow.shape[1])
     swing = np.abs(anchor.watched.weights) @ np.abs(anchor.zeta)
     size = np.abs(slow).max(axis=1, initial=0.0)
-    drifts = slow.shape[1] > 1 and bool(np.any(np.abs(slow[:, 1:]) > STILL * np.maximum(size, 1e-300)[:, None]))
+    changed = np.abs(slow * powers)[:, 1:].max(axis=1, initial=0.0)
+    drifts = bool(np.any(changed > STILL * np.maximum(size, 1e-300)))
     return not drifts and not np.any(_growing(anchor)) and bool(np.all(slow[:, 0] > swing))
 
 

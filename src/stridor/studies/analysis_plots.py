@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -124,7 +125,7 @@ def _steady(result: StudyResult) -> list[_Panel]:
     states = _states("open", nodes["open"], nodes["sticking"], nodes["slipping"])
     panels = [
         _Panel("normal force [N]", (_Line(numbers(result, "normal_force"), "sum of all contacts"),)),
-        _Panel("share of contact nodes", states, share=True),
+        _Panel(f"share of {_how_many(result)}", states, share=True),
     ]
     if not _single(result):
         panels.insert(1, _Panel("largest of a node [N]", (_Line(numbers(result, "largest_node_force"), ""),)))
@@ -143,14 +144,24 @@ def _states(apart: str, separation: Array, stick: Array, slip: Array) -> tuple[_
 
 def _single(result: StudyResult) -> bool:
     """Whether there is one contact node, whose force is the sum."""
-    counts = [numbers(result, f"{name}_nodes") for name in ("open", "sticking", "slipping")]
-    return bool(np.max(np.sum(counts, axis=0), initial=0.0) <= 1)
+    return bool(np.max(_totals(result), initial=0.0) <= 1)
+
+
+def _totals(result: StudyResult) -> Array:
+    """How many contact nodes (n,) there are."""
+    return np.sum([numbers(result, f"{name}_nodes") for name in ("open", "sticking", "slipping")], axis=0)
+
+
+def _how_many(result: StudyResult) -> str:
+    """The contact nodes in words, with their number where there are several, as many in all samples."""
+    totals = np.unique(_totals(result)).astype(int).tolist()
+    return f"{totals[0]} contact nodes" if len(totals) == 1 and totals[0] > 1 else "contact nodes"
 
 
 def _nodes(result: StudyResult) -> dict[str, Array]:
     """Shares (n,) of the contact nodes by what they do; NaN where there are none."""
+    total = _totals(result)
     counts = {name: numbers(result, f"{name}_nodes") for name in ("open", "sticking", "slipping")}
-    total = np.sum(list(counts.values()), axis=0)
     return {name: np.where(total > 0, count / np.maximum(total, 1), np.nan) for name, count in counts.items()}
 
 
@@ -166,11 +177,12 @@ def _simulate(result: StudyResult) -> list[_Panel]:
 
 
 def _by_growth(result: StudyResult) -> tuple[_Line, ...]:
-    """How strongly runs vibrate: filled where growth has ended, as others would go on to vibrate more."""
-    rms, ended = numbers(result, "velocity_rms"), numbers(result, "saturated") == 1
+    """How strongly runs vibrate: filled where growth has ended or the amplitude does not change, as others would go on
+    to vibrate more."""
+    rms, ended = numbers(result, "velocity_rms"), numbers(result, "saturated") >= 1
     every = np.ones(len(rms), dtype=bool)
     return (
-        _Line(np.where(ended, rms, np.nan), "growth has ended", filled=every, joined=False),
+        _Line(np.where(ended, rms, np.nan), "growth has ended, or none", filled=every, joined=False),
         _Line(np.where(ended, np.nan, rms), "not ended, or not known", filled=~every, joined=False),
     )
 
@@ -211,8 +223,14 @@ def maps(result: StudyResult, x: str | None = None, y: str | None = None) -> Fig
         ax.set_title(label)
         known = np.isfinite(values)
         drawn = marks(ax, at, known, c=values[known], cmap="viridis")
-        drawn.set_clim(*((0.0, 1.0) if share else _colours(values[known])))
-        figure.colorbar(drawn, ax=ax, pad=0.02)
+        low, high = _colours(values[known], from_zero=share)
+        drawn.set_clim(low, high)
+        even = known.any() and _even(values[known])
+        if even:  # one colour, as other ones would be those of nothing
+            drawn.set_cmap(ListedColormap([drawn.get_cmap()(0.5 if np.any(values[known]) else 0.0)]))
+        bar = figure.colorbar(drawn, ax=ax, pad=0.02)
+        if even:
+            bar.set_ticks([0.5 * (low + high)], labels=[f"{float(np.mean(values[known])):.5g}"])
         along(result, ax, x, "x")
         along(result, ax, y, "y")
         if k + 2 >= len(shown):  # nothing below it
@@ -228,25 +246,34 @@ def maps(result: StudyResult, x: str | None = None, y: str | None = None) -> Fig
     return figure
 
 
-def _colours(values: Array) -> tuple[float, float]:
-    """Ends of the colours of values; what is even but for rounding has one."""
+def _even(values: Array) -> bool:
+    """Whether values (n,) are the same but for rounding."""
+    low, high = float(values.min()), float(values.max())
+    return high - low <= EVEN * max(abs(low), abs(high))
+
+
+def _colours(values: Array, *, from_zero: bool) -> tuple[float, float]:
+    """Ends of the colours of values (n,): theirs, of shares zero and the largest, as few nodes that open would be one
+    colour with none of all; what is even but for rounding has the middle one."""
     if not values.size:
         return 0.0, 1.0
     low, high = float(values.min()), float(values.max())
-    size = max(abs(low), abs(high))
-    return (low - 0.01 * size, high + 0.01 * size) if high - low <= EVEN * size else (low, high)
+    if _even(values):
+        size = 0.01 * max(abs(low), abs(high)) or 1.0
+        return low - size, high + size
+    return (min(low, 0.0) if from_zero else low), high
 
 
 def _mapped(result: StudyResult) -> Sequence[tuple[str, Array, bool]]:
-    """Titles and values (n,) of the panels of a map, and whether they are shares."""
+    """Titles and values (n,) of the panels of a map, and whether they are shares, whose colours begin at zero."""
     if result.compute == "steady":
-        nodes = _nodes(result)
+        nodes, of = _nodes(result), _how_many(result)
         largest = ("largest force of a node [N]", numbers(result, "largest_node_force"), False)
         return (
             ("normal force of all contacts [N]", numbers(result, "normal_force"), False),
             *(() if _single(result) else (largest,)),
-            ("share of contact nodes open", nodes["open"], True),
-            ("share of contact nodes in stick", nodes["sticking"], True),
+            (f"share of {of} open", nodes["open"], True),
+            (f"share of {of} in stick", nodes["sticking"], True),
         )
     if result.compute != "simulate":
         raise AnalysisError(f"these maps are of steady sliding and of runs, and the study computed {result.compute}")

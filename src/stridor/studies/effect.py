@@ -22,13 +22,16 @@ from .schema import Study
 
 SETTINGS = ("modal", "temporal", "comparison", "phases", "steady")  # change what is computed, not the model
 IN_TIME = ("simulate", "compare")
+TRIES = 3  # samples, until one makes a model
 SAME = 1e-12  # of the largest of a row and a column: matrices no further apart are the same
 _SKIPPED = {"answers", "of_matrices", "stress_stiffness", "line_rows"}
 
 
 def without_effect(study: Study, case: Case, samples: Array) -> list[str]:
     """Sentences about parameters that leave mass, damping, stiffness, contacts, loads and motions as they are, and so
-    every row, or that leave the matrices of the modes so. None where a model cannot be built: its rows say so."""
+    every row, or that leave the matrices of the modes so: with the others as in the case, and as in one sample, as a
+    number that is multiplied by one that the case has as zero changes nothing there alone. None where a model cannot be
+    built: its rows say so."""
     told: list[str] = []
     friction: float | None = None
     if FRICTION in study.parameters:
@@ -42,12 +45,38 @@ def without_effect(study: Study, case: Case, samples: Array) -> list[str]:
             continue
         if path == FRICTION or (table in SETTINGS and not _idle(table, study)):
             continue
-        if table in SETTINGS or _same_model(case, path, float(values[0]), float(values[-1])):
+        if table in SETTINGS:
             told.append(f"{path} has no effect on {study.compute}: it changes nothing of the model")
+            continue
+        ends = float(values[0]), float(values[-1])
+        if _same_model(case, path, *ends):
+            sampled = _at_a_sample(study, case, samples, path)
+            if sampled is None or _same_model(sampled, path, *ends):
+                told.append(f"{path} has no effect on {study.compute}: it changes nothing of the model")
         elif study.compute in ("modes", "onsets") and _same_modes(study, case, path, values, friction):
-            same_there = "the matrices of the modes are the same at both ends and in the middle"
-            told.append(f"{path} has no effect on {study.compute}: {same_there}")
+            sampled = _at_a_sample(study, case, samples, path)
+            if sampled is None or _same_modes(study, sampled, path, values, friction):
+                same_there = "the matrices of the modes are the same at both ends and in the middle"
+                others = "" if sampled is None else ", the others as in the case and as in a sample"
+                told.append(f"{path} has no effect on {study.compute}: {same_there}{others}")
     return told
+
+
+def _at_a_sample(study: Study, case: Case, samples: Array, path: str) -> Case | None:
+    """The case with all parameters but this one, and but friction, as in one of the samples (n, p); None where there is
+    no other, and where none of a few makes a case."""
+    others = [k for k, name in enumerate(study.parameters) if name not in (path, FRICTION)]
+    names = list(study.parameters)
+    if not others:
+        return None
+    for row in np.random.default_rng(study.sampling.seed).permutation(len(samples))[:TRIES].tolist():
+        try:
+            found = case.with_({names[k]: float(samples[row, k]) for k in others})
+            build_system(found)
+        except StridorError:
+            continue
+        return found
+    return None
 
 
 def _same_modes(study: Study, case: Case, path: str, values: Array, friction: float | None) -> bool:

@@ -207,6 +207,7 @@ class StudyResult(Tabular, Shown):
                 told.append(f"in {counted(open_, 'row')} it is not decided whether they do (`note` says why)")
         elif noted:
             told.append(f"{counted(noted, 'row')} with something against the result (`note`)")
+        told += self._told("completed") or []
         told += self._told("without_effect") or []
         return tuple(told)
 

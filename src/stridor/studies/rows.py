@@ -18,6 +18,7 @@ from ..modal.onset import Onsets
 from ..modal.results import grows
 from ..study.analyses import compare, modes, onsets, simulate, steady_sliding, summarise
 from ..study.workspace import Unsaved, Workspace
+from ..temporal.signals import Growth
 from ..temporal.trajectory import Trajectory
 from ..typing import ComplexArray, IntArray
 from .checks import FRICTION
@@ -150,6 +151,13 @@ def _steady(work: Workspace, mu: float | None, keep: Keep) -> Row:
     }
 
 
+def _state(growth: Growth | None) -> int:
+    """What the loudest line of a run does, as a number."""
+    if growth is None:
+        return -1
+    return 1 if growth.saturated else 2 if growth.state == "of constant amplitude" else 0
+
+
 def _simulate(work: Workspace, mu: float | None, keep: Keep) -> Row:
     run = simulate(work, mu)
     found = summarise(work, run)
@@ -157,7 +165,7 @@ def _simulate(work: Workspace, mu: float | None, keep: Keep) -> Row:
         "dominant_frequency_hz": _number(found.dominant_frequency_hz),
         "velocity_rms": _velocity_rms(run),
         "growth_rate_in_time": _number(found.growth_rate),
-        "saturated": -1 if found.growth is None else int(found.growth.saturated),
+        "saturated": _state(found.growth),
         "energy_error": float(found.energy.error),
         "steps": run.steps,
     }
@@ -258,7 +266,10 @@ _VARIABLES: dict[str, tuple[StoreColumn, ...]] = {
             "velocity_rms", "f8", "m/s", "rms of the velocity that has it about its mean, second half of the last phase"
         ),
         StoreColumn("growth_rate_in_time", "f8", "1/s", "growth rate of the run, where it grows exponentially"),
-        StoreColumn("saturated", "i1", "", "1 where growth has ended in the run, 0 where not, -1 unknown"),
+        StoreColumn(
+            "saturated", "i1", "",
+            "1 where growth has ended in the run, 2 where the amplitude does not change, 0 where it does, -1 unknown",
+        ),
         StoreColumn("stick_fraction", "f8", "1", "share of the last phase in stick, mean of the contacts"),
         StoreColumn("slip_fraction", "f8", "1", "share of the last phase in slip"),
         StoreColumn("separation_fraction", "f8", "1", "share of the last phase without contact"),

@@ -19,6 +19,7 @@ from ..case.units import unit_at
 from ..errors import AnalysisError, CaseError
 from ..interrupts import held
 from ..io.claims import claimed
+from ..notebook import counted
 from ..stages import stage
 from ..study.case_key import files_of
 from ..study.fingerprint import contents
@@ -131,6 +132,11 @@ class _Run:
         if path.exists():
             store = OpenStore.opened(path, columns)
             self._check(store, digest)
+            if added := store.complete():
+                computed = int(np.count_nonzero(store.status == DONE))
+                line = f"{', '.join(added)}: not known of {counted(computed, 'row')} of an earlier stridor (NaN)"
+                store.note(completed=[*(store.told("completed") or ()), line])
+                self.say(f"warning: {line}")
             return store
         values = samples(self.study)
         numbers = np.arange(len(values)) if self.part is None else self.part.numbers(len(values))

@@ -81,8 +81,29 @@ class OpenStore:
     def opened(path: Path, variables: Sequence[StoreColumn]) -> OpenStore:
         """One that is there. Raises CaseError for what is none, and for one of a newer stridor."""
         group = _group(path, "r+")
-        _require(path, group, [v.name for v in variables])
+        _require(path, group, _written(path, group))
         return OpenStore(path, group, variables)
+
+    def complete(self) -> list[str]:
+        """Add the results that the store lacks as an earlier version wrote it; returns their names. Rows that are there
+        have NaN. Raises CaseError for a result of which nothing says that it is not known."""
+        there = _written(self.path, self._group)
+        lacking = [v for v in self.variables if v.name not in there]
+        if told := [v.name for v in lacking if v.dtype != "f8" or v.inner]:
+            raise CaseError(
+                str(self.path), None,
+                f"was begun by an earlier stridor, which wrote no {', '.join(told)}: they cannot be completed. Remove "
+                "the store, or name another folder (--out), and all is computed anew",
+            )  # fmt: skip
+        status = self._group["status"]
+        with self._disk_told(), _every_chunk():
+            for variable in lacking:
+                if variable.name in self._group:
+                    del self._group[variable.name]  # where an earlier attempt was killed
+                _array(self._group, variable, status.shape[0], status.chunks[0], {})[:] = _FILL[variable.dtype]
+        if lacking:
+            self.note(**{COLUMNS: [v.name for v in self.variables]})
+        return [v.name for v in lacking]
 
     @property
     def head(self) -> Head:
@@ -194,6 +215,17 @@ def _every_chunk() -> Any:
     return _zarr().config.set({"array.write_empty_chunks": True})
 
 
+def _written(path: Path, group: Any) -> list[str]:
+    """Names of the results that the version which wrote a store put into it. Raises CaseError where it does not say."""
+    if COLUMNS in group.attrs:
+        return list(json.loads(group.attrs[COLUMNS]))
+    try:
+        names = [v.name for v in variables_of(head_of(path, group).study["compute"])]
+    except KeyError:
+        raise CaseError(str(path), None, "a damaged store: it does not say what was computed") from None
+    return [name for name in names if name not in LATER]
+
+
 def _require(path: Path, group: Any, names: Sequence[str]) -> None:
     """Raises CaseError where an array is gone, or a chunk: of a row that counts as computed, or of the parameters."""
     wanted = [*json.loads(group.attrs["parameters"]), "number", *names]
@@ -303,12 +335,7 @@ def dataset(path: Path) -> Any:
     import xarray as xr
 
     group = _group(path, "r")
-    try:
-        names = [v.name for v in variables_of(head_of(path, group).study["compute"])]
-        names = json.loads(group.attrs.get(COLUMNS, json.dumps([name for name in names if name not in LATER])))
-    except KeyError:
-        raise CaseError(str(path), None, "a damaged store: it does not say what was computed") from None
-    _require(path, group, names)
+    _require(path, group, _written(path, group))
     parameters = json.loads(group.attrs["parameters"])
     rows = group["status"].shape[0]  # others are longer where a study was stopped while samples were added
     variables: dict[str, Any] = {}

@@ -31,6 +31,17 @@ def answer(result: StudyResult) -> str:
     return _answer(result) + (f"; of the other samples {', '.join(left)}" if left and result.done.any() else "")
 
 
+def undrawn(result: StudyResult, figures: int) -> str:
+    """What so many figures do not show, in words that go on from `answer`; "" where they show every sample."""
+    if not figures:
+        done = int(result.done.sum())
+        if not done:
+            return "no figure: no sample has a result"
+        where = "results of the one sample" if done == 1 else f"results of {done} samples"
+        return f"no figure: no parameter has more than one value; {where} are in the table of report.html"
+    return "the figures do not show these" if len(result.failed) or result.pending else ""
+
+
 def _answer(result: StudyResult) -> str:
     done = int(result.done.sum())
     if not done:

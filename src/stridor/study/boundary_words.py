@@ -81,8 +81,8 @@ def told(
         warnings.append(f"{counted(failed, 'point')} of the curves not found again in the full problem")
     if found.passing:
         notes.append(
-            "growing modes pass the highest frequency: between curves their number is that of the nearest counted "
-            "point, and may change where no curve is"
+            "growing modes pass the highest frequency: their number changes where no curve is, which was counted on a "
+            "mesh and is known but for strips that the figure hatches"
         )
     if plane.reversible and found.curves:
         notes.append(

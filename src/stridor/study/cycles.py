@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import interrupts
-from ..errors import CaseError
+from ..errors import AnalysisError, CaseError
 from ..periodic import Cycle, CycleBranch, CycleOnset, Cycles, Family, Unclosed, unfinished, why_not_shooting
 from ..periodic.harmonic import HarmonicFamily, why_not_harmonic
 from ..system import System
@@ -169,8 +169,15 @@ class _CycleSearch:
                 if missing := self.tracer.from_onset(number, onset, self.onsets):
                     self.missing.append(missing)
             looked += self._more(values) if self.method.name == "shooting" else []
+        unanswered: list[AnalysisError] = []
         for mu in looked:
-            self._at(mu)
+            try:
+                self._at(mu)
+            except AnalysisError as error:  # of this μ: the others have their answers all the same
+                unanswered.append(error)
+                self.missing.append(f"μ = {mu:.6g}: {error}")
+        if unanswered and len(unanswered) == len(looked) and not self._count():
+            raise unanswered[0]
 
     def _more(self, values: list[float]) -> list[float]:
         """Where else in the range cycles are looked for."""

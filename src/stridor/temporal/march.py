@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import AnalysisError
 from ..interrupts import HeldSignals, at_once, held
+from ..stages import going_on
 from .observe import Observer
 from .pace import Pace
 from .phase_results import PhaseResults
@@ -77,8 +78,10 @@ class March:
                 now = clock.perf_counter()
                 self.wall = now - started
                 pace.end(taken, now - before)
-                if progress is not None and (now - last_told > TOLD_SECONDS or stepper.done == steps):
-                    progress(stepper.done, steps)
+                if now - last_told > TOLD_SECONDS or stepper.done == steps:
+                    going_on(f"time loop, {stepper.done} of {steps} steps")
+                    if progress is not None:
+                        progress(stepper.done, steps)
                     last_told = now
                 if checkpoint is not None and now - last_saved > every_seconds:
                     checkpoint(self._trajectory(interrupted=True))

@@ -28,14 +28,16 @@ from .style import legend_above, panel, root_figure, styled
 RASTER = 240  # points along each number in which regions are shaded
 CLEAR = 7.0  # [pt] about the middle of a number: half of two digits, and of the line beside them
 RING = 3.0  # [pt]: radius of a ring
+UNKNOWN, HATCH = "#E3E3E3", 6 * "/"
 SHADES = ("#FFFFFF", "#F7E3D4", "#EFC9AE", "#E4AA86", "#D58A63", "#C26C46")
 
 
 @styled
 def stability_boundary(result: Boundary, *, ax: Axes | None = None) -> Figure:
     """Curves on which modes begin to grow, coloured by frequency, thick where nothing grows on one side. Regions are
-    shaded by how many modes grow in them, which is written where there is room for it, else in the legend. Rings:
-    solved again in the full problem."""
+    shaded by how many modes grow in them, which is written where there is room for it, else in the legend;
+    hatched where growing modes pass the highest frequency, and how many grow is not known. Rings: solved again in the
+    full problem."""
     figure, ax = panel(ax, 4.8)
     ax.grid(False)
     handles: list[Artist] = []
@@ -86,16 +88,22 @@ def _regions(ax: Axes, result: Boundary) -> list[Artist]:
         return []
     edges = [np.linspace(*ends, RASTER + 1) for ends in (result.x_range, result.y_range)]
     xs, ys = (0.5 * (e[1:] + e[:-1]) for e in edges)
-    table = result.unstable_modes_over(xs, ys)
+    table, known = result.shading(xs, ys)
     most = min(max(int(table.max()), 1), len(SHADES) - 1)
     shades = BoundaryNorm(np.arange(-0.5, most + 1), most + 1), ListedColormap(SHADES[: most + 1])
-    ax.pcolormesh(*edges, np.minimum(table.T, most), norm=shades[0], cmap=shades[1], rasterized=True, zorder=1)
+    shown = np.ma.masked_array(np.minimum(table, most), ~known)
+    ax.pcolormesh(*edges, shown.T, norm=shades[0], cmap=shades[1], rasterized=True, zorder=1)
     paper = _paper(ax, (xs, ys), result)
-    bare = [number for number in np.unique(table).tolist() if not _numbered(ax, paper, table == number, number)]
-    return [
+    numbers = np.unique(table[known]).tolist()
+    bare = [number for number in numbers if not _numbered(ax, paper, (table == number) & known, number)]
+    keys: list[Artist] = [
         Patch(facecolor=SHADES[min(max(number, 0), most)], edgecolor=FAINT, label=f"{number} grow{'s' * (number == 1)}")
         for number in bare
     ]
+    if not known.all():
+        ax.contourf(xs, ys, ~known.T, levels=[0.5, 1.5], colors=[UNKNOWN], hatches=[HATCH], zorder=1.5)
+        keys.append(Patch(facecolor=UNKNOWN, hatch=HATCH, edgecolor=FAINT, label="how many grow is not known"))
+    return keys
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,8 @@ def cycle_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     yield ReportFigure(
         "cycle-branches",
         "Limit cycles over friction",
-        "Half the range of the slip velocity, of the contact where it is largest, and the frequency. Drawn through: "
+        "Half the range of the slip velocity while it is closed, of the contact where it is largest, and the "
+        "frequency. Drawn through: "
         "stable; dashed: unstable or undecided. Diamonds: folds. Triangles: onsets of growth of steady sliding."
         + (" Cross: the run in time, over the last quarter of its last phase." if runs else "")
         + (f" The run in time is not drawn beside them: {inputs.beside_cycles}." if inputs.beside_cycles else ""),
@@ -102,7 +103,7 @@ def cycle_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     if not result.cycles:
         return
     cycle = loudest(result)
-    contact = cycle.contact_names[int(np.argmax(np.ptp(cycle.slip_range, axis=1)))]
+    contact = cycle.contact_names[int(np.argmax(cycle.slip_amplitudes))]
     yield ReportFigure(
         "cycle-period",
         f"One period at μ = {cycle.mu:.6g}",

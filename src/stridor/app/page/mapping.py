@@ -20,6 +20,7 @@ LINES = (2, 3, 5, 9)  # on which onsets are sought, more each time
 CELLS = 150  # of the shading beside the curves, along each number
 GRIDS = (5, 9, 17, 33)  # values of each number where curves cannot be traced
 FRICTION = "mu"
+UNKNOWN = -1  # in place of how many grow
 
 
 def mapped(tell: Callable[[str, Any], None], work: Workspace, options: Mapping[str, Any]) -> str:
@@ -53,7 +54,8 @@ def _curves(found: Boundary) -> dict[str, Any]:
         {"x": x.tolist(), "y": y.tolist(), "frequency_hz": float(np.median(f)), "kind": c.kind}
         for c, (x, y, f) in zip(found.curves, found.polylines(), strict=True)
     ]
-    counts = found.unstable_modes_over(xs, ys).tolist()
+    table, known = found.shading(xs, ys)
+    counts = np.where(known, table, UNKNOWN).tolist()
     return {"xs": xs.tolist(), "ys": ys.tolist(), "counts": counts, "curves": curves}
 
 
@@ -85,7 +87,7 @@ def _solved_on_grids(
 def _counts(
     work: Workspace, options: Mapping[str, Any], xs: Array, ys: Array, known: Mapping[tuple[float, float], int]
 ) -> Iterator[tuple[tuple[float, float], int, str]]:
-    """How many modes grow at the points of a grid that are not known, −1 where there are none; and why."""
+    """How many modes grow at the points of a grid that are not known yet, `UNKNOWN` without modes; and why."""
     case, paths = work.case("a stability map"), (options["x"], options["y"])
     # All μ of one row are solved together.
     along = paths.index(FRICTION) if FRICTION in paths else 0
@@ -104,7 +106,7 @@ def _counts(
                 numbers = [_unstable(varied.with_({paths[along]: p[along]})) for p in points]
             yield from ((p, int(n), "") for p, n in zip(points, numbers, strict=True))
         except (CaseError, AnalysisError) as error:
-            yield from ((p, -1, str(error)) for p in points)
+            yield from ((p, UNKNOWN, str(error)) for p in points)
 
 
 def _unstable(case: Any) -> int:

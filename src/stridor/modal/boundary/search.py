@@ -23,6 +23,7 @@ from ..tolerances import UNSTABLE_RELATIVE
 from .climb import ModesAtPoint, climb, tops
 from .curve import Crossing, Drawn, StabilityCurve, crossings
 from .march import joined, traced, without_points
+from .passing import FINEST, refined
 from .plane import Count, Plane
 from .spot import CurvePoint, Kind, settled
 
@@ -94,7 +95,8 @@ class Found:
         """How many modes and roots grow at a point (2,) as the curves say, from the nearest point at which it was
         counted, or another one."""
         if since is None:
-            since = min((at for at in self.looked), key=lambda at: float(np.hypot(*(at.p - p))))
+            places = np.array([at.p for at in self.looked])
+            since = self.looked[int(np.argmin(np.hypot(*(places - p).T)))]
         passed = crossings(self.drawn, since.p, p)
         return (
             since.count.modes + sum(int(np.sign(c.roots)) for c in passed),
@@ -154,6 +156,8 @@ class _CurveSearch:
         self.found.wrong = [*self._contradicted(), *self._unmatched()]
         if self.found.passing or any("band" in curve.ends for curve in self.found.curves):
             self._look_beside()
+        if self.found.passing or self._more_changes():
+            self.found.wrong += self._look_for_passages()
         return self.found
 
     # -- lines and the curves that cut them ---------------------------------------------------------------------------
@@ -292,6 +296,45 @@ class _CurveSearch:
                 calm = spot.p - ASIDE * spot.gradient / np.hypot(*spot.gradient)
                 if np.all((calm > 0) & (calm < 1)):
                     self._look(calm)
+
+    def _more_changes(self) -> bool:
+        """Whether a growing mode is near the highest frequency somewhere, or modes are not as many as curves say."""
+        looked = self.found.looked
+        return not all(at.count.judged for at in looked) or any(self._differ(*pair) for pair in pairwise(looked))
+
+    def _differ(self, one: Looked, other: Looked) -> bool:
+        return self.found.said(other.p, one)[0] != other.count.modes
+
+    def _look_for_passages(self) -> list[tuple[str, Array]]:
+        """Count on a mesh that is fine where no curve says how the number of growing modes changes; and where it does
+        other than by modes that pass the highest frequency or meet at rest."""
+        seen, pairs = refined(self._clear, self._differ)
+        judged = [(one, other) for one, other in pairs if one.count.judged and other.count.judged]
+        wrong = [place for one, other in judged if (place := self._difference(one, other)) is not None]
+        self.found.passing |= len(judged) < len(pairs)
+        self.found.looked += seen
+        # Where a curve leaves the band, growth ends at it on one side and at the highest frequency on the other.
+        return [("growth begins or ends where no curve is,", place) for place in wrong if not self._leaves_near(place)]
+
+    def _leaves_near(self, p: Array) -> bool:
+        """Whether a curve ends at the highest frequency within a cell of the finest mesh."""
+        tips = [
+            tip for curve in self.found.curves
+            for tip, end in zip((curve.points[0], curve.points[-1]), curve.ends, strict=True) if end == "band"
+        ]  # fmt: skip
+        return any(np.hypot(*(tip - p)) <= FINEST for tip in tips)
+
+    def _clear(self, p: Array) -> Looked | None:
+        """What grows at a point (2,); None where a curve is so near that rounding, or its cubic, would decide."""
+        try:
+            found = self.plane.modes(p)
+        except AnalysisError:
+            return None
+        near = self.tolerance * np.hypot(*self.plane.slopes(p, found).real)
+        told = near > UNSTABLE_RELATIVE * np.abs(found.values)
+        if np.any(told & (np.abs(found.values.real) <= near)):
+            return None
+        return Looked(p, self.plane.count(found))
 
     def _contradicted(self) -> list[tuple[str, Array]]:
         """Points at which the curves say otherwise than what was counted, from one of them to the next."""

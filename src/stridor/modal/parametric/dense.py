@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy.linalg as sl
@@ -15,6 +16,7 @@ from ..dense_problem import combined
 from ..quadratic.inverse_iteration import iterated
 from ..quadratic.problem import Quadratic
 from ..shift_inverted import damped_pairs, undamped_pairs
+from .mostly_real import MostlyReal
 
 NEAR = (1.2, 4.0)  # modes up to this much above the band are solved for together: first try, second try
 SMALL = 1e-13
@@ -100,13 +102,14 @@ def _with_damping(
         return None
     z, w = inner_right @ z, inner_left @ w
     z, w = _unit(z), _unit(w)
-    weight = np.einsum("ij,ij->j", left, combined(mass, right))
+    of_right, of_left = MostlyReal(right), MostlyReal(left)
+    weight = np.einsum("ij,ij->j", left, of_right.images(mass))
     top = reach * frequency
     scale = 1.0 / (np.sqrt(np.abs(weight)) * np.maximum(np.sqrt(np.abs(squares)), top))
-    if top * _coupling(damping, right[:, far] * scale[far], left * scale) > HIDDEN:
+    if top * _coupling(damping, MostlyReal(right[:, far] * scale[far]), MostlyReal(left * scale), len(far)) > HIDDEN:
         return None
     first = lam.copy()
-    rough = _Rough(matrices, squares, weight, right, left, lam, z, w, top)
+    rough = _Rough(matrices, squares, weight, of_right, of_left, lam, z, w, top)
     rough.answering[far] = True
     unsettled = rough.answered(np.arange(len(lam)))
     if len(unsettled) and rough.recombined(unsettled):
@@ -126,7 +129,7 @@ class _Rough:
     combined anew; what is left unsettled takes the inverse itself. top [1/s]: the end of the band."""
 
     def __init__(
-        self, matrices: Matrices, squares: ComplexArray, weight: ComplexArray, right: ComplexArray, left: ComplexArray,
+        self, matrices: Matrices, squares: ComplexArray, weight: ComplexArray, right: MostlyReal, left: MostlyReal,
         lam: ComplexArray, z: ComplexArray, w: ComplexArray, top: float,
     ) -> None:  # fmt: skip
         mass, damping, stiffness = matrices
@@ -136,7 +139,7 @@ class _Rough:
         distance = np.abs(lam**2 - self.squares)
         self.own = np.argmin(distance, axis=0)
         # Of those that damping mixes with a mode the small problem has told it apart; for its own one λ answers.
-        forced = [left.T @ combined(damping, z), right.T @ combined(damping.T, w)]
+        forced = [left.weighed(combined(damping, z)), right.weighed(combined(damping.T, w))]
         self.answering = np.abs(lam) * np.abs(forced).max(axis=0) <= MIXED * distance * np.abs(self.weight)
         self.answering[self.own, np.arange(len(lam))] = False
 
@@ -148,8 +151,8 @@ class _Rough:
         number, watched = len(at) + 1, at
         for _ in range(ANSWERS):
             inverse = np.where(self.answering[:, at], 1.0 / ((lam[at] ** 2 - self.squares) * self.weight), 0.0)
-            z[:, at] -= self.right @ (inverse * (self.left.T @ _rest(lam[at], ours)))
-            w[:, at] -= self.left @ (inverse * (self.right.T @ _rest(lam[at], theirs)))
+            z[:, at] -= self.right.combined(inverse * self.left.weighed(_rest(lam[at], ours)))
+            w[:, at] -= self.left.combined(inverse * self.right.weighed(_rest(lam[at], theirs)))
             ours, theirs = _images(self.matrices, z[:, at]), _images(self.transposed, w[:, at])
             lam[at] = _functional(lam[at], w[:, at], ours)
             unsettled = _unsettled(lam[at], w[:, at], ours, theirs)
@@ -212,16 +215,16 @@ def _apart(lam: ComplexArray) -> Array:
     return nearest
 
 
-def _coupling(damping: Array, right: ComplexArray, left: ComplexArray) -> float:
-    """The norm of leftᵀ D right by a power iteration. Of modes scaled to unit stiffness, and far from the band: damping
-    as strong as that, dashpots beyond critical, would bring them into the band as others."""
-    x = np.random.default_rng(3).standard_normal((right.shape[1], 2)) + 0j
+def _coupling(damping: Array, right: MostlyReal, left: MostlyReal, count: int) -> float:
+    """The norm of leftᵀ D right, of ``count`` columns, by a power iteration. Of modes scaled to unit stiffness, and far
+    from the band: damping as strong as that, dashpots beyond critical, would bring them into the band as others."""
+    x = np.random.default_rng(3).standard_normal((count, 2)) + 0j
     norm = 0.0
     for _ in range(4):
         x = x / np.maximum(np.linalg.norm(x, axis=0), 1e-300)
-        y = left.T @ combined(damping, right @ x)
+        y = left.weighed(combined(damping, right.combined(x)))
         norm = max(norm, float(np.linalg.norm(y, axis=0).max(initial=0.0)))
-        x = (right.T @ combined(damping.T, left @ y.conj())).conj()
+        x = right.weighed(combined(damping.T, left.combined(y.conj()))).conj()
     return norm
 
 
@@ -278,7 +281,14 @@ def assembled(projected: Array, factors: Array, powers: Array) -> Matrices:
 
 def assembled_each(projected: Array, chosen: Sequence[Array], powers: Array) -> list[Matrices]:
     """`assembled` with each of several factors (t,), in one pass through the terms, which are more than the cache
-    holds."""
-    each = [np.where(np.array([[2], [1], [0]]) == powers, factors, 0.0) for factors in chosen]
-    total = (np.vstack(each) @ projected.reshape(len(projected), -1)).reshape(-1, 3, *projected.shape[1:])
+    holds: those on one power of λ that follow one another together."""
+    flat = projected.reshape(len(projected), -1)
+    several = np.stack(chosen)
+    total = np.zeros((len(several), 3, flat.shape[1]))
+    starts = np.flatnonzero(np.diff(powers, prepend=-1))
+    for start, end in pairwise([*starts.tolist(), len(powers)]):
+        # A product of one row goes by BLAS's routine for vectors, which copies nothing.
+        part = several[0, start:end] @ flat[start:end] if len(several) == 1 else several[:, start:end] @ flat[start:end]
+        total[:, 2 - powers[start]] += part
+    total = total.reshape(-1, 3, *projected.shape[1:])
     return [(mass, damping, stiffness) for mass, damping, stiffness in total]

@@ -70,8 +70,9 @@ class ModelAlongLine(OverNumber):
         """dx/dt (k,) of the coordinates."""
         problem, lam = self.model.problem, modes.values
         low, high = max(t - DIFFERENCE, 0.0), min(t + DIFFERENCE, 1.0)
-        change = (problem.factors(self.point(high)) - problem.factors(self.point(low))) / (high - low)
         here = problem.factors(self.point(t))
+        above, below = (here if at == t else problem.factors(self.point(at)) for at in (high, low))
+        change = (above - below) / (high - low)
         moved, sizes = self._sandwiched(t, modes, (change, here))
         by_x = 2 * lam * sizes[0] + sizes[1] if self.damped else sizes[0]
         with np.errstate(all="ignore"):

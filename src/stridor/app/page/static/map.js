@@ -77,7 +77,7 @@ const stridorMap = (() => {
     return found;
   }
 
-  // How many grow: nothing is paper, each one more is darker; what failed is grey.
+  // How many grow: nothing is paper, each one more is darker; what failed or is not known is grey.
   function shading(m) {
     const canvas = document.createElement("canvas"), width = m.xs.length, height = m.ys.length;
     Object.assign(canvas, { width, height });
