@@ -230,4 +230,4 @@ def test_a_run_beside_stable_sliding_has_settled_to_its_cycle():
     assert answer.comparison.modal_eigenvalue.real < 0.0
     assert answer.comparison.settled is not None
     assert answer.comparison.settled.frequency_hz == pytest.approx(cycle.frequency_hz, rel=1e-6)
-    assert answer.agree is True
+    assert answer.agrees is True
