@@ -21,7 +21,7 @@ import stridor as st
 from benches import paper_case
 from stridor.app.page.running import sound_of_file
 from stridor.app.page.runs import Queue, Run, Wish
-from stridor.studies.processes import spawned
+from stridor.studies.processes import forked
 
 SHORT = {
     "bodies.beam1.elements": 4, "bodies.beam2.elements": 8, "temporal.step": 2e-7, "temporal.record_every": 5,
@@ -142,12 +142,12 @@ def test_a_closed_page_ends_its_run(start) -> None:
 def test_a_run_that_is_on_its_way_when_its_page_closes_is_waited_for(monkeypatch, tmp_path: Path) -> None:
     begun, go_on = threading.Event(), threading.Event()
 
-    def slowly(*given: Any) -> Any:
+    def slowly(*given: Any, loaded: str) -> Any:
         begun.set()
         assert go_on.wait(PATIENCE)
-        return spawned(*given)
+        return forked(*given, loaded=loaded)
 
-    monkeypatch.setattr("stridor.app.page.runs.spawned", slowly)
+    monkeypatch.setattr("stridor.app.page.runs.forked", slowly)
     wish = Wish(paper_case().with_(ENDLESS).to_toml(), None, str(tmp_path))
     run = Run(wish, lambda *_: None, Queue(0))
     beginning = threading.Thread(target=run.begin)

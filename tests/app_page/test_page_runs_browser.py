@@ -48,16 +48,16 @@ def endless(tmp_path_factory: pytest.TempPathFactory) -> Generator[tuple[Any, st
 
 
 def processes_of(server: Any) -> int:
-    """How many processes the server has: that of each page, and those of runs."""
-    children = 0
+    """How many processes the server has: that of each page, and those of runs, all forked off one of its own."""
+    parents: dict[int, int] = {}
     for status in Path("/proc").glob("[0-9]*/stat"):
         try:
             words = status.read_text().rpartition(")")[2].split()
-            command = (status.parent / "cmdline").read_bytes()
         except OSError:
             continue
-        children += int(words[1]) == server.pid and words[0] != "Z" and b"spawn_main" in command
-    return children
+        if words[0] != "Z":
+            parents[int(status.parent.name)] = int(words[1])
+    return sum(parents.get(parent) == server.pid for parent in parents.values())
 
 
 def test_a_run_is_drawn_and_heard(browser: Any, shortly: tuple[Any, str]) -> None:

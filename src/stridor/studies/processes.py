@@ -36,6 +36,14 @@ def forked(target: Callable[..., object], name: str, *given: Any, loaded: str) -
     return spawned(target, name, *given)
 
 
+def prepared(loaded: str) -> None:
+    """Begin what processes will be forked off, which imports ``loaded`` while this process goes on."""
+    if sys.platform != "linux":
+        return
+    with contextlib.suppress(OSError), one_thread_each(), main_left_out(), _forked_off(_server(os.getpid(), loaded)):
+        pass
+
+
 def _surrounded(pipe: Any, environment: dict[str, str], target: Callable[..., object], *given: Any) -> None:
     """In the environment that there is now, not that of the time when the first process was forked."""
     os.environ.clear()

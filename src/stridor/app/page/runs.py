@@ -15,9 +15,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from ...studies.processes import spawned
+from ...studies.processes import forked
 from .running import serve
-from .worker import ended, hung_up
+from .worker import LOADED, ended, hung_up
 
 AT_ONCE = max(1, (os.cpu_count() or 2) - 1)  # runs; one core is left to the pages
 PATIENCE = 0.2  # seconds that a process has to end
@@ -116,7 +116,7 @@ class Run:
         with self._end:  # whoever waits for its end waits for a process that is on its way, too
             if self.over:
                 return
-            process, own = spawned(serve, "stridor run", self.wish)
+            process, own = forked(serve, "stridor run", self.wish, loaded=LOADED)
             with self._lock:
                 self._process, self._pipe = process, own
             if self.over:  # closed or stopped while it began

@@ -17,10 +17,12 @@ from typing import Any
 
 from ... import interrupts
 from ...errors import AnalysisError, CaseError
+from ...studies.processes import prepared
 from .folders import remove_left
 from .guard import Guard, new_token
 from .session import Session
 from .state import Source, template_sources
+from .worker import LOADED
 
 HOST = "127.0.0.1"
 PATIENCE = 10.0  # seconds that a page may be away, as behind a busy browser, before it counts as closed
@@ -111,6 +113,7 @@ class Server:
         from .layout import page
 
         remove_left()
+        prepared(LOADED)
         self._socket = bound(self.port)
         self.port = self._socket.getsockname()[1]
         outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)

@@ -20,10 +20,11 @@ from types import FrameType
 from typing import Any
 
 from ...heap import give_back
-from ...studies.processes import spawned
+from ...studies.processes import forked
 
 PATIENCE = 0.5  # seconds that an answer may take before a newer question stops it
 IDLE = "idle"  # the part that says: what comes now is for when nobody asks
+LOADED = "stridor.app.page.loaded"  # what processes of pages have from the start
 END = 3.0  # seconds that a process has to end
 
 Send = Callable[[str, Any], None]
@@ -113,7 +114,7 @@ class Worker:
 
     def _started(self) -> Any:
         """The pipe of a new process."""
-        self._process, own = spawned(_serve, "stridor page", self._program)
+        self._process, own = forked(_serve, "stridor page", self._program, loaded=LOADED)
         self._pipe = own
         threading.Thread(target=self._listening, args=(own,), name="stridor-page-listener", daemon=True).start()
         return own
