@@ -544,11 +544,13 @@ def test_a_contact_none_of_whose_nodes_slides_is_told_where_it_has_friction() ->
     nodes: Any = SimpleNamespace(names=("first", "second", "none"), owner=np.array([0, 0, 1, 1]))
     mu = np.array([0.0, 0.0, 0.1, 0.0])
     slides = np.array([False, False, True, False])
-    surfaces._require_slip(nodes, slides, mu)
+    touching = np.ones(4, dtype=bool)
+    surfaces._require_slip(nodes, slides, mu, touching)
+    surfaces._require_slip(nodes, slides & False, mu, ~touching)
     for stands, friction, name in ((~slides, mu, "second"), (~slides & False, mu + 0.1, "first")):
         still = stands & np.array([True, True, False, False])
         with pytest.raises(AnalysisError, match=f"^contact {name} does not slide: no support moves one of its bodies along"):
-            surfaces._require_slip(nodes, still if name == "second" else still & False, friction)
+            surfaces._require_slip(nodes, still if name == "second" else still & False, friction, touching)
 
 
 def test_friction_coefficients_in_words() -> None:
@@ -599,9 +601,15 @@ def test_points_that_do_not_slide_or_whose_gap_changes_are_told(monkeypatch) -> 
     for speed, opening, told in ((0.5, -0.51e-9, "-5.1e-10"), (0.0, 1.1e-15, "1.1e-15"), (1e-3, 1.1e-12, "1.1e-12")):
         with pytest.raises(AnalysisError, match=f"^contact b: the prescribed velocities change its gap at {told} m/s, so"):
             points.steady_sliding(points_on(speed, opening, monkeypatch=monkeypatch))
+    system, speeds, mu = points_on(0.0, 0.0, monkeypatch=monkeypatch), np.array([3.0, 0.0]), np.array([0.8, 0.2])
+    points.steady_sliding(system)
     with pytest.raises(AnalysisError, match=r"^contact b does not slide: no support moves one of its bodies along"):
-        points.steady_sliding(points_on(0.0, 0.0, monkeypatch=monkeypatch))
-    points.steady_sliding(points_on(0.0, 0.0, mu=0.0, monkeypatch=monkeypatch))
+        points._require_slip(system, speeds, mu, np.array([True, True]))
+    points._require_slip(system, speeds, mu, np.array([True, False]))
+    points._require_slip(system, speeds, 0.0 * mu, np.array([True, True]))
+    system.motion.full = np.zeros(1)  # nothing slides: said before anything is solved
+    with pytest.raises(AnalysisError, match=r"^contact a does not slide: no support moves one of its bodies along"):
+        points.steady_sliding(system)
 
 
 @pytest.mark.parametrize(

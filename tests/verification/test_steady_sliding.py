@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import stridor as st
 from benches import Slave, bench, by_hand, paper_case
 from stridor.errors import AnalysisError
 from stridor.sliding import steady_sliding
@@ -131,3 +132,39 @@ def test_the_static_lift_of_a_moving_clamp_is_a_rigid_translation():
     assert system.motion.stiffness_own[0, 0] == 0.0
     tip = system.points["beam2.end"]
     assert tip.free @ answer * 0 + tip.lift[:, 0] == pytest.approx([0.02, 0.0, 0.0], abs=1e-12)
+
+
+def test_a_stop_that_stays_open_needs_no_motion_of_its_own():
+    """A mass on a belt that carries it to x = μN/k = 0.15 m, with a stop behind that and before it; what slides is
+    answered by every path."""
+
+    def case(stop: float) -> st.Case:
+        return st.Case(
+            units="nondimensional",
+            bodies={
+                "m": {"type": "mass", "mass": 2.0, "position": (0, 0)},
+                "belt": {
+                    "type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (0, 1), "sliding": {"velocity": (1, 0)}
+                },
+                "wall": {"type": "obstacle", "shape": "flat", "point": (stop, 0), "normal": (-1, 0)},
+            },
+            springs={"k": {"between": ("m", "ground"), "direction": (1, 0), "stiffness": 5.0}},
+            loads={"press": {"at": "m", "force": (0, -3)}},
+            contacts={
+                "rub": {
+                    "slave": "m", "master": "belt", "stiffness": "rigid", "friction": {"law": "coulomb", "coefficient": 0.25}
+                },
+                "stop": {
+                    "slave": "m", "master": "wall", "stiffness": "rigid", "friction": {"law": "coulomb", "coefficient": 0.2}
+                },
+            },
+            modal={"max_frequency_hz": 2.0},
+        )  # fmt: skip
+
+    behind = case(0.2)
+    assert st.steady_sliding(behind).active.tolist() == [True, False]
+    for source in ("receptance", "krylov", "full"):
+        found = st.modes(behind.with_({"modal.source": source}))
+        assert found.frequency_hz[0] == pytest.approx([np.sqrt(2.5) / (2 * np.pi)], rel=1e-9)
+    with pytest.raises(AnalysisError, match="contact stop does not slide: no support moves"):
+        st.modes(case(0.1))

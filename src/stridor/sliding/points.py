@@ -89,15 +89,21 @@ def steady_sliding(
     coefficients = (
         system.friction_coefficients(np.abs(speeds)) if mu is None else np.full(len(system.contacts), float(mu))
     )
-    for contact, speed, coefficient in zip(system.contacts, speeds, coefficients, strict=True):
-        if speed == 0.0 and coefficient > 0.0:
+    if not np.any(speeds):
+        _require_slip(system, speeds, coefficients, np.ones(len(speeds), dtype=bool))
+    sense = -np.sign(speeds)
+    force = external_force(system, load_factors) - system.motion.damping @ factors
+    return _active_set(system, force, coefficients, sense, speeds)
+
+
+def _require_slip(system: System, speeds: Array, coefficients: Array, touches: BoolArray) -> None:
+    """Raise AnalysisError where a contact touches and does not slide: how its friction acts is then not known."""
+    for k, contact in enumerate(system.contacts):
+        if touches[k] and speeds[k] == 0.0 and coefficients[k] > 0.0:
             raise AnalysisError(
                 f"contact {contact.name} does not slide: no support moves one of its bodies along the "
                 "tangent; give a support a velocity"
             )
-    sense = -np.sign(speeds)
-    force = external_force(system, load_factors) - system.motion.damping @ factors
-    return _active_set(system, force, coefficients, sense, speeds)
 
 
 def steady_points(system: System, mu: float | None = None) -> SteadySliding:
@@ -141,6 +147,7 @@ def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: A
             f"no contact carries load in steady sliding at {words_of_friction(mu)} (contacts: {names}): the loads pull "
             "the bodies apart, or friction lifts them off at this coefficient; check the direction of the loads"
         )
+    _require_slip(system, speeds, mu, active)  # a stop beside, which stays open, need not
     return SteadySliding(displacement, normal, speeds, sense, active, mu, residual)
 
 

@@ -132,7 +132,8 @@ def steady_sliding_nodes(
     _require_constant_gap(nodes, factors, speed)
     coefficient = nodes.friction_coefficients(speed) if mu is None else np.full(nodes.count, float(mu))
     slips = speed > STILL * float(speed.max(initial=0.0))
-    _require_slip(nodes, slips, coefficient)
+    if not slips.any():
+        _require_slip(nodes, slips, coefficient, np.ones(nodes.count, dtype=bool))
     sense = np.where(slips[:, None], -slip / np.where(slips, speed, 1.0)[:, None], 0.0)
     force = external_force(system, load_factors) - system.motion.damping @ factors
     rubs = bool(np.any(coefficient[:, None] * sense))
@@ -170,6 +171,7 @@ def steady_sliding_nodes(
     if twice := redundant(system, nodes, touches & (nodes.compliance == 0.0)):
         raise AnalysisError(twice)
     active = state.active & ((state.normal_force > 0.0) | nodes.kept)
+    _require_slip(nodes, slips, coefficient, active)  # a stop beside, which stays open, need not
     if nodes.count and not active.any() and held is None:
         raise AnalysisError(
             f"no contact carries load in steady sliding at {words_of_friction(coefficient)} (contacts: "
@@ -317,10 +319,11 @@ def _require_constant_gap(nodes: ContactNodes, factors: Array, speed: Array) -> 
             )
 
 
-def _require_slip(nodes: ContactNodes, slips: BoolArray, coefficient: Array) -> None:
+def _require_slip(nodes: ContactNodes, slips: BoolArray, coefficient: Array, touches: BoolArray) -> None:
+    """Raise AnalysisError where a contact touches and does not slide: how its friction acts is then not known."""
     for k, name in enumerate(nodes.names):
         mine = nodes.owner == k
-        if mine.any() and not slips[mine].any() and np.any(coefficient[mine] > 0.0):
+        if touches[mine].any() and not slips[mine].any() and np.any(coefficient[mine] > 0.0):
             raise AnalysisError(
                 f"contact {name} does not slide: no support moves one of its bodies along the "
                 "tangent; give a support a velocity"
