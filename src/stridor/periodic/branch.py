@@ -25,9 +25,9 @@ class Bifurcation:
     kind: "fold" (μ turns back), "period doubling" (a multiplier leaves or enters at −1), "torus" (a pair of them),
     "branching" (one at 1 without a fold), "stability changes with the contacts" (where contacts change in another way
     behind, multipliers jump), or what begins or ends: "sticking", "reversal of slip", "separation";
-    "contacts change in another order" where none of these does. harmonics: of a sticking that begins or ends by
-    harmonic balance, those of the cycle that sticks: they tell no stick shorter than one over them of the period, so
-    that shorter sticks begin before and end behind; None elsewhere.
+    "contacts change in another order" where none of these does. harmonics: of a sticking or a reversal that
+    begins or ends by harmonic balance, those of the cycle that has it: they tell none that is shorter than one over
+    them of the period, so that shorter ones begin before and end behind; None elsewhere.
     """
 
     kind: Kind
@@ -43,7 +43,7 @@ class Bifurcation:
             return f"fold at μ = {self.mu_before:.6g}"
         between = f"between μ = {self.mu_before:.6g} and {self.mu_after:.6g}"
         if self.harmonics is not None:
-            what, happens = self.kind.split()
+            what, happens = self.kind.rsplit(maxsplit=1)
             told = f"1/{self.harmonics} of the period, which {self.harmonics} harmonics tell"
             return f"{what} of {told}, {happens} {between}"
         return f"{self.kind} {between}"
@@ -93,11 +93,11 @@ def bifurcations(cycles: Sequence[Cycle], folds: Sequence[int]) -> tuple[Bifurca
 
 
 def _told(kind: Kind, one: Cycle, other: Cycle) -> int | None:
-    """The harmonics that decide when sticks are long enough to be told, None where all are."""
-    if not kind.startswith("sticking"):
+    """The harmonics that decide when sticks and reversals are long enough to be told, None where all are."""
+    if not kind.startswith(("sticking", "reversal")):
         return None
-    sticks = other if kind == "sticking begins" else one
-    return sticks.harmonics if sticks.method == "harmonic" else None
+    having = other if kind.endswith("begins") else one
+    return having.harmonics if having.method == "harmonic" else None
 
 
 def _between(one: Cycle, other: Cycle, *, fold: bool) -> list[Kind]:

@@ -97,14 +97,22 @@ class Cycle(Shown):
     @property
     def stable(self) -> bool | None:
         """Whether disturbances die out; None where the largest multiplier is one within 1e-6 (by harmonic balance:
-        0.01, and 0.15 where slip turns or sticks), where the motion's own is further from one than 0.01, or where they
+        0.01, and 0.15 where slip comes to rest, however short), where the motion's own is further from one than 0.01, or where they
         are not known."""
-        size, neutral = self.largest_multiplier, NEUTRAL[self.method]
-        if self.method == "harmonic" and {"stick", "reversal"} & set(self.kinds):
-            neutral = TURNING
+        size = self.largest_multiplier
         if not self.multiplied or self.own_lost:
             return None
-        return None if abs(size - 1.0) <= neutral else size < 1.0
+        return None if abs(size - 1.0) <= self.neutral else size < 1.0
+
+    @property
+    def neutral(self) -> float:
+        """How near to one the size of a multiplier decides nothing."""
+        if self.method != "harmonic":
+            return NEUTRAL[self.method]
+        closed = self.status != OPEN
+        falls, rises = (closed & (self.slip_velocity <= 0.0)).any(axis=0), (closed & (self.slip_velocity >= 0.0)).any(axis=0)
+        rests = np.any(falls & rises) or {"stick", "reversal"} & set(self.kinds)
+        return TURNING if rests else NEUTRAL["harmonic"]
 
     @property
     def own_lost(self) -> bool:
