@@ -109,10 +109,19 @@ class Cycle(Shown):
         """How near to one the size of a multiplier decides nothing."""
         if self.method != "harmonic":
             return NEUTRAL[self.method]
-        closed = self.status != OPEN
-        falls, rises = (closed & (self.slip_velocity <= 0.0)).any(axis=0), (closed & (self.slip_velocity >= 0.0)).any(axis=0)
-        rests = np.any(falls & rises) or {"stick", "reversal"} & set(self.kinds)
+        closed, slip = self.status != OPEN, self.slip_velocity
+        both = (closed & (slip <= 0.0)).any(axis=0) & (closed & (slip >= 0.0)).any(axis=0)
+        rests = both.any() or {"stick", "reversal"} & set(self.kinds)
         return TURNING if rests else NEUTRAL["harmonic"]
+
+    @property
+    def outside(self) -> tuple[int, int] | None:
+        """How many multipliers are beyond the unit circle, at least and at most, as some are as near to it as decides
+        nothing; None where they are not known or not believed."""
+        if not self.multiplied or self.own_lost:
+            return None
+        sizes = np.abs(self.multipliers)
+        return int(np.sum(sizes > 1.0 + self.neutral)), int(np.sum(sizes >= 1.0 - self.neutral))
 
     @property
     def own_lost(self) -> bool:
@@ -193,3 +202,12 @@ class Cycle(Shown):
                 "open": float(shares[0]), "stick": float(shares[1]), "slip": float(shares[2]),
                 "slip_velocity": slip.tolist(), "normal_force": force.tolist(),
             }  # fmt: skip
+
+
+def same_word(one: Cycle, other: Cycle) -> bool:
+    """Whether the same contacts change in the same order, wherever the period begins."""
+    first, second = one.word, other.word
+    if len(first) != len(second):
+        return False
+    twice = second * 2
+    return not first or any(twice[k : k + len(first)] == first for k in range(len(first)))
