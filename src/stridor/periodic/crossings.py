@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -39,12 +40,13 @@ def crossings(cycles: Sequence[Cycle], folds: Sequence[int]) -> list[tuple[Cross
         passed = max(low - number, 0) - max(number - high, 0)
         if passed:
             first = least if passed > 0 else most
-            kinds = _passed(cycles[first : k + 1], passed)
+            kinds: list[Crossed] = _passed(cycles[first : k + 1], passed)
             turns = [f for f in folds if first <= f <= k and f not in spent]
             if turns and ("branching" in kinds or (abs(passed) == 1 and kinds[0].endswith("contacts"))):
                 kinds.remove("branching" if "branching" in kinds else kinds[0])
                 spent.add(turns[0])
-            found += [(kind, first, k) for kind in kinds]
+            for kind in kinds:
+                found.append((kind, first, k))
             number += passed
         least, most = (k if high <= number else least), (k if low >= number else most)
     return found
@@ -55,7 +57,7 @@ def _passed(cycles: Sequence[Cycle], number: int) -> list[Crossed]:
     each real one, each pair."""
     first, last = cycles[0], cycles[-1]
     harmonic = any(c.method == "harmonic" for c in cycles)
-    if not harmonic and not all(same_word(one, other) for one, other in zip(cycles, cycles[1:], strict=False)):
+    if not harmonic and not all(same_word(one, other) for one, other in pairwise(cycles)):
         if first.stable is not last.stable and None not in (first.stable, last.stable):
             return ["stability changes with the contacts"]
         return ["more of it grows with the contacts" if number > 0 else "less of it grows with the contacts"]
@@ -67,7 +69,8 @@ def _passed(cycles: Sequence[Cycle], number: int) -> list[Crossed]:
     mates = np.abs(values.conj()[:, None] - outer.multipliers[None, :]).min(axis=1)
     paired = (np.abs(values.imag) > REAL * np.abs(values)) & (mates < np.abs(values.imag))
     alone: list[Crossed] = ["period doubling" if value.real < 0.0 else "branching" for value in values[~paired]]
-    return alone + ["torus"] * ((int(paired.sum()) + 1) // 2)
+    pairs: list[Crossed] = ["torus"] * ((int(paired.sum()) + 1) // 2)
+    return alone + pairs
 
 
 def _crossing(inner: ComplexArray, outer: ComplexArray, number: int) -> ComplexArray:

@@ -97,8 +97,8 @@ class Cycle(Shown):
     @property
     def stable(self) -> bool | None:
         """Whether disturbances die out; None where the largest multiplier is one within 1e-6 (by harmonic balance:
-        0.01, and 0.15 where slip comes to rest, however short), where the motion's own is further from one than 0.01, or where they
-        are not known."""
+        0.01, and 0.15 where slip comes to rest, however short), where the motion's own is further from one than 0.01,
+        or where they are not known."""
         size = self.largest_multiplier
         if not self.multiplied or self.own_lost:
             return None
