@@ -6,15 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from .cycle import Cycle
+from .crossings import crossings
+from .cycle import Cycle, same_word
 
 Kind = Literal[
-    "fold", "period doubling", "torus", "branching", "stability changes with the contacts", "sticking begins",
+    "fold", "period doubling", "torus", "branching", "stability changes with the contacts",
+    "more of it grows with the contacts", "less of it grows with the contacts", "sticking begins",
     "sticking ends", "reversal of slip begins", "reversal of slip ends", "separation begins", "separation ends",
     "contacts change in another order",
 ]  # fmt: skip
 WORDS = {"stick": "sticking", "reversal": "reversal of slip", "separation": "separation"}
-REAL = 1e-6  # of a multiplier: its imaginary part where it is real
 
 
 @dataclass(frozen=True)
@@ -24,10 +25,11 @@ class Bifurcation:
 
     kind: "fold" (μ turns back), "period doubling" (a multiplier leaves or enters at −1), "torus" (a pair of them),
     "branching" (one at 1 without a fold), "stability changes with the contacts" (where contacts change in another way
-    behind, multipliers jump), or what begins or ends: "sticking", "reversal of slip", "separation";
-    "contacts change in another order" where none of these does. harmonics: of a sticking that begins or ends by
-    harmonic balance, those of the cycle that sticks: they tell no stick shorter than one over them of the period, so
-    that shorter sticks begin before and end behind; None elsewhere.
+    behind, multipliers jump), "more of it grows with the contacts" and "less of it grows with the contacts" (they jump,
+    and it is unstable before and behind), or what begins or ends: "sticking", "reversal of slip", "separation";
+    "contacts change in another order" where none of these does. harmonics: of a sticking or a reversal that
+    begins or ends by harmonic balance, those of the cycle that has it: they tell none that is shorter than one over
+    them of the period, so that shorter ones begin before and end behind; None elsewhere.
     """
 
     kind: Kind
@@ -43,7 +45,7 @@ class Bifurcation:
             return f"fold at μ = {self.mu_before:.6g}"
         between = f"between μ = {self.mu_before:.6g} and {self.mu_after:.6g}"
         if self.harmonics is not None:
-            what, happens = self.kind.split()
+            what, happens = self.kind.rsplit(maxsplit=1)
             told = f"1/{self.harmonics} of the period, which {self.harmonics} harmonics tell"
             return f"{what} of {told}, {happens} {between}"
         return f"{self.kind} {between}"
@@ -81,51 +83,39 @@ class CycleBranch:
 def bifurcations(cycles: Sequence[Cycle], folds: Sequence[int]) -> tuple[Bifurcation, ...]:
     """What changes along cycles in the order of their branch; folds: which of them are folds."""
     found: list[Bifurcation] = []
+    crossed = crossings(cycles, folds)
     for k, cycle in enumerate(cycles):
         if k in folds:
             found.append(Bifurcation("fold", cycle.mu, cycle.mu, cycle.frequency_hz))
         if k + 1 < len(cycles):
+            other = cycles[k + 1]
             found += [
-                Bifurcation(kind, cycle.mu, cycles[k + 1].mu, cycle.frequency_hz, _told(kind, cycle, cycles[k + 1]))
-                for kind in _between(cycle, cycles[k + 1], fold=k in folds or k + 1 in folds)
+                Bifurcation(kind, cycle.mu, other.mu, cycle.frequency_hz, _told(kind, cycle, other))
+                for kind in _between(cycle, other)
             ]
+        found += [
+            Bifurcation(kind, cycles[first].mu, cycles[last].mu, cycles[first].frequency_hz)
+            for kind, first, last in crossed if last == k + 1
+        ]  # fmt: skip
     return tuple(found)
 
 
 def _told(kind: Kind, one: Cycle, other: Cycle) -> int | None:
-    """The harmonics that decide when sticks are long enough to be told, None where all are."""
-    if not kind.startswith("sticking"):
+    """The harmonics that decide when sticks and reversals are long enough to be told, None where all are."""
+    if not kind.startswith(("sticking", "reversal")):
         return None
-    sticks = other if kind == "sticking begins" else one
-    return sticks.harmonics if sticks.method == "harmonic" else None
+    having = other if kind.endswith("begins") else one
+    return having.harmonics if having.method == "harmonic" else None
 
 
-def _between(one: Cycle, other: Cycle, *, fold: bool) -> list[Kind]:
+def _between(one: Cycle, other: Cycle) -> list[Kind]:
     found: list[Kind] = []
     for kind, word in WORDS.items():
         if (kind in one.kinds) != (kind in other.kinds):
             found.append(f"{word} {'begins' if kind in other.kinds else 'ends'}")  # type: ignore[arg-type]
-    # Series of harmonics tell when a contact changes only to a share of the period: the order is no news.
-    alike = same_word(one, other) or "harmonic" in (one.method, other.method)
-    if not found and not alike:
-        found.append("contacts change in another order")
-    if one.stable is None or other.stable is None or one.stable == other.stable or fold:
-        return found
-    if not alike:
-        return [*found, "stability changes with the contacts"]
-    unstable = one if other.stable else other
-    largest = complex(unstable.multipliers[0])
-    if abs(largest.imag) > REAL * abs(largest):
-        return [*found, "torus"]
-    return [*found, "period doubling" if largest.real < 0.0 else "branching"]
+    return found if found or _alike(one, other) else ["contacts change in another order"]
 
 
-def same_word(one: Cycle, other: Cycle) -> bool:
-    """Whether the same contacts change in the same order, wherever the period begins."""
-    first, second = one.word, other.word
-    if len(first) != len(second):
-        return False
-    twice = second * 2
-    return not first or any(twice[k : k + len(first)] == first for k in range(len(first)))
-
-
+def _alike(one: Cycle, other: Cycle) -> bool:
+    """Series of harmonics tell when a contact changes only to a share of the period: the order is no news."""
+    return same_word(one, other) or "harmonic" in (one.method, other.method)

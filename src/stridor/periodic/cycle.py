@@ -97,14 +97,31 @@ class Cycle(Shown):
     @property
     def stable(self) -> bool | None:
         """Whether disturbances die out; None where the largest multiplier is one within 1e-6 (by harmonic balance:
-        0.01, and 0.15 where slip turns or sticks), where the motion's own is further from one than 0.01, or where they
-        are not known."""
-        size, neutral = self.largest_multiplier, NEUTRAL[self.method]
-        if self.method == "harmonic" and {"stick", "reversal"} & set(self.kinds):
-            neutral = TURNING
+        0.01, and 0.15 where slip comes to rest, however short), where the motion's own is further from one than 0.01,
+        or where they are not known."""
+        size = self.largest_multiplier
         if not self.multiplied or self.own_lost:
             return None
-        return None if abs(size - 1.0) <= neutral else size < 1.0
+        return None if abs(size - 1.0) <= self.neutral else size < 1.0
+
+    @property
+    def neutral(self) -> float:
+        """How near to one the size of a multiplier decides nothing."""
+        if self.method != "harmonic":
+            return NEUTRAL[self.method]
+        closed, slip = self.status != OPEN, self.slip_velocity
+        both = (closed & (slip <= 0.0)).any(axis=0) & (closed & (slip >= 0.0)).any(axis=0)
+        rests = both.any() or {"stick", "reversal"} & set(self.kinds)
+        return TURNING if rests else NEUTRAL["harmonic"]
+
+    @property
+    def outside(self) -> tuple[int, int] | None:
+        """How many multipliers are beyond the unit circle, at least and at most, as some are as near to it as decides
+        nothing; None where they are not known or not believed."""
+        if not self.multiplied or self.own_lost:
+            return None
+        sizes = np.abs(self.multipliers)
+        return int(np.sum(sizes > 1.0 + self.neutral)), int(np.sum(sizes >= 1.0 - self.neutral))
 
     @property
     def own_lost(self) -> bool:
@@ -195,3 +212,12 @@ class Cycle(Shown):
                 "open": float(shares[0]), "stick": float(shares[1]), "slip": float(shares[2]),
                 "slip_velocity": slip.tolist(), "normal_force": force.tolist(),
             }  # fmt: skip
+
+
+def same_word(one: Cycle, other: Cycle) -> bool:
+    """Whether the same contacts change in the same order, wherever the period begins."""
+    first, second = one.word, other.word
+    if len(first) != len(second):
+        return False
+    twice = second * 2
+    return not first or any(twice[k : k + len(first)] == first for k in range(len(first)))

@@ -17,15 +17,15 @@ ALONG, AGAINST = 2, 3  # slip, as a change tells it
 
 def sampled_series(cycle: Balanced, reached_from: str) -> Cycle:
     """The cycle as data. Forces are those of the laws of contact and friction at the cycle's motion; what lasts
-    less than the period of the last harmonic is not told: a stick so short counts as slip that turns, slip so short
-    beside stick as stick."""
+    less than the period of the last harmonic is not told: a stick so short counts as the slip around it, slip so short
+    beside stick as stick, slip so short amid slip the other way as that."""
     at, family = cycle.at, cycle.family
     times = np.linspace(0.0, cycle.period, SAMPLES)
     phases = 2 * np.pi * np.arange(at.base.samples) / at.base.samples
     ways = _ways(cycle)
     normal, friction, slip, gap, _ = _at(cycle, 2 * np.pi * times / cycle.period, ways)
     fine = _at(cycle, phases, ways)
-    codes = np.stack([_settled(row, at.base.harmonics) for row in fine[4]])
+    codes = np.stack([settled(row, at.base.harmonics) for row in fine[4]])
     shares = np.stack([np.mean(codes == kind, axis=1) for kind in (OPEN, STICK)], axis=1)
     index = np.minimum((times / cycle.period * at.base.samples).astype(int), at.base.samples - 1)
     status = np.where(codes >= ALONG, SLIP, codes)[:, index]
@@ -54,7 +54,10 @@ def _ways(cycle: Balanced) -> Array:
 
 def _at(cycle: Balanced, phases: Array, ways: Array) -> tuple[Array, Array, Array, Array, IntArray]:
     """Normal force, friction, slip velocity, gap (m, n) and what each node does, 0 open, 1 stick, 2 slip along, 3
-    against."""
+    against.
+
+    Which way it slips is told by friction, which is against it. Series of a velocity with a kink, as where a stick
+    begins or ends, overshoot: that they are below zero there does not say that slip turns."""
     at, family = cycle.at, cycle.family
     series, speed = at.base.at(phases), at.omega * at.motion @ at.base.turn.T
     applied = applied_at(family, series, at.z, at.motion, speed, at.mu, at.scales)
@@ -62,34 +65,57 @@ def _at(cycle: Balanced, phases: Array, ways: Array) -> tuple[Array, Array, Arra
     _, moving, _ = family.split(speed @ series.T)
     slip = np.einsum("mdn,md->mn", moving + family.slip[:, :, None], ways)
     friction = np.einsum("mdn,md->mn", applied.tangential, ways)
-    codes = np.where(applied.status == SLIP, np.where(slip >= 0.0, ALONG, AGAINST), applied.status)
+    against = np.where(friction != 0.0, friction > 0.0, slip < 0.0)
+    codes = np.where(applied.status == SLIP, np.where(against, AGAINST, ALONG), applied.status)
     return applied.normal, friction, slip, gap + family.nodes.gap[:, None], codes.astype(np.int64)
 
 
-def _settled(codes: IntArray, harmonics: int) -> IntArray:
-    """Without what is too short to be told by so many harmonics: slip beside a stick that is long enough is stick, and
-    a stick goes half to what is before and half to behind."""
-    found = codes.copy()
-    n = len(codes)
-    for slips in (True, False):
-        edges = np.flatnonzero(found != np.roll(found, 1))
-        if len(edges) < 2:
-            return found
-        told, lengths = found.copy(), (np.roll(edges, -1) - edges) % n
-        for k, first in enumerate(edges):
-            length, after = int(lengths[k]), (k + 1) % len(edges)
-            here, before, behind = told[first], told[first - 1], told[edges[after]]
-            if length * harmonics >= n or here == OPEN or (here == STICK) == slips:
+def settled(codes: IntArray, harmonics: int) -> IntArray:
+    """Without what is too short to be told by so many harmonics: slip beside a stick that is long enough is stick, a
+    stick goes half to what is before and half to behind, and slip amid slip the other way goes with that."""
+    return _one_way(_without(_without(codes, harmonics, SLIP), harmonics, STICK), harmonics)
+
+
+def _parts(codes: IntArray) -> tuple[IntArray, IntArray]:
+    """Where (e,) one thing after another begins, and how many times (e,) it lasts."""
+    edges = np.flatnonzero(codes != np.roll(codes, 1))
+    return edges, (np.roll(edges, -1) - edges) % len(codes)
+
+
+def _without(codes: IntArray, harmonics: int, kind: int) -> IntArray:
+    """Without slip, or without stick, that is too short."""
+    found, n = codes.copy(), len(codes)
+    edges, lengths = _parts(codes)
+    if len(edges) < 2:
+        return found
+    for k, first in enumerate(edges):
+        length, after = int(lengths[k]), (k + 1) % len(edges)
+        here, before, behind = codes[first], codes[first - 1], codes[edges[after]]
+        if length * harmonics >= n or min(here, SLIP) != kind:
+            continue
+        if kind == SLIP:
+            beside = ((before, lengths[k - 1]), (behind, lengths[after]))
+            if not any(what == STICK and lasting * harmonics >= n for what, lasting in beside):
                 continue
-            if slips:
-                beside = ((before, lengths[k - 1]), (behind, lengths[after]))
-                if not any(kind == STICK and lasting * harmonics >= n for kind, lasting in beside):
-                    continue
-                before = behind = STICK
-            elif OPEN in (before, behind):
-                before = behind = max(before, behind)
-            places = (first + np.arange(length)) % n
-            found[places[: length // 2]], found[places[length // 2 :]] = before, behind
+            before = behind = STICK
+        elif OPEN in (before, behind):
+            before = behind = max(before, behind)
+        places = (first + np.arange(length)) % n
+        found[places[: length // 2]], found[places[length // 2 :]] = before, behind
+    return found
+
+
+def _one_way(codes: IntArray, harmonics: int) -> IntArray:
+    """Without slip that is too short, where before and behind it slips the other way."""
+    found, n = codes.copy(), len(codes)
+    edges, lengths = _parts(codes)
+    for k in np.argsort(lengths, kind="stable"):
+        first, length = edges[k], int(lengths[k])
+        places = (first + np.arange(length)) % n
+        here, before, behind = found[first], found[first - 1], found[(places[-1] + 1) % n]
+        other = ALONG + AGAINST - here
+        if len(edges) > 1 and length * harmonics < n and here >= ALONG and before == behind == other:
+            found[places] = other
     return found
 
 
