@@ -37,9 +37,9 @@ def cycle_branches(
         colour = COLOURS[number % len(COLOURS)]
         for first, last, stable in _stretches(cycles):
             part = cycles[first : last + 1]
-            drawn = {"ls": LINES[stable], "color": colour, "marker": "." if first == last else ""}
-            upper.plot([c.mu for c in part], [c.slip_amplitude for c in part], **drawn)
-            lower.plot([c.mu for c in part], [c.frequency_hz for c in part], **drawn)
+            line, dot = LINES[stable], "." if first == last else ""
+            upper.plot([c.mu for c in part], [c.slip_amplitude for c in part], ls=line, marker=dot, color=colour)
+            lower.plot([c.mu for c in part], [c.frequency_hz for c in part], ls=line, marker=dot, color=colour)
         folds = [result.cycles[k] for k in branch.folds]
         upper.plot([c.mu for c in folds], [c.slip_amplitude for c in folds], "D", color=colour, ms=5, mec="white")
         lower.plot([c.mu for c in folds], [c.frequency_hz for c in folds], "D", color=colour, ms=5, mec="white")
