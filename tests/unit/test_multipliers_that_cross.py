@@ -37,7 +37,9 @@ TOLD = {
 
 
 @pytest.mark.parametrize(("multipliers", "folds", "wanted"), TOLD.values(), ids=TOLD)
-def test_each_that_passes_is_told(cycle: Cycle, multipliers: list, folds: list[int], wanted: list):
+def test_each_that_passes_is_told(
+    cycle: Cycle, multipliers: list[tuple[complex, ...]], folds: list[int], wanted: list[tuple[str, int, int]]
+):
     cycles = [replace(cycle, multipliers=np.array(values, dtype=complex)) for values in multipliers]
     assert crossings(cycles, folds) == wanted
 

@@ -36,3 +36,10 @@ def test_without_si_units_only_plain_numbers_have_one() -> None:
     contact = next(iter(case.contacts))
     assert unit_at(case, f"contacts.{contact}.friction.coefficient") == "1"
     assert unit_at(case, f"contacts.{contact}.stiffness") == unit_at(case, "bodies.beam1.damping.mass") == ""
+
+
+def test_a_component_has_the_unit_of_its_vector() -> None:
+    case = st.loads(template_text("pad-on-disc"))
+    assert unit_at(case, "bodies.disc.sliding.velocity.0") == unit_at(case, "bodies.disc.sliding.velocity") == "m/s"
+    plain = st.loads(template_text("pad-on-disc"), ['units="nondimensional"'])
+    assert unit_at(plain, "bodies.disc.sliding.velocity.0") == ""

@@ -237,6 +237,13 @@ class Call:
         self.say(f"written: {path}")
         return path
 
+    def withdraw(self, *names: str) -> None:
+        """Remove figures from the folder that are none of this result, which an earlier one left; say so."""
+        for path in (self.folder / name for name in names):
+            if path.is_file():
+                path.unlink()
+                self.say(f"removed: {path}, of an earlier result; this one has none to draw")
+
     def keep(self, result: Result, name: str) -> Path:
         """Save a result as a dataset in the folder, and say so."""
         from ..io.datasets import save

@@ -86,8 +86,12 @@ def cycles(
     files = [call.folder / "cycles.nc", call.tabulate(result, "cycles.csv")]
     if result.cycles or result.onsets:
         files.append(call.draw(cycle_branches(result), "cycles.png"))
+    else:
+        call.withdraw("cycles.png")
     if result.cycles:
         files.append(call.draw(cycle_period(loudest(result)), "cycle_period.png"))
+    else:
+        call.withdraw("cycle_period.png")
     call.warn(result.warnings)
     if call.json:
         call.document(result.to_json() | {"files": [str(f) for f in files]})

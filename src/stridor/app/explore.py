@@ -47,6 +47,8 @@ def sensitivities(
     call.tabulate(result, "sensitivities.csv")
     if len(result.branch):
         call.draw(sensitivity_bars(result), "sensitivities.png")
+    else:
+        call.withdraw("sensitivities.png")
     _show(call, result, sensitivity_table(result), ["condition", "frequency per % [Hz]", "growth rate [1/s]"])
     if not call.json:
         call.conclude(of_sensitivities(result, mu))
@@ -86,6 +88,8 @@ def countermeasures(
     call.tabulate(result, "countermeasures.csv")
     if result.measures:
         call.draw(countermeasure_bars(result), "countermeasures.png")
+    else:
+        call.withdraw("countermeasures.png")
     show_countermeasures(call, result)
     if not call.json:
         case = work.case(call.verb)

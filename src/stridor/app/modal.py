@@ -127,6 +127,8 @@ def modes(
     call.tabulate(result, "modes.csv")
     if len(result.branch):
         call.draw(frequency_branches(result) if len(result.mu) > 1 else root_locus(result), "modes.png")
+    else:
+        call.withdraw("modes.png")
     if result.interrupted:
         call.say(f"interrupted: {len(result.mu)} of {result.planned} friction coefficients, which are kept")
     if call.json:

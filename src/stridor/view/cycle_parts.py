@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from ..digits import hertz, readable
 from ..periodic import Cycle, Cycles
-from .cycle_plots import cycle_branches, cycle_period
+from .cycle_plots import cycle_branches, cycle_period, loudest_contact
 from .inputs import ReportInputs
 from .page_parts import ReportFigure
 from .tables import Table, TableRow
@@ -93,8 +91,9 @@ def cycle_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
         "cycle-branches",
         "Limit cycles over friction",
         "Half the range of the slip velocity while it is closed, of the contact where it is largest, and the "
-        "frequency. Drawn through: "
-        "stable; dashed: unstable or undecided. Diamonds: folds. Triangles: onsets of growth of steady sliding."
+        "frequency. Drawn through: stable; dashed: unstable; dotted: undecided or unknown. Diamonds: folds. Triangles: onsets of growth of "
+        "steady sliding."
+        + (" Lines are broken where there are more harmonics." if len({c.harmonics for c in result.cycles}) > 1 else "")
         + (" Cross: the run in time, over the last quarter of its last phase." if runs else "")
         + (f" The run in time is not drawn beside them: {inputs.beside_cycles}." if inputs.beside_cycles else ""),
         "Slip amplitude and frequency of limit cycles over the friction coefficient.",
@@ -103,7 +102,7 @@ def cycle_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     if not result.cycles:
         return
     cycle = loudest(result)
-    contact = cycle.contact_names[int(np.argmax(cycle.slip_amplitudes))]
+    contact = cycle.contact_names[loudest_contact(cycle)]
     yield ReportFigure(
         "cycle-period",
         f"One period at μ = {cycle.mu:.6g}",
