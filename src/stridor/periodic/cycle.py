@@ -23,6 +23,15 @@ WORDS = {
 }  # fmt: skip
 
 
+def closed_amplitudes(slip: Array, status: IntArray) -> Array:
+    """Half the range (m,) of slip velocities (t, m) over the times at which each contact is closed; 0 where it never
+    is."""
+    closed = status != OPEN
+    highest = np.where(closed, slip, -np.inf).max(axis=0, initial=-np.inf)
+    lowest = np.where(closed, slip, np.inf).min(axis=0, initial=np.inf)
+    return 0.5 * (np.where(closed.any(axis=0), highest, 0.0) - np.where(closed.any(axis=0), lowest, 0.0))
+
+
 class Change(NamedTuple):
     """A change of contact: when in the period [s], at which contact, what, and how each contact is behind it: 0 open, 1
     stick, 2 slip along its tangent, 3 slip against it."""
@@ -132,11 +141,8 @@ class Cycle(Shown):
     def slip_amplitudes(self) -> Array:
         """Half the range (m,) of the slip velocity [m/s] of each contact while it is closed; 0 where it never is."""
         whole = 0.5 * (self.slip_range[:, 1] - self.slip_range[:, 0])
-        closed = self.status != OPEN
-        highest = np.where(closed, self.slip_velocity, -np.inf).max(axis=0)
-        lowest = np.where(closed, self.slip_velocity, np.inf).min(axis=0)
-        rubbed = 0.5 * np.where(closed.any(axis=0), highest - lowest, 0.0)
-        return np.where(closed.all(axis=0) & (self.shares[:, 0] == 0.0), whole, rubbed)
+        rubbed = closed_amplitudes(self.slip_velocity, self.status)
+        return np.where(np.all(self.status != OPEN, axis=0) & (self.shares[:, 0] == 0.0), whole, rubbed)
 
     @property
     def slip_amplitude(self) -> float:

@@ -91,8 +91,8 @@ def cycle_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
         "cycle-branches",
         "Limit cycles over friction",
         "Half the range of the slip velocity while it is closed, of the contact where it is largest, and the "
-        "frequency. Drawn through: stable; dashed: unstable; dotted: undecided or unknown. Diamonds: folds. Triangles: onsets of growth of "
-        "steady sliding."
+        "frequency. Drawn through: stable; dashed: unstable; dotted: undecided or unknown. Diamonds: folds. "
+        "Triangles: onsets of growth of steady sliding."
         + (" Lines are broken where there are more harmonics." if len({c.harmonics for c in result.cycles}) > 1 else "")
         + (" Cross: the run in time, over the last quarter of its last phase." if runs else "")
         + (f" The run in time is not drawn beside them: {inputs.beside_cycles}." if inputs.beside_cycles else ""),

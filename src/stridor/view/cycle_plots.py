@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 
 from ..digits import hertz
 from ..periodic import Cycle, Cycles
+from ..periodic.cycle import closed_amplitudes
 from ..temporal.trajectory import Trajectory
 from .colours import BLUE, COLOURS, GREY, INK, STATUS_COLOURS, VERMILION
 from .cycle_shown import STRIPS, strips
@@ -51,8 +52,8 @@ def cycle_branches(
             lower.plot([cycle.mu], [cycle.frequency_hz], "o", ms=5, color=BLUE, mfc=face)
     for mu, run in runs:
         part = run.phase_slice() if run.phases else slice(0, len(run.time))
-        slip = run.slip_speed[part.stop - max(1, (part.stop - part.start) // 4) : part.stop]
-        upper.plot([mu], [0.5 * float(np.ptp(slip, axis=0).max())], "x", color=INK, ms=6)
+        tail = slice(part.stop - max(1, (part.stop - part.start) // 4), part.stop)
+        upper.plot([mu], [float(closed_amplitudes(run.slip_speed[tail], run.status[tail]).max())], "x", color=INK, ms=6)
     low, _ = upper.get_ylim()
     upper.set_ylim(min(low, 0.0), None)
     if result.onsets:
