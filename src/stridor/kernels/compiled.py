@@ -27,8 +27,10 @@ def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **o
         # Nobody calls them from C: an entry for that takes a sixth of the time to compile.
         chosen: dict[str, Any] = {"no_cfunc_wrapper": True, **options}
         dispatcher: Any = numba.njit(pipeline_class=Closed, **chosen)(plain)
+        if _settings.DISABLE_JIT:  # which gives the plain function back
+            return dispatcher
         dispatcher.get_call_template = partial(_without_literals, dispatcher.get_call_template)
-        if cache and not _settings.DISABLE_JIT:  # which gives the plain function back
+        if cache:
             folder = kernel_folder()
             if folder is not None:
                 dispatcher._cache = KernelCache(plain, folder, options)

@@ -23,13 +23,10 @@ WORDS = {
 }  # fmt: skip
 
 
-def closed_amplitudes(slip: Array, status: IntArray) -> Array:
-    """Half the range (m,) of slip velocities (t, m) over the times at which each contact is closed; 0 where it never
-    is."""
-    closed = status != OPEN
-    highest = np.where(closed, slip, -np.inf).max(axis=0, initial=-np.inf)
-    lowest = np.where(closed, slip, np.inf).min(axis=0, initial=np.inf)
-    return 0.5 * (np.where(closed.any(axis=0), highest, 0.0) - np.where(closed.any(axis=0), lowest, 0.0))
+def slip_range(slip: Array, status: IntArray) -> Array:
+    """Least and largest (m, 2) of slip velocities (t, m); zeros for a contact that is never closed, as nothing slips
+    there."""
+    return np.where(np.any(status != OPEN, axis=0), [slip.min(axis=0), slip.max(axis=0)], 0.0).T
 
 
 class Change(NamedTuple):
@@ -58,7 +55,8 @@ class Cycle(Shown):
     [m/s], gap (t, m) [m], status (t, m): 0 open, 1 stick, 2 slip; displacement [m], velocity, acceleration (t, w, 2),
     in space (t, w, 3). In space slip and friction are those along the slip of steady sliding.
     shares (m, 3): of the period that a contact is open, sticks and slips. slip_range (m, 2), force_range (m, 2): least
-    and largest slip velocity and normal force, at those times and at the changes.
+    and largest slip velocity (zeros where it never touches) and normal force, at those times and at the
+    changes.
 
     grazed: the least rate at which a force, gap or slip goes through zero, over what its terms amount to; a small one
     tells that a change is about to come or go. landed: how often contacts that threw one another off were brought to
@@ -139,14 +137,12 @@ class Cycle(Shown):
 
     @property
     def slip_amplitudes(self) -> Array:
-        """Half the range (m,) of the slip velocity [m/s] of each contact while it is closed; 0 where it never is."""
-        whole = 0.5 * (self.slip_range[:, 1] - self.slip_range[:, 0])
-        rubbed = closed_amplitudes(self.slip_velocity, self.status)
-        return np.where(np.all(self.status != OPEN, axis=0) & (self.shares[:, 0] == 0.0), whole, rubbed)
+        """Half the range (m,) of the slip velocity [m/s] of each contact; 0 where it is never closed."""
+        return 0.5 * (self.slip_range[:, 1] - self.slip_range[:, 0])
 
     @property
     def slip_amplitude(self) -> float:
-        """Half the range of the slip velocity [m/s] while it is closed, of the contact where it is largest."""
+        """Half the range of the slip velocity [m/s], of the contact where it is largest of those that touch."""
         return float(self.slip_amplitudes.max(initial=0.0))
 
     def amplitude(self, quantity: str = "acceleration") -> dict[str, tuple[float, ...]]:

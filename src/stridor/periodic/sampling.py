@@ -35,16 +35,17 @@ def sampled(closed: ClosedShot, reached_from: str) -> Cycle:
         edges = np.array([begun, end])
         found = _at(outputs, motion.anchor, np.concatenate([times[here], edges]))
         contacts[here], watch[here] = found[0][:-2], found[1][:-2]
-        least, most = np.minimum(least, found[0].min(axis=0)), np.maximum(most, found[0].max(axis=0))
         now = np.array([{GAP: OPEN, STUCK: STICK}.get(s, SLIP) for s in motion.status])
         status[here] = now
+        least, most = np.minimum(least, found[0].min(axis=0)), np.maximum(most, found[0].max(axis=0))
         lasting[np.arange(m), now] += end - begun
         if end >= closed.period:
             break
         begun = end
         motion.passed()
     ways = problem.ways
-    slip = np.sort(np.stack([least[:, 2] * ways, most[:, 2] * ways], axis=1), axis=1)
+    rubbed = np.where(lasting[:, OPEN] < closed.period, [least[:, 2], most[:, 2]], 0.0)
+    slip = np.sort((rubbed * ways).T, axis=1)
     names = problem.names
     found = multipliers(closed)
     points = [watch[:, :, k].reshape(SAMPLES, w // 2, 2) for k in range(3)]

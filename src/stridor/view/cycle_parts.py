@@ -90,7 +90,7 @@ def cycle_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     yield ReportFigure(
         "cycle-branches",
         "Limit cycles over friction",
-        "Half the range of the slip velocity while it is closed, of the contact where it is largest, and the "
+        "Half the range of the slip velocity, of the contact where it is largest of those that touch, and the "
         "frequency. Drawn through: stable; dashed: unstable; dotted: undecided or unknown. Diamonds: folds. "
         "Triangles: onsets of growth of steady sliding."
         + (" Lines are broken where there are more harmonics." if len({c.harmonics for c in result.cycles}) > 1 else "")

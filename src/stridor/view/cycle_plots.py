@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from ..digits import hertz
 from ..periodic import Cycle, Cycles
-from ..periodic.cycle import closed_amplitudes
+from ..periodic.cycle import slip_range
 from ..temporal.trajectory import Trajectory
 from .colours import BLUE, COLOURS, GREY, INK, STATUS_COLOURS, VERMILION
 from .cycle_shown import STRIPS, strips
@@ -53,7 +53,8 @@ def cycle_branches(
     for mu, run in runs:
         part = run.phase_slice() if run.phases else slice(0, len(run.time))
         tail = slice(part.stop - max(1, (part.stop - part.start) // 4), part.stop)
-        upper.plot([mu], [float(closed_amplitudes(run.slip_speed[tail], run.status[tail]).max())], "x", color=INK, ms=6)
+        slip = slip_range(run.slip_speed[tail], run.status[tail])
+        upper.plot([mu], [0.5 * float(np.ptp(slip, axis=1).max())], "x", color=INK, ms=6)
     low, _ = upper.get_ylim()
     upper.set_ylim(min(low, 0.0), None)
     if result.onsets:

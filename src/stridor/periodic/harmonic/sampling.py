@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...typing import Array, ComplexArray, IntArray
-from ..cycle import OPEN, SLIP, STICK, Change, Cycle
+from ..cycle import OPEN, SLIP, STICK, Change, Cycle, slip_range
 from .balance import applied_at
 from .balanced import Balanced, defect
 from .hill import MOST, Hill, hill, hill_size
@@ -37,7 +37,7 @@ def sampled_series(cycle: Balanced, reached_from: str) -> Cycle:
         _changes(codes, family.names, cycle.period), family.names, tuple(family.system.points),
         times, normal.T, friction.T, slip.T, gap.T, status.T.astype(np.int64),
         displacement, velocity, acceleration, np.column_stack([shares, 1.0 - shares.sum(axis=1)]),
-        np.stack([fine[2].min(axis=1), fine[2].max(axis=1)], axis=1),
+        slip_range(fine[2].T, codes.T),
         np.stack([fine[0].min(axis=1), fine[0].max(axis=1)], axis=1), np.nan, 0, reached_from, "harmonic",
         at.base.harmonics, defect(cycle), known, floquet.own_off,
     )  # fmt: skip
