@@ -398,3 +398,13 @@ def test_a_search_that_time_ends_says_so():
     assert not found.cycles
     assert found.missing
     assert all("its 1e-09 s of computing were over" in m and "chaotic" not in m for m in found.missing)
+
+
+def test_what_was_not_followed_to_its_end_is_not_said_to_end(monkeypatch: pytest.MonkeyPatch):
+    """A motion that dies out, stopped before what is left of it is bounded."""
+    problem = Family(st.Workspace(mode_coupling(DAMPED, 0.1)).system()).at(0.5)
+    monkeypatch.setattr("stridor.periodic.waiting._kept", lambda *_: False)
+    monkeypatch.setattr("stridor.periodic.waiting.ROUNDS", 1)
+    with pytest.raises(NoReturn, match=r"^no contact changes within .* s, and whether any does later was not followed") as told:
+        cycles_reached(problem, pushed(problem, 1e-9))
+    assert not told.value.steady

@@ -53,7 +53,9 @@ def outcome(problem: SlidingProblem, motion: VariedMotion, begun: float, since: 
         return f"contacts come to open or to turn, and stay so{more}", False
     if anchor is not None and np.any(_growing(anchor)):
         return f"steady sliding is unstable, but {lasting}: growth takes longer than it was followed", False
-    if not kept or anchor is None or np.any(~_decaying(anchor) & (np.abs(anchor.zeta) > STEADY * max(begun, 1e-300))):
+    if anchor is None or not kept:
+        return f"{lasting}, and whether any does later was not followed", False
+    if np.any(~_decaying(anchor) & (np.abs(anchor.zeta) > STEADY * max(begun, 1e-300))):
         return f"the motion swings on without any change of contact, neither growing nor dying out ({lasting})", False
     return "the motion dies out: it comes to steady sliding", True
 
