@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels import njit
+from ..kernels import njit, put
 from ..typing import Array, IntArray
 
 MOST_CORNERS = 10
@@ -29,7 +29,8 @@ def common_triangles(
     for p in range(pairs):
         e = owner[p]
         n = other_corners[p]
-        inside[:n] = others[p, :n]
+        for k in range(n):
+            put(inside[k], others[p, k])
         area = 0.0
         for i in range(corners[e]):
             j = (i + 1) % corners[e]
@@ -44,23 +45,27 @@ def common_triangles(
                 side = dx * (inside[k, 1] - ay) - dy * (inside[k, 0] - ax)
                 next_side = dx * (inside[following, 1] - ay) - dy * (inside[following, 0] - ax)
                 if side >= 0.0:
-                    cut[kept] = inside[k]
+                    put(cut[kept], inside[k])
                     kept += 1
                 if (side > 0.0 and next_side < 0.0) or (side < 0.0 and next_side > 0.0):
                     t = side / (side - next_side)
-                    cut[kept] = inside[k] + t * (inside[following] - inside[k])
+                    for d in range(2):
+                        cut[kept, d] = inside[k, d] + t * (inside[following, d] - inside[k, d])
                     kept += 1
                 if kept >= MOST_CORNERS:
                     break
             n = kept
-            inside[:n] = cut[:n]
+            for k in range(n):
+                put(inside[k], cut[k])
             if n < 3:
                 break
         for k in range(1, n - 1):
             size = (inside[k, 0] - inside[0, 0]) * (inside[k + 1, 1] - inside[0, 1])
             size -= (inside[k, 1] - inside[0, 1]) * (inside[k + 1, 0] - inside[0, 0])
             if abs(size) > SLIVER * area:
-                found[count, 0], found[count, 1], found[count, 2] = inside[0], inside[k], inside[k + 1]
+                put(found[count, 0], inside[0])
+                put(found[count, 1], inside[k])
+                put(found[count, 2], inside[k + 1])
                 which[count] = p
                 count += 1
     return which[:count], found[:count]

@@ -8,7 +8,8 @@ And the process that compiles runs the same machine code as those that load it (
 """
 
 from stridor.kernels.compiled import njit
+from stridor.kernels.copying import put
 from stridor.kernels.denormals import denormals_flushed, flush_denormals
 from stridor.kernels.folder import kernel_folder
 
-__all__ = ["denormals_flushed", "flush_denormals", "kernel_folder", "njit"]
+__all__ = ["denormals_flushed", "flush_denormals", "kernel_folder", "njit", "put"]

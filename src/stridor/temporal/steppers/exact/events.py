@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....kernels import njit
+from ....kernels import njit, put
 from ....typing import Array, IntArray
 from ...arithmetic import FAST
 from ...columns import FRICTION, NORMAL, SUPPORT
@@ -267,8 +267,10 @@ def go_through(
         touching[count] = c
         count += 1
     whole, amounts = np.empty(2 * k + terms + m), np.empty(2 * k + terms + m)
-    whole[: 2 * k], amounts[: 2 * k] = moving, sizes
-    whole[2 * k : 2 * k + terms], whole[2 * k + terms :] = sigma, holds
+    put(whole[: 2 * k], moving)
+    put(amounts[: 2 * k], sizes)
+    put(whole[2 * k : 2 * k + terms], sigma)
+    put(whole[2 * k + terms :], holds)
     for i in range(terms + m):
         amounts[2 * k + i] = abs(whole[2 * k + i])
     after = np.empty(m, dtype=np.int64)
@@ -296,5 +298,5 @@ def go_through(
             for p in range(supports):
                 place += bench.tangent_lift[other, p] * dot(bench.places[p], sigma)
             holds[other] = place
-    status[:] = after
+    put(status, after)
     return DONE, code

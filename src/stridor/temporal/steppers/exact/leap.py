@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....kernels import njit
+from ....kernels import njit, put
 from ....typing import Array, IntArray
 from ...columns import FIRST_OPEN, FIRST_STICK, OPEN_STEPS, SLIP_STEPS, STICK_STEPS, WORKS
 from .events import DONE, LEFT, Bench, go_through, powers
@@ -82,15 +82,15 @@ def _begin(
     size, m = state.moving.shape[0], state.holds.shape[0]
     enter, rest, slow = matrix(store, where, ENTER), matrix(store, where, REST), matrix(store, where, SLOW)
     whole = np.empty(enter.shape[1])
-    whole[:size] = state.moving
+    put(whole[:size], state.moving)
     powers(bench, state.times[NOW], whole[size:])
-    whole[whole.shape[0] - m :] = state.holds
+    put(whole[whole.shape[0] - m :], state.holds)
     f, few = enter.shape[0] // 2, rest.shape[0]
     zeta = np.empty(2 * f)
     product(enter, whole, zeta)
     terms = np.zeros((TAYLOR, slow.shape[0]))
     product(rest, whole, terms[0, :few])
-    terms[0, few:] = whole[size:]
+    put(terms[0, few:], whole[size:])
     used, first, last = 1, 0.0, 0.0
     for s in range(slow.shape[0]):
         first = max(first, abs(terms[0, s]))
@@ -195,7 +195,8 @@ def leap(
         along_real, along_imag, alone = np.zeros((FORMS, j, f)), np.zeros((FORMS, j, f)), np.zeros((FORMS, 2 * j))
         followed(store, where, terms, along_real, along_imag, alone)
         modes, first, forms = np.empty(2 * f), np.zeros(FORMS), np.zeros(FORMS)
-        modes[:f], modes[f:] = zeta[0], zeta[1]
+        put(modes[:f], zeta[0])
+        put(modes[f:], zeta[1])
         forms_at(store, where, zeta, modes, 0.0, along_real, along_imag, alone, WORKS, first)
         course = Course(zeta, terms, along_real, along_imag, alone, first, times[NOW])
         # Records on the way, those that fall on a change with the status before it only where rounding has them so.
@@ -210,7 +211,7 @@ def leap(
             counts[NEXT_RECORD] = ends
             counts[RECORDED] += ends - begins
         if times[NEXT] < end and counts[NEXT_KIND] == CONTACT:
-            modes[:] = ahead
+            put(modes, ahead)
         else:
             modes_at(zeta, matrix(store, where, POLES), stop - times[NOW], modes)
         counts[PEAK_LEVEL] = extremes(
@@ -226,7 +227,7 @@ def leap(
         # Through it.
         kind = counts[NEXT_KIND]
         if kind == PIECE:
-            works[:] = works_now
+            put(works, works_now)
             return CHANGE, zeta, terms, ahead
         slow, own = np.empty(s), np.empty(size)
         behind, amounts = np.empty(size), np.empty(size)
@@ -238,7 +239,7 @@ def leap(
         if kind == CONTACT:
             crowd = counts[CROWDED] if stop - times[CROWD_SINCE] <= MOMENT / fastest else 0
             if crowd + 1 > plain:
-                works[:] = works_now
+                put(works, works_now)
                 return CHANGE, zeta, terms, ahead
             sizes = np.empty(f)
             for k in range(f):
@@ -256,7 +257,7 @@ def leap(
                 holds, struck,
             )  # fmt: skip
             if went == LEFT:
-                works[:] = works_now
+                put(works, works_now)
                 return CHANGE, zeta, terms, ahead
             if went != DONE:
                 counts[NEEDED] = missing
@@ -269,10 +270,12 @@ def leap(
             for c in range(m):
                 if status[c] == GAP and status_now[c] != GAP:
                     parted[c], parted_from[c] = stop, status_now[c]
-            status_now[:], kept_holds[:], works[:] = status, holds, struck
-            works_now[:] = works
+            put(status_now, status)
+            put(kept_holds, holds)
+            put(works, struck)
+            put(works_now, struck)
         else:
-            works[:] = works_now
-        moving[:] = behind
+            put(works, works_now)
+        put(moving, behind)
         times[NOW] = stop
         counts[NEXT_KIND] = LATER

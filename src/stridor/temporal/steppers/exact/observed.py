@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....kernels import njit
+from ....kernels import njit, put
 from ....typing import Array, IntArray
 from ...columns import (
     MAX_NORMAL,
@@ -89,7 +89,7 @@ def record(
             modes_at(zeta, poles, after, modes)
         else:
             turn(modes, turning[:1], turning[1:], 0, following)
-            modes[:] = following
+            put(modes, following)
         if number < span[0]:
             continue
         slow_at(terms, after, slow)
@@ -174,7 +174,8 @@ def extremes(
     if time > 0.0:
         modes_at(course.zeta, poles, time, modes)
     else:
-        modes[:f], modes[f:] = course.zeta[0], course.zeta[1]
+        put(modes[:f], course.zeta[0])
+        put(modes[f:], course.zeta[1])
     for i in range(count):
         r = rows[i, 0]
         for j in range(terms.shape[0]):

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....kernels import njit
+from ....kernels import njit, put
 from ....typing import Array, ComplexArray
 from ...arithmetic import FAST
 
@@ -203,7 +203,7 @@ def _root(
         noise += sizes[i, k] * (abs(start[k]) + abs(start[f + k]))
         fastest = max(fastest, abs(poles[0, k]) + abs(poles[1, k]))
     noise *= EPS
-    modes[:] = start
+    put(modes, start)
     _move(modes, poles, t, fastest)
     for _ in range(200):
         y, rate = polynomial(rows, i, time + t)
@@ -300,9 +300,9 @@ def first_root(
                     t = _root(numbers, i, poles, here, (time, length), let[i], ends, trial)
                     if t < first:
                         which, first = i, t
-                        modes[:] = trial
+                        put(modes, trial)
             if first == length:  # a number that is zero from the beginning on
-                modes[:] = following
+                put(modes, following)
             if time + first > limit:
                 break
             return CROSSED, which, time + first, level, parts, unsure

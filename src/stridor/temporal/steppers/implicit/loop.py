@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ....contact import multipliers
-from ....kernels import njit
+from ....kernels import njit, put
 from ....typing import Array
 from ...columns import (
     DAMPING,
@@ -352,7 +352,7 @@ def run_steps(
                 total_of(nodes, work)
                 state.counters[BY_NEWTON] += 1
             else:
-                work.impulse[:] = state.impulse
+                put(work.impulse, state.impulse)
                 sweeps = solve_nodes(SWEEP_LIMIT, a.step, nodes, state, work)
                 if sweeps > SWEEP_LIMIT:
                     return k, HARD
@@ -368,9 +368,9 @@ def run_steps(
             _statistics(a, nodes, state, work)
         _finish(loads[k], increments[k], rate, a, nodes, state, work)
         if m:
-            state.earlier[:] = state.impulse
-            state.impulse[:] = work.impulse
-            state.status[:] = work.status
+            put(state.earlier, state.impulse)
+            put(state.impulse, work.impulse)
+            put(state.status, work.status)
         state.counters[DONE] += 1
         if m and state.counters[DONE] % RENEWED == 0:
             _renew(nodes, state, work.local.shape[1])
