@@ -116,3 +116,13 @@ def test_what_is_slower_than_that_is_no_line() -> None:
     assert signals.spectrum(drift, float(time[1])).line() == (0.0, 0.0)
     squeal = 1e-3 * np.sin(2 * np.pi * 300.0 * time)
     assert signals.spectrum(drift + squeal, float(time[1])).line()[0] == pytest.approx(300.0, abs=0.1)
+
+
+@pytest.mark.parametrize("grown", [0.3, 0.5, 0.6, 0.8, 0.9, 1.5])
+@pytest.mark.parametrize("dip", [0.0, 0.6])
+def test_growth_is_never_called_saturated_however_slow(grown: float, dip: float) -> None:
+    # e^0.6 over the whole: half as large again as at the beginning, and a quarter larger than a quarter before.
+    time = np.arange(60_000) * 1e-6
+    size = np.exp(grown * time / time[-1]) * (1.0 - dip * np.exp(-(((time - 0.01) / 3e-3) ** 2)))
+    fitted = growth(size * np.cos(2 * np.pi * 5e3 * time), 1e-6, 5e3)
+    assert not fitted.saturated

@@ -180,6 +180,19 @@ def test_divergence_with_and_without_damping(tmp_path: Path):
     assert onset.growth_slope == pytest.approx(2 / (0.1 * 2.5), rel=1e-9)
 
 
+@pytest.mark.parametrize("middle", [0.23, 0.41, 0.47, 0.62, 0.79])
+def test_growth_that_begins_and_ends_within_a_step(tmp_path: Path, middle: float):
+    # Growth that begins and ends again within less than a twentieth of the range, far from everything else.
+    terms = [
+        (np.eye(2), "mass", ""), (np.diag([1.0, 4.0]), "stiffness", ""), (0.02 * np.eye(2), "damping", ""),
+        (np.diag([-0.05, 0.0]), "damping", f"exp(-((mu - {middle})/0.02)**2)"), (0.01 * TURN, "stiffness", "sqrt(mu)"),
+    ]  # fmt: skip
+    found = st.onsets(matrix_case(tmp_path, terms, 1.0))
+    half = 0.02 * math.sqrt(math.log(0.05 / 0.02))
+    assert [o.mu for o in found.onsets] == pytest.approx([middle - half, middle + half], abs=1e-4)
+    assert [o.stabilising for o in found.onsets] == [False, True]
+
+
 def test_factors_of_any_kind(tmp_path: Path):
     for factor, between, mu in (
         ("exp(mu)-1", (0.0, 1.0), math.log(1.75)),

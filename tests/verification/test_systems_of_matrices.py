@@ -227,3 +227,42 @@ def test_a_band_holds_all_its_modes_whatever_the_matrices():
         found = st.modes(system, 0.1, max_frequency_hz=500.0)
         np.testing.assert_allclose(found.frequency_hz[0], np.linspace(10.0, 400.0, 40), rtol=1e-9)
         assert st.modes(system, 0.1, count=30).eigenvalues.shape == (1, 30)
+
+
+@pytest.mark.parametrize("free", [2, 3])
+def test_damped_motions_without_stiffness_are_modes_like_others(free: int) -> None:
+    rng = np.random.default_rng(free)
+    for _ in range(4):
+        n = int(rng.integers(5, 9))
+        turn = np.linalg.qr(rng.standard_normal((n, n)))[0]
+        omega = np.concatenate([np.zeros(free), rng.uniform(0.5, 3.0, n - free)])
+        mass, damping = np.diag(rng.uniform(0.5, 2.0, n)), 0.02 * np.diag(rng.uniform(0.0, 1.0, n))
+        stiffness = (turn * omega**2) @ turn.T
+        rows = rng.standard_normal((2, free, n))
+        law = {"law": "coulomb", "coefficient": 0.3}
+        contacts = {
+            f"c{i}": {"normal": rows[0, i], "tangent": rows[1, i], "stiffness": 10.0, "friction": law} for i in range(free)
+        }
+        system = System.from_matrices(mass, damping, (stiffness + stiffness.T) / 2, contacts=contacts)
+        found = st.modes(system, [0.3], max_frequency_hz=7.0 / (2 * np.pi))
+        rubbed = stiffness + 10.0 * (rows[0] - 0.3 * rows[1]).T @ rows[0]
+        states = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(mass, a) for a in (rubbed, damping)]])
+        every = np.linalg.eigvals(states)
+        truth = every[(every.imag > 1e-3) & (np.abs(every) < 6.9)]
+        apart = np.abs(every[:, None] - found.eigenvalues[0])
+        assert apart[np.isin(every, truth)].min(axis=1).max() < 1e-9  # none is left out
+        assert apart[:, found.unstable[0]].min(axis=0, initial=1.0).max(initial=0.0) < 1e-9  # none is invented
+        assert found.residual[0].max() < 1e-11
+
+
+def test_a_motion_that_nothing_holds_leaves_no_basis_and_is_answered_all_the_same() -> None:
+    # The first two are free and undamped along (1, 1), whose double root at 0 has one shape; damping couples the others.
+    stiffness = np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 4.0]])
+    damping = np.array([[0.1, -0.1, 0.05], [-0.1, 0.1, -0.05], [0.05, -0.05, 0.2]])
+    contact = {"normal": [1.0, 0.0, 0.5], "tangent": [0.0, 1.0, 1.0], "stiffness": 2.0, "friction": LAW}
+    system = System.from_matrices(np.eye(3), damping, stiffness, contacts={"rub": contact})
+    found = st.modes(system, [0.2], max_frequency_hz=1.0)
+    rubbed = stiffness + 2.0 * np.outer(np.array([1.0, 0.0, 0.5]) - 0.2 * np.array([0.0, 1.0, 1.0]), [1.0, 0.0, 0.5])
+    truth = np.linalg.eigvals(np.block([[np.zeros((3, 3)), np.eye(3)], [-rubbed, -damping]]))
+    truth = np.sort_complex(truth[truth.imag > 1e-9])
+    assert np.allclose(np.sort_complex(found.eigenvalues[0]), truth, rtol=1e-9)

@@ -16,6 +16,7 @@ from .pencil import Pencil
 from .quadratic.inverse_iteration import solved_beside
 from .results import ComplexModes, Progress, at_each, require_memory
 from .roots import ReceptanceProblem, spectrum_of
+from .tolerances import BELIEVED
 from .tracking import Tracker
 from .unfit import Unfit
 from .vectors import closed, expand, fixed_vectors, modal_coordinates
@@ -57,7 +58,7 @@ def modes_by_receptance(
         system = system.undamped()
     spectrum, coupling, open_contacts = prepare(system, mu=float(values.max()) if len(values) == 1 else None)
     apart = not coupling.contacts and not spectrum.modes.proportional
-    if spectrum.modes.indefinite or apart or (spectrum.unseen and coupling.contacts):
+    if spectrum.modes.no_receptance or apart or (spectrum.unseen and coupling.contacts):
         raise Unfit(unfit_words(spectrum), max_frequency_hz or _limit(spectrum, count, None) / (2 * np.pi))
     limit = _limit(spectrum, count, max_frequency_hz)
     if not limit > 0.0:
@@ -97,6 +98,11 @@ def modes_by_receptance(
         except Unfit as error:
             raise Unfit(str(error), max_frequency_hz or limit / (2 * np.pi)) from error
         eigenvalues[:, moving], residual[:, moving] = part
+        if not np.all(residual <= BELIEVED):
+            raise Unfit(
+                f"roots leave a backward error of {np.nanmax(residual):.1g} in the full problem",
+                max_frequency_hz or limit / (2 * np.pi),
+            )
     else:
         residual[:, moving] = np.nan
     return ComplexModes(
@@ -234,8 +240,8 @@ def _limit(spectrum: ReceptanceProblem, count: int, max_frequency_hz: float | No
 
 def unfit_words(spectrum: ReceptanceProblem) -> str:
     """Why roots of the receptance are not sought."""
-    if spectrum.modes.indefinite:
-        return "a motion of the structure has a stiffness that is not positive"
+    if spectrum.modes.no_receptance:
+        return spectrum.modes.no_receptance
     if not spectrum.coupling.contacts:
         return "nothing is in contact, and damping that is not proportional leaves no real modes"
     return "modes of the structure that no contact sees have no stiffness to tell them by"

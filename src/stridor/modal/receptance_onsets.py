@@ -67,7 +67,7 @@ def onsets_by_receptance(
     if not damped:
         system = system.undamped()
     spectrum, coupling, open_contacts = prepare(system)
-    if (spectrum.modes.indefinite or spectrum.unseen) and coupling.contacts:
+    if (spectrum.modes.no_receptance or spectrum.unseen) and coupling.contacts:
         raise Unfit(unfit_words(spectrum), max_frequency_hz)
     has_damping = bool(np.abs(system.damping).max() > 0) or coupling.sloped
     top = 2 * np.pi * max_frequency_hz

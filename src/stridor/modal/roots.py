@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg as sl
 
-from ..errors import AnalysisError
 from ..system.uncoupled import UncoupledModes
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .coupling import PointCoupling
@@ -228,9 +227,10 @@ def frictionless_roots(spectrum: ReceptanceProblem, limit: float) -> ComplexArra
         return own
     roots, converged = polish(spectrum, starts, starts.imag != 0.0, 0.0)
     if not converged:
-        raise AnalysisError(
+        raise Unfit(
             "the eigenvalues without friction do not settle: two modes coincide at the contact; change a "
-            "length or a frequency limit slightly"
+            "length or a frequency limit slightly",
+            limit / (2 * np.pi),
         )
     roots = np.concatenate([roots, own])
     return roots[np.argsort(np.abs(roots), kind="stable")]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from ..errors import AnalysisError
 from ..typing import Array, ComplexArray, IntArray
@@ -25,6 +26,8 @@ FEW = 2500  # freedoms for which a complete basis pays
 NEGATIVE = 10.0  # times rounding: a negative stiffness that is meant
 KEPT = 400  # freedoms of a component that is not solved again where its matrices come back
 MOST_KEPT = 8  # of them: at most 5 MB each
+ONE_POLE = 1e-10  # of |λ|: poles nearer to each other are one, and which shapes the solver gives is chance
+SUMS_UP = 1e-6  # of the modal mass, which the sum over modes gives back
 
 _Entries = tuple[bytes, bytes, bytes]  # of a sparse matrix: where rows begin, columns, values
 
@@ -43,11 +46,13 @@ class RealBlock:
 @dataclass(frozen=True)
 class ComplexBlock:
     """Generally damped component: freedoms (k,), vectors X (k, 2k) scaled so that
-    D⁻¹ = Σ x xᵀ/(λ − λ_j), poles (2k,) [1/s]."""
+    D⁻¹ = Σ x xᵀ/(λ − λ_j), poles (2k,) [1/s]. complete: whether that sum is D⁻¹, which it cannot be where a pole of
+    two modes has one shape (a motion that neither springs nor dampers hold)."""
 
     freedoms: IntArray
     vectors: ComplexArray
     poles: ComplexArray
+    complete: bool = True
 
 
 @dataclass(frozen=True)
@@ -67,6 +72,15 @@ class UncoupledModes:
     def proportional(self) -> bool:
         """Whether every component has proportional damping, so that real modes are complete."""
         return not self.general
+
+    @property
+    def no_receptance(self) -> str:
+        """Why the sum over modes is not the receptance; "" where it is."""
+        if self.indefinite:
+            return "a motion of the structure has a stiffness that is not positive"
+        if not all(block.complete for block in self.general):
+            return "modes of the damped structure coincide, and leave no basis"
+        return ""
 
     @property
     def stiffness(self) -> Array:
@@ -210,5 +224,48 @@ def _complex_block(part: IntArray, vectors: Array, squares: Array, c: Array) -> 
             sound = np.isfinite(change) & (np.abs(change) <= 1e-3 * np.abs(poles))
             poles = np.where(sound, poles - change, poles)
     # Symmetric pencil: the left vector is the right one; xᵀ(2λM + C)x = 1 makes residues of D⁻¹.
-    norms = np.einsum("ij,ij->j", q, 2 * poles * q + damping @ q)
-    return ComplexBlock(part, vectors @ (q / np.sqrt(norms)), poles)
+    with np.errstate(all="ignore"):
+        q = q / np.sqrt(np.einsum("ij,ij->j", q, 2 * poles * q + damping @ q))
+    for same in _coincident(poles, float(np.abs(states).max())):
+        q[:, same], poles[same] = _apart(q[:, same], complex(poles[same].mean()), damping)
+    return ComplexBlock(part, vectors @ q, poles, _sums_up(q, poles))
+
+
+def _coincident(poles: ComplexArray, largest: float) -> list[IntArray]:
+    """Groups of poles that are one but for rounding, of matrices with entries up to ``largest`` [1/s]."""
+    order = np.argsort(np.abs(poles), kind="stable")
+    pairs: list[tuple[int, int]] = []
+    for step in (1, 2, 3):  # conjugates lie between
+        a, b = order[:-step], order[step:]
+        near = np.abs(poles[a] - poles[b]) <= ONE_POLE * np.abs(poles[b]) + 1e3 * np.finfo(float).eps * largest
+        pairs += zip(a[near].tolist(), b[near].tolist(), strict=True)
+    if not pairs:
+        return []
+    rows, columns = zip(*pairs, strict=True)
+    links = sp.coo_array((np.ones(len(pairs)), (rows, columns)), shape=(len(poles), len(poles)))
+    _, group = connected_components(links, directed=False)
+    return [np.flatnonzero(group == g) for g in np.flatnonzero(np.bincount(group) > 1)]
+
+
+def _apart(q: ComplexArray, pole: complex, damping: Array) -> tuple[ComplexArray, complex]:
+    """Shapes (n, k) of one pole with qᵀ(2λM + C)q = 1, and the pole.
+
+    The eigenvalue solver gives any k of that plane; the sum over modes holds of those that this form keeps apart.
+    """
+    if not np.all(np.isfinite(q)):
+        return q, pole
+    shapes = np.linalg.svd(q, full_matrices=False)[0]
+    form = shapes.T @ (2 * pole * shapes + damping @ shapes)
+    values, turn = sl.eig((form + form.T) / 2)
+    with np.errstate(all="ignore"):
+        turn = turn / np.sqrt(np.einsum("ij,ij->j", turn, turn) * values)
+    return shapes @ turn, pole
+
+
+def _sums_up(q: ComplexArray, poles: ComplexArray) -> bool:
+    """Whether Σ q qᵀ = 0 and Σ λ q qᵀ = 1 in modal coordinates: D⁻¹ is M⁻¹/λ² at large λ."""
+    if not np.all(np.isfinite(q)):
+        return False
+    weighted = q * np.sqrt(poles)
+    one = bool(np.abs(weighted @ weighted.T - np.eye(len(q))).max() <= SUMS_UP)
+    return one and bool(np.abs(q @ q.T).max() <= SUMS_UP * float(np.abs(q).max()) ** 2)

@@ -18,6 +18,7 @@ import scipy.linalg as sl
 
 from ..typing import Array, ComplexArray
 
+GOES_ON = 0.2  # of the rate of a rise: what still grows so fast has not saturated
 CONSTANT = 0.02  # share of an amplitude by which it may change over the whole fit
 PENCIL_TOLERANCE = 1e-9
 # A line outside the band may have grown millions of times larger than what is sought in it; this window
@@ -188,7 +189,8 @@ def growth(signal: Array, sampling: float, frequency_hz: float) -> Growth:
     """Fit the growth of the line at ``frequency_hz`` where it is exponential.
 
     The plateau is the median amplitude of the last quarter. A signal that rises to it is fitted from its
-    lowest point to half the plateau; one that falls is fitted over the fall.
+    lowest point to half the plateau; one that falls is fitted over the fall. It has saturated where the last quarter is
+    larger than the one before by less than a quarter, and by less than a fifth of what its rise would give in that time.
     """
     if frequency_hz <= 0 or len(signal) < 32:
         return Growth(0.0, 0.0, len(signal) * sampling, 0.0, False, 0.0)
@@ -199,11 +201,15 @@ def growth(signal: Array, sampling: float, frequency_hz: float) -> Growth:
     before = float(np.median(size[-2 * quarter : -quarter])) if len(size) >= 2 * quarter else size[0]
     lowest = int(np.argmin(size[: max(3, 3 * len(size) // 4)]))
     rises = plateau > 1.5 * size[lowest]
-    saturated = bool(rises and plateau < 1.25 * before and plateau > 0.0)
+    saturated = False
     if rises:
-        above = np.flatnonzero(size[lowest:] >= (0.5 if saturated else 0.95) * plateau)
-        stop = lowest + int(above[0]) + 1 if len(above) else len(size)
-        part = slice(lowest, max(stop, min(lowest + 4, len(size))))
+        part = _rise(size, lowest, 0.95 * plateau)
+        # Slow growth takes no more from one quarter to the next than a limit cycle may vary: it must have become slower.
+        gained, hop = math.log(plateau / before), float(time[1] - time[0])
+        still = gained > GOES_ON * max(float(np.polyfit(time[part], np.log(size[part]), 1)[0]), 0.0) * quarter * hop
+        saturated = plateau < 1.25 * before and not still
+        if saturated:
+            part = _rise(size, lowest, 0.5 * plateau)
     else:
         part = slice(int(np.argmax(size[: max(3, len(size) // 2)])), len(size))
     t, y = time[part], np.log(size[part])
@@ -212,6 +218,13 @@ def growth(signal: Array, sampling: float, frequency_hz: float) -> Growth:
     rate, offset = np.polyfit(t, y, 1)
     spread = float(np.sqrt(np.mean((y - rate * t - offset) ** 2)))
     return Growth(float(rate), float(t[0]), float(t[-1]), spread, saturated, plateau)
+
+
+def _rise(size: Array, lowest: int, to: float) -> slice:
+    """From the lowest point of an amplitude (k,) to where it first has come to a value, four points at least."""
+    above = np.flatnonzero(size[lowest:] >= to)
+    stop = lowest + int(above[0]) + 1 if len(above) else len(size)
+    return slice(lowest, max(stop, min(lowest + 4, len(size))))
 
 
 @dataclass(frozen=True)

@@ -116,11 +116,20 @@ def _damped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> Ite
     yield ReportFigure(
         "damped-growth-pair",
         f"Growth rates of modes {a} and {b}, with structural damping",
-        "Re λ of the damped pair; positive grows. Damping shifts both downwards, and so the onset to a slightly "
-        "larger friction coefficient." + where,
+        "Re λ of the damped pair; positive grows." + where + _beside_undamped(crossing, onset),
         f"Growth rates of modes {a} and {b} over friction, one becoming positive.",
         plots.growth_branches(modes, onset.branches),
     )
+
+
+def _beside_undamped(damped: Onset | None, undamped: Onset) -> str:
+    """What damping does to an onset, which it may put off or, where it takes more of one mode, bring on."""
+    if damped is None:
+        return ""
+    without = f"without damping the two meet at μ = {measured(undamped.mu, 5)}"
+    if measured(damped.mu, 5) == measured(undamped.mu, 5):
+        return " That is where they meet without damping, too."
+    return f" Damping {'puts it off' if damped.mu > undamped.mu else 'brings it on'}: {without}."
 
 
 def _damped(inputs: ReportInputs) -> tuple[Onset, ...]:

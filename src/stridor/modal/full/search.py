@@ -25,6 +25,8 @@ from .growth import growing_roots, unstable
 
 FINER = 6  # times as many steps where the count at the ends does not agree
 EVEN = 8  # values at which followed branches are held against a count, beside those between the onsets
+CLOSE_BY = 48  # of problems up to CHEAP unknowns
+CHEAP = 100
 SMALL = 600  # unknowns up to which all eigenvalues are found at once
 ON_EDGE = 1e-6  # of the highest frequency: modes so near it may count on one side only
 
@@ -122,20 +124,26 @@ def _borne_out(answer: Answer, between: tuple[float, float], top: float) -> bool
     assert answer.way is not None, "of followed branches"
     source = answer.way.source
     opened = opened_in(source, between[0], top)
-    if source.whole and not opened:
-        return True  # they were solved in full at every step
     onsets = [o for o in answer.onsets if _in_band(o, top)]
+    if source.whole and not opened:
+        # Solved in full at every step, which may step over growth that begins and ends in it.
+        size = source.family.size
+        if size > SMALL:
+            return True
+        number = _number_by(source.family, top)
+        values = _sampled(answer.onsets, between, CLOSE_BY if size <= CHEAP else EVEN)
+        return not Counted(tuple((mu, number(mu)) for mu in values), (), ()).lacking(onsets)
     sampled = _sampled(answer.onsets, between)
     sampled = sorted({*sampled, *beyond(opened, between[0], sampled[1])})
     grid = [(mu, number_at(source, mu, top, opened)) for mu in sampled]
     return not Counted(tuple(grid), (), ()).lacking(onsets)
 
 
-def _sampled(onsets: Sequence[Onset], between: tuple[float, float]) -> list[float]:
+def _sampled(onsets: Sequence[Onset], between: tuple[float, float], even: int = EVEN) -> list[float]:
     """Where growing roots are counted: both ends, between every two onsets, and some in equal distances."""
     (low, high), values = between, sorted({o.mu for o in onsets})
     middles = [0.5 * (a + b) for a, b in zip([low, *values], [*values, high], strict=True)]
-    return sorted({low, high, *middles, *np.linspace(low, high, EVEN + 2)[1:-1].tolist()})
+    return sorted({low, high, *middles, *np.linspace(low, high, even + 2)[1:-1].tolist()})
 
 
 def _walked(
