@@ -393,7 +393,7 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
     case = flutter(tmp_path)
 
     def boundary() -> Boundary:
-        return st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0))
+        return st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0), lines=3)
 
     with monkeypatch.context() as patch:
         patch.setattr(march, "MOST", 3)
@@ -416,7 +416,7 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
             boundary()
     with monkeypatch.context() as patch:
         lay = search._CurveSearch._lay
-        patch.setattr(search._CurveSearch, "_lay", lambda self, axis, value: None if value > 0.3 else lay(self, axis, value))
+        patch.setattr(search._CurveSearch, "_lay", lambda self, axis, value: None if value > 0.6 else lay(self, axis, value))
         assert boundary().agree  # the curve is found on other lines
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -261,6 +262,11 @@ def test_the_largest_forces_are_those_of_all_times(seed: int):
             assert np.abs(seen).max() >= largest * 0.98 or what != "max_tangential_force"
 
 
+def sums(weights: np.ndarray, poles: np.ndarray, rows: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Re Σ w exp(λt) + a + bt (2, k) at times (k,)."""
+    return (weights @ np.exp(poles[:, None] * t)).real + rows[:, :1] + rows[:, 1:] * t
+
+
 def test_the_first_root_is_the_first():
     """Sums of three modes, some of which turn many times on the first part: against a fine grid."""
     rng = np.random.default_rng(5)
@@ -271,9 +277,7 @@ def test_the_first_root_is_the_first():
         weights = (rng.normal(size=(2, 3)) + 1j * rng.normal(size=(2, 3))) * [1.0, 0.3, 0.1]
         rows = np.stack([rng.uniform(0.5, 2.5, 2), rng.normal(size=2)], axis=1)
 
-        def at(t: np.ndarray) -> np.ndarray:
-            return (weights @ np.exp(poles[:, None] * t)).real + rows[:, :1] + rows[:, 1:] * t
-
+        at = partial(sums, weights, poles, rows)
         values = at(times)
         if values[:, 0].min() <= 0.0:
             continue
