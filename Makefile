@@ -33,7 +33,7 @@ test: $(STAMP)  ## all tests but the slow ones
 
 weekly: $(STAMP)  ## the slow tests, the full benchmarks and the tests of the tests
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
-	@$(call each_benchmark,)
+	@$(each_benchmark)
 	@$(MAKE) --no-print-directory mutants
 
 # The tool lies in a folder of its own: the lock file stays as small as work on stridor needs.
@@ -43,7 +43,7 @@ mutants: $(STAMP)  ## do the tests notice small faults? (a sample: MUTANTS="--sa
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/mutants/mutate.py $(MUTANTS)
 
 bench: $(STAMP)  ## the benchmarks in short mode (LANES=2: two at once, which disturb each other)
-	@$(call each_benchmark,--short)
+	@ls benchmarks/[!_]*.py | xargs -P $(LANES) -n 6 $(BIN)/python benchmarks/_short.py
 
 lint: $(STAMP)  ## ruff
 	$(BIN)/python -m ruff check .
@@ -71,7 +71,7 @@ clean:  ## removes what the other targets made, except .venv and demo/
 
 define each_benchmark
 ls benchmarks/[!_]*.py | BENCH="$(BIN)/python" xargs -P $(LANES) -I{} sh -c \
-  'said=$$($$BENCH {} $(1) 2>&1); code=$$?; printf "== %s %s\n%s\n" {} "$(1)" "$$said"; exit $$code'
+  'said=$$($$BENCH {} 2>&1); code=$$?; printf "== %s\n%s\n" {} "$$said"; exit $$code'
 endef
 
 # The first Python that really runs (shims may exist that only complain), is new enough, and can make environments.

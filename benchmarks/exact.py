@@ -1,6 +1,6 @@
 """The two-beam bench from change to change of its contact against explicit steps: seconds of the march alone.
 
-python benchmarks/exact.py [--short]   (--short: a tenth of the time, for CI)
+python benchmarks/exact.py [--short]   (--short: a fiftieth of the time, for CI)
 
 Explicit steps are on all modes, of 20 ns as the case has them, and of 10 ns; exact ones on the modes up to 100 kHz and
 static answers, with records every 1, 10 and 100 µs. The modes of the structure are made before; the modes of
@@ -22,7 +22,7 @@ WINDOW = (0.015, 0.019)  # s after the start of sliding
 def main() -> None:
     assert __doc__ is not None
     short = options(__doc__).short
-    length = 0.01 if short else 0.1
+    length = 0.002 if short else 0.1
     base = bench().with_({f"phases.{n}.duration": length / 2 for n in (0, 1)} | {"temporal.watch": ("beam1.tip",)})
     exact: dict[str, Any] = {"temporal.stepper": "exact", "temporal.step": 1e-6, "temporal.cutoff_hz": CUTOFF}
     cases = {
@@ -32,7 +32,7 @@ def main() -> None:
     cases |= {f"exact, {n} µs": base.with_(exact | {"temporal.record_every": n}) for n in (1, 10, 100)}
     seconds: dict[str, float] = {}
     said: dict[str, str] = {}
-    for turn in range(3 if short else 6):
+    for turn in range(2 if short else 6):
         for name, case in cases.items():
             run = st.simulate(case)
             if turn == 0:  # which compiles

@@ -25,7 +25,7 @@ from stridor.temporal.steppers.implicit import whole_steps
 
 MU = 0.5
 LENGTH = 0.1  # s
-PARTS = ((20, 100, 200), (20, 50, 100, 200))  # steps marched at a time, short and whole
+PARTS = ((20, 50), (20, 50, 100, 200))  # steps marched at a time, short and whole
 
 
 def growth(case: Case) -> None:

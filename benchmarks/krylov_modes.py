@@ -136,7 +136,7 @@ def main() -> None:
     parser.add_argument("--short", action="store_true", help="a small model, for CI")
     parser.add_argument("--along", type=int, default=27, help="cells along the pad")
     chosen = parser.parse_args()
-    system = pad_on_block(8 if chosen.short else chosen.along)
+    system = pad_on_block(5 if chosen.short else chosen.along)
     count, frictions = (8, 4) if chosen.short else (50, 41)
     print(f"{system.size} freedoms, {system.contact_nodes().count} contact nodes")
     for damped in (True,) if chosen.short else (False, True):

@@ -47,7 +47,7 @@ def main() -> None:
     parser.add_argument("case", nargs="*", help="a case file (default: the two beams)")
     args = parser.parse_args()
     if args.process:
-        compute(args.case, 12 if args.short else 60, args.lever)
+        compute(args.case, 4 if args.short else 60, args.lever)
         return
     if find_spec("nicegui") is None or find_spec("playwright") is None or not CHROMIUM.exists():
         print("no measurement: needs nicegui, playwright and /usr/bin/chromium")
@@ -56,7 +56,7 @@ def main() -> None:
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     try:
-        measure(server.stdout.readline().strip(), 12 if args.short else 60, args.lever)
+        measure(server.stdout.readline().strip(), 4 if args.short else 60, args.lever)
     finally:
         server.terminate()
         server.wait(20)

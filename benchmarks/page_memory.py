@@ -35,7 +35,7 @@ START = "typeof stridor !== 'undefined' && stridor.state.onsets !== null && stri
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--minutes", type=float, default=60.0)
-    parser.add_argument("--short", action="store_true", help="half a minute: only that it works")
+    parser.add_argument("--short", action="store_true", help="seconds: only that it works")
     args = parser.parse_args()
     if not all(map(find_spec, ("nicegui", "playwright"))) or not CHROMIUM.exists() or not Path("/proc").exists():
         print("no measurement: needs nicegui, playwright, Linux and /usr/bin/chromium")
@@ -44,7 +44,7 @@ def main() -> None:
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     try:
-        use(server.stdout.readline().strip(), server.pid, *((30.0, 2) if args.short else (60 * args.minutes, SAMPLES)))
+        use(server.stdout.readline().strip(), server.pid, *((6.0, 2) if args.short else (60 * args.minutes, SAMPLES)))
     finally:
         server.terminate()
         server.wait(20)

@@ -1,7 +1,7 @@
 """All modes in a band, against shift-invert written by hand with the same factors: a gyroscopic, circulatory block of
 two sizes, and the pad on the disc.
 
-python benchmarks/quadratic_modes.py [--short]   (about 4 500 and 50 000 freedoms; --short: 1 500 only)
+python benchmarks/quadratic_modes.py [--short]   (about 4 500 and 50 000 freedoms; --short: 500 only)
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def compare_pad() -> None:
 def main() -> None:
     chosen = options(__doc__ or "")
     print(machine())
-    compare_block((10, 7, 6) if chosen.short else (15, 10, 8), 40e3)
+    compare_block((6, 5, 4) if chosen.short else (15, 10, 8), 40e3)
     if not chosen.short:
         compare_block((35, 22, 20), 40e3)
         compare_pad()

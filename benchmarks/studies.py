@@ -193,7 +193,7 @@ def main() -> None:
     if args.large:
         large(2 if args.large == "two" else 3, coarse() if args.coarse else st.loads(template_text("pad-on-disc")))
         return
-    few, many = (16, 200) if args.short else (300, 10_000)
+    few, many = (4, 40) if args.short else (300, 10_000)
     full = scatter(few, "full")
     alone = timed(full, 1)
     one = line("full, 1 worker", 1, alone)

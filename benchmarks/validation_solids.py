@@ -61,8 +61,7 @@ def contact(folder: Path, *, fine: bool) -> None:
     """Pressure, statics and impacts."""
     for size, ratio, quadratic, stiffness in (
         (1.0, 0.9, False, "rigid"),
-        (0.5, 0.9, False, "rigid"),
-        *([(0.25, 0.9, False, "rigid")] if fine else []),
+        *([(0.5, 0.9, False, "rigid"), (0.25, 0.9, False, "rigid")] if fine else []),
         (1.0, 1.0, True, "rigid"),
         (1.0, 1.0, True, 1e15),
     ):

@@ -123,22 +123,22 @@ def disagreement(problem: Plane, found: Found, mesh: float) -> str:
     return ""
 
 
-def off_the_curves(problem: Plane, found: Found, beside: float) -> list[np.ndarray]:
-    """Points of the curves between whose two sides, so far away in shares of the ranges and half as far again, no root of
+def off_the_curves(problem: Plane, found: Found, beside: float, every: int = 1) -> list[np.ndarray]:
+    """Points of the curves, one in every so many of their pieces, between whose two sides, so far away in shares of the ranges and half as far again, no root of
     the curve's frequency begins to grow, nor as many in all as the curves say. Where another curve is as near they are not
     told apart."""
     wrong: list[np.ndarray] = []
     for curve in found.curves:
-        points, ways = curve.drawn.points, np.diff(curve.drawn.points, axis=0)
+        points, ways = curve.drawn.points, np.diff(curve.drawn.points, axis=0)[::every]
         others = replace(found, curves=[other for other in found.curves if other is not curve])
-        middle = 0.5 * (points[1:] + points[:-1])
+        middle = 0.5 * (points[1:] + points[:-1])[::every]
         normal = np.stack([-ways[:, 1], ways[:, 0]], axis=1) / np.maximum(np.hypot(*ways.T), 1e-300)[:, None]
         sides = [(m - 1.5 * beside * n, m + 1.5 * beside * n) for m, n in zip(middle, normal, strict=True)]
         alone = distance(others, middle) > 2 * beside
         judged = [k for k, (a, b) in enumerate(sides) if min(*a, *b) >= 0 and max(*a, *b) <= 1 and alone[k]]
         if not judged:
             continue
-        omega = curve.drawn.omega[:-1][judged, None]
+        omega = curve.drawn.omega[:-1][::every][judged, None]
         off = np.ones(len(judged), dtype=bool)
         for share in (beside, 1.5 * beside):
             ends = [middle[judged] + sign * share * normal[judged] for sign in (-1, 1)]

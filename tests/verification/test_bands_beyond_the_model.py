@@ -107,7 +107,8 @@ def test_a_heavy_mass_on_a_rigid_floor(band: float) -> None:
 
 def test_a_band_of_many_decades_has_the_onsets_of_one_that_ends_with_the_model() -> None:
     """By receptance: its dense problems are scaled by the band, where they would lose the digits of what is slow."""
-    found, wide = (st.onsets(paper_case(), max_frequency_hz=band) for band in (1e8, 1e12))
+    case = paper_case(bodies__beam1__elements=4, bodies__beam2__elements=12)
+    found, wide = (st.onsets(case, max_frequency_hz=band) for band in (1e8, 1e12))
     assert len(found) == len(wide) > 2
     assert [o.mu for o in wide.onsets] == pytest.approx([o.mu for o in found.onsets], rel=1e-10)
 

@@ -71,12 +71,12 @@ def traced(case: st.Case, x: str, ends: tuple[float, float], high: float) -> tup
     return plane, boundaries(plane, 1e-3, LINES)
 
 
-def against_a_grid(plane: Plane, found: Found, columns: int = 26) -> None:
+def against_a_grid(plane: Plane, found: Found, columns: int = 9) -> None:
     """Some columns of a grid of 1001 × 1001 points: where the number of growing roots changes from one to the next there
     is a curve within 0.1 % of the ranges, and curves have that many on their sides; at less than 2 % of its solves."""
     assert found.agree
     assert plane.solves + plane.steps <= 0.02 * FINE**2
-    assert not off_the_curves(plane, found, 1e-3)
+    assert not off_the_curves(plane, found, 1e-3, every=3)
     grid = np.linspace(0.0, 1.0, FINE)
     changes = 0
     for x in np.linspace(0.0, 1.0, columns).tolist():
@@ -89,9 +89,15 @@ def against_a_grid(plane: Plane, found: Found, columns: int = 26) -> None:
     assert changes
 
 
-def test_growth_begins_where_the_closed_form_says(tmp_path: Path) -> None:
-    case = flutter(tmp_path)
-    found = st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0))
+@pytest.fixture(scope="module")
+def fluttering(tmp_path_factory: pytest.TempPathFactory) -> tuple[st.Case, Boundary]:
+    """The boundary of `flutter`, for what changes nothing of it."""
+    case = flutter(tmp_path_factory.mktemp("flutter"))
+    return case, st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0))
+
+
+def test_growth_begins_where_the_closed_form_says(fluttering: tuple[st.Case, Boundary]) -> None:
+    case, found = fluttering
     (curve,) = found.curves
     assert found.agree
     assert curve.y == pytest.approx(1 + curve.x**2 / 4 + C**2 * (2 + curve.x / 2), rel=1e-10)
@@ -166,13 +172,13 @@ def test_pieces_between_points_are_as_near_as_asked_for(tmp_path: Path, toleranc
 
 def test_an_island_that_cuts_no_line_and_is_nowhere_counted_is_not_excluded(tmp_path: Path) -> None:
     """The growth falls off so steeply that nothing betrays it from outside: missed, and the result says that it may."""
-    case = damped_by(tmp_path, "0.1 - exp(-((x - 0.55)/0.01)**2 - ((mu - 0.55)/0.01)**2)")
+    case = damped_by(tmp_path, "0.1 - exp(-((x - 0.2)/0.01)**2 - ((mu - 0.2)/0.01)**2)")
     found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0))
     assert not found.curves
     assert "at most 25 % of a range apart" in found.sentence
     assert "Not excluded" in found.sentence
-    finer = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0), lines=21)
-    assert len(finer.curves) == 1  # at 0.55 there is a line now
+    finer = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0), lines=6)
+    assert len(finer.curves) == 1  # at 0.2 there is a line now
 
 
 def missed_islands(seed: int, folder: Path) -> tuple[int, int]:
@@ -185,7 +191,7 @@ def missed_islands(seed: int, folder: Path) -> tuple[int, int]:
     return sum(off > 0.01 for off in near), len(islands)
 
 
-@pytest.mark.parametrize("seed", [13, 103, 142])
+@pytest.mark.parametrize("seed", [13, 142])
 def test_small_islands_are_found_up_the_growth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """They cut no line and are betrayed by no count, but by how the damping falls off around them."""
     assert missed_islands(seed, tmp_path)[0] == 0
@@ -285,7 +291,7 @@ def test_two_beams_against_onsets_of_the_full_problem() -> None:
     assert max(c.difference for c in found.confirmed) <= 1e-6
     error = np.concatenate([c.error for c in found.curves])
     assert np.nanmax(error) <= 1e-4
-    for value in (0.0, 333.0, 1234.0, 1777.0, 2000.0):
+    for value in (0.0, 1234.0, 2000.0):
         onsets = [o for o in st.onsets(case.with_({path: value}), (0.0, 0.5)).onsets if o.frequency_hz <= 40e3]
         at = sorted(
             (float(np.interp(value, x, y)), float(np.interp(value, x, f))) for x, y, f in map(ascending, found.polylines())
@@ -351,24 +357,26 @@ def test_an_end_without_any_damping_is_left_out(tmp_path: Path) -> None:
 
 
 # -- random problems ---------------------------------------------------------------------------------------------------
-def wrong(seed: int) -> tuple[bool, str]:
-    """Whether all fits together by its own word, and where it does not although it says so."""
+def wrong(seed: int, every: int = 1) -> tuple[bool, str]:
+    """Whether all fits together by its own word, and where it does not although it says so; of the curves every so
+    many-th piece is looked at."""
     plane = random_plane(seed)
     found = boundaries(plane, 1e-3, LINES)
     if not found.agree:
         return False, ""
     if said := disagreement(plane, found, MESH):
         return True, f"seed {seed}: {said}"
-    off = [] if plane.reversible else off_the_curves(plane, found, 1e-3)
+    off = [] if plane.reversible else off_the_curves(plane, found, 1e-3, every)
     return True, f"seed {seed}: no boundary at {off[0].round(4)}" if off else ""
 
 
-MORE = [pytest.param(seeds, marks=pytest.mark.slow) for seeds in ((13, 100), (140, 278))]
+MORE = [pytest.param(seeds, marks=pytest.mark.slow) for seeds in ((7, 10), (13, 100), (140, 278))]
 
 
-@pytest.mark.parametrize("seeds", [range(5), (7, 10), *MORE], ids=str)
+@pytest.mark.parametrize("seeds", [range(5), *MORE], ids=str)
 def test_random_problems(seeds) -> None:
-    assert [wrong(seed) for seed in seeds] == [(True, "")] * len(seeds)
+    every = 3 if seeds == range(5) else 1
+    assert [wrong(seed, every) for seed in seeds] == [(True, "")] * len(seeds)
 
 
 @pytest.mark.slow
@@ -385,7 +393,7 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
     case = flutter(tmp_path)
 
     def boundary() -> Boundary:
-        return st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0))
+        return st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0), lines=3)
 
     with monkeypatch.context() as patch:
         patch.setattr(march, "MOST", 3)
@@ -408,7 +416,7 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
             boundary()
     with monkeypatch.context() as patch:
         lay = search._CurveSearch._lay
-        patch.setattr(search._CurveSearch, "_lay", lambda self, axis, value: None if value > 0.3 else lay(self, axis, value))
+        patch.setattr(search._CurveSearch, "_lay", lambda self, axis, value: None if value > 0.6 else lay(self, axis, value))
         assert boundary().agree  # the curve is found on other lines
 
 
@@ -476,9 +484,13 @@ def test_the_verb(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("empty", [False, True])
-def test_a_boundary_comes_back_from_its_file(tmp_path: Path, empty: bool) -> None:
+def test_a_boundary_comes_back_from_its_file(
+    tmp_path: Path, empty: bool, fluttering: tuple[st.Case, Boundary]
+) -> None:
     high = 1e-3 if empty else 3.0
-    found = st.stability_boundary(flutter(tmp_path), "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, high))
+    case, found = fluttering
+    if empty:
+        found = st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, high))
     assert (len(found.curves) == 0) == empty
     back = st.open(st.save(found, tmp_path / "boundary.nc"))
     assert isinstance(back, Boundary)
@@ -496,9 +508,10 @@ def test_a_boundary_comes_back_from_its_file(tmp_path: Path, empty: bool) -> Non
     ("name", "value"),
     [("x_range", []), ("y_range", [1.0, 0.0]), ("method", 7), ("counted", [{}]), ("curves", None), ("lines_x", ["a"])],
 )
-def test_a_boundary_that_is_none_is_refused_in_one_message(tmp_path: Path, name: str, value: object) -> None:
-    found = st.stability_boundary(flutter(tmp_path), "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0))
-    data = found.to_xarray()
+def test_a_boundary_that_is_none_is_refused_in_one_message(
+    tmp_path: Path, name: str, value: object, fluttering: tuple[st.Case, Boundary]
+) -> None:
+    data = fluttering[1].to_xarray()
     document = json.loads(data.attrs["boundary"]) | {name: value}
     for text in (json.dumps(document), "null"):
         seal(data.assign_attrs({"boundary": text})).to_netcdf(tmp_path / "boundary.nc", engine="h5netcdf")

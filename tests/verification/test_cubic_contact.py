@@ -69,7 +69,7 @@ def test_a_mass_on_a_layer_that_hardens():
     assert found.friction_force[0, 0] == pytest.approx(0.2 * LOAD, rel=1e-12)
     assert found.residual < 1e-14
     tangent = math.sqrt((STIFFNESS + 3 * CUBIC * depth**2) / MASS) / (2 * math.pi)
-    mus = np.linspace(0.0, 1.0, 21)
+    mus = np.linspace(0.0, 1.0, 6)
     assert st.modes(case, mus).frequency_hz.max() == pytest.approx(tangent, rel=1e-12)
     # Under another load it has another frequency; without a load nothing tells it.
     heavier = pressed(**{"loads.press.force": [0.0, -1000.0]})

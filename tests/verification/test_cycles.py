@@ -340,7 +340,7 @@ def test_a_branch_whose_end_at_the_edge_is_lost_says_so(monkeypatch: pytest.Monk
 
 def test_undamped_modes_that_meet_have_no_branch_of_their_own():
     """The onset is a double root: two modes in one, which the exact motion cannot go on with. That is said, not hidden."""
-    found = st.cycles(mode_coupling(), between=(0.5, 0.9), push=[0.5], seconds=2.0, points=2)
+    found = st.cycles(mode_coupling(), between=(0.5, 0.9), push=[0.5], seconds=0.3, points=2)
     assert found.missing[0].startswith("no branch was found from the onset at μ = 0.75 ")
 
 

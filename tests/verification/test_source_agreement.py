@@ -98,7 +98,7 @@ FAST = [(True, "rigid"), (False, 1e8)]
     ("damped", "stiffness"), [pytest.param(*c, marks=() if c in FAST else pytest.mark.slow) for c in ALL]
 )
 def test_two_beams_by_every_source(damped, stiffness):
-    coarse = dict(bodies__beam1__elements=10, bodies__beam2__elements=30) if (damped, stiffness) in FAST else {}
+    coarse = dict(bodies__beam1__elements=6, bodies__beam2__elements=18) if (damped, stiffness) in FAST else {}
     assert assert_same(build_system(two_beams(damped, stiffness, **coarse)), NAMES) >= 3
 
 

@@ -287,5 +287,5 @@ def _require_finite(number: _Dual) -> None:
     value, slopes = number
     if not math.isfinite(value):
         raise _Undefined("the result is too large")
-    if not all(math.isfinite(d) for d in slopes.values()):
+    if slopes and not all(math.isfinite(d) for d in slopes.values()):
         raise _Undefined("the slope is too large")

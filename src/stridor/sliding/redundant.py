@@ -25,6 +25,8 @@ def redundant(system: System, nodes: ContactNodes, rigid: BoolArray) -> str:
     besides, supports and ties, took the freedoms that would tell.
     """
     chosen = np.flatnonzero(rigid)
+    if len(chosen) < 2:
+        return ""
     rows = sp.csr_array(nodes.normal[chosen])
     size = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
     count = int(np.count_nonzero(size > FAINT))

@@ -310,6 +310,9 @@ class System(Shown):
 
     def contact_nodes(self) -> ContactNodes:
         """Every contact, point or surface, as one list of slave nodes: points first, then surfaces in order."""
+        return self.once("contact nodes", self._contact_nodes)
+
+    def _contact_nodes(self) -> ContactNodes:
         parts = [_point_nodes(c) for c in self.contacts] + [s.nodes for s in self.surfaces]
         nodes = stack(parts, self.size, len(self.motion.names), self.dimension)
         if not self.contact_cubic:

@@ -128,6 +128,7 @@ class _CurveSearch:
         self.plane, self.tolerance, self.number = plane, tolerance, lines
         self.found, self._progress, self._done = Found(plane), progress, 0
         self._failed: list[AnalysisError] = []
+        self._modes: list[ModesAtPoint] = []  # at the points at which it was counted
 
     def all(self) -> Found:
         """Lines, curves and counts, again where they differ."""
@@ -206,7 +207,8 @@ class _CurveSearch:
                 found = self.plane.modes(p)
             except AnalysisError:
                 return
-            rates = self.plane.slopes(p, found).real
+            slopes = self.plane.slopes(p, found)
+            rates = slopes.real
             near = ON_CURVE * np.hypot(*rates)
             told = near > UNSTABLE_RELATIVE * np.abs(found.values)  # others are on no curve, or on the axis everywhere
             on = np.flatnonzero(told & (np.abs(found.values.real) <= near))
@@ -217,12 +219,13 @@ class _CurveSearch:
                 break
             p = moved
         self.found.looked.append(Looked(p, self.plane.count(found)))
+        self._modes.append(ModesAtPoint(p, found.values, slopes))
 
     def _look_between(self) -> None:
         """Count where modes that decay at the points so far may grow: where their rates lead, and up to tops."""
         if self.plane.reversible:
             return
-        mesh, seen = 1.0 / (self.number - 1), [ModesAtPoint.at(self.plane, at.p) for at in self.found.looked]
+        mesh, seen = 1.0 / (self.number - 1), list(self._modes)
         for here in seen:
             self._look_ahead(here, mesh)
         most = self.plane.solves + CLIMBING * len(seen)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -252,6 +253,13 @@ def _rest(lam: ComplexArray, images: Images) -> ComplexArray:
     return lam**2 * of_mass + lam * of_damping + of_stiffness
 
 
+@lru_cache(64)
+def _alike(powers: bytes, kind: str) -> list[tuple[int, int]]:
+    """From where to where neighbouring terms are on the same power of λ."""
+    starts = np.flatnonzero(np.diff(np.frombuffer(powers, dtype=kind), prepend=-1)).tolist()
+    return list(pairwise([*starts, len(powers) // np.dtype(kind).itemsize]))
+
+
 def _functional(lam: ComplexArray, w: ComplexArray, images: Images) -> ComplexArray:
     """λ (k,) that makes wᵀP(λ)z zero, by Newton from the one before."""
     a, b, c = (np.einsum("ij,ij->j", w, image) for image in images)
@@ -285,8 +293,7 @@ def assembled_each(projected: Array, chosen: Sequence[Array], powers: Array) -> 
     flat = projected.reshape(len(projected), -1)
     several = np.stack(chosen)
     total = np.zeros((len(several), 3, flat.shape[1]))
-    starts = np.flatnonzero(np.diff(powers, prepend=-1))
-    for start, end in pairwise([*starts.tolist(), len(powers)]):
+    for start, end in _alike(powers.tobytes(), powers.dtype.str):
         # A product of one row goes by BLAS's routine for vectors, which copies nothing.
         part = several[0, start:end] @ flat[start:end] if len(several) == 1 else several[:, start:end] @ flat[start:end]
         total[:, 2 - powers[start]] += part
