@@ -53,7 +53,7 @@ def page_at(browser: Any, address: str, *, width: int = 1280, height: int = 720,
     page.on("pageerror", lambda error: failed.append(str(error)))
     page.on("request", lambda asked: failed.append(asked.url) if "127.0.0.1" not in asked.url and not asked.url.startswith(("data:", "blob:", "about:")) else None)
     page.goto(address)
-    page.wait_for_function(f"{SOLVED} && {READY}", timeout=PATIENT)
+    wait(page, f"{SOLVED} && {READY}")
     try:
         yield page
         if not lost:
@@ -77,7 +77,7 @@ def slide(page: Any, path: str, value: float) -> None:
 
 
 def wait(page: Any, condition: str) -> None:
-    page.wait_for_function(condition, timeout=PATIENT)
+    page.wait_for_function(condition, timeout=PATIENT, polling=100)
 
 
 def number(page: Any, path: str, value: float) -> None:
