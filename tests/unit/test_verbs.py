@@ -14,6 +14,7 @@ import stridor as st
 from stridor.case import template_text
 from stridor.errors import kind_of
 from stridor.notebook import MOST_LETTERS
+from stridor.periodic import returns
 
 COARSE = {
     "bodies.beam1.elements": 3, "bodies.beam2.elements": 6, "modal.max_frequency_hz": 12e3,
@@ -26,7 +27,7 @@ ANY = "a case, the path of its file, a system or a workspace"
 VERBS: dict[str, Callable[[Any, Path], object]] = {
     "body_modes": lambda p, _: st.body_modes(p),
     "compare": lambda p, _: st.compare(p, only=["growth"]),
-    "cycles": lambda p, _: st.cycles(p, 0.01, push=1e-4, seconds=0.1),
+    "cycles": lambda p, _: st.cycles(p, 0.01, push=1e-4),
     "damping_map": lambda p, _: st.damping_map(
         p, *MASS, x_range=(1, 20), y_range=(1, 20), grid=(2, 2), mu_range=(0, 0.2)
     ),
@@ -73,7 +74,8 @@ def test_each_verb_is_looked_at() -> None:
 
 
 @pytest.mark.parametrize("verb", sorted(VERBS))
-def test_kinds_of_problem(verb: str, file: Path, tmp_path: Path) -> None:
+def test_kinds_of_problem(verb: str, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(returns, "QUIET", 0.05 * returns.QUIET)  # how long a motion is followed is no matter here
     call, case = VERBS[verb], st.load(file)
     work, kinds = st.Workspace(case), set[type]()
     result = call(file, tmp_path / "first")
