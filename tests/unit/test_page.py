@@ -235,7 +235,7 @@ def test_warnings_and_notes_fit_the_page_and_errors_that_of_a_terminal(
     assert line.count("\n") == 1
     code, shown = on_terminal(*wrong, cwd=folder)
     shown = shown.replace("\r\n", "\n")
-    assert code == 2
+    assert code == 2, shown
     assert len(line) > 81
     assert max(map(len, shown.splitlines())) <= 80
     assert " ".join(shown.split()) == line.strip()
@@ -246,7 +246,7 @@ def test_warnings_and_notes_fit_the_page_and_errors_that_of_a_terminal(
 )
 def test_warnings_stand_before_the_result(folder: Path, words: str) -> None:
     code, shown = on_terminal(*words_of(words), "--solver", "superlu", "--out", "warned", cwd=folder)
-    assert code == 0
+    assert code == 0, shown
     body, following, after = shown.partition(NEXT)
     assert "warning: --solver has no effect" in body
     assert following
@@ -257,7 +257,7 @@ def test_warnings_stand_before_the_result(folder: Path, words: str) -> None:
 def test_a_terminal_has_unstable_modes_in_red_unless_no_color_is_set(folder: Path, *, colours: bool) -> None:
     more = {} if colours else {"NO_COLOR": "1"}
     code, shown = on_terminal("modes", "two-beams.toml", "--set", "modal.sweep_points=6", cwd=folder, **more)
-    assert code == 0
+    assert code == 0, shown
     red = re.findall(r"\x1b\[31m([^\x1b]*)", shown)
     assert ("8641.12" in " ".join(red)) == colours
     assert not colours or not any("-716.799" in text for text in red)
