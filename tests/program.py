@@ -7,16 +7,21 @@ the end of the interpreter) starts real ones.
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import io
 import os
+import pty
+import struct
 import subprocess
 import sys
+import termios
+import traceback
 import warnings
 from collections.abc import Generator
 from pathlib import Path
 from unittest import mock
 
-from stridor.app import cli
+from stridor.app import cli, output
 
 
 def stridor(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -32,6 +37,46 @@ def stridor(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     ):
         code = cli._guarded(cli._program)
     return subprocess.CompletedProcess(["stridor", *words], code, out.getvalue(), err.getvalue())
+
+
+def on_terminal(*words: str, cwd: Path, **environment: str) -> tuple[int, str]:
+    """Exit code of ``stridor words…`` on a terminal of 80 columns, and what stands on it.
+
+    In a process forked off this one: loading everything again would take longer than most verbs."""
+    child, terminal = pty.fork()
+    if child == 0:
+        code = 70  # of a program that fails by itself
+        try:
+            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+            code = _taken_over(words, cwd, environment)
+        except BaseException:
+            traceback.print_exc(file=sys.__stderr__)
+        finally:
+            os._exit(code)
+    text = b""
+    with contextlib.suppress(OSError):  # the other end is closed
+        while part := os.read(terminal, 65536):
+            text += part
+    os.close(terminal)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), text.decode()
+
+
+def _taken_over(words: tuple[str, ...], cwd: Path, environment: dict[str, str]) -> int:
+    """The program in a process that has nothing else to do: its streams, folder and environment are replaced."""
+    for name in ("NO_COLOR", "COLUMNS"):
+        os.environ.pop(name, None)
+    os.environ |= {"TERM": "xterm"} | environment
+    os.chdir(cwd)
+    sys.argv = ["stridor", *words]
+    sys.stdin, sys.stdout, sys.stderr = (os.fdopen(number, mode) for number, mode in enumerate("rww"))
+    # Whether there are colours is settled where a console is made.
+    output.stdout.__init__(highlight=False, soft_wrap=True)
+    output.stderr.__init__(stderr=True, highlight=False, soft_wrap=True)
+    with _warnings_shown():
+        code = cli._guarded(cli._program)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    return code
 
 
 @contextlib.contextmanager

@@ -53,7 +53,7 @@ def page_at(browser: Any, address: str, *, width: int = 1280, height: int = 720,
     page.on("pageerror", lambda error: failed.append(str(error)))
     page.on("request", lambda asked: failed.append(asked.url) if "127.0.0.1" not in asked.url and not asked.url.startswith(("data:", "blob:", "about:")) else None)
     page.goto(address)
-    page.wait_for_function(f"{SOLVED} && {READY}", timeout=PATIENT)
+    wait(page, f"{SOLVED} && {READY}")
     try:
         yield page
         if not lost:
@@ -62,6 +62,23 @@ def page_at(browser: Any, address: str, *, width: int = 1280, height: int = 720,
     finally:
         context.close()
     assert not failed, failed
+
+
+def begin_again(page: Any, address: str) -> None:
+    """Back to the two beams as they were opened; by loading the page where a test has left it unable to."""
+    from playwright.sync_api import Error
+
+    try:
+        page.evaluate("Quasar.Dark.set(false)")
+        slide(page, "mu", 0.123)  # so that what is told of μ = 0.1 below is not of before
+        page.wait_for_function("stridor.state.at?.mu === 0.123", timeout=20_000, polling=100)
+        page.get_by_role("button", name="Examples").click(timeout=20_000)
+        page.get_by_text("two-beams", exact=True).click(timeout=20_000)
+        page.wait_for_function(f"stridor.state.at?.mu === 0.1 && stridor.state.at.checked && {SOLVED}", timeout=20_000, polling=100)
+    except Error:
+        page.goto("about:blank")
+        page.goto(address)
+        wait(page, f"{SOLVED} && {READY}")
 
 
 def shot(page: Any, name: str, **more: Any) -> None:

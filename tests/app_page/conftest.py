@@ -6,7 +6,7 @@ from collections.abc import Generator
 from typing import Any
 
 import pytest
-from browsing import CHROMIUM, page_at, serving
+from browsing import CHROMIUM, begin_again, page_at, serving
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,14 @@ def browser() -> Generator[Any]:
         opened.close()
 
 
+@pytest.fixture(scope="module")
+def opened(browser: Any, address: str) -> Generator[Any]:
+    with page_at(browser, address) as page:
+        yield page
+
+
 @pytest.fixture
-def page(browser: Any, address: str) -> Generator[Any]:
-    with page_at(browser, address) as opened:
-        yield opened
+def page(opened: Any, address: str) -> Generator[Any]:
+    """A page as it opens: to load one takes longer than most tests do, and they share it."""
+    yield opened
+    begin_again(opened, address)

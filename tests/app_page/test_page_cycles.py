@@ -191,10 +191,12 @@ def test_where_every_motion_dies_out_that_is_said(browser: Any, coupled: str) ->
 
 
 @WITH_BROWSER
-def test_a_case_that_cannot_be_taken_is_told_why(browser: Any, tmp_path: Path) -> None:
+def test_a_case_that_cannot_be_taken_is_told_why(browser: Any, coupled: str, tmp_path: Path) -> None:
     path = tmp_path / "weakening.toml"
-    path.write_text(case().with_(NEITHER).to_toml(), encoding="utf-8")
-    with serving(str(path)) as (_, address), page_at(browser, address) as page:
+    path.write_text(case().with_(NEITHER | {"title": "weakening"}).to_toml(), encoding="utf-8")
+    with page_at(browser, coupled) as page:
+        page.set_input_files("input[type=file]", path)
+        expect(page.locator("#st-title")).to_have_text("weakening")
         page.click("#st-cycle-go")
         wait(page, ENDED)
         expect(page.locator("#st-cycle-said")).to_contain_text("there are cubic springs")

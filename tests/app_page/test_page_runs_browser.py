@@ -36,9 +36,16 @@ def shortly(tmp_path_factory: pytest.TempPathFactory) -> Generator[tuple[Any, st
         yield found
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def short(shortly: tuple[Any, str]) -> str:
     return shortly[1]
+
+
+@pytest.fixture(scope="module")
+def shown(browser: Any, short: str) -> Generator[Any]:
+    """A page of the short case, for what does not ask what was done on it before."""
+    with page_at(browser, short) as page:
+        yield page
 
 
 @pytest.fixture(scope="module")
@@ -217,26 +224,24 @@ def test_another_case_has_nothing_of_the_one_before(browser: Any, short: str) ->
         expect(page.locator("#st-map-go")).to_be_enabled()
 
 
-def test_a_run_may_follow_at_once(browser: Any, short: str) -> None:
-    with page_at(browser, short) as page:
-        for mu in ("0.3", "0.2"):
-            page.fill('[data-number="mu"]', mu)
-            page.press('[data-number="mu"]', "Enter")
-            wait(page, f"stridor.state.values.mu === {mu} && !document.querySelector('#st-run-go').disabled")
-            page.click("#st-run-go")
-            wait(page, f"document.querySelector('#st-run-said').textContent.startsWith('At μ = {mu}: ')")
-            expect(page.locator("#st-run-title")).to_have_text("Run in time")
+def test_a_run_may_follow_at_once(shown: Any) -> None:
+    for mu in ("0.3", "0.2"):
+        shown.fill('[data-number="mu"]', mu)
+        shown.press('[data-number="mu"]', "Enter")
+        wait(shown, f"stridor.state.values.mu === {mu} && !document.querySelector('#st-run-go').disabled")
+        shown.click("#st-run-go")
+        wait(shown, f"document.querySelector('#st-run-said').textContent.startsWith('At μ = {mu}: ')")
+        expect(shown.locator("#st-run-title")).to_have_text("Run in time")
 
 
-def test_words_about_a_file_stay_to_be_read(browser: Any, short: str, tmp_path: Path) -> None:
-    with page_at(browser, short) as page:
-        broken = tmp_path / "broken.toml"
-        broken.write_text("title = 1\n", encoding="utf-8")
-        page.set_input_files("input[type=file]", broken)
-        page.locator("#st-problem").wait_for(state="visible")
-        words = page.inner_text("#st-problem")
-        page.evaluate("stridor.show('at', stridor.state.at, false)")  # an answer that was under way
-        assert page.inner_text("#st-problem") == words
+def test_words_about_a_file_stay_to_be_read(shown: Any, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.toml"
+    broken.write_text("title = 1\n", encoding="utf-8")
+    shown.set_input_files("input[type=file]", broken)
+    shown.locator("#st-problem").wait_for(state="visible")
+    words = shown.inner_text("#st-problem")
+    shown.evaluate("stridor.show('at', stridor.state.at, false)")  # an answer that was under way
+    assert shown.inner_text("#st-problem") == words
 
 
 def test_sensitivities_of_a_large_model_are_asked_for(browser: Any, tmp_path: Path) -> None:

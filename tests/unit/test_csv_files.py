@@ -11,12 +11,16 @@ from pathlib import Path
 import pytest
 
 import stridor as st
+from documented import RESULTS, assert_told
 from mode_coupling import mode_coupling
 from program import stridor
 from stridor.case import template_text
 from stridor.io import atomic
 
-FEW = ["bodies.beam1.elements=6", "bodies.beam2.elements=18", "modal.sweep_points=3"]
+FEW = [
+    "bodies.beam1.elements=6", "bodies.beam2.elements=18", "modal.sweep_points=3", "modal.max_frequency_hz=12e3",
+    "modal.friction_range=[0.0, 0.2]", "phases.press.duration=2e-3", "phases.slide.duration=4e-3",
+]  # fmt: skip
 DAMPINGS = ("bodies.beam1.damping.mass", "bodies.beam2.damping.mass")
 MAP = ["--x", DAMPINGS[0], "--y", DAMPINGS[1], "--x-range", "10:50", "--y-range", "10:50", "--points", "2"]
 BOUNDARY = ["--x", DAMPINGS[0], "--x-range", "10:50", "--y", "mu", "--y-range", "0:0.2", "--lines", "2"]
@@ -32,14 +36,14 @@ VERBS = {
     "damping-map": (MAP, ["damping_map.csv"]),
     "boundary": (BOUNDARY, ["boundary.csv"]),
     "cycles": (["--mu", "1.0"], ["cycles.csv"]),
-    "ensemble": (["--mu", "0.05,0.2", "--set", "temporal.record_every=5"], ["ensemble.csv"]),
+    "ensemble": (["--mu", "0.05,0.2", "--speed", "1,2", "--set", "temporal.record_every=5"], ["ensemble.csv"]),
     "reduce": (REDUCE, ["reduced.csv", "reduced-onsets.csv"]),
 }
 
 
 def documented() -> dict[str, list[str]]:
     """Columns by file, as docs/results.md has them."""
-    text = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    text = RESULTS.read_text(encoding="utf-8")
     part = text.partition("## CSV files")[2].partition("\n## ")[0]
     found: dict[str, list[str]] = {}
     for line in part.splitlines():
@@ -74,6 +78,7 @@ def documents(folder: Path) -> dict[str, dict]:
         for file in files:
             assert f"written: case.out/{file}" in done.stderr or file in str(json.loads(done.stdout).get("files"))
         found[name] = json.loads(done.stdout)
+        assert_told(name.split()[0], done.stdout)
     return found
 
 
@@ -122,9 +127,8 @@ def test_numbers_are_those_of_the_documents(folder: Path, documents: dict[str, d
 
 
 def test_run_writes_them_beside_its_results(folder: Path) -> None:
-    short = ("phases.press.duration=2e-4", "phases.slide.duration=2e-4", "temporal.step=1e-7", "comparison.critical=false")
-    case = st.loads((folder / "case.toml").read_text(encoding="utf-8"), list(short))
-    files = [path.name for path in st.run(case, folder / "all").files]
+    case = st.load(folder / "case.toml")
+    files = [path.name for path in st.run(case, folder / "all", only=["modes", "onsets"], skip=["report"]).files]
     assert {"modes.nc", "modes.csv", "onsets.nc", "onsets.csv"} <= set(files)
     assert list(read(folder / "all" / "modes.csv")[0]) == documented()["modes.csv"]
 

@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
-import pty
 import re
 import shlex
-import struct
-import subprocess
-import sys
-import termios
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +11,7 @@ import numpy as np
 import pytest
 
 from mode_coupling import mode_coupling
-from program import stridor
+from program import on_terminal, stridor
 from stridor.app import output, tables
 from stridor.app.arguments import Call
 from stridor.app.closing import command
@@ -104,7 +97,7 @@ ENDS = {
         "agree: μ = 0.1: both unstable at 8651.1 Hz, growth 642.2 against 641.6 1/s (0.1 %)",
         "run two-beams.toml COARSE",
     ),
-    "run two-beams.toml --only modes,onsets,report COARSE": (
+    "run two-beams.toml --only modes,onsets --skip report COARSE": (
         "modal onset at μ = 0.07634, 8645.3 Hz; no comparison was made", "shapes two-beams.toml COARSE"
     ),
     "report two-beams.toml COARSE": (
@@ -240,7 +233,9 @@ def test_warnings_and_notes_fit_the_page_and_errors_that_of_a_terminal(
     wrong = ["modes", "two-beams.toml", "--set", "bodies.beam1.elements=many"]
     line = stridor(*wrong, cwd=folder).stderr
     assert line.count("\n") == 1
-    shown = on_terminal(wrong, folder, {}, 2).replace("\r\n", "\n")
+    code, shown = on_terminal(*wrong, cwd=folder)
+    shown = shown.replace("\r\n", "\n")
+    assert code == 2, shown
     assert len(line) > 81
     assert max(map(len, shown.splitlines())) <= 80
     assert " ".join(shown.split()) == line.strip()
@@ -250,7 +245,8 @@ def test_warnings_and_notes_fit_the_page_and_errors_that_of_a_terminal(
     "words", ["compare two-beams.toml --only growth COARSE", "modes two-beams.toml", "report two-beams.toml --skip modes,onsets"]
 )
 def test_warnings_stand_before_the_result(folder: Path, words: str) -> None:
-    shown = on_terminal([*words_of(words), "--solver", "superlu", "--out", "warned"], folder, {})
+    code, shown = on_terminal(*words_of(words), "--solver", "superlu", "--out", "warned", cwd=folder)
+    assert code == 0, shown
     body, following, after = shown.partition(NEXT)
     assert "warning: --solver has no effect" in body
     assert following
@@ -259,36 +255,15 @@ def test_warnings_stand_before_the_result(folder: Path, words: str) -> None:
 
 @pytest.mark.parametrize("colours", [True, False])
 def test_a_terminal_has_unstable_modes_in_red_unless_no_color_is_set(folder: Path, *, colours: bool) -> None:
-    words = ["modes", "two-beams.toml", "--set", "modal.sweep_points=6"]
-    shown = on_terminal(words, folder, {} if colours else {"NO_COLOR": "1"})
+    more = {} if colours else {"NO_COLOR": "1"}
+    code, shown = on_terminal("modes", "two-beams.toml", "--set", "modal.sweep_points=6", cwd=folder, **more)
+    assert code == 0, shown
     red = re.findall(r"\x1b\[31m([^\x1b]*)", shown)
     assert ("8641.12" in " ".join(red)) == colours
     assert not colours or not any("-716.799" in text for text in red)
     lines = re.sub(r"\x1b\[[0-9;]*[A-Za-z]", "", shown).replace("\r\n", "\n").split("\n")
     assert max(len(line.rpartition("\r")[2]) for line in lines) <= 80
     assert stdout.page == 80  # of a pipe, as here
-
-
-def on_terminal(words: list[str], cwd: Path, more: dict[str, str], code: int = 0) -> str:
-    """What stands on a terminal of 80 columns."""
-    ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
-    environment = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "COLUMNS")} | {"TERM": "xterm"} | more
-    command = [sys.executable, "-m", "stridor", *words]
-    with subprocess.Popen(command, cwd=cwd, stdin=theirs, stdout=theirs, stderr=theirs, env=environment) as process:
-        os.close(theirs)
-        text = b""
-        while True:
-            try:
-                part = os.read(ours, 65536)
-            except OSError:  # the other end is closed
-                break
-            if not part:
-                break
-            text += part
-    os.close(ours)
-    assert process.returncode == code
-    return text.decode()
 
 
 def change(name: str, removed: float, again: float | None) -> Measure:

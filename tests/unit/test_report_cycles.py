@@ -25,8 +25,8 @@ def found() -> Cycles:
     return st.cycles(mode_coupling(0.02, 0.1), between=(0.7, 1.25), push=0.2, points=40)
 
 
-def page(case: st.Case, folder: Path, **asked: bool) -> str:
-    outcome = st.report(case, folder, skip=PARTS, **asked)
+def page(case: st.Case, folder: Path, skip: list[str] = PARTS, **asked: bool) -> str:
+    outcome = st.report(case, folder, skip=skip, **asked)
     assert outcome.report is not None
     return re.sub(r"[\s\u00a0]+", " ", outcome.report.read_text(encoding="utf-8"))
 
@@ -51,28 +51,32 @@ def test_cycles_of_the_same_model_are_shown(found: Cycles, tmp_path: Path):
 
 
 def test_cycles_of_another_model_are_not(found: Cycles, tmp_path: Path):
+    def bare(case: st.Case) -> str:
+        """Of the page nothing else is looked at."""
+        return page(case, tmp_path, [*PARTS, "modes", "onsets"])
+
     st.save(found, tmp_path / "cycles.nc")
-    text = page(mode_coupling(0.02, 0.2), tmp_path)  # another belt
+    text = bare(mode_coupling(0.02, 0.2))  # another belt
     assert '<section id="limit-cycles"' not in text
     assert "cycles.nc is of another case: its limit cycles are not shown." in text
     st.save(st.onsets(mode_coupling(0.02, 0.1)), tmp_path / "cycles.nc")
-    assert "cycles.nc holds no cycles: " in page(mode_coupling(0.02, 0.1), tmp_path)
+    assert "cycles.nc holds no cycles: " in bare(mode_coupling(0.02, 0.1))
     st.save(replace(found, provenance={}), tmp_path / "cycles.nc")
-    assert "cycles.nc does not tell its case: " in page(mode_coupling(0.02, 0.1), tmp_path)
+    assert "cycles.nc does not tell its case: " in bare(mode_coupling(0.02, 0.1))
     (tmp_path / "cycles.nc").write_bytes(b"no file of results")
-    assert "cycles.nc cannot be read: " in page(mode_coupling(0.02, 0.1), tmp_path)
+    assert "cycles.nc cannot be read: " in bare(mode_coupling(0.02, 0.1))
     (tmp_path / "cycles.nc").unlink()
-    text = page(mode_coupling(0.02, 0.1), tmp_path)
+    text = bare(mode_coupling(0.02, 0.1))
     assert "cycles.nc" not in text
 
 
 def test_a_run_of_another_system_or_that_has_not_settled_is_not_drawn(found: Cycles, tmp_path: Path):
     st.save(found, tmp_path / "cycles.nc")
-    case = mode_coupling(0.02, 0.1).with_({"temporal.record_every": 2, "temporal.perturbation": 0.05})
+    case = mode_coupling(0.02, 0.1).with_({"temporal.record_every": 2, "temporal.perturbation": 0.05, "modal.sweep_points": 3})
 
     def caption(duration: float, **phase: dict[str, float]) -> str:
         asked = case.with_({"phases": [{"name": "slide", "duration": duration, **phase}]})
-        outcome = st.run(asked, tmp_path, only=["modes", "onsets", "simulate", "report"])
+        outcome = st.run(asked, tmp_path, only=["modes", "simulate", "report"])
         assert outcome.report is not None
         text = re.sub(r"[\s\u00a0]+", " ", outcome.report.read_text(encoding="utf-8"))
         (told,) = re.findall(r"(?:The run in time is not drawn|Cross: )[^<]*", text)

@@ -49,10 +49,14 @@ def test_what_the_text_says(followed: tuple[Path, dict[str, str]]) -> None:
 
 def test_both_ways_give_the_same(followed: tuple[Path, dict[str, str]]) -> None:
     folder, _ = followed
+
+    def onsets(case: str | st.Case) -> np.ndarray:
+        found = st.onsets(case if isinstance(case, st.Case) else st.load(folder / case)).onsets
+        assert found
+        return np.array([(o.mu, o.frequency_hz) for o in found])
+
+    own = onsets("two-beams.toml")
+    for imported in ("squeal.toml", "squeal/matrices.toml"):
+        assert onsets(imported) == pytest.approx(own, rel=1e-9)
     meshed = st.loads(rubbing_block("max_frequency_hz = 30e3"))
-    pairs = [("two-beams.toml", "squeal.toml"), ("two-beams.toml", "squeal/matrices.toml"), (meshed, "caliper.toml")]
-    for one, other in pairs:
-        cases = [case if isinstance(case, st.Case) else st.load(folder / case) for case in (one, other)]
-        own, imported = ([(o.mu, o.frequency_hz) for o in st.onsets(case).onsets] for case in cases)
-        assert own
-        assert np.array(imported) == pytest.approx(np.array(own), rel=1e-9)
+    assert onsets("caliper.toml") == pytest.approx(onsets(meshed), rel=1e-9)

@@ -112,8 +112,16 @@ def full_inputs(**changes) -> ReportInputs:
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory) -> Path:
-    return write_report(full_inputs(), tmp_path_factory.mktemp("out"))
+def writing(tmp_path_factory) -> tuple[Path, list[str]]:
+    """The report, and what was said while it was written."""
+    told: list[str] = []
+    with heard(lambda now: told.append("" if now is None else now.what)):
+        return write_report(full_inputs(), tmp_path_factory.mktemp("out")), told
+
+
+@pytest.fixture(scope="module")
+def written(writing) -> Path:
+    return writing[0]
 
 
 @pytest.fixture(scope="module")
@@ -272,12 +280,10 @@ def test_a_model_without_units_keeps_its_digits() -> None:
     assert quantity(-2.5e-7) == "−2.50e−07"
 
 
-def test_what_is_drawn_is_told(tmp_path):
+def test_what_is_drawn_is_told(writing):
     """Figures take seconds, in which nothing else would be said."""
-    told: list[str] = []
-    with heard(lambda now: told.append("" if now is None else now.what)):
-        write_report(full_inputs(), tmp_path)
+    report, told = writing
     assert told[0] == "tables and figures of the page"
     assert told[-1] == ""
-    drawn = {path.stem for path in (tmp_path / "figures").glob("*.svg")}
+    drawn = {path.stem for path in (report.parent / "figures").glob("*.svg")}
     assert set(told[1:-1]) == {f"figure {name}, as SVG and PNG" for name in drawn}
