@@ -189,8 +189,8 @@ def growth(signal: Array, sampling: float, frequency_hz: float) -> Growth:
     """Fit the growth of the line at ``frequency_hz`` where it is exponential.
 
     The plateau is the median amplitude of the last quarter. A signal that rises to it is fitted from its
-    lowest point to half the plateau; one that falls is fitted over the fall. It has saturated where the last quarter is
-    larger than the one before by less than a quarter, and by less than a fifth of what its rise would give in that time.
+    lowest point to half the plateau; one that falls is fitted over the fall. It has saturated where the last quarter
+    exceeds the one before by less than a quarter, and by less than a fifth of what its rise would give in that time.
     """
     if frequency_hz <= 0 or len(signal) < 32:
         return Growth(0.0, 0.0, len(signal) * sampling, 0.0, False, 0.0)
@@ -204,7 +204,7 @@ def growth(signal: Array, sampling: float, frequency_hz: float) -> Growth:
     saturated = False
     if rises:
         part = _rise(size, lowest, 0.95 * plateau)
-        # Slow growth takes no more from one quarter to the next than a limit cycle may vary: it must have become slower.
+        # Slow growth gains no more from one quarter to the next than a limit cycle may vary: it must become slower.
         gained, hop = math.log(plateau / before), float(time[1] - time[0])
         still = gained > GOES_ON * max(float(np.polyfit(time[part], np.log(size[part]), 1)[0]), 0.0) * quarter * hop
         saturated = plateau < 1.25 * before and not still
