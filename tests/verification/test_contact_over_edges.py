@@ -7,12 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from test_contact_patch import SPACE, contact_of, line, rotation, sheet
 
 import stridor as st
 from stridor.contact.pairing import repair
+from stridor.mesh.facets import nodal_areas
 from stridor.sliding import steady_sliding_nodes
 from stridor.system import build_system
-from test_contact_patch import SPACE, contact_of, line, rotation, sheet
 
 pytestmark = pytest.mark.verification
 
@@ -69,15 +70,18 @@ def test_areas_are_those_of_the_common_part_of_random_rectangles(own, other):
         master, corners = placed(master, rng.uniform(0.7, 1.4, 2), rng.uniform(0, 6), rng.uniform(-0.4, 0.4, 2))
         area, middle = area_and_middle(common(own_corners, corners))
         contact = contact_of(slave, master)
-        nodes, outside = contact.nodes, ~contact.location.inside
-        assert outside.any()
+        nodes, whole = contact.nodes, nodal_areas(*slave)
         assert nodes.area.sum() == pytest.approx(area, rel=1e-12)
-        assert nodes.area.min() > 0
-        # An even pressure acts in the middle of the common part, on either body.
+        assert nodes.area.min() > 0.01 * whole.min()
+        # An even pressure acts in the middle of the common part, on either body; near it where shares were given away.
         push = (nodes.normal.T @ nodes.area).reshape(-1, 3)
+        found = []
         for part, points, sign in ((slice(len(slave[0])), slave[0], 1.0), (slice(len(slave[0]), None), master[0], -1.0)):
             assert push[part].sum(axis=0) == pytest.approx([0, 0, sign * area], abs=1e-9 * area)
-            assert push[part, 2] @ points[:, :2] / (sign * area) == pytest.approx(middle, abs=1e-9)
+            found.append(push[part, 2] @ points[:, :2] / (sign * area))
+        assert found[0] == pytest.approx(found[1], abs=1e-7)
+        rim = contact.facets.rim
+        assert found[0] == pytest.approx(middle, abs=0.02 if rim is not None and len(rim.leaders) else 1e-7)
         assert nodes.gap == pytest.approx(np.zeros(nodes.count), abs=1e-12)
 
 
@@ -96,8 +100,10 @@ def test_lengths_are_those_of_the_common_part_of_random_lines(own, other, thickn
         assert area.sum() == pytest.approx(thickness * (high - low), rel=1e-12)
         assert area.min() > 0
         push = (contact.nodes.normal.T @ area).reshape(-1, 2)[:, 1]
+        rim = contact.facets.rim
+        off = 0.02 if rim is not None and len(rim.leaders) else 1e-9
         for part, points in ((push[: len(slave[0])], slave[0]), (push[len(slave[0]) :], master[0])):
-            assert part @ points[:, 0] / part.sum() == pytest.approx((low + high) / 2, abs=1e-9)
+            assert part @ points[:, 0] / part.sum() == pytest.approx((low + high) / 2, abs=off)
 
 
 @pytest.mark.parametrize(("own", "other"), [("quad", "triangle6"), ("triangle6", "quad"), ("quad8", "quad8")])
@@ -168,6 +174,19 @@ def test_on_curves_that_fit_the_area_is_that_of_the_shorter_one(kind, shaft_is_s
         assert np.abs(contact.nodes.gap).max() < 1.5 * heights
         settled = contact_of(slave, master).nodes
         assert settled.area.min() > 0
+
+
+@pytest.mark.parametrize(("cover", "taking"), [(1.0, 3), (0.5, 3), (0.35, 3), (0.3, 2), (0.01, 2), (1e-5, 2)])
+def test_nodes_that_hardly_stand_for_anything_give_their_share_away(cover, taking):
+    """The first node beyond the end of a line stands for cover²/2 of its two facets; a twentieth is asked for."""
+    _, facets = line("line", 4, turned=True)
+    x = np.linspace(0, 1, 5) + 0.75 - 0.25 * cover
+    nodes = contact_of((np.column_stack([x, np.zeros(5)]), facets), line("line", 3)).nodes
+    assert nodes.count == taking
+    assert nodes.area.sum() == pytest.approx(0.25 + 0.25 * cover, rel=1e-12)
+    share = np.array([1.0, 1.0 + 2 * cover - cover**2, cover**2]) / 8  # over the covered part, by hand
+    expected = share if taking == 3 else [share[0], share[1] + share[2]]
+    assert nodes.area == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_rim_that_slides_is_followed_until_nothing_of_it_is_left():
@@ -245,7 +264,7 @@ def test_a_pad_stands_for_the_area_that_the_disc_covers(disc_is_slave, cells, at
 
 
 def test_whichever_body_is_the_slave_modes_come_together_with_finer_meshes():
-    """At µ = 0.4 three modes of the pad on its layer, largest difference: 12, 4.5 and 2.2 %; it was 15, 26 and 21 %."""
+    """At µ = 0.4 three modes of the pad on its layer, largest difference: 12.3, 4.5 and 1.8 %; it was 14, 26 and 21 %."""
     apart = []
     for fineness in (1, 2, 3):
         pad, disc = (

@@ -87,7 +87,7 @@ class SlaveFacets:
         if hanging is not None:
             for kind, over in hanging.over.items():
                 integrals[kind][over] = 0.0
-            rim = hanging.rim(own, thickness)
+            rim = hanging.rim(own, positions, thickness)
         return cls(blocks, own, integrals, nodal_gaps or all(kind in LINEAR for kind in blocks), rim)
 
 
@@ -121,9 +121,9 @@ def coupled(
     # Facets that are not whole in contact have no integral over the master: their nodes stand by themselves.
     alone = area if spline else _areas(facets, len(positions), whole=False)
     if facets.rim is not None:
-        nodal, weighted = facets.rim.integrated(positions, location, master, displacement)
+        shared, nodal, weighted = facets.rim.integrated(positions, location, master, displacement)
         hanging = nodal > 0.0
-        added = _of_basis(mixture, nodal)
+        added = _of_basis(mixture, shared)
         # A node that has slid off altogether stands for nothing any more, and by itself.
         gone = np.where(area + added > 0.0, 0.0, 1.0)
         area, alone, added = area + added + gone, alone + gone, np.maximum(added, 0.0)

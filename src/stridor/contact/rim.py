@@ -5,8 +5,10 @@ function ψ_i is biorthogonal there (Cichosz and Bischoff, Comput. Methods Appl.
 Seitz, Gee and Wall, ibid. 264, 2013, 67). So areas sum to the intersection of both surfaces, an even pressure gives
 both bodies their consistent forces, and the master's weights, ∫ ψ_i φ_l dA / A_i, continue its surface to nodes beyond
 the edge: forces and moments balance. Quadratic facets are taken as linear ones between their own nodes, whose functions
-are positive on every part. The gap of a node beyond the edge is that to the tangent plane of the edge, less what the
-slave bends away from there on, as if the master bent with it.
+are positive on every part. A node beyond the edge that stands for less than a twentieth of what it would if all of its
+facets were covered takes no part, and its share goes to the others of each facet: a rigid contact would press there
+with a force that does not go to zero with the area. The gap of a node beyond the edge is that to the tangent plane of
+the edge, less what the slave bends away from there on, as if the master bent with it.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from ..mesh.facets import facet_integrals, facet_normals, shape_functions
 from ..mesh.model import Blocks
@@ -26,8 +29,10 @@ from .interpolation import element_weights
 from .master import Location
 from .pieces import OPPOSED, Points, covered, outlines
 
-# A part of a facet of which less lies over the master is beyond it: the search for places is no finer.
-LEAST = 1e-6
+# A part of a facet of which less lies over the master is rounding.
+LEAST = 1e-12
+# A node beyond the edge stands for this part at least of what it stands for where all of its facets are covered.
+THIN = 0.05
 # A facet whose middle is farther from the master, in radii of its own, is not looked at.
 FAR = 4.0
 LINES = {"line": [[0, 1]], "line3": [[0, 2], [2, 1]]}
@@ -36,19 +41,26 @@ LINEAR_OF = {2: "line", 3: "triangle", 4: "quad"}
 
 @dataclass(frozen=True)
 class Rim:
-    """Linear parts of facets over an edge, by kind, between the m nodes that take part, in the plane of a thickness
+    """Linear parts of facets over an edge, by kind, between the m nodes that take part, numbered first, and g nodes
+    that do not. leaders (g,): which of the former these follow, at an offset (g, d) [m]. In the plane of a thickness
     [m]. bend (m,) [m]: what is to be taken off the gap of nodes beyond the edge."""
 
     blocks: Blocks
+    leaders: IntArray
+    offset: Array
     thickness: float
     bend: Array
 
     def integrated(
         self, positions: Array, location: Location, master: Curve | FacetSurface, displacement: Array | None
-    ) -> tuple[Array, Sparse]:
-        """∫ φ_i dA (m,) [m²] and ∫ ψ_i φ_l dA (m, k) csr [m²] over what the master covers."""
-        shape = (len(positions), master.node_count)
-        area, weighted = np.zeros(shape[0]), sp.csr_array(shape)
+    ) -> tuple[Array, Array, Sparse]:
+        """Areas (m,) [m²] with the shares of nodes that take no part, ∫ φ_i dA (m,) [m²] and ∫ ψ_i φ_l dA (m, k) csr
+        [m²] over what the master covers."""
+        m, every = len(positions), np.concatenate([np.arange(len(positions)), self.leaders])
+        positions = np.concatenate([positions, positions[self.leaders] + self.offset])
+        location = location.only(every)
+        shape = (len(every), master.node_count)
+        area, shared, weighted = np.zeros(len(every)), np.zeros(len(every)), sp.csr_array(shape)
         current = master.positions if displacement is None else master.positions + displacement
         for kind, block in self.blocks.items():
             points, at, found = _above(kind, block, positions, location, master, displacement)
@@ -57,6 +69,11 @@ class Rim:
             share = np.zeros(block.shape)
             np.add.at(share, points.owner, weight[:, None] * values)
             np.add.at(area, block, share)
+            taking = np.where(block < m, share, 0.0)
+            left = taking.sum(axis=1, keepdims=True)
+            scaled = taking * share.sum(axis=1, keepdims=True) / np.where(left > 0.0, left, 1.0)
+            # Where no node of a facet takes part, those that they follow do.
+            np.add.at(shared, every[block], np.where(left > 0.0, scaled, share))
             if isinstance(master, Curve) and master.follows_spline:
                 element, weights = found.nodes, found.weights
             else:
@@ -68,24 +85,32 @@ class Rim:
         # Thin parts make the dual functions large: what rounding leaves of their sum must not push anybody.
         total = np.asarray(weighted.sum(axis=1))
         exact = np.divide(area, total, out=np.zeros_like(area), where=total > 0.0)
-        return area, sp.csr_array(sp.diags_array(exact) @ weighted)
+        return shared[:m], area[:m], sp.csr_array(sp.diags_array(exact) @ weighted)[:m]
 
 
 @dataclass(frozen=True)
 class Hanging:
     """Of b slave nodes: which facets (f,) of each kind hang over an edge and are covered in part, the linear parts of
-    them that are, and bend (b,) [m] of `Rim`. blocks: facets but for those of which nothing is covered. location (b,):
-    gaps without the bend."""
+    them that are, which nodes (b,) of these are too thinly covered to take part, and bend (b,) [m] of `Rim`. blocks:
+    facets but for those of which nothing is covered. location (b,): gaps without the bend."""
 
     blocks: Blocks
     over: Mapping[str, BoolArray]
     parts: Blocks
+    thin: BoolArray
     bend: Array
     location: Location
 
-    def rim(self, own: IntArray, thickness: float) -> Rim:
-        """The rim in the numbers own (b,) of nodes that take part."""
-        return Rim({kind: own[block] for kind, block in self.parts.items()}, thickness, self.bend[own >= 0])
+    def rim(self, own: IntArray, positions: Array, thickness: float) -> Rim:
+        """The rim in the numbers own (b,) of nodes at positions (b, d) [m] that take part."""
+        taking, ghosts = np.flatnonzero(own >= 0), np.flatnonzero(self.thin)
+        nearest = np.zeros(0, dtype=np.int64)
+        if len(ghosts):
+            nearest = taking[np.asarray(cKDTree(positions[taking]).query(positions[ghosts])[1], dtype=np.int64)]
+        number = own.copy()
+        number[ghosts] = len(taking) + np.arange(len(ghosts))
+        blocks = {kind: number[block] for kind, block in self.parts.items()}
+        return Rim(blocks, own[nearest], positions[ghosts] - positions[nearest], thickness, self.bend[taking])
 
     def places(self, facing: IntArray) -> tuple[IntArray, Location]:
         """Nodes (m,) that take part, in order, and their places: those of the parts, and on other facets those facing
@@ -93,6 +118,7 @@ class Hanging:
         others = [block[~self.over[kind]].ravel() for kind, block in self.blocks.items()]
         own = np.intersect1d(facing, np.concatenate([facing[:0], *others]))
         taking = np.unique(np.concatenate([own, *(block.ravel() for block in self.parts.values())]))
+        taking = taking[~self.thin[taking]]
         return taking, self.location.only(taking)
 
 
@@ -119,6 +145,7 @@ def hanging(
     blocks: dict[str, IntArray] = {}
     masks: dict[str, BoolArray] = {}
     parts: dict[str, list[IntArray]] = {}
+    held, whole = np.zeros(len(position)), np.zeros(len(position))
     changes = False
     for kind, given in facets.items():
         block = np.asarray(given)
@@ -129,7 +156,11 @@ def hanging(
         for columns in _split(kind):
             linear = LINEAR_OF[len(columns)]
             part = block[chosen][:, columns]
-            some = _partly_above(linear, position, part, master, location)
+            share = _covered_shares(linear, position, part, master, location)
+            integral = facet_integrals(position, part, linear)
+            np.add.at(held, part, share)
+            np.add.at(whole, part, integral)
+            some = share.sum(axis=1) > LEAST * integral.sum(axis=1)
             found[chosen[some]] = True
             parts.setdefault(linear, []).append(part[some])
         # All nodes of a facet may be beyond the edge, and a corner of the master below it all the same.
@@ -141,7 +172,10 @@ def hanging(
         return None
     together = {kind: np.concatenate(some) for kind, some in parts.items() if sum(map(len, some))}
     bend = _bends(together, position, normals, over, location)
-    return Hanging(blocks, masks, together, bend, replace(location, gap=location.gap - bend))
+    thin = np.zeros(len(position), dtype=bool)
+    thin[np.concatenate([facing[:0], *(block.ravel() for block in together.values())])] = True
+    thin &= ~over & (held < THIN * whole)
+    return Hanging(blocks, masks, together, thin, bend, replace(location, gap=location.gap - bend))
 
 
 def _split(kind: str) -> list[list[int]]:
@@ -165,17 +199,16 @@ def _along(vectors: Array, normal: Array) -> Array:
     return vectors - np.sum(vectors * normal, axis=-1, keepdims=True) * normal
 
 
-def _partly_above(
+def _covered_shares(
     kind: str, position: Array, part: IntArray, master: Curve | FacetSurface, location: Location
-) -> BoolArray:
-    """Which linear facets (f, r) lie above the master in part."""
-    if not len(part):
-        return np.zeros(0, dtype=bool)
-    corners = position[part]
-    points, _, _ = _above(kind, part, position, location, master, None)
-    weight = _measured(kind, corners, points)[1]
-    size = facet_integrals(position, part, kind).sum(axis=1)
-    return np.bincount(points.owner, weight, len(part)) > LEAST * size
+) -> Array:
+    """∫φ dA (f, r) [m², in the plane m] over what lies above the master of linear facets (f, r)."""
+    share = np.zeros(part.shape)
+    if len(part):
+        points, _, _ = _above(kind, part, position, location, master, None)
+        values, weight = _measured(kind, position[part], points)
+        np.add.at(share, points.owner, weight[:, None] * values)
+    return share
 
 
 def _above(
