@@ -1017,7 +1017,7 @@ def test_nodes_that_take_part_lie_over_the_master_face_it_and_are_within_reach()
     ):
         picked = np.array(places, dtype=int)
         with pytest.raises(CaseError) as caught:
-            pairing._facing("w", at[picked], normals[picked], Shown(pairing._only(where, picked)), reach)
+            pairing._facing("w", at[picked], normals[picked], Shown(where.only(picked)), reach)
         assert str(caught.value).startswith(words)
 
 

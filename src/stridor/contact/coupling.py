@@ -10,7 +10,7 @@ slave, and multipliers ψ_i with ∫ ψ_i φ̃_k = δ_ik ∫ φ̃_i (Wohlmuth 20
 As Σ ψ_i = 1, a uniform pressure p_i = p A_i gives both bodies their consistent nodal forces, whatever their meshes.
 Gaps between linear facets are those of the nodes, which lie on the true surface where facets are its chords; between
 quadratic ones they are weighted as displacements are. On obstacles and on the spline of a beam each node of the changed
-basis stands by itself.
+basis stands by itself. Facets that hang over an edge of the master are integrated over what lies above it (`rim`).
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from .facets import FacetSurface
 from .interpolation import LINEAR, element_weights
 from .master import Location, MasterSurface
 from .pieces import outlines, pieces
+from .rim import Hanging, Rim
 
 # Facets integrated together: their arrays fit comfortably into memory.
 TOGETHER = 400
@@ -40,13 +41,15 @@ NOTHING = 1e-11
 class Coupling:
     """m rows of relative displacement: slave (m, m) csr on the slave nodes minus master (m, k) csr on the master's.
 
-    Each row of either sums to one. area (m,) [m²] that a node stands for, gap (m,) [m] of the row.
+    Each row of either sums to one. area (m,) [m²] that a node stands for, gap (m,) [m] of the row. hanging (m,): nodes
+    of facets over an edge of the master that it still covers in part; None where there are none.
     """
 
     slave: Sparse
     master: Sparse
     area: Array
     gap: Array
+    hanging: BoolArray | None = None
 
 
 @dataclass(frozen=True)
@@ -54,24 +57,38 @@ class SlaveFacets:
     """The facets whose nodes are b slave nodes at positions (b, d) [m], of which m take part in the contact.
 
     blocks: facets by kind in the numbering of the b nodes. own (b,): number among those that take part, −1 for none.
-    integrals: ∫φ dA (f, r) [m²] of the undeformed facets, thickness included. nodal_gaps: whether gaps are those of
-    the nodes though facets are quadratic, because nodes were moved onto the master.
+    integrals: ∫φ dA (f, r) [m²] of the undeformed facets, thickness included, zero for those that hang over an edge of
+    the master: ``rim`` stands for them. nodal_gaps: whether gaps are those of the nodes though facets are quadratic,
+    because nodes were moved onto the master.
     """
 
     blocks: Blocks
     own: IntArray
     integrals: Mapping[str, Array] = field(repr=False)
     nodal_gaps: bool = False
+    rim: Rim | None = None
 
     @classmethod
     def of(
-        cls, positions: Array, blocks: Blocks, taking: IntArray, *, thickness: float = 1.0, nodal_gaps: bool = False
+        cls,
+        positions: Array,
+        blocks: Blocks,
+        taking: IntArray,
+        *,
+        thickness: float = 1.0,
+        nodal_gaps: bool = False,
+        hanging: Hanging | None = None,
     ) -> SlaveFacets:
-        """Facets between b positions of which ``taking`` (m,) take part."""
+        """Facets between b positions of which ``taking`` (m,) take part; ``hanging`` tells those over an edge."""
         own = np.full(len(positions), -1)
         own[taking] = np.arange(len(taking))
         integrals = {k: thickness * facet_integrals(positions, block, k) for k, block in blocks.items()}
-        return cls(blocks, own, integrals, nodal_gaps or all(kind in LINEAR for kind in blocks))
+        rim = None
+        if hanging is not None:
+            for kind, over in hanging.over.items():
+                integrals[kind][over] = 0.0
+            rim = hanging.rim(own, positions, thickness)
+        return cls(blocks, own, integrals, nodal_gaps or all(kind in LINEAR for kind in blocks), rim)
 
 
 def collocated(location: Location, area: Array, master_nodes: int) -> Coupling:
@@ -97,15 +114,38 @@ def coupled(
         return single
     mixture, area = _values_of_basis(facets, len(positions)), _areas(facets, len(positions))
     below, gap = sp.csr_array(mixture @ single.master), mixture @ location.gap
-    if not isinstance(master, Curve | FacetSurface) or (isinstance(master, Curve) and master.follows_spline):
+    if not isinstance(master, Curve | FacetSurface):
         return Coupling(mixture, below, area, gap)
+    spline = isinstance(master, Curve) and master.follows_spline
+    hanging = None
     # Facets that are not whole in contact have no integral over the master: their nodes stand by themselves.
-    alone = _areas(facets, len(positions), whole=False) / area
+    alone = area if spline else _areas(facets, len(positions), whole=False)
+    if facets.rim is not None:
+        shared, nodal, weighted = facets.rim.integrated(positions, location, master, displacement)
+        hanging = nodal > 0.0
+        added = _of_basis(mixture, shared)
+        # A node that has slid off altogether stands for nothing any more, and by itself.
+        gone = np.where(area + added > 0.0, 0.0, 1.0)
+        area, alone, added = area + added + gone, alone + gone, np.maximum(added, 0.0)
+        share = np.maximum(alone + added, 1e-300)
+        covered = sp.diags_array(np.where(hanging, 1.0 / np.where(hanging, nodal, 1.0), 0.0)) @ weighted
+        covered = covered + sp.diags_array(np.where(hanging, 0.0, 1.0)) @ single.master
+        below = sp.diags_array(alone / share) @ below + sp.diags_array(added / share) @ (mixture @ covered)
+        alone = alone + added
+    if spline:
+        return Coupling(mixture, sp.csr_array(below), area, gap, hanging)
+    alone = alone / area
     weighted, gaps = _integrated(facets, positions, location, master, displacement)
     below = sp.csr_array(sp.diags_array(alone) @ below + sp.diags_array(1.0 / area) @ weighted)
     below.data[np.abs(below.data) < NOTHING] = 0.0
     below.eliminate_zeros()
-    return Coupling(mixture, below, area, gap if facets.nodal_gaps else alone * gap + gaps / area)
+    return Coupling(mixture, below, area, gap if facets.nodal_gaps else alone * gap + gaps / area, hanging)
+
+
+def _of_basis(mixture: Sparse, nodal: Array) -> Array:
+    """∫φ̃ (m,) from ∫φ (m,): the other way than values, a middle node gives its corners their shares."""
+    own = mixture.diagonal()
+    return nodal / own - (mixture - sp.diags_array(own)).T @ (nodal / own)
 
 
 def _point_weights(location: Location, nodes: int) -> Sparse:
@@ -171,7 +211,7 @@ def _integrated(
     cut_by = outlines(master, current)
     for kind in facets.blocks:
         own, change, share = _shares(facets, kind)
-        whole = np.flatnonzero(np.all(own >= 0, axis=1))
+        whole = np.flatnonzero(np.all(own >= 0, axis=1) & facets.integrals[kind].any(axis=1))
         for part in np.array_split(whole, max(1, -(-len(whole) // TOGETHER))):
             if not len(part):
                 continue

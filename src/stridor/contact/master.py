@@ -28,6 +28,14 @@ class Location:
     inside: BoolArray
     local: Array | None = None
 
+    def only(self, index: IntArray) -> Location:
+        """Some of the points."""
+        local = None if self.local is None else self.local[index]
+        return Location(
+            self.nodes[index], self.weights[index], self.point[index], self.normal[index], self.gap[index],
+            self.facet[index], self.inside[index], local,
+        )  # fmt: skip
+
 
 class MasterSurface(Protocol):
     """A surface that slave nodes slide on; its k nodes are numbered as its rows of displacements are."""

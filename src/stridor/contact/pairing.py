@@ -14,9 +14,12 @@ from ..mesh.facets import facet_normals
 from ..mesh.model import Blocks
 from ..typing import Array, BoolArray, IntArray
 from .coupling import SlaveFacets, coupled
+from .curve import Curve
+from .facets import FacetSurface
 from .interface import Rows
 from .master import Location, MasterSurface
 from .pieces import OPPOSED
+from .rim import Hanging, hanging
 from .surfaces import SurfaceContact, operators
 
 
@@ -61,8 +64,14 @@ def pair_surface(
     facing, location = _facing(where, slave_position, slave_normals, master, reach)
     around = None
     if facets is not None:
-        facets, facing, location = _opposed(facets, slave_position, facing, location)
-        around = SlaveFacets.of(slave_position, facets, facing, thickness=thickness, nodal_gaps=adjust)
+        over = _over_edges(facets, slave_position, slave_normals, facing, location, master, reach)
+        if over is None:
+            facets, facing, location = _opposed(facets, slave_position, facing, location)
+        else:
+            facets, (facing, location) = over.blocks, over.places(facing)
+        around = SlaveFacets.of(
+            slave_position, facets, facing, thickness=thickness, nodal_gaps=adjust, hanging=over
+        )  # fmt: skip
     d = slave_position.shape[1]
     own = (facing[:, None] * d + np.arange(d)).ravel()
     slave, area, drift = Rows(slave.free[own], slave.lift[own]), area[facing], drift[facing]
@@ -70,7 +79,8 @@ def pair_surface(
     tolerance = allowed_overlap
     if tolerance is None:
         tolerance = overlap_tolerance(position, slave_normals[facing], master)
-    deepest = int(np.argmin(location.gap))
+    # Beyond an edge the slave may well reach below the master.
+    deepest = int(np.argmin(np.where(location.inside, location.gap, np.inf)))
     if location.gap[deepest] < -tolerance:
         raise CaseError(where, None, _overlapping(position, location, deepest, tolerance))
     if adjust:
@@ -119,7 +129,7 @@ def _facing(
     facing = np.flatnonzero(location.inside & opposed & near)
     if not len(facing):
         raise CaseError(where, None, _never_touching(position, location, opposed, reach))
-    return facing, _only(location, facing)
+    return facing, location.only(facing)
 
 
 def _opposed(
@@ -129,19 +139,44 @@ def _opposed(
 
     A boundary may go round an edge: its nodes there take part, the facets on the other side stand for no contact.
     """
+    masks = _which_oppose(facets, position, facing, location)
+    if not any(keep.any() for keep in masks.values()):
+        return facets, facing, location
+    kept = {kind: np.asarray(facets[kind])[keep] for kind, keep in masks.items() if keep.any()}
+    held = np.flatnonzero(np.isin(facing, np.concatenate([block.ravel() for block in kept.values()])))
+    return kept, facing[held], location.only(held)
+
+
+def _which_oppose(
+    facets: Blocks, position: Array, facing: IntArray, location: Location
+) -> dict[str, BoolArray]:
+    """Which facets (f,) of each kind face the master with a node that takes part."""
     out = np.zeros(position.shape)
     out[facing] = location.normal
-    kept: dict[str, IntArray] = {}
+    masks: dict[str, BoolArray] = {}
     for kind, block in facets.items():
         below = out[block].sum(axis=1)
         normal = facet_normals(position, block, kind)
-        keep = (np.sum(normal * below, axis=1) < OPPOSED * np.linalg.norm(below, axis=1)) & below.any(axis=1)
-        if keep.any():
-            kept[kind] = np.asarray(block)[keep]
-    if not kept:
-        return facets, facing, location
-    held = np.flatnonzero(np.isin(facing, np.concatenate([block.ravel() for block in kept.values()])))
-    return kept, facing[held], _only(location, held)
+        masks[kind] = (np.sum(normal * below, axis=1) < OPPOSED * np.linalg.norm(below, axis=1)) & below.any(axis=1)
+    return masks
+
+
+def _over_edges(
+    facets: Blocks,
+    position: Array,
+    normals: Array,
+    facing: IntArray,
+    location: Location,
+    master: MasterSurface,
+    reach: float | None,
+) -> Hanging | None:
+    """Facets that hang over an edge of the master, of which nodes facing (q,) lie at a location above it."""
+    if len(facing) == len(position) or not isinstance(master, Curve | FacetSurface):
+        return None
+    masks = _which_oppose(facets, position, facing, location)
+    if not any(keep.any() for keep in masks.values()):
+        return None
+    return hanging(facets, masks, position, normals, facing, master, master.locate(position), reach)
 
 
 def repair(
@@ -155,11 +190,15 @@ def repair(
     chosen so that this is exactly the present gap at the present displacement.
 
     Nodes (q,) that have left over an edge stay in the list, on the nearest point of that edge, so that m does not
-    change; the caller has to hold them open. Drift is kept node by node.
+    change; the caller has to hold them open. Nodes of facets that hung over an edge at the start have left when nothing
+    of those is above the master any more. Drift is kept node by node, and so are areas.
     """
     location = contact.master.locate(
         contact.slave_position + slave_displacement, master_displacement, guess=contact.location.facet
     )
+    rim = None if contact.facets is None else contact.facets.rim
+    if rim is not None:
+        location = replace(location, gap=location.gap - rim.bend)
     now = coupled(
         contact.facets,
         contact.slave_position + slave_displacement,
@@ -182,7 +221,10 @@ def repair(
         location=location,
         coupling=reference,
     )
-    return replace(contact, location=location, nodes=nodes), np.flatnonzero(~location.inside)
+    left = ~location.inside
+    if now.hanging is not None:
+        left &= ~now.hanging
+    return replace(contact, location=location, nodes=nodes), np.flatnonzero(left)
 
 
 def overlap_tolerance(position: Array, normals: Array, master: MasterSurface) -> float:
@@ -202,19 +244,6 @@ def overlap_tolerance(position: Array, normals: Array, master: MasterSurface) ->
         heights = np.abs(np.sum(change * (position[near] - position[:, None]), axis=2)) / 8.0
         height += float(np.where(smooth, heights, 0.0).max())
     return 1.5 * height + rounding
-
-
-def _only(location: Location, index: IntArray) -> Location:
-    return Location(
-        nodes=location.nodes[index],
-        weights=location.weights[index],
-        point=location.point[index],
-        normal=location.normal[index],
-        gap=location.gap[index],
-        facet=location.facet[index],
-        inside=location.inside[index],
-        local=None if location.local is None else location.local[index],
-    )
 
 
 def _never_touching(position: Array, location: Location, opposed: BoolArray, reach: float | None) -> str:

@@ -97,6 +97,21 @@ def pieces(kind: str, facets: Array, under: Array, below: NodeLine | Outlines) -
     )
 
 
+def covered(kind: str, facets: Array, under: Array, below: NodeLine | Outlines) -> Points:
+    """Points on the parts of linear slave facets (f, r, d) [m] that lie over outlines in space; in the plane points on
+    whole facets, none of whose pieces crosses an end of the master."""
+    if isinstance(below, NodeLine):
+        owner, local, weight, _ = _on_line(kind, facets, under, below)
+        return Points(owner, local, weight)
+    # The nearest points of an edge lie to one side of a facet that hangs over it: look right below the facet.
+    middle = facets.mean(axis=1)
+    normal = _frames(facets)[:, 2]
+    level = np.sum((under - middle) * normal, axis=1, keepdims=True)
+    owner, local, weight, good = _in_space(kind, facets, middle + level * normal, below, least=0.0)
+    keep = good[owner]
+    return Points(owner[keep], local[keep], weight[keep])
+
+
 def _on_line(
     kind: str, facets: Array, under: Array, line: NodeLine
 ) -> tuple[IntArray, Array, Array, BoolArray]:
@@ -129,7 +144,7 @@ def _on_line(
 
 
 def _in_space(
-    kind: str, facets: Array, under: Array, below: Outlines
+    kind: str, facets: Array, under: Array, below: Outlines, *, least: float = LEAST_COVER
 ) -> tuple[IntArray, Array, Array, BoolArray]:
     corner_count = 3 if kind.startswith("triangle") else 4
     corners = facets[:, :corner_count]
@@ -149,12 +164,12 @@ def _in_space(
     twice = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
     following = np.roll(flat[:, :corner_count], -1, axis=1)
     cross = flat[:, :corner_count, 0] * following[:, :, 1] - flat[:, :corner_count, 1] * following[:, :, 0]
-    covered = np.bincount(owner, twice, len(facets)) / np.abs(cross.sum(axis=1))
+    part = np.bincount(owner, twice, len(facets)) / np.abs(cross.sum(axis=1))
     even = _affine(kind, facets)[owner] & below.even[pair_other[which]]
     owners: list[IntArray] = []
     coordinates: list[Array] = []
     weights: list[Array] = []
-    good = (covered >= LEAST_COVER) & (covered <= MOST_COVER)
+    good = (part >= least) & (part <= MOST_COVER)
     for lot, (at, w) in ((even, quadrature("triangle6")), (~even, _fine_triangle(FINE))):
         points = triangles[lot, None, 0] + at[:, :1] * first[lot, None] + at[:, 1:] * second[lot, None]
         facet = np.repeat(owner[lot], len(w))
