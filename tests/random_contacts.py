@@ -34,3 +34,41 @@ def random_system(seed: int) -> tuple[System, np.ndarray]:
         np.eye(n), damping, stiffness, tuple(contacts), {"press": press}, belt_motion(n), points
     )  # fmt: skip
     return system, start
+
+
+def pressed_frame(
+    seed: int, friction: float, *, nodes: int | None = None, contacts: int | None = None, rigid: bool | None = None,
+    damping: float = 0.01,
+) -> System:  # fmt: skip
+    """Two to seven nodes in the plane, at random as far as not given, held by full matrices; the first up to three are
+    pressed on belts, each in a direction of its own. Every freedom is a point: f0, f1, …"""
+    rng = np.random.default_rng(seed)
+    nodes = nodes or int(rng.integers(2, 8))
+    contacts = contacts or int(rng.integers(1, min(3, nodes) + 1))
+    n = 2 * nodes
+    loose = rng.normal(size=(n, n))
+    mass = np.diag(rng.uniform(0.8, 1.6, n)) + 0.15 * loose @ loose.T / n
+    omega = np.sort(rng.uniform(0.7, 3.0, n))
+    root = np.linalg.cholesky(mass)
+    root_shape = root @ np.linalg.qr(rng.normal(size=(n, n)))[0]
+    loose = root @ rng.normal(size=(n, n))
+    viscous = damping * (root_shape * omega @ root_shape.T + 0.3 * loose @ loose.T / n)
+    made, press = [], np.zeros(n)
+    for k in range(contacts):
+        hard = rng.random() < 0.5 if rigid is None else rigid
+        angle = rng.uniform(0.0, 2 * np.pi) if rng.random() < 0.5 else rng.choice([0.0, 0.5, 1.0, 1.5]) * np.pi
+        rng.choice(2)  # so that seeds stand for the frames that they are known by
+        slip = rng.choice([-1, 1]) * rng.uniform(0.1, 0.6)
+        stiffness = np.inf if hard else rng.uniform(2.0, 20.0)
+        normal, tangent = np.zeros(n), np.zeros(n)
+        normal[2 * k : 2 * k + 2] = np.cos(angle), np.sin(angle)
+        tangent[2 * k : 2 * k + 2] = np.sin(angle), -np.cos(angle)
+        contact = touch(normal, tangent, law=Coulomb(friction), slip=float(slip), motions=1, name="ABC"[k])
+        made.append(replace(contact, stiffness=float(stiffness)))
+        press -= rng.uniform(0.5, 1.5) * normal
+    points = points_of(n, **{f"f{i}": i for i in range(n)})
+    points = {name: replace(rows, lift=np.zeros((2, 1))) for name, rows in points.items()}
+    return System(
+        mass, 0.5 * (viscous + viscous.T), root_shape * omega**2 @ root_shape.T, tuple(made), {"press": press},
+        belt_motion(n), points,
+    )  # fmt: skip

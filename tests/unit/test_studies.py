@@ -22,6 +22,7 @@ import xarray as xr
 
 import stridor as st
 from matrix_cases import matrix_case
+from mode_coupling import mode_coupling
 from program import stridor
 from stridor.case import template_text
 from stridor.studies import reduced_rows
@@ -31,7 +32,7 @@ from stridor.studies.processes import forked
 from stridor.studies.rows import Row, failed, full_row, variables
 from stridor.studies.sampling import samples
 from stridor.studies.store import LATER, PENDING, OpenStore
-from stridor.studies.summary import answer
+from stridor.studies.summary import answer, tables
 from stridor.studies.tables import Keep
 from stridor.studies.task import SampleBatch, Task
 from stridor.studies.workers import LOADED, LocalWorkers
@@ -99,6 +100,22 @@ def test_parts_put_together_are_the_whole(grid: st.Study, whole, tmp_path: Path)
     # Nothing is left to do for the study itself.
     again = st.run_study(grid, tmp_path, workers=1, progress=lambda *_: pytest.fail("something was computed"))
     assert again.done.all()
+
+
+def test_bands_of_low_frequencies_are_told_apart(tmp_path: Path) -> None:
+    """Modes at 0.15 Hz: eight bands, each of which begins where the one before ends."""
+    study = st.Study(
+        case=mode_coupling(0.02), parameters={"mu": {"range": (0.8, 1.2)}, "bodies.m.mass": {"range": (0.8, 1.2)}},
+        sampling={"method": "random", "samples": 24},
+    )  # fmt: skip
+    result = st.run_study(study, tmp_path, workers=1)
+    (rows,) = [rows for title, _, rows in tables(result) if title == "How likely a mode grows"]
+    told = [tuple(map(float, row[0].split(" to "))) for row in rows]
+    wanted = [(low, high) for low, high, _ in result.probability_in_bands()]
+    assert all(low < high < 1.0 for low, high in told)
+    assert [high for _, high in told[:-1]] == [low for low, _ in told[1:]]
+    width = wanted[0][1] - wanted[0][0]
+    assert np.abs(np.array(told) - wanted).max() < 0.06 * width
 
 
 def test_rows_that_fail_say_why_and_stop_no_others(case: st.Case, tmp_path: Path) -> None:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import stridor as st
-from marching import block_on_belt
+from marching import block_on_belt, run
 from mode_coupling import mode_coupling
-from random_contacts import random_system
+from random_contacts import pressed_frame, random_system
 from stridor.case import template_text
 from stridor.laws import Coulomb, StaticKinetic
 from stridor.periodic import (
@@ -180,6 +182,60 @@ def test_motions_beside_a_cycle_come_to_it_or_leave_it(seeds: range):
             assert got == pytest.approx(wanted, abs=1e-5 * np.linalg.norm(off) * max(1.0, abs(whole[0])) ** 3), seed
             looked += 1
     assert looked >= len(seeds) // 6
+
+
+def check_closes(seed: int, friction: float, **frame: Any) -> int:
+    """Each cycle of a random frame comes back in a run of exact steps over one period, off by a share of how far it
+    goes; how many there are."""
+    system = pressed_frame(seed, friction, **frame)
+    try:
+        found = st.cycles(system, friction, method="shooting", seconds=2.0)
+    except st.AnalysisError:  # friction jams
+        return 0
+    assert found.cycles or found.missing or found.notes, seed
+    for cycle in found.cycles:
+        assert cycle.changes, (seed, cycle)
+        step = cycle.period / max(20, math.ceil(cycle.period / 0.01))
+        x, v = cycle.displacement[:, :, 0], cycle.velocity[:, :, 0]
+        end = run(
+            system, cycle.period + step, stepper="exact", step=step, start=(x[0], v[0], 0.0),
+            velocities={"belt": 1.0}, watch=cycle.watch_names,
+        )  # fmt: skip
+        assert end.time[-1] == pytest.approx(cycle.period, rel=1e-9)
+        for told, first, whole in ((end.displacement, x[0], x), (end.velocity, v[0], v)):
+            assert np.abs(told[-1, :, 0] - first).max() < 1e-5 * np.ptp(whole, axis=0).max(), (seed, cycle)
+    return len(found.cycles)
+
+
+@pytest.mark.parametrize("seeds", [(401, 405, 419, 437), pytest.param(range(400, 440), marks=pytest.mark.slow)])
+def test_small_frames_swing_in_cycles_that_go_somewhere(seeds: Sequence[int]):
+    """Rigid contacts that throw one another off: impacts that accumulate are no cycle, of those of a cycle they are
+    part (401, 405)."""
+    assert sum(check_closes(seed, 0.6, nodes=2, contacts=1 + seed % 2, rigid=True) for seed in seeds) >= 2
+
+
+@pytest.mark.parametrize("seeds", [(201, 206, 210), pytest.param(range(200, 260), marks=pytest.mark.slow)])
+def test_frames_swing_in_cycles_that_go_somewhere(seeds: Sequence[int]):
+    assert sum(check_closes(seed, 1.0, damping=0.02) for seed in seeds) >= 2
+
+
+def test_no_motion_is_a_cycle_of_no_time():
+    """Nor is rest one of any period, nor a swing that changes no contact."""
+    problem = Family(pressed_frame(206, 1.0, damping=0.02)).at(1.0)
+    chart = Chart.of(problem, problem.status)
+    steady = chart.numbers(problem.q, np.zeros_like(problem.q))
+    beside = steady + 0.01 * np.random.default_rng(0).normal(size=chart.size)
+    for period in (1e-9, 1e-7, 1e-5):
+        with pytest.raises(st.AnalysisError, match="no cycle closes near a return"):
+            close(problem, chart, beside, period)
+    for off in (0.0, 1e-12):
+        with pytest.raises(st.AnalysisError, match="no cycle closes near a return"):
+            close(problem, chart, steady + off * (beside - steady), 1.0)
+    free = Family(block_on_belt(law=Coulomb(0.3), speed=1.0)).at(0.3)
+    chart = Chart.of(free, free.status)
+    swinging = chart.numbers(free.q + 0.01 * free.basis.vectors[0], np.zeros_like(free.q))
+    with pytest.raises(st.AnalysisError, match="no contact changes"):
+        close(free, chart, swinging, 2 * math.pi)
 
 
 @pytest.mark.parametrize("mu", [1.4, 1.7])

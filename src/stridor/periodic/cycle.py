@@ -44,8 +44,8 @@ class Cycle(Shown):
     """A periodic motion at the friction coefficient ``mu``, of m contacts and w watched points.
 
     method: "shooting", or "harmonic" for harmonic balance with so many ``harmonics``. period [s]; residual: by shooting
-    how far from closing it is after one, in shares of its amplitude (root of energy); by harmonic balance what is left
-    of the balance, in shares of the contact forces. defect: of harmonic balance, how far its motion is from the
+    how far from closing it is after one, in shares of how far it goes (root of energy); by harmonic balance what is
+    left of the balance, in shares of the contact forces. defect: of harmonic balance, how far its motion is from the
     equations of motion in time (`periodic.harmonic.balanced.defect`); NaN by shooting, which solves them. multipliers:
     Floquet's, largest first, without the one of the motion itself; none where ``multiplied`` is False, as the system is
     too large for them. own_off: by harmonic balance, how far the one of the motion itself, which is one, came out from

@@ -15,13 +15,13 @@ from ..typing import Array
 from .chart import Chart
 from .parting import Unclosed, next_change, parting
 from .problem import SlidingProblem
-from .shooting import ClosedShot, close, distance, multipliers
+from .shooting import ClosedShot, ahead_of, close, distance, multipliers
 from .waiting import later_change, outcome
 
-NEAR = 0.02  # of the amplitude: returns so close are tried
+NEAR = 0.01  # of the extent, twice the amplitude of a swing: returns so close are tried
 CLOSER = 0.3  # of the last one tried: what is tried next
-SURE = 1e-5  # of the amplitude: a motion that comes back so close is on its cycle
-ROUND = 1e-5  # of the amplitude: a cycle that goes round several times, and once
+SURE = 5e-6  # of the extent: a motion that comes back so close is on its cycle
+ROUND = 5e-6  # of the extent: a cycle that goes round several times, and once
 CHANGES = 4000
 LONGEST = 200  # changes in a period that returns are looked for over
 SECONDS = 120.0
@@ -112,16 +112,19 @@ def cycles_reached(
     to no cycle at all; what ``met`` takes does not count.
     """
     passed: list[_Met] = []
+    went: list[float] = []  # how far the motion goes behind each change, up to the next
     found: list[ClosedShot] = []
     tried, nearest = NEAR / CLOSER, np.inf
     scale = np.sqrt(np.abs(problem.basis.stiffness))
     moving = scale[scale > 1e-6 * scale.max(initial=0.0)]
     quiet = QUIET / float(moving.min(initial=1.0) if len(moving) else 1.0)  # [s]
     until = clock.process_time() + seconds  # so that what is found does not hang on what runs beside
-    amplitude, last = 0.0, ""
+    last = ""
     away = distance(problem, motion.q, motion.v)  # from steady sliding, at the last change
     while len(passed) < CHANGES and clock.process_time() < until:
         since = passed[-1].time if passed else 0.0
+        if passed:
+            went.append(ahead_of(problem, motion, since + quiet, (motion.q, motion.v)))
         change = next_change(motion, since + quiet) or later_change(problem, motion, quiet, until)
         if change is None:
             if found:
@@ -130,8 +133,7 @@ def cycles_reached(
             raise NoReturn(words, steady=steady)
         passed.append(_Met((*change, motion.status), motion.time, np.concatenate([scale * motion.q, motion.v])))
         away = distance(problem, motion.q, motion.v)
-        amplitude = max(amplitude, away)
-        lag, off = _return(passed, amplitude)
+        lag, off = _return(passed, went)
         nearest = min(nearest, off)
         if not lag or off >= CLOSER * tried:
             continue
@@ -158,8 +160,7 @@ def cycles_reached(
         why = "the motion is quasi-periodic or chaotic, or takes longer to come to its cycle"
         why = why if unclosed is None else unclosed.words
     raise NoReturn(
-        f"no return within {len(passed)} changes of contact, the nearest {nearest:.2g} of the amplitude off{last}: "
-        f"{why}",
+        f"no return within {len(passed)} changes of contact, the nearest {nearest:.2g} of its extent off{last}: {why}",
         unclosed=unclosed,
     )  # fmt: skip
 
@@ -172,19 +173,21 @@ def same(one: ClosedShot, other: ClosedShot) -> bool:
     return not one.word or any(twice[k : k + len(one.word)] == one.word for k in range(len(other.word)))
 
 
-def _return(met: list[_Met], amplitude: float) -> tuple[int, float]:
-    """After how many changes the last state came back, with the same changes twice, and how far off [amplitudes]: the
-    least number of those nearly as close as the closest."""
-    found: list[tuple[int, float]] = []
+def _return(met: list[_Met], went: list[float]) -> tuple[int, float]:
+    """After how many changes the last state came back, with the same changes twice, and how far off, in shares of how
+    far the motion went meanwhile: the least number of those nearly as close as the closest. Changes that accumulate
+    come closer and closer, and are no return, as the motion goes less and less far."""
     here = met[-1]
-    for lag in range(1, min(LONGEST, len(met) // 2) + 1):
-        if met[-1 - lag].key != here.key:
-            continue
-        if all(met[-1 - i].key == met[-1 - i - lag].key for i in range(1, lag)):
-            off = float(np.linalg.norm(here.state - met[-1 - lag].state)) / max(amplitude, 1e-300)
-            found.append((lag, off))
-    if not found:
+    lags = [
+        lag for lag in range(1, min(LONGEST, len(met) // 2) + 1)
+        if met[-1 - lag].key == here.key and all(met[-1 - i].key == met[-1 - i - lag].key for i in range(1, lag))
+    ]  # fmt: skip
+    if not lags:
         return 0, np.inf
+    before = np.array([met[-1 - i].state for i in range(1, lags[-1] + 1)])
+    away = np.linalg.norm(before - here.state, axis=1)
+    extents = np.maximum.accumulate(np.maximum(away, went[: -lags[-1] - 1 : -1]))
+    found = [(lag, float(away[lag - 1]) / max(float(extents[lag - 1]), 1e-300)) for lag in lags]
     least = min(off for _, off in found)
     return next((lag, off) for lag, off in found if off <= max(3.0 * least, 1e-9))
 
@@ -217,7 +220,7 @@ def _primitive(closed: ClosedShot) -> ClosedShot:
             once = close(closed.problem, closed.chart, closed.xi, closed.period / times)
         except AnalysisError:
             continue
-        if np.linalg.norm(once.xi - closed.xi) <= ROUND * once.shot.amplitude and len(once.word) == part:
+        if np.linalg.norm(once.xi - closed.xi) <= ROUND * once.shot.extent and len(once.word) == part:
             return once
     return closed
 

@@ -20,10 +20,10 @@ from ..typing import Array
 from .chart import Chart
 from .continuation import BranchPoint
 from .problem import Family
-from .shooting import ENOUGH, ClosedShot, Shot, close, shoot, started
+from .shooting import ENOUGH, ClosedShot, Shot, close, left, shoot, started
 
 BESIDE = 1e-6  # of the range: for differences by μ
-GOOD = 1e-9  # of the amplitude: a corrected point
+GOOD = 1e-9  # of the extent: a corrected point
 SLOW = 0.2  # what a step of Newton's method leaves, above which the derivative by μ is found anew
 EDGE = 0.2  # of the time between two changes: a cycle that begins nearer to one is begun elsewhere
 CORRECTIONS = 9
@@ -50,7 +50,7 @@ class ShootingBranch:
         for _ in range(CORRECTIONS):
             problem = self.family.at(mu)
             miss = np.concatenate([shot.end - xi, [normal @ (xi - start)]])
-            before, off = off, float(np.linalg.norm(miss)) / max(shot.amplitude, 1e-300)
+            before, off = off, left(shot, miss)
             if off <= GOOD or (off < ENOUGH and off > 0.5 * before):
                 break
             if off > SLOW * before and not fresh:
@@ -74,9 +74,9 @@ class ShootingBranch:
                 raise AnalysisError("Newton's method leaves the range")
             shot = shoot(self.family.at(mu), chart, xi, period)
         problem = self.family.at(mu)
-        residual = float(np.linalg.norm(shot.end - xi)) / max(shot.amplitude, 1e-300)
+        residual = left(shot, shot.end - xi)
         if residual > ENOUGH or shot.status != chart.status:
-            raise AnalysisError(f"Newton's method ends {residual:.2g} of the amplitude off a cycle")
+            raise AnalysisError(f"Newton's method ends {residual:.2g} of the extent off a cycle")
         return ClosedShot(problem, chart, xi, period, shot, residual)
 
     def heading(self, closed: ClosedShot, along: Array) -> Array:
@@ -170,5 +170,4 @@ class ShootingBranch:
         chart = Chart.of(problem, motion.status)
         xi = chart.numbers(*motion.anchor.state(end))
         shot = shoot(problem, chart, xi, closed.period)
-        residual = float(np.linalg.norm(shot.end - xi)) / max(shot.amplitude, 1e-300)
-        return ClosedShot(problem, chart, xi, closed.period, shot, residual)
+        return ClosedShot(problem, chart, xi, closed.period, shot, left(shot, shot.end - xi))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 
@@ -72,13 +73,20 @@ def tables(result: StudyResult) -> list[Listing]:
     found.append(("Over all samples", ("result", "least", "5 %", "median", "95 %", "largest", "samples"), rows))
     if result.compute == "modes" and result.method not in ("grid", "saltelli") and result.unstable.any():
         bands = [
-            (f"{low:.0f} to {high:.0f}", f"{100 * p.value:.3g}", f"{100 * p.low:.3g} to {100 * p.high:.3g}")
+            (_band(low, high), f"{100 * p.value:.3g}", f"{100 * p.low:.3g} to {100 * p.high:.3g}")
             for low, high, p in result.probability_in_bands()
         ]
         found.append(("How likely a mode grows", ("band [Hz]", "probability [%]", "95 % interval [%]"), bands))
     if result.method == "saltelli":
         found += _indices(result)
     return found
+
+
+def _band(low: float, high: float) -> str:
+    """A band with as many decimals as tell its ends apart, in two digits of its width."""
+    width = high - low
+    decimals = max(1 - math.floor(math.log10(width)), 0) if width > 0.0 else 0
+    return f"{measured(low, decimals)} to {measured(high, decimals)}"
 
 
 def _indices(result: StudyResult) -> list[Listing]:
