@@ -82,7 +82,8 @@ def reduce(
         asked = _asked(at or [], along, list(ranges))
         model = _made(origin, ranges, max_frequency, BOUND if bound is None else bound)
         seconds = sum(model.seconds.values())
-        call.say(f"{model.problem.size} freedoms reduced to {model.size} in {seconds:.2f} s")
+        made = f"{model.problem.size} freedoms reduced to {model.size} in {seconds:.2f} s"
+        call.say(f"{model.size} freedoms, all of them kept" if model.keeps_all else made)
 
     from ..io.left_out import kept_in
     from ..modal.full import onsets_along
@@ -276,4 +277,5 @@ def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
     heads = [*(p.name for p in model.problem.parameters), "frequency [Hz]", "growth [1/s]", "error", "residual", ""]
     red = [k for k, mode in enumerate(mode for point in document for mode in _modes(point)) if mode["unstable"]]
     gone = ["residual", "error"]
-    table("Modes of the reduced model", heads, rows, drop=gone, words=[""], marked=red, kept_in="reduced.csv")
+    title = "Modes of the full model" if model.keeps_all else "Modes of the reduced model"
+    table(title, heads, rows, drop=gone, words=[""], marked=red, kept_in="reduced.csv")

@@ -196,7 +196,7 @@ def made(study: Study, case: Case, samples: Array, path: Path) -> FrictionModels
     path.mkdir(parents=True, exist_ok=True)
     for number, (own, low, high) in enumerate(_by_touching(study, case, box.get(FRICTION))):
         part = box if FRICTION not in box else {**box, FRICTION: (low, high)}
-        model = reduced_model(own, part, bound=study.answers.bound)
+        model = reduced_model(own, part, bound=study.answers.bound, whole=False)
         if model.whole and model.states is None:
             raise AnalysisError("damping is so strong that the reduced model is no faster")
         location = path / f"{number:02}.npz"

@@ -1,4 +1,5 @@
-"""Onsets along any number of a case: sought on a model reduced over its range, each solved in the full problem."""
+"""Onsets along any number of a case: sought on a model reduced over its range, or on all freedoms of what is small, and
+each solved in the full problem."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ from ..modal.full import ParametricOnsets
 from ..modal.full import onsets_along as sought
 from .asked import require_frequency, require_range
 from .provenance import provenance
-from .reduced import reduced_model
+from .reduced import searched_model
 
 
 def onsets_along(
@@ -30,7 +31,7 @@ def onsets_along(
     started = time.perf_counter()
     chosen = _range(case, name, between, said)
     require_frequency(max_frequency_hz)
-    model = reduced_model(case, {name: chosen}, max_frequency_hz=max_frequency_hz)
+    model = searched_model(case, {name: chosen}, max_frequency_hz=max_frequency_hz)
     found = sought(model, name, solver=solver)
     found.provenance = provenance(case, "onsets along", time.perf_counter() - started, along=name)
     return found

@@ -14,12 +14,10 @@ from ..modal.parametric import ParametricProblem, ReducedModel
 from ..system import build_system
 from ..typing import Array
 from .damping_reduced import FRICTION, box_name
-from .reduced import parametric_problem, reduced_model
+from .reduced import MOST, SMALL, parametric_problem, reduced_model
 from .sensitivities import number_at
 
 Method = Literal["auto", "reduced", "full"]
-SMALL = 60  # unknowns up to which a reduced model saves nothing
-MOST = 400  # and up to which all eigenvalues of the full problem are solved for hundreds of times
 BESIDE = 1e-4  # of a range: how far from an end without any damping curves begin
 
 
@@ -89,7 +87,7 @@ def _solved(case: Case, asked: BoundaryAsked, top: float) -> PlaneProblem:
     why: tuple[str, ...] = ()
     if method == "reduced":
         try:
-            model = reduced_model(case, box, max_frequency_hz=top, bound=asked.bound)
+            model = reduced_model(case, box, max_frequency_hz=top, bound=asked.bound, whole=False)
             notes = tuple(getattr(model.problem, "notes", ()))
             return PlaneProblem(model.problem, names, model.projected, model.vectors, model, model.frequency, notes)
         except AnalysisError as error:

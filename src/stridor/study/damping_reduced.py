@@ -54,7 +54,7 @@ class ReducedSearch:
         _dampings_only(case, full.paths, ends)
         names = tuple(box_name(case, path) for path in full.paths)
         box = {FRICTION: full.mu_range, **dict(zip(names, ends, strict=True))}
-        model = reduced_model(case, box, max_frequency_hz=full.max_frequency_hz, bound=bound)
+        model = reduced_model(case, box, max_frequency_hz=full.max_frequency_hz, bound=bound, whole=False)
         return cls(case, model, (names[0], names[1]), full)
 
     @property

@@ -13,7 +13,7 @@ from ..case import Case
 from ..case.expression import parse_expression
 from ..case.matrix_checks import MU
 from ..case.points import choice
-from ..errors import CaseError
+from ..errors import AnalysisError, CaseError
 from ..sliding.stretches import elsewhere_words, stretches
 from ..system import System, build_system
 from ..system.imported import ImportedTerm
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from ..modal.parametric.family import FactoredPart
     from ..modal.parametric.problem import Role
 
+SMALL = 60  # unknowns up to which a reduced model saves nothing
+MOST = 400  # and up to which all eigenvalues of the full problem are solved for hundreds of times
 REMEMBERED = 8  # systems of a case with other numbers
 DAMPED = "modal.damped = false does not hold here: a reduced model keeps the damping of the case"
 
@@ -36,6 +38,7 @@ def reduced_model(
     *,
     max_frequency_hz: float | None = None,
     bound: float = 1e-8,
+    whole: bool = True,
 ) -> ReducedModel:
     """One factorisation's worth of work, then every mode for all values in the box in milliseconds.
 
@@ -44,18 +47,40 @@ def reduced_model(
     ("materials.lining.young_modulus", "bodies.disc.damping.stiffness"), or one of [parameters] by its name.
     max_frequency_hz: modes up to there (default: modal.max_frequency_hz). bound: relative error of the eigenvalues. The
     nodes that touch are those of steady sliding in the case as it is; ``problem.notes`` of the model says where others
-    would. Rigid contact is eliminated: ``problem.displacements`` gives the system's freedoms back.
+    would. Rigid contact is eliminated: ``problem.displacements`` gives the system's freedoms back. whole: keep
+    matrices of up to 400 freedoms as they are where they cannot be reduced, as with multipliers; a note says so.
 
     Raises CaseError for ranges and names that are none; AnalysisError where matrices depend on a number in no simple
     way, where friction jams, or the bound is not reached.
     """
-    from ..modal.parametric import reduce
+    from ..modal.parametric import all_freedoms, reduce
 
     case = Workspace.of(problem).case("a reduced model")
-    settings = case.modal
-    limit = settings.max_frequency_hz if max_frequency_hz is None else max_frequency_hz
-    solver = None if settings.solver == "auto" else settings.solver
-    return reduce(parametric_problem(case, box), limit, bound=bound, solver=solver)
+    found, limit = parametric_problem(case, box), _limit(case, max_frequency_hz)
+    solver = None if case.modal.solver == "auto" else case.modal.solver
+    try:
+        return reduce(found, limit, bound=bound, solver=solver)
+    except AnalysisError as error:
+        if not whole or found.size > MOST:
+            raise
+        why = f"all is solved in the full problem, there is no reduced model: {error}"
+        return all_freedoms(replace(found, notes=(*found.notes, why)), limit, bound=bound)
+
+
+def searched_model(
+    case: Case, box: Mapping[str, tuple[float, float]], *, max_frequency_hz: float | None = None
+) -> ReducedModel:
+    """The model on which onsets are sought: all freedoms of what is small, so that no mode can be missing, else what
+    `reduced_model` gives."""
+    from ..modal.parametric import all_freedoms
+
+    if build_system(case).size > SMALL:
+        return reduced_model(case, box, max_frequency_hz=max_frequency_hz)
+    return all_freedoms(parametric_problem(case, box), _limit(case, max_frequency_hz))
+
+
+def _limit(case: Case, max_frequency_hz: float | None) -> float:
+    return case.modal.max_frequency_hz if max_frequency_hz is None else max_frequency_hz
 
 
 def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> ContactsProblem:

@@ -88,7 +88,7 @@ class Reduced:
             box[STIFFNESS] = REACH
         with heard(lambda stage: tell("" if stage is None else stage.what)):
             tell("a reduced model is made, once for this case")
-            model = reduced_model(work, box)
+            model = reduced_model(work, box, whole=False)
         took = time.perf_counter() - began
         over = "μ and contact stiffness" if path else "μ"
         words = f"Reduced model over {over}: {model.size} of {work.system().size} freedoms, made in {took:.0f} s"

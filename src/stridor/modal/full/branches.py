@@ -47,11 +47,11 @@ class BranchOnset:
 
 def ends_of(family: Family, low: float, high: float, top: float) -> tuple[RegionModes, RegionModes]:
     """All modes of the band at both ends, in the full problem."""
-    band, least, solver, still = top / (2 * np.pi), -DECAY * top, family.options.solver, family.built(low)
-    stands = partial(is_stiff, still, solver=solver)
+    band, least, solver, first = top / (2 * np.pi), -DECAY * top, family.options.solver, family.built(low)
+    stands, still = partial(is_stiff, first, solver=solver), AT_REST * top
     return (
-        band_modes(still, band, above=least, stands=stands, left=True, solver=solver),
-        band_modes(family.built(high), band, above=least, stands=stands, left=False, solver=solver),
+        band_modes(first, band, above=least, stands=stands, left=True, solver=solver, still=still),
+        band_modes(family.built(high), band, above=least, stands=stands, left=False, solver=solver, still=still),
     )
 
 

@@ -248,7 +248,8 @@ def onsets_along(
     full = ParameterLine(model.problem, parameter, point, Options(solver=solver)) if confirm else None
     tried = [(o, _confirmed(model, source, full, o) if full else _of(line, o, None)) for o in answer.onsets]
     onsets = [found for _, found in tried if found is not None]
-    said, complete = sentence(line, answer, ends, top, parameter, line.value, "in the reduced model"), answer.complete
+    where = "" if model.keeps_all else "in the reduced model"
+    said, complete = sentence(line, answer, ends, top, parameter, line.value, where), answer.complete
     if len(onsets) < len(tried):
         lost = ", ".join(f"{line.value(o.mu):.6g} ({o.frequency_hz:.6g} Hz)" for o, found in tried if found is None)
         complete, said = False, f"Not confirmed in the full problem and left out: {parameter} = {lost}. {said}"

@@ -137,12 +137,14 @@ def _coincide(old: State, found: Eigenpairs) -> bool:
 
 def matched(old: State, found: Eigenpairs, named: int, *, surely: bool = True) -> IntArray | None:
     """Places (b,) among ``found`` of the branches of ``old``; None where that is not clear for the first ``named`` of
-    them and ``surely`` is asked."""
+    them and ``surely`` is asked. Raises FollowingError where there is nothing left to be among."""
     half = 0.5 * (found.mu - old.mu)
     ahead = _moved(old.coordinate, half * old.tangents)
     behind = _moved(found.coordinate, -half * found.tangents)
     distance = np.abs(ahead[:, None] - behind)
     if distance.shape[1] < distance.shape[0]:
+        if not (surely or len(found.values)):
+            raise FollowingError("all modes that are followed leave the band, and what is looked at beyond it")
         return None if surely else np.argmin(distance, axis=1)
     # Of two real values at the same distance the one that grows.
     scale = float(np.abs(found.coordinate).max(initial=1.0))

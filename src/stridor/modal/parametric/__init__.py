@@ -1,5 +1,6 @@
 """Problems with parameters, reduced once and solved in milliseconds everywhere in their box."""
 
+from .all_freedoms import all_freedoms
 from .component import craig_bampton
 from .contacts import contact_parameters
 from .correct import CorrectedModes, Corrector
@@ -19,6 +20,7 @@ __all__ = [
     "ReducedModel",
     "ReducedModes",
     "Term",
+    "all_freedoms",
     "contact_parameters",
     "craig_bampton",
     "reduce",

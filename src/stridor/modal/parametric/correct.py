@@ -23,10 +23,9 @@ from ...errors import CaseError
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from ..dense_problem import combined
-from ..tolerances import UNSTABLE_RELATIVE
 from .basis import real_and_imaginary, residual
 from .dense import assembled, dense_modes
-from .model import REACH, ReducedModel, product_over_slope
+from .model import REACH, ReducedModel, growing, product_over_slope
 from .offline import static_operator, symmetric_parts
 
 STEPS = 10  # at most
@@ -40,7 +39,7 @@ class CorrectedModes:
     residual (k,): the larger of both sides' componentwise backward errors there; scaled_residual (k,): as that of
     `ReducedModes`, but formed. error (k,): estimated of λ, relative,
     from the full residuals; passed (k,): whether that is below the model's bound. steps: how many corrections were
-    made. point, inside as in `ReducedModes`.
+    made. point, inside, top as in `ReducedModes`.
     """
 
     point: Mapping[str, float]
@@ -53,6 +52,7 @@ class CorrectedModes:
     passed: BoolArray
     steps: int
     inside: bool
+    top: float = 0.0
 
     @property
     def frequency_hz(self) -> Array:
@@ -66,8 +66,8 @@ class CorrectedModes:
 
     @property
     def unstable(self) -> BoolArray:
-        """Which grow (k,)."""
-        return self.values.real > UNSTABLE_RELATIVE * np.abs(self.values)
+        """Which grow (k,), motions as a whole not among them."""
+        return growing(self.values, self.top)
 
 
 class Corrector:
@@ -127,7 +127,7 @@ class Corrector:
         )
         return CorrectedModes(
             point, found.values, right, left, backward, np.maximum(*lengths), error, ~doubtful, made,
-            problem.inside(point),
+            problem.inside(point), model.frequency,
         )  # fmt: skip
 
     def _extended(self, basis: Array, projected: Array, block: Array) -> tuple[Array, Array] | None:

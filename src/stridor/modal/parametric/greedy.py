@@ -19,6 +19,7 @@ from ...direct import Factor
 from ...errors import AnalysisError
 from ...stages import passing, stage
 from ...typing import Array, ComplexArray, IntArray, Sparse
+from ..tolerances import AT_REST
 from .basis import ReducedBasis, real_and_imaginary
 from .dense import DenseModes, assembled, dense_modes
 from .model import ReducedModel, product_over_slope, sketched, sketched_rests
@@ -148,7 +149,7 @@ class Greedy:
             if turn.shape[1] == left.shape[1]:
                 break
             share /= LESS
-        if self.whole and constant is not None:
+        if self.whole and constant is not None and any(len(modes.values) for _, modes in self.passed):
             model, constant = self._among_states(replace(model, constant=constant), turn, measured, exact, watched)
         self.work.lap("cut")
         vectors = self.basis.vectors @ turn
@@ -251,8 +252,12 @@ class Greedy:
         return np.hstack([real_and_imaginary(v) for modes in found for v in (modes.right, modes.left)])
 
     def _span(self) -> tuple[Array, Array]:
-        """Left singular vectors (r, s) and singular values (s,) of the modes at all points that passed."""
-        left, size, _ = sl.svd(self._shots(), full_matrices=False)
+        """Left singular vectors (r, s) and singular values (s,) of the modes at all points that passed; where no point
+        has a mode in the band, what the basis began with."""
+        shots = self._shots()
+        if not shots.shape[1]:
+            return np.eye(self.basis.count), np.ones(self.basis.count)
+        left, size, _ = sl.svd(shots, full_matrices=False)
         return left, size
 
     def _model(self, turn: Array) -> ReducedModel:
@@ -273,10 +278,12 @@ def _on(found: DenseModes, count: int) -> DenseModes:
 
 def _constant(model: ReducedModel, points: list[Point], exact: list[ComplexArray]) -> float | None:
     """The factor of the error estimate: the largest found, kept SAFETY times larger, at least 1 as the inverse of a
-    matrix scaled by its diagonal has it; None where errors themselves are too large."""
-    ratio = 0.0
-    for point, values in zip(points, exact, strict=True):
+    matrix scaled by its diagonal has it; None where errors themselves are too large. Motions as a whole are not judged:
+    theirs are zero but for rounding."""
+    ratio, still = 0.0, AT_REST * model.frequency
+    for point, every in zip(points, exact, strict=True):
         found = model.modes(point)
+        found, values = found.of(np.abs(found.values) > still), every[np.abs(every) > still]
         error = np.abs(found.values[:, None] - values).min(axis=1, initial=np.inf) / np.abs(found.values)
         # A mode at the very end of the band may be beyond it in one of the two.
         inner = values[np.abs(values) <= (1 - model.bound) * model.frequency]

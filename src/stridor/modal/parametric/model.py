@@ -24,7 +24,7 @@ from ...tabular import MODE, Rows, Tabular, mode_cells
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from ..dense_problem import combined
-from ..tolerances import UNSTABLE_RELATIVE
+from ..tolerances import AT_REST, UNSTABLE_RELATIVE
 from .dense import DenseModes, assembled, dense_modes
 from .problem import ParametricProblem
 from .states import States
@@ -36,7 +36,8 @@ REACH = 1.0 + 1e-9
 class ReducedModes(Tabular):
     """Modes at one point of the box: λ (k,) [1/s], residual (k,) of the full problem (scaled, both sides' larger one),
     error (k,) estimated of λ, relative; passed (k,): whether that is below the bound asked for. point: the values of
-    the parameters; inside: whether they lie in the box. right, left (r, k) are the vectors on the basis."""
+    the parameters; inside: whether they lie in the box. right, left (r, k) are the vectors on the basis. top [1/s]: the
+    highest frequency promised, which says what is a motion as a whole."""
 
     point: Mapping[str, float]
     values: ComplexArray
@@ -46,6 +47,14 @@ class ReducedModes(Tabular):
     inside: bool
     right: ComplexArray
     left: ComplexArray
+    top: float = 0.0
+
+    def of(self, chosen: BoolArray) -> ReducedModes:
+        """Some of them."""
+        return replace(
+            self, values=self.values[chosen], residual=self.residual[chosen], error=self.error[chosen],
+            passed=self.passed[chosen], right=self.right[:, chosen], left=self.left[:, chosen],
+        )  # fmt: skip
 
     @property
     def _line(self) -> str:
@@ -82,8 +91,8 @@ class ReducedModes(Tabular):
 
     @property
     def unstable(self) -> BoolArray:
-        """Which grow (k,)."""
-        return self.values.real > UNSTABLE_RELATIVE * np.abs(self.values)
+        """Which grow (k,), motions as a whole not among them: their λ is zero but for rounding."""
+        return growing(self.values, self.top)
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,6 +130,11 @@ class ReducedModel(Shown):
         """Number of unknowns r."""
         return int(self.projected.shape[1])
 
+    @property
+    def keeps_all(self) -> bool:
+        """Whether it is the problem itself, on all of its freedoms."""
+        return self.size == self.problem.size and bool(np.array_equal(self.vectors, np.eye(self.size)))
+
     @one_thread
     def modes(self, values: Mapping[str, float] | Sequence[float], *, judged: bool = True) -> ReducedModes:
         """All modes up to the promised frequency at a point of the box. Not judged, their residual and estimated error
@@ -135,7 +149,8 @@ class ReducedModel(Shown):
             found = dense_modes(*matrices, self.frequency, REACH, whole=self.whole)
         unknown = np.full(len(found.values), np.nan)
         made = ReducedModes(
-            point, found.values, unknown, unknown, np.zeros(len(unknown), dtype=bool), inside, found.right, found.left
+            point, found.values, unknown, unknown, np.zeros(len(unknown), dtype=bool), inside, found.right, found.left,
+            self.frequency,
         )  # fmt: skip
         return self._judged(made, matrices, factors) if judged else made
 
@@ -160,6 +175,12 @@ class ReducedModel(Shown):
         left = sketched(self.left_sketch, factors, powers, lam, modes.left)
         error = self.constant * product_over_slope(matrices, modes, right, left)
         return replace(modes, residual=np.maximum(right, left), error=error, passed=error <= self.bound)
+
+
+def growing(values: ComplexArray, top: float) -> BoolArray:
+    """Which λ (k,) of modes up to the highest frequency top [1/s] grow beyond rounding."""
+    size = np.abs(values)
+    return (values.real > UNSTABLE_RELATIVE * size) & (size > AT_REST * top)
 
 
 def sketched(sketch: Array, factors: Array, powers: Array, lam: ComplexArray, z: ComplexArray) -> Array:

@@ -16,6 +16,7 @@ from ...errors import AnalysisError, CaseError
 from ...stages import passing, stage
 from ...threads import one_thread
 from ...typing import Array, IntArray, Sparse
+from ..shift_inverted import undamped_pairs
 from .basis import Indefinite, ReducedBasis
 from .dense import assembled
 from .greedy import MARGIN, SEED, Greedy, ReductionCost, grid_points
@@ -55,6 +56,8 @@ def reduce(
     mass, stiffness = symmetric_parts(problem)
     stage(f"reduced model of {problem.size} freedoms: factors and modes at rest")
     operator, scale = static_operator(mass, stiffness, frequency)
+    if np.any(operator.diagonal() == 0.0):
+        raise AnalysisError("some freedoms have neither stiffness nor mass of their own, as multipliers have it")
     embedding = embedding_of(problem.size, scale)
     with factorise(operator, symmetric=True, solver=solver) as factor:
         work.lap("factorisation")
@@ -78,9 +81,13 @@ def reduce(
 
 def static_operator(mass: Sparse, stiffness: Sparse, frequency: float) -> tuple[Sparse, Array]:
     """A₀ = K_s + s M_s (n, n) of a band [1/s], and the lengths D^{-1/2} (n,) of its diagonal by which forces are
-    scaled."""
+    scaled; rows whose diagonal is zero, as multipliers have them, are measured by their largest entry."""
     operator = sp.csr_array(stiffness + (SHIFT * frequency) ** 2 * mass)
-    return operator, 1.0 / np.sqrt(np.abs(operator.diagonal()))
+    size = np.abs(operator.diagonal())
+    empty = np.flatnonzero(size == 0.0)
+    if len(empty):
+        size[empty] = np.asarray(abs(operator[empty]).max(axis=1).toarray()).ravel()
+    return operator, 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
 
 
 def symmetric_parts(problem: ParametricProblem) -> tuple[Sparse, Sparse]:
@@ -158,8 +165,7 @@ def _first_answers(basis: ReducedBasis, factor: Factor, frequency: float, work: 
     """What every term that varies or has no part in A₀ makes of the modes of the band, from both sides."""
     problem = basis.problem
     mass, _, stiffness = assembled(basis.projected, problem.factors(problem.reference), problem.powers)
-    squares, turn = sl.eigh((stiffness + stiffness.T) / 2, (mass + mass.T) / 2)
-    shapes = basis.vectors @ turn[:, squares < (MARGIN * frequency) ** 2]
+    shapes = basis.vectors @ _undamped((mass + mass.T) / 2, (stiffness + stiffness.T) / 2, frequency)
     forces: list[Array] = []
     corners = [problem.factors(c) for c in problem.corners([2] * len(problem.parameters))]
     for j, term in enumerate(problem.terms):
@@ -175,6 +181,18 @@ def _first_answers(basis: ReducedBasis, factor: Factor, frequency: float, work: 
         force = np.hstack(forces)
         basis.add(factor.solve(force, refine=False), FAINT)
         work.solves += force.shape[1]
+
+
+def _undamped(mass: Array, stiffness: Array, frequency: float) -> Array:
+    """Undamped modes (r, k) of the band, of symmetric matrices (r, r). A mass that is singular, as freedoms without
+    any make it, is no obstacle: K + s M is what is factorised."""
+    shift = (SHIFT * frequency) ** 2
+    try:
+        inverse, turn = sl.eigh(mass, stiffness + shift * mass)
+    except sl.LinAlgError:  # that is not positive definite
+        shapes = undamped_pairs(mass, stiffness, SHIFT * frequency, MARGIN / SHIFT)[1]
+        return np.hstack([shapes.real, shapes.imag[:, np.any(shapes.imag, axis=0)]])
+    return turn[:, inverse * ((MARGIN * frequency) ** 2 + shift) > 1.0]
 
 
 def embedding_of(size: int, scale: Array) -> Sparse:

@@ -30,16 +30,17 @@ def band_modes(
     stands: Callable[[float], bool],
     left: bool = False,
     solver: str | None = None,
+    still: float = 0.0,
 ) -> RegionModes:
     """All eigenvalues with frequencies up to ``max_hz`` [Hz] and growth rates over ``above`` [1/s].
 
     `find_modes` cuts an endless region off at the size of its frequencies, which holds all where stiffness is positive.
     A negative one lets motions diverge at any rate, at frequency zero and so in every band. stands: whether the problem
     at the least friction diverges at no more than a rate [1/s] (`is_stiff`); where it may, or where a negative damping,
-    XX for each factor of eight. Small problems are solved whole.
+    XX for each factor of eight. Small problems are solved whole. still: as in `find_modes`.
     What was not searched the completeness says.
     """
-    found = find_modes(problem, Region.band(0.0, max_hz, above=above), left=left, solver=solver)
+    found = find_modes(problem, Region.band(0.0, max_hz, above=above), left=left, solver=solver, still=still)
     top = 2 * np.pi * max_hz
     if problem.size <= DENSE or (stands(QUIET * top) and not driven(problem, QUIET * top, solver)):
         return found

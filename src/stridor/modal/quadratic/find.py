@@ -83,17 +83,18 @@ class RegionModes:
 @one_thread
 def find_modes(
     problem: Quadratic, region: Region, *, left: bool = False, tolerance: float = 1e-10, solver: str | None = None,
-    guess: Any = None, count: bool | None = None, hint: bool = False,
+    guess: Any = None, count: bool | None = None, hint: bool = False, still: float = 0.0,
 ) -> RegionModes:  # fmt: skip
     """All eigenvalues of λ²M + λD + K in ``region``, with right and, if asked for, left vectors.
 
     tolerance: backward error of every pair. guess (n, k): shapes of a neighbouring problem to start from; they decide
     nothing, and save little. count: whether the argument principle is to count; by default up to 1500 freedoms.
-    hint: count undamped modes too, at two more factorisations. Raises AnalysisError where P(λ) is singular for every λ,
-    the region holds too many eigenvalues, or some do not reach the tolerance.
+    hint: count undamped modes too, at two more factorisations. still [1/s]: eigenvalues no larger are motions as a
+    whole, of which the matrices may hold nothing but rounding, and need not reach the tolerance. Raises AnalysisError
+    where P(λ) is singular for every λ, the region holds too many eigenvalues, or others do not reach the tolerance.
     """
     started = time.perf_counter()
-    run = _RegionSearch(problem, region.bounded(), left, tolerance, solver, guess)
+    run = _RegionSearch(problem, region.bounded(), left, tolerance, solver, guess, still)
     run.counting = problem.size <= COUNTED if count is None else count
     if problem.size <= DENSE:
         sides, evidence = run.dense(endless=not math.isfinite(region.re_max))
@@ -150,6 +151,7 @@ class _RegionSearch:
     tolerance: float
     solver: str | None
     guess: Any
+    still: float = 0.0
     counting: bool = False
     factorisations: int = 0
     solves: int = 0
@@ -370,7 +372,7 @@ class _RegionSearch:
             lam, x, left = better
             if left < error[index] and (which == "right" or abs(lam - values[index]) <= ALIKE * self.padded.scale):
                 values[index], shapes[:, index], error[index] = lam, x, left
-        bad = np.flatnonzero(~(error <= self.tolerance))
+        bad = np.flatnonzero(~(error <= self.tolerance) & ~(np.abs(values) <= self.still))
         if len(bad):
             shown = ", ".join(f"{v:.6g}" for v in values[bad[:3]])
             raise UnsettledError(
