@@ -12,7 +12,7 @@ import pytest
 import stridor as st
 from marching import belt_motion, block_on_belt, in_chunks, points_of, run, touch
 from mode_coupling import mode_coupling
-from random_contacts import pressed_frame, random_system
+from random_contacts import random_system
 from solid_cases import DOYEN, WALL
 from stridor.agreement.perturbation import modes_as_in_time, perturb
 from stridor.case import loads, template_text
@@ -519,22 +519,6 @@ def test_friction_that_falls_with_speed_feeds_a_motion():
     rate = np.polyfit(result.time[1:-1], np.log(size), 1)[0]
     assert np.abs(u).max() < 0.01
     assert rate == pytest.approx(growth, rel=0.01)
-
-
-@pytest.mark.parametrize("ramp", [0.0, 1.0])
-def test_the_first_record_has_the_slip_that_its_friction_is_of(ramp: float):
-    """Belts that move at once, or begin to, under masses at rest: as exact steps have it."""
-    for seed in range(4):
-        system = pressed_frame(seed, 0.4)
-        one, other = (
-            run(system, 0.1, step=0.01, stepper=stepper, velocities={"belt": 1.0}, ramp=ramp)
-            for stepper in ("implicit", "exact")
-        )
-        wanted = other.slip_speed[0]
-        assert np.all(wanted != 0.0) if not ramp else np.all(wanted == 0.0)
-        assert one.slip_speed[0] == pytest.approx(wanted, rel=1e-12, abs=1e-12)
-        assert one.nodes.slip_velocity[0, :, 0] == pytest.approx(wanted, rel=1e-12, abs=1e-12)
-        assert one.slip_speed[1] == pytest.approx(other.slip_speed[1], abs=0.02)
 
 
 def test_a_run_that_is_cut_goes_on_to_the_last_digit(monkeypatch: pytest.MonkeyPatch, tmp_path):

@@ -14,7 +14,7 @@ from ....sliding.surfaces import steady_sliding_nodes
 from ....system import System
 from ....typing import Array
 from ...beta2 import StepLimit, scheme
-from ...columns import ENERGY_RECORD, REC_SLIP, WORK_COLUMNS
+from ...columns import ENERGY_RECORD, WORK_COLUMNS
 from ...node_history import NodeHistory
 from ...restart import motion_ratio
 from ...saved import INFINITY, STATUS_RANGE, Bounds
@@ -120,7 +120,6 @@ class ImplicitStepper:
         self.structure: Structure = structure_of(system, basis, settings.step)
         self.nodes: Nodes = nodes_of(system, nodes, rows, lift, basis, self.structure)
         self.left_out = 0.0  # of the initial displacement or velocity, by mass
-        self._jump = np.zeros(len(system.motion.names))  # [1], of the supports' speeds at t = 0
         self.contact_names, self.closed = nodes.names, nodes.closed
         self.parts = sketch(system, nodes)
         self.moving: State = fresh_state(self.nodes, self.structure, len(nodes.names))
@@ -185,8 +184,6 @@ class ImplicitStepper:
             for contact in range(len(self.contact_names)):
                 extra += settings.perturbation * self._slip_impulse(contact)
         else:
-            first = schedule.stretches[0]
-            self._jump = np.asarray(first.velocities_after, dtype=float) * (not first.ramp_steps)
             u = u if system.initial_displacement is None else u + system.initial_displacement
             v = v if system.initial_velocity is None else v + system.initial_velocity
         if disturbance is not None:
@@ -325,12 +322,9 @@ class ImplicitStepper:
 
     def advance(self, steps: int, schedule: Schedule, phase: str) -> None:
         """Up to so many steps."""
-        last, given, fresh = self.done + steps, False, self.done == 0
+        last, given = self.done + steps, False
         while self.done < last:
             code = self._march(last - self.done, schedule, given=given)
-            if fresh and self.done:
-                fresh = False
-                self._show_jump()
             given = code == HARD
             if given:
                 newton(self.scheme.step, self.nodes, self.moving, self.work)
@@ -338,23 +332,6 @@ class ImplicitStepper:
                 self.moving.counters[UNCONVERGED] += sweeps > SWEEP_LIMIT
             if code == NOT_FINITE:
                 raise AnalysisError(not_finite(self.done * self.scheme.step, phase, self.scheme.step))
-
-    def _show_jump(self) -> None:
-        """Supports without a ramp move from t = 0 on: the slip of the first record is that right behind their jump, as
-        its forces and statuses are."""
-        nodes, a, d = self.nodes, self.structure, self.contact_nodes.directions + 1
-        if not (np.any(self._jump) and self.recorded and len(nodes.gap)):
-            return
-        moved = nodes.lift @ self._jump - nodes.row @ (a.inertia.T @ self._jump / a.mass)
-        moved = moved.reshape(-1, d)[:, 1:]
-        first = self.record.nodes[0]
-        first[:, d : 2 * d - 1] += moved
-        along = (moved * nodes.along).sum(axis=1)
-        for c in range(len(self.contact_names)):
-            mine = nodes.owner == c
-            weight = np.abs(first[mine, 0])
-            weight = weight if weight.any() else nodes.weight[mine]
-            self.record.contacts[0, c, REC_SLIP] += float(weight @ along[mine] / weight.sum())
 
     def velocity(self) -> Array:
         """Velocity (n,) of the freedoms now."""
