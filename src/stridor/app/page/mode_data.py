@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ...case import Case
-from ...digits import hertz
 from ...errors import CaseError, StridorError
 from ...modal.complex_modes import ComplexModes
 from ...modal.krylov import friction_energy
@@ -99,7 +98,7 @@ def tornado_at(work: Workspace, mu: float, branch: int, eigenvalue: complex) -> 
         return {"branch": branch, "mu": mu, "bars": [], "warnings": [str(error)]}
     apart = np.abs(found.eigenvalues[0] - eigenvalue)
     if not np.nanmin(apart, initial=np.inf) <= SAME * abs(eigenvalue):
-        told = f"no mode of the full problem lies at {hertz(eigenvalue.imag / (2 * np.pi))}: choose it again"
+        told = f"no mode of the full problem lies at {eigenvalue.imag / (2 * np.pi):.1f} Hz: choose it again"
         return {"branch": branch, "mu": mu, "bars": [], "warnings": [told]}
     return {**tornado(work, mu, int(found.branch[np.nanargmin(apart)])), "branch": branch, "mu": mu}
 
