@@ -102,3 +102,16 @@ def test_a_shape_in_the_span_of_two_is_all_theirs():
     rest = rng.standard_normal(9) + 0j
     rest -= np.linalg.qr(pair)[0] @ (np.linalg.qr(pair)[0].conj().T @ rest)
     assert span_assurance(rest, pair) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_system_of_matrices_is_compared_by_growth() -> None:
+    # It has no bodies whose shapes could be told: what is compared is the growth and the frequency.
+    contact = {
+        "normal": [0.0, 1.0], "tangent": [1.0, 0.0], "stiffness": 10.0, "friction": {"law": "coulomb", "coefficient": 0.7}
+    }  # fmt: skip
+    stiffness = np.array([[20.0, 4.0], [4.0, 15.0]])
+    system = st.System.from_matrices(
+        np.eye(2), 0.02 * np.eye(2), stiffness, contacts={"rub": contact}, loads={"press": [0.0, -1.0]}
+    )
+    work = st.Workspace(system, modal={"max_frequency_hz": 2.0}, temporal={"step": 1e-3})
+    assert [one.agrees for one in st.compare(work, [0.7], only=["growth"]).comparisons] == [True]

@@ -185,3 +185,72 @@ def test_what_takes_no_cubic_term_says_so():
     with pytest.raises(AnalysisError, match=r"contacts.NAME.cubic makes it depend on the force"):
         st.reduced_model(loads(PAD), {"mu": (0.1, 0.5)})
     assert any("times the cube of the approach" in line for line in st.describe(pressed()).lines)
+
+
+SOFT, HARD = 2 / 3 * (2 - math.sqrt(3)), 2 / 3 * (2 + math.sqrt(3))
+ALONG = np.array([[-math.sqrt(3) / 2, 0.5], [math.sqrt(3) / 2, 0.5]])
+LAYER, DRAG = 4 / 3, 0.02
+
+
+def sprung(cubic: float, load: float) -> st.Case:
+    """The mass of two oblique springs on a belt, which are cubic, too."""
+    springs = {
+        name: {"between": ("m", "ground"), "direction": tuple(along), "stiffness": k, "cubic": k3}
+        for name, along, k, k3 in zip("ab", ALONG, (SOFT, HARD), (cubic, cubic / 2), strict=True)
+    }
+    return st.Case(
+        units="nondimensional",
+        bodies={
+            "m": {"type": "mass", "mass": 1.0, "position": (0, 0)},
+            "belt": {
+                "type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (0, 1), "sliding": {"velocity": (-5, 0)}
+            },
+        },
+        springs=springs,
+        dashpots={
+            n: {"between": ("m", "ground"), "direction": d, "damping": DRAG} for n, d in (("x", (1, 0)), ("y", (0, 1)))
+        },
+        loads={"press": {"at": "m", "force": (0, -load)}},
+        contacts={
+            "rub": {
+                "slave": "m", "master": "belt", "stiffness": LAYER, "friction": {"law": "coulomb", "coefficient": 0.3}
+            }
+        },
+        modal={"max_frequency_hz": 1.0, "friction_range": (0, 2)},
+    )  # fmt: skip
+
+
+def by_hand(cubic: float, load: float, mu: float) -> np.ndarray:
+    """Eigenvalues about the equilibrium, Im λ > 0: springs have the stiffness k + 3 k₃ s² of small motions about it."""
+    factor, stiffness = np.array([cubic, cubic / 2]), np.array([SOFT, HARD])
+    rub = LAYER * np.outer([-mu, 1.0], [0.0, 1.0])  # forces on the mass: N upwards and −μN along x, N = −k y
+    u = np.zeros(2)
+    for _ in range(60):
+        s = ALONG @ u
+        tangent = ALONG.T @ np.diag(stiffness + 3 * factor * s**2) @ ALONG + rub
+        u = u - np.linalg.solve(tangent, ALONG.T @ (stiffness * s + factor * s**3) + rub @ u + [0.0, load])
+    values = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-tangent, -DRAG * np.eye(2)]]))
+    return values[values.imag > 0]
+
+
+@pytest.mark.parametrize(("cubic", "load"), [(0.0, 1.0), (0.5, 1.0), (0.1, 2.0), (5.0, 1.0), (50.0, 1.0)])
+def test_springs_that_steady_sliding_stretches_are_stiffer(cubic: float, load: float):
+    case = sprung(cubic, load)
+    for source in (None, "krylov", "full"):
+        modal = {} if source is None else {"modal.source": source}
+        for mu in (0.0, 0.4, 1.0):
+            found, truth = st.modes(case.with_(modal), mu).eigenvalues[0], by_hand(cubic, load, mu)
+            assert len(found) == len(truth) == 2
+            assert np.abs(truth[:, None] - found).min(axis=1).max() < 1e-9
+    grid = np.linspace(0.0, 2.0, 201)
+    grows = [by_hand(cubic, load, mu).real.max() > 0 for mu in grid]
+    begins = [
+        brentq(lambda mu: by_hand(cubic, load, mu).real.max(), *grid[k : k + 2], xtol=1e-14)
+        for k in range(200) if grows[k] != grows[k + 1]
+    ]  # fmt: skip
+    assert [o.mu for o in st.onsets(case).onsets] == pytest.approx(begins, rel=1e-9)
+
+
+def test_growth_in_time_is_that_of_stretched_springs():
+    compared = st.compare(sprung(5.0, 1.0).with_({"temporal.step": 0.005}), [1.0], only=["growth"])
+    assert [one.agrees for one in compared.comparisons] == [True]

@@ -104,7 +104,7 @@ def perturb(
     signal = linear_part(run.velocity[:, : len(leaders), 0], speed[leaders])
     band = components(signal, run.sampling, max_frequency_hz=max_frequency_hz)
     form = None
-    if shape:
+    if shape and bodies.shape[0]:  # a system of matrices has no bodies whose shapes could be told
         part = slice(0, len(signal), max(1, len(signal) // MOST_INSTANTS))
         motion = run.velocity[part, len(leaders) :].reshape(-1, bodies.shape[0])
         form = component_shape(bodies, run.time[part], motion, band.eigenvalues, band.fastest, max_frequency_hz)

@@ -116,8 +116,9 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
 class Steadiness:
     """The touching nodes' steady state as a function of μ, for the terms that depend on it.
 
-    hardens: whether contact stiffness depends on the force. layer: the contact rows of the problem, those that hold
-    nodes which stick behind those of the touching ones, with the compliances of some μ.
+    hardens: whether contact stiffness depends on the force; stretches: whether there are cubic springs, whose stiffness
+    depends on how far the steady state stretches them. layer: the contact rows of the problem, those that hold nodes
+    which stick behind those of the touching ones, with the compliances of some μ.
     """
 
     system: System
@@ -128,17 +129,18 @@ class Steadiness:
     prestress: bool
     solver: str | None
     hardens: bool
+    stretches: bool
     layer: TouchingRows
 
     @property
     def neutral(self) -> bool:
         """Whether the steady state adds nothing at any μ."""
-        return not (self.sloped or self.friction_damping or self.prestress or self.hardens)
+        return not (self.damps or self.prestress or self.hardens or self.stretches)
 
     @property
     def rests(self) -> bool:
         """Whether it adds nothing where there is no friction."""
-        return not (self.prestress or self.hardens)
+        return not (self.prestress or self.hardens or self.stretches)
 
     @property
     def damps(self) -> bool:
@@ -168,6 +170,9 @@ class Steadiness:
         if self.hardens:
             change = self._hardening(mu, steady.normal_force)
             stiffness = change if stiffness is None else sp.csr_array(stiffness + change)
+        if self.stretches:
+            change = self._stretching(steady)
+            stiffness = change if stiffness is None else sp.csr_array(stiffness + change)
         return weakening, damping, stiffness
 
     def _steady(self, mu: float) -> SurfaceSliding:
@@ -188,6 +193,14 @@ class Steadiness:
         held = np.zeros(self.nodes.count, dtype=bool)
         held[self.touching] = True
         return held
+
+    def _stretching(self, steady: SurfaceSliding) -> Sparse:
+        """The stiffness 3 k₃ s² (n, n) of cubic springs that the steady state has stretched by s."""
+        cubic = self.system.cubic
+        assert cubic is not None, "asked for where there are some"
+        stretch = cubic.rows.free @ steady.displacement + cubic.stretch + cubic.rows.lift @ steady.travel
+        rates = sp.diags_array(3 * cubic.coefficient * stretch**2)
+        return sp.csr_array(cubic.rows.free.T @ rates @ cubic.rows.free)
 
     def _hardening(self, mu: float, normal_force: Array) -> Sparse:
         """What contact at ``mu`` is stiffer than the layer, (N + μS)ᵀ Δk N (n, n)."""
@@ -220,4 +233,8 @@ def steadiness(
             else "contact stiffness with a cubic term"
         )  # fmt: skip
         raise AnalysisError(f"{what} needs the normal force: give the case a load that presses the bodies")
-    return Steadiness(system, nodes, touching, sloped, across, prestress, options.solver, hardens, layer)
+    # Without loads nothing stretches them.
+    stretches = system.cubic is not None and bool(system.cubic.coefficient.size and (system.loads or system.load_steps))
+    return Steadiness(
+        system, nodes, touching, sloped, across, prestress, options.solver, hardens, stretches, layer
+    )

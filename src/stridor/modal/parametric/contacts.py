@@ -98,6 +98,11 @@ def contacts_problem(
         )
     layer = contact_rows(nodes, touching, steady.sense, steady.stuck)
     effects = steadiness(family.own, nodes, touching, options, layer)
+    if effects.stretches:
+        raise AnalysisError(
+            "reduced models over parameters: springs are taken as linear, and springs.NAME.cubic makes their stiffness "
+            "depend on how far steady sliding stretches them; `stridor modes`, `onsets` and `simulate` take that"
+        )
     names = [p.name for p in family.parameters]
     rigid = nodes.compliance[touching] == 0.0
     if STIFFNESS in names and bool(rigid.all()):
