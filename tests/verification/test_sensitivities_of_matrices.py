@@ -174,3 +174,54 @@ def test_where_nothing_can_be_changed(tmp_path: Path) -> None:
         "there is nothing to change but whole matrices: no damping, spring, added mass or parameter of the case"
     )
     assert found.warnings[-1].startswith("not tried, for nobody can build it: ")
+
+
+def meeting(folder: Path) -> st.Case:
+    """Two undamped modes that meet at q = √(5² / 4 + 4²) / 4; r is in a factor and changes nothing."""
+    turning = np.array([[0.0, -4.0], [4.0, 0.0]])
+    stiffness = np.array([[20.0, 4.0], [4.0, 15.0]])
+    terms = [(np.eye(2), "mass", ""), (stiffness, "stiffness", ""), (turning, "stiffness", "q + 0 * r")]
+    return matrix_case(folder, terms, 3.0, more="[parameters]\nq = { value = 0.5 }\nr = { value = 2.0 }")
+
+
+def test_what_is_rounding_is_told_as_no_change(tmp_path: Path) -> None:
+    """Of a mode that stays on the axis a number changes the frequency alone."""
+    case = meeting(tmp_path)
+    words = ("sensitivities", "case.toml", "--parameter", "parameters.q.value", "--branch", "1")
+    done = stridor(*words, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    said = " ".join(done.stdout.split())
+    assert "a per cent more of parameters.q.value changes the growth of no mode by more than rounding" in said
+    assert "most" not in said
+    found = st.sensitivities(case, ["parameters.q.value"], modes="all")
+    assert not found.beyond_rounding.any()
+    assert np.all(np.abs(found.frequency_per_percent_hz) > 1e-5)
+    grown = st.sensitivities(case.with_({"parameters.q.value": 2.0}), ["parameters.q.value"], modes="all")
+    assert grown.beyond_rounding.all()
+    said = " ".join(stridor(*words[:-2], "--set", "parameters.q.value=2.0", cwd=tmp_path).stdout.split())
+    assert "a per cent more of parameters.q.value changes the growth of mode 2 most: +0.0" in said
+
+
+def test_settings_are_no_numbers_of_the_model(tmp_path: Path) -> None:
+    case = meeting(tmp_path).with_({"parameters.q.value": 2.0})
+    told = "a setting of analyses: no matrix depends on it; give a number of the model"
+    for path in ("modal.max_frequency_hz", "temporal.cutoff_hz", "comparison.tolerance"):
+        with pytest.raises(st.CaseError) as error:
+            st.sensitivities(case, [path])
+        assert str(error.value).startswith(path)
+    for analysis in (lambda: st.sensitivities(case, ["modal.max_frequency_hz"]),
+                     lambda: st.rank_countermeasures(case, numbers=["modal.max_frequency_hz"])):  # fmt: skip
+        with pytest.raises(st.CaseError) as error:
+            analysis()
+        assert str(error.value) == f"modal.max_frequency_hz: {told}"
+
+
+def test_a_number_that_changes_nothing_is_told(tmp_path: Path) -> None:
+    found = st.sensitivities(meeting(tmp_path), ["parameters.q.value", "parameters.r.value"], modes="all")
+    assert found.warnings == ("parameters.r.value has no effect: no matrix of the modes depends on it",)
+
+
+def test_branches_of_a_band_without_modes(tmp_path: Path) -> None:
+    with pytest.raises(st.CaseError) as error:
+        st.sensitivities(meeting(tmp_path), ["parameters.q.value"], modes=[1], max_frequency_hz=0.1)
+    assert str(error.value) == 'modes (--branch): [1] – "unstable", "all" or numbers of branches (the band has none)'

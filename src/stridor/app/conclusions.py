@@ -109,14 +109,20 @@ def of_shapes(documents: Sequence[dict[str, Any]], mu: str | None) -> Conclusion
 
 def of_sensitivities(result: Sensitivities, mu: str | None) -> Conclusion:
     """Which number the growth of which mode answers to most; then changes that help."""
-    change = np.abs(result.growth_per_percent)
-    if not np.isfinite(change).any():
-        return Conclusion("", "modes", ("--mu", mu) if mu is not None else ())  # the warnings say why
-    k, b = (int(i) for i in np.unravel_index(int(np.nanargmax(change)), change.shape))
+    own = ("--mu", mu) if mu is not None else ()
+    known = np.isfinite(result.growth_per_percent)
+    if not known.any():
+        return Conclusion("", "modes", own)  # the warnings say why
+    if not result.beyond_rounding.any():
+        name = result.parameters[0] if len(result.parameters) == 1 else f"each of {len(result.parameters)} numbers"
+        said = f"a per cent more of {name} changes the growth of no mode by more than rounding"
+        return Conclusion(said, "modes", own)
+    change = np.where(known & result.beyond_rounding, np.abs(result.growth_per_percent), 0.0)
+    k, b = (int(i) for i in np.unravel_index(int(np.argmax(change)), change.shape))
     rate = float(result.growth_per_percent[k, b])
     name, mode = result.parameters[k], result.branch[b]
     said = f"a per cent more of {name} changes the growth of mode {mode} most: {rate:+.4g} 1/s"
-    return Conclusion(said, "countermeasures", ("--mu", mu) if mu is not None else ())
+    return Conclusion(said, "countermeasures", own)
 
 
 def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float], mu: str | None) -> Conclusion:

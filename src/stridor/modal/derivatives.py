@@ -67,6 +67,13 @@ class PencilChange:
     push: Sparse | None = None
     compliance: Array | None = None
 
+    @property
+    def nothing(self) -> bool:
+        """Whether the number changes no entry at all."""
+        matrices = (self.mass, self.damping, self.stiffness, self.normal, self.push)
+        none = all(matrix is None or not np.any(matrix.data) for matrix in matrices)
+        return none and (self.compliance is None or not np.any(self.compliance))
+
     def form(self, lam: complex, left: ModeVector, right: ModeVector) -> complex:
         """yᵀ (∂P/∂a) x."""
         total = 0j

@@ -37,6 +37,8 @@ BENT = 2.0  # condition number from which two close modes are on their way to an
 ILL = 30.0  # condition number that is worth a sentence by itself
 REPEATED = 1e-9  # of |λ|: eigenvalues nearer to each other are one
 
+SETTINGS = ("modal", "temporal", "comparison")  # tables of a case that say how something is computed
+
 Choice = Literal["unstable", "all"] | Sequence[int]
 _FRICTION = ("mu", "parameters.mu.value")
 
@@ -58,7 +60,9 @@ def sensitivities(
     "mu" is the friction coefficient of every contact and in the factors of imported matrices,
     "contacts.NAME.friction.coefficient" that of one contact; "contacts.NAME.compliance" is 1/K_c, which rigid contact
     has too. Every other path is a number of the case, such as "materials.iron.density", "bodies.pad.thickness" or
-    "bodies.brake.terms.1.factor". mu: the friction coefficient (default: the case's own).
+    "bodies.brake.terms.1.factor"; settings of analyses, such as modal.max_frequency_hz, are none of the model.
+
+    mu: the friction coefficient (default: the case's own).
 
     modes: "unstable", "all" of the band, or numbers of branches; band_hz: of these, what has a frequency between the
     two. count, max_frequency_hz, damped: as in `modes`.
@@ -75,6 +79,11 @@ def sensitivities(
     linear = Linearised.of(work, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
     values = np.array([linear.value(path) for path in parameters])
     changes = [linear.change(path, (steps or {}).get(path)) for path in parameters]
+    linear.warnings += [
+        f"{path} has no effect: no matrix of the modes depends on it"
+        for path, change in zip(parameters, changes, strict=True)
+        if change.nothing
+    ]
     require_band(band_hz, max_frequency_hz or work.modal.max_frequency_hz)
     chosen = _inside(linear, linear.columns(modes), band_hz)
     columns = [b for b in chosen if linear.mode(b) is not None]
@@ -207,6 +216,9 @@ class Linearised:
         if "." not in path:
             known = ("mu", "the path of one such as materials.steel.density")
             raise CaseError(path, None, f"no such number{choice(path, known, 'a number is')}")
+        if split_path(path)[0] in SETTINGS:
+            number_at(self.case, path)
+            raise CaseError(path, None, "a setting of analyses: no matrix depends on it; give a number of the model")
         return number_at(self.case, path)
 
     def change(self, path: str, step: float | None = None) -> PencilChange:
@@ -290,7 +302,8 @@ class Linearised:
         where = {int(number): column for column, number in enumerate(self.modes.branch)}
         missing = [number for number in choice if number not in where]
         if missing or isinstance(choice, str):
-            accepted = f'"unstable", "all" or numbers of branches from 1 to {len(where)}'
+            numbers = f"from 1 to {len(where)}" if where else "(the band has none)"
+            accepted = f'"unstable", "all" or numbers of branches {numbers}'
             raise CaseError("modes (--branch)", missing or choice, accepted)
         return [where[number] for number in choice]
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..digits import readable
 from ..modal.rates import Rates
+from ..modal.tolerances import UNSTABLE_RELATIVE
 from ..notebook import counted, html_table
 from ..tabular import MODE, Cell, Rows, Tabular, dataset, mode_cells, with_band
 from ..typing import Array, BoolArray, ComplexArray, IntArray
@@ -54,6 +55,13 @@ class Sensitivities(Rates, Tabular):
     def growth_per_percent(self) -> Array:
         """Change of the growth rate (k, b) [1/s] per per cent of the number; NaN where the number is zero."""
         return self._percent[:, None] * self.derivative.real
+
+    @property
+    def beyond_rounding(self) -> BoolArray:
+        """Whether the change of the growth rate (k, b) is more than rounding may be: a per cent of the number changes
+        it by more than a per cent of the growth, a share of |λ|, from which on a mode counts as unstable."""
+        with np.errstate(invalid="ignore"):
+            return np.abs(self.growth_per_percent) > 0.01 * UNSTABLE_RELATIVE * np.abs(self.eigenvalues)
 
     @property
     def frequency_per_percent_hz(self) -> Array:

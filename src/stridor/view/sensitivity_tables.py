@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ..digits import readable
 from ..study.countermeasures import Countermeasures, Measure
 from ..study.sensitivities import Sensitivities
@@ -15,6 +17,7 @@ SOME = 3  # modes that a cell of a table names
 
 def sensitivity_table(result: Sensitivities) -> Table:
     """What a per cent of each number does to each mode."""
+    rounding = np.isfinite(result.growth_per_percent) & ~result.beyond_rounding
     rows = [
         TableRow(
             (
@@ -22,7 +25,7 @@ def sensitivity_table(result: Sensitivities) -> Table:
                 quantity(float(result.frequency_hz[b]), 1),
                 quantity(float(result.growth_rate[b]), 2),
                 name,
-                significant(float(result.growth_per_percent[k, b])),
+                "rounding" if rounding[k, b] else significant(float(result.growth_per_percent[k, b])),
                 significant(float(result.frequency_per_percent_hz[k, b])),
                 significant(float(result.condition[b]), 3),
                 _distance(float(result.exceptional_distance[k, b])),
