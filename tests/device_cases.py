@@ -96,8 +96,11 @@ def simulated(folder: Path) -> dict[str, dict[str, np.ndarray]]:
 
 
 if __name__ == "__main__":
-    from stridor.temporal.steppers.modal import device
+    from stridor.temporal.steppers.modal import device, device_kernel
 
+    # The simulator walks over the globals of a device function at every call, in every thread. The first warning of a
+    # member that is lost would add this one meanwhile: "dictionary changed size during iteration".
+    vars(device_kernel).setdefault("__warningregistry__", {})
     sys.setswitchinterval(1e-5)  # threads wait for each other at every turn
     device.THREADS, device.LONGEST = 4, 70  # a thread of Python each; several launches
     for one in NAMES:
