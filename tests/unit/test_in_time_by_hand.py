@@ -250,7 +250,7 @@ def test_the_body_that_sets_the_limit_is_named() -> None:
     bodies = tuple(SimpleNamespace(name=n, freedoms=np.array([k]), cells={"hexahedron": 0}) for k, n in enumerate(["a", "b"]))
     system = System(np.diag([1.0, 1.0, 0.25]), np.zeros((3, 3)), K, solids=bodies)
     found = limit.step_limit_assembled(system, 0.5)
-    assert found == StepLimit(pytest.approx(2 / 6), pytest.approx(6.0), "the system", 0.9)
+    assert found == StepLimit(pytest.approx(2 / 6), pytest.approx(6.0), "the system", 0.9, None)
     found = limit.step_limit_assembled(System(np.diag([1.0, 0.1, 1.0]), np.zeros((3, 3)), K, solids=bodies), 0.8)
     assert found.body == "b"
     assert found.step == pytest.approx(math.sqrt(2 / 0.8) / math.sqrt(40.0))
@@ -259,15 +259,18 @@ def test_the_body_that_sets_the_limit_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lines", "cells", "size", "share"),
-    [
-        ((), ({"vertex"}, {"vertex"}), 60, 0.0393), ((), ({"vertex"},), 61, 0.9), ((), (), 10, 0.9),
-        ((1,), ({"vertex"},), 10, 0.9), ((), ({"vertex"}, {"vertex", "line"}), 10, 0.9),
+    ("lines", "cells", "size", "share", "asked"),
+    [  # asked: where modes are looked at up to a tenth of the highest
+        ((), ({"vertex"}, {"vertex"}), 60, 0.0393, 0.393), ((), ({"vertex"},), 61, 0.9, 0.393), ((), (), 10, 0.0393, 0.393),
+        ((1,), ({"vertex"},), 10, 0.9, 0.9), ((), ({"vertex"}, {"vertex", "line"}), 10, 0.9, 0.9),
     ],
 )  # fmt: skip
-def test_masses_and_springs_take_a_step_that_resolves_them(lines, cells, size: int, share: float) -> None:
+def test_masses_and_matrices_take_a_step_that_resolves_them(lines, cells, size: int, share: float, asked: float) -> None:
     solids = [SimpleNamespace(cells=dict.fromkeys(kinds)) for kinds in cells]
-    assert beta2.share_of(SimpleNamespace(lines=lines, solids=solids, size=size)) == share  # type: ignore[arg-type]
+    found = StepLimit(1e-3, 2e3, "m").of(SimpleNamespace(lines=lines, solids=solids, size=size))  # type: ignore[arg-type]
+    mesh = asked == 0.9
+    steps = [found.usual(highest) for highest in (None, 200 / (2 * math.pi), 1e9, 1e-9)]
+    assert steps == pytest.approx([share * 1e-3, asked * 1e-3, 0.9e-3 if mesh else 0.0393e-3, 0.9e-3])
 
 
 def test_the_courant_limit_is_that_of_the_fastest_part() -> None:

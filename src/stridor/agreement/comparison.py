@@ -268,8 +268,8 @@ class _At:
         found, why = settled(run, dominant, fitted, last_rate(modes))
         unstable = _unstable(modes, self.limit)
         responding = _responding(modes, unstable, dominant) if dominant else None
-        if dominant is None or responding is None:
-            # Without a mode that responds there is nothing to hold the shape against.
+        if dominant is None or responding is None or not (self.system.lines or self.system.solids):
+            # Without a mode that responds, or without bodies, there is no shape to hold against another.
             return _Answer(dominant, fitted, responding, None, found, why)
         assert modes.right is not None, "asked for with vectors"
         shape = operating_shape(self.system, self.phases, self.settings, run, dominant, mu=mu)

@@ -331,7 +331,7 @@ def check_extent(work: Workspace, system: System) -> None:
         if c.gap < -1e-9 and work.temporal.initial == "rest"
     ]
     _, _, limit = plan(system, settings_of(work), phases_of(work))
-    step = work.temporal.step or limit.share * limit.step
+    step = work.temporal.step or limit.usual(settings_of(work).max_frequency_hz)
     steps = sum(p.duration for p in work.phases) / step
     size = 8.0 * (6 * len(system.contact_nodes().names) + 6 * len(work.temporal.watch) + 8)
     needed = steps / work.temporal.record_every * size

@@ -44,24 +44,34 @@ def scheme(step: float, beta2: float) -> Scheme:
 
 @dataclass(frozen=True)
 class StepLimit:
-    """Largest stable step [s], the circular frequency that sets it [rad/s], the body it lives in, and the share of the
-    limit that is taken where no step is given."""
+    """Largest stable step [s], the circular frequency that sets it [rad/s], the body it lives in, the share of the
+    limit that is taken at most where no step is given, and of a system whose modes may all be looked at how many
+    freedoms it has, of others None."""
 
     step: float
     omega_max: float
     body: str
     share: float = SAFE_FRACTION
+    bare: int | None = None
 
+    def usual(self, max_frequency_hz: float | None) -> float:
+        """The step [s] where none is given: of masses and matrices one that resolves what is looked at."""
+        most = self.share * self.step
+        if self.bare is None or (max_frequency_hz is None and self.bare > FEW):
+            return most
+        asked = RESOLVED / (np.pi * max_frequency_hz) if max_frequency_hz else 0.0
+        return min(most, max(RESOLVED * self.step, asked))
 
-def share_of(system: System) -> float:
-    """The share of the limit that is taken where no step is given.
+    def of(self, system: System) -> StepLimit:
+        """With what is known of a system besides its limit.
 
-    The limit of a mesh is set by modes of its elements that nobody asks for, far above those looked at. Of a few masses
-    and springs it is set by modes that are: close to it their frequencies come out up to 40 % too high, and flutter
-    between them is missed.
-    """
-    masses = bool(system.solids) and all(set(solid.cells) == {"vertex"} for solid in system.solids)
-    return RESOLVED if masses and not system.lines and system.size <= FEW else SAFE_FRACTION
+        The limit of a mesh is set by modes of its elements that nobody asks for, far above those looked at. Of masses
+        and springs, or of matrices alone, it may be set by modes that are: close to it their frequencies come out up to
+        40 % too high, and flutter between them is missed. Where no frequency tells how far somebody looks, few freedoms
+        are all meant.
+        """
+        bare = not system.lines and all(set(solid.cells) == {"vertex"} for solid in system.solids)
+        return replace(self, bare=system.size if bare else None)
 
 
 def step_limit(system: System, beta2: float) -> StepLimit:
@@ -71,7 +81,7 @@ def step_limit(system: System, beta2: float) -> StepLimit:
     once.
     """
     limit = system.of_matrices.once(("step limit", beta2), lambda: _sought(system, beta2))
-    return replace(limit, share=share_of(system))
+    return limit.of(system)
 
 
 def _sought(system: System, beta2: float) -> StepLimit:

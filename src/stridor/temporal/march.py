@@ -16,7 +16,7 @@ from .pace import Pace
 from .phase_results import PhaseResults
 from .restart import check_restart, joined, settings_row
 from .schedule import Schedule
-from .settings import Settings
+from .settings import Settings, unresolved
 from .sketch import packed
 from .stepper import Stepper
 from .trajectory import Trajectory
@@ -151,7 +151,7 @@ class March:
             steps=stepper.done,
             planned_steps=self.schedule.steps,
             path=stepper.path,
-            path_reason=stepper.reason,
+            path_reason="; ".join(filter(None, (stepper.reason, unresolved(scheme.step, self.settings)))),
             step_limit=stepper.limit.step,
             limiting_body=stepper.limit.body,
             most_sweeps=most_sweeps,

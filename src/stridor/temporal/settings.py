@@ -14,14 +14,14 @@ from .beta2 import StepLimit
 
 @dataclass(frozen=True)
 class Settings:
-    """How to march: step Δt [s] (None: `StepLimit.share` of the limit), β2 in [0.5, 1], steps between
+    """How to march: step Δt [s] (None: `StepLimit.usual`), β2 in [0.5, 1], steps between
     records, path, initial state, perturbation [m/s] of the slip speed (steady sliding only), watched points. contact
     "rigid" takes contact stiffness out of the time loop, as the paper has it; "as given" leaves it in. stepper
     "explicit" is the scheme of the paper; "exact" goes from one change of contact to the next, and its step is that of
     the records alone; "implicit" takes steps of a part of the shortest period asked for, that of max_frequency_hz,
-    which nothing else here looks at; cutoff_hz is for exact steps alone: modes up to there and static answers in place
-    of the complete basis; "auto" takes "exact" for systems as small as `simulate.SMALL`, and "implicit"
-    for `simulate.MANY` contact nodes where a frequency is given and a step is not."""
+    which steps of masses and of bare matrices resolve as well where none is given; cutoff_hz is for exact steps alone:
+    modes up to there and static answers in place of the complete basis; "auto" takes "exact" for systems as small as
+    `simulate.SMALL`, and "implicit" for `simulate.MANY` contact nodes where a frequency is given and a step is not."""
 
     step: float | None = None
     beta2: float = 0.5
@@ -40,6 +40,16 @@ class Settings:
         return system.with_rigid_contacts() if self.contact == "rigid" else system
 
 
+def unresolved(step: float, settings: Settings) -> str:
+    """What to say of records that show the highest frequency asked for at another one, "" of those that do not."""
+    highest, between = settings.max_frequency_hz, settings.record_every * step
+    if highest is None or between * highest <= 0.5:
+        return ""
+    enough = int(0.5 / (highest * step))
+    mend = f"temporal.record_every = {enough} would" if enough else "no records of such steps do"
+    return f"records every {between:.3g} s do not resolve {highest:g} Hz; {mend}"
+
+
 def not_finite(time: float, phase: str, step: float) -> str:
     """What to say of a motion that has left all numbers."""
     return (
@@ -54,7 +64,7 @@ def choose_step(limit: StepLimit, settings: Settings, path: str = "") -> float:
     if settings.step is None:
         if not np.isfinite(limit.step):
             raise CaseError("temporal.step", None, "nothing in the system oscillates, so no step follows; give one")
-        return limit.share * limit.step
+        return limit.usual(settings.max_frequency_hz)
     if not {"exact", "implicit"} & {settings.stepper, path} and settings.step > limit.step:
         raise CaseError(
             "temporal.step",

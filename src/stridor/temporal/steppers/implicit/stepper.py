@@ -110,7 +110,7 @@ class ImplicitStepper:
     def __init__(self, system: System, nodes: ContactNodes, settings: Settings, why: str) -> None:
         assert settings.step is not None, "the step was found before (`whole_steps`)"
         self._system, self._why, self.contact_nodes = system, why, nodes
-        self._highest_hz, self._sampling = settings.max_frequency_hz, settings.record_every * settings.step
+        self._highest_hz = settings.max_frequency_hz
         self.limit = StepLimit(np.inf, 0.0, "nothing", 1.0)
         self.scheme = scheme(settings.step, 0.5)
         rows, lift = rows_of(nodes)
@@ -146,8 +146,6 @@ class ImplicitStepper:
         angle = self.scheme.step * (self._highest_hz or 0.0)
         if angle > ROUGH:
             said += f"; {1 / angle:.3g} steps to the period of {self._highest_hz:g} Hz are few"
-        if self._highest_hz is not None and self._sampling * self._highest_hz > 0.5:
-            said += f"; records every {self._sampling:.3g} s do not resolve {self._highest_hz:g} Hz"
         return said
 
     @property

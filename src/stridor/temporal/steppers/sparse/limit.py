@@ -28,7 +28,7 @@ converge from above. Where C_r is K times a number, one does.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,7 +38,7 @@ from ....errors import AnalysisError
 from ....fe.assembly import connected_components, plus
 from ....system import System
 from ....typing import Array, Sparse
-from ...beta2 import StepLimit, share_of
+from ...beta2 import SAFE_FRACTION, StepLimit
 from .damping import split_damping
 from .unsymmetric import halves
 
@@ -63,7 +63,7 @@ def step_limit_assembled(system: System, beta2: float) -> StepLimit:
     Of the same matrices it is sought once. Raises AnalysisError where a freedom has no mass.
     """
     limit = system.of_matrices.once(("lagged step limit", beta2), lambda: _sought(system, beta2))
-    return replace(limit, share=min(share_of(system), limit.share))
+    return limit.of(system)
 
 
 def _sought(system: System, beta2: float) -> StepLimit:
@@ -88,7 +88,7 @@ def _sought(system: System, beta2: float) -> StepLimit:
         step = 0.5 / (beta2 * mode.margin * math.sqrt(max(mode.value, 0.0)))
         if step < best:
             best, body = step, _owner(system, int(np.argmax(np.abs(mode.vector))))
-    return StepLimit(best, omega, body, CIRCULATORY_SHARE if parts.circulatory.nnz else np.inf)
+    return StepLimit(best, omega, body, CIRCULATORY_SHARE if parts.circulatory.nnz else SAFE_FRACTION)
 
 
 def _part_limit(stiffness: Sparse, lagged: Sparse, beta2: float, *, alike: bool) -> tuple[float, float, Array]:
