@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stridor as st
-from matrix_cases import TURN, Term, matrix_case
+from matrix_cases import TURN, Term, matrix_case, rubbing
 from program import stridor
 from stridor.study.matrix_reports import matrix_reports
 
@@ -41,6 +41,16 @@ def test_friction_that_is_lost_at_every_friction_is_told(tmp_path: Path) -> None
     (report,) = matrix_reports(matrix_case(tmp_path, terms("mu", BELT + BELT.T), 1.0)).values()
     assert dict(report.ranks) == {0.0: 0, 1.0: 0}
     assert LOST in report.matrices.warnings
+
+
+def test_friction_of_contacts_that_the_case_makes_is_not_missed_in_the_matrices(tmp_path: Path) -> None:
+    case = rubbing(tmp_path, 0.0)
+    (report,) = matrix_reports(case, 0.3).values()
+    assert report.contacts == tuple(case.contacts)
+    assert not any("friction" in warning for warning in report.matrices.warnings)
+    assert f"K is symmetric: friction is that of contacts.{report.contacts[0]}, which the case makes" in report.lines()
+    (report,) = matrix_reports(rubbing(tmp_path, 1.0), 0.3).values()
+    assert not any("K is symmetric" in line for line in report.lines())
 
 
 def test_factors_without_a_value_at_an_end(tmp_path: Path) -> None:

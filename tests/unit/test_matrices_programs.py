@@ -77,7 +77,7 @@ def test_abaqus_symmetric_with_internal_freedoms_and_supports(read):
     assert (stored.role, stored.form, stored.source) == ("stiffness", "symmetric", "beam_STIF1.mtx")
     assert stored.notes == (
         "No entry has a counterpart across the diagonal: taken as one half of a symmetric matrix and completed.",
-        "1 freedom has 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; leave them out.",
+        "1 freedom has 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; they are held.",
     )
 
 

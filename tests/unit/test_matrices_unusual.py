@@ -138,7 +138,7 @@ def test_abaqus_exponents_without_a_letter():
 def test_abaqus_supports_under_a_factor_are_known():
     stored = read("a_STIF1.mtx", "*MATRIX INPUT, NAME=A, SCALE FACTOR=0.01\n1,1,1,1,1e36\n2,1,2,1,500.\n")
     assert held_freedoms(stored.matrix).tolist() == [0]
-    assert stored.notes == ("1 freedom has 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; leave them out.",)
+    assert stored.notes == ("1 freedom has 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; they are held.",)
     mass = read("a_MASS1.mtx", "1,1,1,1,1.\n2,1,2,1,1.\n")
     (k, m), labels = common_labels([stored, mass])
     assert report(m, None, 0.1 * k, labels=labels).held == 1

@@ -83,7 +83,7 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     held = int(np.sum(matrix.diagonal() >= HELD))
     if held:
         many = counted(held, "freedom has", "freedoms have")
-        notes += (f"{many} 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; leave them out.",)
+        notes += (f"{many} 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; they are held.",)
     return StoredMatrix(matrix, path.name, labels, role, form, section.name or None, notes + unended(data))
 
 

@@ -71,7 +71,7 @@ class MatrixReport:
 
     def lines(self) -> list[str]:
         """The report for a reader, a statement a line; warnings last."""
-        held = f", {self.held} of them held (1e36 in K)" if self.held else ""
+        held = f", {self.held} of them held (1e36 in K, Abaqus' supports)" if self.held else ""
         found = [f"{counted(self.size, 'freedom', 'freedoms')}{held}"]
         for role, count in self.entries.items():
             defect = self.defect[role]
@@ -101,11 +101,13 @@ def report(
     labels: Labels | None = None,
     stored: Sequence[StoredMatrix] = (),
     stiffness_terms: Sequence[Sparse] = (),
+    contacts: Sequence[str] = (),
 ) -> MatrixReport:
     """Looks through mass, damping and stiffness, each (n, n); no damping is zero damping.
 
     labels: of the n freedoms. stored: the files the matrices are from, for what these say of themselves.
-    stiffness_terms: (n, n) each, what adds up to the stiffness, where that is known. Raises
+    stiffness_terms: (n, n) each, what adds up to the stiffness, where that is known. contacts: names of those that are
+    made beside the matrices, whose friction these need not hold. Raises
     CaseError at "matrices.ROLE" for a matrix that is not square, of another size, or has entries that are not finite.
     """
     size = int(stiffness.shape[0])
@@ -160,7 +162,7 @@ def report(
         warnings=(),
     )
     internal = 0 if kept is None else int(np.sum(kept.node < 0))
-    return replace(found, warnings=tuple(_warnings(found, internal, stored, whole)))
+    return replace(found, warnings=tuple(_warnings(found, internal, stored, whole, contacts)))
 
 
 def single_lines(stored: StoredMatrix) -> list[str]:
@@ -378,13 +380,14 @@ def _eigenvalues(negative: int | None) -> str:
 
 
 def _warnings(
-    found: MatrixReport, internal: int, stored: Sequence[StoredMatrix], whole: Mapping[str, Sparse]
+    found: MatrixReport,
+    internal: int,
+    stored: Sequence[StoredMatrix],
+    whole: Mapping[str, Sparse],
+    contacts: Sequence[str],
 ) -> list[str]:
     mass, damping, stiffness = whole["mass"], whole["damping"], whole["stiffness"]
     said: list[str] = []
-    if found.held:
-        many = counted(found.held, "freedom has", "freedoms have")
-        said.append(f"{many} 1e36 on the diagonal of K (Abaqus' supports); leave them out")
     if found.held == found.size:
         return [*said, "all freedoms are held: nothing is left that can vibrate"]
     if found.loose:
@@ -405,7 +408,7 @@ def _warnings(
         many = counted(drawn, "freedom has", "freedoms have")
         said.append(f"{many} a negative entry on the diagonal of K; is the sign of every factor right?")
     if found.entries["stiffness"]:
-        said += _friction(found, internal, stored)
+        said += _friction(found, internal, stored, contacts)
     else:
         said.append("the stiffness is zero; is a term missing, or its factor zero?")
     if found.damping == "indefinite":
@@ -418,9 +421,12 @@ def _warnings(
     return said
 
 
-def _friction(found: MatrixReport, internal: int, stored: Sequence[StoredMatrix]) -> list[str]:
+def _friction(
+    found: MatrixReport, internal: int, stored: Sequence[StoredMatrix], contacts: Sequence[str]
+) -> list[str]:
     """Where friction was to be expected in K and is not there."""
-    if found.coupling:
+    made = found.multipliers or internal  # as a program makes them that has contacts of its own
+    if found.coupling or (contacts and not made):
         return []
     of_k = [s for s in stored if s.role == "stiffness"]
     mend = "in Abaqus, ask for *STEP, UNSYMM=YES and a sliding contact with friction before *MATRIX GENERATE"

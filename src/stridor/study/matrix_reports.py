@@ -21,19 +21,23 @@ class BodyReport:
     """A body's matrices, its terms summed, and what was noticed in reading their files.
 
     mu: the friction coefficient that they are looked at, None where no factor depends on it; ranks: of K − Kᵀ at that
-    and at other μ of the range, where factors do.
+    and at other μ of the range, where factors do; contacts: those that the case makes at the body.
     """
 
     matrices: MatrixReport
     notes: tuple[str, ...]
     mu: float | None = None
     ranks: Mapping[float, int] = field(default_factory=dict[float, int])
+    contacts: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """The report for a reader, a statement a line."""
         over = [f"mu = {mu:g}: {rank}" for mu, rank in self.ranks.items()]
         ranks = f"rank of K − Kᵀ at {', '.join(over)}"
         said = [] if self.mu is None else [f"mu is in factors: looked at mu = {self.mu:g}; {ranks}"]
+        if self.contacts and not self.matrices.coupling:
+            made = ", ".join(f"contacts.{name}" for name in self.contacts)
+            said.append(f"K is symmetric: friction is that of {made}, which the case makes")
         return [*(f"read: {note}" for note in self.notes), *said, *self.matrices.lines()]
 
 
@@ -77,9 +81,12 @@ def _report_at(case: Case, name: str, body: MatrixBody, mu: float) -> BodyReport
 def _report(case: Case, name: str, body: MatrixBody, mu: float | None) -> BodyReport:
     terms = load_terms(case, name, body, mu)
     pairs = zip(terms.shares, terms.values, strict=True)
+    sides = {key: {case.location(at).body for at in (c.slave, c.master)} for key, c in case.contacts.items()}
+    contacts = [key for key, bodies in sides.items() if name in bodies]
     matrices = report(
         terms.mass, terms.damping, terms.stiffness, labels=terms.labels, stored=terms.stored,
         stiffness_terms=[sp.csr_array(value * share.matrix) for share, value in pairs if share.role == "stiffness"],
+        contacts=contacts,
     )  # fmt: skip
     notes = dict.fromkeys(f"{s.source}: {note}" for s in terms.stored for note in s.notes)
-    return BodyReport(matrices, tuple(notes))
+    return BodyReport(matrices, tuple(notes), contacts=tuple(contacts))
