@@ -123,12 +123,24 @@ def held() -> Generator[HeldSignals]:
         if before is not None:
             signal.signal(signal.SIGINT, before)
     if block.late or (block.asked and not block.met):
-        if _program.blocks:
-            _program.blocks[-1].asked = True
+        around = _program.blocks[-1] if _program.blocks else None
+        if around is not None and around.ending:
+            around.late = True
+        elif around is not None and not around.met:
+            around.asked = True
         elif block.late:
             _insist()
         else:
             interrupt()
+
+
+@contextlib.contextmanager
+def in_one_piece() -> Generator[None]:
+    """A block whose callbacks drop what they raise, and with it what they were called for: an interrupt in there is
+    raised at its end, also where a handler that is not ours has raised it inside."""
+    with held():
+        yield
+    check()
 
 
 @contextlib.contextmanager

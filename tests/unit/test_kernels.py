@@ -417,3 +417,67 @@ def test_a_file_that_is_dated_ahead_has_not_changed_for_ever(tmp_path: Path) -> 
     os.utime(file, (ahead, ahead))
     assert found.changed_since(moment)
     assert Sources("", (str(tmp_path / "gone.py"),), "").changed_since(moment)
+
+
+# -- Ctrl-C
+# ----------------------------------------------------------------------------------------------------------
+
+# Code is handed over in callbacks of its generator, which drop what a handler raises in them.
+STOPPED = """
+import signal
+import sys
+
+from numba.core.registry import cpu_target
+
+from stridor import interrupts
+from stridor.kernels import njit
+
+
+@njit(cache=True)
+def twice(x):
+    return 2.0 * x
+
+
+def hooked(hook, stops):
+    def call(*given):
+        if stops and not seen:
+            seen.append(True)
+            signal.raise_signal(signal.SIGINT)
+        return hook(*given)
+
+    return call
+
+
+if __name__ == "__main__":
+    import stopped
+
+    who, where = sys.argv[1:]
+    if who == "program":
+        interrupts.install()
+    elif who == "page":  # has a handler of its own
+        signal.signal(signal.SIGINT, lambda *_: interrupts.interrupt())
+        interrupts.insist()
+    seen = []
+    codegen = cpu_target.target_context.codegen()
+    library = codegen._library_class
+    codegen._engine.set_object_cache(
+        hooked(library._object_compiled_hook, where == "made"), hooked(library._object_getbuffer_hook, where == "fetched")
+    )
+    try:
+        stopped.twice(1.0)
+        print("went on")
+    except KeyboardInterrupt:
+        interrupts.heard()
+        print("interrupted")
+    print(stopped.twice(2.0), bool(seen))
+"""
+
+
+@pytest.mark.parametrize("who", ["library", "program", "page"])
+def test_ctrl_c_while_code_is_made_or_fetched_is_an_interrupt_and_nothing_else(who, tmp_path):
+    (tmp_path / "stopped.py").write_text(STOPPED)
+    environment = {"PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), str(tmp_path)])}
+    environment["STRIDOR_CACHE_DIR"] = str(tmp_path / "kept")
+    for where in ("made", "fetched"):  # the second finds what the first has kept
+        said = python(tmp_path / "stopped.py", who, where, environment=environment)
+        assert said == ("interrupted\n4.0 True\n", ""), where

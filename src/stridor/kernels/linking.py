@@ -15,6 +15,8 @@ from typing import Any, cast
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
+from ..interrupts import in_one_piece
+
 _Library: Any = JITCodeLibrary
 _Compiler: Any = Compiler
 
@@ -34,7 +36,9 @@ class ClosedLibrary(_Library):
         for function in own._final_module.functions:
             if not function.is_declaration and function.linkage.name == "linkonce_odr":
                 function.linkage = "internal"
-        super()._finalize_final_module()
+        # The code comes in a callback of its generator: interrupted there it would be lost, and found missing later.
+        with in_one_piece():
+            super()._finalize_final_module()
 
 
 class Closed(_Compiler):

@@ -12,6 +12,7 @@ from typing import Any, cast
 
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 
+from ..interrupts import in_one_piece
 from .folder import Folder
 from .sources import PACKAGE
 
@@ -113,7 +114,8 @@ class KernelCache(_Cache):
         """The compiled form for a signature, None where there is none that can be used."""
         if not self._folder.valid():
             return None
-        return super().load_overload(sig, target_context)
+        with in_one_piece():  # a callback fetches it
+            return super().load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled form; where that cannot be done, a note says so."""
