@@ -1,12 +1,14 @@
 """Random use of the page: does the server, the page's processes or the browser's page grow?
 
-python benchmarks/page_memory.py [--minutes 60] [--short]
+python benchmarks/page_memory.py [--minutes 60] [--kinds] [--short]
 Moves, modes, tabs, undo, runs begun, heard and stopped, limit cycles sought, at random. Printed are, after each twelfth
 of the time (five minutes of an hour), the memory of the server with its processes, what of it is their own (the rest
 are files of libraries, whose share is less the more other programs use them), that of the browser's process that shows
-the page, files left out as well, and of this what is reachable: the heap, what of that is script, compiled by the
-browser ever better the longer it runs, what the browser holds beside it (nodes, styles, pictures), and how many nodes
-and listeners there are. What a page needs at all is there after five minutes: the ratio at the end is to that.
+the page, files left out as well, and of this the heap of its script, rubbish collected, with how many nodes and
+listeners there are. What a page needs at all is there after five minutes: the ratio at the end is to that.
+--kinds: what the heap is made of, too: objects, what of it is script, compiled by the browser ever better the longer it
+runs, what the browser holds beside it (nodes, styles, pictures). To look at it the browser writes it all down, and some
+25 MB of its process stay taken by that: that process then says nothing of the page.
 Needs the extra app, playwright, Linux, and Chromium at /usr/bin/chromium; without them it says so and leaves.
 """
 
@@ -35,6 +37,7 @@ START = "typeof stridor !== 'undefined' && stridor.state.onsets !== null && stri
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--kinds", action="store_true", help="what the heap of the page is made of, too")
     parser.add_argument("--short", action="store_true", help="seconds: only that it works")
     args = parser.parse_args()
     if not all(map(find_spec, ("nicegui", "playwright"))) or not CHROMIUM.exists() or not Path("/proc").exists():
@@ -44,14 +47,15 @@ def main() -> None:
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
     try:
-        use(server.stdout.readline().strip(), server.pid, *((6.0, 2) if args.short else (60 * args.minutes, SAMPLES)))
+        lasts = (6.0, 2) if args.short else (60 * args.minutes, SAMPLES)
+        use(server.stdout.readline().strip(), server.pid, *lasts, kinds=args.kinds)
     finally:
         server.terminate()
         server.wait(20)
         server.stdout.close()
 
 
-def use(address: str, server: int, seconds: float, times: int) -> None:
+def use(address: str, server: int, seconds: float, times: int, *, kinds: bool) -> None:
     """Use the page for so long, and say what it takes, so many times."""
     from playwright.sync_api import sync_playwright
 
@@ -69,7 +73,7 @@ def use(address: str, server: int, seconds: float, times: int) -> None:
             act(page, chance)
             acts += 1
             if time.monotonic() - began > seconds * (len(samples) + 1) / times:
-                samples.append(sample(page, counter, server, time.monotonic() - began))
+                samples.append(sample(page, counter, server, time.monotonic() - began, kinds=kinds))
                 print(f"{(time.monotonic() - began) / 60:5.1f} min, {acts} acts: {samples[-1].words()}", flush=True)
         last = samples[-1]
         first = next((s for s in samples if s.seconds >= FIRST), samples[0])
@@ -119,23 +123,24 @@ class Sample:
         return f"{memory}; {', '.join(f'{value} {key}' for key, value in self.counts.items())}"
 
 
-def sample(page: Any, counter: Any, server: int, seconds: float) -> Sample:
+def sample(page: Any, counter: Any, server: int, seconds: float, *, kinds: bool) -> Sample:
     """What the server with its processes and the page take, no run under way."""
     for kind in ("stop", "leave"):
         page.evaluate(PRESS, [f"#st-{BUTTONS[kind]}", 0])
     time.sleep(5)
     memory, own = resident(server)
-    counter.send("HeapProfiler.collectGarbage")
-    time.sleep(2)
-    shown = page_process()  # before the heap is looked at, which leaves much behind
-    sizes = by_type(counter)
+    for _ in range(2):  # what the first leaves for the second: finalizers, caches that grow old by collections
+        counter.send("HeapProfiler.collectGarbage")
+        time.sleep(1)
+    shown = page_process()
+    heap = counter.send("Runtime.getHeapUsage")["usedSize"] / 1e6
     told = {one["name"]: one["value"] for one in counter.send("Performance.getMetrics")["metrics"]}
-    # JSHeapUsedSize of the metrics is not it: it holds megabytes of rubbish, some of which the counting makes.
-    script, browser = sizes[SCRIPT] / 1e6, sizes[BROWSER] / 1e6
-    heap = sum(sizes.values()) / 1e6 - browser
     counts = {"nodes": int(told["Nodes"]), "listeners": int(told["JSEventListeners"])}
-    mb = {"server": memory, "own": own, "page": shown, "heap": heap, "script": script, "objects": heap - script}
-    mb["browser"] = browser
+    mb = {"server": memory, "own": own, "page": shown, "heap": heap}
+    if kinds:
+        sizes = by_type(counter)
+        script, browser = sizes[SCRIPT] / 1e6, sizes[BROWSER] / 1e6
+        mb |= {"script": script, "objects": sum(sizes.values()) / 1e6 - browser - script, "browser": browser}
     return Sample(seconds, mb, counts)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from test_sensitivities import MINIMAL
@@ -9,7 +11,7 @@ from test_sensitivities import MINIMAL
 from benches import paper_case
 from matrix_cases import matrix_case
 from stridor.case import Case, loads
-from stridor.errors import AnalysisError
+from stridor.errors import AnalysisError, CaseError
 from stridor.study.analyses import modes, onsets
 from stridor.study.countermeasures import rank_countermeasures
 from stridor.study.sensitivities import sensitivities
@@ -44,6 +46,36 @@ def test_what_changes_the_coefficient_of_a_law_does_so_in_the_derivative(falling
         high, low = (e[np.nanargmin(np.abs(e - lam))] for e in (above.eigenvalues[0], below.eigenvalues[0]))
         assert derivative * value == pytest.approx((high - low) / (2 * step), rel=2e-4, abs=1e-5 * abs(lam))
     assert not any("held" in line for line in found.warnings)
+
+
+def beside_itself(one: Case) -> dict[str, Any]:
+    """MINIMAL twice, the second far from the first."""
+    twin = one.model_dump(mode="json", exclude_none=True)
+    for table, name in (("bodies", "m"), ("loads", "weight"), ("contacts", "rub")):
+        twin[table] |= {f"{name}2": dict(twin[table][name])}
+    for table in ("springs", "dashpots"):
+        twin[table] |= {
+            f"{name}2": spring | {"between": ["m2", "ground"]} for name, spring in list(twin[table].items())
+        }
+    twin["bodies"]["m2"]["position"] = [5.0, 0.0]
+    twin["loads"]["weight2"]["at"] = twin["contacts"]["rub2"]["slave"] = "m2"
+    return twin
+
+
+def test_a_number_of_one_law_of_two_is_not_held_in_silence():
+    """Two contacts of one law; another number in one of them gives them two coefficients, which no μ of modes has."""
+    data = beside_itself(loads(MINIMAL))
+    for contact in data["contacts"].values():
+        contact["friction"] = LAW | {"decay_speed": 5.0}
+    both = Case.model_validate(data)
+    path = "contacts.rub2.friction.decay_speed"
+    with pytest.raises(CaseError, match="mu, or a number that all contacts take their friction from"):
+        sensitivities(both, path, modes="all")
+    # At a μ that was asked for it is held, and told; what all contacts share moves them alike.
+    mu = modes(both).mu[0]
+    asked = sensitivities(both, path, mu=1.01 * mu, modes="all")
+    assert any("friction is held" in line for line in asked.warnings)
+    sensitivities(both, ["mu", "springs.x.stiffness"], modes="all")
 
 
 def test_a_friction_that_was_asked_for_is_held_and_told(falling):
@@ -83,16 +115,7 @@ def test_modes_that_diverge_faster_than_the_band_are_sought_there_too(falling):
 def test_unstable_modes_that_are_all_repeated_rank_nothing_and_say_so():
     """Two equal sliders beside each other: every mode is double, and derivatives belong to neither of two."""
     one = loads(MINIMAL)
-    twin = one.model_dump(mode="json", exclude_none=True)
-    for table, name in (("bodies", "m"), ("loads", "weight"), ("contacts", "rub")):
-        twin[table] |= {f"{name}2": dict(twin[table][name])}
-    for table in ("springs", "dashpots"):
-        twin[table] |= {
-            f"{name}2": spring | {"between": ["m2", "ground"]} for name, spring in list(twin[table].items())
-        }
-    twin["bodies"]["m2"]["position"] = [5.0, 0.0]
-    twin["loads"]["weight2"]["at"] = twin["contacts"]["rub2"]["slave"] = "m2"
-    case = Case.model_validate(twin)
+    case = Case.model_validate(beside_itself(one))
     found = rank_countermeasures(case, mu=0.9)
     assert not found.measures
     assert found.warnings[-1].startswith("the unstable modes have no derivatives")

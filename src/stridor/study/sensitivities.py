@@ -232,11 +232,13 @@ class Linearised:
             return by_compliance(self.system, self.held, contact)
 
         moved: list[Array] = []
+        apart: list[bool] = []
 
         def at(value: float) -> Pencil:
             system = self.varied(path, value)
-            if self.by_law and not self.follows_law:
+            if self.by_law:
                 moved.append(frictions_in_sliding(system))
+                apart.append(friction_in_sliding(system) is None)
             return pencil_of(system, self.friction(system), self.held, self.options)
 
         try:
@@ -244,7 +246,12 @@ class Linearised:
         except CaseError as error:
             accepted = f"a number that can be varied a little ({error.problems[0].accepted})"
             raise CaseError(path, self.value(path), accepted) from error
-        if any(not np.array_equal(one, moved[0]) for one in moved[1:]):
+        changed = any(not np.array_equal(one, moved[0]) for one in moved[1:])
+        if changed and self.follows_law and any(apart):
+            # What the laws add is known at a μ that all contacts have; with μ held it is another case's derivative.
+            accepted = "mu, or a number that all contacts take their friction from, as modes are those of one μ"
+            raise CaseError(path, self.value(path), accepted)
+        if changed and not self.follows_law:
             self.warnings.append(
                 f"{path}: friction is held at μ = {self.mu:g}, as asked for; what it does to the coefficient of the "
                 "law is not in the derivative (it is at the case's own friction, without --mu)"
