@@ -156,3 +156,28 @@ def test_negative_masses_are_told_before_what_they_make_grow(tmp_path: Path, whe
         shown = stridor(verb, "negative.toml", cwd=tmp_path)
         assert f"bodies.matrices: {words} a negative mass, and what grows" in " ".join(shown.stderr.split()), shown
     assert all("negative mass" not in told for told in st.describe(model(tmp_path)).warnings)
+
+
+def test_a_text_that_may_be_cut_off_is_told_of_by_all_that_computes(tmp_path: Path):
+    (tmp_path / "M.mtx").write_text("%%MatrixMarket matrix array real general\n1 1\n1.0\n")
+    (tmp_path / "K.mtx").write_text("%%MatrixMarket matrix array real general\n1 1\n3.0E+05")
+    terms = '[{ file = "M.mtx", role = "mass" }, { file = "K.mtx", role = "stiffness" }]'
+    (tmp_path / "cut.toml").write_text(f"[matrices]\nterms = {terms}\n")
+    for verb in ("check", "modes", "onsets"):
+        shown = stridor(verb, "cut.toml", cwd=tmp_path)
+        told = " ".join(shown.stderr.split() if verb != "check" else (shown.stdout + shown.stderr).split())
+        assert "bodies.matrices: K.mtx: The last line has no line end: if the file was cut off there" in told, shown
+    with (tmp_path / "K.mtx").open("a") as file:
+        file.write("\n")
+    assert "line end" not in stridor("modes", "cut.toml", cwd=tmp_path).stderr
+
+
+@pytest.mark.parametrize("damping", [0.0, 2.0])
+def test_without_any_stiffness_all_motions_stay_or_creep(tmp_path: Path, damping: float):
+    system = st.System.from_matrices(np.eye(2), np.diag([damping, 0.0]), np.zeros((2, 2)))
+    found = st.modes(st.Workspace(system, modal={"max_frequency_hz": 1.0}), 0.1)
+    # A free motion is one mode; with a damper it is one that stays and one that creeps to rest.
+    assert sorted(found.eigenvalues[0].real) == pytest.approx([-damping, 0.0, 0.0] if damping else [0.0, 0.0])
+    case = matrix_case(tmp_path, [(np.eye(2), "mass", ""), (np.zeros((2, 2)), "stiffness", "")], 1.0)
+    (tmp_path / "none.toml").write_text(case.to_toml())
+    assert stridor("modes", "none.toml", cwd=tmp_path).returncode == 0

@@ -139,9 +139,9 @@ class Call:
         """Say what is odd about a case before anything is computed."""
         self.warn(case.warnings)
         if case.imported:
-            from ..study.unit_warnings import mass_warnings
+            from ..study.unit_warnings import matrix_warnings
 
-            self.warn(mass_warnings(case))
+            self.warn(matrix_warnings(case))
 
     def warn_of_idle(self) -> None:
         """Say which settings had no effect."""

@@ -181,11 +181,12 @@ def counted(count: int, one: str, more: str) -> str:
     return f"{count} {one if count == 1 else more}"
 
 
+UNENDED = "The last line has no line end: if the file was cut off there, its last number is wrong."
+
+
 def unended(data: bytes) -> tuple[str, ...]:
     """A note where the last line of a text has no end."""
-    if data.endswith(b"\n"):
-        return ()
-    return ("The last line has no line end: if the file was cut off there, its last number is wrong.",)
+    return () if data.endswith(b"\n") else (UNENDED,)
 
 
 def _printable(text: str) -> str:

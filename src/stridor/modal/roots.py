@@ -216,7 +216,7 @@ def frictionless_roots(spectrum: ReceptanceProblem, limit: float) -> ComplexArra
     spectrum, own = _without_tangential(spectrum)
     starts: ComplexArray | None = None
     if spectrum.modes.proportional:
-        limit = min(limit, _beyond(spectrum))  # the dense problems are scaled by it
+        limit = min(limit, _beyond(spectrum)) or limit  # the dense problems are scaled by it
         starts = _dense_undamped(spectrum, limit)
     if starts is None:
         starts = dense_roots(spectrum, 0.0, 1.3 * limit)

@@ -26,7 +26,7 @@ from ..temporal.simulate import plan, step_of
 from .matrix_reports import matrix_reports
 from .pressed import unpressed_in_time
 from .settings import phases_of, settings_of
-from .unit_warnings import mass_warnings, resolution_warnings, unit_warnings
+from .unit_warnings import matrix_warnings, resolution_warnings, unit_warnings
 from .workspace import Problem, Workspace
 
 MOST_THROUGH = 0.2  # of a sliding velocity through a surface: facets on a curve make little of it
@@ -99,7 +99,7 @@ def describe(problem: Problem) -> Description:
         lines.append(f"{what}: `stridor modes` and `stridor onsets` take that, time loops do not: {why}")
     else:
         lines += _time_lines(case, system, data)
-    warnings = [*case.warnings, *unit_warnings(case), *mass_warnings(case)]
+    warnings = [*case.warnings, *unit_warnings(case), *matrix_warnings(case)]
     warnings += [*mesh_warnings(case, system), *imported_warnings(case, system)]
     warnings += data.get("contact_patterns", [])
     if "modal" in case.model_fields_set:

@@ -11,6 +11,7 @@ from ..case.usual import LENGTH, USUAL, unusual
 from ..fe.solid import wave_speeds
 from ..laws import Material
 from ..matrices.report import guessed_units, negative_mass
+from ..matrices.source import UNENDED
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths
 from ..system.imported import load_terms
@@ -22,11 +23,15 @@ MOST_PER_WAVE = 1e5  # above it, lengths are hardly in metres
 MANY_PER_WAVE, SMALL_BODY = 1e3, 2e-3  # nor are they above this in a body smaller than this [m]
 
 
-def mass_warnings(case: Case) -> list[str]:
-    """Bodies of imported matrices with negative masses."""
+def matrix_warnings(case: Case) -> list[str]:
+    """Bodies of imported matrices with negative masses, or from files that may have been cut off."""
     found: list[str] = []
     for name, body in case.bodies.items():
-        if isinstance(body, MatrixBody) and (negative := negative_mass(load_terms(case, name, body).mass)):
+        if not isinstance(body, MatrixBody):
+            continue
+        terms = load_terms(case, name, body)
+        found += dict.fromkeys(f"bodies.{name}: {s.source}: {UNENDED}" for s in terms.stored if UNENDED in s.notes)
+        if negative := negative_mass(terms.mass):
             found.append(
                 f"bodies.{name}: {negative}, and what grows for that is no squeal; is the sign of every factor right, "
                 "and is it the mass?"

@@ -19,7 +19,7 @@ from ...errors import CaseError, StridorError
 from ...modal.complex_modes import ComplexModes
 from ...modal.onsets import Onset, Onsets
 from ...study.analyses import modes, onsets
-from ...study.unit_warnings import mass_warnings
+from ...study.unit_warnings import matrix_warnings
 from ...study.workspace import Unsaved, Workspace
 from ...system import System
 from .drawing import drawing
@@ -251,7 +251,7 @@ def _described(model: _Model) -> dict[str, Any]:
     case, system = model.work.case("the page"), work.system()
     return {
         "title": case.title, "freedoms": system.size, "svg": drawing(case, system),
-        "warnings": [*case.warnings, *mass_warnings(case)], "large": system.size > LARGE, "why": model.why,
+        "warnings": [*case.warnings, *matrix_warnings(case)], "large": system.size > LARGE, "why": model.why,
     }  # fmt: skip
 
 
