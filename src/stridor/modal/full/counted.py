@@ -15,14 +15,15 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from ...typing import BoolArray, ComplexArray, IntArray
-from ..dense_problem import Eigenpairs, upper_root
+from ...typing import BoolArray, ComplexArray
+from ..dense_problem import Eigenpairs
 from ..newton import Root, crossing, meeting, standstill
 from ..onset import Onset
 from ..quadratic.polish import pairs
-from ..tolerances import AT_REST, UNSTABLE_RELATIVE
+from ..tolerances import AT_REST
 from .basis import Along
 from .family import Family
+from .foretold import SLOWEST, changes_within
 from .growth import growing_roots, unstable
 from .opening import Opening
 
@@ -30,9 +31,7 @@ GRID = {False: 96, True: 24}  # intervals to begin with, on a basis and by full 
 ON_IT = 1e-6  # of the range: so near an onset growth may be rounding
 SMALLEST = 1e-9  # of the range: no interval is halved further
 ALONE = 1e-4  # of the range: an interval in which one mode changes is short enough for Newton from here on
-SLOWEST = 1e-8  # of the highest frequency: growth slower than that is rounding
 STILL = 1e-3  # of the highest frequency: slower than that may be divergence
-TOGETHER = 0.25  # of the square of half the difference of two modes: what is left of it where they come together
 NEARBY = 0.05  # of |λ|: how far from where slopes lead it to a growing mode may be in the next interval's end
 CLOSELY = 1.5  # from one value to the next behind what opens at the low end
 AWAY = 0.1  # of |λ|, or of the highest frequency: how far a root in the smallest intervals may be from its mode
@@ -112,9 +111,10 @@ def ends(root: Root) -> bool:
     return root.slope < 0 if root.slope is not None else (root.square or 0.0) < 0
 
 
-def counted(source: Along, between: tuple[float, float], top: float) -> Counted:
-    """Onsets up to |λ| = top [1/s] in a range of the family, and what was counted on the way."""
-    return _Search(source, between, top).all()
+def counted(source: Along, between: tuple[float, float], top: float, more: Sequence[float] = ()) -> Counted:
+    """Onsets up to |λ| = top [1/s] in a range of the family, and what was counted on the way; more: values of μ
+    that the grid has too."""
+    return _Search(source, between, top).all(more)
 
 
 def opened_in(source: Along, low: float, top: float) -> tuple[Opening, ...]:
@@ -170,11 +170,11 @@ class _Search:
         self.width = self.high - self.low
         self.opened = opened_in(source, between[0], top)
 
-    def all(self) -> Counted:
+    def all(self, more: Sequence[float]) -> Counted:
         """The grid from end to end, and what changes in it."""
         even = np.linspace(self.low, self.high, GRID[self.source.whole] + 1)
         early = beyond(self.opened, self.start, self.start + float(even[1]))
-        grid = [self._at(t) for t in sorted({*even.tolist(), *(mu - self.start for mu in early)})]
+        grid = [self._at(t) for t in sorted({*even.tolist(), *(mu - self.start for mu in (*early, *more))})]
         onsets, passing = [as_onset(self.source.family, o.root) for o in self.opened if o.root], list[Passing]()
         for before, after in pairwise(grid):
             for low, high in self._changes(before, after):
@@ -216,7 +216,8 @@ class _Search:
     def _changes(self, low: _Count, high: _Count) -> Iterator[tuple[_Count, _Count]]:
         """Intervals in which the growing modes change by one, those that slopes foretell included."""
         differs, width = low.number != high.number, high.t - low.t
-        foretold = self._foretold(low, width) or self._foretold(high, -width)
+        family, top = self.source.family, self.top
+        foretold = any(changes_within(family, c.found, step, top) for c, step in ((low, width), (high, -width)))
         if not differs and not foretold and self._are_those(low, high):
             return
         if width <= SMALLEST * self.width or (width <= ALONE * self.width and _one(low, high)):
@@ -228,54 +229,6 @@ class _Search:
         middle = self._at(0.5 * (low.t + high.t))
         yield from self._changes(low, middle)
         yield from self._changes(middle, high)
-
-    def _foretold(self, at: _Count, step: float) -> bool:
-        """Whether within a step a mode would begin or cease to grow if it were straight, or two that come together, one
-        and its conjugate too, if their mean and the square of half their difference were, which are smooth where they
-        meet: what little or nothing damps stays beside the axis until then, and its own slope tells nothing of it."""
-        one, other = self._pairs(at.found)
-        half, turn = (one - other) / 2
-        square, change = half * half, 2 * half * turn
-        # How near to zero the square comes within the step.
-        with np.errstate(all="ignore"):
-            part = -np.real(square * change.conj()) / np.abs(change) ** 2
-        nearest = square + np.clip(np.nan_to_num(part / step), 0.0, 1.0) * step * change
-        together = np.abs(nearest) <= TOGETHER * np.abs(square)
-        return bool(np.any(together & (self._roots(one, other, step) != self._roots(one, other, 0.0))))
-
-    def _pairs(self, found: Eigenpairs) -> tuple[ComplexArray, ComplexArray]:
-        """Coordinates and slopes (2, k) of modes that may meet, of which one at least is in the band: every mode with
-        itself, with its conjugate and with others; λ² that are real with their neighbours alone."""
-        squares = self.source.family.reversible
-        size = np.abs(found.values)
-        known = np.flatnonzero(np.isfinite(found.tangents) & (size > SLOWEST * self.top))
-        inside = known[size[known] <= self.top]
-        both = np.array([found.coordinate, found.tangents])
-        alone, axis = inside, both[0].imag == 0
-        if squares:
-            real = known[axis[known]]
-            real = real[np.argsort(both[0, real].real)]
-            one, other = real[:-1], real[1:]
-        else:
-            # One that is on the axis leaves it to either side; two may still meet there.
-            alone = inside[np.abs(found.values[inside].real) > UNSTABLE_RELATIVE * size[inside]]
-            one, other = (known[k] for k in np.triu_indices(len(known), 1))
-        near = np.minimum(size[one], size[other]) <= self.top
-        turned = inside[~axis[inside]]
-        first = np.concatenate([alone, turned, one[near]])
-        second = np.hstack([both[:, alone], both[:, turned].conj(), both[:, other[near]]])
-        return both[:, first], second
-
-    def _roots(self, one: ComplexArray, other: ComplexArray, step: float) -> IntArray:
-        """How many roots (k,) of pairs of coordinates and their slopes (2, k) grow a step on."""
-        half, turn = (one - other) / 2
-        mean = (one[0] + other[0] + step * (one[1] + other[1])) / 2
-        apart = np.sqrt(half * (half + 2 * step * turn))
-        ahead: ComplexArray = np.array([mean + apart, mean - apart])
-        values = upper_root(ahead) if self.source.family.reversible else ahead
-        grows = unstable(self.source.family, values, self.top, SLOWEST)
-        roots: IntArray = np.sum(np.where(grows, np.where(values.imag != 0, 2, 1), 0), axis=0)
-        return roots
 
     def _are_those(self, low: _Count, high: _Count) -> bool:
         """Whether as many growing modes are the same ones: where one begins and another ends their number says nothing.

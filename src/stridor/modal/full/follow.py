@@ -12,6 +12,7 @@ from ..histories import Entries
 from ..krylov.follow import Follower, State
 from ..krylov.passages import Passage, crossings, meetings
 from .basis import Along
+from .foretold import changes_within
 
 BEYOND = 1.1  # modes above the band may meet inside it
 STEPS = {False: 30, True: 12}  # over the range at least, on a basis and by full solves
@@ -23,7 +24,8 @@ SMALLEST = 1.01e-9  # step at which the follower goes on whatever it sees
 @dataclass(frozen=True)
 class Followed:
     """Branches over the range: states at both ends of what was asked for, passages, entries into the band (over
-    t = μ − low), and μ where they were unsure."""
+    t = μ − low), μ where they were unsure, and steps (μ, μ) within which slopes foretell that growth begins or ends:
+    what does both in one leaves nothing at its ends."""
 
     source: Along
     low: State
@@ -31,6 +33,7 @@ class Followed:
     passages: tuple[Passage, ...]
     entries: Entries
     unsure: tuple[float, ...]
+    foretold: tuple[tuple[float, float], ...]
 
 
 def follower(
@@ -83,15 +86,20 @@ def followed(source: Along, low: float, high: float, top: float, finer: int = 1)
     family, entries = source.family, Entries(top)
     passages: list[Passage] = []
     unsure: list[float] = []
+    foretold: list[tuple[float, float]] = []
 
     def watch(old: State, new: State) -> None:
         passages.extend(meetings(source, old, new) if family.reversible else crossings(old, new))
         entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.index)))
+        sides = ((old.found, new.mu - old.mu), (new.found, old.mu - new.mu))
+        if any(changes_within(family, found, step, top) for found, step in sides):
+            foretold.append((family.low + old.mu, family.low + new.mu))
 
     most = ENOUGH[source.whole] * min(finer, 2)
     way = follower(source, finer=finer, most=most, watch=watch, unsure=unsure.append)
     first = way.advance(low - family.low)
-    return Followed(source, first, way.advance(high - family.low), tuple(passages), entries, tuple(unsure))
+    last = way.advance(high - family.low)
+    return Followed(source, first, last, tuple(passages), entries, tuple(unsure), tuple(foretold))
 
 
 def _surely(source: Along, old: State, new: State) -> bool:

@@ -21,12 +21,15 @@ from .branches import BranchOnset, all_values, solved
 from .counted import ALIKE, ON_IT, Counted, Lack, Passing, as_onset, beyond, counted, number_at, opened_in
 from .family import Family
 from .follow import BEYOND, Followed
+from .foretold import changes_within
 from .growth import growing_roots, unstable
 
 FINER = 6  # times as many steps where the count at the ends does not agree
 EVEN = 8  # values at which followed branches are held against a count, beside those between the onsets
-CLOSE_BY = 48  # of problems up to CHEAP unknowns
+CLOSE_BY = 95  # of problems up to CHEAP unknowns
 CHEAP = 100
+WITHIN = 8  # values within a step of full solves where slopes foretell a change
+FINEST = 3e-4  # of the range: steps on a basis that foretell one are halved until then
 SMALL = 600  # unknowns up to which all eigenvalues are found at once
 ON_EDGE = 1e-6  # of the highest frequency: modes so near it may count on one side only
 
@@ -38,7 +41,8 @@ class Answer:
 
     way: the branches, where following them led to all. seen: what was counted instead; lacks: where that and the
     onsets differ. why: what kept branches from being followed, if anything did. walked: at how many ω the imaginary
-    axis was looked at, where that led to the onsets (`axis`).
+    axis was looked at, where that led to the onsets (`axis`). values: at how many μ the onsets of followed branches
+    were held against a count.
     """
 
     onsets: tuple[Onset, ...]
@@ -48,6 +52,7 @@ class Answer:
     lacks: tuple[Lack, ...] = ()
     why: str = ""
     walked: int = 0
+    values: int = 0
 
     @property
     def passing(self) -> tuple[Passing, ...]:
@@ -91,13 +96,18 @@ def search(
             break
         if best is not None and best.complete:
             break
-    if best is not None and best.complete and _borne_out(best, between, top):
-        return best
+    within: Sequence[float] = ()
+    if best is not None and best.complete:
+        held = _borne_out(best, between, top)
+        lacks = [] if held is None else held.lacking([o for o in best.onsets if _in_band(o, top)])
+        if not lacks:
+            return replace(best, values=0 if held is None else len(held.grid))
+        within = sorted({mu for lack in lacks for mu in (lack.low, lack.high)})
     if source is None or source.whole:
         answer = _walked(family, between, ends, top, why)
         if answer is not None:
             return answer
-    seen = counted(_beside(family, source, top, why), between, top)
+    seen = counted(_beside(family, source, top, why), between, top, within)
     return _counted_answer(family, best, seen, ends, top, why)
 
 
@@ -119,24 +129,58 @@ def _in_band(onset: Onset, top: float) -> bool:
     return 2 * np.pi * onset.frequency_hz <= top * (1 + 1e-12)
 
 
-def _borne_out(answer: Answer, between: tuple[float, float], top: float) -> bool:
-    """Whether as many roots grow between every two of the onsets as they say."""
-    assert answer.way is not None, "of followed branches"
-    source = answer.way.source
+def _borne_out(answer: Answer, between: tuple[float, float], top: float) -> Counted | None:
+    """What grows at values between the onsets and between the steps, where that is counted: branches that meet and part
+    again within one step leave nothing at its ends."""
+    way = answer.way
+    assert way is not None, "of followed branches"
+    source = way.source
     opened = opened_in(source, between[0], top)
-    onsets = [o for o in answer.onsets if _in_band(o, top)]
-    if source.whole and not opened:
-        # Solved in full at every step, which may step over growth that begins and ends in it.
-        size = source.family.size
-        if size > SMALL:
-            return True
-        number = _number_by(source.family, top)
-        values = _sampled(answer.onsets, between, CLOSE_BY if size <= CHEAP else EVEN)
-        return not Counted(tuple((mu, number(mu)) for mu in values), (), ()).lacking(onsets)
-    sampled = _sampled(answer.onsets, between)
-    sampled = sorted({*sampled, *beyond(opened, between[0], sampled[1])})
-    grid = [(mu, number_at(source, mu, top, opened)) for mu in sampled]
-    return not Counted(tuple(grid), (), ()).lacking(onsets)
+    if source.whole and source.family.size > SMALL:
+        # Every value is a full solve, as every step is.
+        if not opened:
+            return None
+        values = _sampled(answer.onsets, between)
+    else:
+        cheap = _unknowns(source) <= CHEAP
+        values = _sampled(answer.onsets, between, CLOSE_BY if cheap else EVEN)
+        if cheap:
+            within = [mu for step in way.foretold for mu in _within(source, step, between, top)]
+            values = sorted({*values, *(mu for mu in within if between[0] < mu < between[1])})
+    values = sorted({*values, *beyond(opened, between[0], values[1])})
+    number = _number_by(source.family, top)
+    # What opens at the low end is not seen to grow before its series says so.
+    hidden = max((o.until for o in opened), default=-1.0)
+    by_itself = source.whole and source.family.size <= SMALL
+
+    def roots(mu: float) -> int:
+        return number(mu) if by_itself and mu - source.family.low > hidden else number_at(source, mu, top, opened)
+
+    return Counted(tuple((mu, roots(mu)) for mu in values), (), ())
+
+
+def _within(source: Along, step: tuple[float, float], between: tuple[float, float], top: float) -> list[float]:
+    """Values within a step in which slopes foretell a change: a few in equal distances where every value is a full
+    solve; on a basis its middle, and so on within those of its halves that foretell one as well."""
+    low, high = step
+    if source.whole:
+        return np.linspace(low, high, WITHIN + 2)[1:-1].tolist()
+    middle, start = 0.5 * (low + high), source.family.low
+    if high - low <= FINEST * (between[1] - between[0]):
+        return [middle]
+    found = [middle]
+    for half in ((low, middle), (middle, high)):
+        width = half[1] - half[0]
+        if any(
+            changes_within(source.family, source.eigenpairs(mu - start), way, top)
+            for mu, way in zip(half, (width, -width), strict=True)
+        ):
+            found += _within(source, half, between, top)
+    return found
+
+
+def _unknowns(source: Along) -> int:
+    return source.family.size if source.whole else source.eigenpairs(0.0).right.shape[0]
 
 
 def _sampled(onsets: Sequence[Onset], between: tuple[float, float], even: int = EVEN) -> list[float]:
@@ -209,7 +253,7 @@ def _counted_answer(
     lacks = seen.lacking(onsets)
     agree = _ends_agree(family, seen, ends, top)
     every = tuple(sorted((*onsets, *entering), key=_order))
-    answer = Answer(every, not lacks and agree, way, seen, tuple(lacks), why)
+    answer = Answer(every, not lacks and agree, way, seen, tuple(lacks), why, values=len(seen.grid))
     return replace(answer, complete=answer.complete and not answer.unplaced)
 
 

@@ -49,13 +49,25 @@ def sentence(
     both = all(end.completeness.complete for end in ends)
     if not both:
         unsure = next(end.completeness.sentence for end in ends if not end.completeness.complete)
-        return f"{told}; {numbers}, {said}.{passing} {unsure}"
+        return f"{told}; {numbers}, {said}.{passing} {unsure} {_between_steps(answer, name)}"
     counted = "by QZ" if ends[1].completeness.sentence.startswith("Complete: QZ") else "in discs that cover the band"
     if ends[1].completeness.counted is not None:
         counted += ", counted by the argument principle"
     whole = where or "in the full problem"
     anew = f"All modes up to {top / (2 * np.pi):g} Hz at both ends were found anew {whole} ({counted})"
-    return f"Complete as far as both ends tell: {numbers}, {said}.{passing} {told}. {anew}."
+    between = _between_steps(answer, name)
+    return f"Complete as far as both ends tell: {numbers}, {said}.{passing} {told}. {anew}. {between}"
+
+
+def _between_steps(answer: Answer, name: str) -> str:
+    """What was looked at between both ends, and what that leaves out."""
+    missing = "growth that begins and ends again"
+    if not answer.values:
+        return f"Between the ends nothing was counted: {missing} within one of the steps may be missing."
+    return (
+        f"As many roots grow at each of {answer.values} values of {name} as the onsets say; {missing} between two of "
+        "these values may be missing."
+    )
 
 
 def _between(family: Family, answer: Answer) -> tuple[float, float]:

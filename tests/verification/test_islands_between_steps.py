@@ -1,0 +1,99 @@
+"""Growth that begins and ends again within one step of following: two modes whose squares pass each other while friction
+couples them with different signs grow in an island as narrow as the coupling is weak. The truth is dense eigenvalues."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg as sl
+
+import stridor as st
+from stridor.modal.full import search
+
+pytestmark = pytest.mark.verification
+
+RUN = range(0, 14)
+MORE = [pytest.param(range(k, k + 40), marks=pytest.mark.slow) for k in range(14, 414, 40)]
+HZ = 3000.0  # above everything there is
+NOTHING = 1e-9  # of |λ|
+
+
+def island(seed: int) -> tuple[tuple[np.ndarray, ...], float, float]:
+    """M, D, K and F, and where an island lies and how wide about it is."""
+    rng = np.random.default_rng([seed, 365])
+    n, squares = int(rng.integers(4, 13)), None
+    squares = (2 * np.pi * np.sort(rng.uniform(20, 800, n))) ** 2
+    first, place, width = int(rng.integers(n - 1)), float(rng.uniform(0.05, 0.95)), float(10 ** rng.uniform(-3, -1.3))
+    pair, slope, share = [first, first + 1], (squares[first + 1] - squares[first]) / place, float(rng.uniform(0, 1))
+    friction = np.zeros((n, n))
+    # Growth where |difference − slope μ| < 2 c μ.
+    c = slope * width / (4 * place)
+    friction[np.ix_(pair, pair)] = [[share * slope, c], [-c, -(1 - share) * slope]]
+    if rng.random() < 0.5:
+        friction += rng.normal(size=(n, n)) * 0.02 * np.median(squares)
+    shape = np.eye(n) + 0.3 * rng.normal(size=(n, n)) / np.sqrt(n)
+    damping = 10 ** rng.uniform(-2, 0.3) * np.eye(n) * (rng.random() > 0.2)
+    return tuple(shape.T @ a @ shape for a in (np.eye(n), damping, np.diag(squares), friction)), place, width
+
+
+def case_of(matrices: tuple[np.ndarray, ...], folder: Path) -> st.Case:
+    terms = []
+    for name, matrix in zip("MDKF", matrices, strict=True):
+        np.save(folder / f"{name}.npy", matrix)
+        role = {"M": "mass", "D": "damping"}.get(name, "stiffness")
+        factor = {"factor": "mu"} if name == "F" else {}
+        if np.any(matrix):
+            terms.append({"file": str(folder / f"{name}.npy"), "role": role, **factor})
+    return st.Case(bodies={"b": {"type": "matrices", "terms": terms}}, modal={"max_frequency_hz": HZ})
+
+
+def growing(matrices: tuple[np.ndarray, ...], mu: float) -> int:
+    mass, damping, stiffness, friction = matrices
+    n, unit = len(mass), 2 * np.pi * 300
+    k, d = (np.linalg.solve(mass, a) for a in (stiffness + mu * friction, damping))
+    values = sl.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-k / unit**2, -d / unit]]))
+    return int(np.sum(values.real > (NOTHING if np.any(damping) else 1e-6) * np.abs(values)))
+
+
+def differences(matrices: tuple[np.ndarray, ...], found: st.Onsets, values: np.ndarray) -> list[float]:
+    """Values at which another number of roots grows than the onsets say."""
+    start = growing(matrices, 0.0)
+    return [
+        float(mu) for mu in values
+        if not any(abs(o.mu - mu) < 1e-6 for o in found)
+        and growing(matrices, mu) != start + sum(o.roots for o in found if o.mu < mu)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("seeds", [RUN, *MORE], ids=lambda seeds: f"from {seeds[0]}")
+def test_islands_are_seen(seeds: range, tmp_path: Path) -> None:
+    there, wrong = 0, list[str]()
+    for seed in seeds:
+        matrices, place, width = island(seed)
+        found = st.onsets(case_of(matrices, tmp_path))
+        assert found.complete
+        values = np.clip(place + width * np.linspace(-3, 3, 61), 0.0, 1.0)
+        there += len({growing(matrices, mu) for mu in values}) > 1
+        even = (np.arange(240) + 0.5) / 240
+        other = differences(matrices, found, np.unique(np.concatenate([values, even])))
+        wrong += [f"{seed}: at {other[0]} to {other[-1]}"] if other else []
+    assert there >= len(seeds) // 3, "islands are what this is about"
+    assert not wrong, "\n".join(wrong)
+
+
+def test_how_closely_that_was_looked_at_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A symmetric pair that never meets: nothing is foretold, and the even values are counted."""
+    plain = (np.eye(2), 0.1 * np.eye(2), np.diag([1e4, 9e4]), np.diag([1e3, 2e3]))
+    said = st.onsets(case_of(plain, tmp_path)).completeness
+    assert said.startswith("Complete as far as both ends tell: 0 modes grow at μ = 0 and 0 at μ = 1")
+    assert said.endswith(
+        "As many roots grow at each of 97 values of μ as the onsets say; growth that begins and ends again between two of "
+        "these values may be missing."
+    )
+    monkeypatch.setattr(search, "_borne_out", lambda *_: None)
+    said = st.onsets(case_of(plain, tmp_path)).completeness
+    assert said.endswith(
+        "Between the ends nothing was counted: growth that begins and ends again within one of the steps may be missing."
+    )
