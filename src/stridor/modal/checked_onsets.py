@@ -52,7 +52,7 @@ def checked_onsets(
     except AnalysisError as error:
         return replace(found, completeness=f"{UNCHECKED}: {error}.")
     for wider in follow:
-        if not len(_unled(found, start, end)[1]) and not found.unexplained:
+        if not len(_unled(found, start, end)[1]) and not (found.unexplained or found.unbalanced):
             break
         try:
             found = onsets(
@@ -128,6 +128,11 @@ def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
             wrong.append(f"{extra} of the branches that grow at μ = {mu:g} are not found there")
     if found.unexplained:
         wrong.append(f"{found.unexplained} of those at μ = {high:g} go back to no onset that was solved")
+    if found.unbalanced:
+        wrong.append(
+            f"the onsets begin and end the growth of {abs(found.unbalanced)} "
+            f"{'more' if found.unbalanced > 0 else 'fewer'} eigenvalues than the branches followed have at both ends"
+        )
     wrong += _roots_amiss(found, start, end)
     if wrong:
         return f"NOT COMPLETE: {numbers}, but {'; '.join(wrong)}. Take a smaller range of μ."

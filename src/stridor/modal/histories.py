@@ -13,11 +13,15 @@ from .onset import Onset
 
 @dataclass(frozen=True)
 class StabilityChange:
-    """A passage into or out of growth, the branches that it concerns, and the onset it was solved to be, if any."""
+    """A passage into or out of growth, the branches that it concerns, and the onset it was solved to be, if any.
+
+    lost: where none was solved and none had to be, as above the band: by how many eigenvalues more may grow beyond it,
+    at least and at most."""
 
     mu: float
     branches: tuple[int, ...]
     onset: Onset | None
+    lost: tuple[int, int] = (0, 0)
 
 
 class Entries:
@@ -105,3 +109,24 @@ def unexplained(growing: Iterable[int], from_start: Iterable[int], changes: Iter
             if b not in last or last[b][0] <= change.onset.mu:
                 last[b] = change.onset.mu, change.onset.stabilising
     return sum(1 for b in growing if (last[b][1] if b in last else b not in began))
+
+
+def unbalanced(changes: Iterable[StabilityChange], start: ComplexArray, end: ComplexArray) -> int:
+    """By how many more eigenvalues begin than cease to grow at these changes, than do from growing eigenvalues start
+    (a,) to end (b,) of all branches; 0 where that is not known: halves of a pair that has fallen apart on the real axis
+    are not all followed, and modes that are one have onsets that are."""
+    if not (np.all(start.imag) and np.all(end.imag)):
+        return 0
+    every = list(changes)
+    solved = [c.onset for c in every if c.onset is not None]
+    distinct: list[Onset] = []
+    for onset in solved:
+        if not any(_same(onset, other) for other in distinct):
+            distinct.append(onset)
+    began, ended = (
+        [sum(o.roots for o in some if o.stabilising is ends) for some in (solved, distinct)] for ends in (False, True)
+    )
+    least = began[1] + ended[0] + sum(c.lost[0] for c in every)
+    most = began[0] + ended[1] + sum(c.lost[1] for c in every)
+    grown = 2 * (len(end) - len(start))
+    return least - grown if grown < least else most - grown if grown > most else 0

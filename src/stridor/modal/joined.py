@@ -160,6 +160,7 @@ def joined_onsets(
         friction_range=between,
         at_end=last.at_end,
         unexplained=sum(found.unexplained for _, found in parts),
+        unbalanced=sum(found.unbalanced for _, found in parts),
         damped=any(found.damped for _, found in parts),
         source=" and ".join(sorted({found.source for _, found in parts})),
         open_contacts=tuple(n for n in first.open_contacts if all(n in f.open_contacts for _, f in parts)),

@@ -93,10 +93,11 @@ class Onsets(Tabular):
     Those that begin above the band are among them where the growing mode comes into it (`Onset.enters_at`). damped:
     whether anything works on velocities. at_start, at_end: eigenvalues [1/s] that grow in the band at a and at b;
     entering: those followed that grow above it at a, and the μ (to about a step) at which they come into it;
-    unexplained: how many of the latter none of the onsets accounts for. completeness: what speaks for there being no
-    others, "" where nothing was checked. notes: what else is to be known. contact_state: where contacts may stick, how
-    many nodes stick, slip and are open, and at which μ; it is held over the range. followed: numbers and eigenvalues
-    (b,) of the branches at both ends, where branches were followed; saved nowhere.
+    unexplained: how many of the latter none of the onsets accounts for; unbalanced: by how many more eigenvalues begin
+    to grow at the onsets, less those that cease to, than do of all branches followed. completeness: what speaks for
+    there being no others, "" where nothing was checked. notes: what else is to be known. contact_state: where contacts
+    may stick, how many nodes stick, slip and are open, and at which μ; it is held over the range. followed: numbers and
+    eigenvalues (b,) of the branches at both ends, where branches were followed; saved nowhere.
     source: where the eigenpairs come from, a name of `modal.source`. band_hz: the frequencies asked for (`between`),
     None for all, and ``outside``, how many onsets there are at others; what grows at both ends, and completeness, are
     of all up to max_frequency_hz.
@@ -112,6 +113,7 @@ class Onsets(Tabular):
     at_end: tuple[complex, ...] = ()
     entering: tuple[tuple[complex, float], ...] = ()
     unexplained: int = 0
+    unbalanced: int = 0
     notes: tuple[str, ...] = ()
     contact_state: str = ""
     provenance: dict[str, Any] = field(default_factory=dict)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...typing import ComplexArray
 from ..dense_problem import eigenvalues
-from ..krylov.critical import exceptional_point
+from ..krylov.exceptional import exceptional_point
 from ..krylov.follow import State
 from ..krylov.passages import Passage
 from ..newton import FLAT, Root

@@ -10,10 +10,11 @@ import numpy as np
 import scipy.linalg as sl
 
 from ...typing import ComplexArray
-from ..krylov.critical import crossing as reduced_crossing
-from ..krylov.critical import pair_near
+from ..krylov.crossing import crossing as reduced_crossing
+from ..krylov.double import pair_near
 from ..krylov.follow import Follower, State
-from ..krylov.passages import COMPLEX, Passage
+from ..krylov.passages import Passage
+from ..krylov.undamped import COMPLEX
 from ..newton import Root, crossing, meeting, standstill
 from ..tolerances import AT_REST, UNSTABLE_RELATIVE
 from .basis import Along, OnBasis

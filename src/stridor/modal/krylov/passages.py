@@ -9,12 +9,12 @@ from typing import Literal
 
 import numpy as np
 
-from ...typing import Array, ComplexArray
+from ...typing import Array, BoolArray, ComplexArray
 from ..dense_problem import OverNumber
 from ..tolerances import SPLIT_RELATIVE
 from .follow import COINCIDENT, State, halves
+from .undamped import COMPLEX, Squares, mirrored, on_axis, rounding, squared, squares_of, undamped
 
-COMPLEX = 1e-9  # imaginary part of λ² over the band's that is more than rounding
 TOUCHING = 0.05  # squared half differences that come down to this part of their ends are looked at closely
 PROBES = 4
 STILL = 1e-12  # growth rate over |λ| that is rounding
@@ -24,8 +24,8 @@ STILL = 1e-12  # growth rate over |λ| that is rounding
 class Passage:
     """A change of stability between two μ, low < high: of a branch and its partner, counted from 0.
 
-    kind: "meeting" of two undamped modes, undamped "divergence", or "crossing" of the axis with damping. means: the
-    mean of the two meeting coordinates at both ends. old: the state at or before ``low``.
+    kind: "meeting" of two undamped modes, of which the branch grows, undamped "divergence", or "crossing" of the axis
+    with damping. means: the mean of the two meeting λ² at both ends. old: the state at or before ``low``.
     """
 
     kind: Literal["meeting", "divergence", "crossing"]
@@ -38,20 +38,34 @@ class Passage:
     old: State
 
 
+def passages(source: OverNumber, old: State, new: State) -> list[Passage]:
+    """Changes of stability between two states: of modes that nothing damps where they meet or come to rest, whatever
+    damps others, of these where they cross the axis."""
+    if not source.damped:
+        return meetings(source, old, new)
+    alone = undamped(source, old, new)
+    met = meetings(source, old, new, among=alone) if alone.any() else []
+    return met + [p for p in crossings(old, new) if not alone[p.branch]]
+
+
 def crossings(old: State, new: State) -> list[Passage]:
     """Zeros of the growth rates between two states, by the cubic through rates and slopes at both ends: it sees a mode
     that grows and decays again in between."""
     step = new.mu - old.mu
     found: list[Passage] = []
+    limits = rounding(old.values), rounding(new.values)
     for i in range(len(old.index)):
         start, end = float(old.values[i].real), float(new.values[i].real)
         slopes = step * float(old.tangents[i].real), step * float(new.tangents[i].real)
         scale = max(abs(old.values[i]), 1e-300)
-        if max(abs(start), abs(end)) <= STILL * scale:
+        least = float(limits[0][i]), float(limits[1][i])
+        if abs(start) <= least[0] and abs(end) <= least[1]:
             continue
         # On the axis, as where an undamped branch begins, is stable, whichever sign rounding has given it: growth that
         # ends on the very value that is looked at ends in the step up to there.
-        start, end = (-STILL * scale if abs(rate) <= STILL * scale else rate for rate in (start, end))
+        start, end = (
+            -STILL * scale if abs(rate) <= limit else rate for rate, limit in zip((start, end), least, strict=True)
+        )
         marks = [0.0, *_turns(start, end, *slopes), 1.0]
         rates = [_cubic(start, end, *slopes, mark) for mark in marks]
         passed = [k for k in range(len(marks) - 1) if rates[k] * rates[k + 1] < 0]
@@ -99,24 +113,37 @@ def _neighbour(state: State, i: int) -> int:
     return int(np.argmin(distance))
 
 
-def meetings(source: OverNumber, old: State, new: State) -> list[Passage]:
-    """Undamped modes that meet or part, or diverge, between two states."""
+def meetings(source: OverNumber, old: State, new: State, among: BoolArray | None = None) -> list[Passage]:
+    """Undamped modes that meet or part, or diverge, between two states; of the branches (b,) ``among`` alone where
+    that is given, others being damped."""
     floor = COMPLEX * source.frequency**2
     found: list[Passage] = []
-    was, now = (np.abs(state.coordinate.imag) > _rounding(source, state.coordinate) for state in (old, new))
+    first, last = squared(source, old), squared(source, new)
+    if among is None:
+        own = np.ones(len(old.index), dtype=bool)
+        was, now = (np.abs(x.coordinate.imag) > _rounding(source, x.coordinate) for x in (first, last))
+    else:
+        own = among
+        was, now = (own & ~on_axis(source, state) & (state.values.imag > 0) for state in (old, new))
     for i in np.flatnonzero(was != now):
-        split = new if now[i] else old
-        distance = np.abs(split.coordinate - split.coordinate[i].conj())
+        split = last if now[i] else first
+        distance = np.where(own, np.abs(split.coordinate - split.coordinate[i].conj()), np.inf)
         distance[i] = np.inf
         j = int(np.argmin(distance))
-        if (i < j or was[j] == now[j]) and not _one(old, new, int(i), j):
-            means = halves(old.coordinate[i], old.coordinate[j])[0], halves(new.coordinate[i], new.coordinate[j])[0]
-            found.append(Passage("meeting", old.mu, new.mu, int(i), j, bool(was[i]), means, old))
-    real = ~was & ~now
-    beyond_old, beyond_new = old.coordinate.real > floor, new.coordinate.real > floor
+        if (i < j or was[j] == now[j]) and not _one(first, last, int(i), j):
+            means = _means(first, last, int(i), j)
+            grows, other = (i, j) if split.state.values[i].real > 0 else (j, i)
+            found.append(Passage("meeting", old.mu, new.mu, int(grows), int(other), bool(was[i]), means, old))
+    real = own & ~was & ~now
+    beyond_old, beyond_new = first.coordinate.real > floor, last.coordinate.real > floor
     for i in np.flatnonzero(real & (beyond_old != beyond_new)):
         found.append(Passage("divergence", old.mu, new.mu, int(i), int(i), bool(beyond_old[i]), (0j, 0j), old))
-    return found + _bubbles(source, old, new, np.flatnonzero(real).tolist())
+    return found + _bubbles(source, first, last, np.flatnonzero(real).tolist())
+
+
+def _means(old: Squares, new: Squares, i: int, j: int) -> tuple[complex, complex]:
+    """The mean λ² of two branches at both ends of a step."""
+    return halves(old.coordinate[i], old.coordinate[j])[0], halves(new.coordinate[i], new.coordinate[j])[0]
 
 
 def _rounding(source: OverNumber, coordinate: ComplexArray) -> Array:
@@ -124,13 +151,13 @@ def _rounding(source: OverNumber, coordinate: ComplexArray) -> Array:
     return np.maximum(COMPLEX * source.frequency**2, 2 * SPLIT_RELATIVE * np.abs(coordinate))
 
 
-def _one(old: State, new: State, i: int, j: int) -> bool:
+def _one(old: Squares, new: Squares, i: int, j: int) -> bool:
     """Whether two modes are one at both ends of a step: rounding alone parts them, now real, now complex."""
     pairs = [state.coordinate[[i, j]] for state in (old, new)]
     return all(bool(abs(x[0] - x[1]) <= COINCIDENT * abs(x[0])) for x in pairs)
 
 
-def _bubbles(source: OverNumber, old: State, new: State, real: list[int]) -> list[Passage]:
+def _bubbles(source: OverNumber, old: Squares, new: Squares, real: list[int]) -> list[Passage]:
     """Pairs that meet and part again between two states: where the cubic of their squared half difference comes near
     zero, it is looked at again there."""
     found: list[Passage] = []
@@ -145,13 +172,14 @@ def _bubbles(source: OverNumber, old: State, new: State, real: list[int]) -> lis
         lowest = _lowest(source, old, new, i, j)
         if lowest is not None:
             mu, mean = lowest
-            means = halves(old.coordinate[i], old.coordinate[j])[0], halves(new.coordinate[i], new.coordinate[j])[0]
-            found.append(Passage("meeting", old.mu, mu, min(i, j), max(i, j), False, (means[0], mean), old))
-            found.append(Passage("meeting", mu, new.mu, min(i, j), max(i, j), True, (mean, means[1]), old))
+            means = _means(old, new, i, j)
+            pair = min(i, j), max(i, j)
+            found.append(Passage("meeting", old.mu, mu, *pair, False, (means[0], mean), old.state))
+            found.append(Passage("meeting", mu, new.mu, *pair, True, (mean, means[1]), old.state))
     return found
 
 
-def _lowest(source: OverNumber, old: State, new: State, i: int, j: int) -> tuple[float, complex] | None:
+def _lowest(source: OverNumber, old: Squares, new: Squares, i: int, j: int) -> tuple[float, complex] | None:
     """μ and mean at which the real modes i and j are a complex pair; None where none is found."""
     low, high = _ends(old, i, j), _ends(new, i, j)
     mu_low, mu_high = old.mu, new.mu
@@ -166,12 +194,14 @@ def _lowest(source: OverNumber, old: State, new: State, i: int, j: int) -> tuple
         mu = mu_low + at * step
         found = source.eigenpairs(mu)
         guess = (1 - at) * low[0] + at * high[0]
-        near = np.argsort(np.abs(found.coordinate - guess))[:2]
-        mean, square = halves(*found.coordinate[near])
+        x, tangents = squares_of(source, found)
+        near = np.argsort(np.abs(x - guess))[:2]
+        mean, square = halves(*x[near])
         if square.real < -(float(_rounding(source, np.array([mean]))[0]) ** 2):
-            return mu, mean
-        slopes = found.tangents[near]
-        change = float(((found.coordinate[near[0]] - found.coordinate[near[1]]) * (slopes[0] - slopes[1]) / 2).real)
+            # Beside one that is damped a mode is no pair.
+            return (mu, mean) if mirrored(*found.values[near].tolist()) else None
+        slopes = tangents[near]
+        change = float(((x[near[0]] - x[near[1]]) * (slopes[0] - slopes[1]) / 2).real)
         middle = float(mean.real), float(square.real), change
         if not np.isfinite(change) or square.real <= 1e-14 * abs(mean) ** 2:
             return None
@@ -182,7 +212,7 @@ def _lowest(source: OverNumber, old: State, new: State, i: int, j: int) -> tuple
     return None
 
 
-def _ends(state: State, i: int, j: int) -> tuple[float, float, float]:
+def _ends(state: Squares, i: int, j: int) -> tuple[float, float, float]:
     """Mean, squared half difference and its slope over μ of two real branches."""
     mean, square = halves(state.coordinate[i], state.coordinate[j])
     slopes = state.tangents[[i, j]]

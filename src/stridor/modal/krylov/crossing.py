@@ -1,0 +1,139 @@
+"""Where the growth rate of a damped mode of the projected problem passes through zero."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from ..dense_problem import DenseProblem, Eigenpairs
+from ..newton import crossing as on_axis
+from .follow import Follower, State
+from .passages import Passage
+
+NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
+
+
+@dataclass(frozen=True)
+class Solved:
+    """An onset of the projected problem: μ, λ on the axis, and how the instability opens."""
+
+    mu: float
+    lam: complex
+    square_root: float | None
+    slope: float | None = None
+    exceptional: complex | None = None
+
+
+def root_between(call: Callable[[float], float], low: float, high: float) -> float | None:
+    """A zero of ``call`` between two μ; None where its sign does not change (any more)."""
+    at_low, at_high = call(low), call(high)
+    if at_low == 0.0 or at_high == 0.0:
+        return low if at_low == 0.0 else high
+    if at_low * at_high > 0 or not np.isfinite(at_low * at_high):
+        return None
+    try:
+        return float(scipy.optimize.brentq(call, low, high, xtol=1e-14 * max(high, 1e-3), rtol=1e-14, maxiter=200))
+    except RuntimeError:  # a jump, not a zero: two modes have changed places
+        return None
+
+
+def crossing(reduced: DenseProblem, passage: Passage) -> Solved | None:
+    """Where the growth rate of a damped mode passes through zero."""
+    found = _quick_crossing(reduced, passage)
+    if found is None:
+        start = _again(reduced, passage)
+        found = None if start is None else _slow_crossing(reduced, passage, start)
+    if found is None:
+        found = _by_growth(reduced, passage)
+    if found is None:
+        return None
+    mu, lam, slope = found
+    still = abs(lam) <= NEAR_AXIS * reduced.frequency
+    return Solved(mu, 0j if still else lam, None, slope)
+
+
+def crossing_again(reduced: DenseProblem, passage: Passage, solved: Solved) -> Solved | None:
+    """The same crossing with the basis as it is now, from where it was; None where it has gone."""
+    right, left = reduced.null_vectors(solved.lam, solved.mu)
+    root = on_axis(reduced, solved.mu, solved.lam, right, left, (passage.low, passage.high))
+    if root is None or root.slope is None or (root.slope < 0) != passage.stabilising:
+        return None
+    return Solved(root.mu, 0j if abs(root.lam) <= NEAR_AXIS * reduced.frequency else root.lam, None, root.slope)
+
+
+def _quick_crossing(reduced: DenseProblem, passage: Passage) -> tuple[float, complex, float] | None:
+    """μ, λ on the axis and the growth's slope, following this one mode only; None where that does not settle inside."""
+    start = passage.old
+    index = int(start.index[passage.branch])
+    right, left = (reduced.padded(start.found, v[:, [index]])[:, 0] for v in (start.found.right, start.found.left))
+    lam, tangent = complex(start.found.values[index]), complex(start.found.tangents[index])
+    width = passage.high - passage.low
+    # Of a mode that nothing damps yet the growth rate may have no slope at all.
+    ahead = -lam.real / tangent.real if tangent.real else np.inf
+    ahead = float(np.clip(ahead, 0.0, width)) if np.isfinite(ahead) else 0.5 * width
+    root = on_axis(
+        reduced, start.mu + ahead, lam + tangent * ahead, right, left, (passage.low, passage.high)
+    )
+    if root is None or root.slope is None:
+        return None
+    slack = 0.05 * width
+    if not passage.low - slack <= root.mu <= passage.high + slack or (root.slope < 0) != passage.stabilising:
+        return None
+    return root.mu, root.lam, root.slope
+
+
+def _slow_crossing(reduced: DenseProblem, passage: Passage, start: State) -> tuple[float, complex, float] | None:
+    """The same by bisection on all branches."""
+
+    def at(mu: float) -> State:
+        return Follower.resumed(reduced, start).advance(mu)
+
+    mu = root_between(lambda m: float(at(m).values[passage.branch].real), passage.low, passage.high)
+    if mu is None:
+        return None
+    state = at(mu)
+    return mu, 1j * float(state.values[passage.branch].imag), float(state.tangents[passage.branch].real)
+
+
+def _by_growth(reduced: DenseProblem, passage: Passage) -> tuple[float, complex, float] | None:
+    """The same where two modes all but meet and which is which cannot be told: where the fastest of those about them
+    begins, or ceases, to grow."""
+    begin = complex(passage.old.values[passage.branch])
+    ahead = reduced.eigenpairs(passage.high).values
+    ahead = ahead[(ahead.real > 0) != passage.stabilising]
+    if not len(ahead):
+        return None
+    end = complex(ahead[np.argmin(np.abs(ahead - begin))])
+
+    def fastest(mu: float) -> tuple[Eigenpairs, int]:
+        found = reduced.eigenpairs(mu)
+        part = (mu - passage.low) / (passage.high - passage.low)
+        near = np.abs(found.values - begin - part * (end - begin)) <= 2 * abs(end - begin)
+        return found, int(np.argmax(np.where(near, found.values.real, -np.inf)))
+
+    def growth(mu: float) -> float:
+        found, index = fastest(mu)
+        return float(found.values[index].real)
+
+    mu = root_between(growth, passage.low, passage.high)
+    if mu is None:
+        return None
+    found, index = fastest(mu)
+    lam, slope = complex(found.values[index]), float(found.tangents[index].real)
+    if abs(lam.real) > 1e-9 * abs(lam) or (slope < 0) != passage.stabilising:
+        return None
+    return mu, 1j * lam.imag, slope
+
+
+def _again(reduced: DenseProblem, passage: Passage) -> State | None:
+    """The state before a passage with the basis as it is now."""
+    found = reduced.eigenpairs(passage.low)
+    if passage.old.found is found:
+        return passage.old
+    distance = np.abs(passage.old.coordinate[:, None] - found.coordinate)
+    index = np.argmin(distance, axis=1)
+    near = distance[passage.branch, index[passage.branch]] <= 1e-3 * np.abs(passage.old.coordinate[passage.branch])
+    return State(found, index) if near else None
