@@ -14,13 +14,14 @@ ALONE = 1e-4  # of the way to the next eigenvalue: by how much one is corrected 
 LONG = 300  # unknowns from which it takes seconds
 SMALL = 1e-13  # of the matrices: α and β below it at once are those of a pencil that is singular for every λ
 ROUNDS = 8  # of balancing
+HELD = 1e3  # times the rest of its row: what a freedom has on the diagonal that a penalty holds
 FAR = 1e-3  # of 1/λ, scaled: what may be infinite at most
 SAFE = 100.0  # times the rounding that QZ leaves in 1/λ: what is no larger may as well be zero, and λ infinite
 
 
 @passing()
-def all_modes(problem: Quadratic) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Finite λ (k,) [1/s], right and left vectors (n, k) of unit norm.
+def all_modes(problem: Quadratic, size: float = np.inf) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Finite λ (k,) [1/s], right and left vectors (n, k) of unit norm; size [1/s]: |λ| up to which they are asked for.
 
     Rows and columns are brought to like size (Ruiz 2001) and, as Fan, Lin and Van Dooren (2004) do, λ = γμ with
     γ² = ‖K‖/‖M‖, all divided by (‖K‖ + γ‖D‖)/2. Raises AnalysisError where det P(λ) is zero for every λ.
@@ -28,7 +29,8 @@ def all_modes(problem: Quadratic) -> tuple[ComplexArray, ComplexArray, ComplexAr
     if problem.size >= LONG:
         stage(f"all modes of {problem.size} unknowns, dense", logged=False)
     m, d, k = (np.asarray(a.toarray(), dtype=float) for a in (problem.mass, problem.damping, problem.stiffness))
-    gamma, _ = _units(m, d, k)
+    # A penalty in K would make the mass the whole of every other row, and balancing would change nothing.
+    gamma = min(_units(m, d, k)[0], size)
     rows, columns = _balance(gamma**2 * np.abs(m) + gamma * np.abs(d) + np.abs(k))
     m, d, k = (rows[:, None] * a * columns for a in (m, d, k))
     gamma, delta = _units(m, d, k)
@@ -44,7 +46,9 @@ def all_modes(problem: Quadratic) -> tuple[ComplexArray, ComplexArray, ComplexAr
     upper = np.abs(mu) >= 1
     x = np.where(upper, right[:n, finite], right[n:, finite])
     x, y = unit(columns[:, None] * x), unit(rows[:, None] * left[:n, finite].conj())
-    return _tuned(problem, gamma * mu, x, y), x, y
+    lam = gamma * mu
+    x, y = _with_held(problem, lam, x), _with_held(problem.transposed, lam, y)
+    return _tuned(problem, lam, x, y), x, y
 
 
 def _units(m: Array, d: Array, k: Array) -> tuple[float, float]:
@@ -77,6 +81,21 @@ def _uncertain(a: Array, b: Array, left: ComplexArray, right: ComplexArray) -> A
     found = SAFE * np.finfo(float).eps * size * length / np.maximum(np.hypot(*projected), 1e-300)
     # Finite ones that are defective are as uncertain, and of the size of the others.
     return np.minimum(found, FAR)
+
+
+def _with_held(problem: Quadratic, lam: ComplexArray, x: ComplexArray) -> ComplexArray:
+    """Vectors (n, k) whose freedoms that a penalty holds are as their own equations have them: QZ knows these small
+    motions to digits of the large ones, and a penalty makes much of the rest."""
+    (m, d, k), rate, size = problem.matrices(), np.abs(lam), np.ones((problem.size, 1))
+    own = lam**2 * m.diagonal()[:, None] + lam * d.diagonal()[:, None] + k.diagonal()[:, None]
+    around = rate**2 * (abs(m) @ size) + rate * (abs(d) @ size) + abs(k) @ size - np.abs(own)
+    held = np.abs(own) > HELD * around
+    if not held.any():
+        return x
+    for _ in range(2):
+        rest = problem.residual(lam, x)
+        x = x - np.where(held, rest / np.where(held, own, 1.0), 0.0)
+    return unit(x)
 
 
 def _tuned(problem: Quadratic, lam: ComplexArray, x: ComplexArray, y: ComplexArray) -> ComplexArray:

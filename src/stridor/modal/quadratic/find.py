@@ -170,7 +170,7 @@ class _RegionSearch:
 
     def dense(self, *, endless: bool) -> tuple[list[DiscModes], Callable[[int | None], Completeness]]:
         """Everything, by QZ; endless: however fast it grows."""
-        lam, x, y = all_modes(self.problem)
+        lam, x, y = all_modes(self.problem, self.region.scale)
         strip = lam[(lam.imag >= 0) & (lam.imag <= self.region.im_max)]
         if endless and len(strip):
             self.region = replace(self.region, re_max=max(self.region.re_max, 1.1 * float(strip.real.max())))
