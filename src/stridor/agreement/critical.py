@@ -19,6 +19,7 @@ from .perturbation import options_in_time, perturb
 from .result import GOOD_CRITICAL, Critical
 
 Say = Callable[[str], None]
+ELSEWHERE = (0.5, 0.25, 0.75)  # of a bracket: where it is divided, the next where the one before tells nothing
 
 
 class NoChangeError(AnalysisError):
@@ -41,20 +42,29 @@ def critical_friction(
 ) -> tuple[float, tuple[float, float]]:
     """Bisect the μ at which small perturbations begin to grow in time; the middle and the last bracket.
 
-    kept: where finished steps are put and taken from. Raises AnalysisError where the ends of the bracket do not differ.
+    The last bracket is wider than the tolerance where no march within it tells whether it grows. kept: where finished
+    steps are put and taken from. Raises AnalysisError where the ends of the bracket do not differ, or are not told.
     """
+    whys: dict[float, str] = {}
 
-    def grows(mu: float) -> bool:
+    def grows(mu: float) -> bool | None:
         known = None if kept is None else bool_of(kept.get("critical step", mu), "grows")
         if known is not None:
             return known
-        found = perturb(system, mu, settings=settings, max_frequency_hz=max_frequency_hz).grows
+        found = perturb(system, mu, settings=settings, max_frequency_hz=max_frequency_hz, sign=True)
+        if found.untold and not found.left:
+            whys[mu] = found.untold
+            return None
+        # What leaves the linear range has grown, by whatever component.
+        does = found.grows or found.left
         if kept is not None:
-            kept.put("critical step", mu, {"grows": found})
-        return found
+            kept.put("critical step", mu, {"grows": does})
+        return does
 
     low, high = bracket
     state = {m: grows(m) for m in (low, high)}
+    if whys:
+        raise AnalysisError("; ".join(f"no growth is told at μ = {m:g}: {why}" for m, why in whys.items()))
     if state[low] or not state[high]:
         both = "grow" if state[low] else "decay"
         raise NoChangeError(
@@ -62,11 +72,17 @@ def critical_friction(
             if state[low] == state[high]
             else f"perturbations grow at {low:g} and decay at {high:g}, so that growth ends in the bracket instead of "
             "beginning; choose another comparison.bracket",
-            grow=state[low],
+            grow=bool(state[low]),
         )
     while high - low > tolerance:
-        middle = (low + high) / 2
-        low, high = (low, middle) if grows(middle) else (middle, high)
+        # Close to the onset growth may be too slow to be told: farther from it, it is not.
+        for share in ELSEWHERE:
+            middle = low + share * (high - low)
+            if (does := grows(middle)) is not None:
+                break
+        else:
+            break
+        low, high = (low, middle) if does else (middle, high)
         if progress is not None:
             progress(f"critical μ between {measured(low, 5)} and {measured(high, 5)}")
     return (low + high) / 2, (low, high)
@@ -132,7 +148,20 @@ def _in_time(
         why = f"growth begins at {measured(temporal, 5)} in time, and the modes have no onset in {friction_range}"
         inside = friction_range[0] <= temporal <= friction_range[1]
         return Critical(None, temporal, last, False if inside else None, why)
-    return Critical(modal, temporal, last, abs(modal - temporal) <= max(tolerance, GOOD_CRITICAL * modal))
+    return _held(modal, temporal, last, tolerance)
+
+
+def _held(modal: float, temporal: float, last: tuple[float, float], tolerance: float) -> Critical:
+    """The modal onset against a bracket of the bisection, which may have ended early."""
+    good = max(tolerance, GOOD_CRITICAL * modal)
+    low, high = last
+    if high - low <= max(2 * good, tolerance):
+        return Critical(modal, temporal, last, abs(modal - temporal) <= good)
+    why = (
+        f"growth in time begins between {measured(low, 5)} and {measured(high, 5)}, where marches tell no growth apart"
+    )
+    far = max(low - modal, modal - high) > good
+    return Critical(modal, None, last, False if far else None, why)
 
 
 def _modal(

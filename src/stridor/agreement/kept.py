@@ -50,6 +50,8 @@ def perturbation_data(p: Perturbation) -> dict[str, Any]:
         "sampling": float(p.sampling),
         "components": [pair_of(complex(v)) for v in p.components.eigenvalues],
         "amplitudes": [float(v) for v in p.components.amplitudes],
+        "untold": p.untold,
+        "left": p.left,
     }
 
 
@@ -58,7 +60,10 @@ def perturbation_of(mu: float, data: Plain) -> Perturbation:
     found = np.array([complex(*pair) for pair in data["components"]], dtype=complex)
     components = Components(found, np.array(data["amplitudes"], dtype=float))
     signal = np.array(data["signal"], dtype=float)
-    return Perturbation(mu, complex(*data["eigenvalue"]), signal, float(data["sampling"]), components)
+    return Perturbation(
+        mu, complex(*data["eigenvalue"]), signal, float(data["sampling"]), components,
+        untold=str(data["untold"]), left=bool(data["left"]),
+    )  # fmt: skip
 
 
 def growth_data(fitted: Growth | None) -> dict[str, Any] | None:

@@ -24,18 +24,21 @@ from ..sliding import full_motion
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.settings import Settings, choose_step
-from ..temporal.signals import components
 from ..temporal.simulate import plan, simulate
 from ..threads import one_thread
 from ..typing import Array, ComplexArray, IntArray, Sparse
 from .shapes import component_shape, node_rows
-from .small_motion import PERTURBATION, Perturbation, linear_part, whole
+from .small_motion import DIED, PERTURBATION, Perturbation, linear_parts, small_until, whole
+from .told import ABOVE, SAMPLES, band_of, certain, told
 
 TOLD_APART = 40  # modes, each of two poles, that `components` tells apart in one signal
 FASTEST = 3  # modes to start with where these are not all
 PERIODS = 40  # of the slowest of them
 PERIODS_OF_BAND = 1200  # of its highest frequency, with all modes
-SAMPLES = 12  # to each
+TURNS = 3.0  # periods of every mode that a march holds
+LONGER = 4  # times as long marches the next where one does not tell the fastest apart
+MOST_PERIODS = 4 * PERIODS_OF_BAND  # of the highest frequency of the modes in the longest march
+MOST_WORK = 2e9  # steps times freedoms: what a march may take to become longer
 WATCHED = 100  # nodes of the bodies whose motion gives shapes
 MOST_BYTES = 128e6  # of their motion
 MOST_INSTANTS = 4096  # of it in a shape
@@ -66,14 +69,17 @@ def perturb(
     duration: float | None = None,
     modes: ComplexModes | None = None,
     shape: bool = False,
+    sign: bool = False,
 ) -> Perturbation:
     """March a small perturbation of steady sliding and take its fastest component.
 
     It starts with modes up to ``max_frequency_hz``, of contact as it is in time, in equal measure, 1e-5 of the slip
     speed in all, so that frequencies out of range, which may grow faster, start from nothing; the time scheme alone
     decides what becomes of them. It is used as long as it stays below 2 % of the slip speed, where friction is still
-    linear. modes: `modes_as_in_time`, where they are known. shape: also how nodes move in the fastest component. Raises
-    AnalysisError without steady sliding, KeyboardInterrupt where Ctrl-C cuts the run.
+    linear. Where parts of it do not tell the same, a march four times as long follows, unless ``duration`` [s] is given
+    and as long as its cost is bounded; what is not told by then is ``untold``. sign: whether it grows is enough. modes:
+    `modes_as_in_time`, where they are known. shape: also how nodes move in the fastest component. Raises AnalysisError
+    without steady sliding, KeyboardInterrupt where Ctrl-C cuts the run.
     """
     # The reference configuration, as the modes have it, whatever the full run does (docs/case-file.md).
     system = settings.system(system).in_reference()
@@ -83,7 +89,6 @@ def perturb(
         raise AnalysisError("a perturbation of steady sliding needs contacts that slide")
     found = modes_as_in_time(system, mu, max_frequency_hz) if modes is None else modes
     chosen, length = _started(nodes, found, max_frequency_hz)
-    length = length if duration is None else duration
     if not len(chosen):
         raise AnalysisError(f"no mode vibrates below {max_frequency_hz:g} Hz, so there is nothing to perturb with")
     assert found.right is not None, "asked for with vectors"
@@ -92,23 +97,48 @@ def perturb(
     start, moved = _in_equal_measure(nodes, lam, vectors)
     start *= PERTURBATION * speed[speed > 0.0].min() / len(chosen)
     step = perturbation_step(system, settings)
-    every = max(1, int(1.0 / (SAMPLES * max_frequency_hz * step)))
+    top = _top(found, max_frequency_hz)
+    length, longest = _lengths(lam, length, top, MOST_WORK * step / system.size)
+    if duration is not None:
+        length = longest = duration
     # One node of each contact, of those that slide: the one that moves most.
     leaders = _leaders(nodes, speed, moved)
-    most = MOST_BYTES * every * step / (length * 24 * system.dimension)
-    bodies = node_rows(system, min(int(most), WATCHED) if shape else 0)
-    watched, names = _watching(system, _along_slip(nodes, slip, leaders), bodies)
-    quiet = replace(settings, step=step, initial="steady-sliding", perturbation=0.0, watch=names, record_every=every)
-    disturbance = start[0], start[1], start[2]
-    run = whole(simulate(watched, [_as_steady(system, length)], quiet, mu=mu, disturbance=disturbance))
-    signal = linear_part(run.velocity[:, : len(leaders), 0], speed[leaders])
-    band = components(signal, run.sampling, max_frequency_hz=max_frequency_hz)
+    slips = _along_slip(nodes, slip, leaders)
+    while True:
+        every = max(1, int(1.0 / (SAMPLES * band_of(length, max_frequency_hz, top) * step)))
+        most = MOST_BYTES * every * step / (length * 24 * system.dimension)
+        bodies = node_rows(system, min(int(most), WATCHED) if shape else 0)
+        watched, names = _watching(system, slips, bodies)
+        quiet = replace(settings, step=step, initial="steady-sliding", perturbation=0.0, watch=names)
+        quiet, disturbance = replace(quiet, record_every=every), (start[0], start[1], start[2])
+        run = whole(simulate(watched, [_as_steady(system, length)], quiet, mu=mu, disturbance=disturbance))
+        moving = run.velocity[:, : len(leaders), 0]
+        signals = linear_parts(moving, speed[leaders])
+        band, limit = told(signals, run.sampling, max_frequency_hz, top)
+        sure = certain(signals, run.sampling, limit, band, sign=sign)
+        left = small_until(moving, speed[leaders]) < len(moving)
+        sure &= band.fastest.real > 0.0 or not left
+        if sure or left or length >= longest:
+            break
+        length = min(LONGER * length, longest)
     form = None
     if shape and bodies.shape[0]:  # a system of matrices has no bodies whose shapes could be told
-        part = slice(0, len(signal), max(1, len(signal) // MOST_INSTANTS))
+        part = slice(0, len(signals), max(1, len(signals) // MOST_INSTANTS))
         motion = run.velocity[part, len(leaders) :].reshape(-1, bodies.shape[0])
-        form = component_shape(bodies, run.time[part], motion, band.eigenvalues, band.fastest, max_frequency_hz)
-    return Perturbation(mu, band.fastest, signal, run.sampling, band, form)
+        form = component_shape(bodies, run.time[part], motion, band.eigenvalues, band.fastest, limit)
+    signal = signals[:, 0] if signals.size else np.zeros(0)
+    why = "" if sure else _too_short(len(signal) * run.sampling, lam, left=left)
+    return Perturbation(mu, band.fastest, signal, run.sampling, band, form, why, left)
+
+
+def _too_short(length: float, lam: ComplexArray, *, left: bool) -> str:
+    """Why a motion that stays small for a length [s] does not tell modes apart."""
+    turns = length * float(lam.imag.min()) / (2 * np.pi)
+    how = "leaves the linear range after" if left else "lasts"
+    return (
+        f"the motion in time {how} {length:.3g} s, {turns:.2g} periods of its slowest mode, too short to tell "
+        f"{len(lam)} modes apart" + ("" if left else "; a lower modal.max_frequency_hz leaves fewer of them")
+    )
 
 
 def perturbation_step(system: System, settings: Settings) -> float:
@@ -126,6 +156,20 @@ def _started(nodes: ContactNodes, modes: ComplexModes, max_frequency_hz: float) 
         return inside, PERIODS_OF_BAND / max_frequency_hz
     chosen = inside[np.argsort(modes.growth_rate[0][inside])[::-1][:FASTEST]]
     return chosen, PERIODS / float(modes.frequency_hz[0][chosen].min(initial=max_frequency_hz))
+
+
+def _top(modes: ComplexModes, max_frequency_hz: float) -> float:
+    """The highest frequency [Hz] of the modes within the limit."""
+    frequency = modes.frequency_hz[0]
+    return float(frequency[frequency <= max_frequency_hz].max(initial=0.0))
+
+
+def _lengths(lam: ComplexArray, usual: float, top: float, affordable: float) -> tuple[float, float]:
+    """How long to march [s] first, such that each of the modes (k,) that are heard so long turns `TURNS` times, and how
+    long at most; no longer than what is affordable [s], but as long as usual."""
+    longest = max(usual, min(MOST_PERIODS / (ABOVE * top), affordable))
+    turned = 2 * np.pi * TURNS / lam.imag
+    return float(min(max(usual, turned[lam.real * turned > np.log(DIED)].max(initial=0.0)), longest)), longest
 
 
 def _in_equal_measure(nodes: ContactNodes, lam: ComplexArray, vectors: ComplexArray) -> tuple[Array, Array]:

@@ -224,10 +224,13 @@ def judge(
     completeness: str = "",
     shape: float | None = None,
 ) -> tuple[bool | None, str]:
-    """Whether both approaches agree at one μ, None where the signal shows nothing, where what grows has another shape
-    (MAC, None where it was not taken) and where the modes are not borne out (``completeness``), and the sentence that
-    says it."""
+    """Whether both approaches agree at one μ, None where the signal shows nothing or tells no components apart, where
+    what grows has another shape (MAC, None where it was not taken) and where the modes are not borne out
+    (``completeness``), and the sentence that says it."""
     agrees, sentence = _judged(mu, unstable, here, perturbation, frequency, rate)
+    if not agrees and perturbation.untold and perturbation.shows:
+        said = "unstable" if unstable else "stable"
+        agrees, sentence = None, f"μ = {mu:g}: modal says {said}, but {perturbation.untold}"
     if agrees and unstable and shape is not None and not shape >= GOOD_MAC:
         agrees, sentence = None, f"{sentence}, but it grows in another shape than the mode, MAC {shape:.2f}"
     if not refuted(completeness):
@@ -248,7 +251,7 @@ def _judged(
     if not perturbation.shows:
         return None, f"μ = {mu:g}: modal says {said}, but the signal in time shows no vibration to compare with"
     turns = len(perturbation.signal) * perturbation.sampling * here.imag / (2 * np.pi)
-    if unstable and 0.0 < turns < TURNS:
+    if unstable and 0.0 < turns < TURNS and perturbation.left:
         return None, (
             f"μ = {mu:g}: the mode grows so fast, {_vibration(here)}, that a motion in time stays small for "
             f"{turns:.2g} periods only, too few to take a rate from"

@@ -259,22 +259,24 @@ def low_passed(signal: Array, sampling: float, max_frequency_hz: float) -> Array
 def components(signal: Array, sampling: float, *, max_frequency_hz: float, order: int = 80) -> Components:
     """Take a noise-free free vibration apart into damped exponentials up to ``max_frequency_hz``.
 
-    The signal is low-passed (exponentials pass a filter unchanged but for their amplitude), decimated,
-    and its shift-invariant subspace solved for the poles (ESPRIT form of the matrix pencil). ``order``
-    bounds how many are sought. Parts weaker than 1e-3 of the strongest are not trusted and left out, as is
-    what turns less than twice in the whole signal.
+    A signal (k,), or several (k, c) of one vibration, all of which hold the same exponentials in shares of their own;
+    amplitudes are then those of all together. The signal is low-passed (exponentials pass a filter unchanged but for
+    their amplitude), decimated, and its shift-invariant subspace solved for the poles (ESPRIT form of the matrix
+    pencil). ``order`` bounds how many are sought. Parts weaker than 1e-3 of the strongest are not trusted and left out,
+    as is what turns less than twice in the whole signal.
     """
     nothing = Components(np.zeros(0, dtype=complex), np.zeros(0))
     if len(signal) < 64:
         return nothing
-    band = low_passed(signal, sampling, max_frequency_hz)
+    band = low_passed(np.atleast_2d(signal.T), sampling, max_frequency_hz)
     keep = max(1, int(1.0 / (2.6 * max_frequency_hz * sampling)))
-    reduced = band[::keep][-LONGEST:]
+    reduced = band[:, ::keep][:, -LONGEST:].T
     rate, count = keep * sampling, len(reduced)
     if count < 16 or not np.any(reduced):
         return nothing
     rows = min(count // 2, WIDEST)
-    hankel = np.lib.stride_tricks.sliding_window_view(reduced, count - rows + 1)
+    windows = np.lib.stride_tricks.sliding_window_view(reduced, count - rows + 1, axis=0)
+    hankel = windows.reshape(rows, -1)
     # Its rows are far shorter than its columns are many: the triangle has the same left vectors.
     left, values, _ = sl.svd(sl.qr(hankel.T, mode="r")[0][:rows].T, check_finite=False)
     rank = int(min(order, rows - 1, max(2, np.sum(values > PENCIL_TOLERANCE * values[0]))))
@@ -288,7 +290,8 @@ def components(signal: Array, sampling: float, *, max_frequency_hz: float, order
     exponent = np.arange(count)[:, None] - count // 2
     basis = np.exp(exponent * np.log(poles))
     size = np.linalg.norm(basis, axis=0)
-    amplitude = np.abs(np.linalg.lstsq(basis / size, reduced.astype(complex), rcond=None)[0] / size)
+    shares = np.linalg.lstsq(basis / size, reduced.astype(complex), rcond=None)[0]
+    amplitude = np.linalg.norm(shares, axis=1) / size
     lam = np.log(poles) / rate
     frequency = lam.imag / (2 * np.pi)
     inside = (frequency > 2.0 / (count * rate)) & (frequency <= max_frequency_hz)
