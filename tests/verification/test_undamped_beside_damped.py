@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ HZ = 2.0
 BELT = {"type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (0, 1), "sliding": {"velocity": (-1, 0)}}
 
 
-def spring(body: str, degrees: float, stiffness: float, **others: float) -> dict:
+def spring(body: str, degrees: float, stiffness: float, **others: float) -> dict[str, Any]:
     angle = np.radians(degrees)
     direction = (float(np.cos(angle)), float(np.sin(angle)))
     return {"between": (body, "ground"), "direction": direction, "stiffness": stiffness, **others}
@@ -72,7 +73,7 @@ class Pieces:
 
     def __init__(self, seed: int) -> None:
         rng = np.random.default_rng(seed)
-        self.tables: dict[str, dict] = {"bodies": {"belt": BELT}, "springs": {}, "loads": {}, "contacts": {}}
+        self.tables: dict[str, dict[str, Any]] = {"bodies": {"belt": BELT}, "springs": {}, "loads": {}, "contacts": {}}
         self.parts: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]] = []
         for k in range(int(rng.integers(2, 4))):
             mass, slant, rate = float(rng.uniform(0.5, 2)), float(rng.uniform(20, 60)), float(rng.uniform(0.5, 3))

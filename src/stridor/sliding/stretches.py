@@ -75,8 +75,8 @@ def stretches(
         return (Stretch(low, high, None),)
     search = _Equilibria(system, solver)
     own = search.own()
-    if own is None:
-        return (Stretch(low, high, None),)  # what there is to say, the modes say
+    if own is None and (first := search.at(low)).found is None:
+        return (Stretch(low, high, None, 0, nodes.count, first.reason),)
     count = LOOKS if system.size <= SMALL else FEWER
     asked = np.asarray(at if len(at) <= LOOKS else (), dtype=float)
     looks = [search.at(float(mu)) for mu in np.unique(np.append(np.linspace(low, high, count), asked))]
@@ -161,7 +161,7 @@ class _Equilibria:
         try:
             found = self._solved(None)
         except AnalysisError:
-            return None
+            return None  # what is asked of others needs it not
         self._guess = found.active
         return _key(found)
 
@@ -175,7 +175,7 @@ class _Equilibria:
         try:
             found = self._solved(mu)
         except AnalysisError as error:
-            return _Look(mu, None, None, str(error))
+            return _Look(mu, None, None, f"{error}; that is at μ = {mu:.6g}")
         return _Look(mu, _key(found), found)
 
     def _solved(self, mu: float | None) -> SurfaceSliding:
@@ -200,7 +200,9 @@ class _Equilibria:
         while low.key != high.key:
             span = high.mu - low.mu
             if span <= width * max(high.mu, 1e-3):
-                yield 0.5 * (low.mu + high.mu), high
+                # Where one side has no equilibrium, the other ends with the last that has.
+                solved = [look.mu for look in (low, high) if look.found is not None]
+                yield sum(solved) / len(solved), high
                 return
             before, foreseen = foreseen, self._foreseen(low, high)
             for mu in _probes(low.mu, high.mu, foreseen, before):

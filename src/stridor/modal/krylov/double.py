@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...typing import ComplexArray
@@ -78,8 +80,7 @@ def _closed_meeting(reduced: DenseProblem, passage: Passage) -> tuple[float, flo
     mean, _ = pair(mu)
     if not mean.real < 0:
         return None
-    step = min(1e-4 * max(mu, 1e-3), 0.25 * width)
-    return mu, float(mean.real), (square(mu + step) - square(mu - step)) / (2 * step)
+    return mu, float(mean.real), _slope(square, mu, passage)
 
 
 def _quick_meeting(reduced: DenseProblem, passage: Passage) -> Solved | None:
@@ -102,6 +103,14 @@ def _quick_meeting(reduced: DenseProblem, passage: Passage) -> Solved | None:
     return Solved(float(mu.real), 1j * abs(lam.imag), float(np.sqrt(opens)))
 
 
+def _slope(square: Callable[[float], float], mu: float, passage: Passage) -> float:
+    """The slope at ``mu`` of what passes through zero there, from values in the passage alone: there may be none
+    beyond."""
+    step = min(1e-4 * max(mu, 1e-3), 0.25 * (passage.high - passage.low))
+    low, high = max(mu - step, passage.low), min(mu + step, passage.high)
+    return (square(high) - square(low)) / (high - low)
+
+
 def divergence(reduced: DenseProblem, passage: Passage) -> Solved | None:
     """Where λ² of an undamped mode passes through zero."""
 
@@ -113,9 +122,7 @@ def divergence(reduced: DenseProblem, passage: Passage) -> Solved | None:
     mu = root_between(square, passage.low, passage.high)
     if mu is None:
         return None
-    step = min(1e-4 * max(mu, 1e-3), 0.25 * (passage.high - passage.low))
-    slope = (square(mu + step) - square(mu - step)) / (2 * step)
-    return Solved(mu, 0j, float(np.sqrt(abs(slope))))
+    return Solved(mu, 0j, float(np.sqrt(abs(_slope(square, mu, passage)))))
 
 
 def pair_near(coordinate: ComplexArray, target: complex) -> tuple[complex, complex]:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy.linalg as sl
 
+from ...errors import AnalysisError
 from ...typing import ComplexArray
 from ..dense_problem import DenseProblem, Eigenpairs
 from ..newton import exceptional
@@ -20,14 +21,17 @@ def exceptional_point(reduced: DenseProblem, state: State, lam: complex, mu: flo
     """The complex μ beside an onset at which two modes meet, and κ of λ ≈ λ_c ± κ √(μ − μ_c).
 
     Sought with the modes nearby at a state before it, then solved for. None where it is further away than half the
-    onset's μ.
+    onset's μ, or where there is no steady sliding on the way to it, which may lead beyond the range that was asked for.
     """
     reach = 0.5 * max(mu, 1e-3)
     near = _Halves(_Surroundings(reduced, state.found, lam).values, lam)
-    rough = _zero(near.square, mu, complex(mu), reach, 1e-8)
-    if rough is None:
+    try:
+        rough = _zero(near.square, mu, complex(mu), reach, 1e-8)
+        if rough is None:
+            return None
+        right, left = reduced.null_vectors(near.centre, rough)
+    except AnalysisError:  # on the way there is no steady sliding
         return None
-    right, left = reduced.null_vectors(near.centre, rough)
     found = exceptional(reduced, rough, near.centre, right, left, reach=reach)
     if found is None or abs(found[0] - mu) > reach or abs(found[1] - lam) > 0.5 * abs(lam):
         return None

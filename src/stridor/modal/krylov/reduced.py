@@ -219,7 +219,9 @@ class Reduced(DenseProblem):
             damping, stiffness = _weighed(self._on_grid(extras), extras.slopes(mu))
         else:
             step = 1e-5 * max(mu.real, 1e-3)
-            low, high = max(mu.real - step, 0.0), mu.real + step
+            # Beyond the highest that is asked for there need be no steady sliding.
+            high = max(min(mu.real + step, self.high), mu.real)
+            low = max(high - 2 * step, 0.0)
             before, after = self._steady(extras, low), self._steady(extras, high)
             damping, stiffness = ((b - a) / (high - low) for a, b in zip(before, after, strict=True))
         return nothing, damping, friction + stiffness

@@ -86,7 +86,11 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
     system = system.in_place()
     mu = mu if system.touching_at is None else system.touching_at
     if (system.loads or system.load_steps) and nodes.count:
-        steady = steady_nodes(system, mu, solver)
+        try:
+            steady = steady_nodes(system, mu, solver)
+        except AnalysisError as error:
+            at = "the case's own friction" if mu is None else f"μ = {mu:.6g}"
+            raise AnalysisError(f"{error}; that is at {at}") from error
         require_pressed(system, steady.normal_force)
         if not system.load_steps:
             none = np.zeros(nodes.count, dtype=bool)
