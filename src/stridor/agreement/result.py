@@ -228,7 +228,7 @@ def judge(
     what grows has another shape (MAC, None where it was not taken) and where the modes are not borne out
     (``completeness``), and the sentence that says it."""
     agrees, sentence = _judged(mu, unstable, here, perturbation, frequency, rate)
-    if not agrees and perturbation.untold and perturbation.shows:
+    if agrees is False and perturbation.untold:
         said = "unstable" if unstable else "stable"
         agrees, sentence = None, f"μ = {mu:g}: modal says {said}, but {perturbation.untold}"
     if agrees and unstable and shape is not None and not shape >= GOOD_MAC:
