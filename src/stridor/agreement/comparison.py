@@ -224,7 +224,10 @@ class _At:
         assert modes.right is not None, "asked for with vectors"
         alike = np.flatnonzero(_alike(lam, here))
         shape = None if perturbation.shape is None else perturbation.shape.likeness(modes.right[0, alike])
-        agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate, told, shape)
+        bodies = bool(self.system.lines or self.system.solids)
+        agrees, verdict = judge(
+            mu, len(unstable) > 0, here, perturbation, frequency, rate, told, shape, shape_asked=bodies
+        )
         if agrees is False and not diverges:
             verdict, agrees = self._resolved(mu, here, perturbation, verdict, own)
         return Comparison(

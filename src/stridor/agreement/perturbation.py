@@ -128,7 +128,7 @@ def perturb(
     if shape and bodies.shape[0]:  # a system of matrices has no bodies whose shapes could be told
         part = slice(0, len(signals), max(1, len(signals) // MOST_INSTANTS))
         motion = run.velocity[part, len(leaders) :].reshape(-1, bodies.shape[0])
-        form = component_shape(bodies, run.time[part], motion, band.eigenvalues, band.fastest, limit)
+        form = component_shape(bodies, run.time[part], motion, band.eigenvalues, band.fastest, limit, lam)
     signal = signals[:, 0] if signals.size else np.zeros(0)
     why = "" if sure else _too_short(len(signal) * run.sampling, lam, left=left)
     return Perturbation(mu, band.fastest, signal, run.sampling, band, form, why, left)
