@@ -178,3 +178,20 @@ def test_a_shape_that_is_not_told_is_said(monkeypatch: pytest.MonkeyPatch) -> No
     (one,) = st.compare(made.case, [made.mu], critical=False, only=["growth"]).comparisons
     assert one.growth_mac is None
     assert "in which shape is not told" in one.verdict
+
+
+def test_decay_that_the_contacts_do_not_show_is_said() -> None:
+    """A mass that rubs on nothing and dies out last."""
+    made = next(made for made in map(random_rubbing, range(60, 120)) if made.pressed and made.modes()[0][0].real < -1e-3)
+    data = made.case.model_dump(mode="json", exclude_none=True)
+    data["bodies"]["alone"] = {"type": "mass", "mass": 1.0, "position": [20.0, 0.0]}
+    for name, direction, damping in (("x", [1.0, 0.0], 2e-4), ("y", [0.0, 1.0], 0.1)):
+        data["springs"][f"alone-{name}"] = {
+            "between": ["alone", "ground"], "direction": direction, "stiffness": 2.0, "damping": damping
+        }  # fmt: skip
+    (one,) = st.compare(st.Case.model_validate(data), [made.mu], critical=False, only=["growth"]).comparisons
+    assert one.agrees is True
+    assert one.perturbation.growth_rate == pytest.approx(made.modes()[0][0].real, rel=0.02)
+    assert one.verdict.endswith("Hz with -1.000e-04 1/s dies out last, which the contacts do not show")
+    (whole,) = st.compare(made.case, [made.mu], critical=False, only=["growth"]).comparisons
+    assert "dies out last" not in whole.verdict
