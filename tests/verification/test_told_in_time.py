@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import stridor as st
 from random_rubbing import random_rubbing
@@ -14,6 +15,7 @@ from stridor.agreement import Perturbation, critical, perturbation
 from stridor.agreement.critical import critical_friction
 from stridor.agreement.kept import perturbation_data, perturbation_of
 from stridor.agreement.result import judge
+from stridor.agreement.shapes import component_shape
 from stridor.agreement.small_motion import linear_parts
 from stridor.agreement.told import band_of, certain, told
 from stridor.temporal.signals import Components, components
@@ -32,6 +34,7 @@ def test_the_fastest_of_random_systems_is_seen_in_time(seed: int) -> None:
     lam = made.modes()[0]
     (one,) = st.compare(made.case, [made.mu], critical=False, only=["growth"]).comparisons
     assert one.agrees is True, one.verdict
+    assert one.growth_mac is None or one.growth_mac > 0.99
     # Of the scheme: (ωΔt)²/24 in frequency.
     near = lam[np.argmin(np.abs(lam - one.perturbation.eigenvalue))]
     assert one.perturbation.growth_rate == pytest.approx(near.real, rel=0.02, abs=2e-6)
@@ -154,3 +157,41 @@ def test_slow_flutter_is_an_onset_in_time() -> None:
     first = np.linspace(0.01, 0.7, 70)[int(np.argmax(dense))]
     assert found.agree, found.verdict
     assert found.critical_mu_temporal == pytest.approx(first, abs=0.015)
+
+
+def test_a_shape_is_told_only_where_the_fit_leaves_little() -> None:
+    """A body that moves in what no contact shows: its motion is fitted with what was started, or nothing is told."""
+    time = np.arange(0.0, 100.0, 0.05)
+    seen, hidden = 0.03 + 1.9j, -0.002 + 1.3j
+    shape = np.array([1.0, 0.5j, 0.2, -0.3])
+    motion = np.real(np.outer(np.exp(seen * time), shape) + 40.0 * np.outer(np.exp(hidden * time), [0.0, 0.0, 1.0, 1j]))
+    given = sp.eye_array(4, format="csr"), time, motion, np.array([seen]), seen, 50.0
+    assert component_shape(*given) is None
+    told_by = component_shape(*given, np.array([seen * (1 + 1e-4), hidden]))
+    assert told_by is not None
+    assert told_by.likeness(shape) > 0.999
+
+
+def test_a_shape_that_is_not_told_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(perturbation, "component_shape", lambda *_: None)
+    made = random_rubbing(15)
+    (one,) = st.compare(made.case, [made.mu], critical=False, only=["growth"]).comparisons
+    assert one.growth_mac is None
+    assert "in which shape is not told" in one.verdict
+
+
+def test_decay_that_the_contacts_do_not_show_is_said() -> None:
+    """A mass that rubs on nothing and dies out last."""
+    made = next(made for made in map(random_rubbing, range(60, 120)) if made.pressed and made.modes()[0][0].real < -1e-3)
+    data = made.case.model_dump(mode="json", exclude_none=True)
+    data["bodies"]["alone"] = {"type": "mass", "mass": 1.0, "position": [20.0, 0.0]}
+    for name, direction, damping in (("x", [1.0, 0.0], 2e-4), ("y", [0.0, 1.0], 0.1)):
+        data["springs"][f"alone-{name}"] = {
+            "between": ["alone", "ground"], "direction": direction, "stiffness": 2.0, "damping": damping
+        }  # fmt: skip
+    (one,) = st.compare(st.Case.model_validate(data), [made.mu], critical=False, only=["growth"]).comparisons
+    assert one.agrees is True
+    assert one.perturbation.growth_rate == pytest.approx(made.modes()[0][0].real, rel=0.02)
+    assert one.verdict.endswith("Hz with -1.000e-04 1/s dies out last, which the contacts do not show")
+    (whole,) = st.compare(made.case, [made.mu], critical=False, only=["growth"]).comparisons
+    assert "dies out last" not in whole.verdict

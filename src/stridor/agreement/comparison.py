@@ -224,7 +224,11 @@ class _At:
         assert modes.right is not None, "asked for with vectors"
         alike = np.flatnonzero(_alike(lam, here))
         shape = None if perturbation.shape is None else perturbation.shape.likeness(modes.right[0, alike])
-        agrees, verdict = judge(mu, len(unstable) > 0, here, perturbation, frequency, rate, told, shape)
+        bodies = bool(self.system.lines or self.system.solids)
+        agrees, verdict = judge(
+            mu, len(unstable) > 0, here, perturbation, frequency, rate, told, shape, shape_asked=bodies,
+            last=_last(modes, self.limit),
+        )  # fmt: skip
         if agrees is False and not diverges:
             verdict, agrees = self._resolved(mu, here, perturbation, verdict, own)
         return Comparison(
@@ -319,6 +323,12 @@ def _unstable(modes: ComplexModes, limit: float) -> IntArray:
     """Columns of the unstable modes up to the limit [Hz], the fastest first."""
     columns = np.flatnonzero(modes.unstable[0] & (modes.frequency_hz[0] <= limit))
     return columns[np.argsort(modes.eigenvalues[0][columns].real)[::-1]]
+
+
+def _last(modes: ComplexModes, limit: float) -> complex | None:
+    """λ of the mode up to the limit [Hz] that vibrates and dies out last."""
+    lam = modes.eigenvalues[0][(modes.frequency_hz[0] > 0.0) & (modes.frequency_hz[0] <= limit)]
+    return complex(lam[np.argmax(lam.real)]) if len(lam) else None
 
 
 def _growth_data(c: Comparison) -> Plain:

@@ -29,12 +29,13 @@ from ..threads import one_thread
 from ..typing import Array, ComplexArray, IntArray, Sparse
 from .shapes import component_shape, node_rows
 from .small_motion import DIED, PERTURBATION, Perturbation, linear_parts, small_until, whole
-from .told import ABOVE, SAMPLES, band_of, certain, told
+from .told import ABOVE, certain, told
 
 TOLD_APART = 40  # modes, each of two poles, that `components` tells apart in one signal
 FASTEST = 3  # modes to start with where these are not all
 PERIODS = 40  # of the slowest of them
 PERIODS_OF_BAND = 1200  # of its highest frequency, with all modes
+SAMPLES = 12  # to each
 TURNS = 3.0  # periods of every mode that a march holds
 LONGER = 4  # times as long marches the next where one does not tell the fastest apart
 MOST_PERIODS = 4 * PERIODS_OF_BAND  # of the highest frequency of the modes in the longest march
@@ -105,7 +106,9 @@ def perturb(
     leaders = _leaders(nodes, speed, moved)
     slips = _along_slip(nodes, slip, leaders)
     while True:
-        every = max(1, int(1.0 / (SAMPLES * band_of(length, max_frequency_hz, top) * step)))
+        # As many as of the whole band in the usual length: little of them may be left where motion grows fast.
+        recorded = min(max_frequency_hz, max(ABOVE * top, PERIODS_OF_BAND / length))
+        every = max(1, int(1.0 / (SAMPLES * recorded * step)))
         most = MOST_BYTES * every * step / (length * 24 * system.dimension)
         bodies = node_rows(system, min(int(most), WATCHED) if shape else 0)
         watched, names = _watching(system, slips, bodies)
@@ -125,7 +128,7 @@ def perturb(
     if shape and bodies.shape[0]:  # a system of matrices has no bodies whose shapes could be told
         part = slice(0, len(signals), max(1, len(signals) // MOST_INSTANTS))
         motion = run.velocity[part, len(leaders) :].reshape(-1, bodies.shape[0])
-        form = component_shape(bodies, run.time[part], motion, band.eigenvalues, band.fastest, limit)
+        form = component_shape(bodies, run.time[part], motion, band.eigenvalues, band.fastest, limit, lam)
     signal = signals[:, 0] if signals.size else np.zeros(0)
     why = "" if sure else _too_short(len(signal) * run.sampling, lam, left=left)
     return Perturbation(mu, band.fastest, signal, run.sampling, band, form, why, left)

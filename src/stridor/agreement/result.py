@@ -223,16 +223,25 @@ def judge(
     rate: float,
     completeness: str = "",
     shape: float | None = None,
+    *,
+    shape_asked: bool = False,
+    last: complex | None = None,
 ) -> tuple[bool | None, str]:
     """Whether both approaches agree at one μ, None where the signal shows nothing or tells no components apart, where
-    what grows has another shape (MAC, None where it was not taken) and where the modes are not borne out
-    (``completeness``), and the sentence that says it."""
+    what grows has another shape (MAC, None where it was not taken or, if asked for, not told) and where the modes are
+    not borne out (``completeness``), and the sentence that says it. last: the mode that dies out last, which contacts
+    may not show."""
     agrees, sentence = _judged(mu, unstable, here, perturbation, frequency, rate)
-    if not agrees and perturbation.untold and perturbation.shows:
+    if agrees is False and perturbation.untold:
         said = "unstable" if unstable else "stable"
         agrees, sentence = None, f"μ = {mu:g}: modal says {said}, but {perturbation.untold}"
     if agrees and unstable and shape is not None and not shape >= GOOD_MAC:
         agrees, sentence = None, f"{sentence}, but it grows in another shape than the mode, MAC {shape:.2f}"
+    if agrees and unstable and shape is None and shape_asked:
+        sentence = f"{sentence}; in which shape is not told, as the bodies move in more than what was fitted"
+    slower = last is not None and last.real - here.real > max(SAME_DECAY * abs(here.real), LEVEL * abs(last))
+    if agrees and not unstable and last is not None and slower:
+        sentence = f"{sentence}; by the modes {_vibration(last)} dies out last, which the contacts do not show"
     if not refuted(completeness):
         return agrees, sentence
     return (None if agrees else agrees), f"{sentence}; but which modes there are is not certain"

@@ -14,6 +14,8 @@ from ..typing import Array, ComplexArray, Sparse
 
 BEGINNINGS = (1.0, 0.8, 0.6, 0.45, 0.3)
 SLOW = 8  # degree of polynomials for slow parts
+TOLD = 0.2  # of a shape: by how much what the fit leaves may change it at most where it is told
+SAME = 0.02  # of |λ|: a mode so near to a component is that
 
 
 @dataclass(frozen=True)
@@ -61,16 +63,23 @@ def node_rows(system: System, most: int) -> Sparse:
 
 
 def component_shape(
-    rows: Sparse, time: Array, values: Array, eigenvalues: ComplexArray, chosen: complex, max_frequency_hz: float
-) -> TimeShape | None:
+    rows: Sparse, time: Array, values: Array, eigenvalues: ComplexArray, chosen: complex, max_frequency_hz: float,
+    started: ComplexArray | None = None,
+) -> TimeShape | None:  # fmt: skip
     """Shape of the component that goes as exp(λt) with λ = chosen, one of eigenvalues (k,), in a motion.
 
     values (s, r) at times (s,) [s], evenly spaced, passes the filter that the signal of the components has passed (what
     grows beyond max_frequency_hz is none of them) and is split into all of them and slow parts by least squares, which
     tells lines apart that no spectrum of so short a signal does. Nodes that hardly press or hardly slide leave the
     linear range before others do, so of several beginnings of the motion the one is taken that the components explain
-    best. None where there are too few instants for so many components.
+    best. started: λ (j,) of what the motion was started with: bodies may move in what no contact shows. None where
+    there are too few instants for so many components, and where what is left of the motion might change the shape by
+    more than `TOLD` of it.
     """
+    index = int(np.argmin(np.abs(eigenvalues - chosen))) if len(eigenvalues) else 0
+    if started is not None and len(eigenvalues):
+        away = np.abs(started[:, None] - eigenvalues).min(axis=1) > SAME * np.abs(started)
+        eigenvalues = np.append(eigenvalues, started[away])
     least = 3 * (2 * len(eigenvalues) + SLOW + 1)
     if chosen == 0 or len(time) < least:
         return None
@@ -79,18 +88,19 @@ def component_shape(
     time = time[: len(values)]
     if len(time) < least:
         return None
-    index = int(np.argmin(np.abs(eigenvalues - chosen)))
-    best, misfit = np.zeros(0, dtype=complex), np.inf
+    best, doubt = np.zeros(0, dtype=complex), np.inf
     for share in BEGINNINGS:
         count = max(least, int(share * len(time)))
-        parts, off = _split(time[:count], values[:count], eigenvalues)
-        if off < misfit:
-            best, misfit = parts[index] - 1j * parts[len(eigenvalues) + index], off
-    return TimeShape(rows, best) if np.any(best) and np.isfinite(best).all() else None
+        found, off = _split(time[:count], values[:count], eigenvalues, index)
+        if off < doubt:
+            best, doubt = found, off
+    return TimeShape(rows, best) if doubt <= TOLD and np.isfinite(best).all() else None
 
 
-def _split(time: Array, values: Array, eigenvalues: ComplexArray) -> tuple[Array, float]:
-    """Factors (2k + SLOW + 1, r) of Re exp(λt), Im exp(λt) and slow parts in a motion, what is left of it over all."""
+def _split(time: Array, values: Array, eigenvalues: ComplexArray, index: int) -> tuple[ComplexArray, float]:
+    """Factors (r,) of exp(λt), λ one of eigenvalues, in a motion that is split into all of them and slow parts; and
+    what is left of it: of the part that goes so, or of these factors were all of it along what tells them, whichever
+    is more. What is so near to λ that it turns less than once against it leaves nothing: it must be among them."""
     rate = eigenvalues.real
     # Growth from the end, decay from the beginning: no column outgrows the others.
     grown = (time[:, None] - np.where(rate > 0, time[-1], time[0])) * rate
@@ -99,8 +109,12 @@ def _split(time: Array, values: Array, eigenvalues: ComplexArray) -> tuple[Array
     slow = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, len(time)), SLOW)
     basis = np.column_stack([waves.real, waves.imag, slow])
     parts = np.linalg.lstsq(basis, values, rcond=1e-10)[0]
-    size = float(np.linalg.norm(values))
-    return parts, float(np.linalg.norm(values - basis @ parts)) / size if size > 0.0 else np.inf
+    pair = [index, len(eigenvalues) + index]
+    found = parts[pair[0]] - 1j * parts[pair[1]]
+    size, left = float(np.linalg.norm(found)), float(np.linalg.norm(values - basis @ parts))
+    telling = float(np.linalg.norm(np.linalg.pinv(basis, rcond=1e-10)[pair], 2))
+    part = float(np.linalg.norm(basis[:, pair] @ parts[pair]))
+    return found, left * max(telling / size, 1.0 / part) if min(size, part) > 0.0 else np.inf
 
 
 def by_body(shape: Mapping[str, ComplexArray]) -> ComplexArray:

@@ -11,7 +11,6 @@ from .small_motion import LEVEL
 # Of its highest frequency: of longer signals the rows of the matrix pencil, which are bounded, do not fill a half.
 PERIODS_OF_BAND = 300
 ABOVE = 1.3  # times the highest frequency of the modes, up to where a long signal is split
-SAMPLES = 12  # to a period of the highest frequency of the band
 PARTS = ((0.0, 0.75), (0.25, 1.0))  # of a signal, either of which must tell what all of it does
 SAFETY = 2.0  # times how much parts differ: by how much all may be off
 # By how much these may differ: of the frequency, of growth, of decay.
