@@ -92,7 +92,11 @@ def test_how_closely_that_was_looked_at_is_said(tmp_path: Path, monkeypatch: pyt
         "As many roots grow at each of 97 values of μ as the onsets say; growth that begins and ends again between two of "
         "these values may be missing."
     )
-    monkeypatch.setattr(search, "_borne_out", lambda *_: None)
+
+    def uncounted(*_: object) -> None:
+        return None
+
+    monkeypatch.setattr(search, "_borne_out", uncounted)
     said = st.onsets(case_of(plain, tmp_path)).completeness
     assert said.endswith(
         "Between the ends nothing was counted: growth that begins and ends again within one of the steps may be missing."

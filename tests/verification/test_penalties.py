@@ -45,11 +45,12 @@ def test_modes_are_those_of_what_is_held(seed: int, penalty: float, held: int) -
     values, right, left = values[near], right[:, near], left[:, near]
     assert problem.backward_error(values, right).max() <= 1e-10
     assert problem.transposed.backward_error(values, left).max() <= 1e-10
-    for lam in (true := eigenvalues(*rest))[np.abs(true) < 2 * np.pi * HZ]:
+    true = eigenvalues(rest[0], rest[1], rest[2])
+    for lam in true[np.abs(true) < 2 * np.pi * HZ]:
         # What the penalty gives way at this λ, by its Schur complement: up to 2e-9 with 1e15.
         whole = lam**2 * parts[0] + lam * parts[1] + parts[2]
         inner, there = whole[np.ix_(chosen, chosen)], whole[np.ix_(chosen, free)]
-        nearly = eigenvalues(*rest[:2], rest[2] - whole[np.ix_(free, chosen)] @ np.linalg.solve(inner, there))
+        nearly = eigenvalues(rest[0], rest[1], rest[2] - whole[np.ix_(free, chosen)] @ np.linalg.solve(inner, there))
         exact = nearly[np.argmin(np.abs(nearly - lam))]
         assert np.abs(values - exact).min() <= 1e-9 * abs(exact)
 
