@@ -83,6 +83,17 @@ def test_islands_are_seen(seeds: range, tmp_path: Path) -> None:
     assert not wrong, "\n".join(wrong)
 
 
+def test_one_that_begins_beside_another_that_grows(tmp_path: Path) -> None:
+    """The squares 1e4 μ − 6e3 ± √(1e6 − (1200 μ)²) pass zero one after the other; from μ = 0.83 on they are a pair."""
+    friction = np.array([[-1e4, 1200.0], [-1200.0, -1e4]])
+    found = st.onsets(case_of((np.eye(2), 0.01 * np.eye(2), np.diag([5e3, 7e3]), friction), tmp_path))
+    assert [(o.kind, o.roots) for o in found] == [("divergence", 1)] * 2
+    first, second = (o.mu for o in found)
+    said = f" Of the growing motions without oscillation, at μ = {second:.6g} one begins and another grows already."
+    assert said in found.completeness
+    assert f"{first:.6g}" not in found.completeness
+
+
 def test_how_closely_that_was_looked_at_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A symmetric pair that never meets: nothing is foretold, and the even values are counted."""
     plain = (np.eye(2), 0.1 * np.eye(2), np.diag([1e4, 9e4]), np.diag([1e3, 2e3]))

@@ -47,6 +47,8 @@ def test_a_pair_that_falls_apart_and_loses_a_half(tmp_path: Path) -> None:
     found = problem.solve(tmp_path)
     assert [(o.kind, o.roots) for o in found.onsets] == [("flutter", 2), ("divergence", -1)]
     ends = found.onsets[-1].mu
+    said = f" Of the growing motions without oscillation, at μ = {ends:.6g} one ends and another goes on."
+    assert said in found.completeness
     count = [int(np.sum(problem.eigenvalues(mu).real > 1e-9)) for mu in (ends - 1e-6, ends + 1e-6)]
     assert count == [2, 1]
 

@@ -8,12 +8,14 @@ import numpy as np
 
 from ..quadratic import RegionModes
 from .basis import Projected
+from .branches import all_values
 from .counted import Passing
 from .family import Family
 from .growth import growing_roots, unstable
-from .search import Answer
+from .search import SMALL, Answer
 
 MOST = 4  # places that are named one by one
+BARELY = 1e-4  # of the highest frequency: what is no faster may be the one that begins or ends
 
 
 def sentence(
@@ -27,7 +29,7 @@ def sentence(
     numbers = f"{_modes(first)} at {name} = {low} and {last} at {name} = {high}"
     if where:
         numbers = f"{where} {numbers}"
-    passing = _passing(answer.passing, name, value)
+    passing = _passing(answer.passing, name, value) + _beside(family, answer, top, name, value)
     if not answer.complete:
         numbers += "" if where else ", found in the full problem"
         return f"Not complete: {numbers}, but {_lacking(answer, name, value)}.{passing}"
@@ -37,8 +39,8 @@ def sentence(
         why = f": {answer.why}" if answer.why else ""
         if answer.walked:
             return (
-                f"{how}: {numbers}. Onsets were sought along the imaginary axis, at {answer.walked} frequencies up to "
-                f"{top / (2 * np.pi):g} Hz, and branches not followed{why}."
+                f"{how}: {numbers}.{passing} Onsets were sought along the imaginary axis, at {answer.walked} "
+                f"frequencies up to {top / (2 * np.pi):g} Hz, and branches not followed{why}."
             )
         return (
             f"{how}: {numbers}.{passing} Onsets were enclosed by that count, and branches not followed{why}; growth "
@@ -119,6 +121,29 @@ def _passing(passing: tuple[Passing, ...], name: str, value: Callable[[float], f
     ]
     more = f"; {len(passing) - MOST} more do one or the other" if len(passing) > MOST else ""
     return f" Of the growing modes {'; '.join(told)}{more}."
+
+
+def _beside(family: Family, answer: Answer, top: float, name: str, value: Callable[[float], float]) -> str:
+    """Divergences that begin or end while another motion without oscillation grows: half of a growing pair that reached
+    the real axis ends, and the mode grows on; or one more begins, and both may become a growing pair."""
+    if family.size > SMALL:
+        return ""
+    told = list[str]()
+    for one in answer.onsets:
+        if one.kind != "divergence" or len(told) == MOST:
+            continue
+        values = all_values(family, one.mu, top)
+        # In the band, as everywhere: rigid contacts have infinite ones, of which rounding makes any number.
+        real = values[(values.imag == 0) & (np.abs(values) <= top)]
+        # Without the one at zero.
+        others = np.delete(real, np.argmin(np.abs(real))) if len(real) else real
+        count = int(np.count_nonzero(unstable(family, others, top, BARELY)))
+        if count:
+            ends, on = ("ends", "goes on") if one.stabilising else ("begins", "grows already")
+            number = "another" if count == 1 else f"{count} others"
+            on = on if count == 1 else on.replace("goes", "go").replace("grows", "grow")
+            told.append(f"at {name} = {value(one.mu):.6g} one {ends} and {number} {on}")
+    return f" Of the growing motions without oscillation, {'; '.join(told)}." if told else ""
 
 
 def _across(family: Family, answer: Answer, ends: tuple[RegionModes, RegionModes], top: float) -> str:
