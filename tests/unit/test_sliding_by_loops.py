@@ -753,8 +753,11 @@ def test_larger_models_and_single_values_are_looked_at_less_and_more(monkeypatch
 def test_where_there_is_no_steady_sliding_it_is_said_from_where_on(monkeypatch) -> None:
     system, _ = model(monkeypatch, [(1.0, 0.0)], none_beyond=0.5)
     found = stretches.stretches(system, 0.0, 0.9)
-    assert [s.reason for s in found] == ["", "it tips over"]
+    assert [s.reason.partition(";")[0] for s in found] == ["", "it tips over"]
+    assert float(found[1].reason.rpartition(" = ")[2]) == pytest.approx(found[1].at, rel=1e-5)
+    # The last μ looked at that has an equilibrium ends what can be solved.
     assert found[0].high == found[1].low == pytest.approx(0.5, abs=1e-3)
+    assert found[0].high <= 0.5 < found[1].at
     assert (found[1].touching, found[1].at) == (0, found[1].at)
     assert found[1].at is not None
 
@@ -767,9 +770,23 @@ def test_nothing_is_looked_at_where_nothing_can_change(monkeypatch) -> None:
         vars(system).update(changes)
         assert stretches.stretches(system, 0.1, 0.5) == whole
         assert asked == []
+
+
+def test_own_friction_without_steady_sliding_says_nothing_of_others(monkeypatch) -> None:
+    system, _ = model(monkeypatch, LINES, own=0.9, none_beyond=0.5)
+    found = stretches.stretches(system, 0.0, 0.4)
+    assert [(s.high, s.touching, s.reason) for s in found] == [
+        (pytest.approx(0.31, abs=1e-9), 3, ""), (pytest.approx(0.33, abs=1e-9), 2, ""), (0.4, 3, ""),
+    ]  # fmt: skip
+    assert all(s.at is not None and s.low <= s.at <= s.high for s in found)
+    assert stretches.instead_of_own(system, 0.0, 0.4) == pytest.approx(0.2)
+    assert stretches.instead_of_own(system, 0.3, 0.8) == 0.3
+    assert stretches.instead_of_own(system, 0.6, 0.8) is None
+    # Where there is none at the low end either, no more is looked at.
     system, asked = model(monkeypatch, LINES, none_beyond=-1.0)
-    assert stretches.stretches(system, 0.1, 0.5) == whole
-    assert len(asked) == 1
+    assert stretches.stretches(system, 0.1, 0.5) == (Stretch(0.1, 0.5, None, 0, 4, "it tips over; that is at μ = 0.1"),)
+    assert len(asked) == 2
+    assert stretches.instead_of_own(model(monkeypatch, LINES)[0], 0.0, 0.4) is None
 
 
 def test_many_changes_are_taken_in_equal_parts(monkeypatch) -> None:

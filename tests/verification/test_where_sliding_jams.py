@@ -76,6 +76,18 @@ def test_what_is_asked_for_does_not_depend_on_a_case_that_jams_at_its_own_fricti
     assert modes.unstable.sum(axis=1).tolist() == [0, 1]
 
 
+def test_a_reduced_model_holds_the_nodes_of_its_own_range() -> None:
+    linear = {"springs.a.cubic": 0.0}
+    usual, jammed = (
+        st.reduced_model(two_masses(mu).with_(linear), {"mu": (0.0, 1.0)}, max_frequency_hz=1.0) for mu in (0.3, 1.5)
+    )
+    told = [str(getattr(model.problem, "notes", ())) for model in (usual, jammed)]
+    assert "are held at every μ" not in told[0]
+    assert "touch at μ = 0.5 are held at every μ" in told[1]
+    values = [np.sort_complex(model.modes({"mu": 0.8}).values) for model in (usual, jammed)]
+    np.testing.assert_allclose(values[0], values[1], rtol=1e-8, atol=1e-8)
+
+
 def test_no_steady_sliding_is_told_with_the_friction() -> None:
     case = two_masses(1.5)
     with pytest.raises(AnalysisError, match=r"that is at μ = 1\.4"):
@@ -102,3 +114,18 @@ def test_an_onset_needs_nothing_beyond_the_range(monkeypatch: pytest.MonkeyPatch
     assert found.exceptional_mu is None
     assert found.mu == pytest.approx(known.mu, rel=1e-9)
     assert found.growth_slope == pytest.approx(known.growth_slope, rel=1e-4)
+
+
+def test_a_map_of_dampings_below_the_case_s_own_friction() -> None:
+    # The upper spring of the mass that flutters, and the other's, are damped.
+    linear = {"springs.a.cubic": 0.0}
+    usual, jammed = (
+        st.damping_map(
+            two_masses(mu).with_(linear), "springs.k1.damping", "springs.k2.damping", x_range=(0.01, 0.05),
+            y_range=(0.01, 0.05), grid=(2, 2), mu_range=(0.0, 1.0), method="full",
+        )
+        for mu in (0.3, 1.5)
+    )  # fmt: skip
+    assert np.all(np.isfinite(usual.onset_mu))
+    np.testing.assert_allclose(jammed.onset_mu, usual.onset_mu, rtol=1e-9)
+    np.testing.assert_allclose(jammed.slope_x, usual.slope_x, rtol=1e-6)

@@ -132,6 +132,18 @@ def stretch_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
     return tuple(told)
 
 
+def instead_of_own(system: System, low: float, high: float, *, solver: str | None = None) -> float | None:
+    """The μ from low to high whose touching nodes are held where there is no steady sliding at the case's own friction;
+    None where there is, or nowhere in the middle or at the ends either."""
+    nodes = system.contact_nodes()
+    if not nodes.count or not system.loads or system.load_steps:
+        return None
+    search = _Equilibria(system, solver)
+    if search.own() is not None:
+        return None
+    return next((mu for mu in (0.5 * (low + high), low, high) if search.at(mu).found is not None), None)
+
+
 def elsewhere_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
     """A sentence where a model that holds the nodes of the case's own friction has others than steady sliding."""
     others = [s for s in found if s.at is not None or s.reason]

@@ -26,6 +26,7 @@ from ..modal.over_friction import modes_of_band, onsets_of_band
 from ..modal.receptance_modes import prepare
 from ..modal.source import by_receptance, require_full
 from ..sliding import taken_as_closed
+from ..sliding.stretches import instead_of_own
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
 from ..temporal.settings import Settings
@@ -249,9 +250,8 @@ def found_onsets(
         result = onsets_of_band(work.system(), between, max_frequency_hz, damped=damped, options=options)
         notes = (*taken_as_closed(work.system()), *decided_by_meshes(work.system(), solver=options.solver))
     else:
-        result = solve_onsets(
-            work.system(), between, max_frequency_hz=max_frequency_hz, damped=damped, **asdict(options)
-        )
+        held = work.system().touching(instead_of_own(work.system(), *between, solver=options.solver))
+        result = solve_onsets(held, between, max_frequency_hz=max_frequency_hz, damped=damped, **asdict(options))
         notes = taken_as_closed(work.system())
     return replace(result, notes=(*result.notes, *notes))
 

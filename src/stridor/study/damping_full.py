@@ -13,6 +13,7 @@ from ..modal.derivatives import HeldContacts, Mode, PencilChange, by_friction, p
 from ..modal.krylov.steady import touching_nodes
 from ..modal.onsets import Onset
 from ..modal.pencil import Pencil
+from ..sliding.stretches import instead_of_own
 from .analyses import found_onsets
 from .sensitivities import number_at
 from .workspace import Workspace
@@ -75,7 +76,7 @@ def onset_slopes(
 ) -> list[float]:
     """dμ_c/dp of an onset with damping for numbers of the case. Raises AnalysisError where it has no derivative."""
     options, mu = work.options, onset.mu
-    system, held = work.system(mu), _held(work, mu_range[0])
+    system, held = work.system(mu), _held(work, mu_range)
     pencil = pencil_of(system, mu, held, options)
     lam = 2j * np.pi * onset.frequency_hz
     if not abs(lam):
@@ -91,12 +92,14 @@ def onset_slopes(
     return [-_derivative(work, mode, path, mu, held).real / by_mu for path in paths]
 
 
-def _held(work: Workspace, lowest: float) -> HeldContacts:
-    """The nodes that touch where the search for onsets has them touch: in steady sliding with the laws' own friction,
-    not with that of the onset, which other nodes may do. lowest: the low end of the range of μ."""
+def _held(work: Workspace, mu_range: tuple[float, float]) -> HeldContacts:
+    """The nodes that touch where the search for onsets has them touch: in steady sliding with the laws' own friction
+    where there is any, not with that of the onset, which other nodes may do."""
     at = work.own_friction if work.varies else None
-    at = lowest if work.varies and at is None else at
+    at = mu_range[0] if work.varies and at is None else at
     system = work.system(at)
+    if not work.varies:
+        at = instead_of_own(system, *mu_range, solver=work.options.solver)
     nodes = system.contact_nodes()
     steady = touching_nodes(system, nodes, at, work.options.solver)
     return HeldContacts(np.flatnonzero(steady.active), steady.sense, steady.stuck, system.size, nodes.count)

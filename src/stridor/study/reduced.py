@@ -14,7 +14,7 @@ from ..case.expression import parse_expression
 from ..case.matrix_checks import MU
 from ..case.points import choice
 from ..errors import AnalysisError, CaseError
-from ..sliding.stretches import elsewhere_words, stretches
+from ..sliding.stretches import HELD, elsewhere_words, instead_of_own, stretches
 from ..system import System, build_system
 from ..system.imported import ImportedTerm
 from ..system.shares import system_shares
@@ -106,9 +106,14 @@ def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> Co
         tuple(p for p in parameters if p.name not in exact),
     )
     solver = None if settings.solver == "auto" else settings.solver
-    problem = contacts_problem(family, options=Options(settings.friction_damping, settings.prestress, solver))
-    notes = problem.notes if settings.damped else (*problem.notes, DAMPED)
     friction = next((p for p in parameters if p.name == FRICTION), None)
+    instead = None if friction is None else instead_of_own(numbers.own, friction.low, friction.high, solver=solver)
+    options = Options(settings.friction_damping, settings.prestress, solver)
+    problem = contacts_problem(family, touching_at=instead, options=options)
+    notes = problem.notes if settings.damped else (*problem.notes, DAMPED)
+    if instead is not None:
+        held = f"The nodes that touch at μ = {instead:g} {HELD}: there is no steady sliding at the case's own friction."
+        return replace(problem, notes=(*notes, held))
     # Where steady states are solved for, the problem has told of what it holds.
     if friction is not None and numbers.own.contact_nodes().count and not problem.notes:
         notes = (*notes, *elsewhere_words(stretches(numbers.own, friction.low, friction.high, solver=solver)))
