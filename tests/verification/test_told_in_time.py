@@ -133,7 +133,7 @@ def test_bisection_in_time_passes_by_what_is_not_told(monkeypatch: pytest.Monkey
 
     def marched(system: object, mu: float, **_: object) -> SimpleNamespace:
         untold = "" if abs(mu - 0.5) > silent else "too short"
-        return SimpleNamespace(grows=mu > 0.5 and not untold, untold=untold, left=mu > 0.7)
+        return SimpleNamespace(grows=mu > 0.5 and not untold, untold=untold, grown=mu > 0.7)
 
     monkeypatch.setattr(critical, "perturb", marched)
     if silent > 0.2:

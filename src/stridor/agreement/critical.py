@@ -52,11 +52,11 @@ def critical_friction(
         if known is not None:
             return known
         found = perturb(system, mu, settings=settings, max_frequency_hz=max_frequency_hz, sign=True)
-        if found.untold and not found.left:
+        if found.untold and not found.grown:
             whys[mu] = found.untold
             return None
         # What leaves the linear range has grown, by whatever component.
-        does = found.grows or found.left
+        does = found.grows or found.grown
         if kept is not None:
             kept.put("critical step", mu, {"grows": does})
         return does

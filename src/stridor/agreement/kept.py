@@ -52,6 +52,7 @@ def perturbation_data(p: Perturbation) -> dict[str, Any]:
         "amplitudes": [float(v) for v in p.components.amplitudes],
         "untold": p.untold,
         "left": p.left,
+        "grown": p.grown,
     }
 
 
@@ -62,7 +63,7 @@ def perturbation_of(mu: float, data: Plain) -> Perturbation:
     signal = np.array(data["signal"], dtype=float)
     return Perturbation(
         mu, complex(*data["eigenvalue"]), signal, float(data["sampling"]), components,
-        untold=str(data["untold"]), left=bool(data["left"]),
+        untold=str(data["untold"]), left=bool(data["left"]), grown=bool(data["grown"]),
     )  # fmt: skip
 
 

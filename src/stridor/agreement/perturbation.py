@@ -24,11 +24,12 @@ from ..sliding import full_motion
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.settings import Settings, choose_step
+from ..temporal.signals import low_passed
 from ..temporal.simulate import plan, simulate
 from ..threads import one_thread
 from ..typing import Array, ComplexArray, IntArray, Sparse
 from .shapes import component_shape, node_rows
-from .small_motion import DIED, PERTURBATION, Perturbation, linear_parts, small_until, whole
+from .small_motion import DIED, LINEAR, PERTURBATION, Perturbation, linear_parts, small_until, whole
 from .told import ABOVE, certain, told
 
 TOLD_APART = 40  # modes, each of two poles, that `components` tells apart in one signal
@@ -120,7 +121,8 @@ def perturb(
         band, limit = told(signals, run.sampling, max_frequency_hz, top)
         sure = certain(signals, run.sampling, limit, band, sign=sign)
         left = small_until(moving, speed[leaders]) < len(moving)
-        sure &= band.fastest.real > 0.0 or not left
+        grown = left and _within(signals, run.sampling, max_frequency_hz) > 0.1 * LINEAR * speed[leaders].min()
+        sure &= band.fastest.real > 0.0 or not grown
         if sure or left or length >= longest:
             break
         length = min(LONGER * length, longest)
@@ -131,7 +133,12 @@ def perturb(
         form = component_shape(bodies, run.time[part], motion, band.eigenvalues, band.fastest, limit, lam)
     signal = signals[:, 0] if signals.size else np.zeros(0)
     why = "" if sure else _too_short(len(signal) * run.sampling, lam, left=left)
-    return Perturbation(mu, band.fastest, signal, run.sampling, band, form, why, left)
+    return Perturbation(mu, band.fastest, signal, run.sampling, band, form, why, left, grown)
+
+
+def _within(signals: Array, sampling: float, max_frequency_hz: float) -> float:
+    """The largest of signals (k, c) within the band: what leaves the linear range may lie beyond it."""
+    return float(np.abs(low_passed(signals.T, sampling, max_frequency_hz)).max(initial=0.0))
 
 
 def _too_short(length: float, lam: ComplexArray, *, left: bool) -> str:

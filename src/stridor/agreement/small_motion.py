@@ -26,7 +26,7 @@ class Perturbation:
     the signal (slip speed minus its steady value) [m/s] where it is linear, its sampling [s], and every
     component found in it. shape: how nodes move in the fastest, None where it was not asked for or cannot be told.
     untold: why the signal does not tell the fastest apart from the others, "" where it does. left: whether it grew out
-    of the linear range, by whichever component."""
+    of the linear range, grown: within the frequency range, by whichever component."""
 
     mu: float
     eigenvalue: complex
@@ -36,6 +36,7 @@ class Perturbation:
     shape: TimeShape | None = None
     untold: str = ""
     left: bool = False
+    grown: bool = False
 
     @property
     def growth_rate(self) -> float:
