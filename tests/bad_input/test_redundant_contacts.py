@@ -67,10 +67,11 @@ TAIL = (
 )  # fmt: skip
 def test_a_mass_on_more_flats_than_it_has_freedoms(normals: list[tuple[float, float]], said: str) -> None:
     case = loads(flats(*normals))
-    for call in (st.steady_sliding, lambda c: st.modes(c, 0.1)):
+    calls = ((st.steady_sliding, ""), (lambda c: st.modes(c, 0.1), "; that is at μ = 0.1"))
+    for call, where in calls:
         with pytest.raises(AnalysisError) as caught:
             call(case)
-        assert str(caught.value) == TWICE + said + TAIL
+        assert str(caught.value) == TWICE + said + TAIL + where
 
 
 def test_as_many_as_it_has_freedoms_are_told_apart() -> None:
