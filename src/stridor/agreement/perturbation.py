@@ -121,7 +121,8 @@ def perturb(
         band, limit = told(signals, run.sampling, max_frequency_hz, top)
         sure = certain(signals, run.sampling, limit, band, sign=sign)
         left = small_until(moving, speed[leaders]) < len(moving)
-        grown = left and _within(signals, run.sampling, max_frequency_hz) > 0.1 * LINEAR * speed[leaders].min()
+        moved_within = _within(signals, run.sampling, max_frequency_hz)
+        grown = left and bool(moved_within > 0.1 * LINEAR * speed[leaders].min())
         sure &= band.fastest.real > 0.0 or not grown
         if sure or left or length >= longest:
             break
