@@ -293,7 +293,7 @@ def test_run_writes_a_self_contained_report(folder: Path) -> None:
         (
             ("onsets", "two-beams.toml", "--set", "loads.press.force=[0.0, 20.0]"),
             1,
-            "stridor: steady sliding has no equilibrium: the structure can move freely under its loads; contacts that would pull: A; fix a freedom of the loose body, or turn the load so that it presses the bodies together",
+            "stridor: steady sliding has no equilibrium: body beam1 can move freely under the loads; fix a freedom of the loose body, or turn the load so that it presses the bodies together; that is at μ = 0",
         ),
         (("onsets", "two-beams.toml", "--set", "contacts.A.friction.coefficient=-0.1"), 2, None),
     ],

@@ -76,7 +76,7 @@ def stretches(
     search = _Equilibria(system, solver)
     own = search.own()
     if own is None and (first := search.at(low)).found is None:
-        return (Stretch(low, high, None, 0, nodes.count, search.own_reason or first.reason),)
+        return (Stretch(low, high, None, 0, nodes.count, first.reason),)
     count = LOOKS if system.size <= SMALL else FEWER
     asked = np.asarray(at if len(at) <= LOOKS else (), dtype=float)
     looks = [search.at(float(mu)) for mu in np.unique(np.append(np.linspace(low, high, count), asked))]
@@ -167,14 +167,12 @@ class _Equilibria:
         self._system, self._solver = system, solver
         self._known: dict[float, _Look] = {}
         self._guess: BoolArray | None = None
-        self.own_reason = ""
 
     def own(self) -> bytes | None:
         """The key of the laws' own coefficients; None where there is no steady sliding."""
         try:
             found = self._solved(None)
-        except AnalysisError as error:
-            self.own_reason = str(error)
+        except AnalysisError:
             return None  # what is asked of others needs it not
         self._guess = found.active
         return _key(found)
