@@ -276,7 +276,7 @@ def components(signal: Array, sampling: float, *, max_frequency_hz: float, order
         return nothing
     rows = min(count // 2, WIDEST)
     windows = np.lib.stride_tricks.sliding_window_view(reduced, count - rows + 1, axis=0)
-    hankel = windows.reshape(rows, -1)
+    hankel = windows.reshape(len(windows), -1)
     # Its rows are far shorter than its columns are many: the triangle has the same left vectors.
     left, values, _ = sl.svd(sl.qr(hankel.T, mode="r")[0][:rows].T, check_finite=False)
     rank = int(min(order, rows - 1, max(2, np.sum(values > PENCIL_TOLERANCE * values[0]))))
