@@ -452,6 +452,7 @@ if __name__ == "__main__":
     import stopped
 
     who, where = sys.argv[1:]
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background may have switched it off
     if who == "program":
         interrupts.install()
     elif who == "page":  # has a handler of its own

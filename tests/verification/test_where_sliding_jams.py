@@ -61,8 +61,8 @@ def test_onsets_below_the_friction_at_which_something_jams() -> None:
     low, high = found.friction_range
     assert low == 0.0
     assert JAM - 2e-3 < high < JAM
-    assert not found.complete
-    assert found.completeness.startswith("NOT COMPLETE: there is no steady sliding at μ = 1.32")
+    # What is said of them is said of the range up to there, and that nothing was solved beyond beside it.
+    assert "NOT COMPLETE" not in found.completeness
     assert any("nothing was solved" in note and "that is at μ = 1.32" in note for note in found.notes)
 
 

@@ -25,7 +25,6 @@ from .full.basis import WHOLE
 from .growing import UNCHECKED, growing_modes
 from .joined import TouchingChange, joined_modes, joined_onsets, rows_of
 from .krylov import Carried
-from .onset import NOT_COMPLETE
 from .onsets import Onsets, onsets
 from .options import Options
 from .results import ComplexModes, Progress
@@ -254,7 +253,4 @@ def _solved_onsets(
 
     parts = with_origins(parts, wider, residual)
     found = joined_onsets(parts, (solid[0].low, solid[-1].high), border, residual)
-    jammed = ", ".join(f"{s.low:.4g} to {s.high:.4g}" for s in over if s.reason)
-    lacking = f"{NOT_COMPLETE}: there is no steady sliding at μ = {jammed}. " if jammed else ""
-    completeness = f"{lacking}{found.completeness}".strip()
-    return replace(found, completeness=completeness, notes=(*found.notes, *stretch_words(over)))
+    return replace(found, notes=(*found.notes, *stretch_words(over)))

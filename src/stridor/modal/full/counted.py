@@ -20,7 +20,7 @@ from ..dense_problem import Eigenpairs
 from ..newton import Root, crossing, meeting, standstill
 from ..onset import Onset
 from ..quadratic.polish import pairs
-from ..tolerances import AT_REST
+from ..tolerances import AT_REST, UNSTABLE_RELATIVE
 from .basis import Along
 from .family import Family
 from .foretold import SLOWEST, changes_within
@@ -30,6 +30,8 @@ from .opening import Opening
 GRID = {False: 96, True: 24}  # intervals to begin with, on a basis and by full solves
 ON_IT = 1e-6  # of the range: so near an onset growth may be rounding
 SMALLEST = 1e-9  # of the range: no interval is halved further
+UNSURE = 2.0  # times where growth reaches what counts, by the slope of an onset
+CLOSEST = 0.05  # of the range: farther from an onset every value is judged
 ALONE = 1e-4  # of the range: an interval in which one mode changes is short enough for Newton from here on
 STILL = 1e-3  # of the highest frequency: slower than that may be divergence
 NEARBY = 0.05  # of |λ|: how far from where slopes lead it to a growing mode may be in the next interval's end
@@ -73,8 +75,9 @@ class Counted:
         low, high = self.grid[0][0], self.grid[-1][0]
         near = ON_IT * (high - low)
         judged = [
-            (mu, n) for mu, n in self.grid if mu in (low, high) or all(abs(o.mu - mu) > near for o in onsets)
-        ]
+            (mu, n) for mu, n in self.grid
+            if mu in (low, high) or all(abs(o.mu - mu) > max(near, _unseen(o, high - low)) for o in onsets)
+        ]  # fmt: skip
         lacks: list[Lack] = []
         for (before, number), (after, later) in pairwise(judged):
             start, stop = before - near * (before == low), after + near * (after == high)
@@ -90,6 +93,14 @@ class Counted:
             if not said - most <= later - number <= said - least:
                 lacks.append(Lack(before, after, later - number, said))
         return lacks
+
+
+def _unseen(onset: Onset, width: float) -> float:
+    """How far from an onset growth with its slope may still be too slow to count as growth, in a range so wide."""
+    if not onset.growth_slope:
+        return 0.0
+    slowest = UNSTABLE_RELATIVE * 2 * np.pi * onset.frequency_hz
+    return float(min(UNSURE * slowest / abs(onset.growth_slope), CLOSEST * width))
 
 
 @dataclass(frozen=True)
