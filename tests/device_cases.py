@@ -23,6 +23,7 @@ from stridor.temporal.trajectory import Trajectory
 
 NAMES = ("legs", "beta2", "contacts")
 ALONE = "alone"  # the last track of the first
+SHARED = {"legs": 48 * 1024, "beta2": 1200, "contacts": 0}  # bytes for the member and its modes, for its rows, for none
 SIZES = {"bodies.beam1.elements": 2, "bodies.beam2.elements": 3, "temporal.step": None, "temporal.record_every": 3}
 PRESS = PhaseSpec("press", 2e-4, {}, {"clamp": 0.0}, 1e-4)
 SLIDE = PhaseSpec("slide", 2e-4, {}, {"clamp": 1.0}, 5e-5)
@@ -104,6 +105,8 @@ if __name__ == "__main__":
     sys.setswitchinterval(1e-5)  # threads wait for each other at every turn
     device.THREADS, device.LONGEST = 4, 70  # a thread of Python each; several launches
     for one in NAMES:
+        device_kernel.SHARED = SHARED[one]
         np.savez(Path(sys.argv[1]) / f"{one}.npz", **numbers(*run_on("gpu", made(one))))
+    device_kernel.SHARED = SHARED[NAMES[0]]
     last = replace(made("legs"), tracks=made("legs").tracks[-1:])
     np.savez(Path(sys.argv[1]) / f"{ALONE}.npz", **numbers(*run_on("gpu", last)))

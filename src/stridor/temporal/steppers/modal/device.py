@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ....reading import memory
 from ....system import System
 from ....system.uncoupled import UncoupledModes
 from ....typing import Array
@@ -18,13 +19,14 @@ from ...columns import CONTACT_RECORD
 from ...legs import Acting
 from .batch import MemberBatch
 from .batch_kernel import BatchRecord
-from .device_kernel import GROUP, DeviceMembers, DeviceModel, cuda, run_members, shared_bytes
+from .device_kernel import DeviceMembers, DeviceModel, cuda, places_of, run_members, shared_numbers
 from .machine import Machine
 
 LONGEST = 50_000  # steps of one launch, between which it is asked whether to go on
 LAUNCH_BYTES = 2**28  # of records and of what acts, that one launch may take on the device
-THREADS = 128  # of a block
-HOST_BYTES = 2**31  # of records that are kept until the members of a block are finished
+THREADS = 32  # of a block: those that the GPU steps together
+HOST_BYTES = 2**31  # of records that are kept until the members of a block are finished, at least
+HOST_SHARE = 0.25  # of this computer's memory, where that is more
 
 
 def most_members(system: System, watched: int, records: float, free: float) -> int:
@@ -32,7 +34,8 @@ def most_members(system: System, watched: int, records: float, free: float) -> i
     contacts, points = len(system.contacts), 2 * watched
     recorded = 8 * records * (CONTACT_RECORD * contacts + 3 * points)
     states = 8 * (5 * system.size + 60 * (contacts + 2))
-    return max(1, int(min(HOST_BYTES / max(recorded, 1.0), (0.8 * free - LAUNCH_BYTES) / states, 2**16)))
+    host = max(HOST_BYTES, HOST_SHARE * memory())
+    return max(1, int(min(host / max(recorded, 1.0), (0.8 * free - LAUNCH_BYTES) / states, 2**16)))
 
 
 class DeviceBatch(MemberBatch):
@@ -71,23 +74,22 @@ class DeviceBatch(MemberBatch):
         k, states = self.members, self.states
         ud, q = self.fields.ud[:, :k], self.fields.q[:, :k]
         fields = np.stack([ud[0::2].T, ud[1::2].T, q.T, np.zeros_like(q.T)], axis=1)
-        none = np.zeros_like(states.value)
         predicted = self.fields.pull[:, :k].T
-        return DeviceMembers(
-            friction=self.friction,
-            fields=fields,
-            rows=np.stack([predicted, states.value, states.rate, none, none, none], axis=1),
-            contacts=np.zeros((k, 4, weights[0])),
-            weights=np.zeros((k, 2, *weights)),
-            status=states.status,
-            statistics=states.statistics,
-            counters=states.counters,
-            motion=states.motion,
-            coefficients=self.fields.coefficients[:, :k].T,
-            acting_loads=np.zeros((k, 2, len(self.system.loads))),
-            acting_motion=np.zeros((k, 2, self.table.motions)),
-            lost=self.lost,
+        coefficients = self.fields.coefficients[:, :k].T
+        places = places_of(
+            self.table.force_rows + 1, weights[0], self.table.motions, coefficients.shape[1], len(self.system.loads)
         )
+        numbers = np.zeros((k, places.end))
+        at = places.statistics
+        self._numbers, self._statistics = numbers, numbers[:, at : at + states.statistics[0].size]
+        for at, part in (
+            (0, np.concatenate([predicted, states.value, states.rate], axis=1)),
+            (places.motion, states.motion.reshape(k, -1)), (places.coefficients, coefficients),
+        ):  # fmt: skip
+            numbers[:, at : at + part.shape[1]] = part
+        self._whole = np.concatenate([states.status, states.counters], axis=1)
+        self._sizes = self._whole.shape[1], fields.shape[2]
+        return DeviceMembers(self.friction, fields, numbers, self._whole, self.lost)
 
     def longest(self, every: int) -> int:
         """How many steps one launch takes: what fits into ``LAUNCH_BYTES``."""
@@ -101,23 +103,26 @@ class DeviceBatch(MemberBatch):
         model, members = self._model, self._members._replace(friction=_sent(self.friction)[0])
         kept, every = int(record.kept[0]), record.every
         count = -(-(self.done + steps) // every) - -(-self.done // every)
-        members.statistics.copy_to_device(self.states.statistics)
+        self._statistics[:] = self.states.statistics.reshape(self.members, -1)
+        members.numbers.copy_to_device(self._numbers)
         contacts = cuda.device_array((count, *record.contacts.shape[1:]))
         watched = cuda.device_array((count, *record.watch.shape[1:]))
         lift, before = self._record
         own = BatchRecord(every, contacts, watched, model.whole, model.table, before, lift)
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Grid size")  # of few blocks: members are as many as they are
-            run_members[self.members, THREADS, 0, shared_bytes(THREADS)](
-                steps, self.done, 0, self.scheme, model, members, Acting(*_sent(*acting)), own
+            warnings.filterwarnings("ignore", ".*Grid size")  # of few blocks: members are as many as they are
+            size, inside = shared_numbers(THREADS, self._numbers.shape[1], *self._sizes)
+            run_members[self.members, THREADS, 0, 8 * size](
+                steps, self.done, 0, inside, self.scheme, model, members, Acting(*_sent(*acting)), own
             )
         for sent, ours in (
-            (members.statistics, self.states.statistics), (members.counters, self.states.counters),
-            (members.lost, self.lost), (contacts, record.contacts[kept : kept + count]),
-            (watched, record.watch[kept : kept + count]),
+            (members.numbers, self._numbers), (members.whole, self._whole), (members.lost, self.lost),
+            (contacts, record.contacts[kept : kept + count]), (watched, record.watch[kept : kept + count]),
         ):  # fmt: skip
             if ours.size:
                 sent.copy_to_host(ours)
+        self.states.statistics[:] = self._statistics.reshape(self.states.statistics.shape)
+        self.states.counters[:] = self._whole[:, -self.states.counters.shape[1] :]
         record.kept[0] += count
         self.done += steps
 
@@ -128,5 +133,5 @@ def _sent(*arrays: Any) -> list[Any]:
 
 
 def _filled(rows: Array) -> Array:
-    """Rows filled up with zero to whole groups, at least one."""
-    return np.pad(rows, ((0, -len(rows) % GROUP if len(rows) else GROUP), (0, 0)))
+    """Rows filled up with zero to pairs, at least one."""
+    return np.pad(rows, ((0, len(rows) % 2 if len(rows) else 2), (0, 0)))
