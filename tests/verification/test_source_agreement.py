@@ -142,7 +142,7 @@ def test_solids_by_every_source_that_takes_them():
     """A block rubbing along a slider, eight nodes of contact over a surface."""
     text = rubbing_block("max_frequency_hz = 15e3\nfriction_range = [0.0, 0.8]")
     system = build_system(st.loads(text))
-    assert [source.name for source in sources_for(system)] == ["krylov", "full"]
+    assert [source.name for source in sources_for(system, Options())] == ["krylov", "full"]
     assert_same(system, NAMES[1:], band=15e3, end=0.4)
 
 

@@ -102,12 +102,13 @@ def report(
     stored: Sequence[StoredMatrix] = (),
     stiffness_terms: Sequence[Sparse] = (),
     contacts: Sequence[str] = (),
+    supports: Sequence[str] = (),
 ) -> MatrixReport:
     """Looks through mass, damping and stiffness, each (n, n); no damping is zero damping.
 
     labels: of the n freedoms. stored: the files the matrices are from, for what these say of themselves.
     stiffness_terms: (n, n) each, what adds up to the stiffness, where that is known. contacts: names of those that are
-    made beside the matrices, whose friction these need not hold. Raises
+    made beside the matrices, whose friction these need not hold; supports: of what holds the body beside them. Raises
     CaseError at "matrices.ROLE" for a matrix that is not square, of another size, or has entries that are not finite.
     """
     size = int(stiffness.shape[0])
@@ -162,7 +163,7 @@ def report(
         warnings=(),
     )
     internal = 0 if kept is None else int(np.sum(kept.node < 0))
-    return replace(found, warnings=tuple(_warnings(found, internal, stored, whole, contacts)))
+    return replace(found, warnings=tuple(_warnings(found, internal, stored, whole, contacts, supports)))
 
 
 def single_lines(stored: StoredMatrix) -> list[str]:
@@ -385,6 +386,7 @@ def _warnings(
     stored: Sequence[StoredMatrix],
     whole: Mapping[str, Sparse],
     contacts: Sequence[str],
+    supports: Sequence[str],
 ) -> list[str]:
     mass, damping, stiffness = whole["mass"], whole["damping"], whole["stiffness"]
     said: list[str] = []
@@ -393,7 +395,7 @@ def _warnings(
     if found.loose:
         many = counted(found.loose, "freedom has", "freedoms have")
         said.append(f"{many} neither mass nor stiffness; K has no inverse")
-    if found.free:
+    if found.free and not supports:
         axes = ", ".join("xyz"[d - 1] for d in found.free)
         said.append(f"nothing in K resists moving the whole model along {axes}; are supports missing?")
     if found.mass == "zero":

@@ -74,7 +74,7 @@ class EigenSource(Protocol):
         """The word a user chooses it by."""
         ...
 
-    def refuses(self, system: System) -> str:
+    def refuses(self, system: System, options: Options) -> str:
         """Why it does not take a system, as far as can be seen without computing; "" if it does."""
         ...
 
@@ -92,8 +92,10 @@ class ReceptanceSource:
 
     name = "receptance"
 
-    def refuses(self, system: System) -> str:
+    def refuses(self, system: System, options: Options) -> str:
         """See `EigenSource`."""
+        if options.prestress and system.stress_stiffness is not None:
+            return "stresses of steady sliding stiffen it (prestress)"
         return no_complete_basis(system)
 
     def modes(self, system: System, values: Array, asked: ModesAsked) -> ComplexModes:
@@ -115,7 +117,7 @@ class KrylovSource:
 
     name = "krylov"
 
-    def refuses(self, system: System) -> str:
+    def refuses(self, system: System, options: Options) -> str:
         """See `EigenSource`."""
         return system.not_symmetric_definite
 
@@ -145,7 +147,7 @@ class ReducedSource:
 
     name = "reduced"
 
-    def refuses(self, system: System) -> str:
+    def refuses(self, system: System, options: Options) -> str:
         """See `EigenSource`."""
         return ""
 
@@ -169,7 +171,7 @@ class FullSource:
 
     name = "full"
 
-    def refuses(self, system: System) -> str:
+    def refuses(self, system: System, options: Options) -> str:
         """See `EigenSource`."""
         return ""
 
@@ -194,27 +196,28 @@ SOURCES: tuple[EigenSource, ...] = (ReceptanceSource(), KrylovSource(), ReducedS
 UNASKED = tuple(source for source in SOURCES if source.name != ReducedSource.name)
 
 
-def sources_for(system: System, name: str | None = None) -> tuple[EigenSource, ...]:
-    """The sources that take a system, the fastest first; with a name that one alone.
+def sources_for(system: System, options: Options) -> tuple[EigenSource, ...]:
+    """The sources that take a system with such options, the fastest first; with a name in them that one alone.
 
     Raises CaseError for a name that none has, AnalysisError where the named one does not take the system.
     """
+    name = options.source
     if name is None:
         # What turned out not to suit receptances is known to suit any matrices alone.
-        first = next(source for source in UNASKED if not source.refuses(system))
+        first = next(source for source in UNASKED if not source.refuses(system, options))
         return (first,) if first is SOURCES[-1] else (first, SOURCES[-1])
     chosen = next((source for source in SOURCES if source.name == name), None)
     if chosen is None:
         names = ", ".join(source.name for source in SOURCES)
         raise CaseError("source", name, f"one of {names}, or none for what suits")
-    if why := chosen.refuses(system):
-        raise AnalysisError(f"source {name}: {why}; {_others(system)}")
+    if why := chosen.refuses(system, options):
+        raise AnalysisError(f"source {name}: {why}; {_others(system, options)}")
     return (chosen,)
 
 
-def by_receptance(system: System) -> bool:
-    """Whether modes at any μ are roots of receptances unless something else is asked for: they cost next to nothing."""
-    return sources_for(system)[0].name == ReceptanceSource.name
+def by_receptance(system: System, options: Options) -> bool:
+    """Whether modes at any μ are roots of receptances unless a source is asked for: they cost next to nothing."""
+    return sources_for(system, replace(options, source=None))[0].name == ReceptanceSource.name
 
 
 def require_full(name: str | None) -> None:
@@ -232,7 +235,7 @@ def answered(
 
     without_following: whether a source that follows no branches is asked where they cannot be told apart.
     """
-    *first, last = sources_for(system, asked.options.source)
+    *first, last = sources_for(system, asked.options)
     for source in first:
         try:
             _log.info("source %s, the fastest that takes %d freedoms", source.name, system.size)
@@ -255,10 +258,10 @@ def answered(
         _log.info("source %s, %s", last.name, chosen)
         return replace(ask(last, asked), source=last.name)
     except Unfit as error:
-        raise Unfit(f"source {last.name}: {error}; {_others(system)}") from error
+        raise Unfit(f"source {last.name}: {error}; {_others(system, asked.options)}") from error
 
 
-def _others(system: System) -> str:
+def _others(system: System, options: Options) -> str:
     """What to ask for instead of a source that does not serve."""
-    fit = [source.name for source in SOURCES if not source.refuses(system)]
+    fit = [source.name for source in SOURCES if not source.refuses(system, options)]
     return f"leave it out for what suits, or take {' or '.join(fit)}"

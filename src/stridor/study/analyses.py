@@ -399,8 +399,9 @@ def friction_curve(problem: Problem, frequency_hz: Array) -> Array:
     μ(ω) = −s (1/K_c + G_nn)/G_nt: its level sets are the branches and its maxima the onsets of flutter
     (docs/theory-modal.md). Raises CaseError for another number of contacts.
     """
-    system = Workspace.of(problem).system()
-    if len(system.contacts) != 1 or not by_receptance(system):
+    work = Workspace.of(problem)
+    system = work.system()
+    if len(system.contacts) != 1 or not by_receptance(system, work.options):
         raise CaseError("contacts", len(system.contacts), "one contact: μ(ω) is a single curve only then")
     spectrum, coupling, _ = prepare(system.undamped())
     h, _ = spectrum.receptance(2j * np.pi * np.asarray(frequency_hz, dtype=float))

@@ -101,7 +101,7 @@ def _search(
     if method == "auto":
         system = work.system()
         # Matrices that depend on μ may be symmetric at one; no receptance is theirs at every other.
-        closed = not work.varies and by_receptance(system)
+        closed = not work.varies and by_receptance(system, work.options)
         if system.size < LARGE or len(xs) * len(ys) < MANY or closed:
             method = "full"
     if method == "full":

@@ -78,6 +78,14 @@ def _report_at(case: Case, name: str, body: MatrixBody, mu: float) -> BodyReport
         raise
 
 
+def _held(case: Case, body: str) -> list[str]:
+    """Names of supports, springs and ties of the case at a body."""
+    ends = {f"supports.{key}": (support.at,) for key, support in case.supports.items()}
+    ends |= {f"springs.{key}": spring.between for key, spring in case.springs.items()}
+    ends |= {f"ties.{key}": (tie.slave, tie.master) for key, tie in case.ties.items()}
+    return [key for key, places in ends.items() if any(p != "ground" and case.location(p).body == body for p in places)]
+
+
 def _report(case: Case, name: str, body: MatrixBody, mu: float | None) -> BodyReport:
     terms = load_terms(case, name, body, mu)
     pairs = zip(terms.shares, terms.values, strict=True)
@@ -86,7 +94,7 @@ def _report(case: Case, name: str, body: MatrixBody, mu: float | None) -> BodyRe
     matrices = report(
         terms.mass, terms.damping, terms.stiffness, labels=terms.labels, stored=terms.stored,
         stiffness_terms=[sp.csr_array(value * share.matrix) for share, value in pairs if share.role == "stiffness"],
-        contacts=contacts,
+        contacts=contacts, supports=_held(case, name),
     )  # fmt: skip
     notes = dict.fromkeys(f"{s.source}: {note}" for s in terms.stored for note in s.notes)
     return BodyReport(matrices, tuple(notes), contacts=tuple(contacts))

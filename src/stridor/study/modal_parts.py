@@ -52,7 +52,7 @@ class ModalParts:
     ) -> None:  # fmt: skip
         self.work, self.parts, self.clock, self.notes = work, parts, clock, notes
         self.mu = None if mu is None else float(mu)
-        self.cheap = not work.varies and by_receptance(work.system())
+        self.cheap = not work.varies and by_receptance(work.system(), work.options)
         limit = work.modal.max_frequency_hz
         bodies = self._of("bodies", lambda: dict(analyses.body_modes(work)), "of the bodies alone")
         self.bodies: Mapping[str, BodyModes] = bodies or {}

@@ -59,7 +59,7 @@ def _of_few_points(work: Workspace, case: Case) -> bool:
         return False
     from ..modal.source import by_receptance  # all of the modal approach, which `check` has no need of
 
-    return by_receptance(work.system())
+    return by_receptance(work.system(), work.options)
 
 
 def _given(case: Case, solver: str | None) -> bool:
@@ -114,8 +114,8 @@ def _of_modes(case: Case, verb: str, solver: str | None, *, few: bool) -> Iterat
     if case.modal.prestress:
         if verb in ("compare", "simulate"):
             yield f"modal.prestress has no effect on {verb}: the time loop has no geometric stiffness"
-        elif few or not any(isinstance(body, SolidBody) for body in case.bodies.values()):
-            yield "modal.prestress has no effect: only meshed solids on assembled matrices have it"
+        elif not any(isinstance(body, SolidBody) for body in case.bodies.values()):
+            yield "modal.prestress has no effect: only meshed solids have it"
         elif verb == "run":
             yield "modal.prestress acts on modes and onsets only: the time loop and the comparison are without it"
     if not case.modal.damped and verb in ("compare", "simulate"):

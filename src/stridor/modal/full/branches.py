@@ -62,7 +62,7 @@ def whole_ends(family: Family, low: float, high: float, top: float) -> tuple[Reg
     said = f"Complete: QR computes all eigenvalues of {family.size} freedoms at once."
     for mu in (low, high):
         values = all_values(family, mu, top)
-        values = values[(values.imag >= 0) & (values.imag <= top) & (values.real >= -DECAY * top)]
+        values = values[(values.imag >= 0) & (np.abs(values) <= top) & (values.real >= -DECAY * top)]
         nothing, zero = np.zeros((0, len(values)), dtype=complex), np.zeros(len(values))
         found.append(RegionModes(
             values, nothing, None, zero, None, Completeness(True, said, region), 0, 0,

@@ -222,6 +222,8 @@ class Reduced(DenseProblem):
             # Beyond the highest that is asked for there need be no steady sliding.
             high = max(min(mu.real + step, self.high), mu.real)
             low = max(high - 2 * step, 0.0)
+            if high <= low:  # no more than no friction is asked for, and nothing is followed from there
+                return nothing, nothing, friction
             before, after = self._steady(extras, low), self._steady(extras, high)
             damping, stiffness = ((b - a) / (high - low) for a, b in zip(before, after, strict=True))
         return nothing, damping, friction + stiffness
