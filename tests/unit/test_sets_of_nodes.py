@@ -173,8 +173,8 @@ def contact(name: str) -> SimpleNamespace:
     return SimpleNamespace(name=name, closed=False, gap=0.0, normal_row=np.ones(1), compliance=1.0)
 
 
-@pytest.mark.parametrize(("tries", "settles"), [(9, True), (10, True), (11, False)])
-def test_points_are_given_four_tries_each_and_two_more(monkeypatch, tries: int, settles: bool) -> None:
+@pytest.mark.parametrize(("tries", "settles"), [(9, True), (10, True), (11, True), (13, True), (15, False)])
+def test_points_are_given_four_tries_each_and_two_more_and_then_all_sets(monkeypatch, tries: int, settles: bool) -> None:
     # Two contacts of which the first pulls again and again, and is found closing by its gap in between.
     asked = 0
 
@@ -195,9 +195,52 @@ def test_points_are_given_four_tries_each_and_two_more(monkeypatch, tries: int, 
         points._active_set(*given)
         assert asked == tries
     else:
-        with pytest.raises(AnalysisError, match="the set of touching contacts does not settle"):
+        said = r"^steady sliding at μ = 0.3: none of the 4 sets of touching nodes is in equilibrium; turn loads"
+        with pytest.raises(AnalysisError, match=said):
             points._active_set(*given)
-        assert asked == 4 * 2 + 2
+        assert asked == 4 * 2 + 2 + 4
+
+
+def test_with_much_friction_the_equilibrium_is_that_of_some_set(monkeypatch) -> None:
+    # Three rigid contacts on six freedoms: all eight sets by NumPy tell whether there is one.
+    rng, gone_round = np.random.default_rng(7), 0
+    tried = points.sets_near
+
+    def counted(*given):
+        nonlocal gone_round
+        gone_round += 1
+        return tried(*given)
+
+    monkeypatch.setattr(points, "sets_near", counted)
+    monkeypatch.setattr(points, "_twice", lambda system, active: "")
+    for _ in range(150):
+        half = rng.normal(size=(6, 6))
+        stiffness, force, mu = half @ half.T + 0.1 * np.eye(6), 3 * rng.normal(size=6), np.full(3, rng.uniform(0.5, 3.0))
+        rows, tangents, gaps = rng.normal(size=(3, 6)), rng.normal(size=(3, 6)), rng.uniform(0, 0.2, 3)
+        right = []
+        for bits in range(8):
+            on = np.array([bool(bits >> k & 1) for k in range(3)])
+            push = (rows + mu[:, None] * tangents)[on]
+            count = int(on.sum())
+            whole = np.block([[stiffness, -push.T], [rows[on], np.zeros((count, count))]])
+            answer = np.linalg.solve(whole, np.concatenate([force, -gaps[on]]))
+            if (answer[6:] >= 0).all() and (gaps + rows @ answer[:6])[~on].min(initial=0.0) >= 0:
+                right.append((on, answer[6:]))
+        parts = [
+            SimpleNamespace(name="ABC"[k], closed=False, gap=gaps[k], normal_row=rows[k], tangent_row=tangents[k], compliance=0.0)
+            for k in range(3)
+        ]  # fmt: skip
+        system = SimpleNamespace(contacts=parts, size=6, stiffness=sp.csr_array(stiffness), lines=())
+        given = (system, force, mu, np.ones(3))
+        if right:
+            found = points._settled(*given)
+            same = [on for on, _ in right if np.array_equal(on, found.active)]
+            assert len(same) == 1
+            assert found.normal[found.active] == pytest.approx(next(n for on, n in right if on is same[0]), rel=1e-6)
+        else:
+            with pytest.raises(AnalysisError, match="none of the 8 sets of touching nodes is in equilibrium"):
+                points._settled(*given)
+    assert gone_round > 8
 
 
 @pytest.mark.parametrize(("size", "held"), [(2.9e6, True), (3.1e6, False)])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from .prepared import Preparing
 # Contact springs stiffer than this, relative to the structure, would drown it in rounding if added to its matrix.
 CONDENSED = 1e3
 NEWTON_STEPS = 60
+FEW = 8  # nodes of which all sets are tried, where the search among them does not settle
 NEARBY = "factors nearby"  # the question of `System.of_matrices` whose answer is a `direct.Nearby`
 BALANCED = 1e-14  # of the largest force: what an equilibrium by prepared factors may leave
 
@@ -233,7 +236,8 @@ def find_touching(
     go of those that pull and takes in those that penetrate, which is Newton's method on the complementarity and
     settles in a few steps. Where it returns to a set it has seen, it goes on more carefully: first letting go only,
     then half of the worst offenders, then the first in the list alone, which is certain to end where the contact
-    problem has one solution (Murty 1974). Where letting go frees the structure, fewer are let go. Raises
+    problem has one solution (Murty 1974). Where letting go frees the structure, fewer are let go. With much
+    friction that may go round in circles though there is an equilibrium: of few nodes all sets are then tried. Raises
     direct.SingularMatrix, or AnalysisError where nothing settles.
     """
     nodes = equilibrium.nodes
@@ -271,9 +275,38 @@ def find_touching(
             care += 1
             seen.clear()
             active = changed(state.active, pulled, closing, care)
-    raise AnalysisError(
-        f"steady sliding: the set of touching nodes does not settle in {limit} steps; "
-        "turn loads that pull, lower the friction coefficient, or give the contact a finite stiffness"
+    free = np.flatnonzero(movable & ~kept)
+    if len(free) <= FEW:
+        for active in sets_near(movable, free):
+            try:
+                state = equilibrium.solve(active)
+            except direct.SingularMatrix:
+                continue
+            pulled, closing = offenders(state, movable, load)
+            if kept[pulled].all() and not len(closing):
+                return state, limit
+    raise AnalysisError(f"steady sliding: {unsettled(len(free), limit)}")
+
+
+def sets_near(active: BoolArray, free: IntArray) -> Iterator[BoolArray]:
+    """All sets that differ from ``active`` in some of the nodes ``free``, those that differ in few first."""
+    for count in range(len(free) + 1):
+        for flipped in combinations(free.tolist(), count):
+            following = active.copy()
+            following[list(flipped)] ^= True
+            yield following
+
+
+def unsettled(free: int, limit: int) -> str:
+    """What is said where no set of touching nodes was found, of so many that need not touch."""
+    if free <= FEW:
+        return (
+            f"none of the {2**free} sets of touching nodes is in equilibrium; turn loads that pull, or lower the "
+            "friction coefficient"
+        )
+    return (
+        f"the set of touching nodes does not settle in {limit} steps; turn loads that pull, lower the friction "
+        "coefficient, or give the contact a finite stiffness"
     )
 
 

@@ -17,8 +17,11 @@ import scipy.sparse.linalg as spl
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray
+from .equilibrium import FEW, sets_near, unsettled
 from .redundant import closed, redundant
 
+ROUNDING = 1e-12  # of the largest force, and of the largest gap or way towards it
+SIGNS = 6  # times at most that forces of contacts kept closed change their sign
 LEAST = 0.2  # of the speeds: a mean velocity below that is no direction (a whole turning ring)
 
 
@@ -119,26 +122,81 @@ def external_force(system: System, load_factors: Mapping[str, float] | None) -> 
     return force
 
 
-def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: Array) -> SteadySliding:
-    count = len(system.contacts)
-    active = np.ones(count, dtype=bool)
-    displacement, normal, gaps = np.zeros(system.size), np.zeros(count), np.zeros(count)
-    residual = 0.0
+@dataclass(frozen=True)
+class _Found:
+    """An equilibrium, and which contacts would rather let go of one another (pulled) or touch (closing), each (m,)."""
+
+    displacement: Array
+    normal: Array
+    gaps: Array
+    sense: Array
+    active: BoolArray
+    pulled: BoolArray
+    closing: BoolArray
+    residual: float
+
+    @property
+    def settled(self) -> bool:
+        """Whether none would."""
+        return not self.pulled.any() and not self.closing.any()
+
+
+def _with(system: System, force: Array, mu: Array, slips: Array, active: BoolArray) -> _Found:
+    """The equilibrium with these contacts touching. Raises AnalysisError where there is none."""
     kept = np.array([c.closed for c in system.contacts], dtype=bool)
-    slips, sign = sense, np.ones(count)
-    for _ in range(4 * count + 2):
+    sign = np.ones(len(active))
+    for _ in range(SIGNS):
         # Friction is μ|N| against the slip: where a contact kept closed pulls, it goes with −N.
         sense = sign * slips
         displacement, normal, residual = _solve(system, force, mu, sense, active)
-        gaps = np.array([c.gap + c.normal_row @ displacement for c in system.contacts])
-        pulled = active & ~kept & (normal < 0)
-        closing = ~active & (gaps < 0)
         before, sign = sign, np.where(kept & (normal < 0), -1.0, 1.0)
-        if not pulled.any() and not closing.any() and np.array_equal(sign, before):
+        if np.array_equal(sign, before):
             break
-        active = (active & ~pulled) | closing
     else:
-        raise AnalysisError("steady sliding: the set of touching contacts does not settle")
+        raise AnalysisError(
+            "steady sliding: where contacts kept closed push and where they pull does not settle at "
+            f"{words_of_friction(mu)}"
+        )
+    ways = np.array([c.normal_row @ displacement for c in system.contacts])
+    gaps = np.array([c.gap for c in system.contacts]) + ways
+    # Where a contact opens or closes, its force and its gap are zero but for rounding, with it and without.
+    pulls = ROUNDING * np.abs(normal).max(initial=0.0)
+    overlaps = ROUNDING * max(np.abs(gaps).max(initial=0.0), np.abs(ways).max(initial=0.0))
+    pulled, closing = active & ~kept & (normal < -pulls), ~active & (gaps < -overlaps)
+    return _Found(displacement, normal, gaps, sense, active, pulled, closing, residual)
+
+
+def _settled(system: System, force: Array, mu: Array, slips: Array) -> _Found:
+    """The equilibrium in which no contact pulls and none penetrates, searched for from that of all contacts. Of few
+    contacts all sets are tried where that goes round in circles, or meets one that does not hold the structure."""
+    count = len(system.contacts)
+    active = np.ones(count, dtype=bool)
+    failed: AnalysisError | None = None
+    try:
+        for _ in range(4 * count + 2):
+            found = _with(system, force, mu, slips, active)
+            if found.settled:
+                return found
+            active = (active & ~found.pulled) | found.closing
+    except AnalysisError as error:
+        failed = error
+    free = np.flatnonzero([not c.closed for c in system.contacts])
+    for active in sets_near(np.ones(count, dtype=bool), free) if 1 < len(free) <= FEW else ():
+        try:
+            found = _with(system, force, mu, slips, active)
+        except AnalysisError:
+            continue
+        if found.settled:
+            return found
+    raise failed or AnalysisError(
+        f"steady sliding at {words_of_friction(mu)}: {unsettled(len(free), 4 * count + 2)}"
+    )
+
+
+def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: Array) -> SteadySliding:
+    count = len(system.contacts)
+    found = _settled(system, force, mu, sense)
+    active, displacement, gaps = found.active, found.displacement, found.gaps
     if twice := _twice(system, closed(active, gaps, displacement)):
         raise AnalysisError(twice)
     if count and not active.any():
@@ -148,7 +206,7 @@ def _active_set(system: System, force: Array, mu: Array, sense: Array, speeds: A
             "the bodies apart, or friction lifts them off at this coefficient; check the direction of the loads"
         )
     _require_slip(system, speeds, mu, active)  # a stop beside, which stays open, need not
-    return SteadySliding(displacement, normal, speeds, sense, active, mu, residual)
+    return SteadySliding(displacement, found.normal, speeds, found.sense, active, mu, found.residual)
 
 
 def words_of_friction(mu: Array) -> str:
