@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+import stridor as st
 from stridor.contact.multipliers import OPEN, SLIP, STICK
 from stridor.errors import AnalysisError
 from stridor.sliding import history, points, surfaces
@@ -359,3 +360,37 @@ def test_forces_alone_that_move_are_contact_that_holds_twice() -> None:
     assert "a slides or moves freely" in history._unheld(system, nodes, "here", np.array([1e-6, 0, 0.5, -0.5]))
     assert "b slides or moves freely" in history._unheld(system, nodes, "here", np.array([0, 1.0]))
     assert "the structure slides or moves freely" in history._unheld(system, nodes, "here", None)
+
+
+def test_other_sets_in_equilibrium_are_named() -> None:
+    # Two elastic contacts on two masses; all four sets by NumPy.
+    rng, several = np.random.default_rng(11), 0
+    for _ in range(60):
+        half = rng.normal(size=(4, 4))
+        stiffness, force, mu = half @ half.T + 0.1 * np.eye(4), 3 * rng.normal(size=4), float(rng.uniform(0.5, 3.0))
+        rows, tangents, gaps = rng.normal(size=(2, 4)), rng.normal(size=(2, 4)), rng.uniform(0, 0.2, 2)
+        right = set[str]()
+        for on in ([], [0], [1], [0, 1]):
+            off = [k for k in (0, 1) if k not in on]
+            whole = stiffness + 5.0 * (rows[on] - mu * tangents[on]).T @ rows[on]
+            u = np.linalg.solve(whole, force - 5.0 * (rows[on] - mu * tangents[on]).T @ gaps[on])
+            gap = gaps + rows @ u
+            if (gap[on] <= 0).all() and (gap[off] >= 0).all():
+                right.add(", ".join("AB"[k] for k in on) or "none")
+        contacts = {
+            "AB"[k]: {"normal": rows[k], "tangent": tangents[k], "gap": gaps[k], "stiffness": 5.0,
+                      "friction": {"law": "coulomb", "coefficient": 0.3}}
+            for k in (0, 1)
+        }  # fmt: skip
+        system = st.System.from_matrices(np.eye(4), None, stiffness, contacts=contacts, loads={"f": force})
+        if not right - {"none"}:
+            continue
+        found = st.steady_sliding(system, mu)
+        own = ", ".join("AB"[k] for k in np.flatnonzero(found.active)) or "none"
+        assert own in right
+        told = [w for w in found.warnings if w.startswith("there is more than one equilibrium at this friction: as well ")]
+        assert len(told) == (len(right) > 1)
+        for other in right - {own}:
+            assert f"with {other} touching" in told[0] or f"with {other};" in told[0]
+        several += len(told)
+    assert several > 3

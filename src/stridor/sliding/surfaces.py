@@ -23,13 +23,14 @@ from ..notebook import Shown, counted, html_table
 from ..stages import passing, stage
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
-from .equilibrium import Equilibrium, NodeEquilibrium, find_touching
+from .equilibrium import Equilibrium, NodeEquilibrium, find_touching, sets_near
 from .history import STILL, follow
 from .pattern import left_by_facets, unexplained_patterns
 from .points import external_force, full_motion, words_of_friction
 from .redundant import closed, redundant
 from .resultants import Balance, Resultant, balance, resultants
 
+ALL_TRIED = 5  # nodes of which it is looked whether other sets are in equilibrium as well
 SIGN_CHANGES = 30
 STEADY = "steady sliding of nodes"
 
@@ -205,6 +206,29 @@ def steady_sliding_nodes(
         balance=balance(system, force, push.T @ state.normal_force),
         warnings=tuple(unexplained_patterns(system, normal, state.gap, state.active)),
     )
+
+
+def other_equilibria(system: System, found: SurfaceSliding, mu: float | None = None) -> list[BoolArray]:
+    """The other sets (m,) of touching nodes that are in equilibrium at the same friction, where all can be tried: of a
+    few nodes, without load steps."""
+    nodes = system.contact_nodes()
+    free = np.flatnonzero(~nodes.kept)
+    if system.load_steps or not 0 < len(free) <= ALL_TRIED:
+        return []
+    others = list[BoolArray]()
+    for active in sets_near(found.active, free):
+        if np.array_equal(active, found.active):
+            continue
+        try:
+            held = steady_sliding_nodes(system, mu=mu, held=active)
+        except AnalysisError:
+            continue
+        force, gap, own = held.normal_force[free], held.gap[free], active[free]
+        # One that differs in contacts without force and gap is the same.
+        pushes = force[own] > 1e-9 * np.abs(force).max(initial=0.0)
+        if pushes.all() and np.all(gap[~own] > 1e-9 * np.abs(gap).max(initial=0.0)):
+            others.append(active)
+    return others
 
 
 def steady_nodes(

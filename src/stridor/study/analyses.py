@@ -27,7 +27,7 @@ from ..modal.receptance_modes import prepare
 from ..modal.source import by_receptance, require_full
 from ..sliding import taken_as_closed
 from ..sliding.stretches import instead_of_own
-from ..sliding.surfaces import SurfaceSliding
+from ..sliding.surfaces import SurfaceSliding, other_equilibria
 from ..system import System
 from ..temporal.settings import Settings
 from ..temporal.simulate import Checkpoint, Progress, plan
@@ -171,10 +171,24 @@ def _held_by_factors(work: Workspace, own: float | None) -> tuple[str, ...]:
 def steady_sliding(problem: Problem, mu: float | None = None) -> SurfaceSliding:
     """The equilibrium under load and friction that both approaches start from, node by node of every contact.
 
-    mu replaces the friction coefficient of every contact. Raises AnalysisError where there is none.
+    mu replaces the friction coefficient of every contact. Where more than one set of a few contact nodes is in
+    equilibrium, a warning names the others. Raises AnalysisError where there is none.
     """
     require_friction(mu)
-    return Workspace.of(problem).steady(mu)
+    work = Workspace.of(problem)
+    found, system = work.steady(mu), work.system(mu)
+    nodes = system.contact_nodes()
+    others = [
+        ", ".join(dict.fromkeys(nodes.names[k] for k in nodes.owner[active])) or "none"
+        for active in other_equilibria(system, found, mu)
+    ]
+    if not others:
+        return found
+    said = (
+        f"there is more than one equilibrium at this friction: as well with {'; with '.join(others)} touching; which "
+        "it is depends on how load and friction came about"
+    )
+    return replace(found, warnings=(*found.warnings, said))
 
 
 @overload
