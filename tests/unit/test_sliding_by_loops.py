@@ -706,6 +706,8 @@ def model(monkeypatch, forces, *, own: float = 0.1, size: int = 10, none_beyond:
         return line_of(forces, at, kept=kept)
 
     monkeypatch.setattr(stretches, "steady_sliding_nodes", steady)
+    monkeypatch.setattr(stretches, "other_equilibria", lambda *_: [])
+    monkeypatch.setattr(stretches, "FEW", 3)  # as of many nodes
     held = np.isin(np.arange(len(forces)), kept)
     nodes = SimpleNamespace(count=len(forces), kept=held)
     once = AnswerCache().once
@@ -733,6 +735,26 @@ def test_stretches_end_where_forces_and_gaps_run_out(monkeypatch) -> None:
     assert {round(0.9 * k / 8, 12) for k in range(9)} <= {round(mu, 12) for mu in values}
     # The first look takes the nodes at the case's own friction for its guess, later ones those of the nearest look.
     assert list(asked[1][1]) == [True, True, False, True]
+
+
+def test_of_few_nodes_each_equilibrium_is_found_as_if_no_other_were_known(monkeypatch) -> None:
+    system, asked = model(monkeypatch, LINES)
+    monkeypatch.setattr(stretches, "FEW", 4)
+    looked: list[float] = []
+
+    def others(_: object, __: object, mu: float) -> list[str]:
+        looked.append(mu)
+        return ["another"] if mu > 0.8 else []
+
+    monkeypatch.setattr(stretches, "other_equilibria", others)
+    found = stretches.stretches(system, 0.0, 0.9)
+    assert all(guess is None for _, guess in asked)
+    assert looked == pytest.approx([0.0, 0.45, 0.9])
+    assert [s.several for s in found] == [(), (), (), (0.9,)]
+    assert [w for w in stretches.stretch_words(found) if "more than one" in w] == [
+        "At μ = 0.9 there is more than one equilibrium of steady sliding, each with other nodes that touch: modes and onsets "
+        "are those of one of them (`stridor steady --mu` names the others)."
+    ]
 
 
 def test_larger_models_and_single_values_are_looked_at_less_and_more(monkeypatch) -> None:

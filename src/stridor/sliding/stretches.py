@@ -16,7 +16,8 @@ import numpy as np
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray
-from .surfaces import STEADY, SurfaceSliding, steady_sliding_nodes
+from .equilibrium import FEW
+from .surfaces import ALL_TRIED, STEADY, SurfaceSliding, other_equilibria, steady_sliding_nodes
 
 HELD = "are held at every μ of the model"  # nodes of one friction coefficient
 LOOKS = 9  # equilibria over a range, of small models
@@ -34,7 +35,8 @@ class Stretch:
 
     at: a μ whose steady sliding has them, None where they are those of the case's own friction. touching: how many of
     ``nodes`` they are. reason: why there is no steady sliding, "" where there is. others: how many nodes are others at
-    one end or the other, of stretches that were cut where nothing changes; 0 of all that are exact.
+    one end or the other, of stretches that were cut where nothing changes; 0 of all that are exact. several: the μ
+    that were looked at where other nodes may touch as well.
     """
 
     low: float
@@ -44,6 +46,7 @@ class Stretch:
     nodes: int = 0
     reason: str = ""
     others: int = 0
+    several: tuple[float, ...] = ()
 
     def of(self, system: System) -> System:
         """The system whose modes hold these nodes."""
@@ -91,13 +94,23 @@ def stretches(
             if len(pieces) > MOST:
                 return _equal(search, low, high, nodes.count)
     ends = [low, *borders, high]
+    several = _several(system, looks)
     return tuple(
         Stretch(
             a, b, None if piece.key == own else piece.mu,
             0 if piece.found is None else int(piece.found.active.sum()), nodes.count, piece.reason,
+            several=tuple(mu for mu in several if a <= mu <= b and not piece.reason),
         )
         for (a, b), piece in zip(pairwise(ends), pieces, strict=True)
     )  # fmt: skip
+
+
+def _several(system: System, looks: Sequence[_Look]) -> list[float]:
+    """At which of some μ more than one set of touching nodes is in equilibrium, as far as all are tried."""
+    if (free := int(np.count_nonzero(~system.contact_nodes().kept))) > ALL_TRIED:
+        return []
+    some = looks if free < ALL_TRIED - 1 else [looks[0], looks[len(looks) // 2], looks[-1]]
+    return [look.mu for look in some if look.found is not None and other_equilibria(system, look.found, look.mu)]
 
 
 def _equal(search: _Equilibria, low: float, high: float, count: int) -> tuple[Stretch, ...]:
@@ -128,7 +141,15 @@ def stretch_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
             f"Of the {solid[0].nodes} contact nodes other ones touch in steady sliding as friction grows: "
             f"{', '.join(parts)}. Each μ is solved with those of its stretch."
         )
-    told += [f"Between μ = {s.low:.4g} and {s.high:.4g} nothing was solved: {s.reason}." for s in found if s.reason]
+    if several := sorted({mu for s in solid for mu in s.several}):
+        told.append(
+            f"At μ = {', '.join(f'{mu:.4g}' for mu in several)} there is more than one equilibrium of steady sliding, each "
+            "with other nodes that touch: modes and onsets are those of one of them (`stridor steady --mu` names the "
+            "others)."
+        )
+    none = [(f"{s.low:.4g}", f"{s.high:.4g}", s.reason) for s in found if s.reason]
+    # Where one equilibrium jumps to another there may be none at that μ alone.
+    told += [f"Between μ = {low} and {high} nothing was solved: {why}." for low, high, why in none if low != high]
     return tuple(told)
 
 
@@ -161,7 +182,8 @@ def elsewhere_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
 
 
 class _Equilibria:
-    """Equilibria by μ, each solved once, the nearest known one as its first guess."""
+    """Equilibria by μ, each solved once, the nearest known one as its first guess. Of few nodes there is no guess:
+    where there is more than one equilibrium, it would choose one that another question at the same μ does not have."""
 
     def __init__(self, system: System, solver: str | None) -> None:
         self._system, self._solver = system, solver
@@ -199,6 +221,8 @@ class _Equilibria:
 
     def _near(self, mu: float) -> BoolArray | None:
         solved = [look for look in self._known.values() if look.found is not None]
+        if self._system.contact_nodes().count <= FEW:
+            return None
         if not solved:
             return self._guess
         nearest = min(solved, key=lambda look: abs(look.mu - mu)).found
