@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
+import stridor as st
 from benches import paper_case
 from solid_cases import case, slider
+from stridor.app.conclusions import of_countermeasures
 from stridor.case import Case, loads, template_text
 from stridor.errors import CaseError
+from stridor.study.analyses import modes
 from stridor.study.contact_edges import edge_rows
 from stridor.study.countermeasures import Countermeasures, Measure, Verified, rank_countermeasures
 from stridor.study.damping_map import DampingMap, damping_map
-from stridor.study.sensitivities import sensitivities
+from stridor.study.sensitivities import number_at, sensitivities
 from stridor.system import build_system
 from stridor.view import sensitivity_plots
 from stridor.view.sensitivity_tables import countermeasure_table, sensitivity_table
@@ -126,6 +130,45 @@ def test_rows_of_a_pad_on_a_turning_disc_lie_along_radii():
     assert angle[leading] == pytest.approx(65.0)
     assert angle[trailing] == pytest.approx(115.0)
     assert len(leading) == 4
+
+
+PRESSED = """
+units = "nondimensional"
+bodies.m = { type = "mass", mass = 1.0, position = [0.0, 0.0] }
+bodies.belt = { type = "obstacle", shape = "flat", point = [0, 0], normal = [0, 1], sliding.velocity = [-0.5, 0.0] }
+springs.k = { between = ["m", "ground"], direction = [1.0, 0.0], stiffness = 1.0 }
+springs.n = { between = ["m", "ground"], direction = [0.3, 1.0], stiffness = 1.0 }
+loads.press = { at = "m", force = [0.0, -1.0] }
+contacts.rub.slave = "m"
+contacts.rub.master = "belt"
+contacts.rub.stiffness = 1.0
+contacts.rub.friction = { law = "hyperbolic", coefficient = 0.0, static_coefficient = 0.8, delta = 0.5 }
+modal.max_frequency_hz = 1.0
+"""
+
+
+def test_a_per_cent_more_of_a_negative_number_is_farther_from_zero(tmp_path):
+    """A mass on falling friction: a load of −1 drives it, a speed of −0.5 that becomes faster quietens it."""
+    model = loads(PRESSED)
+    load, speed = "loads.press.force.1", "bodies.belt.sliding.velocity.0"
+    found = rank_countermeasures(model, numbers=[load, speed], percent=2.0, verify=2, added_mass=False)
+    assert {m.name: m.direction for m in found.measures} == {load: -1, speed: 1}
+    assert named(found, load).words == "move loads.press.force.1 from -1 to -0.98, 2 % less"
+    assert named(found, speed).words == "move bodies.belt.sliding.velocity.0 from -0.5 to -0.51, 2 % more"
+    before = modes(model).growth_rate[0].max()
+    for measure in found.measures:
+        assert measure.verified is not None
+        assert measure.verified.removed == pytest.approx(measure.removed, rel=0.01)
+        again = modes(model.with_({measure.name: measure.changed})).growth_rate[0].max()
+        assert measure.verified.removed == pytest.approx(before - again, rel=1e-9)
+    slopes = sensitivities(model, [load, speed])
+    for k, (path, more) in enumerate(((load, -1.001), (speed, -0.5005))):
+        grown = modes(model.with_({path: more})).growth_rate[0].max() - before
+        assert slopes.growth_per_percent[k, 0] == pytest.approx(10 * grown, rel=2e-3)
+    back = st.open(st.save(found, tmp_path / "changes.nc"))
+    assert [m.words for m in back.measures] == [m.words for m in found.measures]
+    option = of_countermeasures(found, partial(number_at, model), None).options[-1]
+    assert option == f"{found.helpful[0].name}={found.helpful[0].changed:.6g}"
 
 
 def test_documents_tables_and_figures(beams, ranked):

@@ -13,7 +13,7 @@ from ..system.bodies import build_bodies
 from ..system.model import Line, Solid
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .contact_edges import edge_rows
-from .measures import Kind, Measure, Target, growing, growth
+from .measures import Kind, Measure, Target, growing, growth, per_cent_of
 from .sensitivities import BENT, Linearised
 
 
@@ -37,10 +37,11 @@ class Ranking:
         for path in paths:
             value, change = self.linear.value(path), self.linear.change(path)
             per_unit = _derivatives(self.modes, change)
-            slopes = 0.01 * abs(value) * per_unit
+            slopes = per_cent_of(value) * per_unit
             direction = -1 if slopes[self.aimed].real.sum() > 0 else 1
             if value:
-                found.append(self._measure("number", path, direction, self.percent, direction * slopes * self.percent))
+                moved = direction * slopes * self.percent
+                found.append(replace(self._measure("number", path, direction, self.percent, moved), value=value))
         return found
 
     def masses(self) -> list[Measure]:
