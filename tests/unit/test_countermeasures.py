@@ -40,9 +40,12 @@ def named(result: Countermeasures, name: str) -> Measure:
 
 
 def test_order_is_that_of_what_a_per_cent_removes(ranked):
-    removed = [m.removed_per_percent for m in ranked.measures]
+    removed = [m.removed_per_percent for m in ranked.measures if m.verified is None]
     assert removed == sorted(removed, reverse=True)
-    assert min(removed) > 0
+    solved = [m.verified.removed / m.percent for m in ranked.measures if m.verified is not None]
+    assert solved == sorted(solved, reverse=True)
+    assert [m.verified is not None for m in ranked.measures] == [True] * len(solved) + [False] * len(removed)
+    assert min(removed + solved + [m.removed_per_percent for m in ranked.measures]) > 0
     assert {m.kind for m in ranked.measures} == {"number", "added mass"}
     # More damping always helps this bench; its material is one, so stiffness and density do the same.
     assert named(ranked, "bodies.beam1.damping.mass").direction == 1
@@ -169,6 +172,37 @@ def test_a_per_cent_more_of_a_negative_number_is_farther_from_zero(tmp_path):
     assert [m.words for m in back.measures] == [m.words for m in found.measures]
     option = of_countermeasures(found, partial(number_at, model), None).options[-1]
     assert option == f"{found.helpful[0].name}={found.helpful[0].changed:.6g}"
+
+
+def test_what_was_solved_again_is_ranked_by_that_and_what_did_harm_is_told(monkeypatch):
+    from stridor.study import countermeasures as module
+
+    solve, took = module.verified, {"springs.k.stiffness": 0.5, "bodies.m.mass": -0.25, "loads.press.force.1": 0.75}
+
+    def as_said(ranking, measure, *rest):
+        found = solve(ranking, measure, *rest)
+        return replace(found, verified=replace(found.verified, removed=took[measure.name]))
+
+    monkeypatch.setattr(module, "verified", as_said)
+    found = rank_countermeasures(loads(PRESSED), numbers=list(took), verify=3, added_mass=False)
+    assert [m.name for m in found.measures] == ["loads.press.force.1", "springs.k.stiffness"]
+    assert found.helpful == found.measures
+    (told,) = [line for line in found.warnings if "slopes promise" in line]
+    assert told.startswith("1 change that the slopes promise does not take growth away when solved again")
+    assert told.endswith("raise bodies.m.mass by 5 % (-0.25 1/s)")
+
+
+def test_changes_of_rounding_only_help_nothing(monkeypatch):
+    """A second mass that is connected to nothing that grows."""
+    other = """
+bodies.far = { type = "mass", mass = 1.0, position = [3.0, 0.0] }
+springs.x = { between = ["far", "ground"], direction = [1.0, 0.0], stiffness = 3.0 }
+springs.y = { between = ["far", "ground"], direction = [0.0, 1.0], stiffness = 5.0 }
+"""
+    paths = ["springs.x.stiffness", "springs.y.stiffness", "springs.k.stiffness"]
+    found = rank_countermeasures(loads(PRESSED + other), numbers=paths, verify=9)
+    assert {m.name for m in found.measures} == {"springs.k.stiffness", "m"}
+    assert "3 changes tried: no effect on the growth beyond rounding" in found.warnings  # the mass added to it, too
 
 
 def test_documents_tables_and_figures(beams, ranked):

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..modal.derivatives import Mode, PencilChange, by_mass_at_node, by_release
+from ..modal.tolerances import UNSTABLE_RELATIVE
 from ..system import System
 from ..system.bodies import build_bodies
 from ..system.model import Line, Solid
@@ -31,6 +32,11 @@ class Ranking:
         self.unstable = growing(self.eigenvalues)
         numbers = linear.modes.branch[columns]
         self.aimed: BoolArray = self.unstable if target == "sum" else numbers == target
+
+    @property
+    def rounding(self) -> float:
+        """Growth rate [1/s] per per cent that may be rounding: see `Sensitivities.beyond_rounding`."""
+        return 0.01 * UNSTABLE_RELATIVE * float(np.abs(self.eigenvalues[self.aimed]).sum())
 
     def numbers(self, paths: Sequence[str]) -> list[Measure]:
         found: list[Measure] = []

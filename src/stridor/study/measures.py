@@ -91,7 +91,8 @@ class Measure(Shown):
 
 @dataclass(frozen=True, repr=False)
 class Countermeasures(Tabular):
-    """Changes by growth removed per per cent, best first. target: number of a branch, or "sum" of all unstable ones.
+    """Changes by growth removed per per cent, best first: those solved again by what they took, then those predicted
+    to take some. target: number of a branch, or "sum" of all unstable ones.
 
     branch (b,) and eigenvalues (b,) [1/s] of the modes watched, as the case is; margin: damping ratio below which a
     stable mode is called close.
@@ -131,7 +132,7 @@ class Countermeasures(Tabular):
     def helpful(self) -> tuple[Measure, ...]:
         """Changes that take growth away, best first: those solved again by what they took, then those predicted to."""
         again = [m for m in self.measures if m.verified is not None and m.verified.removed > 0]
-        again.sort(key=lambda m: -m.verified.removed if m.verified else 0.0)
+        again.sort(key=lambda m: -m.verified.removed / m.percent if m.verified else 0.0)
         return (*again, *(m for m in self.measures if m.verified is None and m.removed > 0))
 
     @property
