@@ -192,6 +192,13 @@ def test_what_was_solved_again_is_ranked_by_that_and_what_did_harm_is_told(monke
     assert told.endswith("raise bodies.m.mass by 5 % (-0.25 1/s)")
 
 
+def test_the_next_command_sets_what_the_case_has():
+    model = loads(PRESSED)
+    for path, option in (("contacts.rub.compliance", "contacts.rub.stiffness=0.952381"), ("mu", "0.608")):
+        found = rank_countermeasures(model, numbers=[path], verify=int(path != "mu"), added_mass=False)
+        assert of_countermeasures(found, partial(number_at, model), None).options[-1] == option
+
+
 def test_changes_of_rounding_only_help_nothing(monkeypatch):
     """A second mass that is connected to nothing that grows."""
     other = """

@@ -147,8 +147,13 @@ def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float]
     number = next((m for m in result.helpful if m.kind == "number"), None)
     if number is None:
         return Conclusion(said)
-    new = more_of(value_of(number.name), number.direction * number.percent)
-    return Conclusion(said, "modes", (*own, "--set", f"{number.name}={new:.6g}"))
+    value = value_of(number.name) if number.value is None else number.value
+    name, new = number.name, more_of(value, number.direction * number.percent)
+    if name == "mu":
+        return Conclusion(said, "modes", ("--mu", f"{new:.6g}"))
+    if name.endswith(".compliance"):  # a case has its inverse
+        name, new = name.removesuffix("compliance") + "stiffness", 1 / new
+    return Conclusion(said, "modes", (*own, "--set", f"{name}={new:.6g}"))
 
 
 def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
