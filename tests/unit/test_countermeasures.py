@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
+import stridor as st
 from benches import paper_case
 from solid_cases import case, slider
+from stridor.app.conclusions import of_countermeasures
 from stridor.case import Case, loads, template_text
 from stridor.errors import CaseError
+from stridor.study.analyses import modes
 from stridor.study.contact_edges import edge_rows
 from stridor.study.countermeasures import Countermeasures, Measure, Verified, rank_countermeasures
 from stridor.study.damping_map import DampingMap, damping_map
-from stridor.study.sensitivities import sensitivities
+from stridor.study.sensitivities import number_at, sensitivities
 from stridor.system import build_system
 from stridor.view import sensitivity_plots
 from stridor.view.sensitivity_tables import countermeasure_table, sensitivity_table
@@ -36,9 +40,12 @@ def named(result: Countermeasures, name: str) -> Measure:
 
 
 def test_order_is_that_of_what_a_per_cent_removes(ranked):
-    removed = [m.removed_per_percent for m in ranked.measures]
+    removed = [m.removed_per_percent for m in ranked.measures if m.verified is None]
     assert removed == sorted(removed, reverse=True)
-    assert min(removed) > 0
+    solved = [m.verified.removed / m.percent for m in ranked.measures if m.verified is not None]
+    assert solved == sorted(solved, reverse=True)
+    assert [m.verified is not None for m in ranked.measures] == [True] * len(solved) + [False] * len(removed)
+    assert min(removed + solved + [m.removed_per_percent for m in ranked.measures]) > 0
     assert {m.kind for m in ranked.measures} == {"number", "added mass"}
     # More damping always helps this bench; its material is one, so stiffness and density do the same.
     assert named(ranked, "bodies.beam1.damping.mass").direction == 1
@@ -126,6 +133,83 @@ def test_rows_of_a_pad_on_a_turning_disc_lie_along_radii():
     assert angle[leading] == pytest.approx(65.0)
     assert angle[trailing] == pytest.approx(115.0)
     assert len(leading) == 4
+
+
+PRESSED = """
+units = "nondimensional"
+bodies.m = { type = "mass", mass = 1.0, position = [0.0, 0.0] }
+bodies.belt = { type = "obstacle", shape = "flat", point = [0, 0], normal = [0, 1], sliding.velocity = [-0.5, 0.0] }
+springs.k = { between = ["m", "ground"], direction = [1.0, 0.0], stiffness = 1.0 }
+springs.n = { between = ["m", "ground"], direction = [0.3, 1.0], stiffness = 1.0 }
+loads.press = { at = "m", force = [0.0, -1.0] }
+contacts.rub.slave = "m"
+contacts.rub.master = "belt"
+contacts.rub.stiffness = 1.0
+contacts.rub.friction = { law = "hyperbolic", coefficient = 0.0, static_coefficient = 0.8, delta = 0.5 }
+modal.max_frequency_hz = 1.0
+"""
+
+
+def test_a_per_cent_more_of_a_negative_number_is_farther_from_zero(tmp_path):
+    """A mass on falling friction: a load of −1 drives it, a speed of −0.5 that becomes faster quietens it."""
+    model = loads(PRESSED)
+    load, speed = "loads.press.force.1", "bodies.belt.sliding.velocity.0"
+    found = rank_countermeasures(model, numbers=[load, speed], percent=2.0, verify=2, added_mass=False)
+    assert {m.name: m.direction for m in found.measures} == {load: -1, speed: 1}
+    assert named(found, load).words == "move loads.press.force.1 from -1 to -0.98, 2 % less"
+    assert named(found, speed).words == "move bodies.belt.sliding.velocity.0 from -0.5 to -0.51, 2 % more"
+    before = modes(model).growth_rate[0].max()
+    for measure in found.measures:
+        assert measure.verified is not None
+        assert measure.verified.removed == pytest.approx(measure.removed, rel=0.01)
+        again = modes(model.with_({measure.name: measure.changed})).growth_rate[0].max()
+        assert measure.verified.removed == pytest.approx(before - again, rel=1e-9)
+    slopes = sensitivities(model, [load, speed])
+    for k, (path, more) in enumerate(((load, -1.001), (speed, -0.5005))):
+        grown = modes(model.with_({path: more})).growth_rate[0].max() - before
+        assert slopes.growth_per_percent[k, 0] == pytest.approx(10 * grown, rel=2e-3)
+    back = st.open(st.save(found, tmp_path / "changes.nc"))
+    assert [m.words for m in back.measures] == [m.words for m in found.measures]
+    option = of_countermeasures(found, partial(number_at, model), None).options[-1]
+    assert option == f"{found.helpful[0].name}={found.helpful[0].changed:.6g}"
+
+
+def test_what_was_solved_again_is_ranked_by_that_and_what_did_harm_is_told(monkeypatch):
+    from stridor.study import countermeasures as module
+
+    solve, took = module.verified, {"springs.k.stiffness": 0.5, "bodies.m.mass": -0.25, "loads.press.force.1": 0.75}
+
+    def as_said(ranking, measure, *rest):
+        found = solve(ranking, measure, *rest)
+        return replace(found, verified=replace(found.verified, removed=took[measure.name]))
+
+    monkeypatch.setattr(module, "verified", as_said)
+    found = rank_countermeasures(loads(PRESSED), numbers=list(took), verify=3, added_mass=False)
+    assert [m.name for m in found.measures] == ["loads.press.force.1", "springs.k.stiffness"]
+    assert found.helpful == found.measures
+    (told,) = [line for line in found.warnings if "slopes promise" in line]
+    assert told.startswith("1 change that the slopes promise does not take growth away when solved again")
+    assert told.endswith("raise bodies.m.mass by 5 % (-0.25 1/s)")
+
+
+def test_the_next_command_sets_what_the_case_has():
+    model = loads(PRESSED)
+    for path, option in (("contacts.rub.compliance", "contacts.rub.stiffness=0.952381"), ("mu", "0.608")):
+        found = rank_countermeasures(model, numbers=[path], verify=int(path != "mu"), added_mass=False)
+        assert of_countermeasures(found, partial(number_at, model), None).options[-1] == option
+
+
+def test_changes_of_rounding_only_help_nothing(monkeypatch):
+    """A second mass that is connected to nothing that grows."""
+    other = """
+bodies.far = { type = "mass", mass = 1.0, position = [3.0, 0.0] }
+springs.x = { between = ["far", "ground"], direction = [1.0, 0.0], stiffness = 3.0 }
+springs.y = { between = ["far", "ground"], direction = [0.0, 1.0], stiffness = 5.0 }
+"""
+    paths = ["springs.x.stiffness", "springs.y.stiffness", "springs.k.stiffness"]
+    found = rank_countermeasures(loads(PRESSED + other), numbers=paths, verify=9)
+    assert {m.name for m in found.measures} == {"springs.k.stiffness", "m"}
+    assert "3 changes tried: no effect on the growth beyond rounding" in found.warnings  # the mass added to it, too
 
 
 def test_documents_tables_and_figures(beams, ranked):

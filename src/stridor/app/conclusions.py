@@ -128,6 +128,8 @@ def of_sensitivities(result: Sensitivities, mu: str | None) -> Conclusion:
 def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float], mu: str | None) -> Conclusion:
     """The change that takes most growth away, as it was solved again or is predicted; then the modes with the best
     change of a number made. value_of: what a number of the case is."""
+    from ..study.measures import more_of
+
     own = ("--mu", mu) if mu is not None else ()
     if not result.measures:
         return Conclusion("", "modes", own)  # the warnings say why
@@ -145,8 +147,13 @@ def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float]
     number = next((m for m in result.helpful if m.kind == "number"), None)
     if number is None:
         return Conclusion(said)
-    new = value_of(number.name) * (1 + number.direction * number.percent / 100)
-    return Conclusion(said, "modes", (*own, "--set", f"{number.name}={new:.6g}"))
+    value = value_of(number.name) if number.value is None else number.value
+    name, new = number.name, more_of(value, number.direction * number.percent)
+    if name == "mu":
+        return Conclusion(said, "modes", ("--mu", f"{new:.6g}"))
+    if name.endswith(".compliance"):  # a case has its inverse
+        name, new = name.removesuffix("compliance") + "stiffness", 1 / new
+    return Conclusion(said, "modes", (*own, "--set", f"{name}={new:.6g}"))
 
 
 def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:

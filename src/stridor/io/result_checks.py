@@ -156,6 +156,7 @@ _CHANGES = {
     "direction": _Rule(("change",), low=-1.0, high=1.0),
     **dict.fromkeys(("percent", "removed_per_percent", "removed_sum_per_percent", "removed"), _Rule(("change",))),
     "mass": _Rule(("change",), low=0.0, missing=True),
+    "value": _Rule(("change",), missing=True, needed=False),
     **{
         f"verified_{name}": _Rule(("change",), missing=True)
         for name in ("growth_rate", "frequency_hz", "removed", "removed_sum")

@@ -41,6 +41,8 @@ WIDENED = 30.0
 BESIDE = 3e-4  # of the distance to the nearest other eigenvalue: how far from a pole what is regular there is taken
 RELATIVE_STEP = 1e-3
 AFFINE = 1e-8  # second over first differences below which a matrix is affine in a number
+FIRST, FINER, MOST = 1e-4, 1 / 8, 12  # steps from zero: the first of the scale, each of the last, how many
+AGREED = 1e-6  # relative difference of two changes per unit that are one
 
 
 @dataclass(frozen=True)
@@ -143,14 +145,16 @@ def by_friction(
 ) -> PencilChange:
     """Change of P per unit of μ, of every contact or of one by name.
 
-    Raises CaseError for one contact where the steady state adds terms of its own: they know a common μ only.
+    Raises CaseError for one of several contacts where the steady state adds terms of its own: they know a common μ
+    only.
     """
     nodes = system.contact_nodes()
     chosen = nodes.select(held.touching)
     rows = contact_rows(nodes, held.touching, held.sense, held.stuck)
-    if not steadiness(system, nodes, held.touching, options, rows).neutral:
-        if contact is not None:
-            accepted = "mu, of all contacts together, since the law's slope, friction damping or prestress count"
+    added = steadiness(system, nodes, held.touching, options, rows).reasons
+    if added:
+        if contact is not None and len(nodes.names) > 1:
+            accepted = f"mu, of all contacts together, since steady sliding counts here: {', '.join(added)}"
             raise CaseError(f"contacts.{contact}.friction.coefficient", None, accepted)
         return rate_of(lambda value: pencil_of(system, value, held, options), mu)[0]
     slide = rows.slide
@@ -161,17 +165,20 @@ def by_friction(
     return PencilChange(push=slide)
 
 
-def by_compliance(system: System, held: HeldContacts, contact: str) -> PencilChange:
-    """Change of P per unit of the compliance 1/K_c of a contact, per area [m³/N] or of a point [m/N], rigid or not."""
+def by_compliance(system: System, held: HeldContacts, options: Options, contact: str) -> PencilChange | None:
+    """Change of P per unit of the compliance 1/K_c of a contact, per area [m³/N] or of a point [m/N], rigid or not.
+
+    None where the steady state adds terms of its own, which move with it.
+    """
     nodes = system.contact_nodes()
     chosen = nodes.select(held.touching)
-    if system.contact_cubic:
-        accepted = f"contacts.{contact}.stiffness, since contact stiffness depends on the force with a cubic term"
-        raise CaseError(f"contacts.{contact}.compliance", None, accepted)
+    rows = contact_rows(nodes, held.touching, held.sense, held.stuck)
+    if not steadiness(system, nodes, held.touching, options, rows).neutral:
+        return None
     area = np.where(np.isnan(chosen.area), 1.0, chosen.area)
     mine = (chosen.owner == nodes.names.index(contact)).astype(float)
     change = np.divide(mine, area, out=np.zeros_like(area), where=area > 0)
-    sticking = contact_rows(nodes, held.touching, held.sense, held.stuck).normal.shape[0] - len(change)
+    sticking = rows.normal.shape[0] - len(change)
     return PencilChange(compliance=np.append(change, np.zeros(sticking)))
 
 
@@ -236,6 +243,33 @@ def rate_of(
         return _combined(((-0.5, low), (0.5, high)), h), True
     farther = ((1 / 12, at(value - 2 * h)), (-1 / 12, at(value + 2 * h)))
     return _combined(((-2 / 3, low), (2 / 3, high), *farther), h), False
+
+
+def rate_from_zero(at: Callable[[float], Pencil], scale: float, *, base: Pencil) -> PencilChange:
+    """Change of P per unit of a number at zero that is not negative and on which steady sliding depends.
+
+    scale: values that are no longer small. Steps begin well below it and become smaller until two of them agree. Raises
+    AnalysisError where they do not.
+    """
+    step = FIRST * scale
+    found = rate_of(at, 0.0, step, base=base)[0]
+    for _ in range(MOST):
+        step *= FINER
+        finer = rate_of(at, 0.0, step, base=base)[0]
+        if _agree(found, finer, base, step):
+            return finer
+        found = finer
+    raise AnalysisError("differences from zero do not settle as steps become smaller")
+
+
+def _agree(coarse: PencilChange, fine: PencilChange, base: Pencil, step: float) -> bool:
+    """Whether two changes per unit are the same, beyond what rounding of the terms leaves of differences."""
+    for field in fields(PencilChange):
+        one, other = getattr(coarse, field.name), getattr(fine, field.name)
+        rounding = 1e-13 * _largest(getattr(base, field.name)) / step
+        if _largest(one - other) > AGREED * _largest(other) + rounding:
+            return False
+    return True
 
 
 @passing()

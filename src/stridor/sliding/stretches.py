@@ -142,10 +142,10 @@ def stretch_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
             f"{', '.join(parts)}. Each μ is solved with those of its stretch."
         )
     if several := sorted({mu for s in solid for mu in s.several}):
+        where = ", ".join(f"{mu:.4g}" for mu in several)
         told.append(
-            f"At μ = {', '.join(f'{mu:.4g}' for mu in several)} there is more than one equilibrium of steady sliding, each "
-            "with other nodes that touch: modes and onsets are those of one of them (`stridor steady --mu` names the "
-            "others)."
+            f"At μ = {where} there is more than one equilibrium of steady sliding, each with other nodes that touch: "
+            "modes and onsets are those of one of them (`stridor steady --mu` names the others)."
         )
     none = [(f"{s.low:.4g}", f"{s.high:.4g}", s.reason) for s in found if s.reason]
     # Where one equilibrium jumps to another there may be none at that μ alone.

@@ -13,6 +13,7 @@ from ..case.bodies import BeamBody, SolidBody
 from ..case.matrix_checks import MU
 from ..errors import AnalysisError, CaseError
 from ..modal.krylov.steady import refuse_stick
+from ..notebook import counted
 from ..system.imported import ImportedTerm, load_terms
 from .asked import names_of, require_count, require_frequency
 from .measure_ranking import Ranking
@@ -50,8 +51,9 @@ def rank_countermeasures(
     but for whole masses and stiffnesses, and the parameters in them). added_mass: a point mass at the best node of each
     body. chamfers: how many rows of contact nodes are taken away at most, at the leading edge (which meets the other
     body's material first) and at the trailing one. percent: change that consequences are predicted for; margin: damping
-    ratio. The best ``verify`` are solved again with that change made. watch: "unstable" does not look after the stable
-    modes, which saves a factorisation for each.
+    ratio. The best ``verify`` are solved again with that change made; they come first, by what they took per per cent
+    then. What took nothing is left out with a sentence, as is what changes growth by rounding only. watch: "unstable"
+    does not look after the stable modes, which saves a factorisation for each.
 
     Predictions are of first order; a pair of modes near its exceptional point is predicted by its mean and squared
     half difference, which go through it smoothly. Touching nodes are held in predictions, solved for anew in
@@ -91,11 +93,22 @@ def rank_countermeasures(
         found += ranking.masses()
     if chamfers > 0:
         found += ranking.chamfers(chamfers)
-    helping = sorted((m for m in found if m.removed_per_percent > 0), key=lambda m: -m.removed_per_percent)
+    acting = [m for m in found if abs(m.removed_per_percent) > ranking.rounding]
+    helping = sorted((m for m in acting if m.removed_per_percent > 0), key=lambda m: -m.removed_per_percent)
     told = [] if helping else [_none_helps(case, len(found), left)]
+    if helping and len(acting) < len(found):
+        told.append(f"{counted(len(found) - len(acting), 'change')} tried: no effect on the growth beyond rounding")
     told += [_left_out(left)] if left else []
     checked, left_over, lost = _solved_again(ranking, helping, verify, count, max_frequency_hz)
     told += lost
+    worse = [m for m in checked if _taken(m) <= 0]
+    if worse:
+        names = "; ".join(f"{m.words} ({_taken(m):.4g} 1/s)" for m in worse)
+        told.append(
+            f"{counted(len(worse), 'change')} that the slopes promise {'does' if len(worse) == 1 else 'do'} not take "
+            f"growth away when solved again, and {'is' if len(worse) == 1 else 'are'} left out: {names}"
+        )
+    checked = sorted((m for m in checked if _taken(m) > 0), key=lambda m: -_taken(m) / m.percent)
     return Countermeasures(
         linear.mu,
         target,
@@ -106,6 +119,12 @@ def rank_countermeasures(
         (*linear.warnings, *told),
         provenance(work, "countermeasures", time.perf_counter() - started, mu=linear.mu),
     )
+
+
+def _taken(measure: Measure) -> float:
+    """Growth rate that a measure took from the target when it was solved again."""
+    assert measure.verified is not None, "asked of those solved again"
+    return measure.verified.removed
 
 
 def _solved_again(

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..modal.derivatives import Mode, PencilChange, by_mass_at_node, by_release
+from ..modal.tolerances import UNSTABLE_RELATIVE
 from ..system import System
 from ..system.bodies import build_bodies
 from ..system.model import Line, Solid
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .contact_edges import edge_rows
-from .measures import Kind, Measure, Target, growing, growth
+from .measures import Kind, Measure, Target, growing, growth, per_cent_of
 from .sensitivities import BENT, Linearised
 
 
@@ -32,15 +33,21 @@ class Ranking:
         numbers = linear.modes.branch[columns]
         self.aimed: BoolArray = self.unstable if target == "sum" else numbers == target
 
+    @property
+    def rounding(self) -> float:
+        """Growth rate [1/s] per per cent that may be rounding: see `Sensitivities.beyond_rounding`."""
+        return 0.01 * UNSTABLE_RELATIVE * float(np.abs(self.eigenvalues[self.aimed]).sum())
+
     def numbers(self, paths: Sequence[str]) -> list[Measure]:
         found: list[Measure] = []
         for path in paths:
             value, change = self.linear.value(path), self.linear.change(path)
             per_unit = _derivatives(self.modes, change)
-            slopes = 0.01 * abs(value) * per_unit
+            slopes = per_cent_of(value) * per_unit
             direction = -1 if slopes[self.aimed].real.sum() > 0 else 1
             if value:
-                found.append(self._measure("number", path, direction, self.percent, direction * slopes * self.percent))
+                moved = direction * slopes * self.percent
+                found.append(replace(self._measure("number", path, direction, self.percent, moved), value=value))
         return found
 
     def masses(self) -> list[Measure]:

@@ -66,9 +66,8 @@ def _solved(system: System, linear: Linearised, mu: float, band: float, numbered
 def _changed(linear: Linearised, measure: Measure) -> System:
     """The system with the change made."""
     if measure.kind == "number":
-        value = linear.value(measure.name)
-        factor = 1 + 0.01 * measure.direction * measure.percent
-        return linear.varied(measure.name, factor * value)
+        assert measure.changed is not None, "a number has a value"
+        return linear.varied(measure.name, measure.changed)
     if measure.kind == "added mass":
         return _heavier(linear.system, measure)
     return _chamfered(linear, measure)

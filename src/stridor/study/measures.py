@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -12,9 +12,10 @@ from ..digits import readable
 from ..modal.complex_modes import UNSTABLE_RELATIVE
 from ..notebook import Shown, counted, html_table
 from ..tabular import Cell, Rows, Tabular, dataset, joined, split
-from ..typing import BoolArray, ComplexArray, IntArray
+from ..typing import Array, BoolArray, ComplexArray, IntArray
 
 Kind = Literal["number", "added mass", "chamfer"]
+Values = TypeVar("Values", float, Array)
 Target = int | Literal["sum"]
 SAID = ("kind", "name")  # of a change, as its dataset has it: texts
 SIZES = ("direction", "percent", "removed_per_percent", "removed_sum_per_percent", "removed")
@@ -39,9 +40,10 @@ class Verified:
 class Measure(Shown):
     """One change of a case.
 
-    name: path of a number, body that gets mass, or contact that is chamfered and where. direction: +1 raise, −1 lower.
-    percent: the size of change that predictions are made for, of the number, of the body's mass, of the contact's area
-    (nodes where they have none). removed_per_percent [1/s]: growth rate of the target taken away per per cent of
+    name: path of a number, body that gets mass, or contact that is chamfered and where. direction: +1 more, −1 less: of
+    a negative number more is farther from zero (`more_of`). value: the number as the case has it. percent: the size of
+    change that predictions are made for, of the number, of the body's mass, of the contact's area (nodes where they
+    have none). removed_per_percent [1/s]: growth rate of the target taken away per per cent of
     change, removed_sum_per_percent of all unstable modes together. predicted (b,) [1/s]: eigenvalues after the change.
     makes_unstable: branches that were stable and are predicted not to be; brings_close: those predicted to come within
     the margin. position [m] and mass [kg] of an added mass. verified: solved again, None where it was not.
@@ -60,6 +62,7 @@ class Measure(Shown):
     position: tuple[float, ...] | None = None
     mass: float | None = None
     verified: Verified | None = None
+    value: float | None = None
 
     @property
     def _line(self) -> str:
@@ -74,12 +77,22 @@ class Measure(Shown):
             return f"add {self.mass:.3g} kg to {self.name} at ({at}) m"
         if self.kind == "chamfer":
             return f"take {self.percent:.3g} % of the contact away: {self.name}"
+        if self.value is not None and self.value < 0:
+            # Raised or lowered would be taken for the sign's sake.
+            moved, more = f"from {self.value:.6g} to {self.changed:.6g}", "more" if self.direction > 0 else "less"
+            return f"move {self.name} {moved}, {self.percent:g} % {more}"
         return f"{'raise' if self.direction > 0 else 'lower'} {self.name} by {self.percent:g} %"
+
+    @property
+    def changed(self) -> float | None:
+        """The number after the change, None of other changes."""
+        return None if self.value is None else more_of(self.value, self.direction * self.percent)
 
 
 @dataclass(frozen=True, repr=False)
 class Countermeasures(Tabular):
-    """Changes by growth removed per per cent, best first. target: number of a branch, or "sum" of all unstable ones.
+    """Changes by growth removed per per cent, best first: those solved again by what they took, then those predicted
+    to take some. target: number of a branch, or "sum" of all unstable ones.
 
     branch (b,) and eigenvalues (b,) [1/s] of the modes watched, as the case is; margin: damping ratio below which a
     stable mode is called close.
@@ -119,7 +132,7 @@ class Countermeasures(Tabular):
     def helpful(self) -> tuple[Measure, ...]:
         """Changes that take growth away, best first: those solved again by what they took, then those predicted to."""
         again = [m for m in self.measures if m.verified is not None and m.verified.removed > 0]
-        again.sort(key=lambda m: -m.verified.removed if m.verified else 0.0)
+        again.sort(key=lambda m: -m.verified.removed / m.percent if m.verified else 0.0)
         return (*again, *(m for m in self.measures if m.verified is None and m.removed > 0))
 
     @property
@@ -163,6 +176,7 @@ class Countermeasures(Tabular):
                     "brings_close": list(m.brings_close),
                     "position": None if m.position is None else list(m.position),
                     "mass": m.mass,
+                    "value": m.value,
                     "verified": None if m.verified is None else vars(m.verified).copy(),
                 }
                 for m in self.measures
@@ -176,12 +190,14 @@ class Countermeasures(Tabular):
         again = [m.verified for m in self.measures]
         shape = len(self.measures), len(self.branch)
         predicted = np.array([m.predicted for m in self.measures], complex).reshape(shape)
-        units = {"percent": "size of the change [%]", "direction": "+1 raise, -1 lower"}
+        units = {"percent": "size of the change [%]", "direction": "+1 more, -1 less"}
         variables: dict[str, Any] = {
             **{n: ("change", np.array([getattr(m, n) for m in self.measures], dtype=object)) for n in SAID},
             **{n: ("change", [float(getattr(m, n)) for m in self.measures], {"long_name": units.get(n, f"{n} [1/s]")})
                for n in SIZES},
             "mass": ("change", [np.nan if m.mass is None else m.mass for m in self.measures], {"units": "kg"}),
+            "value": ("change", [np.nan if m.value is None else m.value for m in self.measures],
+                      {"long_name": "the number before the change"}),
             **{f"verified_{n}": ("change", [np.nan if v is None else float(getattr(v, n)) for v in again])
                for n in SOLVED},
             "eigenvalue": split(("branch",), self.eigenvalues, {"units": "1/s"}),
@@ -210,6 +226,7 @@ class Countermeasures(Tabular):
         if not (known and mu >= 0 and all(isinstance(text, str) for text in told["warnings"])):
             raise ValueError("its friction coefficient, target or texts are none")
         columns = {name: data[name].values for name in (*SAID, *SIZES, "mass", *(f"verified_{n}" for n in SOLVED))}
+        columns["value"] = data["value"].values if "value" in data else np.full(len(predicted), np.nan)
         measures: list[Measure] = []
         for k, lists in zip(range(len(predicted)), told["changes"], strict=True):
             row = {name: values[k] for name, values in columns.items()}
@@ -233,6 +250,7 @@ class Countermeasures(Tabular):
                     brings_close=tuple(map(int, lists["brings_close"])),
                     position=None if position is None else tuple(map(float, position)),
                     mass=None if np.isnan(row["mass"]) else float(row["mass"]),
+                    value=None if np.isnan(row["value"]) else float(row["value"]),
                     verified=solved,
                 )
             )
@@ -240,6 +258,16 @@ class Countermeasures(Tabular):
             mu, target, branch, joined(data["eigenvalue"].values), tuple(measures), margin, tuple(told["warnings"]),
             json.loads(data.attrs["provenance"]),
         )  # fmt: skip
+
+
+def per_cent_of(value: Values) -> Values:
+    """What a per cent more of a number adds to it: farther from zero whatever its sign, −1 N becomes −1.01 N."""
+    return 0.01 * value
+
+
+def more_of(value: float, percent: float) -> float:
+    """A number with so many per cent more of it, less of it where they are negative."""
+    return value + percent * per_cent_of(value)
 
 
 def growing(lam: ComplexArray) -> BoolArray:

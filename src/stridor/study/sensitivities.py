@@ -18,10 +18,20 @@ from ..digits import measured
 from ..direct import Nearby
 from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
-from ..modal.derivatives import Mode, PencilChange, by_compliance, by_friction, hold, pencil_of, rate_of, solve_mode
+from ..modal.derivatives import (
+    Mode,
+    PencilChange,
+    by_compliance,
+    by_friction,
+    hold,
+    pencil_of,
+    rate_from_zero,
+    rate_of,
+    solve_mode,
+)
 from ..modal.growing import doubt
 from ..modal.pencil import Pencil
-from ..sliding import share_factors
+from ..sliding import share_factors, steady_nodes
 from ..system import System, build_system
 from ..system.bodies import KnownBodies
 from ..system.imported import cleaned
@@ -228,8 +238,11 @@ class Linearised:
             return self._by_friction(path)
         if contact and self._is_friction(path):
             return by_friction(self.system, self.mu, self.held, self.options, contact=contact)
-        if contact and path.endswith(".compliance"):
-            return by_compliance(self.system, self.held, contact)
+        compliance = contact is not None and path.endswith(".compliance")
+        if contact and compliance:
+            alone = by_compliance(self.system, self.held, self.options, contact)
+            if alone is not None:
+                return alone
 
         moved: list[Array] = []
         apart: list[bool] = []
@@ -242,7 +255,10 @@ class Linearised:
             return pencil_of(system, self.friction(system), self.held, self.options)
 
         try:
-            found = rate_of(at, self.value(path), step, base=self.pencil)[0]
+            if compliance and not self.value(path) and step is None:
+                found = rate_from_zero(at, self._yielding(), base=self.pencil)
+            else:
+                found = rate_of(at, self.value(path), step, base=self.pencil)[0]
         except CaseError as error:
             accepted = f"a number that can be varied a little ({error.problems[0].accepted})"
             raise CaseError(path, self.value(path), accepted) from error
@@ -258,6 +274,14 @@ class Linearised:
             )
         return found
 
+    def _yielding(self) -> float:
+        """A compliance of contact [m³/N, m/N of a point] with which bodies come as near as they move in steady
+        sliding."""
+        steady = steady_nodes(self.system, self.mu, self.options.solver)
+        area = self.system.contact_nodes().area
+        pressure = np.abs(steady.normal_force) / np.where(np.isnan(area) | (area <= 0), 1.0, area)
+        return float(np.abs(steady.displacement).max()) / float(pressure.max())
+
     def _is_friction(self, path: str) -> bool:
         """Whether a number of a contact is its friction coefficient: of a law of speed it is but one of its numbers."""
         return path.endswith(".friction.coefficient") and not self.follows_law
@@ -270,10 +294,14 @@ class Linearised:
 
     def varied(self, path: str, value: float) -> System:
         """The system with another number at a path, with or without damping as this one. Raises CaseError."""
+        to: float | str = value
+        if _contact_of(self.case, path) and path.endswith(".compliance"):
+            path = path.removesuffix("compliance") + "stiffness"
+            to = 1.0 / value if value else "rigid"
         steps = split_path(path)
         # The range of a parameter says where onsets are sought; a little beyond its end nothing is amiss.
         beyond = {".".join([*steps[:2], "range"]): None} if steps[0] == "parameters" else {}
-        case = self.case.with_({**beyond, path: value})
+        case = self.case.with_({**beyond, path: to})
         mu = self.mu if self.work.varies else None
         system = self._as_asked(build_system(case, mu, known=self._bodies))
         share_factors(system, self._factors)

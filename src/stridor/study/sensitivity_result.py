@@ -14,7 +14,7 @@ from ..modal.tolerances import UNSTABLE_RELATIVE
 from ..notebook import counted, html_table
 from ..tabular import MODE, Cell, Rows, Tabular, dataset, mode_cells, with_band
 from ..typing import Array, BoolArray, ComplexArray, IntArray
-from .measures import growing
+from .measures import growing, per_cent_of
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,7 +53,8 @@ class Sensitivities(Rates, Tabular):
 
     @property
     def growth_per_percent(self) -> Array:
-        """Change of the growth rate (k, b) [1/s] per per cent of the number; NaN where the number is zero."""
+        """Change of the growth rate (k, b) [1/s] per per cent more of the number (farther from zero where it is
+        negative); NaN where the number is zero."""
         return self._percent[:, None] * self.derivative.real
 
     @property
@@ -65,7 +66,7 @@ class Sensitivities(Rates, Tabular):
 
     @property
     def frequency_per_percent_hz(self) -> Array:
-        """Change of the frequency (k, b) [Hz] per per cent of the number; NaN where the number is zero."""
+        """Change of the frequency (k, b) [Hz] per per cent more of the number; NaN where the number is zero."""
         return self._percent[:, None] * self.derivative.imag / (2 * np.pi)
 
     @property
@@ -78,7 +79,7 @@ class Sensitivities(Rates, Tabular):
 
     @property
     def _percent(self) -> Array:
-        return np.where(self.values == 0.0, np.nan, 0.01 * np.abs(self.values))
+        return np.where(self.values == 0.0, np.nan, per_cent_of(self.values))
 
     def of(self, parameter: str) -> ComplexArray:
         """dλ/dp (b,) of one number."""

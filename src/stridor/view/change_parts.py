@@ -96,8 +96,8 @@ def change_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
         yield ReportFigure(
             "countermeasures",
             "Counter-measures, the best first",
-            "Growth rate that a per cent of each change takes away; diamonds: solved again with the change made; "
-            "crosses: solved again, growth became more, not less.",
+            "Growth rate that a per cent of each change takes away; diamonds: solved again with the change made, "
+            "which come first.",
             "Bars of the growth rate removed per per cent of change, for each counter-measure.",
             countermeasure_bars(inputs.measures),
         )

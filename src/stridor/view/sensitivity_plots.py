@@ -63,7 +63,7 @@ def countermeasure_bars(result: Countermeasures, *, ax: Axes | None = None) -> F
     _names(ax, [m.words for m in measures])
     if measures:
         # Changes of a damping differ by decades from those of a mass.
-        least = measures[-1].removed_per_percent
+        least = min(m.removed_per_percent for m in measures)
         ax.set_xscale("symlog", linthresh=least, linscale=0.5)
         ax.set_xlim(0.0, 1.6 * max([m.removed_per_percent for m in measures] + [v for _, v in checked]))
         # Zero would be written into the first decade's label.

@@ -142,6 +142,18 @@ class Steadiness:
         return not (self.damps or self.prestress or self.hardens or self.stretches)
 
     @property
+    def reasons(self) -> list[str]:
+        """What of the steady state adds terms, in words."""
+        found = {
+            "the slope of a friction law": self.sloped,
+            "friction damping": self.friction_damping,
+            "prestress": self.prestress,
+            "contact stiffness with a cubic term": self.hardens,
+            "cubic springs": self.stretches,
+        }
+        return [words for words, there in found.items() if there]
+
+    @property
     def rests(self) -> bool:
         """Whether it adds nothing where there is no friction."""
         return not (self.prestress or self.hardens or self.stretches)
