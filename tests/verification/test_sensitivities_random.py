@@ -62,7 +62,8 @@ def hold(seed: int) -> int:
     compliances = [f"contacts.{name}.compliance" for name in case.contacts]
     paths = [*compliances, "loads.press0.force.0", f"bodies.{first.replace('rub', 'belt')}.sliding.velocity.1"]
     found = st.sensitivities(case, paths, mu=mu, modes="all")
-    usable = (found.condition < 20) & (found.nearest > 1e-2) & (np.abs(found.eigenvalues.imag) > 1e-3)
+    # Modes are solved to a residual of 1e-10, which leaves slow ones too few digits for differences.
+    usable = (found.condition < 20) & (found.nearest > 1e-2) & (np.abs(found.eigenvalues.imag) > 0.1)
     lam, compared = found.eigenvalues[usable], 0
     assert found.mu == mu
     for k, path in enumerate(paths):
@@ -82,7 +83,7 @@ def test_derivatives_are_those_of_modes_solved_again(seed: int) -> None:
 
 @pytest.mark.slow
 def test_derivatives_of_many_random_systems() -> None:
-    assert sum(hold(seed) for seed in range(60)) > 600
+    assert sum(hold(seed) for seed in range(50)) > 600
 
 
 BLOCK = """
