@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 
 from stridor.errors import AnalysisError
-from stridor.modal.full import counted, onsets_along, search
+from stridor.modal.full import counted, onsets_along, parametric_onsets, search
 from stridor.modal.parametric import Parameter, ParametricProblem, Term, reduce
 from stridor.modal.parametric.factors import CONSTANT, Product
 from stridor.typing import Array, ComplexArray
@@ -220,3 +220,17 @@ def test_counting_that_loses_an_onset_is_not_called_whole(monkeypatch: pytest.Mo
     assert len(fewer) < len(found)
     assert not fewer.complete
     assert fewer.sentence.startswith("Not complete")
+
+
+def test_what_is_left_out_unconfirmed_is_not_called_complete(monkeypatch: pytest.MonkeyPatch):
+    def unconfirmed(*_: object) -> None:
+        """Newton's method leads nowhere."""
+
+    monkeypatch.setattr(parametric_onsets, "_confirmed", unconfirmed)
+    friction = np.array([[0.0, -4 / 3], [0.0, 0.0]])
+    found = along([(np.eye(2), "mass", CONSTANT), (np.array([[2.0, 1.0], [1.0, 2.0]]), "stiffness", CONSTANT),
+                   (friction, "stiffness", P)], 1.5, 6.0)  # fmt: skip
+    assert (len(found), found.complete) == (0, False)
+    assert found.sentence.startswith("Not confirmed in the full problem and left out: p = 0.75 ")
+    assert "With these: in the reduced model 0 modes grow at p = 0 and 1 at" in found.sentence
+    assert "Complete" not in found.sentence

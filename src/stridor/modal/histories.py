@@ -112,11 +112,16 @@ def unexplained(growing: Iterable[int], from_start: Iterable[int], changes: Iter
 
 
 def unbalanced(changes: Iterable[StabilityChange], start: ComplexArray, end: ComplexArray) -> int:
-    """By how many more eigenvalues begin than cease to grow at these changes, than do from growing eigenvalues start
-    (a,) to end (b,) of all branches; 0 where that is not known: halves of a pair that has fallen apart on the real axis
-    are not all followed, and modes that are one have onsets that are."""
+    """`imbalance` from growing eigenvalues start (a,) to end (b,) of all branches; 0 where that is not known: halves of
+    a pair that has fallen apart on the real axis are not all followed."""
     if not (np.all(start.imag) and np.all(end.imag)):
         return 0
+    return imbalance(changes, 2 * (len(end) - len(start)))
+
+
+def imbalance(changes: Iterable[StabilityChange], grown: int) -> int:
+    """By how many more eigenvalues begin than cease to grow at these changes, than the ``grown`` that do of all that
+    are followed; 0 where that is not known: modes that are one have onsets that are."""
     every = list(changes)
     solved = [c.onset for c in every if c.onset is not None]
     distinct: list[Onset] = []
@@ -128,5 +133,16 @@ def unbalanced(changes: Iterable[StabilityChange], start: ComplexArray, end: Com
     )
     least = began[1] + ended[0] + sum(c.lost[0] for c in every)
     most = began[0] + ended[1] + sum(c.lost[1] for c in every)
-    grown = 2 * (len(end) - len(start))
     return least - grown if grown < least else most - grown if grown > most else 0
+
+
+def once_each(changes: Iterable[StabilityChange]) -> list[StabilityChange]:
+    """The changes without those that are the same onset of the same branches once more."""
+    kept: list[StabilityChange] = []
+    for change in changes:
+        onset, branches = change.onset, set(change.branches)
+        if onset is None or not any(
+            other.onset is not None and set(other.branches) == branches and _same(onset, other.onset) for other in kept
+        ):
+            kept.append(change)
+    return kept

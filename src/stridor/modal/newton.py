@@ -23,7 +23,7 @@ import numpy as np
 from ..errors import AnalysisError
 from ..typing import Array, ComplexArray
 from .quadratic.problem import Quadratic, times
-from .tolerances import CONFIRMED
+from .tolerances import CONFIRMED, SPLIT_RELATIVE
 
 STEPS = 14
 CONVERGED = 1e-13
@@ -124,6 +124,7 @@ class _Steps:
     """Newton's way to one root: its shortest step so far and where that began."""
 
     enough: float  # steps as short as this may end in rounding
+    rounding: float = ROUNDING  # and what steps that repeat may be all the same
     shortest: float = np.inf
     idle: int = 0  # steps since then that brought nothing
     kept: tuple[float, float, NewtonPoint] | None = None
@@ -139,7 +140,7 @@ class _Steps:
     @property
     def done(self) -> bool:
         """Whether stiff springs leave no more than this: steps so short that they repeat are rounding's own."""
-        return self.idle >= IDLE and self.shortest <= ROUNDING
+        return self.idle >= IDLE and self.shortest <= self.rounding
 
 
 class Border:
@@ -219,7 +220,8 @@ def meeting(
     """Where two eigenvalues of a reversible problem meet on the axis; None where that does not settle."""
     width = between[1] - between[0]
     omega, border = float(lam.imag), Border(problem, x, y)
-    steps = _Steps(1e3 * ON_AXIS)
+    # Stiff structures leave of ω what double precision leaves of the vectors, while μ has its digits.
+    steps = _Steps(1e3 * ON_AXIS, SPLIT_RELATIVE)
     for _ in range(STEPS):
         try:
             here = border.at(1j * omega, mu)
@@ -236,7 +238,7 @@ def meeting(
         mu, omega = mu + float(by_mu.real), omega + float(by_lam.imag)
         if off <= CONVERGED:
             break
-    if steps.kept is None or steps.shortest > 1e3 * ON_AXIS:
+    if steps.kept is None or (steps.shortest > 1e3 * ON_AXIS and not steps.done):
         return None
     omega, mu, here = steps.kept
     square = complex(-2 * here.by_mu / here.by_lam_lam)

@@ -98,9 +98,11 @@ class Receptance:
         value, slope = both[..., 0], both[..., 1]
         if self.general.shape[1]:
             gain = self._gains  # type: ignore[attr-defined]
-            inverse = 1.0 / (lam[:, None] - self._poles)  # type: ignore[attr-defined]
-            value = value + inverse @ gain
-            slope = slope - inverse**2 @ gain
+            # On a pole to the last bit this is not a number, as the sums over real modes are not; who asks sees it.
+            with np.errstate(divide="ignore", invalid="ignore"):
+                inverse = 1.0 / (lam[:, None] - self._poles)  # type: ignore[attr-defined]
+                value = value + inverse @ gain
+                slope = slope - inverse**2 @ gain
         return value, slope
 
 

@@ -7,7 +7,7 @@ the bordered sense; a damped onset is a simple root λ = jω; divergence is λ =
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..typing import BoolArray, ComplexArray, Sparse
 from .backward_error import BackwardError
 from .coupling import PointCoupling
 from .full.family import Family
-from .histories import Entries, StabilityChange, reported, unexplained
+from .histories import Entries, StabilityChange, imbalance, once_each, reported, unexplained
 from .newton import Root, crossing, exceptional, meeting, standstill
 from .onset import Branches, Onset, Onsets
 from .options import Options
@@ -35,6 +35,7 @@ ASTRAY = 0.1  # of μ
 FIRST = 1e-5  # μ at which branches are begun with at most, beside the poles
 OPENS = 1e-3  # of what has opened there: growth that began without friction
 STANDS = 1e-13  # of |λ|: on the axis, but for rounding
+UNSURE = 2.0  # times the growth that counts
 STILL = 1e-6  # of |λ|: what swings slower diverges
 
 
@@ -88,14 +89,16 @@ def onsets_by_receptance(
 
     tracker.watch = watch
     start = tracker.advance(low)
+    before = len(events)
     end = tracker.advance(high)
     order = _numbering(spectrum, tracker.origin)
     judge, family = BackwardError(coupling), _PointFamily(coupling, (0.0, high))
-    changes = [
-        StabilityChange(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping))
-        for event in events
+    passed = [
+        (StabilityChange(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping)), k)
+        for k, event in enumerate(events)
         if event.mu > 0.0 or event.branch in grown  # growth that stays within rounding all over the range is none
     ]
+    changes = [change for change, _ in passed]
     return Onsets(
         tuple(reported(changes, entries, (low, high), max_frequency_hz)),
         (low, high),
@@ -109,6 +112,7 @@ def onsets_by_receptance(
             start.branch[_inside(start.roots, np.inf)].tolist(),
             [c for c in changes if c.onset is not None and c.onset.mu >= low],
         ),
+        unbalanced=_unbalanced([(c, events[k]) for c, k in passed if k >= before], start, end, top),
         followed=(_numbered(start, spectrum, order), _numbered(end, spectrum, order)),
     )
 
@@ -147,6 +151,40 @@ def _numbered(state: RootState, spectrum: ReceptanceProblem, order: dict[int, in
 def _inside(roots: ComplexArray, top: float) -> BoolArray:
     """Which roots (k,) grow with a frequency up to top [1/s], twins in the lower half plane left out."""
     return grows(roots, top if np.isfinite(top) else 0.0) & (roots.imag >= 0) & (roots.imag <= top)
+
+
+def _unbalanced(passed: list[tuple[StabilityChange, _Event]], start: RootState, end: RootState, top: float) -> int:
+    """By how many more eigenvalues begin to grow at the onsets, less those that cease to, than do of all followed from
+    one end to the other."""
+    changes = once_each(_surely(change, event, passed, start, end, top) for change, event in passed)
+    return imbalance(changes, _growing_roots(end) - _growing_roots(start))
+
+
+def _surely(
+    change: StabilityChange, event: _Event, passed: list[tuple[StabilityChange, _Event]], start: RootState,
+    end: RootState, top: float,
+) -> StabilityChange:  # fmt: skip
+    """The change, or one that may have been where what is followed need not show it."""
+    onset = change.onset
+    if onset is None:
+        # Above the band nothing is lost with it.
+        above = max(abs(event.old.roots[event.index].imag), abs(event.new.roots[event.index].imag)) > top
+        roots = 0 if not above else -2 if event.stabilising else 2
+    elif event.double:
+        # Of two that meet, one may lie beyond all that are followed.
+        others = (e.branch for _, e in passed if e.double and e.new is event.new)
+        roots = 0 if event.partner < 0 or event.partner in others else onset.roots
+    else:
+        # What has only just begun to grow, or is about to cease to, need not count as growing.
+        state = start if onset.stabilising else end
+        root = state.roots[event.index] if event.index < len(state.roots) else 0j
+        roots = onset.roots if abs(root.real) <= UNSURE * UNSTABLE_RELATIVE * abs(root) else 0
+    return replace(change, onset=None, lost=(min(roots, 0), max(roots, 0))) if roots else change
+
+
+def _growing_roots(state: RootState) -> int:
+    """How many eigenvalues grow, twins that are left unsaid included."""
+    return int(np.sum(np.where(state.implied, 2, 1)[grows(state.roots, 0.0)]))
 
 
 def _growing(roots: ComplexArray, top: float) -> tuple[complex, ...]:
@@ -245,6 +283,8 @@ def _axis_crossings(start: float, end: float, slope0: float, slope1: float) -> l
 
     The cubic sees a root that grows and decays again inside one step.
     """
+    if not (np.isfinite(slope0) and np.isfinite(slope1)):  # at a double root
+        return [(start / (start - end), start > 0)] if start * end < 0 else []
     c3 = 2 * start - 2 * end + slope0 + slope1
     c2 = -3 * start + 3 * end - 2 * slope0 - slope1
     if start * end > 0 and min(abs(start), abs(end)) > abs(slope0) + abs(slope1):

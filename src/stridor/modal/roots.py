@@ -28,6 +28,7 @@ MAX_STEPS = 40
 UNCOUPLED_TOLERANCE = 1e-12
 APART = 1e-12  # of the largest: squares of poles nearer to each other have no room between them
 HALVINGS = 100  # of the interval between two poles at most
+BESIDE_POLE = 1e-6  # of |λ|: how far on both sides of a pole T is looked at
 NEAR_ROOT = 1e-8  # of its square: as near as the iteration wants a start
 
 
@@ -91,13 +92,25 @@ class ReceptanceProblem:
     def tangents(self, lam: ComplexArray, mu: float) -> ComplexArray:
         """dλ/dμ (k,) along the branches through the roots λ (k,)."""
         value, by_lambda, by_mu = self.evaluate(lam, mu)
-        # Infinite at a double root and on a pole, which whoever follows branches looks for.
+        # Infinite at a double root, which whoever follows branches looks for.
         with np.errstate(divide="ignore", invalid="ignore"):
             if value.shape[1] == 1:
-                return -by_mu[:, 0, 0] / by_lambda[:, 0, 0]
+                slopes = -by_mu[:, 0, 0] / by_lambda[:, 0, 0]
+                on_pole = np.isnan(slopes)
+                if on_pole.any():
+                    slopes[on_pole] = self._on_poles(lam[on_pole], mu)
+                return slopes
             left, right = _null_vectors(value)
             top = np.einsum("ki,kij,kj->k", left, by_mu, right)
             return -top / np.einsum("ki,kij,kj->k", left, by_lambda, right)
+
+    def _on_poles(self, lam: ComplexArray, mu: float) -> ComplexArray:
+        """dλ/dμ (k,) of roots that are on poles p to the last bit, of one contact: T is a/(λ − p) + b there, a zero at
+        this μ, so that b dλ = −da. Values on both sides of the pole tell a from b."""
+        beside = BESIDE_POLE * np.abs(lam)
+        (before, _, less), (after, _, more) = (self.evaluate(lam + way * beside, mu) for way in (-1.0, 1.0))
+        slopes: ComplexArray = (-beside * (more - less)[:, 0, 0] / (after + before)[:, 0, 0]).astype(complex)
+        return slopes
 
     def null_vectors(self, lam: ComplexArray, mu: float) -> tuple[ComplexArray, ComplexArray]:
         """Left and right null vectors (k, q) of T at the roots λ (k,)."""

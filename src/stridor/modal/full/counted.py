@@ -119,7 +119,7 @@ class _Count:
 
 def ends(root: Root) -> bool:
     """Whether growth ends there."""
-    return root.slope < 0 if root.slope is not None else (root.square or 0.0) < 0
+    return bool(root.slope < 0) if root.slope is not None else bool((root.square or 0.0) < 0)
 
 
 def counted(source: Along, between: tuple[float, float], top: float, more: Sequence[float] = ()) -> Counted:

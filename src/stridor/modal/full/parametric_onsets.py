@@ -249,8 +249,10 @@ def onsets_along(
     tried = [(o, _confirmed(model, source, full, o) if full else _of(line, o, None)) for o in answer.onsets]
     onsets = [found for _, found in tried if found is not None]
     where = "" if model.keeps_all else "in the reduced model"
-    said, complete = sentence(line, answer, ends, top, parameter, line.value, where), answer.complete
-    if len(onsets) < len(tried):
+    left_out = len(onsets) < len(tried)
+    said = sentence(line, answer, ends, top, parameter, line.value, where, left_out)
+    complete = answer.complete
+    if left_out:
         lost = ", ".join(f"{line.value(o.mu):.6g} ({o.frequency_hz:.6g} Hz)" for o, found in tried if found is None)
         complete, said = False, f"Not confirmed in the full problem and left out: {parameter} = {lost}. {said}"
     listed = sorted(onsets, key=lambda o: o.value)

@@ -20,10 +20,11 @@ BARELY = 1e-4  # of the highest frequency: what is no faster may be the one that
 
 def sentence(
     family: Family, answer: Answer, ends: tuple[RegionModes, RegionModes], top: float, name: str,
-    value: Callable[[float], float], where: str = "",
+    value: Callable[[float], float], where: str = "", left_out: bool = False,
 ) -> str:  # fmt: skip
     """What speaks for these onsets being all, or where they are not. name: of the parameter, value(μ) what it is there;
-    top [1/s]: the end of the band; where: what was searched, if not the full problem."""
+    top [1/s]: the end of the band; where: what was searched, if not the full problem; left_out: whether some of them
+    are not listed, so that nothing listed is complete."""
     first, last = (int(np.count_nonzero(unstable(family, end.values, top))) for end in ends)
     low, high = (f"{value(mu):g}" for mu in _between(family, answer))
     numbers = f"{_modes(first)} at {name} = {low} and {last} at {name} = {high}"
@@ -35,7 +36,8 @@ def sentence(
         return f"Not complete: {numbers}, but {_lacking(answer, name, value)}.{passing}"
     if answer.way is None:
         assert answer.seen is not None, "what else would have led to it"
-        how = f"As many roots grow at each of {len(answer.seen.grid)} values of {name} as the onsets say"
+        as_many = "With these, as many" if left_out else "As many"
+        how = f"{as_many} roots grow at each of {len(answer.seen.grid)} values of {name} as the onsets say"
         why = f": {answer.why}" if answer.why else ""
         if answer.walked:
             return (
@@ -58,7 +60,8 @@ def sentence(
     whole = where or "in the full problem"
     anew = f"All modes up to {top / (2 * np.pi):g} Hz at both ends were found anew {whole} ({counted})"
     between = _between_steps(answer, name)
-    return f"Complete as far as both ends tell: {numbers}, {said}.{passing} {told}. {anew}. {between}"
+    lead = "With these" if left_out else "Complete as far as both ends tell"
+    return f"{lead}: {numbers}, {said}.{passing} {told}. {anew}. {between}"
 
 
 def _between_steps(answer: Answer, name: str) -> str:

@@ -73,7 +73,7 @@ def crossings(old: State, new: State) -> list[Passage]:
             # One that is alone lies somewhere in the step: where the cubic turns is not known to the last.
             a, b = (0.0, 1.0) if len(passed) == 1 else (marks[k], marks[k + 1])
             low, high = old.mu + a * step, old.mu + b * step
-            found.append(Passage("crossing", low, high, i, _neighbour(new, i), rates[k] > 0, (0j, 0j), old))
+            found.append(Passage("crossing", low, high, i, _neighbour(new, i), bool(rates[k] > 0), (0j, 0j), old))
     return found
 
 
