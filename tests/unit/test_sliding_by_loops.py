@@ -727,7 +727,7 @@ def test_stretches_end_where_forces_and_gaps_run_out(monkeypatch) -> None:
     assert found[0].at is None
     for s in found[1:]:
         assert s.at is not None
-        assert s.low <= s.at <= s.high
+        assert min(s.at - s.low, s.high - s.at) > 1e-3 * (s.high - s.low)  # not where a force is zero but for rounding
     assert not any(s.reason or s.others for s in found)
     # Nine looks, and few more for each change, as all is straight; no μ twice.
     values = [mu for mu, _ in asked if mu is not None]

@@ -25,6 +25,7 @@ FEWER = 3  # of larger ones
 SMALL = 8000  # freedoms
 WIDTH = 1e-9  # of the largest μ: how closely a change is enclosed
 WIDTH_OF_NONE = 1e-3  # where there is no equilibrium on one side, which costs far more to find out
+EDGE = 1e-3  # of a stretch: closer to a border it is looked at elsewhere which nodes it has
 MOST = 40  # changes of single nodes; where there are more, each is small, and stretches of equal length do
 EQUAL = 12  # of them
 
@@ -97,7 +98,7 @@ def stretches(
     several = _several(system, looks)
     return tuple(
         Stretch(
-            a, b, None if piece.key == own else piece.mu,
+            a, b, None if piece.key == own else search.inside(a, b, piece),
             0 if piece.found is None else int(piece.found.active.sum()), nodes.count, piece.reason,
             several=tuple(mu for mu in several if a <= mu <= b and not piece.reason),
         )
@@ -204,6 +205,18 @@ class _Equilibria:
         if mu not in self._known:
             self._known[mu] = self._system.once(("look", mu, self._solver), lambda: self._look(mu))
         return self._known[mu]
+
+    def inside(self, low: float, high: float, piece: _Look) -> float:
+        """A μ well between two borders that shows the nodes of a look: right behind a border, where a force or a gap
+        is zero but for rounding, who touches may be read in two ways."""
+        if piece.found is None:
+            return piece.mu
+        middle = 0.5 * (low + high)
+        known = (k.mu for k in self._known.values() if k.key == piece.key and low <= k.mu <= high)
+        mu = min(known, key=lambda mu: abs(mu - middle), default=piece.mu)
+        if min(mu - low, high - mu) < EDGE * (high - low) and self.at(middle).key == piece.key:
+            return middle
+        return mu
 
     def _look(self, mu: float) -> _Look:
         try:
