@@ -48,8 +48,8 @@ class Cycle(Shown):
     left of the balance, in shares of the contact forces. defect: of harmonic balance, how far its motion is from the
     equations of motion in time (`periodic.harmonic.balanced.defect`); NaN by shooting, which solves them. multipliers:
     Floquet's, largest first, without the one of the motion itself; none where ``multiplied`` is False, as the system is
-    too large for them. own_off: by harmonic balance, how far the one of the motion itself, which is one, came out from
-    one; NaN by shooting. changes: of contact, in their order.
+    too large for them or some were not found. own_off: by harmonic balance, how far the one of the motion itself, which
+    is one, came out from one; NaN by shooting. changes: of contact, in their order.
 
     time (t,) [s] over one period, both ends included: normal_force, tangential_force (t, m) [N], slip_velocity (t, m)
     [m/s], gap (t, m) [m], status (t, m): 0 open, 1 stick, 2 slip; displacement [m], velocity, acceleration (t, w, 2),
