@@ -494,17 +494,20 @@ def test_where_steady_sliding_ends_cycles_are_sought_below():
 
 
 def test_ranges_are_those_of_the_motion_not_of_its_samples(monkeypatch: pytest.MonkeyPatch):
-    """With 12 samples of the period they are those with 4096 to 1e-4 of themselves, which samples alone do not meet."""
+    """With few samples of the period they are those with 4096 to 1e-4 of themselves, which samples alone do not meet."""
     family = Family(st.Workspace(mode_coupling(DAMPED, 0.1)).system())
     closed = cycles_reached(family.at(1.0), pushed(family.at(1.0), 0.2))[-1]
     monkeypatch.setattr(sampling, "SAMPLES", 4096)
     fine = sampling.sampled(closed, "")
-    monkeypatch.setattr(sampling, "SAMPLES", 12)
-    coarse = sampling.sampled(closed, "")
-    for name in ("slip_range", "force_range"):
-        wanted = getattr(fine, name)
-        assert np.abs(getattr(coarse, name) - wanted).max() < 1e-4 * np.ptp(wanted)
-    assert np.ptp(coarse.slip_velocity) < 0.99 * np.ptp(fine.slip_velocity)
+    missed: list[float] = []
+    for samples in (6, 7, 9, 12):
+        monkeypatch.setattr(sampling, "SAMPLES", samples)
+        coarse = sampling.sampled(closed, "")
+        missed.append(1.0 - float(np.ptp(coarse.slip_velocity) / np.ptp(fine.slip_velocity)))
+        for name in ("slip_range", "force_range"):
+            wanted = getattr(fine, name)
+            assert np.abs(getattr(coarse, name) - wanted).max() < 1e-4 * np.ptp(wanted)
+    assert max(missed) > 0.05
     assert fine.slip_amplitude == pytest.approx(0.5 * np.ptp(fine.slip_velocity), rel=1e-4)
 
 
