@@ -31,6 +31,8 @@ from stridor.periodic import (
     multipliers,
     pushed,
     returns,
+    sampling,
+    turning,
 )
 from stridor.periodic.chart import Chart
 from stridor.periodic.shooting import shoot, started
@@ -447,6 +449,66 @@ def test_a_fold_is_solved_for():
     assert mus[: k + 1] == sorted(mus[: k + 1])
     assert mus[k:] == sorted(mus[k:], reverse=True)
     assert mus[-1] < onset.mu < mus[0]
+
+
+@pytest.mark.parametrize(
+    ("mus", "told", "wanted"),
+    [
+        ((1.0, 1.1, 1.2, 1.1), [2], [2]),
+        ((1.0, 1.1, 1.2, 1.3), [1, 2], []),
+        ((1.0, 1.2, 1.2 + 1e-12, 1.0), [1], [1]),
+        ((1.0, 1.0 + 1e-12, 1.0 - 1e-12, 1.0), [1, 2], []),
+        ((1.2, 1.1, 1.0), [2], []),
+    ],
+    ids=["turns", "goes on", "beside another", "stays", "at the end"],
+)  # fmt: skip
+def test_folds_are_where_friction_turns(mus: tuple[float, ...], told: list[int], wanted: list[int]):
+    assert turning(mus, told) == wanted
+
+
+def test_a_cycle_at_the_edge_is_there_once():
+    found = st.cycles(mode_coupling(DAMPED, 0.1), 1.0, between=(0.9, 1.0), method="shooting", points=2)
+    assert sorted(c.mu for c in found.cycles).count(1.0) == 1
+    assert any(b.ends == "it leaves the range at μ = 1; a fold beyond it is not looked for" for b in found.branches)
+
+
+def test_where_steady_sliding_ends_cycles_are_sought_below():
+    """A mass on springs, coupled by c, and a contact of k: friction jams at μ = (1 + (1 − c²)/k) / c."""
+    c, k = 0.8, 10.0
+    contact = {
+        "normal": (0.0, 1.0), "tangent": (1.0, 0.0), "stiffness": k, "slip": -0.1,
+        "friction": {"law": "coulomb", "coefficient": 0.5},
+    }  # fmt: skip
+    system = st.System.from_matrices(
+        np.eye(2), 0.3 * np.eye(2), np.array([[1.0, c], [c, 1.0]]), contacts={"c": contact}, loads={"p": (0.0, -1.0)},
+        points={"m": np.eye(2)},
+    )  # fmt: skip
+    work = st.Workspace(system, modal={"max_frequency_hz": 5.0}, temporal={"watch": ["m"]},
+                        phases=[{"name": "run", "duration": 10.0}])  # fmt: skip
+    jams = (1.0 + (1.0 - c**2) / k) / c
+    found = st.cycles(work, between=(0.0, 1.5), method="shooting", seconds=1.0)
+    said = next(m for m in found.missing if m.startswith("there is steady sliding for μ = 0 to "))
+    assert float(said.split(" to ")[1].split()[0]) == pytest.approx(jams, rel=2e-3)
+    with pytest.raises(st.AnalysisError, match="does not settle"):
+        st.cycles(work, 1.5, method="shooting")
+
+
+def test_ranges_are_those_of_the_motion_not_of_its_samples(monkeypatch: pytest.MonkeyPatch):
+    """With few samples of the period they are those with 4096 to 1e-4 of themselves, which samples alone do not meet."""
+    family = Family(st.Workspace(mode_coupling(DAMPED, 0.1)).system())
+    closed = cycles_reached(family.at(1.0), pushed(family.at(1.0), 0.2))[-1]
+    monkeypatch.setattr(sampling, "SAMPLES", 4096)
+    fine = sampling.sampled(closed, "")
+    missed: list[float] = []
+    for samples in (6, 7, 9, 12):
+        monkeypatch.setattr(sampling, "SAMPLES", samples)
+        coarse = sampling.sampled(closed, "")
+        missed.append(1.0 - float(np.ptp(coarse.slip_velocity) / np.ptp(fine.slip_velocity)))
+        for name in ("slip_range", "force_range"):
+            wanted = getattr(fine, name)
+            assert np.abs(getattr(coarse, name) - wanted).max() < 1e-4 * np.ptp(wanted)
+    assert max(missed) > 0.05
+    assert fine.slip_amplitude == pytest.approx(0.5 * np.ptp(fine.slip_velocity), rel=1e-4)
 
 
 def test_a_search_that_time_ends_says_so():

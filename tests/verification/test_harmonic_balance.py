@@ -120,7 +120,9 @@ def test_without_reversal_the_equations_of_motion_are_met_ever_better():
     assert np.all(np.log2(left[:-1] / left[1:]) > 2.0)
     assert left[0] < 0.01
     # Hill's multipliers, and Liouville's formula: their product is exp(−tr C T), with this model's 2 · 0.02.
-    multipliers, own_off = hill(found[1])
+    told = hill(found[1])
+    assert told is not None
+    multipliers, own_off = told
     assert own_off < 1e-4
     pairs = [found[np.argsort(found.imag)] for found in (multipliers, np.array(cycle.multipliers))]
     assert pairs[0] == pytest.approx(pairs[1], abs=1e-4)
@@ -130,8 +132,9 @@ def test_without_reversal_the_equations_of_motion_are_met_ever_better():
 @pytest.mark.parametrize(("mu", "within"), [(0.9, 0.05), (1.0, 0.02), (1.7, 0.06)])
 def test_hill_is_floquet_where_slip_turns_and_sticks(mu: float, within: float):
     cycle, family = shot(0.1, mu)
-    found = hill(beside(cycle, family, 60)).multipliers
-    assert np.sort(np.abs(found)) == pytest.approx(np.sort(np.abs(cycle.multipliers)), abs=within)
+    found = hill(beside(cycle, family, 60))
+    assert found is not None
+    assert np.sort(np.abs(found.multipliers)) == pytest.approx(np.sort(np.abs(cycle.multipliers)), abs=within)
 
 
 @pytest.fixture(scope="module")

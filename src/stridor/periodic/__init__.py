@@ -2,7 +2,7 @@
 
 from .birth import born
 from .branch import Bifurcation, CycleBranch, bifurcations
-from .continuation import Followed, follow, unfinished
+from .continuation import Followed, follow, turning, unfinished
 from .cycle import Cycle
 from .cycles import CycleOnset, Cycles
 from .parting import Unclosed
@@ -36,6 +36,7 @@ __all__ = [
     "refuse_cycles",
     "same",
     "sampled",
+    "turning",
     "unfinished",
     "why_not_shooting",
 ]

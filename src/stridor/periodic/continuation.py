@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -22,6 +22,7 @@ FIRST = 0.02
 MOST = 400  # points
 TURN = 0.6  # cosine between two headings
 FLAT = 1e-4  # of a heading: a fold
+SAME = 1e-9  # of μ or the range: rounding
 HALVINGS = 14  # cycles between two others that are closed for one
 STOPPED = "it was stopped"
 UNFINISHED = ("could not be followed", "could not be closed", "points were made", "of computing were over")
@@ -173,9 +174,25 @@ def _fold(branch: Followed[P], spot: BranchPoint[P], length: float, tangent: Arr
     return None
 
 
+def turning(mus: Sequence[float], folds: Sequence[int]) -> list[int]:
+    """Those of the folds (numbers of points of a branch with these μ) that are shown: μ is larger there, or smaller,
+    than at the nearest points before and behind that have another. A heading that jumps, as its derivative by μ may, is
+    no fold."""
+    found: list[int] = []
+    for k in folds:
+        near = SAME * max(abs(mus[k]), 1e-300)
+        before = next((mus[k] - mus[j] for j in range(k - 1, -1, -1) if abs(mus[k] - mus[j]) > near), 0.0)
+        behind = next((mus[k] - mus[j] for j in range(k + 1, len(mus)) if abs(mus[k] - mus[j]) > near), 0.0)
+        found += [k] if before * behind > 0.0 else []
+    return found
+
+
 def _to_the_edge(branch: Followed[P], spot: BranchPoint[P], beyond: P, seen: Seen[P]) -> str:
     """The cycle at the edge of the range, between the last one and one beyond."""
     edge = branch.between[0] if beyond.mu < branch.between[0] else branch.between[1]
+    left = f"it leaves the range at μ = {edge:.6g}; a fold beyond it is not looked for"
+    if abs(spot.mu - edge) <= SAME * (branch.between[1] - branch.between[0]):
+        return left  # the last one is that cycle
     try:
         closed = branch.at(edge, spot.point, beyond)
     except (AnalysisError, np.linalg.LinAlgError) as error:
@@ -184,4 +201,4 @@ def _to_the_edge(branch: Followed[P], spot: BranchPoint[P], beyond: P, seen: See
             f"closed: {error}"
         )
     seen(closed, fold=False)
-    return f"it leaves the range at μ = {edge:.6g}; a fold beyond it is not looked for"
+    return left

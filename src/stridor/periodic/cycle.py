@@ -29,6 +29,19 @@ def slip_range(slip: Array, status: IntArray) -> Array:
     return np.where(np.any(status != OPEN, axis=0), [slip.min(axis=0), slip.max(axis=0)], 0.0).T
 
 
+def extremes(values: Array) -> tuple[Array, Array]:
+    """Least and largest (…) of values (t, …) at even times, also between these: at the tips of parabolas."""
+    least, most = values.min(axis=0), values.max(axis=0)
+    before, here, behind = values[:-2], values[1:-1], values[2:]
+    slope, bend = 0.5 * (behind - before), before - 2.0 * here + behind
+    within = (bend != 0.0) & (np.abs(slope) <= np.abs(bend))
+    tips = here - 0.5 * slope**2 / np.where(within, bend, 1.0)
+    return (
+        np.minimum(least, np.where(within & (bend > 0.0), tips, np.inf).min(axis=0, initial=np.inf)),
+        np.maximum(most, np.where(within & (bend < 0.0), tips, -np.inf).max(axis=0, initial=-np.inf)),
+    )
+
+
 class Change(NamedTuple):
     """A change of contact: when in the period [s], at which contact, what, and how each contact is behind it: 0 open, 1
     stick, 2 slip along its tangent, 3 slip against it."""
@@ -48,15 +61,14 @@ class Cycle(Shown):
     left of the balance, in shares of the contact forces. defect: of harmonic balance, how far its motion is from the
     equations of motion in time (`periodic.harmonic.balanced.defect`); NaN by shooting, which solves them. multipliers:
     Floquet's, largest first, without the one of the motion itself; none where ``multiplied`` is False, as the system is
-    too large for them. own_off: by harmonic balance, how far the one of the motion itself, which is one, came out from
-    one; NaN by shooting. changes: of contact, in their order.
+    too large for them or some were not found. own_off: by harmonic balance, how far the one of the motion itself, which
+    is one, came out from one; NaN by shooting. changes: of contact, in their order.
 
     time (t,) [s] over one period, both ends included: normal_force, tangential_force (t, m) [N], slip_velocity (t, m)
     [m/s], gap (t, m) [m], status (t, m): 0 open, 1 stick, 2 slip; displacement [m], velocity, acceleration (t, w, 2),
     in space (t, w, 3). In space slip and friction are those along the slip of steady sliding.
     shares (m, 3): of the period that a contact is open, sticks and slips. slip_range (m, 2), force_range (m, 2): least
-    and largest slip velocity (zeros where it never touches) and normal force, at those times and at the
-    changes.
+    and largest slip velocity (zeros where it never touches) and normal force, between those times as well.
 
     grazed: the least rate at which a force, gap or slip goes through zero, over what its terms amount to; a small one
     tells that a change is about to come or go. landed: how often contacts that threw one another off were brought to

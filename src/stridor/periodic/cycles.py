@@ -93,7 +93,7 @@ class Cycles(Tabular):
         if unknown := sum(not c.multiplied for c in self.cycles):
             said.append(
                 f"of {counted(unknown, 'cycle')} it is not known whether they are stable: the system is too large for "
-                "Floquet's multipliers; a run in time tells"
+                "Floquet's multipliers, or some of them were not found; a run in time tells"
             )
         if lost := [c for c in self.cycles if c.own_lost]:
             said.append(

@@ -9,11 +9,13 @@ from ..temporal.steppers.exact.outputs import Outputs
 from ..temporal.steppers.exact.statuses import GAP
 from ..temporal.steppers.exact.statuses import STICK as STUCK
 from ..typing import Array
-from .cycle import OPEN, SLIP, STICK, Change, Cycle
+from .cycle import OPEN, SLIP, STICK, Change, Cycle, extremes
 from .shooting import ClosedShot, multipliers, started
 
 SAMPLES = 512
 KEPT = 16  # of the multipliers
+OFTEN = 64  # times of a period of the fastest mode, for ranges
+LEAST, MOST = 32, 8192  # of them between two changes
 
 
 def sampled(closed: ClosedShot, reached_from: str) -> Cycle:
@@ -32,12 +34,12 @@ def sampled(closed: ClosedShot, reached_from: str) -> Cycle:
         end = motion.reach(closed.period)
         assert motion.anchor is not None
         here = (times >= begun) & (times < end) if end < closed.period else times >= begun
-        edges = np.array([begun, end])
-        found = _at(outputs, motion.anchor, np.concatenate([times[here], edges]))
-        contacts[here], watch[here] = found[0][:-2], found[1][:-2]
+        if here.any():
+            contacts[here], watch[here] = _at(outputs, motion.anchor, times[here])
         now = np.array([{GAP: OPEN, STUCK: STICK}.get(s, SLIP) for s in motion.status])
         status[here] = now
-        least, most = np.minimum(least, found[0].min(axis=0)), np.maximum(most, found[0].max(axis=0))
+        low, high = extremes(_at(outputs, motion.anchor, _often(motion.anchor, begun, end, closed.period))[0])
+        least, most = np.minimum(least, low), np.maximum(most, high)
         lasting[np.arange(m), now] += end - begun
         if end >= closed.period:
             break
@@ -56,6 +58,13 @@ def sampled(closed: ClosedShot, reached_from: str) -> Cycle:
         contacts[:, :, 3], status, points[0], points[1], points[2], lasting / closed.period, slip,
         np.stack([least[:, 0], most[:, 0]], axis=1), closed.shot.grazed, closed.shot.landed, reached_from,
     )  # fmt: skip
+
+
+def _often(anchor: Anchor, begun: float, end: float, period: float) -> Array:
+    """Even times between two changes, both included: as often as the period is sampled, and for the fastest mode."""
+    fastest = float(np.abs(anchor.watched.flow.split.poles.imag).max(initial=0.0))
+    wanted = (end - begun) * max(SAMPLES / period, OFTEN * fastest / (2 * np.pi))
+    return np.linspace(begun, end, int(np.clip(wanted, LEAST, MOST)) + 1)
 
 
 def _at(outputs: Outputs, anchor: Anchor, times: Array) -> tuple[Array, Array]:

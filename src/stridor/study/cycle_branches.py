@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import AnalysisError
-from ..periodic import Cycle, CycleBranch, CycleOnset, bifurcations, follow
+from ..periodic import Cycle, CycleBranch, CycleOnset, bifurcations, follow, turning
 from .cycle_methods import Method
 
 Kept = Callable[[], bool]
@@ -61,7 +61,7 @@ class Traced:
 
     def result(self, first: int) -> CycleBranch:
         """As data; first: the number of its first cycle."""
-        folds = [k for k, fold in enumerate(self.folds) if fold]
+        folds = turning([c.mu for c in self.cycles], [k for k, fold in enumerate(self.folds) if fold])
         return CycleBranch(
             tuple(range(first, first + len(self.cycles))), self.begins, self.ends, self.onset,
             tuple(first + k for k in folds), bifurcations(self.cycles, folds),

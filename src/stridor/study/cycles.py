@@ -25,6 +25,7 @@ from .workspace import Problem, Workspace
 
 MOST_ASKED = 1000  # harmonics
 METHODS = ("auto", "shooting", "harmonic")
+SHORT = 1e-3  # of the steady sliding of the range, where that ends within it
 BELOW = 0.05  # of the range: how far below its lowest onset cycles are looked for as well
 
 
@@ -128,6 +129,7 @@ class _CycleSearch:
         self.progress, self.keep, self.started, self.points = progress, keep, started, points
         self.harmonics = harmonics
         self.notes: list[str] = []
+        self.slides = between or (0.0, math.inf)  # what of the range has steady sliding
         self.method: Method[Any, Any] = self._method(chosen)
         self.tracer = Tracer(self.method, between or (0.0, 1.0), points, self._kept)
         self.onsets: tuple[CycleOnset, ...] = ()
@@ -151,6 +153,7 @@ class _CycleSearch:
 
     def _onsets(self, between: tuple[float, float]) -> tuple[CycleOnset, ...]:
         found = onsets(self.work, between)
+        self.slides = found.friction_range
         return tuple(CycleOnset(o.mu, o.frequency_hz, o.stabilising) for o in found.onsets)
 
     def run(self, values: list[float]) -> None:
@@ -163,7 +166,12 @@ class _CycleSearch:
             )
         if self.between is not None:
             self.onsets = self._onsets(self.between)
-            self.notes += [] if self.onsets else [f"no onset for μ from {self.between[0]:g} to {self.between[1]:g}"]
+            low, high = self.slides
+            if (low, high) != self.between:
+                self.missing.append(
+                    f"there is steady sliding for μ = {low:.6g} to {high:.6g} only: cycles are sought from it"
+                )
+            self.notes += [] if self.onsets else [f"no onset for μ from {low:g} to {high:g}"]
             for number, onset in enumerate(self.onsets):
                 self._say(f"branch from the onset at μ = {onset.mu:.6g}")
                 if missing := self.tracer.from_onset(number, onset, self.onsets):
@@ -176,13 +184,15 @@ class _CycleSearch:
             except AnalysisError as error:  # of this μ: the others have their answers all the same
                 unanswered.append(error)
                 self.missing.append(f"μ = {mu:.6g}: {error}")
-        if unanswered and len(unanswered) == len(looked) and not self._count():
+        if self.between is None and unanswered and len(unanswered) == len(looked):
             raise unanswered[0]
 
     def _more(self, values: list[float]) -> list[float]:
         """Where else in the range cycles are looked for."""
         assert self.between is not None
-        low, high = self.between
+        low, high = self.slides
+        if high < self.between[1]:  # at its very end contacts part at once
+            high -= SHORT * (high - low)
         lowest = min((o.mu for o in self.onsets), default=high)
         below = max(low, lowest - BELOW * (high - low))
         return [mu for mu in dict.fromkeys((below, high)) if mu not in values]

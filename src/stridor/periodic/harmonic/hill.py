@@ -1,4 +1,4 @@
-"""Floquet's multipliers of a cycle in harmonics, by Hill's determinant.
+"""Floquet's multipliers of a cycle in harmonics, by Hill's determinant, and held against motions followed.
 
 A motion beside the cycle is exp(σt) times a series of the cycle's period; with it the derivative of the balance, at
 s = σ + jkω in place of jkω, is singular. With displacements and velocities of the modes as unknowns that is linear in
@@ -11,10 +11,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from ...typing import Array, ComplexArray, IntArray
 from .balance import applied_at
 from .balanced import Balanced
+from .monodromy import by_monodromy
 
 MOST = 700  # size of the eigenproblem: 2 k (2h + 1)
 SHIFT = 0.05  # of ω: where the roots are sought about
@@ -22,7 +24,12 @@ FINER = 4  # times as many times as the balance has
 APART = 0.5  # between the centres of two roots of one exponent
 ALIKE = 0.02  # of a multiplier
 CENTRAL = 0.9  # of series: how far from k = 0
-EDGE = 0.15  # of half ω: how far beyond it roots are looked at
+EDGE = 0.15  # of half a turn: how near to a negative number
+FAR = 10.0  # times the highest frequency: no exponent that counts
+LARGE = 0.9  # size of a multiplier that must not be missing
+INNER = 1.5  # of series: how far from k = 0 copies are right enough to tell
+MISSED = 0.1  # of it: how far the nearest of those found is from one that is missing
+AGREE = 0.05  # with motions followed
 SO_NEAR = 10.0  # times as far from one as the nearest: another so near may be the own one of the motion
 
 
@@ -39,8 +46,30 @@ class Hill(NamedTuple):
     own_off: float
 
 
-def hill(cycle: Balanced) -> Hill:
-    """Floquet's multipliers of a cycle of a system of k modes."""
+def hill(cycle: Balanced) -> Hill | None:
+    """Floquet's multipliers of a cycle of a system of k modes; None where they are not known: the system is too large,
+    or roots of Hill's determinant tell that some are missing.
+
+    Where nothing jumps beside the cycle they are held against motions followed over the period (`monodromy`), which
+    are believed where both differ."""
+    followed = by_monodromy(cycle)
+    found = by_hill(cycle) if hill_size(cycle) <= MOST else None
+    if followed is not None and (found is None or not agree(found, followed)):
+        found = followed
+    return None if found is None else _without_own(found)
+
+
+def agree(found: ComplexArray, followed: ComplexArray) -> bool:
+    """Whether the multipliers followed, which rigid contacts leave less of, are all among those found, and these are
+    zero beyond them."""
+    off = np.abs(found[:, None] - followed[None, :])
+    rows, columns = linear_sum_assignment(off)
+    rest = np.delete(np.abs(found), rows)
+    return bool(off[rows, columns].max(initial=0.0) <= AGREE and rest.max(initial=0.0) <= AGREE)
+
+
+def by_hill(cycle: Balanced) -> ComplexArray | None:
+    """All 2k multipliers by Hill's determinant, the motion's own among them; None where some are missing."""
     at, family = cycle.at, cycle.family
     modes, h = family.condensed, at.base.harmonics
     k, length = modes.size, 2 * h + 1
@@ -69,44 +98,65 @@ def hill(cycle: Balanced) -> Hill:
     speeds = np.repeat(s, k)[:, None] * moved
     speeds[:, : k * length] += np.eye(k * length)
     roots, vectors = np.linalg.eig(np.vstack([moved, speeds]))
-    kept = np.abs(roots) > 1e-12 / at.omega
+    # Rigid contacts leave roots at infinity, which rounding brings to anywhere far away.
+    farthest = FAR * (float(np.sqrt(modes.squares.max())) + h * at.omega)
+    kept = np.abs(roots) * farthest > 1.0
     exponents: ComplexArray = (shift + 1.0 / roots[kept]).astype(complex)
     vectors = vectors[:, kept]
     sizes = np.abs(vectors[: k * length].reshape(length, k, -1)) ** 2
     weights = np.maximum(sizes.sum(axis=1), 1e-300)
     centres = (np.arange(-h, h + 1)[:, None] * weights).sum(axis=0) / weights.sum(axis=0)
-    return _without_own(_chosen(exponents, centres, 2 * np.pi / at.omega, 2 * k))
+    period = 2 * np.pi / at.omega
+    multipliers = np.exp(np.minimum(exponents.real * period, 300.0) + 1j * exponents.imag * period)
+    found = chosen(multipliers, centres)[: 2 * k]
+    if _lost(multipliers, centres, found):
+        return None
+    # What has no root left has died out within a period: sticking takes a motion beside the cycle away.
+    return np.concatenate([found, np.zeros(2 * k - len(found), dtype=complex)])
 
 
-def _chosen(exponents: ComplexArray, centres: Array, period: float, count: int) -> ComplexArray:
-    """The ``count`` largest multipliers of roots with central series, each exponent once. What has no such root has
-    died out within a period: sticking takes a motion beside the cycle away."""
-    angles = exponents.imag * period
-    multipliers = np.exp(np.minimum(exponents.real * period, 300.0) + 1j * angles)
-    central = np.flatnonzero((np.abs(centres) < CENTRAL) & (np.abs(angles) <= (1.0 + EDGE) * np.pi))
-    central = central[np.argsort(-np.abs(multipliers[central]), kind="stable")]
+def chosen(multipliers: ComplexArray, centres: Array) -> ComplexArray:
+    """One multiplier of each exponent, largest first, from all roots and where their series are centred.
 
-    def copies(j: int, of: complex, among: list[int] | IntArray) -> bool:
-        """Whether one of a root's copies, displaced by jω, is among some."""
-        return any(
-            abs(of - multipliers[k]) <= ALIKE * abs(of) and APART < abs(centres[j] - centres[k]) < 2.0 - APART
-            for k in among if k != j
-        )  # fmt: skip
+    The copies of an exponent have one multiplier and centres one apart, so that one of them is centred within half of
+    k = 0, whatever its frequency: a motion that is nearly one harmonic far above ω has that one far above ω as well.
+    Where it is half from k = 0, two copies are as near."""
+    central = np.flatnonzero(np.abs(centres) < CENTRAL)
+    central = central[np.argsort(np.abs(centres[central]), kind="stable")]
 
-    found: list[int] = []
+    def copies(j: int, of: complex, among: list[int] | IntArray) -> list[int]:
+        """Those of some that may be copies of a root, nearest first."""
+        met = [
+            int(k) for k in among
+            if k != j and abs(of - multipliers[k]) <= ALIKE * abs(of)
+            and APART < abs(centres[j] - centres[k]) < 2.0 - APART
+        ]  # fmt: skip
+        return sorted(met, key=lambda k: abs(of - multipliers[k]))
+
+    free: list[int] = []  # of those found, the ones whose other copy was not met
     values: list[complex] = []
-    for j in central:
+    for j in map(int, central):
         here = complex(multipliers[j])
         # A negative multiplier has its two copies at ±jω/2, which need not be displaced by all of jω then.
-        halved = abs(angles[j]) > (1.0 - EDGE) * np.pi and not copies(j, here, central) and (
-            copies(j, here.conjugate(), central)
-        )
-        if copies(j, here, found) or (halved and copies(j, here.conjugate(), found)):
+        negative = abs(np.angle(here)) > (1.0 - EDGE) * np.pi
+        halved = negative and not copies(j, here, central) and bool(copies(j, here.conjugate(), central))
+        met = copies(j, here.conjugate() if halved else here, free)
+        if met:
+            free.remove(met[0])
             continue
-        found.append(int(j))
+        free.append(j)
         values.append(-abs(here) if halved else here)
-    values = values[:count]
-    return np.array(values + [0.0] * (count - len(values)), dtype=complex)
+    found = np.array(values, dtype=complex)
+    return found[np.argsort(-np.abs(found), kind="stable")]
+
+
+def _lost(multipliers: ComplexArray, centres: Array, found: ComplexArray) -> bool:
+    """Whether a root that counts for stability is a copy of none of those found."""
+    inner = np.flatnonzero((np.abs(centres) < INNER) & (np.abs(multipliers) > LARGE))
+    if not len(inner):
+        return False
+    off = np.abs(multipliers[inner, None] - found[None, :]).min(axis=1, initial=np.inf)
+    return bool(np.any(off > MISSED * np.abs(multipliers[inner])))
 
 
 def _without_own(found: ComplexArray) -> Hill:

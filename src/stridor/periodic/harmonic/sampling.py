@@ -8,7 +8,7 @@ from ...typing import Array, ComplexArray, IntArray
 from ..cycle import OPEN, SLIP, STICK, Change, Cycle, slip_range
 from .balance import applied_at
 from .balanced import Balanced, defect
-from .hill import MOST, Hill, hill, hill_size
+from .hill import hill
 
 SAMPLES = 512
 KEPT = 16  # of the multipliers
@@ -29,17 +29,18 @@ def sampled_series(cycle: Balanced, reached_from: str) -> Cycle:
     shares = np.stack([np.mean(codes == kind, axis=1) for kind in (OPEN, STICK)], axis=1)
     index = np.minimum((times / cycle.period * at.base.samples).astype(int), at.base.samples - 1)
     status = np.where(codes >= ALONG, SLIP, codes)[:, index]
-    known = hill_size(cycle) <= MOST
-    floquet = hill(cycle) if known else Hill(np.zeros(0, dtype=complex), np.nan)
+    floquet = hill(cycle)
+    known = floquet is not None
+    multipliers, own_off = floquet or (np.zeros(0, dtype=complex), np.nan)
     displacement, velocity, acceleration = _watched(cycle, times)
     return Cycle(
-        cycle.mu, cycle.period, cycle.residual, floquet.multipliers[:KEPT],
+        cycle.mu, cycle.period, cycle.residual, multipliers[:KEPT],
         _changes(codes, family.names, cycle.period), family.names, tuple(family.system.points),
         times, normal.T, friction.T, slip.T, gap.T, status.T.astype(np.int64),
         displacement, velocity, acceleration, np.column_stack([shares, 1.0 - shares.sum(axis=1)]),
         slip_range(fine[2].T, codes.T),
         np.stack([fine[0].min(axis=1), fine[0].max(axis=1)], axis=1), np.nan, 0, reached_from, "harmonic",
-        at.base.harmonics, defect(cycle), known, floquet.own_off,
+        at.base.harmonics, defect(cycle), known, own_off,
     )  # fmt: skip
 
 
