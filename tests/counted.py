@@ -51,9 +51,10 @@ class Counts:
 
 
 def _question(call: tuple[Any, ...]) -> tuple[Any, ...]:
-    """The system, which the call keeps alive, and the μ of an equilibrium."""
+    """The system, which the call keeps alive, the μ of an equilibrium, and who has to touch."""
     named = dict(call[1:])
-    return id(call[0]), named.get("mu")
+    held = named.get("held")
+    return id(call[0]), named.get("mu"), None if held is None else held.tobytes()
 
 
 def _of_a_phase(call: tuple[Any, ...]) -> bool:

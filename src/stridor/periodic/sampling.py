@@ -14,7 +14,7 @@ from .shooting import ClosedShot, multipliers, started
 
 SAMPLES = 512
 KEPT = 16  # of the multipliers
-OFTEN = 64  # times of a period of the fastest mode, for ranges
+OFTEN = 24  # times of a period of the fastest mode, for ranges
 LEAST, MOST = 32, 8192  # of them between two changes
 
 

@@ -215,6 +215,10 @@ def other_equilibria(system: System, found: SurfaceSliding, mu: float | None = N
     free = np.flatnonzero(~nodes.kept)
     if system.load_steps or not 0 < len(free) <= ALL_TRIED:
         return []
+    return system.once(("other equilibria", mu), lambda: _others(system, found, mu, free))
+
+
+def _others(system: System, found: SurfaceSliding, mu: float | None, free: IntArray) -> list[BoolArray]:
     others = list[BoolArray]()
     for active in sets_near(found.active, free):
         if np.array_equal(active, found.active):
