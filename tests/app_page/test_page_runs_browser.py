@@ -244,6 +244,7 @@ def test_words_about_a_file_stay_to_be_read(shown: Any, tmp_path: Path) -> None:
     assert shown.inner_text("#st-problem") == words
 
 
+@pytest.mark.slow
 def test_sensitivities_of_a_large_model_are_asked_for(browser: Any, tmp_path: Path) -> None:
     path = tmp_path / "fine.toml"
     path.write_text(paper_case().with_({"bodies.beam2.elements": 180, "bodies.beam2.damping.stiffness": 1e-9}).to_toml(), encoding="utf-8")
