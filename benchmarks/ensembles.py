@@ -51,6 +51,21 @@ def separately(system: st.System, phases, settings) -> tuple[float, list[Traject
     return time.perf_counter() - started, runs
 
 
+def timed_launches() -> list[tuple[float, int]]:
+    """Seconds and steps of every launch on a GPU from now on."""
+    from stridor.temporal.steppers.modal.device import DeviceBatch
+
+    launches, advance = list[tuple[float, int]](), DeviceBatch.advance
+
+    def timed(self: DeviceBatch, steps: int, *given: object) -> None:
+        began = time.perf_counter()
+        advance(self, steps, *given)  # type: ignore[arg-type]
+        launches.append((time.perf_counter() - began, steps))
+
+    DeviceBatch.advance = timed  # type: ignore[method-assign]
+    return launches
+
+
 def on_a_gpu(system: st.System, settings, steps: int) -> None:
     """Many members on a GPU and on all cores, in turns."""
     there = gpu()
@@ -63,13 +78,15 @@ def on_a_gpu(system: st.System, settings, steps: int) -> None:
     ours, theirs = (side_by_side(system, shorter, settings, None, mus, device)[1] for device in ("gpu", "cpu"))
     difference = max(np.abs(ours[k].slip_speed - theirs[k].slip_speed).max() for k in theirs)
     largest = max(np.abs(run.slip_speed).max() for run in theirs.values())
-    times = {"gpu": [], "cpu": []}
+    times, launches = {"gpu": [], "cpu": []}, timed_launches()
     for _ in range(3):
         for device, kept in times.items():
             kept.append(side_by_side(system, phases, settings, None, mus, device)[0] / steps / len(mus))
     print(f"ensemble of {len(mus)} runs, {system.size} free freedoms, {steps} steps each ({machine()}, {there.name})")
     for device, kept in times.items():
         print(f"  {device}  {min(kept) * 1e9:8.1f} ns per member and step ({max(kept) * 1e9:.1f} at most)")
+    alone = sum(seconds for seconds, _ in launches) / sum(done * len(mus) for _, done in launches if done > 1)
+    print(f"  gpu  {alone * 1e9:8.1f} ns of these for launches, records brought back included")
     print(f"  slip speed of the first 1000 steps, largest relative difference {difference / largest:.1e}")
 
 

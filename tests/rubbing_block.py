@@ -41,3 +41,19 @@ def rubbing_block(modal: str, block: str = MESHED, *, title: str = "", more: str
     """The case's text: lines of [modal], which is last, and of [bodies.block]; more: further tables."""
     head = f'title = "{title}"\n' if title else ""
     return f"{head}{SLIDER}[bodies.block]\n{block}{more}[modal]\n{modal}\n"
+
+
+# A mass on two springs, pressed by −1 on a belt of speed −0.5, with falling friction.
+RUBBING_MASS = """
+units = "nondimensional"
+bodies.m = { type = "mass", mass = 1.0, position = [0.0, 0.0] }
+bodies.belt = { type = "obstacle", shape = "flat", point = [0, 0], normal = [0, 1], sliding.velocity = [-0.5, 0.0] }
+springs.k = { between = ["m", "ground"], direction = [1.0, 0.0], stiffness = 1.0 }
+springs.n = { between = ["m", "ground"], direction = [0.3, 1.0], stiffness = 1.0 }
+loads.press = { at = "m", force = [0.0, -1.0] }
+contacts.rub.slave = "m"
+contacts.rub.master = "belt"
+contacts.rub.stiffness = 1.0
+contacts.rub.friction = { law = "hyperbolic", coefficient = 0.0, static_coefficient = 0.8, delta = 0.5 }
+modal.max_frequency_hz = 1.0
+"""

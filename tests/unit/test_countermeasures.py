@@ -11,6 +11,7 @@ import pytest
 
 import stridor as st
 from benches import paper_case
+from rubbing_block import RUBBING_MASS
 from solid_cases import case, slider
 from stridor.app.conclusions import of_countermeasures
 from stridor.case import Case, loads, template_text
@@ -135,24 +136,9 @@ def test_rows_of_a_pad_on_a_turning_disc_lie_along_radii():
     assert len(leading) == 4
 
 
-PRESSED = """
-units = "nondimensional"
-bodies.m = { type = "mass", mass = 1.0, position = [0.0, 0.0] }
-bodies.belt = { type = "obstacle", shape = "flat", point = [0, 0], normal = [0, 1], sliding.velocity = [-0.5, 0.0] }
-springs.k = { between = ["m", "ground"], direction = [1.0, 0.0], stiffness = 1.0 }
-springs.n = { between = ["m", "ground"], direction = [0.3, 1.0], stiffness = 1.0 }
-loads.press = { at = "m", force = [0.0, -1.0] }
-contacts.rub.slave = "m"
-contacts.rub.master = "belt"
-contacts.rub.stiffness = 1.0
-contacts.rub.friction = { law = "hyperbolic", coefficient = 0.0, static_coefficient = 0.8, delta = 0.5 }
-modal.max_frequency_hz = 1.0
-"""
-
-
 def test_a_per_cent_more_of_a_negative_number_is_farther_from_zero(tmp_path):
     """A mass on falling friction: a load of −1 drives it, a speed of −0.5 that becomes faster quietens it."""
-    model = loads(PRESSED)
+    model = loads(RUBBING_MASS)
     load, speed = "loads.press.force.1", "bodies.belt.sliding.velocity.0"
     found = rank_countermeasures(model, numbers=[load, speed], percent=2.0, verify=2, added_mass=False)
     assert {m.name: m.direction for m in found.measures} == {load: -1, speed: 1}
@@ -184,7 +170,7 @@ def test_what_was_solved_again_is_ranked_by_that_and_what_did_harm_is_told(monke
         return replace(found, verified=replace(found.verified, removed=took[measure.name]))
 
     monkeypatch.setattr(module, "verified", as_said)
-    found = rank_countermeasures(loads(PRESSED), numbers=list(took), verify=3, added_mass=False)
+    found = rank_countermeasures(loads(RUBBING_MASS), numbers=list(took), verify=3, added_mass=False)
     assert [m.name for m in found.measures] == ["loads.press.force.1", "springs.k.stiffness"]
     assert found.helpful == found.measures
     (told,) = [line for line in found.warnings if "slopes promise" in line]
@@ -193,7 +179,7 @@ def test_what_was_solved_again_is_ranked_by_that_and_what_did_harm_is_told(monke
 
 
 def test_the_next_command_sets_what_the_case_has():
-    model = loads(PRESSED)
+    model = loads(RUBBING_MASS)
     for path, option in (("contacts.rub.compliance", "contacts.rub.stiffness=0.952381"), ("mu", "0.608")):
         found = rank_countermeasures(model, numbers=[path], verify=int(path != "mu"), added_mass=False)
         assert of_countermeasures(found, partial(number_at, model), None).options[-1] == option
@@ -207,7 +193,7 @@ springs.x = { between = ["far", "ground"], direction = [1.0, 0.0], stiffness = 3
 springs.y = { between = ["far", "ground"], direction = [0.0, 1.0], stiffness = 5.0 }
 """
     paths = ["springs.x.stiffness", "springs.y.stiffness", "springs.k.stiffness"]
-    found = rank_countermeasures(loads(PRESSED + other), numbers=paths, verify=9)
+    found = rank_countermeasures(loads(RUBBING_MASS + other), numbers=paths, verify=9)
     assert {m.name for m in found.measures} == {"springs.k.stiffness", "m"}
     assert "3 changes tried: no effect on the growth beyond rounding" in found.warnings  # the mass added to it, too
 

@@ -196,7 +196,7 @@ def test_points_are_given_four_tries_each_and_two_more_and_then_all_sets(monkeyp
         points._active_set(*given)
         assert asked == tries
     else:
-        said = r"^steady sliding at μ = 0.3: none of the 4 sets of touching nodes is in equilibrium; turn loads"
+        said = r"^steady sliding at μ = 0.3: none of the 4 sets of touching nodes is in equilibrium and holds the structure; turn loads"
         with pytest.raises(AnalysisError, match=said):
             points._active_set(*given)
         assert asked == 4 * 2 + 2 + 4

@@ -7,6 +7,7 @@ import pytest
 
 import stridor as st
 from random_rubbing import random_rubbing
+from rubbing_block import RUBBING_MASS
 from stridor.modal.derivatives import HeldContacts, by_compliance
 from stridor.modal.options import Options
 from stridor.study.sensitivities import Linearised
@@ -86,19 +87,6 @@ def test_derivatives_of_many_random_systems() -> None:
     assert sum(hold(seed) for seed in range(50)) > 600
 
 
-BLOCK = """
-units = "nondimensional"
-bodies.m = { type = "mass", mass = 1.0, position = [0.0, 0.0] }
-bodies.belt = { type = "obstacle", shape = "flat", point = [0, 0], normal = [0, 1], sliding.velocity = [-0.5, 0.0] }
-springs.k = { between = ["m", "ground"], direction = [1.0, 0.0], stiffness = 1.0 }
-springs.n = { between = ["m", "ground"], direction = [0.3, 1.0], stiffness = 1.0 }
-loads.press = { at = "m", force = [0.0, -1.0] }
-contacts.rub.slave = "m"
-contacts.rub.master = "belt"
-contacts.rub.stiffness = 1.0
-contacts.rub.friction = { law = "hyperbolic", coefficient = 0.0, static_coefficient = 0.8, delta = 0.5 }
-modal.max_frequency_hz = 1.0
-"""
 COULOMB = {"law": "coulomb", "coefficient": 0.4}
 
 
@@ -106,7 +94,7 @@ COULOMB = {"law": "coulomb", "coefficient": 0.4}
 def test_a_compliance_takes_steady_sliding_along_as_its_stiffness_does(change: dict[str, object]) -> None:
     """d/d(1/K) = −K² d/dK: with a slope of friction, a cubic spring that is stretched, and contact that hardens."""
     cubic = {"springs.n.cubic": 0.5} if "friction" in change else {}
-    model = st.loads(BLOCK).with_({f"contacts.rub.{name}": value for name, value in change.items()} | cubic)
+    model = st.loads(RUBBING_MASS).with_({f"contacts.rub.{name}": value for name, value in change.items()} | cubic)
     found = st.sensitivities(model, ["contacts.rub.compliance", "contacts.rub.stiffness"], modes="all")
     np.testing.assert_allclose(found.derivative[0], -found.derivative[1], rtol=1e-8, atol=1e-13)
     held = by_compliance(*held_of(model, found.mu), "rub")
@@ -120,7 +108,7 @@ def held_of(model: st.Case, mu: float) -> tuple[System, HeldContacts, Options]:
 
 def test_a_rigid_contact_that_begins_to_yield_relaxes_cubic_springs() -> None:
     """Against equilibria and frequencies by hand, with rigid contact and with a little compliance."""
-    model = st.loads(BLOCK).with_(
+    model = st.loads(RUBBING_MASS).with_(
         {"contacts.rub.friction": COULOMB, "contacts.rub.stiffness": "rigid", "springs.n.cubic": 0.5, "springs.k.cubic": 0.2}
     )
     found = st.sensitivities(model, ["contacts.rub.compliance"], modes="all")
@@ -152,7 +140,7 @@ def tangent_frequency(compliance: float) -> float:
 
 
 def test_the_friction_of_the_only_contact_is_mu_and_of_one_of_two_is_refused_with_its_reason() -> None:
-    model = st.loads(BLOCK).with_({"contacts.rub.friction": COULOMB, "springs.n.cubic": 0.5})
+    model = st.loads(RUBBING_MASS).with_({"contacts.rub.friction": COULOMB, "springs.n.cubic": 0.5})
     path = "contacts.rub.friction.coefficient"
     found = st.sensitivities(model, ["mu", path], modes="all")
     np.testing.assert_allclose(found.derivative[1], found.derivative[0], rtol=1e-12)

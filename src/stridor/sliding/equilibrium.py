@@ -301,8 +301,8 @@ def unsettled(free: int, limit: int) -> str:
     """What is said where no set of touching nodes was found, of so many that need not touch."""
     if free <= FEW:
         return (
-            f"none of the {2**free} sets of touching nodes is in equilibrium; turn loads that pull, or lower the "
-            "friction coefficient"
+            f"none of the {2**free} sets of touching nodes is in equilibrium and holds the structure; turn loads that "
+            "pull, or lower the friction coefficient"
         )
     return (
         f"the set of touching nodes does not settle in {limit} steps; turn loads that pull, lower the friction "

@@ -122,6 +122,10 @@ def external_force(system: System, load_factors: Mapping[str, float] | None) -> 
     return force
 
 
+class _SignsUnclear(AnalysisError):
+    """Where contacts kept closed push and where they pull does not settle: there may be an equilibrium all the same."""
+
+
 @dataclass(frozen=True)
 class _Found:
     """An equilibrium, and which contacts would rather let go of one another (pulled) or touch (closing), each (m,)."""
@@ -153,7 +157,7 @@ def _with(system: System, force: Array, mu: Array, slips: Array, active: BoolArr
         if np.array_equal(sign, before):
             break
     else:
-        raise AnalysisError(
+        raise _SignsUnclear(
             "steady sliding: where contacts kept closed push and where they pull does not settle at "
             f"{words_of_friction(mu)}"
         )
@@ -184,7 +188,10 @@ def _settled(system: System, force: Array, mu: Array, slips: Array) -> _Found:
     for active in sets_near(np.ones(count, dtype=bool), free) if 1 < len(free) <= FEW else ():
         try:
             found = _with(system, force, mu, slips, active)
-        except AnalysisError:
+        except _SignsUnclear as error:
+            failed = failed or error
+            continue
+        except AnalysisError:  # it does not hold the structure
             continue
         if found.settled:
             return found
