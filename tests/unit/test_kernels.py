@@ -20,6 +20,7 @@ import pytest
 import stridor
 from stridor.contact import curve
 from stridor.kernels import folder as folders
+from stridor.kernels import njit
 from stridor.kernels.folder import ABOUT, Folder, kernel_folder
 from stridor.kernels.sources import ABOVE, Sources, read_sources
 
@@ -482,3 +483,22 @@ def test_ctrl_c_while_code_is_made_or_fetched_is_an_interrupt_and_nothing_else(w
     for where in ("made", "fetched"):  # the second finds what the first has kept
         said = python(tmp_path / "stopped.py", who, where, environment=environment)
         assert said == ("interrupted\n4.0 True\n", ""), where
+
+
+def test_what_compiled_code_calls_has_no_entry_for_python_and_python_still_calls_it():
+    @njit
+    def twice(value):
+        return 2.0 * value
+
+    @njit
+    def four_times(value):
+        return twice(twice(value))
+
+    assert four_times(1.5) == 6.0
+    assert not twice.overloads
+    (form,) = twice.get_overload.__self__.overloads.values()
+    names = [function.name for function in form.library.get_defined_functions()]
+    assert names
+    assert not [name for name in names if name.startswith(form.fndesc.llvm_cpython_wrapper_name)]
+    assert twice(1.5) == 3.0
+    assert len(twice.overloads) == 1

@@ -10,7 +10,7 @@ import numba
 from numba.core import config, types
 
 from .folder import kernel_folder
-from .linking import Closed
+from .linking import Closed, Inner
 from .store import KernelCache
 
 _settings: Any = config
@@ -29,11 +29,16 @@ def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **o
         dispatcher: Any = numba.njit(pipeline_class=Closed, **chosen)(plain)
         if _settings.DISABLE_JIT:  # which gives the plain function back
             return dispatcher
-        dispatcher.get_call_template = partial(_without_literals, dispatcher.get_call_template)
+        # Compiled code calls another form, made when it does: without an entry for Python, which takes a third of the
+        # time where a hundred arrays are handed over.
+        inner: Any = numba.njit(pipeline_class=Inner, no_cpython_wrapper=True, **chosen)(plain)
+        dispatcher.get_call_template = partial(_without_literals, inner.get_call_template)
+        dispatcher.get_overload = inner.get_overload
         if cache:
             folder = kernel_folder()
             if folder is not None:
                 dispatcher._cache = KernelCache(plain, folder, options)
+                inner._cache = KernelCache(plain, folder, {**options, "no_cpython_wrapper": True})
         return dispatcher
 
     return made if function is None else made(function)

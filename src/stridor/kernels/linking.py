@@ -41,13 +41,34 @@ class ClosedLibrary(_Library):
             super()._finalize_final_module()
 
 
+class InnerLibrary(ClosedLibrary):
+    """The code of a function that only compiled functions call: it is optimised in them, so that here it is only
+    brought down to its size."""
+
+    def _optimize_final_module(self) -> None:
+        own = cast("Any", self)
+        passes, builder = own._codegen._module_pass_manager(
+            loop_vectorize=False, slp_vectorize=False, opt=own._codegen._opt_level, cost="cheap"
+        )
+        with own._recorded_timings.record("Module passes (cheap optimization for refprune)", builder):
+            passes.run(own._final_module, builder)
+
+
 class Closed(_Compiler):
     """numba's compiler, writing into a ``ClosedLibrary``."""
+
+    library: type[Any] = ClosedLibrary
 
     def compile_extra(self, func: Any) -> Any:
         """Compile from bytecode."""
         state = cast("Any", self).state
         if state.library is None:
-            state.library = ClosedLibrary(state.targetctx.codegen(), func.__qualname__)
+            state.library = self.library(state.targetctx.codegen(), func.__qualname__)
             state.library.enable_object_caching()
         return super().compile_extra(func)
+
+
+class Inner(Closed):
+    """The same, writing into an ``InnerLibrary``."""
+
+    library = InnerLibrary

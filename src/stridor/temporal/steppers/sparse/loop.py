@@ -46,8 +46,9 @@ from .unsymmetric import MOST_PASSES, Unsymmetric, apply_force, converged, keep_
 DONE, NOT_FINITE = 0, 1
 
 
-# The functions of the contacts are inlined: handing a hundred arrays on costs more than a few contacts do.
-@njit(cache=True, inline="always")
+# The functions of the contacts are called in one place and become part of it: handing a hundred arrays on costs more
+# than a few contacts do.
+@njit(cache=True, forceinline=True)
 def _correct(
     a: Structure, f: Fields, table: NodeTable, nodes: NodeState, work: NodeScratch
 ) -> float:  # pragma: no cover - compiled
@@ -71,24 +72,7 @@ def _correct(
     return extra
 
 
-@njit(cache=True, inline="always")
-def _contacts_of_step(
-    increments: Array, a: Structure, f: Fields, b: StepMatrix, table: NodeTable, nodes: NodeState, work: NodeScratch,
-    state: LoopState, w: StepWork,
-) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Forces at t_n into the motion to t_{n+1}: powers of normal and tangential forces, and what they add to that of
-    the structure."""
-    count = _solve_contacts(increments, a, f, table, nodes, work, state, w)
-    extra = 0.0
-    if count and b.before.shape[0]:
-        correct_whole(count, a, f, table, nodes, work)
-    elif count:
-        extra = _correct(a, f, table, nodes, work)
-    normal, friction = _after_contacts(count, increments, a, table, nodes, work, state, w)
-    return normal, friction, extra
-
-
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _solve_contacts(
     increments: Array, a: Structure, f: Fields, table: NodeTable, nodes: NodeState, work: NodeScratch, state: LoopState,
     w: StepWork,
@@ -104,7 +88,7 @@ def _solve_contacts(
     return count
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _after_contacts(
     count: int, increments: Array, a: Structure, table: NodeTable, nodes: NodeState, work: NodeScratch,
     state: LoopState, w: StepWork,
@@ -126,34 +110,45 @@ def _after_contacts(
     return normal, friction
 
 
-@njit(cache=True)
-def _unsymmetric_step(
-    increments: Array, a: Structure, f: Fields, x: Unsymmetric, table: NodeTable, nodes: NodeState, work: NodeScratch,
-    state: LoopState, w: StepWork,
+@njit(cache=True, forceinline=True)
+def _forces_of_step(
+    increments: Array, a: Structure, f: Fields, x: Unsymmetric, b: StepMatrix, table: NodeTable, nodes: NodeState,
+    work: NodeScratch, state: LoopState, w: StepWork,
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Skew forces and contact forces at t_n in turn until both agree with the motion to t_{n+1}: powers as
-    `_contacts_of_step` gives them."""
-    keep_free(f, x)
+    """Forces of contacts at t_n into the motion to t_{n+1}, with skew forces in turn until both agree with it: powers
+    of normal and tangential forces, and what they add to that of the structure."""
+    skew, touched = x.force.shape[0] > 0, table.gap.shape[0] > 0
+    if skew:
+        keep_free(f, x)
     count, passes = 0, 0
     while True:
-        apply_force(a, f, x)
-        if table.gap.shape[0]:
+        if skew:
+            apply_force(a, f, x)
+        if touched:
             count = _solve_contacts(increments, a, f, table, nodes, work, state, w)
-            if count:
-                for c in range(table.indices.shape[0]):
-                    f.u[table.indices[c]], f.q[table.indices[c]] = work.u[c], work.q[c]
+        if not skew:
+            break
+        if count:
+            for c in range(table.indices.shape[0]):
+                f.u[table.indices[c]], f.q[table.indices[c]] = work.u[c], work.q[c]
         passes += 1
         if passes == MOST_PASSES:
             state.counters[UNCONVERGED] += 1
             break
         if converged(a, f, x, f.y):
             break
+    extra = 0.0
+    if skew:
+        circulatory, gyroscopic, extra = powers(a, f, x)
+        state.works[CIRCULATORY] += circulatory * a.numbers[0]
+        state.works[GYROSCOPIC] += gyroscopic * a.numbers[0]
+    elif count and b.before.shape[0]:
+        correct_whole(count, a, f, table, nodes, work)
+    elif count:
+        extra = _correct(a, f, table, nodes, work)
     normal = friction = 0.0
-    if table.gap.shape[0]:
+    if touched:
         normal, friction = _after_contacts(count, increments, a, table, nodes, work, state, w)
-    circulatory, gyroscopic, extra = powers(a, f, x)
-    state.works[CIRCULATORY] += circulatory * a.numbers[0]
-    state.works[GYROSCOPIC] += gyroscopic * a.numbers[0]
     return normal, friction, extra
 
 
@@ -175,18 +170,14 @@ def run_steps(
             return k, NOT_FINITE
         if skew:
             keep_before(f, x)
-        taken = normal = friction = 0.0
+        taken = 0.0
         if whole:
             advance_whole(a, f, b)
         else:
             taken = advance(a, f, w.power)
         code = follow_feet(w.displacement, f.u, table, nodes, work)
-        if skew:
-            normal, friction, extra = _unsymmetric_step(g.increments[k], a, f, x, table, nodes, work, state, w)
-            taken += extra
-        elif table.gap.shape[0]:
-            normal, friction, extra = _contacts_of_step(g.increments[k], a, f, b, table, nodes, work, state, w)
-            taken += extra
+        normal, friction, extra = _forces_of_step(g.increments[k], a, f, x, b, table, nodes, work, state, w)
+        taken += extra
         if whole:
             taken = take_drag(a, f, b)
         if recording:

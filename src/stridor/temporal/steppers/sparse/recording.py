@@ -76,7 +76,7 @@ def energies(a: Structure, f: Fields, b: StepMatrix, g: Forcing, state: LoopStat
     row[0], row[1] = kinetic, elastic + state.works[CUBIC]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def statistics(
     count: int, ratio: Array, step: float, increments: Array, table: NodeTable, nodes: NodeState, work: NodeScratch,
     status: IntArray, state: LoopState, sums: Array,
