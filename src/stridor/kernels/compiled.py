@@ -14,6 +14,7 @@ from .linking import Closed, Inner
 from .store import KernelCache
 
 _settings: Any = config
+_njit: Any = numba.njit
 
 
 def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **options: Any) -> Any:
@@ -26,12 +27,12 @@ def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **o
     def made(plain: Callable[..., Any]) -> Any:
         # Nobody calls them from C: an entry for that takes a sixth of the time to compile.
         chosen: dict[str, Any] = {"no_cfunc_wrapper": True, **options}
-        dispatcher: Any = numba.njit(pipeline_class=Closed, **chosen)(plain)
+        dispatcher: Any = _njit(pipeline_class=Closed, **chosen)(plain)
         if _settings.DISABLE_JIT:  # which gives the plain function back
             return dispatcher
         # Compiled code calls another form, made when it does: without an entry for Python, which takes a third of the
         # time where a hundred arrays are handed over.
-        inner: Any = numba.njit(pipeline_class=Inner, no_cpython_wrapper=True, **chosen)(plain)
+        inner: Any = _njit(pipeline_class=Inner, no_cpython_wrapper=True, **chosen)(plain)
         dispatcher.get_call_template = partial(_without_literals, inner.get_call_template)
         dispatcher.get_overload = inner.get_overload
         if cache:
