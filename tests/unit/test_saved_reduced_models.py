@@ -107,9 +107,12 @@ def test_a_model_comes_back_to_the_last_bit(model, case, tmp_path):
         elif one.name != "problem":
             assert mine == theirs, one.name
     assert type(back.problem) is type(model.problem)
-    known = {"terms", "parameters", "elimination", "notes"}
+    known = {"terms", "parameters", "elimination", "notes", "elsewhere", "touching"}
     assert {f.name for f in fields(model.problem)} <= known  # a new one must be saved, and looked at below
     assert back.problem.parameters == model.problem.parameters
+    for name in ("notes", "elsewhere"):
+        assert getattr(back.problem, name, ()) == getattr(model.problem, name, ())
+    assert np.array_equal(getattr(back.problem, "touching", None), getattr(model.problem, "touching", None))
     for mine, theirs in zip(model.problem.terms, back.problem.terms, strict=True):
         assert (mine.role, mine.factor, mine.symmetric) == (theirs.role, theirs.factor, theirs.symmetric)
         assert (mine.matrix != theirs.matrix).nnz == 0

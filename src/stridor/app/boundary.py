@@ -76,6 +76,7 @@ def _conclusion(result: Boundary, case: Case) -> Conclusion:
         many = counts.pop() if len(counts) == 1 else None
         grow = "" if many is None else f"; {counted(many, 'mode')} {'grows' if many == 1 else 'grow'}"
         growing = f"{grow} wherever that was counted" if grow else ""
+        growing += "" if result.agree else ", but see above"
         return Conclusion(f"no curve was found in the rectangle up to {result.max_frequency_hz:g} Hz{growing}", "modes")
     if not outer:
         return Conclusion(f"{len(result.curves)} curves; something grows on both sides of each of them", "modes")

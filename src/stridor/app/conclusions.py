@@ -174,10 +174,11 @@ def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
 
 
 def of_reduced(
-    document: Sequence[dict[str, Any]], found: ParametricOnsets | None, ranges: Mapping[str, str]
-) -> Conclusion:
+    document: Sequence[dict[str, Any]], found: ParametricOnsets | None, ranges: Mapping[str, str], *,
+    elsewhere: bool = False,
+) -> Conclusion:  # fmt: skip
     """What grows at the points that were asked for, and where growth begins; then the other of the two. ranges: of each
-    parameter, as --at takes them."""
+    parameter, as --at takes them. elsewhere: whether other nodes touch at some values than those that are held."""
     first = next(iter(ranges))
     onsets = None if found is None else of_onsets_along(found).sentence
     if not document:
@@ -188,6 +189,7 @@ def of_reduced(
     if some:
         rate, frequency = max(modes)
         said += f"; the fastest {fastest(frequency, rate)}"
+    said += ", with the nodes that are held: others touch at some values, see the note" if elsewhere else ""
     if onsets is None:
         return Conclusion(said, "reduce", ("--onsets", first))
     return Conclusion(f"{said}\n{onsets}")

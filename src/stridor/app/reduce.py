@@ -127,7 +127,8 @@ def reduce(
             _show_modes(model, points)
         if along is not None and onsets is not None:
             show_onsets_along(onsets, confirmed=confirm, held=any(HELD in note for note in notes))
-        call.conclude(of_reduced(points, onsets, {p.name: f"{p.low:g}:{p.high:g}:5" for p in model.problem.parameters}))
+        ranges = {p.name: f"{p.low:g}:{p.high:g}:5" for p in model.problem.parameters}
+        call.conclude(of_reduced(points, onsets, ranges, elsewhere=bool(getattr(model.problem, "elsewhere", ()))))
     if onsets is not None and not onsets.complete:
         raise typer.Exit(INCOMPLETE)
 

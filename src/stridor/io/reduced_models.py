@@ -46,7 +46,7 @@ QUICK = 1  # compression: half the time of the usual 6, a tenth larger
 
 _NUMBERS = ("frequency", "constant", "bound", "solves", "whole")
 _ARRAYS = ("vectors", "projected", "right_sketch", "left_sketch")
-_OF_CONTACTS = {"terms", "parameters", "elimination", "notes"}
+_OF_CONTACTS = {"terms", "parameters", "elimination", "notes", "elsewhere", "touching"}
 _NAMED = {"problem", "seconds", "states", *_NUMBERS, *_ARRAYS}
 
 
@@ -178,8 +178,10 @@ def _contacts(problem: ParametricProblem, written: _Arrays, *, vectors: bool) ->
     if not isinstance(problem, ContactsProblem) or {f.name for f in fields(problem)} != _OF_CONTACTS:
         raise CaseError("model.problem", type(problem).__name__, f"files of format {VERSION} cannot hold it")
     found = problem.elimination
+    touching = None if problem.touching is None else [int(one) for one in problem.touching]
     if found is None or not vectors:
-        return {"notes": list(problem.notes), "elimination": None}
+        said = {"notes": list(problem.notes), "elsewhere": list(problem.elsewhere)}
+        return said | {"touching": touching, "elimination": None}
     changes = [
         {"factor": _factor(f"elimination[{k}].factor", f, "rigid contact"), "matrix": _csr(f"change{k}", v, written)}
         for k, (f, v) in enumerate(found.changes)
@@ -187,6 +189,8 @@ def _contacts(problem: ParametricProblem, written: _Arrays, *, vectors: bool) ->
     motion = _csr("motion", found.motion, written)
     return {
         "notes": list(problem.notes),
+        "elsewhere": list(problem.elsewhere),
+        "touching": touching,
         "elimination": {"displacements": int(found.motion.shape[0]), "motion": motion, "changes": changes},
     }
 
@@ -367,9 +371,14 @@ def _read_problem(
     if contacts is None:
         return ParametricProblem(terms, parameters)
     notes = tuple(str(note) for note in contacts["notes"])
+    # Files of before have neither.
+    elsewhere = tuple(str(note) for note in contacts.get("elsewhere", ()))
+    held = contacts.get("touching")
+    touching = None if held is None else np.array(held, dtype=bool)
     found = contacts["elimination"]
     if found is None or keep == "eigenvalues":
-        return ContactsProblem(terms, parameters, None, notes)
+        return ContactsProblem(terms, parameters, None, notes, elsewhere, touching)
     shape = whole_count(found["displacements"]), n
     changes = tuple((factor_from_json(c["factor"]), reading.csr(c["matrix"], shape)) for c in found["changes"])
-    return ContactsProblem(terms, parameters, Elimination(reading.csr(found["motion"], shape), changes), notes)
+    elimination = Elimination(reading.csr(found["motion"], shape), changes)
+    return ContactsProblem(terms, parameters, elimination, notes, elsewhere, touching)

@@ -208,17 +208,18 @@ def _told(parts: Sequence[tuple[Stretch, Onsets]]) -> str:
     if not any(found.completeness for _, found in parts):
         return ""
     held = "with the nodes of its middle" if any(s.others for s, _ in parts) else "with the nodes that touch there"
-    return f"{len(parts)} stretches of μ, each {held}. {' '.join(_by_stretch(parts))}"
+    said = [(s, found.completeness or "Not checked.") for s, found in parts]
+    return f"{len(parts)} stretches of μ, each {held}. {' '.join(by_stretch(said))}"
 
 
-def _by_stretch(parts: Sequence[tuple[Stretch, Onsets]]) -> list[str]:
+def by_stretch(told: Sequence[tuple[Stretch, str]]) -> list[str]:
     """What was checked by stretch; sentences that all of them share once, behind the others."""
-    said = [_sentences(found.completeness or "Not checked.") for _, found in parts]
-    shared = [s for s in said[-1] if all(s in other for other in said)]
+    said = [_sentences(words) for _, words in told]
+    shared = [s for s in said[-1] if all(s in other for other in said)] if len(said) > 1 else []
     own = [" ".join(s for s in other if s not in shared) for other in said]
-    told = [f"({s.low:.6g} to {s.high:.6g}) {words}" for (s, _), words in zip(parts, own, strict=True) if words]
-    lead = "In each of them: " if told and shared else ""
-    return told + ([lead + " ".join(shared)] if shared else [])
+    listed = [f"({s.low:.6g} to {s.high:.6g}) {words}" for (s, _), words in zip(told, own, strict=True) if words]
+    lead = "In each of them: " if listed and shared else ""
+    return listed + ([lead + " ".join(shared)] if shared else [])
 
 
 def _sentences(text: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Which nodes touch over the friction coefficient: stretches of μ in which they are the same.
+"""Which nodes touch over the friction coefficient, or another number: stretches of it in which they are the same.
 
 Friction redistributes the pressure, so that nodes of a surface open and close as μ grows. Between two such changes the
 equilibrium is that of one linear problem and its forces and gaps are smooth in μ: where the first of them runs out is
@@ -7,7 +7,7 @@ foreseen by a straight line through the last two, and enclosed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,13 +17,15 @@ from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray
 from .equilibrium import FEW
-from .surfaces import ALL_TRIED, STEADY, SurfaceSliding, other_equilibria, steady_sliding_nodes
+from .surfaces import ALL_TRIED, STEADY, SurfaceSliding, other_equilibria, steady_nodes, steady_sliding_nodes
 
 HELD = "are held at every μ of the model"  # nodes of one friction coefficient
+HELD_AT_ALL = "are held at all values of the model"
 LOOKS = 9  # equilibria over a range, of small models
 FEWER = 3  # of larger ones
 SMALL = 8000  # freedoms
 WIDTH = 1e-9  # of the largest μ: how closely a change is enclosed
+WIDTH_ALONG = 1e-7  # of the largest size of another number, each of whose values is a system of its own
 WIDTH_OF_NONE = 1e-3  # where there is no equilibrium on one side, which costs far more to find out
 EDGE = 1e-3  # of a stretch: closer to a border it is looked at elsewhere which nodes it has
 MOST = 40  # changes of single nodes; where there are more, each is small, and stretches of equal length do
@@ -84,8 +86,31 @@ def stretches(
     count = LOOKS if system.size <= SMALL else FEWER
     asked = np.asarray(at if len(at) <= LOOKS else (), dtype=float)
     looks = [search.at(float(mu)) for mu in np.unique(np.append(np.linspace(low, high, count), asked))]
+    return _between(search, looks, own)
+
+
+def stretches_along(
+    system_at: Callable[[float], System], own: System, low: float, high: float, *, rubs: bool = False,
+    solver: str | None = None,
+) -> tuple[Stretch, ...]:  # fmt: skip
+    """`stretches` of another number than μ, from ``low`` to ``high``: system_at gives the system at its values, own is
+    that of the case as it is. ``Stretch.at`` is a value of this number, and every contact has its own friction; rubs:
+    the number is the friction of all contacts, and something else too."""
+    nodes = own.contact_nodes()
+    if not nodes.count or not own.loads or own.load_steps or bool(np.all(nodes.kept)):
+        return (Stretch(low, high, None),)
+    search = _Along(own, system_at, max(abs(low), abs(high)), solver, rubs=rubs)
+    looks = [search.at(float(value)) for value in np.linspace(low, high, LOOKS if own.size <= SMALL else FEWER)]
+    if all(look.found is None for look in looks):
+        return (Stretch(low, high, None, 0, nodes.count, looks[0].reason),)
+    return _between(search, looks, search.own())
+
+
+def _between(search: _Equilibria, looks: Sequence[_Look], own: bytes | None) -> tuple[Stretch, ...]:
+    """The stretches between the first and the last of some looks."""
+    low, high, count = looks[0].mu, looks[-1].mu, search.count
     if sum(_different(a, b) for a, b in pairwise(looks)) > MOST:
-        return _equal(search, low, high, nodes.count)
+        return _equal(search, low, high, count)
     pieces = [looks[0]]
     borders: list[float] = []
     for before, after in pairwise(looks):
@@ -93,25 +118,25 @@ def stretches(
             borders.append(border)
             pieces.append(beyond)
             if len(pieces) > MOST:
-                return _equal(search, low, high, nodes.count)
+                return _equal(search, low, high, count)
     ends = [low, *borders, high]
-    several = _several(system, looks)
+    several = _several(search, looks)
     return tuple(
         Stretch(
             a, b, None if piece.key == own else search.inside(a, b, piece),
-            0 if piece.found is None else int(piece.found.active.sum()), nodes.count, piece.reason,
+            0 if piece.found is None else int(piece.found.active.sum()), count, piece.reason,
             several=tuple(mu for mu in several if a <= mu <= b and not piece.reason),
         )
         for (a, b), piece in zip(pairwise(ends), pieces, strict=True)
     )  # fmt: skip
 
 
-def _several(system: System, looks: Sequence[_Look]) -> list[float]:
+def _several(search: _Equilibria, looks: Sequence[_Look]) -> list[float]:
     """At which of some μ more than one set of touching nodes is in equilibrium, as far as all are tried."""
-    if (free := int(np.count_nonzero(~system.contact_nodes().kept))) > ALL_TRIED:
+    if (free := search.free) > ALL_TRIED:
         return []
     some = looks if free < ALL_TRIED - 1 else [looks[0], looks[len(looks) // 2], looks[-1]]
-    return [look.mu for look in some if look.found is not None and other_equilibria(system, look.found, look.mu)]
+    return [look.mu for look in some if look.found is not None and search.others(look.mu, look.found)]
 
 
 def _equal(search: _Equilibria, low: float, high: float, count: int) -> tuple[Stretch, ...]:
@@ -126,31 +151,35 @@ def _equal(search: _Equilibria, low: float, high: float, count: int) -> tuple[St
     return tuple(result)
 
 
-def stretch_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
-    """A sentence on what touches where, and one on where there is no steady sliding; () where nothing changes."""
+def stretch_words(found: tuple[Stretch, ...], name: str = "μ") -> tuple[str, ...]:
+    """A sentence on what touches where, and one on where there is no steady sliding; () where nothing changes. name: of
+    the number whose values they are."""
+    asked = " --mu" if name == "μ" else ""
+    as_grows, one = ("as friction grows", "μ") if name == "μ" else (f"as {name} grows", "value")
     told: list[str] = []
     solid = [s for s in found if not s.reason]
     if (most := max((s.others for s in solid), default=0)) > 0:
         told.append(
-            f"More than {MOST} of the {solid[0].nodes} contact nodes open or close between μ = {found[0].low:.6g} and "
-            f"{found[-1].high:.6g}: in each of {len(found)} equal stretches of μ those touch that do so in its middle, "
-            f"and up to {most} are others at its ends. Modes there are other ones: ask for one μ, or a smaller range."
+            f"More than {MOST} of the {solid[0].nodes} contact nodes open or close between {name} = {found[0].low:.6g} "
+            f"and {found[-1].high:.6g}: in each of {len(found)} equal stretches of {name} those touch that do so "
+            f"in its middle, and up to {most} are others at its ends. Modes there are other ones: ask for one {one}, "
+            "or a smaller range."
         )
     elif len(solid) > 1:
-        parts = [f"{s.touching} between μ = {s.low:.6g} and {s.high:.6g}" for s in solid]
+        parts = [f"{s.touching} between {name} = {s.low:.6g} and {s.high:.6g}" for s in solid]
         told.append(
-            f"Of the {solid[0].nodes} contact nodes other ones touch in steady sliding as friction grows: "
-            f"{', '.join(parts)}. Each μ is solved with those of its stretch."
+            f"Of the {solid[0].nodes} contact nodes other ones touch in steady sliding {as_grows}: "
+            f"{', '.join(parts)}. Each {one} is solved with those of its stretch."
         )
     if several := sorted({mu for s in solid for mu in s.several}):
         where = ", ".join(f"{mu:.4g}" for mu in several)
         told.append(
-            f"At μ = {where} there is more than one equilibrium of steady sliding, each with other nodes that touch: "
-            "modes and onsets are those of one of them (`stridor steady --mu` names the others)."
+            f"At {name} = {where} there is more than one equilibrium of steady sliding, each with other nodes that "
+            f"touch: modes and onsets are those of one of them (`stridor steady{asked}` names the others)."
         )
     none = [(f"{s.low:.4g}", f"{s.high:.4g}", s.reason) for s in found if s.reason]
     # Where one equilibrium jumps to another there may be none at that μ alone.
-    told += [f"Between μ = {low} and {high} nothing was solved: {why}." for low, high, why in none if low != high]
+    told += [f"Between {name} = {low} and {high} nothing was solved: {why}." for low, high, why in none if low != high]
     return tuple(told)
 
 
@@ -166,7 +195,7 @@ def instead_of_own(system: System, low: float, high: float, *, solver: str | Non
     return next((mu for mu in (0.5 * (low + high), low, high) if search.at(mu).found is not None), None)
 
 
-def elsewhere_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
+def elsewhere_words(found: tuple[Stretch, ...], name: str = "μ") -> tuple[str, ...]:
     """A sentence where a model that holds the nodes of the case's own friction has others than steady sliding."""
     others = [s for s in found if s.at is not None or s.reason]
     if not others:
@@ -176,9 +205,11 @@ def elsewhere_words(found: tuple[Stretch, ...]) -> tuple[str, ...]:
     where = ", ".join(
         f"{s.low:.4g} to {s.high:.4g} ({'no steady sliding' if s.reason else f'{s.touching} touch'})" for s in others
     )
+    own_value = "at the case's own friction" if name == "μ" else "in the case as it is"
+    at_every = HELD if name == "μ" else HELD_AT_ALL
     return (
-        f"{held} that touch at the case's own friction {HELD}; steady sliding has others at "
-        f"μ = {where}. Modes there are other ones: `stridor modes` and `stridor onsets` have them.",
+        f"{held} that touch {own_value} {at_every}; steady sliding has others at "
+        f"{name} = {where}. Modes there are other ones: `stridor modes` and `stridor onsets` have them.",
     )
 
 
@@ -190,6 +221,21 @@ class _Equilibria:
         self._system, self._solver = system, solver
         self._known: dict[float, _Look] = {}
         self._guess: BoolArray | None = None
+        nodes = system.contact_nodes()
+        self.count, self.free = nodes.count, int(np.count_nonzero(~nodes.kept))
+
+    def others(self, mu: float, found: SurfaceSliding) -> bool:
+        """Whether other nodes may touch at ``mu`` as well, as far as all sets are tried."""
+        return bool(other_equilibria(self._system, found, mu))
+
+    def size(self, mu: float) -> float:
+        """What the width of a change near ``mu`` is measured by."""
+        return max(mu, 1e-3)
+
+    @property
+    def width(self) -> float:
+        """How closely a change is enclosed."""
+        return WIDTH
 
     def own(self) -> bytes | None:
         """The key of the laws' own coefficients; None where there is no steady sliding."""
@@ -244,17 +290,17 @@ class _Equilibria:
 
     def changes(self, low: _Look, high: _Look) -> Iterator[tuple[float, _Look]]:
         """Each μ between two looks from which on other nodes touch, and a look beyond it that shows which."""
-        width = WIDTH if None not in (low.key, high.key) else WIDTH_OF_NONE
+        width = self.width if None not in (low.key, high.key) else WIDTH_OF_NONE
         foreseen: float | None = None
         while low.key != high.key:
             span = high.mu - low.mu
-            if span <= width * max(high.mu, 1e-3):
+            if span <= width * self.size(high.mu):
                 # Where one side has no equilibrium, the other ends with the last that has.
                 solved = [look.mu for look in (low, high) if look.found is not None]
                 yield sum(solved) / len(solved), high
                 return
             before, foreseen = foreseen, self._foreseen(low, high)
-            for mu in _probes(low.mu, high.mu, foreseen, before):
+            for mu in _probes(low.mu, high.mu, foreseen, before, self.width * self.size(high.mu)):
                 look = self.at(mu)
                 if look.key == low.key:
                     low = look
@@ -282,14 +328,49 @@ class _Equilibria:
         return None
 
 
-def _probes(low: float, high: float, foreseen: float | None, before: float | None) -> Iterator[float]:
+class _Along(_Equilibria):
+    """The same by the values of another number, each with a system of its own. scale: the largest size of one."""
+
+    def __init__(
+        self, own: System, system_at: Callable[[float], System], scale: float, solver: str | None, *, rubs: bool
+    ) -> None:
+        super().__init__(own, solver)
+        self._system_at, self._scale, self._rubs = system_at, scale, rubs
+
+    def others(self, mu: float, found: SurfaceSliding) -> bool:
+        return bool(other_equilibria(self._system_at(mu), found, mu if self._rubs else None))
+
+    def size(self, mu: float) -> float:
+        return self._scale
+
+    @property
+    def width(self) -> float:
+        return WIDTH_ALONG
+
+    def at(self, mu: float) -> _Look:
+        if mu not in self._known:
+            self._known[mu] = self._look(mu)
+        return self._known[mu]
+
+    def _look(self, mu: float) -> _Look:
+        try:
+            system = self._system_at(mu).in_place()
+            found = steady_nodes(system, mu if self._rubs else None, self._solver, guess=self._near(mu))
+        except AnalysisError as error:
+            return _Look(mu, None, None, f"{error}; that is at {mu:.6g}")
+        return _Look(mu, _key(found), found)
+
+
+def _probes(
+    low: float, high: float, foreseen: float | None, before: float | None, width: float
+) -> Iterator[float]:
     """Where to look next, low < μ < high: on both sides of what is foreseen, the closer the better that was."""
     span = high - low
     if foreseen is None:
         yield 0.5 * (low + high)
         return
     doubt = 0.05 * span if before is None else 4.0 * abs(foreseen - before)
-    doubt = min(max(doubt, 0.25 * WIDTH * high), 0.2 * span)
+    doubt = min(max(doubt, 0.25 * width), 0.2 * span)
     yield min(max(foreseen - doubt, low + 0.02 * span), high - 0.02 * span) if foreseen - doubt > low else low + doubt
     yield foreseen + doubt if foreseen + doubt < high else high - doubt
 

@@ -6,12 +6,15 @@ from __future__ import annotations
 import time
 
 from ..case import Case
-from ..errors import CaseError
+from ..case.matrix_checks import MU
+from ..errors import AnalysisError, CaseError
 from ..modal.full import ParametricOnsets
 from ..modal.full import onsets_along as sought
+from ..modal.full.along_stretches import Part, joined_along
+from ..sliding.stretches import stretch_words
 from .asked import require_frequency, require_range
 from .provenance import provenance
-from .reduced import searched_model
+from .reduced import searched_model, stretches_of
 
 
 def onsets_along(
@@ -23,18 +26,39 @@ def onsets_along(
     solver: str | None = None,
     said: str = "friction_range",
 ) -> ParametricOnsets:
-    """Every change of stability along a number of the case, in its range there unless another is given.
+    """Every change of stability along a number of the case, in its range there unless another is given. Where other
+    nodes touch in steady sliding, each stretch of the number is solved with its own.
 
     name: its path in the case, or a parameter of its matrices; mu is the friction coefficient. said: what the range is
-    called in messages. Raises CaseError for a number that there is not or that has no range.
+    called in messages. Raises CaseError for a number that there is not or that has no range; AnalysisError where there
+    is no steady sliding in all of it.
     """
     started = time.perf_counter()
     chosen = _range(case, name, between, said)
     require_frequency(max_frequency_hz)
-    model = searched_model(case, {name: chosen}, max_frequency_hz=max_frequency_hz)
-    found = sought(model, name, solver=solver)
+    found = _in_stretches(case, name, chosen, max_frequency_hz, solver)
     found.provenance = provenance(case, "onsets along", time.perf_counter() - started, along=name)
     return found
+
+
+def _in_stretches(
+    case: Case, name: str, between: tuple[float, float], max_frequency_hz: float | None, solver: str | None
+) -> ParametricOnsets:
+    over = stretches_of(case, name, between)
+    solid = [s for s in over if not s.reason]
+    if not solid:
+        raise AnalysisError(over[0].reason)
+    parts: list[Part] = []
+    for stretch in solid:
+        held_at = {} if stretch.at is None else {name: stretch.at}
+        box = {name: (stretch.low, stretch.high)}
+        model = searched_model(case, box, max_frequency_hz=max_frequency_hz, held_at=held_at)
+        parts.append(Part(stretch, model, sought(model, name, solver=solver)))
+    words = stretch_words(over, "μ" if name == MU else name)
+    if len(over) == 1 and parts[0].stretch.at is None:
+        parts[0].found.notes = (*words, *parts[0].found.notes)
+        return parts[0].found
+    return joined_along(parts, name, between, words)
 
 
 def _range(case: Case, name: str, between: tuple[float, float] | None, said: str) -> tuple[float, float]:

@@ -72,8 +72,10 @@ def stability_boundary(
     again, failed = solved_again(found, solved.problem, solved.vectors, options_of(case).solver)
     curves = tuple(_curve(found, curve, solved.model) for curve in found.curves)
     result_notes, warnings = told(found, asked.paths, solved, again, failed, tolerance)
+    elsewhere = bool(getattr(solved.problem, "elsewhere", ()))
     return Boundary(
-        x, y, *ends, top, curves, *_lines(found), _counted(found), found.agree, sentence(found, asked.paths),
+        x, y, *ends, top, curves, *_lines(found), _counted(found), found.agree and not elsewhere,
+        sentence(found, asked.paths, elsewhere=elsewhere),
         "full" if solved.model is None else "reduced", len(plane.sizes), plane.solves, plane.steps,
         0 if solved.model is None else solved.model.solves, again, (*solved.notes, *notes, *result_notes),
         (*solved.problem.idle_words, *warnings),

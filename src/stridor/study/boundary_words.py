@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..modal.boundary import Found
+from ..modal.full.parametric_onsets import ELSEWHERE
 from ..notebook import counted
 from .boundary_problem import PlaneProblem
 from .boundary_result import SolvedAgain
@@ -15,8 +16,11 @@ MOST_TOLD = 3
 LEFT_OPEN = "closed curves that lie between the lines can be missing"
 
 
-def sentence(found: Found, paths: tuple[str, str]) -> str:
-    """Whether lines, curves and counts fit together, and what that does not say."""
+def sentence(found: Found, paths: tuple[str, str], *, elsewhere: bool = False) -> str:
+    """Whether lines, curves and counts fit together, and what that does not say. elsewhere: whether other nodes touch
+    at some values than those that are held."""
+    if elsewhere:
+        return f"Not complete: {ELSEWHERE}. With the nodes that are held: {sentence(found, paths)}"
     on = " and ".join(f"{sum(line.axis == axis for line in found.lines)} of {path}" for axis, path in enumerate(paths))
     where = f"Onsets were sought on lines at {on} (at most {_mesh(found)} of a range apart) and modes counted at "
     where += counted(len(found.looked), "point")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,10 +15,20 @@ from ..case.expression import parse_expression
 from ..case.matrix_checks import MU
 from ..case.points import choice
 from ..errors import AnalysisError, CaseError
-from ..sliding.stretches import HELD, elsewhere_words, instead_of_own, stretches
+from ..sliding.stretches import (
+    HELD,
+    HELD_AT_ALL,
+    Stretch,
+    elsewhere_words,
+    instead_of_own,
+    stretches,
+    stretches_along,
+)
+from ..sliding.surfaces import steady_nodes
 from ..system import System, build_system
 from ..system.imported import ImportedTerm
 from ..system.shares import system_shares
+from ..typing import BoolArray
 from .workspace import Problem, Workspace
 
 if TYPE_CHECKING:
@@ -28,6 +39,8 @@ if TYPE_CHECKING:
 
 SMALL = 60  # unknowns up to which a reduced model saves nothing
 MOST = 400  # and up to which all eigenvalues of the full problem are solved for hundreds of times
+GRID = 5  # values of each of two numbers at which it is looked which nodes touch, of small models
+CORNERS = 4  # numbers of a box up to which all of its corners are looked at
 REMEMBERED = 8  # systems of a case with other numbers
 DAMPED = "modal.damped = false does not hold here: a reduced model keeps the damping of the case"
 
@@ -39,6 +52,7 @@ def reduced_model(
     max_frequency_hz: float | None = None,
     bound: float = 1e-8,
     whole: bool = True,
+    held_at: Mapping[str, float] | None = None,
 ) -> ReducedModel:
     """One factorisation's worth of work, then every mode for all values in the box in milliseconds.
 
@@ -49,6 +63,7 @@ def reduced_model(
     nodes that touch are those of steady sliding in the case as it is; ``problem.notes`` of the model says where others
     would. Rigid contact is eliminated: ``problem.displacements`` gives the system's freedoms back. whole: keep
     matrices of up to 400 freedoms as they are where they cannot be reduced, as with multipliers; a note says so.
+    held_at: as of `searched_model`.
 
     Raises CaseError for ranges and names that are none; AnalysisError where matrices depend on a number in no simple
     way, where friction jams, or the bound is not reached.
@@ -56,7 +71,7 @@ def reduced_model(
     from ..modal.parametric import all_freedoms, reduce
 
     case = Workspace.of(problem).case("a reduced model")
-    found, limit = parametric_problem(case, box), _limit(case, max_frequency_hz)
+    found, limit = parametric_problem(case, box, held_at=held_at), _limit(case, max_frequency_hz)
     solver = None if case.modal.solver == "auto" else case.modal.solver
     try:
         return reduce(found, limit, bound=bound, solver=solver)
@@ -68,28 +83,43 @@ def reduced_model(
 
 
 def searched_model(
-    case: Case, box: Mapping[str, tuple[float, float]], *, max_frequency_hz: float | None = None
-) -> ReducedModel:
+    case: Case, box: Mapping[str, tuple[float, float]], *, max_frequency_hz: float | None = None,
+    held_at: Mapping[str, float] | None = None,
+) -> ReducedModel:  # fmt: skip
     """The model on which onsets are sought: all freedoms of what is small, so that no mode can be missing, else what
-    `reduced_model` gives."""
+    `reduced_model` gives. held_at: values whose touching nodes it holds, for a box in which they are the same (the
+    caller has seen to that)."""
     from ..modal.parametric import all_freedoms
 
     if build_system(case).size > SMALL:
-        return reduced_model(case, box, max_frequency_hz=max_frequency_hz)
-    return all_freedoms(parametric_problem(case, box), _limit(case, max_frequency_hz))
+        return reduced_model(case, box, max_frequency_hz=max_frequency_hz, held_at=held_at)
+    return all_freedoms(parametric_problem(case, box, held_at=held_at), _limit(case, max_frequency_hz))
+
+
+def stretches_of(case: Case, name: str, between: tuple[float, float]) -> tuple[Stretch, ...]:
+    """The stretches of a number of the case, as a box calls it, in which the same nodes touch."""
+    numbers = Numbers(case, {name: between})
+    solver = None if case.modal.solver == "auto" else case.modal.solver
+    if name == MU and not numbers.named_in_factors:
+        return stretches(numbers.own, *between, solver=solver)
+    return stretches_along(
+        lambda value: numbers.pressed({name: value}), numbers.own, *between, rubs=name == MU, solver=solver
+    )
 
 
 def _limit(case: Case, max_frequency_hz: float | None) -> float:
     return case.modal.max_frequency_hz if max_frequency_hz is None else max_frequency_hz
 
 
-def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> ContactsProblem:
+def parametric_problem(
+    case: Case, box: Mapping[str, tuple[float, float]], *, held_at: Mapping[str, float] | None = None
+) -> ContactsProblem:
     """The matrices of a case as sums of terms in the numbers of a box, as `reduced_model` takes it."""
     from ..modal.options import Options
     from ..modal.parametric.contacts import FRICTION, STIFFNESS, ParametricSystems, contacts_problem
 
     parameters = _parameters(case, box)
-    numbers = _Numbers(case, box)
+    numbers = Numbers(case, box)
     if not numbers.own.contact_nodes().count:
         elsewhere = {*case.parameters, *case.factor_names}
         for name in (FRICTION, STIFFNESS):
@@ -99,7 +129,7 @@ def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> Co
     exact = {FRICTION, STIFFNESS, *case.parameters}
     settings = case.modal
     family = ParametricSystems(
-        numbers.own,
+        numbers.own if held_at is None else numbers.pressed(held_at),
         numbers.system,
         numbers.structure,
         parameters,
@@ -107,17 +137,69 @@ def parametric_problem(case: Case, box: Mapping[str, tuple[float, float]]) -> Co
     )
     solver = None if settings.solver == "auto" else settings.solver
     friction = next((p for p in parameters if p.name == FRICTION), None)
-    instead = None if friction is None else instead_of_own(numbers.own, friction.low, friction.high, solver=solver)
+    if held_at is not None:
+        instead = held_at.get(FRICTION)
+    else:
+        instead = None if friction is None else instead_of_own(numbers.own, friction.low, friction.high, solver=solver)
     options = Options(settings.friction_damping, settings.prestress, solver)
     problem = contacts_problem(family, touching_at=instead, options=options)
-    notes = problem.notes if settings.damped else (*problem.notes, DAMPED)
-    if instead is not None:
+    said, where = problem.notes, problem.elsewhere
+    if held_at is not None:
+        said = where = ()  # what is held there is right
+    elif instead is not None:
         held = f"The nodes that touch at μ = {instead:g} {HELD}: there is no steady sliding at the case's own friction."
-        return replace(problem, notes=(*notes, held))
-    # Where steady states are solved for, the problem has told of what it holds.
-    if friction is not None and numbers.own.contact_nodes().count and not problem.notes:
-        notes = (*notes, *elsewhere_words(stretches(numbers.own, friction.low, friction.high, solver=solver)))
-    return replace(problem, notes=notes)
+        said, where = (*said, held), (*where, held)
+    elif numbers.own.contact_nodes().count and not where:
+        # Where steady states are solved for, the problem has told of what it holds.
+        where = _elsewhere(case, box, numbers, problem)
+        said = (*said, *where)
+    return replace(problem, notes=said if settings.damped else (*said, DAMPED), elsewhere=where)
+
+
+def _elsewhere(
+    case: Case, box: Mapping[str, tuple[float, float]], numbers: Numbers, problem: ContactsProblem
+) -> tuple[str, ...]:
+    """Where in a box others than the nodes that a problem holds touch, in words."""
+    if problem.touching is None:
+        return ()
+    if len(box) == 1:
+        ((name, between),) = box.items()
+        return elsewhere_words(stretches_of(case, name, between), "μ" if name == MU else name)
+    solver = None if case.modal.solver == "auto" else case.modal.solver
+    points = _looked_at(problem, small=numbers.own.size <= MOST)
+    others = list[str]()
+    for point in points:
+        try:
+            found = numbers.touching(point, solver)
+            how = f"{np.count_nonzero(found)} touch" if np.any(found != problem.touching) else ""
+        except AnalysisError:
+            how = "no steady sliding"
+        if how:
+            others.append(f"{', '.join(f'{name} = {value:.4g}' for name, value in point.items())} ({how})")
+    if not others:
+        return ()
+    return (
+        f"The {np.count_nonzero(problem.touching)} of {len(problem.touching)} contact nodes that touch in the case as "
+        f"it is {HELD_AT_ALL}; steady sliding has others at {len(others)} of {len(points)} values of the box that were "
+        f"looked at, such as {'; '.join(others[:2])}. Modes there are other ones: `stridor modes` has them.",
+    )
+
+
+def _looked_at(problem: ContactsProblem, *, small: bool) -> list[dict[str, float]]:
+    """Points of a box: its corners and what lies between them, as far as that is cheap."""
+    own = problem.reference
+    if small and len(own) == 2:
+        places: Iterable[tuple[float, ...]] = product(np.linspace(0.0, 1.0, GRID), repeat=2)
+    elif small and len(own) <= CORNERS:
+        places = product((0.0, 1.0), repeat=len(own))
+    else:
+        places = (tuple(end for _ in own) for end in (0.0, 1.0))
+    points = [
+        {p.name: p.low + float(at) * (p.high - p.low) for p, at in zip(problem.parameters, place, strict=True)}
+        for place in places
+    ]
+    # And each number alone, the others as they are.
+    return points + [{**own, p.name: end} for p in problem.parameters for end in (p.low, p.high)]
 
 
 def _parameters(case: Case, box: Mapping[str, tuple[float, float]]) -> tuple[Parameter, ...]:
@@ -157,19 +239,19 @@ def _parameters(case: Case, box: Mapping[str, tuple[float, float]]) -> tuple[Par
     return tuple(found)
 
 
-class _Numbers:
+class Numbers:
     """The systems of a case with other numbers: own is that of the case as it is."""
 
     def __init__(self, case: Case, box: Mapping[str, tuple[float, float]]) -> None:
         self._case, self._box = case, box
         self.own = build_system(case).in_place()
         # In factors of imported matrices, unless that is a parameter of its own.
-        self._friction = MU in case.factor_names and MU not in case.parameters
+        self.named_in_factors = MU in case.factor_names and MU not in case.parameters
         self._built: dict[tuple[tuple[str, float], ...], System] = {}
 
     def system(self, values: Mapping[str, float]) -> System:
         """The system at values of the box; others stay as they are in the case."""
-        mu = values.get(MU) if self._friction else None
+        mu = values.get(MU) if self.named_in_factors else None
         changes = self._changes(values)
         if not changes and mu is None:
             return self.own
@@ -179,6 +261,21 @@ class _Numbers:
                 del self._built[next(iter(self._built))]
             self._built[key] = self._checked(build_system(self._case.with_(changes), mu).in_place())
         return self._built[key]
+
+    def pressed(self, values: Mapping[str, float]) -> System:
+        """`system`, with the contact stiffness of the values: what steady sliding is solved on."""
+        factor = values.get("contact_stiffness")
+        if factor is None or "contact_stiffness" in self._case.parameters:
+            return self.system(values)
+        soft = {f"contacts.{name}.stiffness": c.stiffness for name, c in self._case.contacts.items()}
+        changes = {path: factor * own for path, own in soft.items() if not isinstance(own, str)}
+        mu = values.get(MU) if self.named_in_factors else None
+        return self._checked(build_system(self._case.with_({**self._changes(values), **changes}), mu).in_place())
+
+    def touching(self, values: Mapping[str, float], solver: str | None) -> BoolArray:
+        """Which nodes touch in steady sliding at values of the box. Raises AnalysisError where there is none."""
+        rubs = MU not in self._case.parameters
+        return steady_nodes(self.pressed(values), values.get(MU) if rubs else None, solver).active
 
     def structure(self, values: Mapping[str, float]) -> Mapping[str, FactoredPart]:
         """The pieces of mass, damping and stiffness where others than [parameters] and friction have these values."""

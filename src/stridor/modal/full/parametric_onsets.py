@@ -37,6 +37,7 @@ COLUMNS = (
     "value", "frequency_hz", "residual", "square_root_coefficient", "reduced_value", "growth_slope", "enters_at",
     "stabilising",
 )  # fmt: skip
+ELSEWHERE = "other nodes touch at some of these values (see the note), and modes there are other ones"
 NEAR = 1e-3  # of the range and of λ: how far from the reduced model's onset the full problem's may be
 
 
@@ -44,7 +45,8 @@ NEAR = 1e-3  # of the range and of λ: how far from the reduced model's onset th
 class ParametricOnset(Shown):
     """A mode becomes unstable (or stable, ``stabilising``, as the parameter grows) at ``value`` of ``parameter``.
 
-    point: values of all parameters there. kind: "flutter" or "divergence". growth_slope: dRe λ/dp [1/s per unit], None
+    point: values of all parameters there. kind: "flutter", "divergence" or "contact"
+    (growth that begins or ends because other nodes touch). growth_slope: dRe λ/dp [1/s per unit], None
     where two undamped modes meet, whose growth opens as κ √|p − p_c| with κ = square_root_coefficient, 0 where growth
     opens at the low end of the range as a square or a higher power. residual:
     backward error in the full problem, None where it was not solved there. reduced_value: what the reduced model alone
@@ -173,7 +175,7 @@ class ParametricOnsets(Tabular, tuple[ParametricOnset, ...]):
         onsets: list[ParametricOnset] = []
         for k in range(data.sizes["onset"]):
             at = {name: float(data[name].values[k]) for name in COLUMNS}
-            if data["kind"].values[k] not in ("flutter", "divergence"):
+            if data["kind"].values[k] not in ("flutter", "divergence", "contact"):
                 raise ValueError("an onset of another kind")
             onsets.append(
                 ParametricOnset(
@@ -255,6 +257,9 @@ def onsets_along(
     if left_out:
         lost = ", ".join(f"{line.value(o.mu):.6g} ({o.frequency_hz:.6g} Hz)" for o, found in tried if found is None)
         complete, said = False, f"Not confirmed in the full problem and left out: {parameter} = {lost}. {said}"
+    # Of a mode with other nodes in contact nothing was sought.
+    if getattr(model.problem, "elsewhere", ()):
+        complete, said = False, f"Not complete: {ELSEWHERE}. {said}"
     listed = sorted(onsets, key=lambda o: o.value)
     return ParametricOnsets.of(listed, model, parameter, complete=complete, sentence=said)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -38,7 +39,7 @@ def sentence(
         assert answer.seen is not None, "what else would have led to it"
         as_many = "With these, as many" if left_out else "As many"
         how = f"{as_many} roots grow at each of {len(answer.seen.grid)} values of {name} as the onsets say"
-        why = f": {answer.why}" if answer.why else ""
+        why = f": {_named(answer.why, name, value)}" if answer.why else ""
         if answer.walked:
             return (
                 f"{how}: {numbers}.{passing} Onsets were sought along the imaginary axis, at {answer.walked} "
@@ -62,6 +63,11 @@ def sentence(
     between = _between_steps(answer, name)
     lead = "With these" if left_out else "Complete as far as both ends tell"
     return f"{lead}: {numbers}, {said}.{passing} {told}. {anew}. {between}"
+
+
+def _named(why: str, name: str, value: Callable[[float], float]) -> str:
+    """A reason of what follows branches, which calls every parameter mu, in terms of this one."""
+    return re.sub(r"\bmu = ([-+.e\d]*\d)", lambda found: f"{name} = {value(float(found[1])):.6g}", why)
 
 
 def _between_steps(answer: Answer, name: str) -> str:

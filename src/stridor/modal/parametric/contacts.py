@@ -38,11 +38,21 @@ class ContactsProblem(ParametricProblem):
     """A parametric problem of a system with contacts.
 
     elimination: how rigid contact was taken out of it, which leaves fewer freedoms than the system has; None where
-    there is none. notes: sentences on what its user should know.
+    there is none. notes: sentences on what its user should know; elsewhere: those of them on values at which other
+    nodes touch, which nothing of the problem holds for. touching (m,): which of the contact nodes it holds.
     """
 
     elimination: Elimination | None = None
     notes: tuple[str, ...] = ()
+    elsewhere: tuple[str, ...] = ()
+    touching: BoolArray | None = None
+
+    @property
+    def idle_words(self) -> tuple[str, ...]:
+        """A sentence for each parameter without effect, or with none but on which nodes touch, which are held."""
+        if not self.elsewhere:
+            return super().idle_words
+        return tuple(f"{name} changes at most which nodes touch: no matrix depends on it" for name in self.idle)
 
     def displacements(self, vectors: Any) -> Any:
         """Right vectors (size, k) of this problem as displacements (n, k) of the system."""
@@ -127,7 +137,7 @@ def contacts_problem(
         terms = (*terms, *more)
     if elimination is not None:
         terms = elimination.applied(terms)
-    return ContactsProblem(terms, family.parameters, elimination, notes)
+    return ContactsProblem(terms, family.parameters, elimination, notes, notes, steady.active)
 
 
 def _springs(contacts: Contacts, *, varied: bool) -> dict[str, FactoredPart]:
