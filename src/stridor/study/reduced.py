@@ -24,11 +24,9 @@ from ..sliding.stretches import (
     stretches,
     stretches_along,
 )
-from ..sliding.surfaces import steady_nodes
 from ..system import System, build_system
 from ..system.imported import ImportedTerm
 from ..system.shares import system_shares
-from ..typing import BoolArray
 from .workspace import Problem, Workspace
 
 if TYPE_CHECKING:
@@ -160,6 +158,8 @@ def _elsewhere(
     case: Case, box: Mapping[str, tuple[float, float]], numbers: Numbers, problem: ContactsProblem
 ) -> tuple[str, ...]:
     """Where in a box others than the nodes that a problem holds touch, in words."""
+    from ..modal.parametric.contacts_steady import FRICTION, STIFFNESS, unlike_at
+
     if problem.touching is None:
         return ()
     if len(box) == 1:
@@ -167,21 +167,17 @@ def _elsewhere(
         return elsewhere_words(stretches_of(case, name, between), "μ" if name == MU else name)
     solver = None if case.modal.solver == "auto" else case.modal.solver
     points = _looked_at(problem, small=numbers.own.size <= MOST)
-    others = list[str]()
-    for point in points:
-        try:
-            found = numbers.touching(point, solver)
-            how = f"{np.count_nonzero(found)} touch" if np.any(found != problem.touching) else ""
-        except AnalysisError:
-            how = "no steady sliding"
-        if how:
-            others.append(f"{', '.join(f'{name} = {value:.4g}' for name, value in point.items())} ({how})")
+    # Those of one system, which differ in friction and contact stiffness alone, one after the other.
+    points.sort(key=lambda point: [value for name, value in point.items() if name not in (FRICTION, STIFFNESS)])
+    held = np.flatnonzero(problem.touching)
+    others = unlike_at(numbers.system, held, points, solver)
     if not others:
         return ()
+    told = [f"{', '.join(f'{name} = {value:.4g}' for name, value in at.items())} ({words})" for at, words in others[:2]]
     return (
-        f"The {np.count_nonzero(problem.touching)} of {len(problem.touching)} contact nodes that touch in the case as "
-        f"it is {HELD_AT_ALL}; steady sliding has others at {len(others)} of {len(points)} values of the box that were "
-        f"looked at, such as {'; '.join(others[:2])}. Modes there are other ones: `stridor modes` has them.",
+        f"The {len(held)} of {len(problem.touching)} contact nodes that touch in the case as it is {HELD_AT_ALL}; "
+        f"steady sliding has others at {len(others)} of {len(points)} values of the box that were looked at, such as "
+        f"{'; '.join(told)}. Modes there are other ones: `stridor modes` has them.",
     )
 
 
@@ -271,11 +267,6 @@ class Numbers:
         changes = {path: factor * own for path, own in soft.items() if not isinstance(own, str)}
         mu = values.get(MU) if self.named_in_factors else None
         return self._checked(build_system(self._case.with_({**self._changes(values), **changes}), mu).in_place())
-
-    def touching(self, values: Mapping[str, float], solver: str | None) -> BoolArray:
-        """Which nodes touch in steady sliding at values of the box. Raises AnalysisError where there is none."""
-        rubs = MU not in self._case.parameters
-        return steady_nodes(self.pressed(values), values.get(MU) if rubs else None, solver).active
 
     def structure(self, values: Mapping[str, float]) -> Mapping[str, FactoredPart]:
         """The pieces of mass, damping and stiffness where others than [parameters] and friction have these values."""

@@ -58,7 +58,8 @@ def _at_border(before: Part, after: Part, name: str) -> Iterator[ParametricOnset
     """Growth that begins or ends because other nodes touch."""
     value = before.stretch.high
     sides = [part.model.modes({name: value}, judged=False) for part in (before, after)]
-    begins, ends = jumps(*(side.values[growing(side.values, before.model.frequency)] for side in sides))
+    grow = [side.values[growing(side.values, before.model.frequency)].tolist() for side in sides]
+    begins, ends = jumps(*grow)
     for found, side, part, stabilising in ((ends, sides[0], before, True), (begins, sides[1], after, False)):
         if not found:
             continue

@@ -7,7 +7,7 @@ interpolated; the nodes that touch are held, whichever the signs of their forces
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -165,9 +165,8 @@ class _States:
         if not pulling and not closing:
             return ()
         where = ", ".join(f"{name} = {value:.4g}" for name, value in at.items())
-        told = [f"{pulling} of {len(self._touching)} touching nodes would lift off"] if pulling else []
-        told += [f"{closing} open ones would touch"] if closing else []
-        return (f"At {where} {' and '.join(told)}; the reduced model holds the nodes that touch in the case as it is.",)
+        told = _told(pulling, closing, len(self._touching))
+        return (f"At {where} {told}; the reduced model holds the nodes that touch in the case as it is.",)
 
     def _solved(self, values: Values) -> tuple[Array, Array]:
         key = tuple(sorted(values.items()))
@@ -206,13 +205,52 @@ class _States:
 
     def _noted(self, contacts: Contacts, held: HeldEquilibria, values: Values) -> None:
         """Remember where most nodes are held that would not touch, or would."""
-        others = np.ones(contacts.nodes.count, dtype=bool)
-        others[self._touching] = False
-        others &= np.diff(contacts.nodes.normal.indptr) > 0
-        pulling = int(np.sum(held.normal_force < -PULLING * np.abs(held.normal_force).max(initial=0.0)))
-        closing = int(np.sum(held.gap[others] < -PULLING * np.abs(held.gap).max(initial=0.0)))
+        pulling, closing = _unlike(contacts, held)
         if pulling + closing > sum(self._worst[:2]):
             self._worst = pulling, closing, dict(values)
+
+
+def _unlike(contacts: Contacts, held: HeldEquilibria) -> tuple[int, int]:
+    """How many nodes that are held would lift off, and how many others would touch."""
+    others = np.ones(contacts.nodes.count, dtype=bool)
+    others[contacts.touching] = False
+    others &= np.diff(contacts.nodes.normal.indptr) > 0
+    pulling = int(np.sum(held.normal_force < -PULLING * np.abs(held.normal_force).max(initial=0.0)))
+    return pulling, int(np.sum(held.gap[others] < -PULLING * np.abs(held.gap).max(initial=0.0)))
+
+
+def _told(pulling: int, closing: int, touching: int) -> str:
+    told = [f"{pulling} of {touching} touching nodes would lift off"] if pulling else []
+    told += [f"{closing} open {'one' if closing == 1 else 'ones'} would touch"] if closing else []
+    return " and ".join(told)
+
+
+def unlike_at(
+    system_at: Callable[[Values], System], touching: IntArray, points: Sequence[Values], solver: str | None
+) -> list[tuple[Values, str]]:
+    """At which of some points others than the nodes that are held would touch in steady sliding, each with words on
+    how many: forces of theirs that pull, and gaps of others that close. A system is factorised once for all friction
+    and contact stiffness."""
+    found: list[tuple[Values, str]] = []
+    last: tuple[System, Equilibria] | None = None
+    for values in points:
+        system = system_at(values)
+        contacts = contacts_of(system, touching)
+        nodes = contacts.nodes
+        mu = np.full(nodes.count, values[FRICTION]) if FRICTION in values else contacts.coefficient
+        if last is None or last[0] is not system:
+            if last is not None:
+                last[1].free()
+            last = system, Equilibria(system, nodes, touching, contacts.sense, solver)
+        try:
+            words = _told(*_unlike(contacts, last[1].at(mu, values.get(STIFFNESS, 1.0))), len(touching))
+        except SingularMatrix:
+            words = "no steady sliding"
+        if words:
+            found.append((values, words))
+    if last is not None:
+        last[1].free()
+    return found
 
 
 def _terms(
