@@ -143,12 +143,12 @@ def test_own_friction_of_the_one_contact_is_mu():
 
 def test_models_that_hold_the_nodes_of_the_case_call_nothing_complete(tmp_path):
     case = pad()
-    plane = stability_boundary(case, SIDEWAYS, "springs.s1.stiffness", x_range=(-600.0, 600.0), y_range=(3e6, 5e6))
+    plane = stability_boundary(case, SIDEWAYS, "springs.s1.stiffness", x_range=(-600.0, 600.0), y_range=(3e6, 5e6), lines=2)
     assert not plane.agree
     assert plane.sentence.startswith("Not complete: other nodes touch at some of these values")
     assert any("(1 open one would touch)" in note for note in plane.notes)
     assert plane.warnings == (f"{SIDEWAYS} changes at most which nodes touch: no matrix depends on it",)
-    whole = stability_boundary(case, SIDEWAYS, "springs.s1.stiffness", x_range=(-50.0, 50.0), y_range=(3.9e6, 4.1e6))
+    whole = stability_boundary(case, SIDEWAYS, "springs.s1.stiffness", x_range=(-50.0, 50.0), y_range=(3.9e6, 4.1e6), lines=2)
     assert whole.agree
     path = tmp_path / "pad.toml"
     path.write_text(PAD)
