@@ -15,15 +15,16 @@ from ..case.schema import Rotation
 from ..case.schema import Tie as TieCase
 from ..contact.curve import Curve
 from ..contact.facets import FacetSurface
-from ..contact.ties import Bond, NodeTies, check_facing, tie_transformation
+from ..contact.held_ties import led_by_supports
+from ..contact.ties import Bond, check_facing, tie_transformation
 from ..contact.ties import tie as tie_weights
 from ..errors import CaseError
 from ..mesh.boundary import facets_within, require_boundary
 from ..mesh.facets import nodal_normals
 from ..mesh.model import Mesh
-from ..typing import Array, BoolArray, IntArray, Sparse
+from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody
-from .motion import Constraint
+from .motion import Constraint, columns
 from .view import nearest_node
 
 _DIRECTIONS = {"x": 0, "y": 1, "z": 2}
@@ -149,30 +150,58 @@ def tie_matrix(
 ) -> Tied | None:
     """Ties between bodies, and of bodies that repeat with themselves; None without ties.
 
-    Freedoms that a support holds stay with their support.
+    Slave freedoms that a support holds stay with their support, and hold their leaders.
     """
     if not case.ties:
         return None
-    held = {f for c in constraints for f in c.freedoms}
     bonds: list[Bond] = []
     repeated: set[int] = set()
     for name, tie in case.ties.items():
         bond = _bond(case, bodies, f"ties.{name}", tie)
         if bond.rotation is not None:
             _refuse_rotated_motion(bond, constraints)
-        bond = _free_of_supports(bond, held)
         if tie.translation is not None:
             # A corner of a body that repeats in two directions follows by one of them; the other is implied.
             again = np.array([bool(repeated.intersection(row)) for row in bond.slave.tolist()], dtype=bool)
-            bond = _only(bond, ~again)
+            bond = bond.only(~again)
             repeated.update(bond.slave.ravel().tolist())
         bonds.append(bond)
-    rotated = any(bond.rotation is not None for bond in bonds)
-    return Tied(
-        tie_transformation(total, bonds),
-        np.unique(np.concatenate([b.slave.ravel() for b in bonds])),
-        tie_transformation(total, [bond.shares for bond in bonds]) if rotated else None,
-    )
+    names = {f: _path(c) for c in constraints for f in c.freedoms}
+    held = np.zeros(total, dtype=bool)
+    held[list(names)] = True
+    moving = columns(list(constraints))
+    prescribed = np.zeros((total, len(moving)))
+    for number, column in enumerate(moving):
+        prescribed[list(column.freedoms), number] = column.values
+    tied = np.unique(np.concatenate([b.slave.ravel() for b in bonds]))
+    matrix, followers = led_by_supports(tie_transformation(total, bonds), tied, held, prescribed, names)
+    if all(bond.rotation is None for bond in bonds):
+        return Tied(matrix, followers)
+    shares = tie_transformation(total, [bond.shares for bond in bonds], checked=False)
+    changed = np.setxor1d(followers, tied)
+    if len(changed):
+        # What supports hold, and the leaders that are held by it, share as they move.
+        keep = np.ones(total)
+        keep[changed] = 0.0
+        led = np.zeros(total)
+        led[changed] = 1.0
+        shares = sp.csr_array((sp.diags_array(keep) @ shares + sp.diags_array(led)) @ _shared(matrix, changed))
+    return Tied(matrix, followers, shares)
+
+
+def _shared(matrix: Sparse, changed: IntArray) -> Sparse:
+    """Identity but for the rows of the changed freedoms: sizes of theirs in T, of sum one."""
+    total = matrix.shape[0]
+    keep = np.ones(total)
+    keep[changed] = 0.0
+    size = abs(matrix)
+    along = np.asarray(size.sum(axis=1)).ravel()
+    part = np.where(keep == 0.0, 1.0 / np.where(along > 0.0, along, 1.0), 0.0)
+    return sp.csr_array(sp.diags_array(keep) + sp.diags_array(part) @ size)
+
+
+def _path(constraint: Constraint) -> str:
+    return constraint.name if constraint.name.startswith("bodies.") else f"supports.{constraint.name}"
 
 
 def _bond(case: Case, bodies: dict[str, BuiltBody], where: str, tie: TieCase) -> Bond:
@@ -227,37 +256,6 @@ def _refuse_rotated_motion(bond: Bond, constraints: Sequence[Constraint]) -> Non
             "rotation; let the material slide (sliding) instead"
         )
         raise CaseError(f"{bond.where}.slave", None, accepted)
-
-
-def _only(bond: Bond, keep: BoolArray) -> Bond:
-    tie = NodeTies(bond.tie.nodes[keep], bond.tie.weights[keep], bond.tie.point[keep], bond.tie.distance[keep])
-    return Bond(bond.where, tie, bond.slave[keep], bond.master, bond.rotation)
-
-
-def _free_of_supports(bond: Bond, held: set[int]) -> Bond:
-    """The bond without nodes that a support holds in a direction in which their leaders are free.
-
-    Where the leaders are held as well, as on a plane of symmetry, the node follows them and is held so; with a rotation
-    they must be held in all directions that it mixes into that one.
-    """
-    is_held = np.vectorize(held.__contains__, otypes=[bool])
-    if not held or not len(bond.slave):
-        return bond
-    leaders = bond.master[bond.tie.nodes]  # (s, r, d)
-    leading = is_held(leaders)
-    if bond.rotation is not None:
-        mixed = np.abs(bond.rotation) > 1e-12
-        leading = np.all(leading[:, :, None, :] | ~mixed, axis=3)
-    leading = leading | (bond.tie.weights == 0.0)[:, :, None]
-    conflict = np.any(is_held(bond.slave) & ~leading.all(axis=1), axis=1)
-    keep = ~conflict
-    if len(keep) and not keep.any():
-        accepted = (
-            f"bonds nothing: supports hold all of its {len(keep)} slave nodes, and a held node cannot follow as well; "
-            "exchange slave and master, or support the master's body instead"
-        )
-        raise CaseError(bond.where, None, accepted)
-    return _only(bond, keep)
 
 
 def _outward(mesh: Mesh, boundary: str, nodes: IntArray) -> Array:
