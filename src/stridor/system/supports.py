@@ -16,13 +16,14 @@ from ..case.schema import Tie as TieCase
 from ..contact.curve import Curve
 from ..contact.facets import FacetSurface
 from ..contact.held_ties import led_by_supports
+from ..contact.tie_mortar import weighted
 from ..contact.ties import Bond, check_facing, tie_transformation
 from ..contact.ties import tie as tie_weights
 from ..errors import CaseError
 from ..mesh.boundary import facets_within, require_boundary
 from ..mesh.facets import nodal_normals
-from ..mesh.model import Mesh
-from ..typing import Array, IntArray, Sparse
+from ..mesh.model import Blocks, Mesh
+from ..typing import Array, BoolArray, IntArray, Sparse
 from .bodies import BuiltBody
 from .motion import Constraint, columns
 from .view import nearest_node
@@ -115,11 +116,12 @@ def master_surface(mesh: Mesh, boundary: str, where: str) -> tuple[Curve | Facet
 @dataclass(frozen=True)
 class Tied:
     """T (N, N) with u = T u_independent; freedoms that follow (f,); by which shares (N, N) masses follow, None where
-    those of T do."""
+    those of T do. words: warnings."""
 
     matrix: Sparse
     followers: IntArray
     shares: Sparse | None = None
+    words: tuple[str, ...] = ()
 
     def within(self, matrix: Sparse) -> Sparse:
         """TᵀAT (N, N) csr. Few rows of a large A know of a tie: the others stay as they are."""
@@ -154,10 +156,16 @@ def tie_matrix(
     """
     if not case.ties:
         return None
+    names = {f: _path(c) for c in constraints for f in c.freedoms}
+    held = np.zeros(total, dtype=bool)
+    held[list(names)] = True
+    alone = held | _slaves_twice(case, bodies, total)
     bonds: list[Bond] = []
+    words: list[str] = []
     repeated: set[int] = set()
     for name, tie in case.ties.items():
-        bond = _bond(case, bodies, f"ties.{name}", tie)
+        bond, said = _bond(case, bodies, f"ties.{name}", tie, alone)
+        words += said
         if bond.rotation is not None:
             _refuse_rotated_motion(bond, constraints)
         if tie.translation is not None:
@@ -166,9 +174,6 @@ def tie_matrix(
             bond = bond.only(~again)
             repeated.update(bond.slave.ravel().tolist())
         bonds.append(bond)
-    names = {f: _path(c) for c in constraints for f in c.freedoms}
-    held = np.zeros(total, dtype=bool)
-    held[list(names)] = True
     moving = columns(list(constraints))
     prescribed = np.zeros((total, len(moving)))
     for number, column in enumerate(moving):
@@ -176,7 +181,7 @@ def tie_matrix(
     tied = np.unique(np.concatenate([b.slave.ravel() for b in bonds]))
     matrix, followers = led_by_supports(tie_transformation(total, bonds), tied, held, prescribed, names)
     if all(bond.rotation is None for bond in bonds):
-        return Tied(matrix, followers)
+        return Tied(matrix, followers, words=tuple(words))
     shares = tie_transformation(total, [bond.shares for bond in bonds], checked=False)
     changed = np.setxor1d(followers, tied)
     if len(changed):
@@ -186,7 +191,7 @@ def tie_matrix(
         led = np.zeros(total)
         led[changed] = 1.0
         shares = sp.csr_array((sp.diags_array(keep) @ shares + sp.diags_array(led)) @ _shared(matrix, changed))
-    return Tied(matrix, followers, shares)
+    return Tied(matrix, followers, shares, tuple(words))
 
 
 def _shared(matrix: Sparse, changed: IntArray) -> Sparse:
@@ -204,8 +209,24 @@ def _path(constraint: Constraint) -> str:
     return constraint.name if constraint.name.startswith("bodies.") else f"supports.{constraint.name}"
 
 
-def _bond(case: Case, bodies: dict[str, BuiltBody], where: str, tie: TieCase) -> Bond:
-    """Slave nodes with their leaders, sought where the slave would be on the master's side."""
+def _slaves_twice(case: Case, bodies: dict[str, BuiltBody], total: int) -> BoolArray:
+    """Which freedoms (N,) are slaves of more than one tie."""
+    times = np.zeros(total, dtype=np.int64)
+    for name, tie in case.ties.items():
+        at = case.location(tie.slave)
+        assert isinstance(at, BoundaryRef), "checked"
+        body = bodies[at.body]
+        times[np.unique(body.displacements(boundary_nodes(body, at, f"ties.{name}.slave")))] += 1
+    return times > 1
+
+
+def _bond(
+    case: Case, bodies: dict[str, BuiltBody], where: str, tie: TieCase, alone: BoolArray
+) -> tuple[Bond, list[str]]:
+    """Slave nodes with their leaders, sought where the slave would be on the master's side, and warnings.
+
+    alone (N,): freedoms whose nodes follow the point below them and are not weighted with their neighbours.
+    """
     slave_at, master_at = case.location(tie.slave), case.location(tie.master)
     assert isinstance(slave_at, BoundaryRef), "checked"
     assert isinstance(master_at, BoundaryRef), "checked"
@@ -226,13 +247,23 @@ def _bond(case: Case, bodies: dict[str, BuiltBody], where: str, tie: TieCase) ->
         normals = normals @ rotation
     weights = tie_weights(points, surface, where=where, tolerance=tolerance)
     check_facing(points, normals, surface, weights, where=where, limit=max(edge, _edge(slave.points[nodes])))
+    facets = _facets_between(slave.mesh, slave_at.boundary, nodes)
+    single = alone[slave.displacements(nodes)].any(axis=1)
+    bonded = weighted(weights, points, facets, surface, single, tolerance)
+    words: list[str] = []
+    if bonded.uncovered:
+        words.append(
+            f"{where}: {bonded.uncovered} of {len(nodes)} slave nodes belong to facets that the master does not cover; "
+            "each follows the point below it, which passes no even stress where meshes differ"
+        )
+    weights = bonded.tie
     bond = Bond(where, weights, slave.displacements(nodes), master.displacements(master_nodes), rotation)
     own = (bond.master[weights.nodes] == bond.slave[:, None, :]).any(axis=2) & (weights.weights != 0.0)
     if own.any():
         at = ", ".join(f"{x:.6g}" for x in slave.points[nodes[int(np.argmax(own.any(axis=1)))]])
         accepted = f"the node at ({at}) m would follow itself: it lies on the axis; tie boundaries without it"
         raise CaseError(where, None, accepted)
-    return bond
+    return bond, words
 
 
 def turn_of(rotation: Rotation, dimension: int) -> tuple[Array, Array]:
@@ -256,6 +287,16 @@ def _refuse_rotated_motion(bond: Bond, constraints: Sequence[Constraint]) -> Non
             "rotation; let the material slide (sliding) instead"
         )
         raise CaseError(f"{bond.where}.slave", None, accepted)
+
+
+def _facets_between(mesh: Mesh, boundary: str, nodes: IntArray) -> Blocks:
+    """Facets of a boundary, or whole sides within a node set, in the order of its nodes (s,)."""
+    facets = mesh.boundaries.get(boundary)
+    if facets is None:
+        facets = facets_within(mesh.cells, mesh.points, mesh.node_sets[boundary])
+    number = np.full(len(mesh.points), -1)
+    number[nodes] = np.arange(len(nodes))
+    return {kind: number[np.asarray(block)] for kind, block in facets.items() if len(block)}
 
 
 def _outward(mesh: Mesh, boundary: str, nodes: IntArray) -> Array:
