@@ -90,7 +90,7 @@ def test_a_long_side_beside_a_fillet_is_bent_no_more_than_by_its_neighbour() -> 
     """A flat of length 1 into a fillet of steps of 0.05 that turn by 15° each: the free end of the flat stays level."""
     angle = np.radians(15.0) * np.arange(1, 5)
     fillet = np.cumsum(0.05 * np.column_stack([np.cos(angle), np.sin(angle)]), axis=0)
-    points = np.concatenate([[[0.0, 0.0], [1.0, 0.0]], [1.0, 0.0] + fillet])
+    points = np.concatenate([[[0.0, 0.0], [1.0, 0.0]], fillet + np.array([1.0, 0.0])])
     curve = along(points)
     found = curve.locate(points[:1])
     assert np.degrees(np.arcsin(abs(found.normal[0, 0]))) < 0.2

@@ -47,8 +47,8 @@ class Curve:
     the corner angle the spline is broken, so that the side of a rectangle stays straight; off an outward corner the
     gap is the distance from it. facets (f, 3): first, last and middle node (−1 for linear facets) of the curve's
     numbering, as the finite elements interpolate.
-    stencils (c, 4): nodes that shape each of the c segments, negative where the spline begins or ends; chords (c, 3) [m]:
-    undisplaced lengths of the segments before, of and after it. before, after (c,): segments that continue it
+    stencils (c, 4): nodes that shape each of the c segments, negative where the spline begins or ends; chords (c, 3):
+    undisplaced lengths [m] of the segments before, of and after it. before, after (c,): segments that continue it
     smoothly, −1 at ends and corners. follows_spline: whether displacements are interpolated as positions are, by the
     spline (the line of a beam), or by the facets.
     """

@@ -216,9 +216,7 @@ def _check_again(
     said = sp.csr_array((value, (row, column)), shape=transformation.shape) @ transformation
     freedoms = np.unique(bond.slave)
     off = abs(sp.csr_array(said[freedoms] - transformation[freedoms])).max(axis=1).toarray().ravel() > SAME
-    wrong = np.isin(bond.slave, freedoms[off]).any(axis=1)
-    if keep.all():
-        wrong[:] = True  # a tie that says nothing new is a mistake
+    wrong = np.isin(bond.slave, freedoms[off]).any(axis=1) | keep.all()  # a tie that says nothing new is a mistake
     if wrong.any():
         node = int(np.argmax(wrong))
         at = ", ".join(f"{x:.6g}" for x in bond.tie.point[node])

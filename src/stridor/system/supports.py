@@ -248,7 +248,7 @@ def _bond(
     weights = tie_weights(points, surface, where=where, tolerance=tolerance)
     check_facing(points, normals, surface, weights, where=where, limit=max(edge, _edge(slave.points[nodes])))
     facets = _facets_between(slave.mesh, slave_at.boundary, nodes)
-    single = alone[slave.displacements(nodes)].any(axis=1)
+    single: BoolArray = np.any(alone[slave.displacements(nodes)], axis=1)
     bonded = weighted(weights, points, facets, surface, single, tolerance)
     words: list[str] = []
     if bonded.uncovered:
