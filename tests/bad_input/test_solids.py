@@ -570,7 +570,7 @@ LINKS = {
     "tie twice": (
         CONTACT,
         tie() + tie().replace("glue", "more"),
-        "ties.more: the node at (0.025, 0.01) m is tied also by ties.glue; a node can be slave once, leave it out of one of them",
+        "ties.more: the node at (0.02, 0.01) m is tied also by ties.glue; a node can be slave once, leave it out of one of them",
     ),
     "tie of what slides": (
         CONTACT,
@@ -584,11 +584,6 @@ LINKS = {
         CONTACT,
         tie(master="wall"),
         f"ties.glue.master: 'wall' – {NO_OBSTACLE}",
-    ),
-    "tie of what is held": (
-        CONTACT,
-        tie() + '[supports.x]\nat = "slider.bottom"\nfixed = ["y"]\n',
-        "ties.glue: bonds nothing: supports hold all of its 5 slave nodes, and a held node cannot follow as well; exchange slave and master, or support the master's body instead",
     ),
     "tie tolerance": (
         CONTACT,

@@ -237,16 +237,29 @@ def test_without_bonds_nothing_changes():
     assert abs(tie_transformation(4, []) - sp.eye_array(4)).sum() == 0
 
 
+def test_a_node_that_two_ties_lead_to_the_same_follows_once():
+    """Nodes 4 and 5 lie half way between 0 and 1, the one tied to them at once, and to the other as well."""
+    first, second = bond("ties.a", [4, 5], [0, 1], [0.5, 0.5]), bond("ties.b", [6, 4], [5, 3], [0.0, 1.0])
+    for order in ([first, second], [second, first]):
+        transformation = tie_transformation(14, order).toarray()
+        np.testing.assert_allclose(transformation[[8, 10]][:, [0, 2]], 0.5, atol=1e-15)
+        assert not transformation[:, [8, 9, 10, 11, 12, 13]].any()
+
+
 @pytest.mark.parametrize(
     ("bonds", "message"),
     [
+        (
+            lambda: [bond("ties.a", [4], [0, 1], [0.5]), bond("ties.b", [4], [0, 1], [0.5])],
+            "ties.b: the node at (0.5, 0) m is tied also by ties.a; a node can be slave once, leave it out of one of them",
+        ),
         (
             lambda: [bond("ties.a", [4], [0, 1], [0.5]), bond("ties.b", [4], [2, 3], [0.25])],
             "ties.b: the node at (0.25, 0) m is tied also by ties.a; a node can be slave once, leave it out of one of them",
         ),
         (
             lambda: [bond("ties.a", [4, 4], [0, 1], [0.5, 0.75])],
-            "ties.a: the node at (0.5, 0) m is tied twice; a node can be slave once, leave it out of one of them",
+            "ties.a: the node at (0.75, 0) m is tied twice; a node can be slave once, leave it out of one of them",
         ),
         (
             lambda: [bond("ties.a", [4], [0, 1], [1.0]), bond("ties.b", [0], [4, 3], [1.0])],

@@ -220,7 +220,7 @@ def _integrated(
             points = pieces(kind, corners, location.point[nodes].mean(axis=1), cut_by)
             values, slopes = shape_functions(kind, points.local)
             at = np.einsum("qr,qrd->qd", values, corners[points.owner])
-            weight = points.weight * _stretch(slopes, corners[points.owner])
+            weight = points.weight * stretch(slopes, corners[points.owner])
             found = master.locate(at, displacement, guess=location.facet[nodes[points.owner, 0]])
             element, weights = element_weights(master, found, at, current)
             below = np.einsum("qr,qrd->qd", weights, current[element])
@@ -232,10 +232,10 @@ def _integrated(
             columns = np.repeat(element[:, None, :], row.shape[1], axis=1).ravel()
             found_so_far.append(sp.csr_array((entries, (rows, columns)), shape=shape).tocoo())
             np.add.at(gaps, row, dual * gap[:, None])
-    return _total(found_so_far, shape), gaps
+    return total_of(found_so_far, shape), gaps
 
 
-def _total(parts: list[Sparse], shape: tuple[int, int]) -> Sparse:
+def total_of(parts: list[Sparse], shape: tuple[int, int]) -> Sparse:
     """The sum csr of coo matrices, taken once: one after the other would take the time of their number squared."""
     none = np.zeros(0, dtype=np.int64)
     rows = np.concatenate([none, *(part.row for part in parts)])
@@ -257,7 +257,7 @@ def _dual(change: Array, share: Array, values: Array, weight: Array, owner: IntA
     return weight[:, None] * np.einsum("qij,qj->qi", coefficients[owner], changed)
 
 
-def _stretch(slopes: Array, corners: Array) -> Array:
+def stretch(slopes: Array, corners: Array) -> Array:
     """dA/dξ (q,) of elements with corners (q, r, d), slopes (e, q, r)."""
     tangents = np.einsum("eqr,qrd->eqd", slopes, corners)
     if len(tangents) == 1:

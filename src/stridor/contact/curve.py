@@ -1,6 +1,8 @@
 """The boundary of a plane body as a master: a C1 cubic spline through its nodes, split at corners.
 
-The spline is that of `surface`: cubic Hermite, slopes from the neighbours, linear in the node positions. Since the
+The spline is that of `surface`: cubic Hermite, slopes from the neighbours, linear in the node positions. At its ends
+it begins as the parabola through the three nodes there, so that normals are of second order up to the edge of a curved
+master; the line of a beam begins along its chord, as `surface` has it. Since the
 normal is perpendicular to it and the master point the nearest one, the normal row of a contact is the exact
 derivative of the gap: dg = n · (du_slave − Σ weights du_master), at any gap and any curvature.
 """
@@ -27,6 +29,11 @@ NODE_TOLERANCE = 1e-9
 ROUNDING = 1e-10
 CANDIDATES = 4
 INSIDE, BEFORE, AFTER = 0, 1, 2
+# No node of a stencil: the spline begins as a parabola, or along its chord.
+PARABOLA, CHORD = -1, -2
+# An end segment this many times as long as its neighbour is still bent by it in full: a long straight side beside the
+# short ones of a fillet is not.
+LONG = 2.0
 
 _spline_weights = njit(cache=True)(surface.spline_weights)
 
@@ -40,8 +47,8 @@ class Curve:
     the corner angle the spline is broken, so that the side of a rectangle stays straight; off an outward corner the
     gap is the distance from it. facets (f, 3): first, last and middle node (−1 for linear facets) of the curve's
     numbering, as the finite elements interpolate.
-    stencils (c, 4): nodes that shape each of the c segments, −1 where the spline begins or ends; chords (c, 3) [m]:
-    undisplaced lengths of the segments before, of and after it. before, after (c,): segments that continue it
+    stencils (c, 4): nodes that shape each of the c segments, negative where the spline begins or ends; chords (c, 3):
+    undisplaced lengths [m] of the segments before, of and after it. before, after (c,): segments that continue it
     smoothly, −1 at ends and corners. follows_spline: whether displacements are interpolated as positions are, by the
     spline (the line of a beam), or by the facets.
     """
@@ -84,8 +91,9 @@ class Curve:
             smooth[0] = False
         before = np.where(smooth, previous, -1)
         after = np.where(smooth[following], following, -1)
+        none = CHORD if follows_spline else PARABOLA
         stencils = np.stack(
-            [np.where(before < 0, -1, start[before]), start, end, np.where(after < 0, -1, end[after])], axis=1
+            [np.where(before < 0, none, start[before]), start, end, np.where(after < 0, none, end[after])], axis=1
         )
         chords = np.stack(
             [np.where(before < 0, 0.0, length[before]), length, np.where(after < 0, 0.0, length[after])], axis=1
@@ -205,6 +213,42 @@ def _segment_weights(
     first = 1 if stencils[segment, 0] < 0 else 0
     last = 2 if stencils[segment, 3] < 0 else 3
     _spline_weights(1 - first, xi, chords[segment, first:last], weights, slopes)
+    if first == 1 and last == 3 and stencils[segment, 0] == PARABOLA:
+        own, other = chords[segment, 1], chords[segment, 2]
+        value = xi * (1.0 - xi) * (1.0 - xi)
+        _bend(value, (1.0 - xi) * (1.0 - 3.0 * xi), own, other, weights, slopes, 1, 2, 3)
+    elif first == 0 and last == 2 and stencils[segment, 3] == PARABOLA:
+        own, other = chords[segment, 1], chords[segment, 0]
+        value = xi * xi * (1.0 - xi)
+        _bend(value, xi * (2.0 - 3.0 * xi), own, other, weights, slopes, 2, 1, 0)
+
+
+@njit(cache=True)
+def _bend(
+    value: float,
+    slope: float,
+    own: float,
+    other: float,
+    weights: Array,
+    slopes: Array,
+    end: int,
+    middle: int,
+    beyond: int,
+) -> None:  # pragma: no cover - compiled
+    """Add to the chord's slope at an end of a segment what that of the parabola through three nodes has more.
+
+    Away from the end the parabola's slope is the chord's by −own² times the second divided difference. value and slope:
+    of the Hermite function that has slope one there, directed from the end.
+    """
+    ratio = min(1.0, (LONG * other / own) ** 2)
+    whole = own + other
+    to_end, to_beyond = ratio * own / whole, ratio * own * own / (other * whole)
+    weights[end] -= to_end * value
+    weights[middle] += (to_end + to_beyond) * value
+    weights[beyond] -= to_beyond * value
+    slopes[end] -= to_end * slope
+    slopes[middle] += (to_end + to_beyond) * slope
+    slopes[beyond] -= to_beyond * slope
 
 
 @njit(cache=True)

@@ -15,13 +15,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import CaseError
-from ..typing import Array, IntArray, Sparse
+from ..typing import Array, BoolArray, IntArray, Sparse
 from .curve import Curve
 from .master import MasterSurface
 
 CANDIDATES = 3
 PROJECTION_STEPS = 30
 CHAIN_DOUBLINGS = 12
+SAME = 1e-6  # difference of weights that two bonds of one node may have: rounding of mesh files
 _SAME_DIRECTION = 0.5  # cosine between outward normals above which surfaces do not face each other
 
 
@@ -53,6 +54,12 @@ class Bond:
     slave: IntArray
     master: IntArray
     rotation: Array | None = None
+
+    def only(self, keep: BoolArray) -> Bond:
+        """The bond of some of its slave nodes (s,)."""
+        tie = self.tie
+        kept = NodeTies(tie.nodes[keep], tie.weights[keep], tie.point[keep], tie.distance[keep])
+        return replace(self, tie=kept, slave=self.slave[keep])
 
     @property
     def shares(self) -> Bond:
@@ -126,31 +133,28 @@ def check_facing(
         raise CaseError(where, None, accepted)
 
 
-def tie_transformation(total: int, bonds: Sequence[Bond]) -> Sparse:
+def tie_transformation(total: int, bonds: Sequence[Bond], *, checked: bool = True) -> Sparse:
     """T (N, N) csr of u = T u_independent on N = ``total`` freedoms: identity but for the rows of tied ones.
 
     The columns of tied freedoms are empty. Matrices become Tᵀ M T, forces Tᵀ f; rows and columns of tied freedoms are
-    then empty and to be dropped. A master node that is itself tied elsewhere is followed on to what it hangs on.
-    Raises CaseError for a node that is slave in two bonds and for nodes that hang on nothing but each other.
+    then empty and to be dropped. A master node that is itself tied elsewhere is followed on to what it hangs on, and a
+    node that is slave in two bonds follows the first, if the second then says the same. Raises CaseError where it does
+    not, with ``checked``, and for nodes that hang on nothing but each other.
     """
-    tied = np.zeros(total, dtype=bool)
     owner = np.full(total, -1)
     rows: list[IntArray] = []
     columns: list[IntArray] = []
     values: list[Array] = []
+    again: list[tuple[int, IntArray]] = []  # bond, nodes that are tied already
     for number, bond in enumerate(bonds):
-        _claim(bond, number, bonds, owner)
-        tied[bond.slave] = True
-        r, d = bond.tie.weights.shape[1], bond.slave.shape[1]
-        if bond.rotation is None:
-            rows.append(np.repeat(bond.slave[:, None, :], r, axis=1).ravel())
-            columns.append(bond.master[bond.tie.nodes].ravel())
-            values.append(np.repeat(bond.tie.weights[:, :, None], d, axis=2).ravel())
-            continue
-        shape = (len(bond.slave), r, d, d)  # slave node, leader, component of the slave, of the leader
-        rows.append(np.broadcast_to(bond.slave[:, None, :, None], shape).ravel())
-        columns.append(np.broadcast_to(bond.master[bond.tie.nodes][:, :, None, :], shape).ravel())
-        values.append((bond.tie.weights[:, :, None, None] * bond.rotation).ravel())
+        first = _claim(bond, number, owner)
+        if not first.all():
+            again.append((number, np.flatnonzero(~first)))
+        row, column, value = _entries(bond.only(first))
+        rows.append(row)
+        columns.append(column)
+        values.append(value)
+    tied = owner >= 0
     free = np.flatnonzero(~tied)
     # Long integers would pass on to every matrix of the system, which is a third larger and slower with them.
     short = np.int32 if total <= np.iinfo(np.int32).max else np.int64
@@ -164,6 +168,8 @@ def tie_transformation(total: int, bonds: Sequence[Bond]) -> Sparse:
     transformation.eliminate_zeros()
     for _ in range(CHAIN_DOUBLINGS):
         if not np.any(tied[transformation.indices]):
+            for number, nodes in again if checked else ():
+                _check_again(bonds, number, nodes, transformation, owner)
             return transformation
         transformation = sp.csr_array(transformation @ transformation)
         transformation.eliminate_zeros()
@@ -176,19 +182,48 @@ def tie_transformation(total: int, bonds: Sequence[Bond]) -> Sparse:
     )
 
 
-def _claim(bond: Bond, number: int, bonds: Sequence[Bond], owner: IntArray) -> None:
-    """Enter the slaves of a bond as tied; CaseError where they are already."""
-    unique, times = np.unique(bond.slave, return_counts=True)
-    twice = np.isin(bond.slave, unique[times > 1]).any(axis=1)
-    taken = (owner[bond.slave] >= 0).any(axis=1) | twice
-    if taken.any():
-        node = int(np.argmax(taken))
+def _entries(bond: Bond) -> tuple[IntArray, IntArray, Array]:
+    """Rows, columns and values of what slaves do by what their leaders do."""
+    r, d = bond.tie.weights.shape[1], bond.slave.shape[1]
+    if bond.rotation is None:
+        row = np.repeat(bond.slave[:, None, :], r, axis=1).ravel()
+        return row, bond.master[bond.tie.nodes].ravel(), np.repeat(bond.tie.weights[:, :, None], d, axis=2).ravel()
+    shape = (len(bond.slave), r, d, d)  # slave node, leader, component of the slave, of the leader
+    row = np.broadcast_to(bond.slave[:, None, :, None], shape).ravel()
+    column = np.broadcast_to(bond.master[bond.tie.nodes][:, :, None, :], shape).ravel()
+    return row, column, (bond.tie.weights[:, :, None, None] * bond.rotation).ravel()
+
+
+def _claim(bond: Bond, number: int, owner: IntArray) -> BoolArray:
+    """Enter the slaves of a bond as tied; which (s,) were not yet."""
+    _, once = np.unique(bond.slave[:, :1], return_index=True)
+    first = np.zeros(len(bond.slave), dtype=bool)
+    first[once] = True
+    first &= ~(owner[bond.slave] >= 0).any(axis=1)
+    owner[bond.slave[first]] = number
+    return first
+
+
+def _check_again(
+    bonds: Sequence[Bond], number: int, nodes: IntArray, transformation: Sparse, owner: IntArray
+) -> None:
+    """Raise CaseError unless nodes of a bond that are tied already do by that what this bond says."""
+    bond = bonds[number]
+    keep = np.zeros(len(bond.slave), dtype=bool)
+    keep[nodes] = True
+    bond = bond.only(keep)
+    row, column, value = _entries(bond)
+    said = sp.csr_array((value, (row, column)), shape=transformation.shape) @ transformation
+    freedoms = np.unique(bond.slave)
+    off = abs(sp.csr_array(said[freedoms] - transformation[freedoms])).max(axis=1).toarray().ravel() > SAME
+    wrong = np.isin(bond.slave, freedoms[off]).any(axis=1) | keep.all()  # a tie that says nothing new is a mistake
+    if wrong.any():
+        node = int(np.argmax(wrong))
         at = ", ".join(f"{x:.6g}" for x in bond.tie.point[node])
         other = int(owner[bond.slave[node]].max())
-        by = f"also by {bonds[other].where}" if other >= 0 else "twice"
+        by = f"also by {bonds[other].where}" if other != number else "twice"
         accepted = f"the node at ({at}) m is tied {by}; a node can be slave once, leave it out of one of them"
         raise CaseError(bond.where, None, accepted)
-    owner[bond.slave] = number
 
 
 def _positions(master: MasterSurface) -> Array:

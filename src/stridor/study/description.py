@@ -100,7 +100,7 @@ def describe(problem: Problem) -> Description:
     else:
         lines += _time_lines(case, system, data)
     warnings = [*case.warnings, *unit_warnings(case), *matrix_warnings(case)]
-    warnings += [*mesh_warnings(case, system), *imported_warnings(case, system)]
+    warnings += [*mesh_warnings(case, system), *imported_warnings(case, system), *system.tie_words]
     warnings += data.get("contact_patterns", [])
     if "modal" in case.model_fields_set:
         warnings += resolution_warnings(case)

@@ -102,6 +102,7 @@ def build_system(
         holders=holders_of(case, view, contacts, surfaces),
         load_steps=_load_steps(case, motion),
         contact_cubic={name: contact.cubic for name, contact in case.contacts.items() if contact.cubic},
+        tie_words=() if tied is None else tied.words,
     )
 
 

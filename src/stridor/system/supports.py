@@ -15,15 +15,17 @@ from ..case.schema import Rotation
 from ..case.schema import Tie as TieCase
 from ..contact.curve import Curve
 from ..contact.facets import FacetSurface
-from ..contact.ties import Bond, NodeTies, check_facing, tie_transformation
+from ..contact.held_ties import led_by_supports
+from ..contact.tie_mortar import weighted
+from ..contact.ties import Bond, check_facing, tie_transformation
 from ..contact.ties import tie as tie_weights
 from ..errors import CaseError
 from ..mesh.boundary import facets_within, require_boundary
 from ..mesh.facets import nodal_normals
-from ..mesh.model import Mesh
+from ..mesh.model import Blocks, Mesh
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .bodies import BuiltBody
-from .motion import Constraint
+from .motion import Constraint, columns
 from .view import nearest_node
 
 _DIRECTIONS = {"x": 0, "y": 1, "z": 2}
@@ -114,11 +116,12 @@ def master_surface(mesh: Mesh, boundary: str, where: str) -> tuple[Curve | Facet
 @dataclass(frozen=True)
 class Tied:
     """T (N, N) with u = T u_independent; freedoms that follow (f,); by which shares (N, N) masses follow, None where
-    those of T do."""
+    those of T do. words: warnings."""
 
     matrix: Sparse
     followers: IntArray
     shares: Sparse | None = None
+    words: tuple[str, ...] = ()
 
     def within(self, matrix: Sparse) -> Sparse:
         """TᵀAT (N, N) csr. Few rows of a large A know of a tie: the others stay as they are."""
@@ -149,34 +152,81 @@ def tie_matrix(
 ) -> Tied | None:
     """Ties between bodies, and of bodies that repeat with themselves; None without ties.
 
-    Freedoms that a support holds stay with their support.
+    Slave freedoms that a support holds stay with their support, and hold their leaders.
     """
     if not case.ties:
         return None
-    held = {f for c in constraints for f in c.freedoms}
+    names = {f: _path(c) for c in constraints for f in c.freedoms}
+    held = np.zeros(total, dtype=bool)
+    held[list(names)] = True
+    alone = held | _slaves_twice(case, bodies, total)
     bonds: list[Bond] = []
+    words: list[str] = []
     repeated: set[int] = set()
     for name, tie in case.ties.items():
-        bond = _bond(case, bodies, f"ties.{name}", tie)
+        bond, said = _bond(case, bodies, f"ties.{name}", tie, alone)
+        words += said
         if bond.rotation is not None:
             _refuse_rotated_motion(bond, constraints)
-        bond = _free_of_supports(bond, held)
         if tie.translation is not None:
             # A corner of a body that repeats in two directions follows by one of them; the other is implied.
             again = np.array([bool(repeated.intersection(row)) for row in bond.slave.tolist()], dtype=bool)
-            bond = _only(bond, ~again)
+            bond = bond.only(~again)
             repeated.update(bond.slave.ravel().tolist())
         bonds.append(bond)
-    rotated = any(bond.rotation is not None for bond in bonds)
-    return Tied(
-        tie_transformation(total, bonds),
-        np.unique(np.concatenate([b.slave.ravel() for b in bonds])),
-        tie_transformation(total, [bond.shares for bond in bonds]) if rotated else None,
-    )
+    moving = columns(list(constraints))
+    prescribed = np.zeros((total, len(moving)))
+    for number, column in enumerate(moving):
+        prescribed[list(column.freedoms), number] = column.values
+    tied = np.unique(np.concatenate([b.slave.ravel() for b in bonds]))
+    matrix, followers = led_by_supports(tie_transformation(total, bonds), tied, held, prescribed, names)
+    if all(bond.rotation is None for bond in bonds):
+        return Tied(matrix, followers, words=tuple(words))
+    shares = tie_transformation(total, [bond.shares for bond in bonds], checked=False)
+    changed = np.setxor1d(followers, tied)
+    if len(changed):
+        # What supports hold, and the leaders that are held by it, share as they move.
+        keep = np.ones(total)
+        keep[changed] = 0.0
+        led = np.zeros(total)
+        led[changed] = 1.0
+        shares = sp.csr_array((sp.diags_array(keep) @ shares + sp.diags_array(led)) @ _shared(matrix, changed))
+    return Tied(matrix, followers, shares, tuple(words))
 
 
-def _bond(case: Case, bodies: dict[str, BuiltBody], where: str, tie: TieCase) -> Bond:
-    """Slave nodes with their leaders, sought where the slave would be on the master's side."""
+def _shared(matrix: Sparse, changed: IntArray) -> Sparse:
+    """Identity but for the rows of the changed freedoms: sizes of theirs in T, of sum one."""
+    total = matrix.shape[0]
+    keep = np.ones(total)
+    keep[changed] = 0.0
+    size = abs(matrix)
+    along = np.asarray(size.sum(axis=1)).ravel()
+    part = np.where(keep == 0.0, 1.0 / np.where(along > 0.0, along, 1.0), 0.0)
+    return sp.csr_array(sp.diags_array(keep) + sp.diags_array(part) @ size)
+
+
+def _path(constraint: Constraint) -> str:
+    return constraint.name if constraint.name.startswith("bodies.") else f"supports.{constraint.name}"
+
+
+def _slaves_twice(case: Case, bodies: dict[str, BuiltBody], total: int) -> BoolArray:
+    """Which freedoms (N,) are slaves of more than one tie."""
+    times = np.zeros(total, dtype=np.int64)
+    for name, tie in case.ties.items():
+        at = case.location(tie.slave)
+        assert isinstance(at, BoundaryRef), "checked"
+        body = bodies[at.body]
+        times[np.unique(body.displacements(boundary_nodes(body, at, f"ties.{name}.slave")))] += 1
+    return times > 1
+
+
+def _bond(
+    case: Case, bodies: dict[str, BuiltBody], where: str, tie: TieCase, alone: BoolArray
+) -> tuple[Bond, list[str]]:
+    """Slave nodes with their leaders, sought where the slave would be on the master's side, and warnings.
+
+    alone (N,): freedoms whose nodes follow the point below them and are not weighted with their neighbours.
+    """
     slave_at, master_at = case.location(tie.slave), case.location(tie.master)
     assert isinstance(slave_at, BoundaryRef), "checked"
     assert isinstance(master_at, BoundaryRef), "checked"
@@ -197,13 +247,23 @@ def _bond(case: Case, bodies: dict[str, BuiltBody], where: str, tie: TieCase) ->
         normals = normals @ rotation
     weights = tie_weights(points, surface, where=where, tolerance=tolerance)
     check_facing(points, normals, surface, weights, where=where, limit=max(edge, _edge(slave.points[nodes])))
+    facets = _facets_between(slave.mesh, slave_at.boundary, nodes)
+    single: BoolArray = np.any(alone[slave.displacements(nodes)], axis=1)
+    bonded = weighted(weights, points, facets, surface, single, tolerance)
+    words: list[str] = []
+    if bonded.uncovered:
+        words.append(
+            f"{where}: {bonded.uncovered} of {len(nodes)} slave nodes belong to facets that the master does not cover; "
+            "each follows the point below it, which passes no even stress where meshes differ"
+        )
+    weights = bonded.tie
     bond = Bond(where, weights, slave.displacements(nodes), master.displacements(master_nodes), rotation)
     own = (bond.master[weights.nodes] == bond.slave[:, None, :]).any(axis=2) & (weights.weights != 0.0)
     if own.any():
         at = ", ".join(f"{x:.6g}" for x in slave.points[nodes[int(np.argmax(own.any(axis=1)))]])
         accepted = f"the node at ({at}) m would follow itself: it lies on the axis; tie boundaries without it"
         raise CaseError(where, None, accepted)
-    return bond
+    return bond, words
 
 
 def turn_of(rotation: Rotation, dimension: int) -> tuple[Array, Array]:
@@ -229,35 +289,14 @@ def _refuse_rotated_motion(bond: Bond, constraints: Sequence[Constraint]) -> Non
         raise CaseError(f"{bond.where}.slave", None, accepted)
 
 
-def _only(bond: Bond, keep: BoolArray) -> Bond:
-    tie = NodeTies(bond.tie.nodes[keep], bond.tie.weights[keep], bond.tie.point[keep], bond.tie.distance[keep])
-    return Bond(bond.where, tie, bond.slave[keep], bond.master, bond.rotation)
-
-
-def _free_of_supports(bond: Bond, held: set[int]) -> Bond:
-    """The bond without nodes that a support holds in a direction in which their leaders are free.
-
-    Where the leaders are held as well, as on a plane of symmetry, the node follows them and is held so; with a rotation
-    they must be held in all directions that it mixes into that one.
-    """
-    is_held = np.vectorize(held.__contains__, otypes=[bool])
-    if not held or not len(bond.slave):
-        return bond
-    leaders = bond.master[bond.tie.nodes]  # (s, r, d)
-    leading = is_held(leaders)
-    if bond.rotation is not None:
-        mixed = np.abs(bond.rotation) > 1e-12
-        leading = np.all(leading[:, :, None, :] | ~mixed, axis=3)
-    leading = leading | (bond.tie.weights == 0.0)[:, :, None]
-    conflict = np.any(is_held(bond.slave) & ~leading.all(axis=1), axis=1)
-    keep = ~conflict
-    if len(keep) and not keep.any():
-        accepted = (
-            f"bonds nothing: supports hold all of its {len(keep)} slave nodes, and a held node cannot follow as well; "
-            "exchange slave and master, or support the master's body instead"
-        )
-        raise CaseError(bond.where, None, accepted)
-    return _only(bond, keep)
+def _facets_between(mesh: Mesh, boundary: str, nodes: IntArray) -> Blocks:
+    """Facets of a boundary, or whole sides within a node set, in the order of its nodes (s,)."""
+    facets = mesh.boundaries.get(boundary)
+    if facets is None:
+        facets = facets_within(mesh.cells, mesh.points, mesh.node_sets[boundary])
+    number = np.full(len(mesh.points), -1)
+    number[nodes] = np.arange(len(nodes))
+    return {kind: number[np.asarray(block)] for kind, block in facets.items() if len(block)}
 
 
 def _outward(mesh: Mesh, boundary: str, nodes: IntArray) -> Array:
