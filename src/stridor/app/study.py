@@ -47,6 +47,7 @@ def study(
     """Many samples of one case: maps, probability of squeal, what decides it. Goes on where it was."""
     from ..studies.parts import Part
     from ..studies.schema import Study
+    from ..study.workspace import Workspace
 
     given = [name for name, on in (("--part", part), ("--scheduler", scheduler), ("--workers", workers)) if on]
     if merge and given:
@@ -58,6 +59,8 @@ def study(
     one = None if part is None else Part.read(part)
     loaded = Study.load(call.path, call.set_ or [])
     call.warn_of(loaded.base())
+    if "mu" in loaded.parameters or loaded.compute == "onsets":
+        call.warn(Workspace(loaded.base()).one_for_all)
     if merge:
         result = _merged(call)
     else:

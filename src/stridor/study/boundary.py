@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..case.matrix_checks import MU
 from ..errors import CaseError
 from ..modal.boundary import Found, StabilityCurve, boundaries
 from ..modal.parametric import ReducedModel
@@ -76,7 +77,7 @@ def stability_boundary(
         x, y, *ends, top, curves, *_lines(found), _counted(found), found.agree, sentence(found, asked.paths),
         "full" if solved.model is None else "reduced", len(plane.sizes), plane.solves, plane.steps,
         0 if solved.model is None else solved.model.solves, again, (*solved.notes, *notes, *result_notes),
-        (*solved.problem.idle_words, *warnings),
+        (*solved.problem.idle_words, *warnings, *(work.one_for_all if MU in (x, y) else ())),
         provenance(work, "boundary", time.perf_counter() - started, method=method, bound=bound, tolerance=tolerance),
     )  # fmt: skip
 

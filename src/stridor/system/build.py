@@ -102,7 +102,7 @@ def build_system(
         holders=holders_of(case, view, contacts, surfaces),
         load_steps=_load_steps(case, motion),
         contact_cubic={name: contact.cubic for name, contact in case.contacts.items() if contact.cubic},
-    )
+    ).keeping_frictionless()
 
 
 def _load_steps(case: Case, motion: PrescribedMotion) -> tuple[LoadStep, ...]:
