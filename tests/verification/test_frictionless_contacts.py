@@ -117,10 +117,10 @@ def truth(system: System, mu: dict[str, float], held: np.ndarray | None = None) 
     return np.where(touch, -spring * gap, 0.0), sl.eigvals(whole)
 
 
-def growing(system: System, touching: np.ndarray | None = None, **mu: float) -> int:
+def growing(system: System, touching: np.ndarray | None = None, highest: float = 60e3, **mu: float) -> int:
     """How many modes of the band grow."""
     values = truth(system, mu, touching)[1]
-    band = (np.abs(values) < 2 * np.pi * 60e3) & (values.imag >= 0)
+    band = (np.abs(values) < 2 * np.pi * highest) & (values.imag >= 0)
     return int(np.sum(band & (values.real > 1e-10 * np.abs(values))))
 
 
@@ -164,6 +164,33 @@ def test_onsets_over_mu_are_those_of_the_contacts_with_friction() -> None:
         below, above = (growing(system, rub=mu * f, back=0.0, guide=0.0) for f in (1 - 1e-4, 1 + 1e-4))
         assert above - below == expected, mu
     assert growing(system, rub=1.0, back=0.0, guide=0.0) == sum(-1 if o.stabilising else 1 for o in found.onsets)
+
+
+def test_growth_that_leaves_the_band_where_other_nodes_touch_and_comes_back_is_listed_once() -> None:
+    case, top = with_friction(), 25808.0
+    system, found = st.build_system(case), st.onsets(case, (0.0, 0.7), max_frequency_hz=top)
+    later = st.onsets(case, (0.0, 0.8), max_frequency_hz=top)
+    (border,) = {o.mu for o in found.onsets if o.kind == "contact"}
+    # At the border one mode jumps in frequency, from below the top to above it, and grows on both sides.
+    sides = [truth(system, {"rub": border * f, "back": 0.0, "guide": 0.0})[1] for f in (1 - 1e-6, 1 + 1e-6)]
+    before, after = (v[np.argmin(np.abs(v - 2j * np.pi * 25800.0))] for v in sides)
+    assert abs(before) < 2 * np.pi * top < abs(after)
+    assert before.real > 100.0
+    assert after.real > 100.0
+    # In the range up to 0.7 it is above the band at the end, up to 0.8 it is in it again.
+    first = found.onsets[0].mu
+    assert [sum(abs(o.mu - first) < 1e-6 for o in which.onsets) for which in (found, later)] == [1, 1]
+    assert not any(o.stabilising and abs(o.frequency_hz - 25800.0) < 50.0 for o in later.onsets)
+    assert growing(system, highest=top, rub=0.8, back=0.0, guide=0.0) == sum(
+        -1 if o.stabilising else 1 for o in later.onsets
+    )
+    said = [n for n in later.notes if n.startswith("The growth that begins")]
+    assert len(said) == 1
+    assert said[0].startswith(f"The growth that begins at μ = {first:.6g}, {found.onsets[0].frequency_hz:.1f} Hz, leaves")
+    assert f"upwards at μ = {border:.6g}, where other nodes touch, goes on above it and comes back at" in said[0]
+    enters = float(said[0].rpartition("≈ ")[2].rstrip("."))
+    counts = [growing(system, highest=top, rub=mu, back=0.0, guide=0.0) for mu in (enters - 0.02, enters + 0.02)]
+    assert counts[1] == counts[0] + 1
 
 
 def test_a_reduced_model_over_mu_leaves_frictionless_contacts_without() -> None:
