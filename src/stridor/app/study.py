@@ -17,6 +17,7 @@ from .closing import Conclusion
 if TYPE_CHECKING:
     from ..studies.parts import Part
     from ..studies.result import StudyResult
+    from ..studies.schema import Study
 
 _ADDRESS = re.compile(r"(\w+://)?[^\s/]+:\d{1,5}/?")
 
@@ -62,7 +63,7 @@ def study(
     if "mu" in loaded.parameters or loaded.compute == "onsets":
         call.warn(Workspace(loaded.base()).one_for_all)
     if merge:
-        result = _merged(call)
+        result = _merged(call, loaded)
     else:
         if one is None:
             call.claim()
@@ -83,13 +84,13 @@ def _run(
         )  # fmt: skip
 
 
-def _merged(call: Call) -> StudyResult:
+def _merged(call: Call, study: Study) -> StudyResult:
     from ..studies.merge import merged
     from ..studies.result import open_study
     from ..studies.run import NAME
 
     call.claim()
-    call.warn(merged(call.folder, call.folder / NAME))
+    call.warn(merged(call.folder, call.folder / NAME, study))
     return open_study(call.folder / NAME)
 
 
