@@ -30,7 +30,8 @@ def test_each_node_has_its_own_limit_and_none_is_sought_among_all(mu: float | No
     owner = np.arange(len(speed)) % 2
     laws = (Coulomb(0.3), Coulomb(0.5))
     nodes = SimpleNamespace(
-        count=len(speed), owner=owner, laws=laws, friction_coefficients=lambda v: np.array([0.3, 0.5])[owner] + 0 * v
+        count=len(speed), owner=owner, laws=laws, share=np.ones(len(speed)),
+        friction_coefficients=lambda v: np.array([0.3, 0.5])[owner] + 0 * v
     )
     Counted.comparisons = 0
     sliding, sticking = _coefficients(cast("Any", nodes), speed.view(Speeds), mu)

@@ -575,7 +575,7 @@ def points_on(speed: float, opening: float, *, mu: float = 0.2, monkeypatch) -> 
     system: Any = SimpleNamespace(
         contacts=contacts, load_steps=(), loads={"P": np.array([1.0]), "Q": np.array([4.0])}, size=1,
         motion=SimpleNamespace(full=np.ones(1), damping=np.array([[0.5]])),
-        friction_coefficients=lambda speeds: mu * (1 + speeds),
+        friction_coefficients=lambda speeds: mu * (1 + speeds), contact_nodes=lambda: SimpleNamespace(share=np.ones(2)),
     )  # fmt: skip
     system.in_place = lambda: system
     monkeypatch.setattr(points, "_active_set", lambda system, *given: given)

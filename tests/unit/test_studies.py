@@ -25,6 +25,7 @@ from matrix_cases import matrix_case
 from mode_coupling import mode_coupling
 from program import stridor
 from stridor.case import template_text
+from stridor.errors import CaseError
 from stridor.studies import reduced_rows
 from stridor.studies.effect import without_effect
 from stridor.studies.parts import Part
@@ -91,15 +92,24 @@ def test_parts_put_together_are_the_whole(grid: st.Study, whole, tmp_path: Path)
         st.run_study(grid, tmp_path, workers=1, part=Part(number, 3))
     from stridor.studies.merge import merged
 
-    told = merged(tmp_path, tmp_path / "study.zarr")
+    told = merged(tmp_path, tmp_path / "study.zarr", grid)
     assert told == ["parts missing: 2 of 3; their rows are not computed"]
     assert st.open_study(tmp_path).pending == 3
     st.run_study(grid, tmp_path, workers=1, part=Part(2, 3))
-    assert merged(tmp_path, tmp_path / "study.zarr") == []
+    assert merged(tmp_path, tmp_path / "study.zarr", grid) == []
     assert same(st.open_study(tmp_path).data, whole.data)
     # Nothing is left to do for the study itself.
     again = st.run_study(grid, tmp_path, workers=1, progress=lambda *_: pytest.fail("something was computed"))
     assert again.done.all()
+    # Parts of another study are not those of the one that is given, and leave what is there alone.
+    before = st.open_study(tmp_path).data.load()
+    other = grid.model_copy(update={"compute": "onsets", "restart_failed": True})
+    changed = grid.model_copy(update={"case": grid.base().with_({"modal.damped": False})})
+    for given, names in ((other, "compute differs"), (changed, "case differs")):
+        with pytest.raises(CaseError, match=f"holds parts of another study than the one given: {names}; give"):
+            merged(tmp_path, tmp_path / "study.zarr", given)
+    assert same(st.open_study(tmp_path).data, before)
+    assert merged(tmp_path, tmp_path / "study.zarr", grid.model_copy(update={"restart_failed": True})) == []
 
 
 def test_bands_of_low_frequencies_are_told_apart(tmp_path: Path) -> None:

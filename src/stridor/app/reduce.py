@@ -71,6 +71,7 @@ def reduce(
     _check_file(save, keep)
     call.asked.extend(("--box", item) for item in box or ())
     call.asked.extend([("--max-frequency", f"{max_frequency}")] if max_frequency else [])
+    told: tuple[str, ...] = ()
     if is_reduced_file(call.path):
         given = {"--box": box, "--set": call.set_, "--max-frequency": max_frequency, "--bound": bound}
         call.claim()
@@ -79,6 +80,9 @@ def reduce(
     else:
         origin = call.case()
         ranges = _ranges(origin, box or [])
+        from ..study.workspace import Workspace
+
+        told = Workspace(origin).one_for_all if CONTACTS[0] in ranges else ()
         asked = _asked(at or [], along, list(ranges))
         model = _made(origin, ranges, max_frequency, BOUND if bound is None else bound)
         seconds = sum(model.seconds.values())
@@ -92,7 +96,7 @@ def reduce(
     from ..view.onset_plots import modes_at_points, onset_chart
     from .conclusions import of_reduced
 
-    notes = list(getattr(model.problem, "notes", ()))
+    notes = [*getattr(model.problem, "notes", ()), *told]
     for note in notes:
         call.say(f"note: {note}")
     call.warn(model.problem.idle_words)

@@ -17,6 +17,7 @@ from .closing import Conclusion
 if TYPE_CHECKING:
     from ..studies.parts import Part
     from ..studies.result import StudyResult
+    from ..studies.schema import Study
 
 _ADDRESS = re.compile(r"(\w+://)?[^\s/]+:\d{1,5}/?")
 
@@ -47,6 +48,7 @@ def study(
     """Many samples of one case: maps, probability of squeal, what decides it. Goes on where it was."""
     from ..studies.parts import Part
     from ..studies.schema import Study
+    from ..study.workspace import Workspace
 
     given = [name for name, on in (("--part", part), ("--scheduler", scheduler), ("--workers", workers)) if on]
     if merge and given:
@@ -58,8 +60,10 @@ def study(
     one = None if part is None else Part.read(part)
     loaded = Study.load(call.path, call.set_ or [])
     call.warn_of(loaded.base())
+    if "mu" in loaded.parameters or loaded.compute == "onsets":
+        call.warn(Workspace(loaded.base()).one_for_all)
     if merge:
-        result = _merged(call)
+        result = _merged(call, loaded)
     else:
         if one is None:
             call.claim()
@@ -80,13 +84,13 @@ def _run(
         )  # fmt: skip
 
 
-def _merged(call: Call) -> StudyResult:
+def _merged(call: Call, study: Study) -> StudyResult:
     from ..studies.merge import merged
     from ..studies.result import open_study
     from ..studies.run import NAME
 
     call.claim()
-    call.warn(merged(call.folder, call.folder / NAME))
+    call.warn(merged(call.folder, call.folder / NAME, study))
     return open_study(call.folder / NAME)
 
 

@@ -86,6 +86,7 @@ def simulate(
         _check_records(work, before, path)
 
     call.warn(decided_by_meshes(work.system(friction), friction))
+    call.warn(() if friction is None else work.one_for_all)
 
     def checkpoint(part: Trajectory) -> None:
         try:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..laws.friction import FrictionLaw
+from ..laws.friction import FrictionLaw, share_of
 from ..typing import Array, BoolArray, IntArray, Sparse
 
 
@@ -55,6 +55,11 @@ class ContactNodes:
     def kept(self) -> BoolArray:
         """Nodes (m,) of contacts that are kept closed, whether they push or pull."""
         return np.array(self.closed)[self.owner] if self.closed else np.zeros(self.count, dtype=bool)
+
+    @property
+    def share(self) -> Array:
+        """The part (m,) of a friction coefficient asked for of all contacts that each node gets, 0 without friction."""
+        return np.array([share_of(law) for law in self.laws], dtype=float)[self.owner]
 
     @property
     def count(self) -> int:

@@ -252,6 +252,67 @@ class Tabulated:
         return replace(self, coefficients=tuple(factor * c for c in self.coefficients), static_coefficient=static)
 
 
+@dataclass(frozen=True)
+class Shared:
+    """The law of a contact that gets ``share`` times the friction coefficient asked for of all contacts; none where its
+    share is 0, whatever is asked for."""
+
+    law: FrictionLaw
+    share: float
+
+    @property
+    def sticking(self) -> float:
+        """The friction coefficient [-] at which sticking ends."""
+        return self.law.sticking
+
+    def sliding(self, speed: float) -> float:
+        """The friction coefficient [-] at a slip speed [m/s]."""
+        return self.law.sliding(speed)
+
+    def slope(self, speed: float) -> float:
+        """The slope dμ/d|v| [s/m] at a slip speed [m/s]."""
+        return self.law.slope(speed)
+
+    @property
+    def constant(self) -> bool:
+        """Whether the coefficient is the same at every slip speed."""
+        return self.law.constant
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The law as a row of numbers; see FrictionLaw."""
+        return self.law.numbers
+
+    def scaled(self, mu: float, speed: float) -> FrictionLaw:
+        """The law scaled to its share of mu at a slip speed [m/s]."""
+        return Shared(self.law.scaled(self.share * mu, speed), self.share)
+
+
+FRICTIONLESS = Shared(Coulomb(0.0), 0.0)
+
+
+def share_of(law: FrictionLaw) -> float:
+    """The part of the friction coefficient asked for of all contacts that one with this law gets: 1 unless it says."""
+    return law.share if isinstance(law, Shared) else 1.0
+
+
+def own_law(law: FrictionLaw) -> FrictionLaw:
+    """The law as it was given, without its share."""
+    return law.law if isinstance(law, Shared) else law
+
+
+def is_zero(law: FrictionLaw) -> bool:
+    """Whether a contact with this law has no friction at any speed, and none to overcome."""
+    return law.constant and law.sticking == 0.0 and law.sliding(0.0) == 0.0
+
+
+def keeping_frictionless(laws: Sequence[FrictionLaw]) -> list[FrictionLaw]:
+    """The laws of all contacts of a system: where some have friction, those given none have none at any coefficient
+    asked for. Where none has any, what is asked for is that of all."""
+    zero = [is_zero(law) for law in laws]
+    return list(laws) if all(zero) else [FRICTIONLESS if z else law for law, z in zip(laws, zero, strict=True)]
+
+
 def _factor(mu: float, present: float) -> float | None:
     """The factor mu / present, None where that is not finite."""
     if present == 0.0:

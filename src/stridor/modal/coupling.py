@@ -20,6 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import AnalysisError
+from ..laws.friction import share_of
 from ..sliding import full_motion, least_force, require_pressed, slip_speeds, steady_points, steady_sliding
 from ..system import System
 from ..typing import Array, ComplexArray
@@ -30,8 +31,8 @@ from .pencil import Pencil
 class PointCoupling:
     """What friction adds to a system whose contacts all touch. m contacts.
 
-    compliance (m,) 1/K_c [m/N]; sense (m,) ±1; slip_speed (m,) [m/s], signed. Whether the laws have
-    a slope at their slip speeds is ``sloped``.
+    compliance (m,) 1/K_c [m/N]; sense (m,) ±1 times the share of μ, 0 of a frictionless contact;
+    slip_speed (m,) [m/s], signed. Whether the laws have a slope at their slip speeds is ``sloped``.
     """
 
     system: System
@@ -150,7 +151,8 @@ def couple(system: System, *, mu: float | None = None) -> tuple[PointCoupling, t
         raise AnalysisError(
             "a friction law with a slope needs the normal force: give the case a load that presses the bodies"
         )
-    still = [c.name for c, v in zip(system.contacts, speeds, strict=True) if v == 0.0]
+    share = np.array([share_of(c.law) for c in system.contacts])
+    still = [c.name for c, v, own in zip(system.contacts, speeds, share, strict=True) if v == 0.0 and own]
     if still:
         raise AnalysisError(
             f"contact {', '.join(still)} does not slide: no support moves one of its bodies along the "
@@ -158,4 +160,5 @@ def couple(system: System, *, mu: float | None = None) -> tuple[PointCoupling, t
         )
     compliance = np.array([c.compliance for c in system.contacts])
     # Friction is μ|N|: where a contact kept closed pulls, it goes with −N.
-    return PointCoupling(system, compliance, np.where(pulls, 1.0, -1.0) * np.sign(speeds), speeds, sloped), open_names
+    sense = np.where(pulls, 1.0, -1.0) * np.sign(speeds) * share
+    return PointCoupling(system, compliance, sense, speeds, sloped), open_names

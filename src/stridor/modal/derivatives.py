@@ -157,12 +157,13 @@ def by_friction(
             accepted = f"mu, of all contacts together, since steady sliding counts here: {', '.join(added)}"
             raise CaseError(f"contacts.{contact}.friction.coefficient", None, accepted)
         return rate_of(lambda value: pencil_of(system, value, held, options), mu)[0]
-    slide = rows.slide
-    if contact is not None:
-        mine = np.zeros(slide.shape[0])
-        mine[: chosen.count] = chosen.owner == nodes.names.index(contact)
-        slide = sp.csr_array(sp.diags_array(mine) @ slide)
-    return PencilChange(push=slide)
+    if contact is None:
+        return PencilChange(push=rows.slide)
+    # Its own coefficient, whichever share of a common one it gets: one without friction may be given some.
+    mine = (chosen.owner == nodes.names.index(contact)).astype(float)
+    slide = chosen.along(held.sense[held.touching] * mine[:, None])
+    sticking = sp.csr_array((rows.slide.shape[0] - chosen.count, slide.shape[1]))
+    return PencilChange(push=sp.csr_array(sp.vstack([slide, sticking])))
 
 
 def by_compliance(system: System, held: HeldContacts, options: Options, contact: str) -> PencilChange | None:

@@ -137,11 +137,13 @@ def joined_onsets(
     between: tuple[float, float],
     border: Callable[[int], TouchingChange],
     residual: Callable[[Stretch, float, complex], float],
+    returning: Sequence[tuple[int, complex]] = (),
 ) -> Onsets:
     """One list of onsets from those of neighbouring stretches.
 
     border(k): both sides of the border behind parts[k]; residual(stretch, mu, λ): backward error of a mode that grows
-    at a border with the nodes of a stretch.
+    at a border with the nodes of a stretch. returning: number of the stretch before a border, and the λ there, of modes
+    that leave the band at the border, go on growing above it and come back: their growth does not end.
     """
     names = Names()
     every: list[Onset] = []
@@ -149,6 +151,10 @@ def joined_onsets(
         if k:
             here = border(k - 1)
             begins, ends = jumps(parts[k - 1][1].at_end, found.at_start)
+            staying = {
+                i for i, _ in matched(np.array(ends, dtype=complex), np.array([v for b, v in returning if b == k - 1]))
+            }
+            ends = [lam for i, lam in enumerate(ends) if i not in staying]
             every += [_jump(parts[k - 1], here.mu, lam, here.before, names, residual, ends=True) for lam in ends]
             names.cross(here)
             every += [_jump(parts[k], here.mu, lam, here.after, names, residual, ends=False) for lam in begins]

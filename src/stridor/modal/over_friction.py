@@ -19,7 +19,7 @@ from ..typing import Array, ComplexArray, IntArray
 from .checked_modes import checked_modes
 from .checked_onsets import checked_onsets, sought_at_end
 from .complex_modes import complex_modes
-from .from_above import WIDER, with_origins
+from .from_above import WIDER, Returning, with_origins
 from .full import full_onsets
 from .full.basis import WHOLE
 from .growing import UNCHECKED, growing_modes
@@ -251,6 +251,9 @@ def _solved_onsets(
             return np.nan
         return float(found.residual[int(np.argmin(np.abs(found.values - lam)))]) if len(found.values) else np.nan
 
-    parts = with_origins(parts, wider, residual)
-    found = joined_onsets(parts, (solid[0].low, solid[-1].high), border, residual)
-    return replace(found, notes=(*found.notes, *stretch_words(over)))
+    returning: list[Returning] = []
+    parts = with_origins(parts, wider, residual, returning)
+    leaving = [(r.before, r.lam) for r in returning if r.jumps]
+    found = joined_onsets(parts, (solid[0].low, solid[-1].high), border, residual, leaving)
+    told = [r.words(solid[r.before].high) for r in returning]
+    return replace(found, notes=(*found.notes, *stretch_words(over), *told))

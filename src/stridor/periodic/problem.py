@@ -139,6 +139,12 @@ def why_not_shooting(system: System, cutoff_hz: float | None = None) -> str:
         why = "it has load steps, so that what drives it does not stay the same"
     if not why and not np.any(full_motion(system)):
         why = "nothing slides: no support has a velocity"
+    if not why:
+        nodes = system.contact_nodes()
+        still = (nodes.share == 0.0) & (slip_of(system) == 0.0)
+        if still.any():
+            name = nodes.names[nodes.owner[int(np.argmax(still))]]
+            why = f"contact {name} has no friction and nothing slides it, so that each of its swings is a reversal"
     return why
 
 

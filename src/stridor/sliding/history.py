@@ -82,7 +82,7 @@ def _loading(
 
 def _coefficients(nodes: ContactNodes, speed: Array, mu: float | None) -> tuple[Array, Array]:
     """Friction coefficients (m,) of slip and at which sticking ends."""
-    sliding = nodes.friction_coefficients(speed) if mu is None else np.full(nodes.count, float(mu))
+    sliding = nodes.friction_coefficients(speed) if mu is None else float(mu) * nodes.share
     sticking = np.empty(nodes.count)
     for k, law in enumerate(nodes.laws):
         mine = np.flatnonzero(nodes.owner == k)

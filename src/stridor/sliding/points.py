@@ -90,7 +90,7 @@ def steady_sliding(
                 "so there is no steady sliding; let the supports move along the master line"
             )
     coefficients = (
-        system.friction_coefficients(np.abs(speeds)) if mu is None else np.full(len(system.contacts), float(mu))
+        system.friction_coefficients(np.abs(speeds)) if mu is None else float(mu) * system.contact_nodes().share
     )
     if not np.any(speeds):
         _require_slip(system, speeds, coefficients, np.ones(len(speeds), dtype=bool))

@@ -19,6 +19,7 @@ from ..contact.nodes import ContactNodes
 from ..digits import readable
 from ..direct import SingularMatrix
 from ..errors import AnalysisError
+from ..laws.friction import own_law
 from ..notebook import Shown, counted, html_table
 from ..stages import passing, stage
 from ..system import System
@@ -131,7 +132,7 @@ def steady_sliding_nodes(
     slip = nodes.slip_velocity(factors)
     speed = np.linalg.norm(slip, axis=1)
     _require_constant_gap(nodes, factors, speed)
-    coefficient = nodes.friction_coefficients(speed) if mu is None else np.full(nodes.count, float(mu))
+    coefficient = nodes.friction_coefficients(speed) if mu is None else float(mu) * nodes.share
     slips = speed > STILL * float(speed.max(initial=0.0))
     if not slips.any():
         _require_slip(nodes, slips, coefficient, np.ones(nodes.count, dtype=bool))
@@ -331,7 +332,7 @@ def _slopes(nodes: ContactNodes, speed: Array, mu: Array) -> Array:
     """dμ/d|w| (m,) [s/m] of the laws, scaled where another coefficient was asked for than they have."""
     slopes, own = nodes.friction_slopes(speed), nodes.friction_coefficients(speed)
     for i in np.flatnonzero((mu != own) & (slopes != 0.0)):
-        slopes[i] = nodes.laws[nodes.owner[i]].scaled(float(mu[i]), float(speed[i])).slope(float(speed[i]))
+        slopes[i] = own_law(nodes.laws[nodes.owner[i]]).scaled(float(mu[i]), float(speed[i])).slope(float(speed[i]))
     return slopes
 
 

@@ -9,14 +9,15 @@ from ..case.units import unit_at
 from ..errors import CaseError
 from .parts import FOLDERS, Part
 from .rows import lengths, variables
+from .run import differing, digest_of
 from .sampling import samples
 from .schema import Study
 from .store import DONE, Head, OpenStore, dataset, head_of
 
 
-def merged(folder: Path, path: Path) -> list[str]:
-    """Put the parts in a folder together into one store; says which parts and rows are missing. Raises CaseError where
-    there are none, or they are of different studies."""
+def merged(folder: Path, path: Path, given: Study) -> list[str]:
+    """Put the parts of a study in a folder together into one store; says which parts and rows are missing. Raises
+    CaseError where there are none, or they are of another study than that, or of one with another case."""
     places = sorted(p / "study.zarr" for p in folder.glob(FOLDERS) if (p / "study.zarr").is_dir())
     if not places:
         raise CaseError(str(folder), None, f"no parts there: folders {FOLDERS} that --part wrote")
@@ -24,6 +25,9 @@ def merged(folder: Path, path: Path) -> list[str]:
     for location, head in zip(places, heads, strict=True):
         if head.digest != heads[0].digest:
             raise CaseError(str(location), None, f"is of another study than {places[0]}")
+    if heads[0].digest != digest_of(given, given.base()):
+        accepted = f"holds parts of another study than the one given: {differing(heads[0].study, given)}"
+        raise CaseError(str(folder), None, f"{accepted}; give the study as it was, or run its parts anew")
     study = Study.from_document(heads[0].study)
     count = Part.read(heads[0].part).count
     told: list[str] = []

@@ -313,10 +313,13 @@ class _Run:
         return True
 
 
+NOT_COUNTED = ("title", "restart_failed", "goal")  # of a study: rows do not follow from them
+
+
 def digest_of(study: Study, case: Case) -> str:
     """SHA-256 of what the rows follow from: samples, case, the files that it names; not of who computes them."""
     document = study.document()
-    for name in ("title", "restart_failed", "goal"):
+    for name in NOT_COUNTED:
         document.pop(name, None)
     data = case.model_dump(mode="json", exclude_none=True)
     files = {path: contents(Path(path)) for path in sorted(set(files_of(data)))}
@@ -325,11 +328,16 @@ def digest_of(study: Study, case: Case) -> str:
 
 
 def _differences(before: Mapping[str, Any], study: Study) -> str:
-    """What of a study differs from that in the store, in a few words."""
+    """What of a study differs from that in the store, in a few words, and what to do."""
+    return f"{differing(before, study)}; remove it, or name another folder (--out)"
+
+
+def differing(before: Mapping[str, Any], study: Study) -> str:
+    """What of a study differs from that in a store, in a few words."""
     now = study.document()
-    names = [n for n in dict.fromkeys([*before, *now]) if n not in ("title", "goal") and before.get(n) != now.get(n)]
+    names = [n for n in dict.fromkeys([*before, *now]) if n not in NOT_COUNTED and before.get(n) != now.get(n)]
     what = ", ".join(names) or "a file that the case names"
-    return f"{what} differ{'s' if len(names) < 2 else ''}; remove it, or name another folder (--out)"
+    return f"{what} differ{'s' if len(names) < 2 else ''}"
 
 
 def _workers(task: Task, count: int | None, scheduler: str | None) -> Workers:

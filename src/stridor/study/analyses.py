@@ -44,7 +44,7 @@ from .provenance import provenance
 from .run_summary import RunSummary, first_regime, summarise
 from .settings import phases_of, settings_of
 from .touching import decided_by_meshes
-from .workspace import Problem, Workspace
+from .workspace import Problem, Workspace, frictions_by_contact, in_proportion
 
 __all__ = [
     "BodyModes",
@@ -80,7 +80,7 @@ def modes(
     residuals: bool = True,
     progress: Progress | None = None,
 ) -> ComplexModes:
-    """Complex modes at one or many friction coefficients (default: the problem's own).
+    """Complex modes at one or many friction coefficients (default: the problem's own, of each contact its own).
 
     All modes with frequencies up to modal.max_frequency_hz are found; kept are the ``count`` lowest (default
     modal.modes) and every unstable one, with max_frequency_hz all up to that. band_hz: of all found, those between two
@@ -94,11 +94,12 @@ def modes(
     if count is not None:
         require_count(count, "count")
     work = Workspace.of(problem)
-    values = work.one_friction() if mu is None else mu
+    values, system = (_own(work) if mu is None else (mu, None))
     damped = work.modal.damped if damped is None else damped
     band = max_frequency_hz or work.modal.max_frequency_hz
     require_band(band_hz, band)
-    asked = ("modes", *np.shape(values), *np.ravel(values).tolist(), band, damped, check)
+    what = "modes" if system is None else "modes of own"
+    asked = (what, *np.shape(values), *np.ravel(values).tolist(), band, damped, check)
     # What has vectors serves who wants none.
     more = {False: (False, "right", True), "right": ("right", True), True: (True,)}[vectors]
     judged = residuals or check
@@ -106,8 +107,9 @@ def modes(
     result = next((r for key in served if (r := work.answers.known(key)) is not None), None)
     if result is None:
         result = _modes(
-            work, values, band, damped=damped, vectors=vectors, check=check, residuals=judged, progress=progress
-        )
+            work, values, band, damped=damped, vectors=vectors, check=check, residuals=judged, progress=progress,
+            in_proportion=system,
+        )  # fmt: skip
         # What was cut short is not for others, nor are vectors of a sweep, which are large.
         if not result.interrupted and (not vectors or len(result.mu) == 1):
             work.answers.keep((*asked, vectors, judged), result)
@@ -129,9 +131,11 @@ def _modes(
     check: bool,
     residuals: bool,
     progress: Progress | None,
+    in_proportion: System | None,
 ) -> ComplexModes:
     """Every mode of the band: followed from μ = 0 and checked, or where matrices depend on μ sought at each."""
     started, options = time.perf_counter(), work.options
+    system = work.system() if in_proportion is None else in_proportion
     if work.varies:
         require_full(options.source)
         own = work.own_friction if work.has_contacts else None
@@ -141,20 +145,36 @@ def _modes(
         )  # fmt: skip
         notes = _held_by_factors(work, own)
     elif check:
-        own = work.own_friction if work.has_contacts else None
+        own = work.own_friction if work.has_contacts and in_proportion is None else None
         result = modes_of_band(
-            work.system(), values, band, damped=damped, vectors=vectors, own=own, options=options, progress=progress
+            system, values, band, damped=damped, vectors=vectors, own=own, options=options, progress=progress
         )
         single = float(result.mu[0]) if len(result.mu) == 1 else None
-        notes = (*taken_as_closed(work.system()), *decided_by_meshes(work.system(), single, options.solver))
+        notes = (*taken_as_closed(system), *decided_by_meshes(system, single, options.solver))
     else:
         result = complex_modes(
-            work.system(), values, max_frequency_hz=band, damped=damped, vectors=vectors, residuals=residuals,
+            system, values, max_frequency_hz=band, damped=damped, vectors=vectors, residuals=residuals,
             progress=progress, **asdict(options),
         )  # fmt: skip
-        notes = taken_as_closed(work.system())
+        notes = taken_as_closed(system)
+    notes = (*notes, *(work.one_for_all if in_proportion is None else _said_of_own(work)))
     made = provenance(work, "modes", time.perf_counter() - started, damped=damped)
     return replace(result, notes=(*result.notes, *notes), provenance=made)
+
+
+def _own(work: Workspace) -> tuple[float, System | None]:
+    """The friction coefficient of all contacts, or where the case gives them different ones the largest, and the system
+    in which each has its own at it. Raises CaseError where contacts have several, by their laws."""
+    found = None
+    if work.own_friction is None and not work.varies:
+        found = work.system().once("in proportion", lambda: in_proportion(work.system()))
+    return (work.one_friction(), None) if found is None else (found[1], found[0])
+
+
+def _said_of_own(work: Workspace) -> tuple[str, ...]:
+    own = frictions_by_contact(work.system()) or {}
+    given = ", ".join(f"{name} {value:g}" for name, value in own.items())
+    return (f"each contact has its own friction coefficient ({given}); the μ that is named is the largest",)
 
 
 def _held_by_factors(work: Workspace, own: float | None) -> tuple[str, ...]:
@@ -171,8 +191,8 @@ def _held_by_factors(work: Workspace, own: float | None) -> tuple[str, ...]:
 def steady_sliding(problem: Problem, mu: float | None = None) -> SurfaceSliding:
     """The equilibrium under load and friction that both approaches start from, node by node of every contact.
 
-    mu replaces the friction coefficient of every contact. Where more than one set of a few contact nodes is in
-    equilibrium, a warning names the others. Raises AnalysisError where there is none.
+    mu replaces the friction coefficient of every contact that has friction. Where more than one set of a few contact
+    nodes is in equilibrium, a warning names the others. Raises AnalysisError where there is none.
     """
     require_friction(mu)
     work = Workspace.of(problem)
@@ -182,6 +202,8 @@ def steady_sliding(problem: Problem, mu: float | None = None) -> SurfaceSliding:
         ", ".join(dict.fromkeys(nodes.names[k] for k in nodes.owner[active])) or "none"
         for active in other_equilibria(system, found, mu)
     ]
+    if mu is not None and work.one_for_all:
+        found = replace(found, warnings=(*found.warnings, *work.one_for_all))
     if not others:
         return found
     said = (
@@ -267,7 +289,7 @@ def found_onsets(
         held = work.system().touching(instead_of_own(work.system(), *between, solver=options.solver))
         result = solve_onsets(held, between, max_frequency_hz=max_frequency_hz, damped=damped, **asdict(options))
         notes = taken_as_closed(work.system())
-    return replace(result, notes=(*result.notes, *notes))
+    return replace(result, notes=(*result.notes, *notes, *work.one_for_all))
 
 
 def simulate(
@@ -402,7 +424,8 @@ def compare(
         finished=finished,
         options=work.options,
     )
-    notes = dict.fromkeys((*result.notes, *(said for mu in chosen for said in decided_by_meshes(system, mu))))
+    by_meshes = (said for mu in chosen for said in decided_by_meshes(system, mu))
+    notes = dict.fromkeys((*result.notes, *work.one_for_all, *by_meshes))
     seconds = time.perf_counter() - started
     return replace(result, notes=tuple(notes), provenance=provenance(work, "compare", seconds, mu=chosen))
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..case.matrix_checks import MU
 from ..errors import CaseError
 from ..modal.boundary import Found, StabilityCurve, boundaries
 from ..modal.parametric import ReducedModel
@@ -78,7 +79,7 @@ def stability_boundary(
         sentence(found, asked.paths, elsewhere=elsewhere),
         "full" if solved.model is None else "reduced", len(plane.sizes), plane.solves, plane.steps,
         0 if solved.model is None else solved.model.solves, again, (*solved.notes, *notes, *result_notes),
-        (*solved.problem.idle_words, *warnings),
+        (*solved.problem.idle_words, *warnings, *(work.one_for_all if MU in (x, y) else ())),
         provenance(work, "boundary", time.perf_counter() - started, method=method, bound=bound, tolerance=tolerance),
     )  # fmt: skip
 

@@ -128,7 +128,7 @@ class _CycleSearch:
         self.work, self.between, self.pushes, self.seconds = work, between, pushes, seconds
         self.progress, self.keep, self.started, self.points = progress, keep, started, points
         self.harmonics = harmonics
-        self.notes: list[str] = []
+        self.notes: list[str] = list(work.one_for_all)
         self.slides = between or (0.0, math.inf)  # what of the range has steady sliding
         self.method: Method[Any, Any] = self._method(chosen)
         self.tracer = Tracer(self.method, between or (0.0, 1.0), points, self._kept)

@@ -85,7 +85,7 @@ def damping_map(
     return DampingMap(
         x, y, xs, ys, (low, high), top, table.mu, table.frequency, table.slope_x, table.slope_y, table.residual,
         None if undamped is None else undamped.mu,
-        tuple(table.warnings),
+        (*table.warnings, *work.one_for_all),
         provenance(work, "damping map", time.perf_counter() - started, method=method, bound=bound),
         "reduced" if isinstance(search, ReducedSearch) else "full",
         table.error if isinstance(search, ReducedSearch) else None,

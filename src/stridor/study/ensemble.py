@@ -252,6 +252,7 @@ def _result(
     nodes = system.contact_nodes()
     sliding = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1).max(initial=0.0)
     end = sum(p.duration for p in work.phases)
+    given = () if np.isnan(plan.rows[:, 0]).all() else work.one_for_all
     return Ensemble(
         mu=plan.rows[:, 0], load=plan.rows[:, 1], speed=plan.rows[:, 2], perturbation=plan.rows[:, 3],
         sweep=plan.sweep, slip_speed=plan.rows[:, 2] * float(sliding), observable=seen.observable.name,
@@ -259,6 +260,7 @@ def _result(
         mode_hz=mode_hz, mode_deviation=deviation, error=tuple(seen.errors.get(k, "") for k in range(count)),
         window=(end - window * work.phases[-1].duration, end), step=outcome.step,
         method="side by side" if outcome.side_by_side else "separate runs", axes=plan.axes, modal=found.map,
-        runs=tuple(seen.runs.get(k) for k in range(count)) if seen.records else (), notes=(*separate, *found.notes),
+        runs=tuple(seen.runs.get(k) for k in range(count)) if seen.records else (),
+        notes=(*separate, *found.notes, *given),
         interrupted=outcome.interrupted, device=outcome.device, provenance=made,
     )  # fmt: skip

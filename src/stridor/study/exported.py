@@ -20,6 +20,7 @@ from ..errors import AnalysisError, CaseError
 from ..matrices.model import Role
 from ..modal.krylov.problem import ContactProblem, problem_of
 from ..modal.options import Options
+from ..sliding import full_motion
 from ..system import System
 from ..typing import Array, IntArray, Sparse
 from .asked import require_friction
@@ -110,7 +111,7 @@ def exported_model(problem: Problem, mu: float | None = None) -> ExportedModel:
         matrices = pencil(work, mu).matrices()
         roles: tuple[Role, ...] = ("mass", "damping", "stiffness")
         terms = tuple(ExportedTerm(n, m, role) for n, m, role in zip("MCK", matrices, roles, strict=True))
-        whole, notes = True, ()
+        whole, notes = True, work.one_for_all
     beyond = terms[0].matrix.shape[0] - system.size
     if contact.contact_state:
         notes = (*notes, contact.contact_state)
@@ -120,7 +121,7 @@ def exported_model(problem: Problem, mu: float | None = None) -> ExportedModel:
     return ExportedModel(
         terms=terms,
         normal=contact.normal[:sliding],
-        tangent=sp.csr_array(-contact.slide[:sliding]),
+        tangent=_tangent(system, contact),
         contacts=_contact_rows(system, contact),
         loads=sp.csr_array(sp.vstack([columns, sp.csr_array((beyond, columns.shape[1]))])),
         load_names=tuple(system.loads),
@@ -202,6 +203,19 @@ def _other_nodes(work: Workspace, system: System, contact: ContactProblem) -> tu
                 f"({len(contact.touching)}), which Kc and Kf are made of",
             )
     return ()
+
+
+def _tangent(system: System, contact: ContactProblem) -> Sparse:
+    """Rows (m, n) of the touching nodes along their slip, of those without friction too."""
+    nodes = system.contact_nodes().select(contact.touching)
+    rows = sp.csr_array(-contact.slide[: nodes.count])
+    without = nodes.share == 0.0
+    if not without.any():
+        return rows
+    slip = nodes.slip_velocity(full_motion(system))
+    speed = np.linalg.norm(slip, axis=1)
+    way = np.where((without & (speed > 0.0))[:, None], slip / np.where(speed > 0.0, speed, 1.0)[:, None], 0.0)
+    return sp.csr_array(rows + nodes.along(way))
 
 
 def _contact_rows(system: System, contact: ContactProblem) -> tuple[ContactRow, ...]:

@@ -188,6 +188,7 @@ class Linearised:
         self.pencil = pencil_of(self.system, mu, self.held, self.options)
         doubtful = doubt(modes.completeness[0]) if modes.completeness else ""
         self.warnings: list[str] = [f"modes at μ = {mu:g}: {doubtful}"] if doubtful else []
+        self.warnings += work.one_for_all
         self._solved: dict[int, Mode | None] = {}
         # At the case's own friction a number of its laws, or what slides faster, changes that friction, too.
         self.by_law = any(c.friction.law != "coulomb" for c in self.case.contacts.values())
@@ -218,7 +219,7 @@ class Linearised:
     def value(self, path: str) -> float:
         """The number at a path. Raises CaseError where there is none."""
         contact = _contact_of(self.case, path)
-        if path in _FRICTION or (contact and self._is_friction(path)):
+        if path in _FRICTION or (contact and self._is_friction(path) and not self._without(contact)):
             return self.mu
         if contact and path.endswith(".compliance"):
             stiffness = self.case.contacts[contact].stiffness
@@ -281,6 +282,11 @@ class Linearised:
         area = self.system.contact_nodes().area
         pressure = np.abs(steady.normal_force) / np.where(np.isnan(area) | (area <= 0), 1.0, area)
         return float(np.abs(steady.displacement).max()) / float(pressure.max())
+
+    def _without(self, contact: str) -> bool:
+        """Whether a contact has no friction at any μ."""
+        nodes = self.system.contact_nodes()
+        return bool(np.all(nodes.share[nodes.owner == nodes.names.index(contact)] == 0.0))
 
     def _is_friction(self, path: str) -> bool:
         """Whether a number of a contact is its friction coefficient: of a law of speed it is but one of its numbers."""

@@ -21,6 +21,7 @@ from ..case.matrix_checks import MU
 from ..case.messages import problems_of
 from ..case.schema import DEFAULT_PHASES, Comparison, Modal, Phase, Phases, Temporal
 from ..errors import AnalysisError, CaseError, kind_of
+from ..laws.friction import Shared, own_law
 from ..modal.options import Options
 from ..notebook import Shown, counted
 from ..sliding import full_motion
@@ -33,6 +34,7 @@ from .case_key import case_key
 from .options import options_of
 
 SYSTEMS = 16  # kept at the same time, of a case whose matrices depend on μ
+KEPT_BY = "`modes`, `steady` and `simulate` without μ answer with each contact's own"
 ACCEPTED = "a case, the path of its file, a system or a workspace"
 
 
@@ -184,9 +186,29 @@ class Workspace(Shown):
                 "mu",
                 None,
                 "one friction coefficient for all contacts, since the case gives them different ones: name it "
-                "(--mu 0.3), it scales every contact's law",
+                f"(--mu 0.3), every contact with friction then has it; {KEPT_BY}",
             )
         return found
+
+    @cached_property
+    def one_for_all(self) -> tuple[str, ...]:
+        """What is said with results over μ where contacts have different coefficients, which μ takes the place of."""
+        if not self.has_contacts or (self._case is not None and len(self._case.contacts) < 2):
+            return ()
+        own = frictions_by_contact(self.system()) or {}
+        if len(own) < 2 or max(own.values()) - min(own.values()) <= 1e-12 * max(own.values()):
+            return ()
+        given = ", ".join(f"{name} {value:g}" for name, value in own.items())
+        nodes = self.system().contact_nodes()
+        rigid = {nodes.names[k] for k in nodes.owner[nodes.compliance == 0.0]}
+        soft = [name for name in own if name not in rigid]
+        along = "" if self._case is None or not soft else (
+            f", and `onsets --along contacts.{soft[0]}.friction.coefficient` goes along that of one contact"
+        )  # fmt: skip
+        return (
+            f"μ stands for one friction coefficient of all contacts, to which the case gives different ones ({given}), "
+            f"so that their ratios do not count here; {KEPT_BY}{along}",
+        )
 
     def steady(self, mu: float | None = None) -> SurfaceSliding:
         """Steady sliding, node by node, at ``mu`` (None: with the laws' own coefficients)."""
@@ -246,9 +268,40 @@ def friction_in_sliding(system: System) -> float | None:
     return float(found[0]) if np.ptp(found) <= 1e-12 * np.max(np.abs(found)) else None
 
 
-def frictions_in_sliding(system: System) -> Array:
-    """The coefficient of each contact node (m,) of a system at its slip speed in steady sliding."""
+def frictions_by_contact(system: System) -> dict[str, float] | None:
+    """The coefficient of each contact with friction, in steady sliding; None where one has several, by its law."""
     nodes = system.contact_nodes()
+    speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
+    all_found, moving = nodes.friction_coefficients(speeds), speeds > 1e-9 * speeds.max(initial=0.0)
+    rubs, found = nodes.share > 0.0, dict[str, float]()
+    for k, name in enumerate(nodes.names):
+        mine = rubs & (nodes.owner == k)
+        own = all_found[mine & moving] if np.any(mine & moving) else all_found[mine]
+        if len(own):
+            if np.ptp(own) > 1e-12 * np.max(np.abs(own)):
+                return None
+            found[name] = float(own[0])
+    return found
+
+
+def in_proportion(system: System) -> tuple[System, float] | None:
+    """The system whose contacts keep their coefficients to one another at any μ, and the μ, that of the largest, at
+    which they have their own; None where one has several, by its law."""
+    own = frictions_by_contact(system)
+    if not own:
+        return None
+    largest, nodes = max(own.values()), system.contact_nodes()
+    laws = [
+        Shared(own_law(law), own.get(name, 0.0) / largest) for name, law in zip(nodes.names, nodes.laws, strict=True)
+    ]
+    return system.with_laws(laws), largest
+
+
+def frictions_in_sliding(system: System) -> Array:
+    """The coefficient of each contact node (m,) of a system at its slip speed in steady sliding, without those of
+    contacts that have no friction at any μ."""
+    nodes = system.contact_nodes()
+    nodes = nodes.select(nodes.share > 0.0)
     speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
     # The centre of a turning surface slides at no speed and has no say.
     moving = speeds > 1e-9 * speeds.max(initial=0.0)

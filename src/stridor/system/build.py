@@ -103,7 +103,7 @@ def build_system(
         load_steps=_load_steps(case, motion),
         contact_cubic={name: contact.cubic for name, contact in case.contacts.items() if contact.cubic},
         tie_words=() if tied is None else tied.words,
-    )
+    ).keeping_frictionless()
 
 
 def _load_steps(case: Case, motion: PrescribedMotion) -> tuple[LoadStep, ...]:

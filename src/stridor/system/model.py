@@ -5,7 +5,7 @@ Nothing after it asks whether the freedoms came from beams, solids or another pr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeVar
@@ -17,6 +17,7 @@ from ..contact.interface import Contact, Rows
 from ..contact.nodes import ContactNodes, stack
 from ..contact.surfaces import SurfaceContact
 from ..fe.assembly import connected_components
+from ..laws.friction import FrictionLaw, keeping_frictionless, share_of
 from ..notebook import Shown, counted, html_table
 from ..typing import Array, IntArray, Sparse
 from .given_matrices import contacts_given, not_symmetric_definite, points_given, square_matrices, vectors_given
@@ -195,7 +196,7 @@ class System(Shown):
             m, c, k, built, vectors_given("loads", loads, size), motion, points_given(points, size, len(motion.names)),
             dof_names=tuple(f"freedom {k}" for k in range(size)), contact_cubic=cubic,
             not_symmetric_definite=not_symmetric_definite(m, c, k),
-        )  # fmt: skip
+        ).keeping_frictionless()  # fmt: skip
 
     @property
     def _line(self) -> str:
@@ -297,6 +298,38 @@ class System(Shown):
         contacts = tuple(replace(c, stiffness=np.inf) for c in self.contacts)
         surfaces = tuple(s.rigid() for s in self.surfaces)
         return replace(self, contacts=contacts, surfaces=surfaces, contact_cubic={})
+
+    def keeping_frictionless(self) -> System:
+        """The system in which contacts that were given no friction, beside others that have some, have none at any
+        coefficient asked for."""
+        given = (*(c.law for c in self.contacts), *(s.law for s in self.surfaces))
+        laws = keeping_frictionless(given)
+        return self if tuple(laws) == given else self.with_laws(laws)
+
+    def with_laws(self, laws: Sequence[FrictionLaw]) -> System:
+        """The same system with other friction laws, one for each contact: points first, then surfaces."""
+        points, count = zip(self.contacts, laws[: len(self.contacts)], strict=True), len(self.contacts)
+        surfaces = zip(self.surfaces, laws[count:], strict=True)
+        return replace(
+            self, contacts=tuple(replace(c, law=law) for c, law in points),
+            surfaces=tuple(replace(s, law=law, nodes=replace(s.nodes, laws=(law,))) for s, law in surfaces),
+        )  # fmt: skip
+
+    def without_idle_slip(self) -> System:
+        """The system in which nothing slides contacts without friction: what knows friction by the slip leaves them
+        out."""
+        if self.contact_nodes().share.all():
+            return self
+        return self.once("without idle slip", self._without_idle_slip)
+
+    def _without_idle_slip(self) -> System:
+        def still(nodes: ContactNodes) -> ContactNodes:
+            slid = np.repeat(nodes.share > 0.0, nodes.directions)
+            return replace(nodes, tangent_lift=slid[:, None] * nodes.tangent_lift)
+
+        contacts = (replace(c, tangent_lift=float(share_of(c.law) > 0.0) * c.tangent_lift) for c in self.contacts)
+        surfaces = (replace(s, nodes=still(s.nodes)) for s in self.surfaces)
+        return replace(self, contacts=tuple(contacts), surfaces=tuple(surfaces))
 
     @property
     def finitely_sliding(self) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from typing import Any, cast
 from ...case import Case, loads, template_text, templates
 from ...case.overrides import apply, split_path
 from ...errors import CaseError
+from ...laws.friction import is_zero
 
 LARGEST_TEXT = 5_000_000  # bytes of a case that is uploaded or comes in a link
 LARGEST_LINK = 60_000  # letters: what browsers and mail programs take
@@ -136,8 +137,14 @@ def own_friction(case: Case) -> float:
 
 def different_frictions(case: Case) -> dict[str, float]:
     """The friction coefficients of contacts that do not have the same one; none where one is meant for all."""
-    own = {name: contact.friction.coefficient for name, contact in case.contacts.items()}
+    own = {name: c.friction.coefficient for name, c in case.contacts.items() if name not in frictionless(case)}
     return own if len(set(own.values())) > 1 and "mu" not in case.parameters else {}
+
+
+def frictionless(case: Case) -> set[str]:
+    """Contacts without friction at any μ, where others have some."""
+    zero = {name for name, contact in case.contacts.items() if is_zero(contact.friction.law_object())}
+    return zero if len(zero) < len(case.contacts) else set()
 
 
 class History:
@@ -266,7 +273,10 @@ def friction_changes(state: State) -> dict[str, float]:
     if "mu" in case.parameters:
         return {"parameters.mu.value": state.mu}
     changes: dict[str, float] = {}
+    without = frictionless(case)
     for name, contact in case.contacts.items():
+        if name in without:
+            continue
         law, at = asdict_of(contact.friction), f"contacts.{name}.friction"
         scale = state.mu / contact.friction.coefficient if contact.friction.coefficient else 1.0
         if "coefficient" in law:

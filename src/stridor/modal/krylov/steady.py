@@ -53,10 +53,11 @@ class TouchingRows:
 def contact_rows(nodes: ContactNodes, touching: IntArray, sense: Array, stuck: BoolArray) -> TouchingRows:
     """What the nodes ``touching`` (k,) of all add to small motions: sense (m, d−1) and stuck (m,) are of all nodes.
 
-    A node that sticks is held along its tangents as a rigid contact is along its normal: rows with forces of their own.
+    Friction gives each node its share of μ, none to those of a frictionless contact. A node that sticks is held along
+    its tangents as a rigid contact is along its normal: rows with forces of their own.
     """
     chosen = nodes.select(touching)
-    slide = chosen.along(sense[touching])
+    slide = chosen.along(sense[touching] * chosen.share[:, None])
     if not np.any(stuck[touching]):
         return TouchingRows(chosen.normal, slide, chosen.compliance)
     sticks = StickRows(chosen)
@@ -106,7 +107,10 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
     slip = nodes.slip_velocity(full_motion(system))
     speed = np.linalg.norm(slip, axis=1)
     slides = speed > STILL * float(speed.max(initial=0.0))
-    still = [name for k, name in enumerate(nodes.names) if not np.any(slides[nodes.owner == k])]
+    needed = nodes.share > 0.0
+    still = [
+        name for k, name in enumerate(nodes.names) if np.any(needed[m := nodes.owner == k]) and not np.any(slides[m])
+    ]
     if still:
         raise AnalysisError(
             f"contact {', '.join(still)} does not slide: no support moves one of its bodies along the tangent; "

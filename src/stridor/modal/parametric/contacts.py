@@ -12,7 +12,7 @@ steady sliding adds (`contacts_steady`) are further terms, and rigid contact is 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ import scipy.sparse as sp
 
 from ...errors import AnalysisError, CaseError
 from ...system import System
-from ...typing import BoolArray
+from ...typing import BoolArray, Sparse
 from ..krylov.steady import contact_rows, refuse_stick, steadiness, touching_nodes
 from ..options import Options
 from .contacts_rigid import Elimination, eliminate
@@ -85,11 +85,14 @@ def contacts_problem(
     """The problem over all parameters of a family, in its contacts too.
 
     touching_at: μ of the steady sliding that says which nodes touch (None: the laws' own). Raises CaseError where only
-    rigid contact is there to have its stiffness varied, where contacts have different friction and μ is no parameter,
+    rigid contact is there to have its stiffness varied, where rigid contacts change their friction by other than μ,
     and where a parameter changes who can touch; AnalysisError where there is no steady sliding, where rigid contact is
     given twice or friction jams, and where something does not depend on a parameter smoothly enough.
     """
-    options = options or Options()
+    options, given = options or Options(), family
+    if any(p.name == FRICTION for p in given.parameters):
+        # Contacts that stay without friction are told by that nothing slides them.
+        family = replace(given, system_at=lambda values: given.system_at(values).without_idle_slip())
     nodes = family.own.contact_nodes()
     if not nodes.count:
         return ContactsProblem(interpolated_terms(family.structure_at, family.interpolated), family.parameters)
@@ -146,31 +149,28 @@ def _springs(contacts: Contacts, *, varied: bool) -> dict[str, FactoredPart]:
     if not soft.any():
         return {}
     rows = sp.csr_array(sp.diags_array(1.0 / contacts.compliance[soft]) @ contacts.normal[soft])
-    friction = sp.csr_array(contacts.slide[soft].T @ rows)
+    slide = contacts.slide if varied else _own_slide(contacts)
+    friction = sp.csr_array(slide[soft].T @ rows)
     stiffness: ParameterFactor = Product(((STIFFNESS, 1.0),))
     by_friction: ParameterFactor = Product(((STIFFNESS, 1.0), (FRICTION, 1.0)))
     if not varied:
-        friction, by_friction = sp.csr_array(_friction_of(contacts) * friction), stiffness
+        by_friction = stiffness
     return {
         "contact": FactoredPart(sp.csr_array(contacts.normal[soft].T @ rows), "stiffness", stiffness),
         "friction": FactoredPart(friction, "stiffness", by_friction),
     }
 
 
-def _friction_of(contacts: Contacts) -> float:
-    """The friction coefficient of the laws. Raises CaseError where they differ."""
-    found = contacts.friction
-    if found is None:
-        raise CaseError(FRICTION, None, "the contacts have different friction coefficients; give one for all")
-    return found
+def _own_slide(contacts: Contacts) -> Sparse:
+    """μS (m, n) with each node's own coefficient."""
+    return sp.csr_array(sp.diags_array(contacts.coefficient[contacts.touching]) @ contacts.slide)
 
 
 def _elimination(family: ParametricSystems, contacts_at: Callable[[Values], Contacts], rigid: BoolArray) -> Elimination:
     """Rigid contact taken out, the same for all values of the parameters. Raises CaseError where it is not the same."""
     reference = {p.name: p.value for p in family.interpolated}
     own = contacts_at(reference)
-    friction: Parameter | float | None = next((p for p in family.parameters if p.name == FRICTION), None)
-    friction = _friction_of(own) if friction is None else friction
+    friction = next((p for p in family.parameters if p.name == FRICTION), None)
     for p in family.interpolated:
         for value in (p.low, p.low + 0.37 * (p.high - p.low), p.high):
             other = contacts_at({**reference, p.name: value})
@@ -180,9 +180,11 @@ def _elimination(family: ParametricSystems, contacts_at: Callable[[Values], Cont
             if not same:
                 accepted = "moves where rigid contact touches, or the direction of its slip; give numbers that do not"
                 raise CaseError(f"box.{p.name}", value, accepted)
-            if isinstance(friction, float) and abs(_friction_of(other) - friction) > SAME * max(friction, 1e-300):
+            if friction is None and deviation(_own_slide(own)[rigid], _own_slide(other)[rigid]) > SAME:
                 accepted = "friction of rigid contact is varied for all contacts together, by mu"
                 raise CaseError(f"box.{p.name}", value, accepted)
+    if friction is None:
+        return eliminate(own.normal[rigid], _own_slide(own)[rigid], 1.0)
     return eliminate(own.normal[rigid], own.slide[rigid], friction)
 
 

@@ -93,7 +93,7 @@ class ContactLaw:
         slips_at(size, normal, mu, self.table, self.owner, rub, found)
         shape, slope = found[..., 1], found[..., 2]
         limit = mu * shape * normal
-        sticks = size <= limit
+        sticks = (size <= limit) & (limit > 0.0)  # where there is no friction nothing sticks, at no slip either
         way = pull / np.where(size > 0.0, size, 1.0)[:, None]
         # Of the limit by |q|, N and μ, the speed going along.
         moving = np.where(self.constant[:, None], 0.0, slope * mu * normal)
