@@ -237,7 +237,7 @@ def unlike_at(
         system = system_at(values)
         contacts = contacts_of(system, touching)
         nodes = contacts.nodes
-        mu = np.full(nodes.count, values[FRICTION]) if FRICTION in values else contacts.coefficient
+        mu = values[FRICTION] * nodes.share if FRICTION in values else contacts.coefficient
         if last is None or last[0] is not system:
             if last is not None:
                 last[1].free()
