@@ -188,3 +188,18 @@ def test_bodies_that_both_repeat_can_be_glued() -> None:
     assert len(ring) > 10 * len(found[0])
     for omega in found[0][:6]:
         assert np.abs(ring / omega - 1.0).min() < 1e-6
+
+
+@pytest.mark.parametrize("counts", [(3, 5), (6, 4)])
+def test_bodies_that_both_repeat_can_be_glued_though_their_meshes_do_not_match(counts: tuple[int, int]) -> None:
+    """Torsion and breathing, within the mesh's error of those of matching meshes."""
+
+    def found(slave: str, master: str, low: int, high: int) -> np.ndarray:
+        text = REPEATING.replace("SLAVE", slave).replace("MASTER", master).replace("SWEEP", "30.0")
+        for count in (low, high):
+            text = text.replace("divisions = [2, 3]", f"divisions = [2,  {count}]", 1)
+        return omegas(loads(text + TURN.format("inner") + TURN.format("outer")))[:3]
+
+    exact = found("inner.outer", "outer.inner", 12, 12)
+    for ends in (("inner.outer", "outer.inner"), ("outer.inner", "inner.outer")):
+        assert found(*ends, *counts) == pytest.approx(exact, rel=2e-3)

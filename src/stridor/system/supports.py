@@ -210,13 +210,16 @@ def _path(constraint: Constraint) -> str:
 
 
 def _slaves_twice(case: Case, bodies: dict[str, BuiltBody], total: int) -> BoolArray:
-    """Which freedoms (N,) are slaves of more than one tie."""
+    """Which freedoms (N,) are slaves of more than one tie, or of one and on the side that another repeats."""
     times = np.zeros(total, dtype=np.int64)
     for name, tie in case.ties.items():
-        at = case.location(tie.slave)
-        assert isinstance(at, BoundaryRef), "checked"
-        body = bodies[at.body]
-        times[np.unique(body.displacements(boundary_nodes(body, at, f"ties.{name}.slave")))] += 1
+        # What repeats at the slave's corner must begin alike at the master's.
+        repeats = tie.translation is not None or tie.rotation is not None
+        for side in ("slave", "master") if repeats else ("slave",):
+            at = case.location(getattr(tie, side))
+            assert isinstance(at, BoundaryRef), "checked"
+            body = bodies[at.body]
+            times[np.unique(body.displacements(boundary_nodes(body, at, f"ties.{name}.{side}")))] += 1
     return times > 1
 
 
