@@ -177,6 +177,8 @@ def test_what_boxes_of_imported_matrices_refuse(turning: st.Case) -> None:
     ):
         with pytest.raises(st.CaseError, match=message):
             parametric_problem(turning, box)
+    with pytest.raises(st.CaseError, match=r"^along: .*parameters\.Omega\.value.* call it Omega$"):
+        st.onsets(turning, (10.0, 20.0), along="parameters.Omega.value")
     # At its own value a factor is zero, and freedoms that nothing else has are left out: they cannot come back.
     folder = Path(turning.imported["matrices"].terms[0].file).parent
     wide = sp.coo_array((np.ones(1), ([50], [50])), shape=(51, 51))

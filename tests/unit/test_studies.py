@@ -112,6 +112,21 @@ def test_parts_put_together_are_the_whole(grid: st.Study, whole, tmp_path: Path)
     assert merged(tmp_path, tmp_path / "study.zarr", grid.model_copy(update={"restart_failed": True})) == []
 
 
+def test_a_goal_is_not_pursued_in_parts_and_that_is_said(case: st.Case, tmp_path: Path) -> None:
+    from stridor.studies.merge import merged
+
+    study = st.Study(
+        case=case, parameters=SCATTER, sampling={"method": "sobol", "samples": 4}, goal={"half_width": 0.02},
+        answers={"source": "full"},
+    )  # fmt: skip
+    told: list[str] = []
+    for number in (1, 2):
+        assert len(st.run_study(study, tmp_path, workers=1, part=Part(number, 2), say=told.append).status) == 2
+    said = "[goal] is not pursued in parts: each has the samples of the study; without --part more are added"
+    assert told.count(f"warning: {said}") == 2
+    assert merged(tmp_path, tmp_path / "study.zarr", study) == [said]
+
+
 def test_bands_of_low_frequencies_are_told_apart(tmp_path: Path) -> None:
     """Modes at 0.15 Hz: eight bands, each of which begins where the one before ends."""
     study = st.Study(

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from test_sensitivities import MINIMAL
 
+import stridor as st
 from benches import paper_case
 from matrix_cases import matrix_case
 from stridor.case import Case, loads
 from stridor.errors import AnalysisError, CaseError
+from stridor.modal.full import full_onsets
 from stridor.study.analyses import modes, onsets
 from stridor.study.countermeasures import rank_countermeasures
 from stridor.study.sensitivities import sensitivities
@@ -139,6 +141,14 @@ def test_a_growing_pair_that_parts_on_the_real_axis_did_not_begin_above_the_band
     assert found.complete
     assert "above 2 Hz" not in found.completeness
     assert "as the onsets say (a growing pair parted into two growing motions without oscillation)" in found.completeness
+    # Where branches are not followed it is said with the count.
+    work = st.Workspace(matrix_case(tmp_path, terms, 2.0))
+    counted = full_onsets(
+        work.system, work.modal.friction_range, max_frequency_hz=2.0, damped=True, options=work.options, unfollowed=""
+    )
+    assert counted.complete
+    assert " (a growing pair parted into two growing motions without oscillation). " in counted.completeness
+    assert "Onsets were enclosed by that count" in counted.completeness or "along the imaginary axis" in counted.completeness
 
 
 def test_modes_without_friction_of_a_law_of_speed_are_those_of_constant_friction(falling):

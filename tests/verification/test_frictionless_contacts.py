@@ -329,3 +329,15 @@ def test_what_friction_would_do_in_a_contact_without_any() -> None:
     assert found.derivative[0] == pytest.approx(back, rel=1e-4)
     assert found.derivative[1] == pytest.approx(common, rel=1e-4)
     assert np.abs(back).min() > 1.0
+
+
+def test_what_is_wrong_with_a_range_along_a_number_or_with_a_stepper_is_said_of_what_it_is() -> None:
+    case = with_friction()
+    with pytest.raises(CaseError, match=r"^range of supports\.drive\.velocity\.x: \[?\(?-0\.1, -5"):
+        st.onsets(case, (-0.1, -5), along="supports.drive.velocity.x")
+    with pytest.raises(CaseError, match=r"^friction_range: "):
+        st.onsets(case, (0.5, 0.1))
+    hard = case.with_({"contacts.rub.cubic": 1e20})
+    for stepper in ("exact", "implicit"):
+        with pytest.raises(CaseError, match="contact rub has a cubic part of its stiffness"):
+            st.simulate(hard.with_({"temporal.stepper": stepper}))

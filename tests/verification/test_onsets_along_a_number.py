@@ -62,7 +62,7 @@ def test_a_parameter_of_imported_matrices(tmp_path: Path) -> None:
     called = st.onsets(st.load(tmp_path / "case.toml"), along="p")
     assert {**called.to_json(), "warnings": []} == found
     assert (called.parameter, called.between) == ("p", (0.0, 1.5))
-    with pytest.raises(st.CaseError, match=r"friction_range: missing – damping\.q has no range in the case"):
+    with pytest.raises(st.CaseError, match=r"range of damping\.q: missing – damping\.q has no range in the case"):
         st.onsets(paper_case(), along="damping.q")
     with pytest.raises(st.CaseError, match="along"):
         st.onsets(st.build_system(paper_case()), along="bodies.beam1.length")

@@ -9,7 +9,7 @@ from ..case.units import unit_at
 from ..errors import CaseError
 from .parts import FOLDERS, Part
 from .rows import lengths, variables
-from .run import differing, digest_of
+from .run import NO_GOAL, differing, digest_of
 from .sampling import samples
 from .schema import Study
 from .store import DONE, Head, OpenStore, dataset, head_of
@@ -30,7 +30,7 @@ def merged(folder: Path, path: Path, given: Study) -> list[str]:
         raise CaseError(str(folder), None, f"{accepted}; give the study as it was, or run its parts anew")
     study = Study.from_document(heads[0].study)
     count = Part.read(heads[0].part).count
-    told: list[str] = []
+    told = [] if given.goal is None else [NO_GOAL]
     if others := [str(p) for p, h in zip(places, heads, strict=True) if Part.read(h.part).count != count]:
         raise CaseError(others[0], None, f"is one of another number of parts than {places[0]}")
     present = {Part.read(h.part).number for h in heads}

@@ -109,6 +109,8 @@ class _Run:
         stage("samples of the study")
         case = self.study.base()
         store = self._store(case)
+        if self.study.goal is not None and self.part is not None:
+            self.say(f"warning: {NO_GOAL}")
         for line in store.told("without_effect") or ():
             self.say(f"warning: {line}")
         if not self._open_rows(store.status).size and not self._more(store):
@@ -313,6 +315,7 @@ class _Run:
         return True
 
 
+NO_GOAL = "[goal] is not pursued in parts: each has the samples of the study; without --part more are added"
 NOT_COUNTED = ("title", "restart_failed", "goal")  # of a study: rows do not follow from them
 
 

@@ -24,17 +24,19 @@ def onsets_along(
     *,
     max_frequency_hz: float | None = None,
     solver: str | None = None,
-    said: str = "friction_range",
+    said: str = "",
 ) -> ParametricOnsets:
     """Every change of stability along a number of the case, in its range there unless another is given. Where other
     nodes touch in steady sliding, each stretch of the number is solved with its own.
 
     name: its path in the case, or a parameter of its matrices; mu is the friction coefficient. said: what the range is
-    called in messages. Raises CaseError for a number that there is not or that has no range; AnalysisError where there
-    is no steady sliding in all of it.
+    called in messages (default: friction_range for mu, else the range of that number). Raises CaseError for a number
+    that there is not or that has no range; AnalysisError where there is no steady sliding in all of it.
     """
     started = time.perf_counter()
-    chosen = _range(case, name, between, said)
+    if (steps := name.split("."))[0] == "parameters" and len(steps) == 3 and steps[1] in case.parameters:
+        raise CaseError("along", name, f"call it {steps[1]}")
+    chosen = _range(case, name, between, said or ("friction_range" if name == MU else f"range of {name}"))
     require_frequency(max_frequency_hz)
     found = _in_stretches(case, name, chosen, max_frequency_hz, solver)
     found.provenance = provenance(case, "onsets along", time.perf_counter() - started, along=name)

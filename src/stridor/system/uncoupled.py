@@ -114,7 +114,9 @@ def no_complete_basis(system: System, *, nodes: bool = False) -> str:
         return "there is contact over surfaces"
     if system.load_steps:
         return "contacts may stick"
-    if system.cubic is not None or system.contact_cubic:
+    if system.contact_cubic:
+        return f"contact {next(iter(system.contact_cubic))} has a cubic part of its stiffness"
+    if system.cubic is not None:
         return "there are cubic springs"
     if system.size > FEW:
         return f"{system.size} freedoms are too many for a complete basis, which has up to {FEW}"

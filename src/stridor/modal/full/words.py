@@ -39,6 +39,7 @@ def sentence(
         assert answer.seen is not None, "what else would have led to it"
         as_many = "With these, as many" if left_out else "As many"
         how = f"{as_many} roots grow at each of {len(answer.seen.grid)} values of {name} as the onsets say"
+        numbers += _pairs(family, answer, ends, top)
         why = f": {_named(answer.why, name, value)}" if answer.why else ""
         if answer.walked:
             return (
@@ -158,20 +159,33 @@ def _beside(family: Family, answer: Answer, top: float, name: str, value: Callab
 def _across(family: Family, answer: Answer, ends: tuple[RegionModes, RegionModes], top: float) -> str:
     """Words for what changes the number of growing modes beside the onsets: modes that cross the border of the band
     while they grow, and pairs that become two real roots."""
-    first, last = (end.values[unstable(family, end.values, top)] for end in ends)
-    signs = [-1 if o.stabilising else 1 for o in answer.onsets]
-    roots = [2 if o.frequency_hz > 0.0 else 1 for o in answer.onsets]
-    across = growing_roots(last) - growing_roots(first) - sum(s * r for s, r in zip(signs, roots, strict=True))
+    across = _changes(family, answer, ends, top)[0]
     if across:
         limit, count = f"{top / (2 * np.pi):g} Hz", (abs(across) + 1) // 2
         how = "whose growth began above" if across > 0 else "that went on growing above"
         return f" but for {count} {how} {limit}"
-    more = len(last) - len(first) - sum(signs)
-    if not more:
+    return _pairs(family, answer, ends, top)
+
+
+def _pairs(family: Family, answer: Answer, ends: tuple[RegionModes, RegionModes], top: float) -> str:
+    """Words for growing pairs that become two real roots, and the other way round, which no onset is of."""
+    across, more = _changes(family, answer, ends, top)
+    if across or not more:
         return ""
     pairs = "a growing pair" if abs(more) == 1 else f"{abs(more)} growing pairs"
     how, each = "parted into" if more > 0 else "came of", " each" if abs(more) > 1 else ""
     return f" ({pairs} {how} two growing motions without oscillation{each})"
+
+
+def _changes(
+    family: Family, answer: Answer, ends: tuple[RegionModes, RegionModes], top: float
+) -> tuple[int, int]:
+    """By how much the numbers of growing roots, and of growing modes, change from end to end beside the onsets."""
+    first, last = (end.values[unstable(family, end.values, top)] for end in ends)
+    signs = [-1 if o.stabilising else 1 for o in answer.onsets]
+    roots = [2 if o.frequency_hz > 0.0 else 1 for o in answer.onsets]
+    across = growing_roots(last) - growing_roots(first) - sum(s * r for s, r in zip(signs, roots, strict=True))
+    return across, len(last) - len(first) - sum(signs)
 
 
 def _modes(count: int) -> str:

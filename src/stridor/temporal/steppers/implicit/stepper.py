@@ -47,7 +47,9 @@ def why_not_implicit(system: System, settings: Settings) -> str:
     """Why it does not take a system; "" where it does."""
     if system.not_symmetric_definite:
         return system.not_symmetric_definite
-    if system.cubic is not None or system.contact_cubic:
+    if system.contact_cubic:
+        return f"contact {next(iter(system.contact_cubic))} has a cubic part of its stiffness"
+    if system.cubic is not None:
         return "there are cubic springs"
     if system.finitely_sliding:
         return f"contact {system.finitely_sliding[0]} slides finitely, so that its rows move"
