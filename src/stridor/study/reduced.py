@@ -96,6 +96,7 @@ def searched_model(
 
 def stretches_of(case: Case, name: str, between: tuple[float, float]) -> tuple[Stretch, ...]:
     """The stretches of a number of the case, as a box calls it, in which the same nodes touch."""
+    _parameters(case, {name: between})  # raises for what is none
     numbers = Numbers(case, {name: between})
     solver = None if case.modal.solver == "auto" else case.modal.solver
     if name == MU and not numbers.named_in_factors:
