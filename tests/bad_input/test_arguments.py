@@ -24,7 +24,7 @@ CASE = mode_coupling(0.02, 0.1)
         (lambda: st.onsets(CASE, (0.0, "a")), "friction_range: [0.0, 'a'] – two finite numbers 0 ≤ low < high"),  # type: ignore[arg-type]
         (
             lambda: st.onsets(CASE, (0, 1, 2), along="bodies.m.mass"),  # type: ignore[call-overload]
-            "friction_range: [0, 1, 2] – two finite numbers low < high",
+            "range of bodies.m.mass: [0, 1, 2] – two finite numbers low < high",
         ),
         (lambda: st.ensemble(paper_case(), cores=-1), "cores: -1 – a whole number ≥ 1, or None for all"),
         (lambda: st.ensemble(paper_case(), cores=0), "cores: 0 – a whole number ≥ 1, or None for all"),

@@ -92,7 +92,10 @@ def contacts_problem(
     options, given = options or Options(), family
     if any(p.name == FRICTION for p in given.parameters):
         # Contacts that stay without friction are told by that nothing slides them.
-        family = replace(given, system_at=lambda values: given.system_at(values).without_idle_slip())
+        def sliding_at(values: Values) -> System:
+            return given.system_at(values).without_idle_slip()
+
+        family = replace(given, system_at=sliding_at)
     nodes = family.own.contact_nodes()
     if not nodes.count:
         return ContactsProblem(interpolated_terms(family.structure_at, family.interpolated), family.parameters)
