@@ -268,7 +268,7 @@ def plate(m: int = 4) -> Any:
     lift[0::2, 0] = 1.0
     lift[1::2, 1] = np.arange(m)
     return SimpleNamespace(
-        count=m, directions=2, owner=owner, laws=(Weakening(0.2, 0.6, 0.5), StaticKinetic(0.3, 0.45)),
+        count=m, directions=2, owner=owner, share=np.ones(m), laws=(Weakening(0.2, 0.6, 0.5), StaticKinetic(0.3, 0.45)),
         slip_velocity=lambda v: (lift @ v).reshape(m, 2),
         friction_coefficients=lambda speed: np.array(
             [(Weakening(0.2, 0.6, 0.5), StaticKinetic(0.3, 0.45))[k].sliding(v) for k, v in zip(owner, speed, strict=True)]

@@ -362,15 +362,16 @@ class _Along(_Equilibria):
 
 
 def _probes(
-    low: float, high: float, foreseen: float | None, before: float | None, width: float
+    low: float, high: float, foreseen: float | None, before: float | None, width: float | None = None
 ) -> Iterator[float]:
-    """Where to look next, low < μ < high: on both sides of what is foreseen, the closer the better that was."""
+    """Where to look next, low < μ < high: on both sides of what is foreseen, the closer the better that was; width: how
+    closely a change is enclosed (None: WIDTH of the highest μ)."""
     span = high - low
     if foreseen is None:
         yield 0.5 * (low + high)
         return
     doubt = 0.05 * span if before is None else 4.0 * abs(foreseen - before)
-    doubt = min(max(doubt, 0.25 * width), 0.2 * span)
+    doubt = min(max(doubt, 0.25 * (WIDTH * high if width is None else width)), 0.2 * span)
     yield min(max(foreseen - doubt, low + 0.02 * span), high - 0.02 * span) if foreseen - doubt > low else low + doubt
     yield foreseen + doubt if foreseen + doubt < high else high - doubt
 

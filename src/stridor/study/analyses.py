@@ -135,7 +135,6 @@ def _modes(
 ) -> ComplexModes:
     """Every mode of the band: followed from μ = 0 and checked, or where matrices depend on μ sought at each."""
     started, options = time.perf_counter(), work.options
-    system = work.system() if in_proportion is None else in_proportion
     if work.varies:
         require_full(options.source)
         own = work.own_friction if work.has_contacts else None
@@ -144,19 +143,21 @@ def _modes(
             own=own, progress=progress,
         )  # fmt: skip
         notes = _held_by_factors(work, own)
-    elif check:
-        own = work.own_friction if work.has_contacts and in_proportion is None else None
-        result = modes_of_band(
-            system, values, band, damped=damped, vectors=vectors, own=own, options=options, progress=progress
-        )
-        single = float(result.mu[0]) if len(result.mu) == 1 else None
-        notes = (*taken_as_closed(system), *decided_by_meshes(system, single, options.solver))
     else:
-        result = complex_modes(
-            system, values, max_frequency_hz=band, damped=damped, vectors=vectors, residuals=residuals,
-            progress=progress, **asdict(options),
-        )  # fmt: skip
-        notes = taken_as_closed(system)
+        system = work.system() if in_proportion is None else in_proportion
+        if check:
+            own = work.own_friction if work.has_contacts and in_proportion is None else None
+            result = modes_of_band(
+                system, values, band, damped=damped, vectors=vectors, own=own, options=options, progress=progress
+            )
+            single = float(result.mu[0]) if len(result.mu) == 1 else None
+            notes = (*taken_as_closed(system), *decided_by_meshes(system, single, options.solver))
+        else:
+            result = complex_modes(
+                system, values, max_frequency_hz=band, damped=damped, vectors=vectors, residuals=residuals,
+                progress=progress, **asdict(options),
+            )  # fmt: skip
+            notes = taken_as_closed(system)
     notes = (*notes, *(work.one_for_all if in_proportion is None else _said_of_own(work)))
     made = provenance(work, "modes", time.perf_counter() - started, damped=damped)
     return replace(result, notes=(*result.notes, *notes), provenance=made)
