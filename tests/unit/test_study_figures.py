@@ -462,7 +462,9 @@ WHOLE = {
 
 
 @pytest.mark.parametrize("compute", list(WHOLE))
-@pytest.mark.parametrize("beside", [False, True], ids=["two vary", "three vary"])
+@pytest.mark.parametrize(
+    "beside", [pytest.param(False, id="two vary"), pytest.param(True, id="three vary", marks=pytest.mark.slow)]
+)
 def test_no_words_of_a_figure_lie_on_others(compute: str, beside: bool) -> None:
     parameters, columns = WHOLE[compute]
     if beside:

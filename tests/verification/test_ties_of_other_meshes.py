@@ -118,7 +118,7 @@ mesh = {{ shape = "annulus", inner_radius = {1}, outer_radius = {2}, divisions =
 """
 
 
-@pytest.mark.parametrize("cells", ["quad", "quad8"])
+@pytest.mark.parametrize("cells", ["quad", pytest.param("quad8", marks=pytest.mark.slow)])
 def test_rings_of_other_divisions_are_one_ring(cells: str) -> None:
     """Curved, closed ties: no worse than one ring as coarse as the coarser side, against a fine one."""
     def omegas(text: str) -> np.ndarray:
