@@ -69,7 +69,7 @@ def kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.Fixt
 
 
 @WITH_BROWSER
-@pytest.mark.parametrize(("kernel", "host"), [((), "localhost"), (("stop",), "127.0.0.1")], indirect=["kernel"])
+@pytest.mark.parametrize(("kernel", "host"), [pytest.param((), "localhost", marks=pytest.mark.slow), (("stop",), "127.0.0.1")], indirect=["kernel"])
 def test_a_frame_below_a_cell_shows_the_page(browser: Any, kernel: Any, notebook: Callable[[str], int], host: str, tmp_path: Path) -> None:
     """localhost, where notebooks are, is another site than 127.0.0.1: a browser may give the frame no storage."""
     html = kernel.stdout.readline()

@@ -70,6 +70,7 @@ def test_cycles_of_another_model_are_not(found: Cycles, tmp_path: Path):
     assert "cycles.nc" not in text
 
 
+@pytest.mark.slow
 def test_a_run_of_another_system_or_that_has_not_settled_is_not_drawn(found: Cycles, tmp_path: Path):
     st.save(found, tmp_path / "cycles.nc")
     case = mode_coupling(0.02, 0.1).with_({"temporal.record_every": 2, "temporal.perturbation": 0.05, "modal.sweep_points": 3})

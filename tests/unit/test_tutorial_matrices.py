@@ -47,6 +47,7 @@ def test_what_the_text_says(followed: tuple[Path, dict[str, str]]) -> None:
     assert re.sub(r"\d+ unknowns", "", sentence) in re.sub(r"\d+ unknowns", "", complete)
 
 
+@pytest.mark.slow
 def test_both_ways_give_the_same(followed: tuple[Path, dict[str, str]]) -> None:
     folder, _ = followed
 

@@ -137,6 +137,7 @@ def test_a_free_chain_keeps_a_small_model(tmp_path: Path) -> None:
     assert model.modes({"q": 1.3}).passed.all()
 
 
+@pytest.mark.slow
 def test_motions_as_a_whole_in_any_basis(tmp_path: Path) -> None:
     """Of them a reduced model's matrices have nothing but rounding, more than a share of their entries."""
     n = 90

@@ -240,7 +240,7 @@ def test_no_motion_is_a_cycle_of_no_time():
         close(free, chart, swinging, 2 * math.pi)
 
 
-@pytest.mark.parametrize("mu", [1.4, 1.7])
+@pytest.mark.parametrize("mu", [1.4, pytest.param(1.7, marks=pytest.mark.slow)])
 def test_a_run_of_explicit_steps_comes_to_the_same_cycle(mu: float):
     """Hoffmann's minimal model with stick, reversal and separation."""
     case = mode_coupling(DAMPED, 0.1)
