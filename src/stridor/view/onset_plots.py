@@ -38,7 +38,9 @@ def onset_chart(onsets: Onsets | ParametricOnsets, *, ax: Axes | None = None) ->
             label = f"grows at the {side} of the range"
             kilohertz = [abs(v.imag) / (2e3 * np.pi) for v in values]
             ax.plot([end] * len(values), kilohertz, marker, color=INK, ms=6, ls="none", label=label, clip_on=False)
-    for x, o in list(zip(at, onsets, strict=True))[:MOST_NAMED]:
+    # Once where several begin or end together, as at a value from which on other nodes touch.
+    highest = {x: o for x, o in sorted(zip(at, onsets, strict=True), key=lambda one: one[1].frequency_hz)}
+    for x, o in sorted(highest.items(), key=lambda one: one[0])[:MOST_NAMED]:
         right = x < (low + high) / 2
         ax.annotate(
             measured(x, 4), (x, o.frequency_hz / 1e3), xytext=(7 if right else -7, 0), textcoords="offset points",
