@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 SMALL = 60  # unknowns up to which a reduced model saves nothing
 MOST = 400  # and up to which all eigenvalues of the full problem are solved for hundreds of times
 GRID = 5  # values of each of two numbers at which it is looked which nodes touch, of small models
+ENCLOSED = 8000  # freedoms up to which the values from which on other nodes touch are enclosed
 CORNERS = 4  # numbers of a box up to which all of its corners are looked at
 REMEMBERED = 8  # systems of a case with other numbers
 DAMPED = "modal.damped = false does not hold here: a reduced model keeps the damping of the case"
@@ -163,7 +164,8 @@ def _elsewhere(
 
     if problem.touching is None:
         return ()
-    if len(box) == 1:
+    # From where on others do takes tens of systems for another number than μ.
+    if len(box) == 1 and (MU in box or numbers.own.size <= ENCLOSED):
         ((name, between),) = box.items()
         return elsewhere_words(stretches_of(case, name, between), "μ" if name == MU else name)
     solver = None if case.modal.solver == "auto" else case.modal.solver
@@ -196,7 +198,8 @@ def _looked_at(problem: ContactsProblem, *, small: bool) -> list[dict[str, float
         for place in places
     ]
     # And each number alone, the others as they are.
-    return points + [{**own, p.name: end} for p in problem.parameters for end in (p.low, p.high)]
+    alone = [{**own, p.name: end} for p in problem.parameters for end in (p.low, p.high)]
+    return points + [point for point in alone if point not in points]
 
 
 def _parameters(case: Case, box: Mapping[str, tuple[float, float]]) -> tuple[Parameter, ...]:
