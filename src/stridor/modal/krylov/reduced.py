@@ -12,6 +12,7 @@ any conforming method: no spurious modes.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -58,7 +59,7 @@ class Reduced(DenseProblem):
         self._extra: dict[float, tuple[Array, Array]] = {}
         self._grid: list[tuple[Array, Array]] | None = None
         self._lift_scale = 1.0
-        self._kept: list[tuple[Array, Array]] = []
+        self._kept: list[tuple[Array, Array, float]] = []  # parts on pairs and on forces, and how well they are known
         self.add(modes)
         self._modes = self.compressed = self.pairs.count
 
@@ -108,19 +109,21 @@ class Reduced(DenseProblem):
             self._project()
         return grown + self.count - before
 
-    def keep(self, right: ComplexArray) -> None:
-        """Remember right vectors (r, k) that are exact, for `compress`."""
+    def keep(self, right: ComplexArray, weight: float = 1.0) -> None:
+        """Remember right vectors (r, k) for `compress`: exact ones, or with a smaller weight what is known less well."""
         own = self.pairs.count
         columns = real_columns(right / np.linalg.norm(right[:own], axis=0))
-        self._kept.append((columns[:own], columns[own:]))
+        self._kept.append((columns[:own], columns[own:], weight))
         if len(self._kept) > REMEMBERED:
-            self._kept = [tuple(_condensed(block) for block in self._all_kept())]  # type: ignore[list-item]
+            shapes, forces = self._all_kept()
+            self._kept = [(_condensed(shapes), _condensed(forces), 1.0)]
 
-    def _all_kept(self) -> tuple[Array, Array]:
+    def _all_kept(self, *, weighted: bool = False) -> tuple[Array, Array]:
         """Vectors kept so far, on the basis as it is now: their parts on pairs and on forces."""
-        own = self.pairs.count
-        shapes = np.hstack([_padded(u, own) for u, _ in self._kept])
-        return shapes, np.hstack([_padded(p, self.forces.shape[1]) for _, p in self._kept])
+        own, acting = self.pairs.count, self.forces.shape[1]
+        weights = [weight if weighted else 1.0 for *_, weight in self._kept]
+        shapes = np.hstack([w * _padded(u, own) for w, (u, *_) in zip(weights, self._kept, strict=True)])
+        return shapes, np.hstack([w * _padded(p, acting) for w, (_, p, _) in zip(weights, self._kept, strict=True)])
 
     @property
     def exact(self) -> Array:
@@ -133,25 +136,35 @@ class Reduced(DenseProblem):
         own = self.pairs.count
         return self._matrices[2][:own, :own]
 
-    def compress(self) -> None:
-        """Reduce the basis to the frictionless modes and the span of the vectors kept, which stay exact."""
+    def compress(self, kept: float = KEPT, *, weighted: bool = False) -> None:
+        """Reduce the basis to the frictionless modes and the span of the vectors kept, but for ``kept`` of it; with
+        ``weighted`` but for more of what is known less well."""
         own, first = self.pairs.count, self._modes
-        shapes, forces = self._all_kept()
+        shapes, forces = self._all_kept(weighted=weighted)
         turn = np.zeros((own, own))
         turn[:first, :first] = np.eye(first)
-        beyond = _span(shapes[first:])
+        beyond = _span(shapes[first:], kept)
         turn[first:, first : first + beyond.shape[1]] = beyond
         turn = turn[:, : first + beyond.shape[1]]
-        force_turn = _span(forces)
+        force_turn = _span(forces, kept)
         self.pairs = self.pairs.combined(turn)
         self.forces, self.lifts = self.forces @ force_turn, self.lifts @ force_turn
         self._products = [
             (turn.T @ square @ turn, force_turn.T @ across @ turn) if len(square) else (square, across)
             for square, across in self._products
         ]
-        self._kept = [(turn.T @ shapes, force_turn.T @ forces)]
+        self._kept = [
+            (turn.T @ _padded(u, own), force_turn.T @ _padded(p, len(force_turn)), w) for u, p, w in self._kept
+        ]
         self.compressed = self.count
         self._project()
+
+    def narrowed(self, kept: float) -> Reduced:
+        """The same on a basis of its own that leaves out ``kept`` of what is known best, more of the rest."""
+        other = copy(self)
+        other._known, other._extra = {}, dict[float, tuple[Array, Array]]()
+        other.compress(kept, weighted=True)
+        return other
 
     def _add_forces(self, candidates: Array) -> None:
         """Take forces (m, k) on rigid contacts in as far as they are new, each with its lift."""
@@ -342,9 +355,9 @@ def _condensed(block: Array) -> Array:
     return left[:, strong] * size[strong]
 
 
-def _span(block: Array) -> Array:
-    """Orthonormal columns that span those of ``block`` but for KEPT of its largest."""
+def _span(block: Array, kept: float = KEPT) -> Array:
+    """Orthonormal columns that span those of ``block`` but for ``kept`` of its largest."""
     if not block.size:
         return np.zeros((len(block), 0))
     left, size, _ = sl.svd(block, full_matrices=False)
-    return left[:, size > KEPT * max(float(size[0]), 1e-300)]
+    return left[:, size > kept * max(float(size[0]), 1e-300)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as sl
@@ -33,6 +33,7 @@ WEAKEST = 1e-3  # of the strongest direction: residuals below it wait for the ne
 COUNTED = 20_000  # freedoms up to which the number of frictionless modes is checked, by one more factorisation
 GROWN = 1.4  # a basis this much larger than when it was last reduced is reduced again
 MARGIN = 1.1  # modes up to this much above the band are made exact
+SAME = 1e-9  # of an eigenvalue: a basis that has grown has the one that was exact before
 GUARD = 1.5  # and frictionless ones up to this much above take part
 
 
@@ -127,14 +128,15 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
     stuck: list[float] = []
     pending = list(dict.fromkeys(float(mu) for mu in frictions))
     worst: dict[float, float] = dict.fromkeys(pending, np.inf)
-    least = dict(worst)
+    least, exact = dict(worst), dict.fromkeys(pending, np.zeros(0, dtype=complex))
     idle = dict.fromkeys(pending, 0)
     for _ in range(SWEEPS):
         if not pending:
             break
         for mu in list(pending):
             stage(f"modes at μ = {mu:.6g}, {reduced.count} unknowns")
-            worst[mu], force, opening = unbalanced(reduced, mu, tolerance, left=left)
+            rest = unbalanced(reduced, mu, tolerance, left=left, exact=exact[mu])
+            worst[mu], exact[mu], force, opening = rest.error, rest.exact, rest.forces, rest.openings
             idle[mu] = 0 if worst[mu] < 0.5 * least[mu] else idle[mu] + 1
             least[mu] = min(least[mu], worst[mu])
             rounding = idle[mu] >= IDLE and worst[mu] <= BELIEVED  # which no basis vectors are made of
@@ -146,7 +148,7 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
                 stuck.append(mu)  # there is nothing to take in
             pending.remove(mu)
             found = reduced.untracked(mu)
-            reduced.keep(found.right[:, wanted(reduced, found)])
+            reduced.keep(found.right[:, wanted(reduced, found)], min(1.0, TOLERANCE / tolerance))
     stuck = [mu for mu in (*stuck, *pending) if worst[mu] > BELIEVED]
     if stuck:
         raise FollowingError(
@@ -178,37 +180,66 @@ def converge_over(reduced: Reduced, frictions: Array, *, between: float = GROWTH
             parts += [(low, middle), (middle, high)]
 
 
-def unbalanced(reduced: Reduced, mu: float, tolerance: float, *, left: bool = False) -> tuple[float, Array, Array]:
-    """Largest backward error at ``mu``, and what the band's eigenpairs that are not exact leave unbalanced: forces
-    (n, k) against their inertia forces, and for left vectors the slips (m, l) that must open the gaps."""
-    problem = reduced.problem
+@dataclass(frozen=True)
+class Unbalanced:
+    """What eigenpairs at one μ leave: the largest backward error of those looked at, λ (k,) of those that are exact,
+    forces (n, l) against their inertia forces and, of left vectors, slips (m, j) that must open the gaps."""
+
+    error: float
+    exact: ComplexArray
+    forces: Array
+    openings: Array
+
+
+def unbalanced(
+    reduced: Reduced, mu: float, tolerance: float, *, left: bool = False, exact: ComplexArray | None = None
+) -> Unbalanced:
+    """What the band's eigenpairs at ``mu`` that are not exact leave unbalanced. Those that were ``exact`` (k,) on a
+    smaller basis are looked at again where the others leave nothing."""
     found = reduced.untracked(mu)
     chosen = wanted(reduced, found)
+    known = np.zeros(len(chosen), dtype=bool)
+    if exact is not None and len(exact):
+        values = found.values[chosen]
+        known = np.abs(values[:, None] - exact).min(axis=1) <= SAME * np.abs(values)
+    rest = _left_by(reduced, found, chosen[~known], tolerance, left=left)
+    if rest.forces.shape[1] or rest.openings.shape[1] or not known.any():
+        return replace(rest, exact=np.concatenate([rest.exact, found.values[chosen[known]]]))
+    again = _left_by(reduced, found, chosen[known], tolerance, left=left)
+    return replace(again, error=max(rest.error, again.error), exact=np.concatenate([rest.exact, again.exact]))
+
+
+def _left_by(reduced: Reduced, found: Eigenpairs, chosen: IntArray, tolerance: float, *, left: bool) -> Unbalanced:
+    """What some of the eigenpairs leave unbalanced."""
+    problem, mu = reduced.problem, found.mu
     lam = found.values[chosen]
     u, p = reduced.expand(found.right[:, chosen])
     pencil = problem.pencil(mu)
     rest = pencil.residual(lam, u, p)
     error = pencil.backward_error(lam, u, p, rest=rest)
-    forces = [_relative(reduced, rest, lam, u, error > tolerance)]
-    openings: list[Array] = [np.zeros((problem.nodes, 0))]
+    force, inexact = _relative(reduced, rest, lam, u, error > tolerance)
+    forces, openings = [force], [np.zeros((problem.nodes, 0))]
     if left:
         y, q = left_vectors(reduced, lam, found.left[:, chosen], mu)
         left_rest = pencil.transposed.residual(lam, y, q)
         left_error = pencil.transposed.backward_error(lam, y, q, rest=left_rest)
         wrong = left_error > tolerance
-        forces.append(_relative(reduced, left_rest, lam, y, wrong))
+        force, more = _relative(reduced, left_rest, lam, y, wrong)
+        forces.append(force)
         openings.append(real_columns(times(problem.slide, y[:, wrong])))
-        error = np.maximum(error, left_error)
-    return float(error.max(initial=0.0)), np.hstack(forces), np.hstack(openings)
+        error, inexact = np.maximum(error, left_error), inexact | more
+    return Unbalanced(float(error.max(initial=0.0)), lam[~inexact], np.hstack(forces), np.hstack(openings))
 
 
-def _relative(reduced: Reduced, rest: ComplexArray, lam: ComplexArray, u: ComplexArray, inexact: BoolArray) -> Array:
-    """Residuals (n, k) over the pairs' inertia forces, of those that are inexact or large against them."""
+def _relative(
+    reduced: Reduced, rest: ComplexArray, lam: ComplexArray, u: ComplexArray, inexact: BoolArray
+) -> tuple[Array, BoolArray]:
+    """Residuals (n, k) over the pairs' inertia forces, of those that are inexact or large against them, and which are."""
     weight = lumped(reduced.problem)[:, None]
     inertia = (np.abs(lam) ** 2 + reduced.shifted.shift) * np.linalg.norm(np.sqrt(weight) * u, axis=0)
     size = np.linalg.norm(rest / np.sqrt(weight), axis=0) / tiny(inertia)
     chosen = inexact | (size > LARGEST_REST)
-    return real_columns(rest[:, chosen] / tiny(inertia[chosen]))
+    return real_columns(rest[:, chosen] / tiny(inertia[chosen])), chosen
 
 
 def left_vectors(reduced: Reduced, lam: ComplexArray, w: ComplexArray, mu: float) -> tuple[ComplexArray, ComplexArray]:
