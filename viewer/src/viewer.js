@@ -67,7 +67,7 @@ uniform vec2 window; // [pixels]
 uniform float width;
 in vec3 position, re, im, otherPosition, otherRe, otherIm, body; // its own end first; the other at -1 of way.x
 in vec2 way;
-out float share, long;
+out float share, reach;
 out vec2 from;
 out vec3 own;
 vec2 pixels(vec3 point, vec3 u) {
@@ -77,22 +77,22 @@ vec2 pixels(vec3 point, vec3 u) {
 void main() {
   vec3 u = displaced(re, im), v = displaced(otherRe, otherIm);
   vec2 a = pixels(position, u), b = pixels(otherPosition, v), along = way.x * (b - a);
-  long = length(along);
-  along = long > 0.0 ? along / long : vec2(1.0, 0.0);
-  float reach = 0.5 * width + 1.0;
-  vec2 at = a - way.x * reach * along + way.y * reach * vec2(-along.y, along.x);
-  from = vec2(way.x > 0.0 ? -reach : long + reach, way.y * reach);
+  reach = length(along);
+  along = reach > 0.0 ? along / reach : vec2(1.0, 0.0);
+  float edge = 0.5 * width + 1.0;
+  vec2 at = a - way.x * edge * along + way.y * edge * vec2(-along.y, along.x);
+  from = vec2(way.x > 0.0 ? -edge : reach + edge, way.y * edge);
   share = 0.5 * (shown(u) + shown(v));
   own = body;
   gl_Position = vec4(2.0 * at / window - 1.0, 0.0, 1.0);
 }`;
 const ROUND = `${COLOUR}
 uniform float width;
-in float share, long;
+in float share, reach;
 in vec2 from;
 in vec3 own;
 void main() {
-  float away = length(vec2(from.x - clamp(from.x, 0.0, long), from.y));
+  float away = length(vec2(from.x - clamp(from.x, 0.0, reach), from.y));
   pixel = vec4(toned(share, own), clamp(0.5 * width + 0.5 - away, 0.0, 1.0));
 }`;
 
@@ -127,7 +127,10 @@ class Viewer {
   constructor(above, lost) {
     this.canvas = document.createElement("canvas");
     this.canvas.setAttribute("aria-hidden", "true");
-    this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, stencil: true, powerPreference: "high-performance" });
+    // Where WebGL is computed by the processor, the plain canvas is faster: none is given then (benchmarks/viewer.py).
+    this.renderer = new WebGLRenderer({
+      canvas: this.canvas, alpha: false, antialias: true, stencil: true, failIfMajorPerformanceCaveat: true,
+    });
     this.canvas.addEventListener("webglcontextlost", lost);
     this.renderer.debug.onShaderError = () => queueMicrotask(lost);
     this.camera = new OrthographicCamera();

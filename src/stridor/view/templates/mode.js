@@ -367,6 +367,9 @@ let asked = false;
 function ask() {
   if (asked || !body.length) return;
   asked = true;
+  const tried = document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true });
+  if (!tried) return;
+  tried.getExtension("WEBGL_lose_context")?.loseContext();
   window.parent.postMessage("stridor-viewer-wanted", "*");
 }
 function receive(text) {
