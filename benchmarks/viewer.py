@@ -1,8 +1,8 @@
 """Frames a second of modes in motion, by the graphics card and on the plain canvas, in a real browser.
 
 python benchmarks/viewer.py [--short] [--graphics-card] [--fine] [TRIANGLES …]
-Without --graphics-card WebGL is computed by the processor (SwiftShader), which the page itself would not take; how long the
-script works on a frame is the same with a graphics card. A browser draws at most 60 frames a second.
+Without --graphics-card WebGL is computed by the processor (SwiftShader); how long the script works on a frame is the same
+with a graphics card. A browser draws at most 60 frames a second.
 Needs playwright, and Chromium at /usr/bin/chromium; without them it says so and leaves.
 """
 
@@ -22,9 +22,6 @@ from stridor.view.skin import Skin
 
 CHROMIUM = Path("/usr/bin/chromium")
 SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-# What a browser without a graphics card refuses a page that asks for the fast kind of WebGL alone, as ours does.
-TAKEN = """const given = HTMLCanvasElement.prototype.getContext;
-HTMLCanvasElement.prototype.getContext = function (kind, options) { return given.call(this, kind, { ...options, failIfMajorPerformanceCaveat: false }); };"""
 # How many frames a second while it plays, and how long the script works on one [ms], as a rule.
 FRAMES = """(seconds) => new Promise((done) => {
   const drawn = draw, each = [];
@@ -89,8 +86,6 @@ def measure(sizes: list[int], seconds: float, *, card: bool, ratio: int) -> None
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox", *(() if card else SOFTWARE)])
         context = browser.new_context(viewport={"width": 1280, "height": 720}, device_scale_factor=ratio)
-        if not card:
-            context.add_init_script(TAKEN)
         for size in sizes:
             skin = ring(size)
             for viewer in (True, False):

@@ -83,7 +83,7 @@ function close() {
 const colourOf = (p) => ((p & 255) << 16) | (p & 0xff00) | ((p >> 16) & 255);
 
 function resize() {
-  const ratio = Math.min(window.devicePixelRatio || 1, facets.length > 60000 && !card ? 1 : 2);
+  const ratio = Math.min(window.devicePixelRatio || 1, (card ? card.coarse : facets.length > 60000) ? 1 : 2);
   width = Math.max(2, Math.round(canvas.clientWidth * ratio));
   height = Math.max(2, Math.round(canvas.clientHeight * ratio));
   if (card) {
@@ -365,11 +365,8 @@ function begin() {
 // is asked once for the viewer, by the first model that has any use for it; until that comes the canvas draws.
 let asked = false;
 function ask() {
-  if (asked || !body.length) return;
+  if (asked || !body.length || !globalThis.WebGL2RenderingContext) return;
   asked = true;
-  const tried = document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true });
-  if (!tried) return;
-  tried.getExtension("WEBGL_lose_context")?.loseContext();
   window.parent.postMessage("stridor-viewer-wanted", "*");
 }
 function receive(text) {
