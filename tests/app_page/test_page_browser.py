@@ -146,7 +146,7 @@ def test_a_mode_of_a_solid_is_played_by_the_graphics_card(page: Any, tmp_path: P
     page.get_by_text("two-beams", exact=True).click()
     wait(page, "stridor.state.at?.mu === 0.1 && stridor.state.at.modes.length > 8")
     page.locator("#st-modes-list button").nth(8).click()
-    frame.wait_for_function("data.names.length === 2 && card.renderer.info.render.triangles > 100")
+    frame.wait_for_function("data.names.length === 2 && card.renderer.info.render.triangles > 100 && width > 200 && height > 100")
     shot(page, "lines", full_page=True)
     assert asked == [page.url.partition("#")[0] + "viewer.js"]
 

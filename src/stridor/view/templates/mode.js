@@ -351,7 +351,14 @@ canvas.addEventListener("keydown", (event) => {
   else return;
   event.preventDefault();
 });
-window.addEventListener("resize", () => { if (data) { resize(); later(); } });
+// A frame that is hidden has no size, and may be told of a model before it is shown.
+function fit() {
+  if (!data || !canvas.clientWidth) return;
+  resize();
+  later();
+}
+window.addEventListener("resize", fit);
+new ResizeObserver(fit).observe(canvas);
 
 function begin() {
   Object.assign(start, { elevation: data.elevation, azimuth: data.azimuth });
