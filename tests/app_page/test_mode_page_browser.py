@@ -121,6 +121,12 @@ def unlike(one: Array, other: Array) -> float:
     return float(np.mean(np.abs(one - other).max(axis=2) > 60))
 
 
+def assert_alike(drawn: Array, wanted: Array) -> None:
+    """Edges are smooth in one of them. Light from the other side, or a tenth of the motion, makes more of a difference."""
+    assert unlike(drawn, wanted) < 0.008
+    assert float(np.mean(np.abs(drawn - wanted).max(axis=2))) < 2.5  # of 255
+
+
 @pytest.mark.parametrize("dimension", [3, 2])
 def test_the_graphics_card_draws_what_the_canvas_draws(browser: Any, tmp_path: Path, dimension: int):
     seen: dict[str, list[Array]] = {}
@@ -140,7 +146,7 @@ def test_the_graphics_card_draws_what_the_canvas_draws(browser: Any, tmp_path: P
     paper = seen["canvas"][0][0, 0]
     for drawn, wanted in zip(seen["card"], seen["canvas"], strict=True):
         assert float(np.mean(np.abs(wanted - paper).max(axis=2) > 60)) > 0.08  # of the window is the model
-        assert unlike(drawn, wanted) < 0.012
+        assert_alike(drawn, wanted)
     for one, other in ((0, 1), (1, 2), (0, 2)):
         assert unlike(seen["card"][one], seen["card"][other]) > 0.04
 
@@ -190,7 +196,7 @@ def test_the_canvas_goes_on_where_the_graphics_card_is_taken_away(browser: Any, 
         frame.wait_for_function("card !== null")
         frame.evaluate(STILL)
         assert page.evaluate("heard") == ["stridor-mode-ready", "stridor-viewer-wanted"]
-        assert unlike(picture(frame), wanted) < 0.012
+        assert_alike(picture(frame), wanted)
         assert frame.locator("#view").get_attribute("aria-label") == "Rings, in motion; unstable"
         frame.evaluate("card.renderer.getContext().getExtension('WEBGL_lose_context').loseContext()")
         frame.wait_for_function("card === null")
