@@ -1,7 +1,7 @@
 """Frames a second of modes in motion, by the graphics card and on the plain canvas, in a real browser.
 
 python benchmarks/viewer.py [--short] [--graphics-card] [--fine] [TRIANGLES …]
-Without --graphics-card WebGL is computed by the processor (SwiftShader); how long the script works on a frame is the same
+Without --graphics-card WebGL is computed by the processor (SwiftShader); the script works as long on a frame as it does
 with a graphics card. A browser draws at most 60 frames a second.
 Needs playwright, and Chromium at /usr/bin/chromium; without them it says so and leaves.
 """
@@ -61,8 +61,9 @@ def ring(triangles: int) -> Skin:
 def page(skin: Skin, *, viewer: bool) -> str:
     """Its page."""
     return mode_page(
-        title="ring", growth="", kind="stable", note="", description="ring", data=page_data(skin, scale=None), framed=False, viewer=viewer
-    )
+        title="ring", growth="", kind="stable", note="", description="ring", data=page_data(skin, scale=None),
+        framed=False, viewer=viewer,
+    )  # fmt: skip
 
 
 def main() -> None:
@@ -84,7 +85,8 @@ def measure(sizes: list[int], seconds: float, *, card: bool, ratio: int) -> None
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox", *(() if card else SOFTWARE)])
+        options = ["--no-sandbox", *(() if card else SOFTWARE)]
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=options)
         context = browser.new_context(viewport={"width": 1280, "height": 720}, device_scale_factor=ratio)
         for size in sizes:
             skin = ring(size)

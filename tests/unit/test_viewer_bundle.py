@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_view_solids import boxes, made
 
 from stridor.system import System
 from stridor.view.animation import VIEWER_FROM, animation_html
 from stridor.view.mode_page import animation_shell, viewer_script
-from test_view_solids import boxes, made
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ("build.mjs", "package-lock.json", "package.json", "src/viewer.js")  # as build.mjs has them

@@ -137,7 +137,7 @@ class Viewer {
   constructor(above, lost) {
     this.canvas = document.createElement("canvas");
     this.canvas.setAttribute("aria-hidden", "true");
-    // Where the processor computes what WebGL draws, smooth edges and fine screens take two to four times as long.
+    // Where the processor computes what WebGL draws, smooth edges and fine screens take too long: docs/app.md.
     this.coarse = software();
     this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: !this.coarse, stencil: true });
     this.canvas.addEventListener("webglcontextlost", lost);

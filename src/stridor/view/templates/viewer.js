@@ -1,5 +1,5 @@
 /*! The viewer of stridor (MIT), on three.js 0.187.0. Built by `make viewer`, not to be changed by hand.
-sources sha256-a64eb8ae08e4bf45e30860aa5c161820f8099641dd28f4b98360c304d3b1b7ad
+sources sha256-fb144bc8f2372bed7852596a149341f54900da361f6949787efce6b52c6c75ca
 what follows sha256-f480c7b53b416ae991d3a9598b38682b26a2eb7cf5ebddc5daf2d0f7990cb54c
 
 three.js: The MIT License
