@@ -159,8 +159,9 @@ class Viewer {
     u.space.value = data.dimension === 3;
     this.motion = ["real", "imag"].map((name) => new BufferAttribute(new Int16Array(model[name]), 3, true));
     const points = attribute(model.points, 3), body = new Float32Array(model.points.length);
+    const pale = data.pale.map((colour) => colour.map((v) => v / 255));
     model.body.forEach((own, f) => {
-      for (const k of model.facets.subarray(4 * f, 4 * f + 4)) body.set(data.pale[own].map((v) => v / 255), 3 * k);
+      for (let k = 4 * f; k < 4 * f + 4; k++) body.set(pale[own], 3 * model.facets[k]);
     });
     const shape = (index) => {
       const made = new BufferGeometry();
