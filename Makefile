@@ -12,7 +12,7 @@ STAMP := .venv/.stridor-ready
 PIP = $(BIN)/python -m pip install -qq --no-input --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo test weekly mutants bench lint types layers docs lock clean FORCE
+.PHONY: help env demo test weekly mutants bench lint types layers docs viewer lock clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -57,6 +57,9 @@ layers: $(STAMP)  ## which part may import which
 docs: $(STAMP)  ## the documentation, in docs/_build/html; warnings are errors
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
+viewer:  ## the viewer of solids on pages, built again from viewer/ (needs npm and a network)
+	cd viewer && npm ci --no-audit --no-fund && npm run build
+
 lock: $(STAMP)  ## requirements/dev.lock again from pyproject.toml (newest versions: UPGRADE=--upgrade)
 	$(BIN)/python -m uv pip compile pyproject.toml --group dev --universal --python-version 3.11 \
 	  --fork-strategy fewest --generate-hashes --custom-compile-command "make lock" --no-emit-index-url --no-emit-find-links \
@@ -64,7 +67,7 @@ lock: $(STAMP)  ## requirements/dev.lock again from pyproject.toml (newest versi
 	@! grep -n '://' $(LOCK) || { echo "make lock: $(LOCK) must not name an address" >&2; exit 1; }
 
 clean:  ## removes what the other targets made, except .venv and demo/
-	rm -rf build dist docs/_build .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf build dist docs/_build viewer/node_modules .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find src tests benchmarks examples docs -type d -name __pycache__ -prune -exec rm -rf {} + 2>/dev/null || true
 
 # -- how it is done ----------------------------------------------------------------------------------------------------

@@ -100,6 +100,57 @@ def test_a_click_on_a_branch_chooses_its_mode(page: Any):
     assert {point[2] for point in drawn if point[0] != "-"} == {place[2]}
 
 
+BLOCK = """
+title = "A block"
+materials.steel = { young_modulus = 200e9, density = 7800.0, poisson_ratio = 0.3 }
+[bodies.block]
+type = "solid"
+material = "steel"
+model = "3d"
+mesh = { shape = "block", corner = [0, 0, 0], size = [0.1, 0.03, 0.01], divisions = [6, 2, 1], cells = "hexahedron" }
+[supports.root]
+at = "block.left"
+fixed = ["x", "y", "z"]
+[modal]
+max_frequency_hz = 20e3
+"""
+CLICKED = """() => {
+  const chart = getElement(stridor.state.charts.frequency).chart, b = stridor.state.locus.branches[1];
+  const [x, y] = chart.convertToPixel({xAxisIndex: 0, yAxisIndex: 0}, [stridor.state.locus.mu[2], b.frequency_hz[2]]), box = chart.getDom().getBoundingClientRect();
+  return [box.left + x, box.top + y, b.branch];
+}"""
+
+
+def test_a_mode_of_a_solid_is_played_by_the_graphics_card(page: Any, tmp_path: Path):
+    """What that needs is asked of the page's own server, once, when there is a solid to show; a mode of lines does without."""
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url) if "viewer" in request.url else None)
+    page.locator("#st-modes-list button").first.click()
+    wait(page, "stridor.state.shape?.motion")
+    file = tmp_path / "block.toml"
+    file.write_text(BLOCK, encoding="utf-8")
+    page.set_input_files("input[type=file]", file)
+    wait(page, f"document.querySelector('#st-title').textContent.includes('block') && {SOLVED} && stridor.state.locus?.branches.length > 1 && stridor.state.locus.mu.length > 2")
+    frame = page.frames[1]
+    assert (frame.evaluate("card"), asked) == (None, [])
+    x, y, branch = page.evaluate(CLICKED)
+    page.mouse.click(x, y)
+    wait(page, f"stridor.state.shape?.branch === {branch}")
+    frame.wait_for_function("card !== null && card.renderer.info.render.triangles === 2 * 2 * (6 * 2 + 6 * 1 + 2 * 1)")
+    expect(page.frame_locator("#st-mode-frame").locator("h1")).to_contain_text(f"Mode {branch}:")
+    first, phase = page.locator("#st-mode-frame").screenshot(), frame.evaluate("state.phase")
+    frame.wait_for_function("before => Math.abs(state.phase - before) > 1", arg=phase)
+    assert page.locator("#st-mode-frame").screenshot() != first
+    shot(page, "solid", full_page=True)
+    page.get_by_role("button", name="Examples").click()
+    page.get_by_text("two-beams", exact=True).click()
+    wait(page, "stridor.state.at?.mu === 0.1 && stridor.state.at.modes.length > 8")
+    page.locator("#st-modes-list button").nth(8).click()
+    frame.wait_for_function("data.names.length === 2 && card.renderer.info.render.triangles > 100 && width > 200 && height > 100")
+    shot(page, "lines", full_page=True)
+    assert asked == [page.url.partition("#")[0] + "viewer.js"]
+
+
 ON_CHART = """(name) => {
   const o = getElement(stridor.state.charts[name]).chart.getOption(), modes = o.series.find((s) => s.id === "modes");
   return {x: [o.xAxis[0].name, o.xAxis[0].min, o.xAxis[0].max], y: o.yAxis[0].name, colour: modes.lineStyle.color, text: o.xAxis[0].axisLabel.color,

@@ -434,6 +434,7 @@ let strokes = 0, shown = null, waiting = null;
 globalThis.document = { getElementById: node, createElement: () => ({ style: {}, append() {} }) };
 globalThis.window = { devicePixelRatio: 1, addEventListener() {} };
 globalThis.matchMedia = () => ({ matches: true });
+globalThis.ResizeObserver = class { observe() {} };
 globalThis.requestAnimationFrame = (f) => { waiting = f; };
 """
 

@@ -22,6 +22,7 @@ from .skin import VIEW, mode_title, skin_of
 from .solid_plots import draw_frame
 from .style import styled
 
+VIEWER_FROM = 10_000  # triangles; of fewer the viewer weighs more than the page, and the canvas is quick: docs/app.md
 GIF_PERIOD = 1.6  # seconds for one cycle
 GIF_DPI = 80
 GIF_PIXELS = 520  # of the solid, along the longer side
@@ -52,6 +53,7 @@ def animation_html(
         description=f"{heading}: {', '.join(skin.names)} in motion, {moving}",
         data=page_data(skin, scale=scale),
         framed=False,
+        viewer=skin.triangles >= VIEWER_FROM,
     )
 
 

@@ -28,10 +28,15 @@ def animation_shell() -> str:
     )
 
 
-def mode_page(**content: Any) -> str:
-    """The page with its words and the mode that it plays."""
+def mode_page(*, viewer: bool = False, **content: Any) -> str:
+    """The page with its words and the mode that it plays; viewer: whether it has what draws with the graphics card."""
     page = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     ramp = ", ".join(COLOURS[:: (len(COLOURS) - 1) // 9])
     return page.from_string(template_text("mode.html.j2")).render(
-        ramp=ramp, script=Markup(template_text("mode.js")), **content
+        ramp=ramp, script=Markup(template_text("mode.js")), viewer=Markup(viewer_script()) if viewer else "", **content
     )
+
+
+def viewer_script() -> str:
+    """What draws modes with the graphics card, for a page that has `mode.js`: built from viewer/ by `make viewer`."""
+    return template_text("viewer.js")

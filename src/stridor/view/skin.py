@@ -61,6 +61,11 @@ class Skin:
         return int(self.points.shape[1])
 
     @property
+    def triangles(self) -> int:
+        """How many the facets are drawn as."""
+        return len(self.facets) + int(np.count_nonzero(self.facets[:, 3] != self.facets[:, 2]))
+
+    @property
     def extent(self) -> float:
         """Largest side of the box around everything [m], 1 where there is none."""
         return float(np.ptp(self.points, axis=0).max(initial=0.0)) or 1.0 if len(self.points) else 1.0

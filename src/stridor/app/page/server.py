@@ -18,6 +18,7 @@ from typing import Any
 from ... import interrupts
 from ...errors import AnalysisError, CaseError
 from ...studies.processes import prepared
+from ...view.mode_page import viewer_script
 from .folders import remove_left
 from .guard import Guard, new_token
 from .session import Session
@@ -117,6 +118,7 @@ class Server:
         self._socket = bound(self.port)
         self.port = self._socket.getsockname()[1]
         outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+        outer.add_route(f"/{self.token}/viewer.js", _viewer)
         page(self)
         # No bar over the page while something is fetched: it has no name, and the page says itself what it does.
         nicegui.app.config.quasar_config["loadingBar"] = {"skipHijack": True}
@@ -141,6 +143,13 @@ class Server:
         self._close()
         for session in list(self.sessions):
             session.end()
+
+
+async def _viewer(_: Any) -> Any:
+    """What draws modes of solids with the graphics card, for pages that have one to show."""
+    from fastapi import Response
+
+    return Response(viewer_script(), media_type="text/javascript", headers={"cache-control": "max-age=86400"})
 
 
 LARGEST_MESSAGE = 1_000_000  # bytes that a page may send at once by its socket

@@ -1,8 +1,9 @@
 "use strict";
-// A mode in motion: Re(û e^{jφ}) on the outer facets, turned by dragging. A depth buffer decides what hides what;
-// everything is drawn on a plain canvas, nothing is fetched.
+// A mode in motion: Re(û e^{jφ}) on the outer facets, turned by dragging. Drawn on a plain canvas, where a depth buffer
+// decides what hides what, or by the graphics card: viewer.js, where the page has it and there is WebGL. Nothing is fetched.
 let data, points, real, imag, facets, edges, body, segments, segmentBody, count, space, reach, ramp, bodies;
 let moved, seen, size; // in the model; right and down in pixels, towards the eye; |u| of the largest amplitude
+let card = null, cardless = false; // what draws instead of the canvas; whether there is none
 
 function decoded(text, Kind) {
   const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -21,19 +22,30 @@ function load(given) {
   segmentBody = decoded(data.segment_body, Uint8Array);
   count = points.length / 3;
   space = data.dimension === 3;
-  moved = new Float32Array(3 * count);
-  seen = new Float32Array(3 * count);
-  size = new Float32Array(count);
   // The box around the model fits the window as it is first seen; turning does not change the size of things.
   reach = directions(data.elevation, data.azimuth)
     .map((d) => Math.max(1e-12, d.reduce((sum, v, i) => sum + Math.abs(v) * data.half[i], 0)));
+  unpack(data);
+  if (!card && !cardless && globalThis.stridorViewer && body.length) open();
+  if (card) card.load(model());
+  else plain();
+}
+// What only the canvas needs of a model.
+function plain() {
+  moved = new Float32Array(3 * count);
+  seen = new Float32Array(3 * count);
+  size = new Float32Array(count);
   ramp = shades(data.ramp);
   bodies = shades(data.pale);
-  change(data);
 }
+const model = () => ({ data, points, real, imag, facets, edges, body, segments, segmentBody });
 
 // Another mode of the same model.
 function change(motion) {
+  unpack(motion);
+  if (card) card.change(model());
+}
+function unpack(motion) {
   Object.assign(data, motion);
   real = decoded(data.real, Int16Array);
   imag = decoded(data.imag, Int16Array);
@@ -48,10 +60,36 @@ const state = { ...start, phase: 0, playing: !matchMedia("(prefers-reduced-motio
 let paper = 0xffffffff; // behind it all
 let image, pixels, depth, inked, width = 0, height = 0;
 
+// The graphics card draws behind the canvas, which stays where keys and pointer go and says what is seen.
+function open() {
+  card = globalThis.stridorViewer(canvas, close);
+  cardless = !card;
+  if (!card) return;
+  canvas.width = canvas.height = 1; // transparent, and no memory
+  image = pixels = depth = inked = null;
+  card.paper(colourOf(paper));
+  if (width) resize();
+}
+// Where the graphics card is taken away, the canvas goes on.
+function close() {
+  if (!card) return;
+  card.end();
+  card = null;
+  cardless = true;
+  plain();
+  resize();
+  later();
+}
+const colourOf = (p) => ((p & 255) << 16) | (p & 0xff00) | ((p >> 16) & 255);
+
 function resize() {
-  const ratio = Math.min(window.devicePixelRatio || 1, facets.length > 60000 ? 1 : 2);
+  const ratio = Math.min(window.devicePixelRatio || 1, (card ? card.coarse : facets.length > 60000) ? 1 : 2);
   width = Math.max(2, Math.round(canvas.clientWidth * ratio));
   height = Math.max(2, Math.round(canvas.clientHeight * ratio));
+  if (card) {
+    card.resize(width, height);
+    return;
+  }
   canvas.width = width;
   canvas.height = height;
   image = context.createImageData(width, height);
@@ -80,11 +118,16 @@ function directions(elevation, azimuth) {
   const ce = Math.cos(rise), se = Math.sin(rise), ca = Math.cos(turn), sa = Math.sin(turn);
   return [[-sa, ca, 0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]];
 }
-function project() {
-  const [right, up, toward] = directions(state.elevation, state.azimuth);
+// From where it is seen, how large a metre is and where its middle comes to be [pixels].
+function sight() {
   const fit = Math.min(width / (2 * reach[0]), height / (2 * reach[1]));
-  const factor = 0.96 * fit * state.zoom;
-  const x = width / 2 + state.x * width, y = height / 2 + state.y * height;
+  return {
+    axes: directions(state.elevation, state.azimuth), factor: 0.96 * fit * state.zoom,
+    x: width / 2 + state.x * width, y: height / 2 + state.y * height,
+  };
+}
+function project() {
+  const { axes: [right, up, toward], factor, x, y } = sight();
   for (let i = 0; i < 3 * count; i += 3) {
     const a = moved[i], b = moved[i + 1], c = moved[i + 2];
     seen[i] = x + factor * (a * right[0] + b * right[1] + c * right[2]);
@@ -186,8 +229,13 @@ function lines() {
 }
 
 function draw() {
-  const byBody = control("colours").value === "body";
-  move(Number(control("amplitude").value));
+  const byBody = control("colours").value === "body", amplitude = Number(control("amplitude").value);
+  if (card) {
+    const far = Math.hypot(...data.half) + Math.abs(amplitude * data.scale);
+    card.draw({ ...sight(), far, amplitude: amplitude * data.scale, phase: state.phase, byBody });
+    return;
+  }
+  move(amplitude);
   project();
   pixels.fill(paper);
   depth.fill(-Infinity);
@@ -303,7 +351,14 @@ canvas.addEventListener("keydown", (event) => {
   else return;
   event.preventDefault();
 });
-window.addEventListener("resize", () => { if (data) { resize(); later(); } });
+// A frame that is hidden has no size, and may be told of a model before it is shown.
+function fit() {
+  if (!data || !canvas.clientWidth) return;
+  resize();
+  later();
+}
+window.addEventListener("resize", fit);
+new ResizeObserver(fit).observe(canvas);
 
 function begin() {
   Object.assign(start, { elevation: data.elevation, azimuth: data.azimuth });
@@ -313,13 +368,36 @@ function begin() {
   play(state.playing);
 }
 
-// A page that has this one in a frame tells it what to play: all of a model, or another mode of the one that it has.
+// A page that has this one in a frame tells it what to play: all of a model, or another mode of the one that it has. It
+// is asked once for the viewer, by the first model that has any use for it; until that comes the canvas draws.
+let asked = false;
+function ask() {
+  if (asked || !body.length || !globalThis.WebGL2RenderingContext) return;
+  asked = true;
+  window.parent.postMessage("stridor-viewer-wanted", "*");
+}
+function receive(text) {
+  const script = document.createElement("script");
+  script.textContent = text;
+  document.head.append(script);
+  if (!data || card || cardless || !globalThis.stridorViewer) return;
+  open();
+  if (!card) return;
+  card.load(model());
+  moved = seen = size = null;
+  later();
+}
 window.addEventListener("message", (event) => {
   if (event.source !== window.parent || window.parent === window || !event.data) return;
-  const { geometry, motion, title, growth, unstable, dark } = event.data;
+  const { geometry, motion, title, growth, unstable, dark, viewer } = event.data;
+  if (viewer) {
+    receive(viewer);
+    return;
+  }
   if (dark !== undefined) {
     document.documentElement.classList.toggle("dark", dark);
     paper = dark ? 0xff221d1b : 0xffffffff;
+    card?.paper(colourOf(paper));
     if (data) later();
   }
   if (title !== undefined) {
@@ -333,6 +411,7 @@ window.addEventListener("message", (event) => {
     load(geometry);
     if (first) begin();
     else legend();
+    ask();
   } else if (motion && data) change(motion);
   if (data) {
     legend();

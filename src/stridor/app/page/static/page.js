@@ -288,6 +288,9 @@ const stridor = (() => {
 
   // -- the chosen mode ---------------------------------------------------------------------------------------------
   const frame = () => $("st-mode-frame")?.contentWindow;
+  // What draws modes of solids with the graphics card, for the frame, which may fetch nothing itself.
+  let fetched = null;
+  const viewer = () => (fetched ??= fetch("viewer.js").then((answer) => (answer.ok ? answer.text() : Promise.reject(answer.status))));
   function shape() {
     const s = state.shape;
     $("st-mode-none").hidden = Boolean(s);
@@ -403,7 +406,10 @@ const stridor = (() => {
     said(true);
   }
   window.addEventListener("message", (event) => {
-    if (event.source !== frame() || event.data !== "stridor-mode-ready") return;
+    if (event.source !== frame()) return;
+    // Without it the frame goes on as it is.
+    if (event.data === "stridor-viewer-wanted") viewer().then((text) => frame()?.postMessage({ viewer: text }, "*"), () => {});
+    if (event.data !== "stridor-mode-ready") return;
     frame().postMessage({ dark: dark() }, "*");
     if (state.shape?.motion && state.geometry) { state.shape.geometry = state.geometry; shape(); }
   });
