@@ -10,9 +10,11 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 
+import stridor as st
 from benches import Slave, bench, distance_to, full_eigenvalues, paper_case
+from stridor.case import template_text
 from stridor.contact.nodes import ContactNodes
-from stridor.errors import AnalysisError, CaseError
+from stridor.errors import AnalysisError, CaseError, FollowingError
 from stridor.laws import Coulomb, Weakening
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.krylov import (
@@ -21,10 +23,12 @@ from stridor.modal.krylov import (
     friction_energy,
     krylov_modes,
     krylov_onsets,
+    refine,
 )
+from stridor.modal.krylov import modes as modes_over_friction
 from stridor.modal.krylov.follow import State
 from stridor.modal.krylov.passages import crossings
-from stridor.modal.krylov.problem import Varying
+from stridor.modal.krylov.problem import Varying, problem_of
 from stridor.modal.krylov.reduced import Eigenpairs
 from stridor.modal.onsets import onsets
 from stridor.sliding import friction_damping_matrix, steady_sliding_nodes
@@ -290,6 +294,55 @@ def test_growth_changes_sign_at_the_onsets_of_many_contacts(damping):
         values = eliminated(system, mu)
         seen = sum(-1 if o.stabilising else 1 for o in found.onsets if o.mu < mu)
         assert seen == np.sum((values.real > 1e-6) & (values.imag < 2 * np.pi * 0.2))
+
+
+# -- left vectors that no basis holds ----------------------------------------------------------------------------------
+@pytest.mark.parametrize("compliance", [0.0, 0.05])
+def test_left_vectors_are_solved_for_where_they_do_not_settle_on_a_basis(compliance, monkeypatch):
+    system = scattered(3, compliance, 0.02)
+    usual = krylov_modes(system, [0.2, 0.8], count=12, vectors=True)
+    converge_over = refine.converge_over
+
+    def unsettled(*given, left, **more):
+        if left:
+            raise FollowingError("they do not settle")
+        converge_over(*given, left=left, **more)
+
+    monkeypatch.setattr(modes_over_friction, "converge_over", unsettled)
+    alone = krylov_modes(system, [0.2, 0.8], count=12, vectors=True)
+    assert np.abs(alone.eigenvalues - usual.eigenvalues).max() < 1e-9 * np.abs(usual.eigenvalues).max()
+    assert np.abs(np.einsum("kbn,kbn->kb", alone.left.conj(), usual.left)).min() > 1 - 1e-9
+    # Right ones are others.
+    assert np.abs(np.einsum("kbn,kbn->kb", alone.left.conj(), usual.right)).min() < 0.999
+
+
+def test_a_basis_that_takes_rounding_in_is_given_up(monkeypatch):
+    left_over = iter([1e-3, 1e-6, 1e-9, *(1e-9 * 10.0**k for k in range(60))])
+    seen = []
+
+    def worse(reduced, mu, tolerance, **_):
+        seen.append(next(left_over))
+        force = np.random.default_rng(len(seen)).standard_normal((reduced.problem.size, 1))
+        return refine.Unbalanced(seen[-1], np.zeros(0, dtype=complex), force, np.zeros((reduced.problem.nodes, 0)))
+
+    monkeypatch.setattr(refine, "unbalanced", worse)
+    with pytest.raises(FollowingError, match="do not settle: a backward error of"):
+        krylov_modes(scattered(3, 0.05, 0.02, size=200), 0.0, count=2)
+    assert len(seen) < 12
+
+
+@pytest.mark.slow
+def test_left_vectors_beside_stiff_contact():
+    """A coarse mesh of the shipped pad: a basis that opens gaps against 2e12 N/m³ takes rounding in."""
+    meshes = {"disc": [4, 44, 1], "lining": [4, 9, 2], "plate": [4, 9, 1]}
+    case = st.loads(template_text("pad-on-disc")).with_(
+        {f"bodies.{name}.mesh.divisions": divisions for name, divisions in meshes.items()}
+    )
+    modes = st.modes(case, mu=0.3, vectors=True, count=12)
+    pencil = problem_of(build_system(case), 0.3, Options()).pencil(0.3).condensed()
+    right = pencil.backward_error(modes.eigenvalues[0], modes.right[0].T)
+    left = pencil.transposed.backward_error(modes.eigenvalues[0], modes.left[0].T)
+    assert left.max() < 3 * right.max()
 
 
 # -- energy, steady state, refusals ------------------------------------------------------------------------------------

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
-from ...errors import CaseError
+from ...errors import AnalysisError, CaseError, FollowingError
+from ...stages import stage
 from ...system import System
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from ..options import Options
+from ..quadratic.inverse_iteration import solved_beside
 from ..quadratic.reach import searched
 from ..results import ComplexModes, Progress, at_each, off_rounding, require_memory
 from ..tolerances import BELIEVED, SPLIT_RELATIVE
@@ -21,7 +24,10 @@ from .problem import problem_of
 from .reduced import Reduced
 from .refine import MARGIN, NAMES, Band, converge_at, converge_over, left_vectors, projected
 
+_log = logging.getLogger("stridor")
+
 SAMPLES = 7
+SAME = 1e-6  # of an eigenvalue: a left vector solved for belongs to it
 
 
 @one_thread
@@ -57,20 +63,34 @@ def krylov_modes(
     top = float(values.max())
     asked = None if max_frequency_hz is None else 2 * np.pi * max_frequency_hz
     band = Band(count, None if asked is None else searched(problem.pencil(top).condensed(), asked))
-    reduced = projected(problem, band, top)
-    converge_over(reduced, numbered_at + samples(top - numbered_at), between=NAMES, left=vectors is True)
-    values, _, planned = at_each(
-        values, lambda at: converge_at(reduced, [at], tolerance=BELIEVED, left=vectors is True), progress
-    )
-    found = _followed(reduced, values, band, damped=damped, vectors=vectors, start=numbered_at)
-    planned = found.planned if planned is None else planned
-    return replace(found, max_frequency_hz=max_frequency_hz, planned=planned)
+
+    def solved(*, left: bool) -> ComplexModes:
+        """With left vectors of the basis, or else each solved for by itself."""
+        reduced = projected(problem, band, top)
+        converge_over(reduced, numbered_at + samples(top - numbered_at), between=NAMES, left=left)
+        done, _, planned = at_each(
+            values, lambda at: converge_at(reduced, [at], tolerance=BELIEVED, left=left), progress
+        )
+        found = _followed(reduced, done, band, damped=damped, vectors=vectors, start=numbered_at, of_basis=left)
+        planned = found.planned if planned is None else planned
+        return replace(found, max_frequency_hz=max_frequency_hz, planned=planned)
+
+    if vectors is not True:
+        return solved(left=False)
+    try:
+        return solved(left=True)
+    except FollowingError:
+        # Beside stiff contact a basis that opens gaps takes rounding in before its left vectors are exact.
+        _log.info("left vectors do not settle on one basis: each is solved for in the full problem")
+        return solved(left=False)
 
 
 def _followed(
-    reduced: Reduced, values: Array, band: Band, *, damped: bool, vectors: bool | Literal["right"], start: float
-) -> ComplexModes:
-    """The branches of the band at all μ, judged in the sparse problem."""
+    reduced: Reduced, values: Array, band: Band, *, damped: bool, vectors: bool | Literal["right"], start: float,
+    of_basis: bool,
+) -> ComplexModes:  # fmt: skip
+    """The branches of the band at all μ, judged in the sparse problem; their left vectors, where they are asked for,
+    those of the basis or each solved for by itself."""
     problem = reduced.problem
     longest = max(float(values.max()) / 10, 1e-3)
     follower = Follower(reduced, start=start, longest=longest)
@@ -87,7 +107,12 @@ def _followed(
         state = follower.advance(mu)
         lam, index = state.values[branches], state.index[branches]
         u, p = reduced.expand(state.found.right[:, index])
-        left = left_vectors(reduced, lam, state.found.left[:, index], mu)[0] if vectors is True else u[:0]
+        if vectors is not True:
+            left = u[:0]
+        elif of_basis:
+            left = left_vectors(reduced, lam, state.found.left[:, index], mu)[0]
+        else:
+            left = _solved_left(reduced, mu, lam, u, p)
         return (
             lam if reduced.damped else off_rounding(lam, SPLIT_RELATIVE),
             problem.pencil(mu).backward_error(lam, u, p),
@@ -115,6 +140,25 @@ def _followed(
     ever: BoolArray = np.any(np.imag(eigenvalues) <= top, axis=0)
     inside = (first.values.imag[branches] <= top) | ever
     return found.chosen(np.flatnonzero(inside))
+
+
+def _solved_left(reduced: Reduced, mu: float, lam: ComplexArray, u: ComplexArray, p: ComplexArray) -> ComplexArray:
+    """Left vectors (n, k) of unit norm beside right ones, by inverse iteration in the sparse problem. Raises
+    AnalysisError where one does not settle."""
+    pencil, left = reduced.problem.pencil(mu), np.zeros_like(u)
+    whole = pencil.whole
+    for k, value in enumerate(lam):
+        stage(f"left vector {k + 1} of {len(lam)} at μ = {mu:.6g}, in the full problem")
+        found = solved_beside(
+            whole, complex(value), np.concatenate([u[:, k], p[:, k] / pencil.unit]), None, solver=reduced.problem.solver
+        )
+        if found is None or abs(found.lam - value) > SAME * abs(value):
+            raise AnalysisError(
+                f"the left vector of the mode at {abs(value.imag) / (2 * np.pi):.6g} Hz, μ = {mu:g} does not settle; "
+                'ask for right vectors alone (vectors="right")'
+            )
+        left[:, k] = found.left[: pencil.size] / np.linalg.norm(found.left[: pencil.size])
+    return left
 
 
 def checked_friction(mu: float | Sequence[float] | Array) -> Array:

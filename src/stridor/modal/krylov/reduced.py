@@ -110,7 +110,7 @@ class Reduced(DenseProblem):
         return grown + self.count - before
 
     def keep(self, right: ComplexArray, weight: float = 1.0) -> None:
-        """Remember right vectors (r, k) for `compress`: exact ones, or with a smaller weight what is known less well."""
+        """Remember right vectors (r, k) for `compress`: exact ones, or with less weight what is known less well."""
         own = self.pairs.count
         columns = real_columns(right / np.linalg.norm(right[:own], axis=0))
         self._kept.append((columns[:own], columns[own:], weight))

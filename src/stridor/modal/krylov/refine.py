@@ -28,6 +28,7 @@ NAMES = 1e-7  # and where it is only which branch is which
 LARGEST_REST = 1e-4  # and what it may leave of the lumped inertia forces
 SWEEPS = 40
 IDLE = 4  # sweeps in a row that do not halve what is left: it is rounding
+RUINED = 1e4  # times the least that was left: the basis has taken rounding in
 WIDEST = 64  # right sides of one enrichment
 WEAKEST = 1e-3  # of the strongest direction: residuals below it wait for the next sweep
 COUNTED = 20_000  # freedoms up to which the number of frictionless modes is checked, by one more factorisation
@@ -140,6 +141,10 @@ def converge(reduced: Reduced, frictions: Iterable[float], *, tolerance: float =
             idle[mu] = 0 if worst[mu] < 0.5 * least[mu] else idle[mu] + 1
             least[mu] = min(least[mu], worst[mu])
             rounding = idle[mu] >= IDLE and worst[mu] <= BELIEVED  # which no basis vectors are made of
+            if idle[mu] >= IDLE and worst[mu] > RUINED * least[mu]:
+                stuck.append(mu)
+                pending.remove(mu)
+                continue
             if (force.shape[1] or opening.shape[1]) and not rounding:
                 force = principal(reduced.problem, force)
                 grown = reduced.enrich_left(force, opening) if left else reduced.enrich(force)
@@ -218,7 +223,8 @@ def _left_by(reduced: Reduced, found: Eigenpairs, chosen: IntArray, tolerance: f
     rest = pencil.residual(lam, u, p)
     error = pencil.backward_error(lam, u, p, rest=rest)
     force, inexact = _relative(reduced, rest, lam, u, error > tolerance)
-    forces, openings = [force], [np.zeros((problem.nodes, 0))]
+    forces: list[Array] = [force]
+    openings: list[Array] = [np.zeros((problem.nodes, 0))]
     if left:
         y, q = left_vectors(reduced, lam, found.left[:, chosen], mu)
         left_rest = pencil.transposed.residual(lam, y, q)
@@ -234,7 +240,7 @@ def _left_by(reduced: Reduced, found: Eigenpairs, chosen: IntArray, tolerance: f
 def _relative(
     reduced: Reduced, rest: ComplexArray, lam: ComplexArray, u: ComplexArray, inexact: BoolArray
 ) -> tuple[Array, BoolArray]:
-    """Residuals (n, k) over the pairs' inertia forces, of those that are inexact or large against them, and which are."""
+    """Residuals (n, k) over the pairs' inertia forces, of those that are inexact or large against them; which are."""
     weight = lumped(reduced.problem)[:, None]
     inertia = (np.abs(lam) ** 2 + reduced.shifted.shift) * np.linalg.norm(np.sqrt(weight) * u, axis=0)
     size = np.linalg.norm(rest / np.sqrt(weight), axis=0) / tiny(inertia)
