@@ -125,6 +125,20 @@ def test_curves_come_coarse_first_and_then_whole(answered: Callable[[State], lis
     assert STATE.mu in drawn[0]["mu"]
 
 
+def test_the_first_curves_are_quick_and_say_how_near_they_are():
+    made = Reduced.made(STATE, lambda _: None)
+    assert made.quick is not None
+    assert made.quick.model.size <= 0.8 * made.model.size
+    for state in (STATE, STATE.with_change(STIFF, 4e9)):
+        (few, told), (every, exact) = made.sweep(state)
+        rows = [every.mu.tolist().index(mu) for mu in few.mu.tolist()]
+        assert few.branch.tolist() == every.branch.tolist()
+        wanted = every.eigenvalues[rows]
+        off = np.nanmax(np.abs(few.eigenvalues - wanted) / np.abs(wanted))
+        assert exact < 1e-7 < off < 1e-4  # another model, not seen in a picture
+        assert off <= 3 * told
+
+
 def test_sensitivities_are_those_of_the_full_model_once_they_are_asked_for(
     answered: Callable[[State], list[tuple[str, Any]]], tmp_path: Path
 ):

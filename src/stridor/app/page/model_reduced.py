@@ -30,6 +30,8 @@ FRICTION, STIFFNESS = "mu", "contact_stiffness"
 REACH = (0.1, 10.0)  # times the contact stiffness of the case
 POINTS = 21  # of the curves
 COARSE = 4  # every so many of them are drawn first
+QUICK = 1e-3  # share of directions left out of what the first ones are drawn from: λ to some 1e-5 there
+QUICK_POINTS = 5  # of either number, whose modes these directions are of
 
 Tell = Callable[[str], None]
 
@@ -62,7 +64,8 @@ class _Line:
 @dataclass
 class Reduced:
     """A reduced model over μ, and over contact stiffness where one contact has a number for it, with the workspace of
-    the case that it is of. words: what the page says of it."""
+    the case that it is of. words: what the page says of it. quick: the model on the most of what its modes over both
+    numbers span, where that is worth it."""
 
     model: ReducedModel
     work: Workspace
@@ -70,6 +73,7 @@ class Reduced:
     words: str
     base: Any
     seconds: float = 0.0  # about, of sensitivities in the full problem
+    quick: Restricted | None = None
     _numbered: list[Numbered] = field(default_factory=list[Numbered])
     _line: _Line | None = None
 
@@ -89,11 +93,12 @@ class Reduced:
         with heard(lambda stage: tell("" if stage is None else stage.what)):
             tell("a reduced model is made, once for this case")
             model = reduced_model(work, box, whole=False)
+            quick = _quick(model, box) if path else None
         took = time.perf_counter() - began
         over = "μ and contact stiffness" if path else "μ"
         words = f"Reduced model over {over}: {model.size} of {work.system().size} freedoms, made in {took:.0f} s"
         seconds = tornado_seconds(case, state.mu, solve=took, build=build)
-        return Reduced(model, work, path, words, base_of(state).model, seconds)
+        return Reduced(model, work, path, words, base_of(state).model, seconds, quick)
 
     def holds(self, state: State) -> bool:
         """Whether a state differs in nothing but what the model is over, and lies in the ranges of that."""
@@ -116,14 +121,31 @@ class Reduced:
         low, high = friction_range(self.work.case("the page"))
         line = np.linspace(low, high, POINTS)
         own = [state.mu] if low <= state.mu <= high else []
+        passes = (np.unique(np.append(line[::COARSE], own)), np.unique(np.append(line, own)))
         known: dict[float, ReducedModes] = {}
-        for mus in (np.unique(np.append(line[::COARSE], own)), np.unique(np.append(line, own))):
+        for mus in passes:
+            quick = self.quick if mus is passes[0] else None
+            model = self.model if quick is None else quick.model
+            found = known if quick is None else dict[float, ReducedModes]()
             for mu in np.append(0.0, mus).tolist():
-                if mu not in known:
-                    known[mu] = self.model.modes(self._point(replace(state, mu=mu)))
-            self._numbered = []
-            for mu in sorted(known):
-                self._numbered.append(Numbered(self.model, known[mu], self._numbers(known[mu], state)))
+                if mu not in found:
+                    found[mu] = model.modes(self._point(replace(state, mu=mu)), judged=quick is None)
+            # The first ones take their numbers straight from those of the sweep before: no steps over friction.
+            before = self._numbered if quick is not None and len(self._numbered) >= POINTS else []
+            if quick is not None:
+                before = [Numbered(model, quick.inside(one.modes), one.numbers) for one in before]
+            self._numbered = before
+            numbered: list[Numbered] = []
+            for mu in sorted(found):
+                numbered.append(Numbered(model, found[mu], self._numbers(found[mu], state)))
+                if not before:
+                    self._numbered = numbered
+            self._numbered = numbered
+            if quick is not None:
+                self._numbered = [
+                    Numbered(self.model, self.model.judged(quick.outside(one.modes)), one.numbers)
+                    for one in self._numbered
+                ]
             drawn = [one for one in self._numbered if one.modes.point[FRICTION] in mus]
             rows, numbers = [one.modes for one in drawn], [one.numbers for one in drawn]
             yield self._modes(rows, numbers), max(float(r.error.max(initial=0.0)) for r in rows)
@@ -200,6 +222,18 @@ class Reduced:
             right=None if right is None else right[:, kept], source="reduced",
             max_frequency_hz=self.work.modal.max_frequency_hz, notes=tuple(getattr(self.model.problem, "notes", ())),
         )  # fmt: skip
+
+
+def _quick(model: ReducedModel, box: Mapping[str, tuple[float, float]]) -> Restricted | None:
+    """The model on the most of what its modes over friction and contact stiffness span."""
+    (low, high), (soft, stiff) = box[FRICTION], box[STIFFNESS]
+    stiffnesses = np.geomspace(soft, stiff, QUICK_POINTS).tolist()
+    known = [
+        model.modes({FRICTION: mu, STIFFNESS: stiffness}, judged=False)
+        for mu in np.linspace(low, high, QUICK_POINTS).tolist()
+        for stiffness in stiffnesses
+    ]
+    return Restricted.of(model, known, share=QUICK)
 
 
 def base_of(state: State) -> State:

@@ -56,7 +56,7 @@ class ModelAlongLine(OverNumber):
             if mu not in self._modes:
                 if len(self._known) >= TRIES:
                     raise AnalysisError("branches change too often along the line")
-                self._modes[mu] = self.model.modes(self.point(mu))
+                self._modes[mu] = self.model.modes(self.point(mu), judged=False)
             self.remembered(self._pairs(mu, self._modes[mu]))
         return self._known[mu]
 

@@ -25,14 +25,14 @@ class Restricted:
     model: ReducedModel
 
     @staticmethod
-    def of(model: ReducedModel, known: Sequence[ReducedModes]) -> Restricted | None:
-        """On the span of modes of the model; None where that has not much fewer unknowns, or points of the model do
-        not take a problem of its size anyway."""
+    def of(model: ReducedModel, known: Sequence[ReducedModes], *, share: float = SHARE) -> Restricted | None:
+        """On the span of modes of the model, but for directions that are ``share`` of the largest; None where that has
+        not much fewer unknowns, or points of the model do not take a problem of its size anyway."""
         if model.states is not None or model.whole:
             return None
         sides = [side for modes in known for side in (modes.right, modes.left)]
         directions, size, _ = sl.svd(np.hstack([part for z in sides for part in (z.real, z.imag)]), full_matrices=False)
-        span: Array = np.ascontiguousarray(directions[:, size > SHARE * size[0]])
+        span: Array = np.ascontiguousarray(directions[:, size > share * size[0]])
         if span.shape[1] > WORTH * model.size:
             return None
         projected = np.array([span.T @ (term @ span) for term in model.projected])
