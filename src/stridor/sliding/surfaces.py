@@ -19,7 +19,6 @@ from ..contact.nodes import ContactNodes
 from ..digits import readable
 from ..direct import SingularMatrix
 from ..errors import AnalysisError
-from ..laws.friction import own_law
 from ..notebook import Shown, counted, html_table
 from ..stages import passing, stage
 from ..system import System
@@ -321,19 +320,11 @@ def friction_damping_matrix(system: System, steady: SurfaceSliding) -> Sparse:
     normal, sense = steady.normal_force[working], steady.sense[working]
     parallel = chosen.along(sense)
     normal = np.abs(normal)  # a contact kept closed rubs where it pulls, too
-    matrix = parallel.T @ sp.diags_array(normal * _slopes(chosen, speed, mu)) @ parallel
+    matrix = parallel.T @ sp.diags_array(normal * chosen.friction_slopes(speed, mu)) @ parallel
     if nodes.directions == 2:
         across = chosen.along(np.stack([-sense[:, 1], sense[:, 0]], axis=1))
         matrix = matrix + across.T @ sp.diags_array(mu * normal / speed) @ across
     return sp.csr_array(matrix)
-
-
-def _slopes(nodes: ContactNodes, speed: Array, mu: Array) -> Array:
-    """dμ/d|w| (m,) [s/m] of the laws, scaled where another coefficient was asked for than they have."""
-    slopes, own = nodes.friction_slopes(speed), nodes.friction_coefficients(speed)
-    for i in np.flatnonzero((mu != own) & (slopes != 0.0)):
-        slopes[i] = own_law(nodes.laws[nodes.owner[i]]).scaled(float(mu[i]), float(speed[i])).slope(float(speed[i]))
-    return slopes
 
 
 def _require_constant_gap(nodes: ContactNodes, factors: Array, speed: Array) -> None:

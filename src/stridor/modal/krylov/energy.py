@@ -54,8 +54,8 @@ def friction_energy(
     problem = problem_of(used, mu if len(modes.mu) == 1 else None, options or Options())
     p = contact_forces(problem, lam, u, mu)
     extras = problem.at(mu)
-    slip = times(problem.slide, u)[:, 0]
-    force = mu * p[:, 0]
+    slip = times(problem.slip, u)[:, 0]
+    force = mu * problem.share * p[:, 0]
     if extras.weakening is not None:
         force = force - lam * extras.weakening * slip
     size = abs(lam) ** 2
