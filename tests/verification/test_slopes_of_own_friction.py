@@ -1,0 +1,213 @@
+"""Contacts with coefficients of their own, of which some vary with slip speed: the slope of each law acts in full.
+
+The truth is put together here, on dense matrices: steady sliding by Newton's method, the slope of a law by differences
+of its own formula, the friction force −μ(|w|) N w/|w| linearised contact by contact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg as sl
+
+import stridor as st
+from stridor.modal.krylov import friction_energy
+from stridor.study.workspace import in_proportion
+from stridor.system import System
+
+Spec = dict[str, Any]
+WEAKENING = {"law": "weakening", "coefficient": 0.2, "static_coefficient": 0.4, "decay_speed": 0.5}
+
+
+def coefficient(law: Spec, v: float) -> float:
+    """μ at a slip speed, by the formulas of the case file."""
+    low = law["coefficient"]
+    if law["law"] == "weakening":
+        return low + (law["static_coefficient"] - low) * np.exp(-v / law["decay_speed"])
+    if law["law"] == "hyperbolic":
+        return low + (law["static_coefficient"] - low) / (1 + law["delta"] * v)
+    return low
+
+
+def slope(law: Spec, v: float) -> float:
+    """dμ/dv of it, of sixth order."""
+    h, weights = 1e-3 * v, {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
+    return sum(w * (coefficient(law, v + k * h) - coefficient(law, v - k * h)) for k, w in weights.items()) / h
+
+
+@dataclass(frozen=True)
+class Model:
+    """Matrices (n, n), contacts by name as `System.from_matrices` takes them, a load (n,)."""
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    contacts: dict[str, Spec]
+    load: np.ndarray
+
+    @property
+    def system(self) -> System:
+        return System.from_matrices(
+            self.mass, self.damping, self.stiffness, contacts=self.contacts, loads={"press": self.load}
+        )
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Steady sliding (motion, normal forces, coefficients) and the pairs (λ, u) of small motions about it.
+
+    weakening (m,): N dμ/dv; sense (m,): of friction along the tangents.
+    """
+
+    normal: np.ndarray
+    mu: np.ndarray
+    weakening: np.ndarray
+    sense: np.ndarray
+    values: np.ndarray
+    vectors: np.ndarray
+
+
+def truth(model: Model) -> Truth | None:
+    """None where not all contacts are pressed."""
+    contacts, n = list(model.contacts.values()), len(model.load)
+    normal, tangent = (np.array([c[name] for c in contacts]) for name in ("normal", "tangent"))
+    slip = np.array([c["slip"] for c in contacts])
+    sense, speed = -np.sign(slip), np.abs(slip)
+    mu = np.array([coefficient(c["friction"], v) for c, v in zip(contacts, speed, strict=True)])
+    push = normal + (mu * sense)[:, None] * tangent
+    rigid = np.array([c["stiffness"] == "rigid" for c in contacts])
+    linear = np.array([0.0 if c["stiffness"] == "rigid" else c["stiffness"] for c in contacts])
+    cubic = np.array([c.get("cubic", 0.0) for c in contacts])
+    # Newton's method for K u − pushᵀ N = f with N = k d + k₃ d³ of the approach d = −n u, or d = 0.
+    u, force = np.zeros(n), np.zeros(len(contacts))
+    for _ in range(60):
+        d = -normal @ u
+        tangents = np.where(rigid, 1.0, linear + 3 * cubic * d**2)
+        jacobian = np.block(
+            [[model.stiffness, -push.T], [tangents[:, None] * normal, np.diag(np.where(rigid, 0.0, 1.0))]]
+        )
+        law = np.where(rigid, -d, force - linear * d - cubic * d**3)
+        left = np.concatenate([model.stiffness @ u - push.T @ force - model.load, law])
+        step = np.linalg.solve(jacobian, left)
+        u, force = u - step[:n], force - step[n:]
+    assert np.abs(step).max() < 1e-10
+    if force.min() <= 1e-3:
+        return None
+    weakening = force * [slope(c["friction"], v) for c, v in zip(contacts, speed, strict=True)]
+    soft = ~rigid
+    stiffness = model.stiffness + (push[soft].T * (linear + 3 * cubic * (normal @ u) ** 2)[soft]) @ normal[soft]
+    damping = model.damping + (tangent.T * weakening) @ tangent
+    # Rigid contacts: motions that keep their gaps, tested with what their forces do no work on.
+    motion, tests = (sl.null_space(rows[rigid]) if rigid.any() else np.eye(n) for rows in (normal, push))
+    m, c, k = (tests.T @ matrix @ motion for matrix in (model.mass, damping, stiffness))
+    size = len(m)
+    inverse = np.linalg.inv(m)
+    whole = np.block([[np.zeros((size, size)), np.eye(size)], [-inverse @ k, -inverse @ c]])
+    values, vectors = sl.eig(whole)
+    return Truth(force, mu, weakening, sense, values, motion @ vectors[:size])
+
+
+def chain(*, kind: str) -> Model:
+    """Three freedoms, a Coulomb contact and one that weakens with less than half its coefficient."""
+    more = {"plain": {"stiffness": 10.0}, "cubic": {"stiffness": 10.0, "cubic": 1e-9}}[kind]
+    along = {"tangent": [1.0, 0.0, 0.0], "slip": 0.4, **more}
+    return Model(
+        np.eye(3), 0.05 * np.eye(3), np.array([[4.0, 1, 0], [1, 9, 1], [0, 1, 6]]),
+        {
+            "a": {"normal": [0.0, 1.0, 0.0], "friction": {"law": "coulomb", "coefficient": 0.6}, **along},
+            "b": {"normal": [0.0, 0.0, 1.0], "friction": WEAKENING, **along},
+        },
+        np.array([0.0, -1.0, -2.0]),
+    )  # fmt: skip
+
+
+def drawn(seed: int) -> Model:
+    """Random matrices of 4 to 7 freedoms and 2 or 3 contacts: rigid, springs or hardening ones, of several laws."""
+    random = np.random.default_rng(seed)
+    n, count = int(random.integers(4, 8)), int(random.integers(2, 4))
+    turn = np.linalg.qr(random.standard_normal((n, n)))[0]
+    omega = np.sort(random.uniform(0.7, 3.0, n))
+    contacts: dict[str, Spec] = {}
+    load = np.zeros(n)
+    places = random.permutation(n)
+    for k in range(count):
+        low = float(random.uniform(0.1, 0.6))
+        laws: list[Spec] = [
+            {"law": "weakening", "coefficient": low, "static_coefficient": 1.4 * low,
+             "decay_speed": float(random.uniform(0.2, 1.0))},
+            {"law": "hyperbolic", "coefficient": low, "static_coefficient": 1.4 * low,
+             "delta": float(random.uniform(1.0, 5.0))},
+            {"law": "static-kinetic", "coefficient": low, "static_coefficient": 1.3 * low},
+            {"law": "coulomb", "coefficient": low},
+        ]  # fmt: skip
+        normal, tangent = 0.2 * random.standard_normal((2, n))
+        normal[places[k]] += 1.0
+        tangent[places[-1]] += 1.0
+        spec: Spec = {
+            "normal": normal.tolist(), "tangent": tangent.tolist(), "friction": laws[(seed + k) % 2 if k < 2 else 2],
+            "slip": float(random.choice([-1, 1]) * random.uniform(0.1, 0.6)), "stiffness": float(random.uniform(2, 20)),
+        }  # fmt: skip
+        if k == 1 and seed % 3 == 0:
+            spec["friction"] = laws[3]
+        match int(random.integers(3)):
+            case 0:
+                spec["stiffness"] = "rigid"
+            case 1:
+                spec["cubic"] = float(random.uniform(1, 20))
+        contacts[f"c{k}"] = spec
+        load -= normal * random.uniform(0.5, 1.5)
+    return Model(
+        np.eye(n), turn @ np.diag(2 * omega * random.uniform(0.005, 0.04, n)) @ turn.T,
+        turn @ np.diag(omega**2) @ turn.T, contacts, load,
+    )  # fmt: skip
+
+
+def assert_all_modes(model: Model, known: Truth) -> None:
+    """Without μ, `modes` has every vibration of the truth once and nothing else."""
+    upper = known.values[known.values.imag > 1e-6]
+    top = 1.01 * np.abs(known.values).max()
+    found = st.modes(model.system, max_frequency_hz=top)
+    assert found.mu[0] == pytest.approx(known.mu.max(), rel=1e-12)
+    values = found.eigenvalues.ravel()
+    values = values[values.imag > 1e-6]
+    assert len(values) == len(upper)
+    for value in upper:
+        assert np.abs(values - value).min() < 1e-7 * abs(value)
+
+
+def share_of_slopes(known: Truth) -> float:
+    """How much of the slopes belongs to other contacts than that of the largest coefficient, which never was wrong."""
+    others = known.mu < 0.95 * known.mu.max()
+    return float(np.abs(known.weakening[others]).max(initial=0.0))
+
+
+@pytest.mark.parametrize("kind", ["plain", "cubic"])
+def test_a_weakening_contact_beside_one_with_more_friction(kind: str) -> None:
+    model = chain(kind=kind)
+    known = truth(model)
+    assert known is not None
+    assert share_of_slopes(known) > 0.1
+    assert known.values.real.max() == pytest.approx(0.0875031, rel=1e-5)
+    assert_all_modes(model, known)
+
+
+def assert_random(seed: int) -> bool:
+    """Whether the system says anything about slopes of contacts with less friction than another."""
+    model = drawn(seed)
+    known = truth(model)
+    if known is None or share_of_slopes(known) < 0.01:
+        return False
+    assert_all_modes(model, known)
+    return True
+
+
+def test_random_contacts_with_friction_of_their_own() -> None:
+    assert sum(assert_random(seed) for seed in range(14)) >= 5
+
+
+@pytest.mark.slow
+def test_many_random_contacts_with_friction_of_their_own() -> None:
+    assert sum(assert_random(seed) for seed in range(14, 200)) >= 60
