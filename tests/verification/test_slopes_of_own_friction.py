@@ -208,6 +208,52 @@ def test_random_contacts_with_friction_of_their_own() -> None:
     assert sum(assert_random(seed) for seed in range(14)) >= 5
 
 
+def assert_power_of_each(model: Model) -> float:
+    """The power of friction at each contact from the truth's pairs; the most that the slopes of laws have in it."""
+    known = truth(model)
+    assert known is not None
+    made = in_proportion(model.system)
+    assert made is not None
+    system, mu = made
+    modes = st.modes(model.system, max_frequency_hz=1.01 * np.abs(known.values).max(), vectors=True)
+    contacts = list(model.contacts.values())
+    normal, tangent = (np.array([c[name] for c in contacts]) for name in ("normal", "tangent"))
+    along = known.sense[:, None] * tangent
+    most = 0.0
+    assert modes.mu[0] == pytest.approx(mu)
+    for mode in np.flatnonzero(modes.frequency_hz[0] > 0):
+        found = friction_energy(system, modes, 0, int(mode))
+        k = int(np.argmin(np.abs(known.values - modes.eigenvalues[0, mode])))
+        lam, u = known.values[k], known.vectors[:, k]
+        # What the structure asks for is what contacts give: (N + μS)ᵀ p − Sᵀ d λ S u.
+        slopes = known.weakening * lam * (along @ u)
+        asked = (lam**2 * model.mass + lam * model.damping + model.stiffness) @ u + along.T @ slopes
+        force = np.linalg.lstsq((normal + known.mu[:, None] * along).T.astype(complex), asked, rcond=None)[0]
+        power = 0.5 * (np.conj(lam * (along @ u)) * (known.mu * force - slopes)).real
+        size = abs(lam) ** 2 * np.vdot(u, model.damping @ u).real / 2
+        assert (found.power.sum() - found.damping) == pytest.approx(2 * lam.real, abs=1e-7 * abs(lam))
+        assert found.power / found.damping == pytest.approx(power / size, rel=1e-5, abs=1e-6 * np.abs(power / size).max())
+        own = 0.5 * (np.conj(lam * (along @ u)) * slopes).real
+        most = max(most, float(np.abs(own).max() / np.abs(power).max()))
+    return most
+
+
+@pytest.mark.parametrize("kind", ["plain", "cubic"])
+def test_power_of_friction_at_each_contact(kind: str) -> None:
+    assert assert_power_of_each(chain(kind=kind)) > 0.3
+
+
+def test_power_of_friction_at_each_rigid_contact() -> None:
+    model = drawn(next(seed for seed in range(200) if _rigid_alone(seed)))
+    assert assert_power_of_each(model) > 0.1
+
+
+def _rigid_alone(seed: int) -> bool:
+    known = truth(model := drawn(seed))
+    rigid = all(c["stiffness"] == "rigid" for c in model.contacts.values())
+    return rigid and known is not None and share_of_slopes(known) > 0.01
+
+
 @pytest.mark.slow
 def test_many_random_contacts_with_friction_of_their_own() -> None:
     assert sum(assert_random(seed) for seed in range(14, 200)) >= 60

@@ -304,12 +304,12 @@ def touching(system: System, steady: SurfaceSliding) -> ContactNodes:
     return system.contact_nodes().select(steady.active)
 
 
-def friction_damping_matrix(system: System, steady: SurfaceSliding) -> Sparse:
+def friction_damping_matrix(system: System, steady: SurfaceSliding, *, slope: bool = True) -> Sparse:
     """Damping (n, n) csr [N s/m] that friction adds to small motions about steady sliding.
 
     Friction keeps opposing the slip as its direction turns, which damps motion across it with μ N/|w| (in space
     only); along it the law's slope N dμ/d|w| counts, negative where friction weakens with speed. A node that does
-    not slip adds nothing.
+    not slip adds nothing. slope False leaves what acts along it to who has it already.
     """
     nodes = system.contact_nodes()
     speed = steady.slip_speed
@@ -318,9 +318,11 @@ def friction_damping_matrix(system: System, steady: SurfaceSliding) -> Sparse:
     chosen = nodes.select(working)
     speed, mu = speed[working], steady.friction_coefficient[working]
     normal, sense = steady.normal_force[working], steady.sense[working]
-    parallel = chosen.along(sense)
     normal = np.abs(normal)  # a contact kept closed rubs where it pulls, too
-    matrix = parallel.T @ sp.diags_array(normal * chosen.friction_slopes(speed, mu)) @ parallel
+    matrix = sp.csr_array((system.size, system.size))
+    if slope:
+        parallel = chosen.along(sense)
+        matrix = parallel.T @ sp.diags_array(normal * chosen.friction_slopes(speed, mu)) @ parallel
     if nodes.directions == 2:
         across = chosen.along(np.stack([-sense[:, 1], sense[:, 0]], axis=1))
         matrix = matrix + across.T @ sp.diags_array(mu * normal / speed) @ across

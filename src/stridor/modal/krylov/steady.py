@@ -192,9 +192,8 @@ class Steadiness:
             raise AnalysisError(f"{error}; that is at μ = {mu:g}, of the range that was asked for") from error
         weakening = damping = None
         if self.friction_damping and mu:
-            # It holds the law's slope too.
-            damping = friction_damping_matrix(self.system, steady)
-        elif self.sloped and mu:
+            damping = friction_damping_matrix(self.system, steady, slope=False)
+        if self.sloped and mu:
             chosen = self.nodes.select(self.touching)
             slopes = chosen.friction_slopes(
                 steady.slip_speed[self.touching], steady.friction_coefficient[self.touching]
