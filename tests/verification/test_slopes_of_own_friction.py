@@ -257,3 +257,149 @@ def _rigid_alone(seed: int) -> bool:
 @pytest.mark.slow
 def test_many_random_contacts_with_friction_of_their_own() -> None:
     assert sum(assert_random(seed) for seed in range(14, 200)) >= 60
+
+
+# -- masses on a belt that moves along two directions, by a case file ---------------------------------------------------
+LAWS: dict[str, Spec] = {
+    "m": {"law": "coulomb", "coefficient": 0.6},
+    "q": WEAKENING,
+    "r": {"law": "weakening", "coefficient": 0.05, "static_coefficient": 0.3, "decay_speed": 0.4},
+}
+
+
+def masses(stiffness: float | str = 10.0, *, turns: bool = False, **laws: Spec) -> st.Case:
+    """Three masses in space on springs, pressed on a belt; ``laws`` in place of those above."""
+    random = np.random.default_rng(3)
+    bodies: Spec = {
+        "belt": {
+            "type": "obstacle", "shape": "flat", "point": [0.0, 0.0, 0.0], "normal": [0.0, 0.0, 1.0],
+            "sliding": {"velocity": [-0.4, 0.1, 0.0]},
+        }
+    }  # fmt: skip
+    springs: Spec = {}
+    case: Spec = {
+        "units": "nondimensional", "bodies": bodies, "springs": springs, "dashpots": {}, "loads": {}, "contacts": {},
+        "modal": {"max_frequency_hz": 2.0, "friction_damping": turns},
+    }  # fmt: skip
+    for k, (name, law) in enumerate({**LAWS, **laws}.items()):
+        bodies[name] = {"type": "mass", "mass": 1.0, "position": [float(k), 0.1 * k, 0.0]}
+        case["loads"][name] = {"at": name, "force": [0.0, 0.0, -1.0 - 0.5 * k]}
+        case["contacts"][name] = {"slave": name, "master": "belt", "stiffness": stiffness, "friction": law}
+        for j, way in enumerate(np.eye(3)):
+            across = (way + 0.2 * random.standard_normal(3)).tolist()
+            held: Spec = {"between": [name, "ground"], "direction": across, "stiffness": float(random.uniform(2, 8))}
+            springs[f"{name}{j}"] = held
+            case["dashpots"][f"{name}{j}"] = {"between": held["between"], "direction": way.tolist(), "damping": 0.03}
+    for one, two in ("mq", "qr"):
+        springs[one + two] = {"between": [one, two], "direction": [1.0, 0.3, 0.2], "stiffness": 1.5}
+    return st.Case.model_validate(case)
+
+
+def vibrations(case: st.Case, laws: dict[str, Spec], *, turns: bool = False) -> np.ndarray:
+    """λ of all vibrations of the case's masses with these laws, friction linearised by differences node by node."""
+    system = st.build_system(case)
+    nodes = system.contact_nodes()
+    m, c, k = (matrix.toarray() for matrix in (system.mass, system.damping, system.stiffness))
+    normal, tangent = nodes.normal.toarray(), nodes.tangent.toarray()
+    slip = nodes.slip_velocity(system.motion.full)
+    force = sum(system.loads.values()) - system.motion.damping @ system.motion.full
+
+    def rubs(i: int, w: np.ndarray) -> np.ndarray:
+        """Friction on node i per normal force at a slip velocity."""
+        speed = float(np.linalg.norm(w))
+        return -coefficient(laws[nodes.names[nodes.owner[i]]], speed) * w / speed
+
+    rows = [tangent[2 * i : 2 * i + 2] for i in range(nodes.count)]
+    push = normal + np.array([rubs(i, slip[i]) @ rows[i] for i in range(nodes.count)])
+    rigid = bool(np.all(nodes.compliance == 0.0))
+    spring = np.zeros(nodes.count) if rigid else 1.0 / nodes.compliance
+    whole = k + push.T @ (spring[:, None] * normal)
+    if rigid:
+        border = np.block([[k, -push.T], [normal, np.zeros((nodes.count, nodes.count))]])
+        pressed = np.linalg.solve(border, np.concatenate([force, -nodes.gap]))[len(m) :]
+    else:
+        pressed = -spring * (normal @ np.linalg.solve(whole, force - push.T @ (spring * nodes.gap)) + nodes.gap)
+    assert pressed.min() > 0.0
+    for i in range(nodes.count):
+        along = slip[i] / np.linalg.norm(slip[i])
+        for way in (along, np.array([-along[1], along[0]]))[: 1 + turns]:
+            h = 1e-4
+            change = sum(
+                w * (rubs(i, slip[i] + j * h * way) - rubs(i, slip[i] - j * h * way)) / h
+                for j, w in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
+            )
+            c = c - pressed[i] * rows[i].T @ np.outer(change, way) @ rows[i]
+    if rigid:
+        motion, tests = sl.null_space(normal), sl.null_space(push)
+        m, c, whole = (tests.T @ matrix @ motion for matrix in (m, c, k))
+    inverse = np.linalg.inv(m)
+    values = sl.eigvals(np.block([[np.zeros_like(m), np.eye(len(m))], [-inverse @ whole, -inverse @ c]]))
+    return values[values.imag > 1e-6]
+
+
+def assert_same(found: np.ndarray, known: np.ndarray, rel: float = 1e-7) -> None:
+    found = found[found.imag > 1e-6]
+    assert len(found) == len(known)
+    assert max(np.abs(found - value).min() / abs(value) for value in known) < rel
+
+
+@pytest.mark.parametrize("stiffness", [10.0, "rigid"])
+@pytest.mark.parametrize("turns", [False, True])
+def test_in_space_with_and_without_friction_that_turns(stiffness: float | str, turns: bool) -> None:
+    case = masses(stiffness, turns=turns)
+    assert_same(st.modes(case).eigenvalues[0], vibrations(case, LAWS, turns=turns))
+
+
+def test_a_model_over_numbers_beside_friction_that_each_contact_has_of_its_own() -> None:
+    case = masses()
+    model = st.reduced_model(case, {"springs.m0.stiffness": (3.0, 6.0)})
+    for value in (3.4, 5.7):
+        there = case.with_({"springs.m0.stiffness": value})
+        assert_same(model.modes({"springs.m0.stiffness": value}).values, vibrations(there, LAWS))
+
+
+def scaled(law: Spec, mu: float, speed: float) -> Spec:
+    factor = mu / coefficient(law, speed)
+    return {k: factor * v if k.endswith("coefficient") else v for k, v in law.items()}
+
+
+def test_one_coefficient_of_all_beside_a_contact_without_friction() -> None:
+    """Slopes are those of the laws scaled to it; over μ, at one μ, at onsets, and in derivatives."""
+    still: Spec = {"law": "coulomb", "coefficient": 0.0}
+    case, speed = masses(m=still), float(np.hypot(0.4, 0.1))
+
+    def known(mu: float, case: st.Case = case) -> np.ndarray:
+        return vibrations(case, {"m": still, **{n: scaled(LAWS[n], mu, speed) for n in "qr"}})
+
+    model = st.reduced_model(case, {"mu": (0.02, 0.5)})
+    for mu in (0.05, 0.3):
+        assert_same(st.modes(case, mu).eigenvalues[0], known(mu))
+        assert_same(model.modes({"mu": mu}).values, known(mu))
+    found = st.onsets(case, (0.0, 0.5)).onsets
+    assert found
+    for onset in found:
+        before, after = (int(np.sum(known(onset.mu + d).real > 0.0)) for d in (-1e-5, 1e-5))
+        assert after - before == (-1 if onset.stabilising else 1)
+    rates = st.sensitivities(case, ["mu", "contacts.q.compliance"], mu=0.3, modes="all")
+    h, own = 1e-5, known(0.3)
+    softer, stiffer = (case.with_({"contacts.q.stiffness": 1 / (0.1 + d)}) for d in (h, -h))
+    for k, (high, low) in enumerate([(known(0.3 + h), known(0.3 - h)), (known(0.3, softer), known(0.3, stiffer))]):
+        for value, rate in zip(rates.eigenvalues, rates.derivative[k], strict=True):
+            near = own[np.argmin(np.abs(own - value))]
+            change = high[np.argmin(np.abs(high - near))] - low[np.argmin(np.abs(low - near))]
+            assert rate == pytest.approx(change / (2 * h), rel=1e-4, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_onsets_along_the_law_of_the_contact_with_less_friction() -> None:
+    case, path = masses(), "contacts.q.friction.static_coefficient"
+    found = st.onsets(case, (0.2, 0.9), along=path)
+
+    def growing(value: float) -> int:
+        return int(np.sum(vibrations(case, {**LAWS, "q": {**WEAKENING, "static_coefficient": value}}).real > 0.0))
+
+    assert len(found)
+    for onset in found:
+        step = -1 if onset.stabilising else 1
+        assert growing(onset.value + 1e-5) - growing(onset.value - 1e-5) == step
+    assert growing(0.9) - growing(0.2) == sum(-1 if onset.stabilising else 1 for onset in found)

@@ -45,9 +45,9 @@ class ContactProblem:
     """P(λ, μ) of m touching nodes on n freedoms: (λ²M + λC + K) u − (N + μS)ᵀ p = 0 and N u + c p = 0.
 
     normal N (m, n), slip T (m, n): relative displacement slave − master along the normal and against the slip; share
-    (m,): of μ that each node has, S = share T; compliance c (m,) [m/N], 0 for rigid contact. touching (m,) are the places of the nodes among all the system's.
-    damped: whether anything works on velocities. extras gives what steady sliding at a μ adds, None where nothing does.
-    solver: that of `direct.factorise`.
+    (m,): of μ that each node has, S = share T; compliance c (m,) [m/N], 0 for rigid contact. touching (m,) are the
+    places of the nodes among all the system's. damped: whether anything works on velocities. extras gives what steady
+    sliding at a μ adds, None where nothing does. solver: that of `direct.factorise`.
 
     Nodes that stick have further rows behind those of the touching nodes: their tangential displacement in N, zero in
     S. contact_state: how many stick, slip and are open, "" where every node slides.
