@@ -39,6 +39,7 @@ from stridor.contact.obstacles import Cylinder, Flat
 from stridor.contact.surfaces import _along, frames, operators
 from stridor.errors import CaseError
 from stridor.laws import Coulomb, StaticKinetic, Tabulated, Weakening
+from stridor.laws.friction import Shared
 from stridor.mesh.facets import quadrature, reference_nodes, shape_functions
 
 # What NumPy warns of is a fault here, whatever comes of it.
@@ -120,7 +121,15 @@ def test_friction_of_nodes_is_that_of_their_contacts_at_their_speeds() -> None:
     speeds = 2 * rng.random(30)
     laws = [nodes.laws[k] for k in nodes.owner]
     assert nodes.friction_coefficients(speeds) == pytest.approx([w.sliding(v) for w, v in zip(laws, speeds, strict=True)])
-    assert nodes.friction_slopes(speeds) == pytest.approx([w.slope(v) for w, v in zip(laws, speeds, strict=True)])
+    own = nodes.friction_coefficients(speeds)
+    slopes = np.array([w.slope(v) for w, v in zip(laws, speeds, strict=True)])
+    assert nodes.friction_slopes(speeds, own) == pytest.approx(slopes)
+    # A law scaled to another coefficient has its slope in proportion, whichever share of a common one that is.
+    factor = 0.5 + rng.random(30)
+    shares = replace(nodes, laws=tuple(Shared(law, 0.3) for law in nodes.laws))
+    assert np.abs(slopes).max() > 0.01
+    for given in (nodes, shares):
+        assert given.friction_slopes(speeds, factor * own) == pytest.approx(factor * slopes)
     table = replace(nodes, laws=(Tabulated((0.0, 1.0), (0.3, 0.3)), *nodes.laws[1:]))
     assert table.friction_coefficients(speeds)[nodes.owner == 0] == pytest.approx(0.3)
 

@@ -477,7 +477,7 @@ def rubbing(d: int, speeds, *, mu=None, kept: bool = False) -> tuple[Any, Contac
         friction_coefficient=own if mu is None else np.full(m, mu), gap=np.zeros(m), residual=0.0, iterations=1,
         status=np.full(m, SLIP), travel=np.zeros(1),
     )  # fmt: skip
-    return SimpleNamespace(contact_nodes=lambda: nodes), nodes, steady
+    return SimpleNamespace(contact_nodes=lambda: nodes, size=d * m), nodes, steady
 
 
 @pytest.mark.parametrize("d", [2, 3])

@@ -382,6 +382,27 @@ def test_falling_friction_and_turning_friction_are_in_the_equations():
         assert distance_to(modes.eigenvalues[0], eliminated(system, mu)).max() > 1e-5
 
 
+def test_power_of_the_slope_of_a_law_is_that_of_its_node_whether_friction_turns_or_not():
+    system, mu = pressed(law=Weakening(0.2, 0.4, 1.0)), 0.3
+    steady = steady_sliding_nodes(system, mu=mu)
+    slopes = [Weakening(0.2, 0.4, 1.0).scaled(mu, float(v)).slope(float(v)) for v in steady.slip_speed]
+    nodes = system.contact_nodes()
+    for options in (Options(), Options(friction_damping=True)):
+        modes = krylov_modes(system, mu, count=8, vectors=True, options=options)
+        for mode in range(8):
+            energy, lam, u = (
+                friction_energy(system, modes, 0, mode, options=options),
+                modes.eigenvalues[0, mode],
+                modes.right[0, mode],
+            )
+            slip, gap = nodes.along(steady.sense) @ u, nodes.normal @ u
+            power = np.conj(lam * slip) * (-mu * gap / nodes.compliance - steady.normal_force * slopes * lam * slip)
+            assert energy.power / energy.power[0] == pytest.approx(power.real / power.real[0], rel=1e-6)
+            assert energy.power.sum() - energy.damping == pytest.approx(2 * lam.real, abs=1e-7 * abs(lam))
+            without = np.conj(lam * slip) * (-mu * gap / nodes.compliance)
+            assert np.abs(power.real / power.real[0] - without.real / without.real[0]).max() > 1e-4
+
+
 def test_nodes_that_pull_open_and_take_no_part():
     system = scattered(3, 0.02, 0.1, size=40, nodes=3)
     nodes = system.surfaces[0].nodes

@@ -189,7 +189,7 @@ def test_prestress_friction_stiffness_and_a_modulus_at_once():
         held = problem_of(build_system(at(case, point)), mu, options)
         assert len(held.touching) == 7
         extra, mine = held.at(mu), problem.at(point)
-        weakening = held.slide.T @ sp.diags_array(extra.weakening) @ held.slide
+        weakening = held.slip.T @ sp.diags_array(extra.weakening) @ held.slip
         push = held.normal + mu * held.slide
         springs = push.T @ sp.diags_array(1 / held.compliance) @ held.normal
         for found, whole, added in (

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..laws.friction import FrictionLaw, share_of
+from ..laws.friction import FrictionLaw, share_of, slope_at
 from ..typing import Array, BoolArray, IntArray, Sparse
 
 
@@ -83,9 +83,16 @@ class ContactNodes:
             found[mine] = law.sliding(1.0) if law.constant else [law.sliding(float(v)) for v in speeds[mine]]
         return found
 
-    def friction_slopes(self, speeds: Array) -> Array:
-        """dμ/d|v| (m,) [s/m] at slip speeds (m,) [m/s]."""
-        return np.array([self.laws[k].slope(float(v)) for k, v in zip(self.owner, speeds, strict=True)])
+    def friction_slopes(self, speeds: Array, coefficients: Array) -> Array:
+        """dμ/d|v| (m,) [s/m] at slip speeds (m,) [m/s] of the laws scaled to the coefficients (m,) of the nodes there:
+        each node's own, not a common one of which it gets a share."""
+        found = np.zeros(self.count)
+        for k, law in enumerate(self.laws):
+            if not law.constant:
+                mine = np.flatnonzero(self.owner == k)
+                pairs = zip(coefficients[mine], speeds[mine], strict=True)
+                found[mine] = [slope_at(law, float(mu), float(v)) for mu, v in pairs]
+        return found
 
     def along(self, direction: Array) -> Sparse:
         """Rows (m, n) csr of the relative tangential displacement along one direction (m, d−1) per node."""

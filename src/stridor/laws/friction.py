@@ -301,6 +301,13 @@ def own_law(law: FrictionLaw) -> FrictionLaw:
     return law.law if isinstance(law, Shared) else law
 
 
+def slope_at(law: FrictionLaw, coefficient: float, speed: float) -> float:
+    """dμ/d|v| [s/m] at ``speed`` [m/s] of a law scaled such that a contact with it has ``coefficient`` there: its own
+    one, whichever share that is of a coefficient asked for of all contacts."""
+    own = own_law(law)
+    return own.slope(speed) if own.sliding(speed) == coefficient else own.scaled(coefficient, speed).slope(speed)
+
+
 def is_zero(law: FrictionLaw) -> bool:
     """Whether a contact with this law has no friction at any speed, and none to overcome."""
     return law.constant and law.sticking == 0.0 and law.sliding(0.0) == 0.0

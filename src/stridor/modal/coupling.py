@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import AnalysisError
-from ..laws.friction import share_of
+from ..laws.friction import share_of, slope_at
 from ..sliding import full_motion, least_force, require_pressed, slip_speeds, steady_points, steady_sliding
 from ..system import System
 from ..typing import Array, ComplexArray
@@ -57,7 +57,7 @@ class PointCoupling:
         speeds = np.abs(self.slip_speed)
         steady = steady_sliding(self.system, mu=mu)
         slopes = [
-            c.law.scaled(mu, float(v)).slope(float(v))
+            slope_at(c.law, share_of(c.law) * mu, float(v))
             for c, v in zip(self.system.contacts, speeds, strict=True)
         ]
         found = np.abs(steady.normal_force) * np.array(slopes)

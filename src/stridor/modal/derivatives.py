@@ -160,10 +160,9 @@ def by_friction(
     if contact is None:
         return PencilChange(push=rows.slide)
     # Its own coefficient, whichever share of a common one it gets: one without friction may be given some.
-    mine = (chosen.owner == nodes.names.index(contact)).astype(float)
-    slide = chosen.along(held.sense[held.touching] * mine[:, None])
-    sticking = sp.csr_array((rows.slide.shape[0] - chosen.count, slide.shape[1]))
-    return PencilChange(push=sp.csr_array(sp.vstack([slide, sticking])))
+    mine = np.zeros(rows.slip.shape[0])
+    mine[: chosen.count] = chosen.owner == nodes.names.index(contact)
+    return PencilChange(push=sp.csr_array(sp.diags_array(mine) @ rows.slip))
 
 
 def by_compliance(system: System, held: HeldContacts, options: Options, contact: str) -> PencilChange | None:

@@ -19,7 +19,6 @@ from ..contact.nodes import ContactNodes
 from ..digits import readable
 from ..direct import SingularMatrix
 from ..errors import AnalysisError
-from ..laws.friction import own_law
 from ..notebook import Shown, counted, html_table
 from ..stages import passing, stage
 from ..system import System
@@ -305,12 +304,12 @@ def touching(system: System, steady: SurfaceSliding) -> ContactNodes:
     return system.contact_nodes().select(steady.active)
 
 
-def friction_damping_matrix(system: System, steady: SurfaceSliding) -> Sparse:
+def friction_damping_matrix(system: System, steady: SurfaceSliding, *, slope: bool = True) -> Sparse:
     """Damping (n, n) csr [N s/m] that friction adds to small motions about steady sliding.
 
     Friction keeps opposing the slip as its direction turns, which damps motion across it with μ N/|w| (in space
     only); along it the law's slope N dμ/d|w| counts, negative where friction weakens with speed. A node that does
-    not slip adds nothing.
+    not slip adds nothing. slope False leaves what acts along it to who has it already.
     """
     nodes = system.contact_nodes()
     speed = steady.slip_speed
@@ -319,21 +318,15 @@ def friction_damping_matrix(system: System, steady: SurfaceSliding) -> Sparse:
     chosen = nodes.select(working)
     speed, mu = speed[working], steady.friction_coefficient[working]
     normal, sense = steady.normal_force[working], steady.sense[working]
-    parallel = chosen.along(sense)
     normal = np.abs(normal)  # a contact kept closed rubs where it pulls, too
-    matrix = parallel.T @ sp.diags_array(normal * _slopes(chosen, speed, mu)) @ parallel
+    matrix = sp.csr_array((system.size, system.size))
+    if slope:
+        parallel = chosen.along(sense)
+        matrix = parallel.T @ sp.diags_array(normal * chosen.friction_slopes(speed, mu)) @ parallel
     if nodes.directions == 2:
         across = chosen.along(np.stack([-sense[:, 1], sense[:, 0]], axis=1))
         matrix = matrix + across.T @ sp.diags_array(mu * normal / speed) @ across
     return sp.csr_array(matrix)
-
-
-def _slopes(nodes: ContactNodes, speed: Array, mu: Array) -> Array:
-    """dμ/d|w| (m,) [s/m] of the laws, scaled where another coefficient was asked for than they have."""
-    slopes, own = nodes.friction_slopes(speed), nodes.friction_coefficients(speed)
-    for i in np.flatnonzero((mu != own) & (slopes != 0.0)):
-        slopes[i] = own_law(nodes.laws[nodes.owner[i]]).scaled(float(mu[i]), float(speed[i])).slope(float(speed[i]))
-    return slopes
 
 
 def _require_constant_gap(nodes: ContactNodes, factors: Array, speed: Array) -> None:

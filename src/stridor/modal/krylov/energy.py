@@ -22,7 +22,8 @@ class FrictionEnergy:
     """Mean power over a cycle for unit energy (kinetic and elastic) of a mode λ.
 
     power (m,) [1/s] that friction feeds in at each of the system's contact nodes, positive where it drives the mode,
-    zero at open ones; damping [1/s] that the structure takes out. power.sum() − damping = 2 Re λ.
+    zero at open ones, a law's slope included; damping [1/s] that the structure takes out, and friction that turns with
+    the slip (`friction_damping`). power.sum() − damping = 2 Re λ.
     """
 
     eigenvalue: complex
@@ -54,8 +55,8 @@ def friction_energy(
     problem = problem_of(used, mu if len(modes.mu) == 1 else None, options or Options())
     p = contact_forces(problem, lam, u, mu)
     extras = problem.at(mu)
-    slip = times(problem.slide, u)[:, 0]
-    force = mu * p[:, 0]
+    slip = times(problem.slip, u)[:, 0]
+    force = mu * problem.share * p[:, 0]
     if extras.weakening is not None:
         force = force - lam * extras.weakening * slip
     size = abs(lam) ** 2

@@ -15,7 +15,7 @@ from ...system import System
 from ...typing import Array, BoolArray, IntArray, Sparse
 from ..options import Options
 from ..pencil import Pencil
-from .steady import Steadiness, contact_rows, steadiness, touching_nodes
+from .steady import Steadiness, contact_rows, shared, steadiness, touching_nodes
 
 CHEAP = 600  # freedoms below which an equilibrium costs next to nothing
 MOST_EQUILIBRIA = 6
@@ -24,7 +24,8 @@ REMEMBERED = 3  # pencils
 
 @dataclass(frozen=True)
 class Extras:
-    """What steady sliding at one μ adds: weakening d (m,) = N dμ/d|v| [N s/m] on slip, damping and stiffness (n, n)."""
+    """What steady sliding at one μ adds: weakening d (m,) = N dμ/d|v| [N s/m] on slip T u, damping and stiffness
+    (n, n)."""
 
     weakening: Array | None = None
     damping: Sparse | None = None
@@ -43,10 +44,10 @@ NOTHING = Extras()
 class ContactProblem:
     """P(λ, μ) of m touching nodes on n freedoms: (λ²M + λC + K) u − (N + μS)ᵀ p = 0 and N u + c p = 0.
 
-    normal N (m, n), slide S (m, n): relative displacement slave − master along the normal and against the slip;
-    compliance c (m,) [m/N], 0 for rigid contact. touching (m,) are the places of the nodes among all the system's.
-    damped: whether anything works on velocities. extras gives what steady sliding at a μ adds, None where nothing does.
-    solver: that of `direct.factorise`.
+    normal N (m, n), slip T (m, n): relative displacement slave − master along the normal and against the slip; share
+    (m,): of μ that each node has, S = share T; compliance c (m,) [m/N], 0 for rigid contact. touching (m,) are the
+    places of the nodes among all the system's. damped: whether anything works on velocities. extras gives what steady
+    sliding at a μ adds, None where nothing does. solver: that of `direct.factorise`.
 
     Nodes that stick have further rows behind those of the touching nodes: their tangential displacement in N, zero in
     S. contact_state: how many stick, slip and are open, "" where every node slides.
@@ -56,7 +57,8 @@ class ContactProblem:
     damping: Sparse
     stiffness: Sparse
     normal: Sparse
-    slide: Sparse
+    slip: Sparse
+    share: Array
     compliance: Array
     touching: IntArray
     open_contacts: tuple[str, ...]
@@ -74,6 +76,11 @@ class ContactProblem:
     def nodes(self) -> int:
         """Number of touching nodes m."""
         return int(self.normal.shape[0])
+
+    @cached_property
+    def slide(self) -> Sparse:
+        """S (m, n): friction pushes with μ S p."""
+        return shared(self.slip, self.share)
 
     def at(self, mu: float) -> Extras:
         """What steady sliding at ``mu`` adds; nothing at μ = 0, where no friction force is there to vary."""
@@ -96,7 +103,7 @@ class ContactProblem:
         extras = self.at(mu)
         damping, stiffness = self.damping, self.stiffness
         if extras.weakening is not None:
-            damping = damping + self.slide.T @ sp.diags_array(extras.weakening) @ self.slide
+            damping = damping + self.slip.T @ sp.diags_array(extras.weakening) @ self.slip
         if extras.damping is not None:
             damping = damping + extras.damping
         if extras.stiffness is not None:
@@ -148,7 +155,8 @@ def problem_held(
         damping=system.damping if has_damping else sp.csr_array(system.damping.shape),
         stiffness=system.stiffness,
         normal=rows.normal,
-        slide=rows.slide,
+        slip=rows.slip,
+        share=rows.share,
         compliance=rows.compliance,
         touching=touching,
         open_contacts=(),

@@ -55,7 +55,7 @@ class Reduced(DenseProblem):
         empty: Array = np.zeros((0, 0))
         self._matrices = (empty, empty, empty, empty)
         self._products: list[tuple[Array, Array]] = [(empty, empty)] * 3
-        self._slide = np.zeros((problem.nodes, 0))
+        self._slip = np.zeros((problem.nodes, 0))
         self._extra: dict[float, tuple[Array, Array]] = {}
         self._grid: list[tuple[Array, Array]] | None = None
         self._lift_scale = 1.0
@@ -207,8 +207,9 @@ class Reduced(DenseProblem):
                 self._products[index] = _grown(self._products[index], matrix, *tests)
                 target[:own, :own], target[own:, :own] = self._products[index]
         normal = np.hstack([_few(problem.normal, t) for t in tests])
-        self._slide = np.hstack([_few(problem.slide, t) for t in tests])
-        self._matrices = (mass, damping, stiffness - normal.T @ force, -self._slide.T @ force)
+        self._slip = np.hstack([_few(problem.slip, t) for t in tests])
+        friction = -self._slip.T @ (problem.share[:, None] * force)
+        self._matrices = (mass, damping, stiffness - normal.T @ force, friction)
         self._known.clear()
         self._extra.clear()
         self._grid = None
@@ -266,7 +267,7 @@ class Reduced(DenseProblem):
         # Most have no rigid contact, and the vectors of a large problem are not copied for nothing.
         tests = np.hstack([self.pairs.u, self.lifts]) if self.lifts.shape[1] else self.pairs.u
         if extras.weakening is not None:
-            damping[:, :own] += self._slide.T @ (extras.weakening[:, None] * self._slide[:, :own])
+            damping[:, :own] += self._slip.T @ (extras.weakening[:, None] * self._slip[:, :own])
         if extras.damping is not None:
             damping[:, :own] += _sandwiched(tests, extras.damping, self.pairs.u)
         if extras.stiffness is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -42,12 +43,18 @@ class TouchingNodes:
 
 @dataclass(frozen=True)
 class TouchingRows:
-    """Rows of the touching nodes (m, n) csr, then those that hold stuck ones along their tangents: normal N, slide S
-    (zero where a node sticks), compliance c (m,) [m/N]."""
+    """Rows of the touching nodes (m, n) csr, then those that hold stuck ones along their tangents: normal N, slip T,
+    of unit length against the slip and zero where a node sticks, share (m,) of μ, compliance c (m,) [m/N]."""
 
     normal: Sparse
-    slide: Sparse
+    slip: Sparse
+    share: Array
     compliance: Array
+
+    @cached_property
+    def slide(self) -> Sparse:
+        """S (m, n): friction pushes with μ S, each node with its share of μ."""
+        return shared(self.slip, self.share)
 
 
 def contact_rows(nodes: ContactNodes, touching: IntArray, sense: Array, stuck: BoolArray) -> TouchingRows:
@@ -57,16 +64,22 @@ def contact_rows(nodes: ContactNodes, touching: IntArray, sense: Array, stuck: B
     its tangents as a rigid contact is along its normal: rows with forces of their own.
     """
     chosen = nodes.select(touching)
-    slide = chosen.along(sense[touching] * chosen.share[:, None])
+    slip = chosen.along(sense[touching])
     if not np.any(stuck[touching]):
-        return TouchingRows(chosen.normal, slide, chosen.compliance)
+        return TouchingRows(chosen.normal, slip, chosen.share, chosen.compliance)
     sticks = StickRows(chosen)
     held = sticks.rows[sticks.held(np.ones(chosen.count, dtype=bool), stuck[touching])]
     return TouchingRows(
         sp.csr_array(sp.vstack([chosen.normal, held])),
-        sp.csr_array(sp.vstack([slide, sp.csr_array(held.shape)])),
+        sp.csr_array(sp.vstack([slip, sp.csr_array(held.shape)])),
+        np.concatenate([chosen.share, np.zeros(held.shape[0])]),
         np.concatenate([chosen.compliance, np.zeros(held.shape[0])]),
     )
+
+
+def shared(slip: Sparse, share: Array) -> Sparse:
+    """Rows of slip (m, n) times each node's share (m,) of μ."""
+    return slip if np.all(share == 1.0) else sp.csr_array(sp.diags_array(share) @ slip)
 
 
 def refuse_stick(system: System, what: str) -> None:
@@ -168,22 +181,26 @@ class Steadiness:
         return self.sloped or self.friction_damping
 
     def terms(self, mu: float) -> tuple[Array | None, Sparse | None, Sparse | None]:
-        """Weakening d (m,) [N s/m], damping (n, n) and stiffness (n, n) at ``mu``, None where there is none."""
+        """Weakening d (m,) [N s/m] along the slip, damping (n, n) and stiffness (n, n) at ``mu``, None where there is
+        none.
+
+        d = N dμ/d|v| is of each node's own law, scaled to the coefficient that the node has: the share of μ is in it.
+        """
         try:
             steady = self._steady(mu)
         except AnalysisError as error:
             raise AnalysisError(f"{error}; that is at μ = {mu:g}, of the range that was asked for") from error
         weakening = damping = None
         if self.friction_damping and mu:
-            # It holds the law's slope too.
-            damping = friction_damping_matrix(self.system, steady)
-        elif self.sloped and mu:
-            speeds = steady.slip_speed[self.touching]
-            laws = [self.nodes.laws[k] for k in self.nodes.owner[self.touching]]
-            slopes = [law.scaled(mu, float(v)).slope(float(v)) for law, v in zip(laws, speeds, strict=True)]
+            damping = friction_damping_matrix(self.system, steady, slope=False)
+        if self.sloped and mu:
+            chosen = self.nodes.select(self.touching)
+            slopes = chosen.friction_slopes(
+                steady.slip_speed[self.touching], steady.friction_coefficient[self.touching]
+            )
             held = len(self.layer.compliance) - len(self.touching)
             pressing = np.abs(steady.normal_force[self.touching])  # a contact kept closed rubs where it pulls, too
-            weakening = np.append(pressing * np.array(slopes), np.zeros(held))
+            weakening = np.append(pressing * slopes, np.zeros(held))
         stiffness = None
         if self.prestress and self.system.stress_stiffness is not None:
             stiffness = self.system.stress_stiffness(steady.displacement)

@@ -178,7 +178,7 @@ class _States:
         system, effects, touching = self._system_at(values), self._effects, self._touching
         contacts = contacts_of(system, touching)
         nodes = contacts.nodes
-        mu = np.full(nodes.count, values[FRICTION]) if FRICTION in values else contacts.coefficient
+        mu = values[FRICTION] * nodes.share if FRICTION in values else contacts.coefficient
         if self._last is None or self._last[0] is not system:
             self.free()
             self._last = system, Equilibria(system, nodes, touching, contacts.sense, effects.solver)
@@ -192,11 +192,7 @@ class _States:
             ) from error
         normal = held.normal_force
         self._noted(contacts, held, values)
-        slopes = [
-            nodes.laws[owner].scaled(float(own), float(v)).slope(float(v)) if own else 0.0
-            for owner, own, v in zip(nodes.owner[touching], mu[touching], contacts.speed, strict=True)
-        ]
-        rates = normal * np.array(slopes)
+        rates = normal * nodes.select(touching).friction_slopes(contacts.speed, mu[touching])
         if effects.friction_damping:
             slips = np.any(contacts.sense[touching] != 0.0, axis=1)
             across = mu[touching] * normal / np.where(slips, contacts.speed, 1.0)
