@@ -343,8 +343,9 @@ class Linearised:
         where = {int(number): column for column, number in enumerate(self.modes.branch)}
         missing = [number for number in choice if number not in where]
         if missing or isinstance(choice, str):
-            numbers = f"numbers of branches from 1 to {len(where)}" if where else "numbers of branches (the band has none)"
-            accepted = f'"unstable", "all" or {numbers}' if isinstance(choice, str) else numbers
+            numbers = f"from 1 to {len(where)}" if where else "(the band has none)"
+            words = '"unstable", "all" or ' if isinstance(choice, str) else ""
+            accepted = f"{words}numbers of branches {numbers}"
             raise CaseError("modes", missing or choice, accepted)
         return [where[number] for number in choice]
 
